@@ -5,8 +5,6 @@ components in axes b to components in axes a (35). R' is its transpose, R_d a de
 Angles are in [rad], rates in [rad/s]; `u x` is the skew-symmetric matrix of the cross product with u.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

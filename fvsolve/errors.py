@@ -1,7 +1,5 @@
 """Error classes, faults of cases and notices of runs, and functions for the texts of messages."""
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Iterable, Iterator

@@ -5,8 +5,6 @@ along an edge (link) the potential decreases by drop(M). All edges and nodes are
 (Todini and Pilati 1988). In a loop without friction the flows are those of least norm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -71,7 +69,9 @@ def solve_steady(held: np.ndarray, demand: np.ndarray, edges: list[Edge], scale:
     A problem without solution raises no error, see `SteadyState`.
     """
     quiet = _quiet(held, demand, edges)
-    edges = [replace(edge, row=None, flow=0.0, drop=_no_drop) if e in quiet else edge for e, edge in enumerate(edges)]
+    edges = [
+        replace(edge, row=None, flow=0.0, drop=lambda flow: 0.0) if e in quiet else edge for e, edge in enumerate(edges)
+    ]
     parts, free_sets = _components(held, edges)
     missing = np.isnan(held)
     given = held.size - np.count_nonzero(missing)
@@ -92,10 +92,6 @@ def solve_steady(held: np.ndarray, demand: np.ndarray, edges: list[Edge], scale:
     _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors)
     _through_shut(result, held, edges, free_sets, floating)
     return result
-
-
-def _no_drop(flow: float) -> float:
-    return 0.0
 
 
 def _quiet(held, demand, edges) -> set[int]:

@@ -26,7 +26,7 @@ UNCOMPILED = (
     "tests/fluid",
     "tests/basins/test_basin.py",
     "tests/basins/test_faces.py",
-    "tests/parts/test_leak.py",
+    "tests/parts/test_outlets.py",
     "tests/parts/test_outlets.py",
     "tests/parts/test_pump.py",
 )

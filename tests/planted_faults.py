@@ -58,7 +58,7 @@ FAULTS = [
         'row["sweep_a"] = 1.01 * a["mass"] / a["volume"] * row["area_a"]',
     ),
     Fault(
-        "assembly/hydraulics.py", "reynolds * math.pi / 4.0 * diameter", "1.01 * reynolds * math.pi / 4.0 * diameter"
+        "assembly/model_draft.py", "reynolds * math.pi / 4.0 * diameter", "1.01 * reynolds * math.pi / 4.0 * diameter"
     ),
     Fault("compile/cache_folders.py", 'digest.update(path.read_bytes() + b"\\0")', 'digest.update(b"\\0")'),
     Fault("draw/plot.py", "np.argmin(values[a:b])", "np.argmax(values[a:b])"),
@@ -86,7 +86,7 @@ FAULTS = [
         "return per * taken, per * rate",
         "return per * taken, 1.01 * per * rate",
     ),
-    Fault("units/__init__.py", "value_si - ambient", "value_si + ambient"),
+    Fault("units.py", "value_si - ambient", "value_si + ambient"),
     Fault("case/sloshing.py", "return 0.25 * np.pi * a * a if", "return 0.2525 * np.pi * a * a if"),
     Fault("fluid/oils.py", "(hot - cold)) - 0.7)", "(hot - cold)) - 0.707)"),
     Fault(
@@ -142,14 +142,14 @@ FAULTS = [
         "dydt[o + i] += flow * near.flow_weight(",
         "dydt[o + i] -= flow * near.flow_weight(",
     ),
-    Fault("parts/pipe_sizes.py", "DN_NPS.get(number, number / 25.0)", "DN_NPS.get(number, number / 25.4)"),
+    Fault("parts/conduit.py", "DN_NPS.get(number, number / 25.0)", "DN_NPS.get(number, number / 25.4)"),
     Fault(
         "parts/accumulator/law.py",
         "rho * (n * p * compressibility * (total - volume) + volume)",
         "rho * (n * p * compressibility * (total - volume) - volume)",
     ),
     Fault("parts/tank.py", "0.5 * s * (area[k + 1] - area[k])", "0.505 * s * (area[k + 1] - area[k])"),
-    Fault("parts/pump/law_curve.py", "residual = drop + weight * head", "residual = drop + 1.01 * weight * head"),
+    Fault("parts/pump/law.py", "residual = drop + weight * head", "residual = drop + 1.01 * weight * head"),
     Fault("run/case_claims.py", "compare.t + compare.shift", "compare.t - compare.shift"),
     Fault("epanet/part_tables.py", "2.0 * GRAVITY * drop / velocity**2", "2.02 * GRAVITY * drop / velocity**2"),
     Fault("solve/run_summary.py", 'row["inflow"] - row["outflow"] for name', 'row["inflow"] + row["outflow"] for name'),

@@ -1,4 +1,4 @@
-"""Conversion of parts to rows of the model's tables, one class for each kind of part."""
+"""Conversion of parts to rows of the model's tables, one class for each kind of part; inputs and devices."""
 
 from __future__ import annotations
 
@@ -8,15 +8,77 @@ from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
+
+from fvsolve.errors import Notice
 from fvsolve.kernels import calls
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.restrictions import step_at
+from fvsolve.kernels.restrictions import flow_at_drop, step_at, transition_of
 from fvsolve.steady import Edge
 
-if TYPE_CHECKING:
-    from fvsolve.assembly.inputs import Input
+
+class InputKind(NamedTuple):
+    """Kind of an input: unit, expected value in words, range of values, and size of a small change [SI].
+
+    For HEAD the small change is that of the pressure [Pa].
+    """
+
+    unit: str
+    expected: str
+    least: float = -math.inf
+    greatest: float = math.inf
+    small: float = 1.0
+
+    @property
+    def bounded(self) -> bool:
+        return self.least > -math.inf or self.greatest < math.inf
+
+
+OPENING = InputKind("-", "a number from 0, shut, to 1, open", 0.0, 1.0)
+POSITION = InputKind("-", "a number from -1 to 1", -1.0, 1.0)
+SPEED = InputKind("-", "a relative speed of at least 0", 0.0)
+ANGULAR_SPEED = InputKind("rad/s", "a finite number [rad/s]")
+PRESSURE = InputKind("Pa", "an absolute pressure above 0 [Pa]", small=1e5)
+HEAD = InputKind("m", "a head whose pressure is above 0 Pa absolute [m]", small=1e5)  # [Pa]
+SET_PRESSURE = InputKind("Pa", "an absolute pressure [Pa]")
+FLOW = InputKind("m3/s", "a finite number [m3/s]", small=1e-3)
+FORCE = InputKind("N", "a finite number [N]", small=1e3)
+TORQUE = InputKind("N m", "a finite number [N m]")
+VALUE = InputKind("-", "a finite number")
+
+
+class Input(NamedTuple):
+    """Schedule that can be held at a value; kernels read scale * value + offset.
+
+    Under density laws other than `linear`, kernels read the value itself for pressures and heads.
+    sort : kind of the input; schedule : its index in the table of schedules
+    """
+
+    sort: InputKind
+    schedule: int
+    scale: float = 1.0
+    offset: float = 0.0
+    node: int = -1  # node, for a pressure or head
+    other: int = -1  # for a value with a sign, the schedule of its negative part
+    scalar: int = -1  # scalar whose value flows in
+
+
+def opening_input(model, name: str) -> dict[str, Input]:
+    """Input "opening" of a restriction : key -> input."""
+    return {"opening": Input(OPENING, int(model.tables.valves[model.valve_names.index(name)]["schedule"]))}
+
+
+def scalar_inputs(model, name: str) -> dict[str, Input]:
+    """Inputs for the values of scalars that flow in from a node : name of the scalar -> input."""
+    i, inputs = model.node_names.index(name), {}
+    for q, (scalar, row) in enumerate(zip(model.case.scalars, model.tables.scalars, strict=True)):
+        place = int(model.tables.integers[row["places"] + i])
+        if place >= 0:
+            inputs[scalar] = Input(VALUE, place, scalar=q)
+    return inputs
+
 
 TYPICAL_DROP = 1e5  # a typical pressure drop [Pa]
 LAMINAR_REYNOLDS = 10.0  # Reynolds number below which a restriction is made laminar, to bound its slope at zero drop
@@ -30,7 +92,7 @@ class Lowering:
     law : module of its compiled law, whose functions are named as in `kernels.calls.HOOKS`; if it has a `step`, that
     function gives the flow through its restriction, in place of the square-root law
     events : meaning of a zero of each event function, "" if it is not reported
-    is_device : True if it is also a device, see `assembly.device_lowering`
+    is_device : True if it is also a device, see `Device`
     ledger_name : for a node, name of the energy it supplies in the energy ledger ("" for none); for a link, category of
     its row in the ledger
     """
@@ -213,3 +275,153 @@ def links_by_table(case) -> dict[str, list[tuple[str, Any, Lowering]]]:
 def rows_in(case, table: str) -> list[tuple[str, Any, Lowering]]:
     """Links with rows in one table, in the order of rows : list of (name, link, its `Lowering`)."""
     return links_by_table(case).get(table, [])
+
+
+class Device(Restriction):
+    """Conversion of a kind of device to table rows: its states, and its state in the steady start.
+
+    mode : code of the kind in its law; quantities : names of its probes, in the order of codes in the law's `value`
+    events_only : True if only events open it; states : names of its states; remedy : advice for events that alternate
+    controlling_event : index of the event by which it starts to control a rigid column, -1 for none
+    """
+
+    is_device, rank = True, 2
+    mode: ClassVar[int] = 0
+    events_only: ClassVar[bool] = False
+    controlling_event: ClassVar[int] = -1
+    states: ClassVar[tuple[str, ...]] = ()
+    quantities: ClassVar[tuple[str, ...]] = ()
+    remedy: ClassVar[str] = "give the part a time_constant"
+    vessel: ClassVar[bool] = False  # True for a node whose pressure it computes
+
+    def place(self, draft, name: str, node: Any, row) -> None:
+        """Fill the NODE row of a vessel."""
+        row["kind"], row["row"] = rec.VESSEL, draft.stiff()
+
+    def pressure_at_start(self, start, i: int, node: Any, row) -> float | None:
+        """Stated pressure [Pa] of a vessel at the start; None if it has none."""
+        return node.initial_pressure
+
+    def motion_text(self, name: str, node: Any, row, inflow: float, flow: float, amount: Callable[..., str]) -> str:
+        """Text of the rate of change of the pressure in a vessel that a net inflow causes at the start.
+
+        Arguments as for `Lowering.motion_text`.
+        """
+        return f"{node.kind} {name}: pressure changes by {amount(row['stiffness'] * inflow, 'pressure', span=True)}/s"
+
+    def gate(self, name: str) -> str | None:
+        """Name of a further link that the device opens and closes; None for none."""
+        return None
+
+    def row_of(self, model, name: str):
+        """DEVICE row of the part `name`."""
+        return model.tables.devices[[device_name for device_name, _, _ in model.devices].index(name)]
+
+    def probe(self, draft, name: str, probe: Any, row) -> None:
+        """Fill the PROBE row of a probe of this part."""
+        if probe.quantity in self.quantities:
+            row["index"] = draft.device_names.index(draft.inside(name))
+            row["kind"], row["side"] = rec.DEVICE_VALUE, self.quantities.index(probe.quantity)
+        elif self.vessel:
+            Lowering.probe(self, draft, name, probe, row)
+        else:
+            super().probe(draft, name, probe, row)
+
+    def states_of(self, draft, name: str, part: Any) -> tuple[str, ...]:
+        """Names of the states of this part."""
+        return self.states
+
+    def scales(self, draft, name: str, part: Any) -> list[float]:
+        """Size of a small deviation of each state of this part."""
+        return []
+
+    def revise_state(self, start, part: Any, row) -> bool:
+        """Set the state of the device, such as open or shut, that the steady solution implies; True if it changed."""
+        return False
+
+    def begin(self, start, part: Any, row) -> list[str]:
+        """Fill in data that depend on the initial steady state; return texts of motions at the start."""
+        return []
+
+    def passing_notice(self, model, name: str, part: Any, time: float) -> Notice:
+        """Notice that the part was temporarily outside the range of its law, first at `time` [s].
+
+        The function `outside` of the law then returns TEMPORARY.
+        """
+        raise NotImplementedError
+
+    def apply_event(self, run_data, row, t: float, y: np.ndarray, scale: np.ndarray) -> None:
+        """Apply sudden changes of states at an event of the device to y, and new small deviations to `scale`."""
+
+    def dissipates(self, part: Any) -> bool:
+        """True if drop times flow in its restriction is dissipated; otherwise it is energy supplied."""
+        return True
+
+    def energy_rows(self, model, part: Any, row, y: np.ndarray, out: np.ndarray) -> list[dict[int, float]]:
+        """Rows of the energy matrix L that this part adds, each state -> factor.
+
+        |L d|^2 is the energy [J] that a small deviation d of the states from y stores in the part. For a vessel the
+        energy is m^2 dp/dm / (2 rho), m the deviation of its mass [kg]. Other kinds that store energy override this
+        function.
+        """
+        if not self.vessel:
+            return []
+        node = model.tables.nodes[row["node"]]
+        stiffness = float(out[model.layout["stiffness"] + node["row"]])
+        return [{int(node["y"]): float(np.sqrt(stiffness / (2.0 * model.case.properties.density)))}]
+
+    def above(self, model, part: Any, row) -> float:
+        """Energy of the device at the start [J], above its least possible energy; 0 if it stores none."""
+        return 0.0
+
+
+def lower_devices(draft) -> None:
+    """Fill the table of devices of a draft, with their states, numbers and event functions."""
+    parts = [*draft.case.places.items(), *draft.case.conduits.items()]
+    lowered = [(name, part, lowering_of(type(part)).of(part)) for name, part in parts]
+    draft.devices = [(name, part, device) for name, part, device in lowered if device.is_device]
+    table = draft.device_table = np.zeros(len(draft.devices), rec.DEVICE)
+    table["valve"] = table["node"] = table["schedule"] = table["y"] = table["row"] = -1
+    for k, ((name, part, device), row) in enumerate(zip(draft.devices, table, strict=True)):
+        states = device.states_of(draft, name, part)
+        row["hooks"], row["mode"], row["states"] = draft.hooks(device), device.mode, len(states)
+        row["data"], row["opens_by_event"] = len(draft.floats), device.events_only
+        row["event"] = draft.flags(name, device.events)
+        row["controls_column"] = row["event"] + device.controlling_event if device.controlling_event >= 0 else -1
+        if name in draft.valve_names:
+            row["valve"] = draft.valve_names.index(name)
+            valve = draft.valve_table[row["valve"]]
+            valve["device"] = k if calls.hook_of(device.law, "set") is not None else -1  # it sets the opening
+            valve["event"], valve["data"] = row["event"], row["data"] if valve["data"] < 0 else valve["data"]
+        elif name in draft.node_index:
+            row["node"] = draft.node_index[name]
+            row["row"] = draft.node_table[row["node"]]["row"]
+        if (gate := device.gate(name)) is not None:
+            row["valve"] = draft.valve_names.index(gate)
+            draft.valve_table["device"][row["valve"]] = k
+        draft.floats += device.numbers(draft, name, part)
+        for state, scale in zip(states, device.scales(draft, name, part), strict=True):
+            at = draft.states([f"{name}.{state}"], scale)
+            row["y"] = at if row["y"] < 0 else row["y"]
+
+
+def opening_of(start, k: int) -> float:
+    """Opening x between 0 and 1 at which valve k passes its steady flow, M |M| = G x^2 dP.
+
+    M [kg/s] : mass flow; G [kg2/s2/Pa] : conductance fully open; dP [Pa] : pressure drop
+    Below the valve's transition flow or rounding drop the law of `flow_at_drop` applies instead. Without a flow, or
+    without a positive drop, x is 0; a greater flow than the open valve passes gives 1.
+    """
+    valve = start.valves[k]
+    conductance, drop = start.valve_law(k)
+    flow = abs(float(valve["flow"]))
+    if flow == 0.0 or not conductance * drop > 0.0:
+        return 0.0
+    if flow >= valve["transition"] and drop >= valve["rounding_drop"]:
+        return min(flow / math.sqrt(conductance * drop), 1.0)
+    low, high, x = 0.0, 1.0, 0.5
+    for _ in range(60):
+        g = conductance * x * x
+        low, high = (x, high) if flow_at_drop(g, transition_of(valve, g), drop) < flow else (low, x)
+        x = 0.5 * (low + high)
+    return x

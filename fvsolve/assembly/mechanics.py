@@ -1,7 +1,5 @@
 """Rows of force elements that act on masses along an axis, or between points of bodies."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.assembly.lowering import Lowering

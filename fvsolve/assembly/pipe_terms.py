@@ -5,8 +5,6 @@ diameter D. s is the Laplace variable of tau. A sum is fitted to the transform o
 the value for a wave of dimensionless angular frequency w, over all w that cells resolve and that fit into the run.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 
@@ -16,11 +14,8 @@ ACCURACY = 1e-4
 LAMINAR = 2000.0  # Reynolds number of the start below which Zielke's function is used
 FASTEST_DECAY = 1.9  # decay of the fastest term times the travel time of a cell
 MAX_TERMS = 40
-ERROR_FACTOR, MAX_ERROR, LAST_FREQUENCY = (
-    2.0,
-    0.3,
-    0.7,
-)  # allowed error at w: 2 (w / top)^3, at most 0.3; last w over top
+# Allowed error at w: 2 (w / top)^3, at most 0.3; last w over top
+ERROR_FACTOR, MAX_ERROR, LAST_FREQUENCY = 2.0, 0.3, 0.7
 SLOWEST_DECAYS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4)  # slowest decay over the lowest frequency
 FLAT_FREQUENCY = 4.0  # frequency below which the transform of Zielke's function is nearly its value at zero, 1/12
 MAX_ZEROS = 8  # greatest number of zeros of J_2 that are used as exact decays

@@ -1,7 +1,5 @@
 """Schedules as pieces (polynomial, power, wave) for kernels, and the times at which steps must end."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Codes of schemes and limiters for kernels, and weights of a probe between cells."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -8,9 +8,8 @@ from fvsolve.basins import basin_frames as frame
 from fvsolve.basins import cell_sides, moving_meshes
 from fvsolve.basins.lower_mesh import lower_ends
 from fvsolve.basins.moving_walls import VECTOR_MARGIN
-from fvsolve.case import moving_wall_checks as case
-from fvsolve.case.bodies import carriers, free_joints
-from fvsolve.case.nodes_on_bodies import level_over
+from fvsolve.case import basins as case
+from fvsolve.case.bodies import carriers, free_joints, level_over
 from fvsolve.kernels import dtypes as rec
 
 TRAVEL_SCALE = 1e-2  # a small travel [m]

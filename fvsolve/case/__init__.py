@@ -4,7 +4,7 @@ from fvsolve.case.case import Case
 from fvsolve.case.claims import Compare, Expect
 from fvsolve.case.load import load
 from fvsolve.case.probe import Probe
-from fvsolve.case.raw import locate_faults
+from fvsolve.case.reading import locate_faults
 from fvsolve.case.schema import schema
 from fvsolve.case.sections import FluidSpec, Numerics, Output
 

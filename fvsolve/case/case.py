@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import units
-from fvsolve.case import basins, bodies, case_notices, nodes_on_bodies, sloshing, text
+from fvsolve.case import basins, bodies, case_notices, sloshing, text
 from fvsolve.case.claims import Compare, DesignLimit, Expect
 from fvsolve.case.pipe_routes import Route
 from fvsolve.case.probe import Probe, of_profiles
@@ -117,7 +117,7 @@ class Case(Displayable):
             if name in self.meshes:
                 result |= basins.places(name, node, self.meshes[name], self.poses.get(node.on))
             elif node.domain == "hydraulic":
-                result |= nodes_on_bodies.with_elevation(node, self.poses).inner(name)[0]
+                result |= bodies.with_elevation(node, self.poses).inner(name)[0]
         for name, link in self.links.items():
             result |= link.inner(name)[0]
             if "A" in link.owns:

@@ -1,7 +1,5 @@
 """Notices of a case: values outside usual ranges, wave speeds that contradict the wall, schedules after the end."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -9,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve import units
-from fvsolve.case.raw import default_place, pipe_of_piece, raw_link
+from fvsolve.case.reading import default_place, pipe_of_piece, raw_link
 from fvsolve.errors import Notice
 from fvsolve.parts import Pipe
 from fvsolve.parts.pipe.pipe_wall import elastic_compliance

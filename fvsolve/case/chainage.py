@@ -9,8 +9,6 @@ Arguments: table : nested dicts of a case as in the file; report : function that
 fault.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -19,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve import units
-from fvsolve.case.raw import split_key
+from fvsolve.case.reading import split_key
 from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts import KINDS, Pipe
 from fvsolve.units import show

@@ -1,7 +1,5 @@
 """Effect of a changed key on the model: other numbers, another initial state, or a new model."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +9,7 @@ from fvsolve.case.chainage import original_keys, pieces_of, placed
 from fvsolve.case.claims import COMPARE_KEYS, expect_keys, limit_keys
 from fvsolve.case.load import TOP
 from fvsolve.case.pipe_routes import Route
-from fvsolve.case.raw import WITH_DEFAULTS, default_values, raw_link, split_key
+from fvsolve.case.reading import WITH_DEFAULTS, default_values, raw_link, split_key
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import KINDS, Scalar
@@ -44,10 +42,8 @@ def changes(case: Case, key: str) -> str:
 
 def class_of_key(case: Case, keys: tuple[Any, ...]) -> str:
     """Effect of changing the value at a key path of a case: "value", "profile" or "shape", see `changes`."""
-    result, links = (
-        declaration_of(case.raw, keys).changes,
-        [raw_link(case.raw, name) for name in case.raw.get("links", {})],
-    )
+    result = declaration_of(case.raw, keys).changes
+    links = [raw_link(case.raw, name) for name in case.raw.get("links", {})]
     if keys[0] == "links" and keys[2:3] == ("length",) and keys[1] in pieces_of(case.raw):
         return SHAPE  # its pieces between chainages get other cells
     if result == BY_CELLS:

@@ -3,22 +3,20 @@
 The keys of a part are checked when it is read, its connections in `connections`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
 from fvsolve import units
-from fvsolve.case import basins, bodies, connections, nodes_on_bodies, sloshing
+from fvsolve.case import basins, bodies, connections, sloshing
 from fvsolve.case.claims import Expect
-from fvsolve.case.raw import Raw
+from fvsolve.case.reading import Raw
 from fvsolve.case.resource_checks import name_faults
 from fvsolve.case.sections import CAVITY_SCHEMES, FluidSpec, Numerics
 from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.fluid.laws import LAWS, law_names
 from fvsolve.parts import KINDS, Basin
 from fvsolve.parts.basin import VELOCITY_FIELDS, Physics
-from fvsolve.parts.context import CaseContext
+from fvsolve.parts.table_model import CaseContext
 from fvsolve.parts.value import ROOT
 from fvsolve.steppers.loop_records import LEAST_STEP, LEAST_TOLERANCE
 from fvsolve.steppers.tableau import AUTO, METHODS
@@ -48,9 +46,9 @@ def part_faults(
     """
     poses = bodies.poses(nodes, start)
     named, raw_links = (nodes, {}) if raw is None else (raw.table.get(group, {}) for group in ("nodes", "links"))
-    high = {name: node for name, node in nodes.items() if nodes_on_bodies.has_elevation(node, poses)}
+    high = {name: node for name, node in nodes.items() if bodies.has_elevation(node, poses)}
     lends = any(_may_lend(link, named) for name, link in raw_links.items() if name not in links or "profile" in link)
-    high = {name: nodes_on_bodies.with_elevation(node, poses) for name, node in high.items()}
+    high = {name: bodies.with_elevation(node, poses) for name, node in high.items()}
     yield from _elevations(high, links, lends)
 
     def vacuum(group: str, name: str, key: str, pressures: list[float]) -> Faults:
@@ -60,12 +58,12 @@ def part_faults(
 
     if meshes or lumped or gravity == 0.0 or any(map(in_space, (*nodes.values(), *links.values()))):
         yield from bodies.find_faults(nodes, named)
-        yield from nodes_on_bodies.find_faults(nodes, links, basins.places_on_bodies(nodes, meshes), named)
+        yield from bodies.faults_on_bodies(nodes, links, basins.places_on_bodies(nodes, meshes), named)
         yield from bodies.coincident_ends(nodes, links, poses)
         yield from bodies.open_pins(nodes, links, poses)
         yield from sloshing.find_faults(nodes, lumped, poses)
         yield from sloshing.weightless(nodes, gravity)
-        yield from nodes_on_bodies.overturned(nodes, poses)
+        yield from bodies.overturned(nodes, poses)
 
     def separation(*ends: str) -> float | None:
         return bodies.separation(nodes, poses, *ends)
@@ -214,11 +212,8 @@ def scalar_faults(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[st
                     if scalar not in scalars:
                         yield place, _unknown_scalar(scalar, scalars)
                     elif part.physics_type.joined and patch_options.boundary != "open":
-                        yield (
-                            place,
-                            "is not valid here, because the joined links give the value. Remove this key, or set "
-                            'boundary = "open"',
-                        )
+                        text = "is not valid here, because the joined links give the value. Remove this key, or set "
+                        yield place, text + 'boundary = "open"'
             if scalars and part.no_scalars:
                 yield (group, name), f"is {article(part.kind)}; {part.no_scalars}"
     if not scalars:

@@ -3,8 +3,6 @@
 Arguments of the functions that read them: kinds : as for `read_probe`; routes, links : by name, None if faulty.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -18,8 +16,8 @@ from fvsolve.case.probe import ALL, OF_PRESSURE, Extent, Kinds, Probe, only_dime
 from fvsolve.case.reading import Reading
 from fvsolve.errors import did_you_mean
 from fvsolve.parts import value as val
-from fvsolve.parts.table_model import read_keys
-from fvsolve.parts.time_series import copy_name, find_file, read_columns
+from fvsolve.parts.csv_rows import copy_name, find_file, read_columns
+from fvsolve.parts.table_model import check_table, read_keys
 from fvsolve.parts.value import NEEDED, VALUE, Quantity, ReadContext, ValueFault, faults_of, nonnegative
 from fvsolve.units import show
 
@@ -95,8 +93,7 @@ def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any],
     if target is None:
         keys |= {"value": (val.Anything(), NEEDED), "atol": (val.Anything(), 0.0)}
     try:
-        if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is not a table; expected for example {{ value = 1.0, rtol = 1e-2 }}")
+        check_table(given, "for example { value = 1.0, rtol = 1e-2 }")
         if "rtol" not in given and "atol" not in given:
             faults.append(((), "tolerance is missing; expected rtol, atol or both"))
         values = read_keys(given, keys, setting)
@@ -170,8 +167,7 @@ COMPARE_KEYS = {
 
 def read_compare(probe: Probe | None, given: Any, setting: ReadContext) -> Compare | None:
     """Read one entry of `[compare]`; None if its probe is faulty. Raises ValueError if entry or file are invalid."""
-    if not isinstance(given, dict):
-        raise ValueError(f'{show(given)} is not a table; expected for example {{ file = "rig.csv" }}')
+    check_table(given, 'for example { file = "rig.csv" }')
     values = read_keys(given, COMPARE_KEYS, setting)
     try:
         path = find_file(values["file"], setting)
@@ -254,8 +250,7 @@ def read_limit(
 
     name, given : name and content of the table; kinds : as for `read_probe`; routes, links : by name
     """
-    if not isinstance(given, dict):
-        raise ValueError(f'{show(given)} is not a table; expected for example {{ on = "pipes", maximum = "16 barg" }}')
+    check_table(given, 'for example { on = "pipes", maximum = "16 barg" }')
     quantity = given.get("quantity", "gauge_pressure" if "class_fraction" in given else "pressure")
     faults, extent = [], None
     if not isinstance(quantity, str):

@@ -3,8 +3,6 @@
 Arguments of most functions are keys as in the file: nodes, links : name -> keys; node, link : keys of one part.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -4,8 +4,6 @@ python -m fvsolve.case.key_tables docs/parts.md    rewrites the tables of a page
 python -m fvsolve.case.key_tables valve            prints the table of a part
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path
@@ -22,11 +20,9 @@ from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.basin import BasinStart, Patch
 from fvsolve.parts.body import Joint
 from fvsolve.parts.connection import Connection
-from fvsolve.parts.disc.part import Disc
-from fvsolve.parts.link import TwoPort
-from fvsolve.parts.node import PlaceOnBody
-from fvsolve.parts.pipe.materials import SI, materials
-from fvsolve.parts.pipe.pipe_wall import Lining, Wall
+from fvsolve.parts.nodes_and_links import PlaceOnBody, TwoPort
+from fvsolve.parts.pipe.pipe_wall import SI, Lining, Wall, materials
+from fvsolve.parts.self_acting.part import Disc
 from fvsolve.parts.table_model import Table, plain_value
 from fvsolve.parts.value import NEEDED, Quantity, Text, Value
 from fvsolve.parts.valve import Sized
@@ -141,11 +137,8 @@ def default_cell(key: str, default: Any, needs: tuple[tuple[str, ...], ...]) -> 
         content = {key: value for key, value in content.items() if value is not None}
     if content in (None, {}, (), ""):
         return "*none*"
-    return (
-        f"{content:g}"
-        if isinstance(content, (int, float)) and not isinstance(content, bool)
-        else f"`{inline(content)}`"
-    )
+    is_number = isinstance(content, (int, float)) and not isinstance(content, bool)
+    return f"{content:g}" if is_number else f"`{inline(content)}`"
 
 
 def main(given: list[str]) -> None:

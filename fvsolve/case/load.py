@@ -1,7 +1,5 @@
 """Reading of a case from a TOML file or a dict, in stages; each stage runs when what it needs is known."""
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Iterator, Mapping
@@ -15,8 +13,7 @@ from fvsolve.case.case import Case, wave_speed
 from fvsolve.case.part_reading import Parts
 from fvsolve.case.pipe_routes import legs, read_routes
 from fvsolve.case.probe import default_probes, read_probe
-from fvsolve.case.raw import Raw, copy_paths, default_faults, override, read_raw, split_key
-from fvsolve.case.reading import Reading
+from fvsolve.case.reading import Raw, Reading, copy_paths, default_faults, override, read_raw, split_key
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.fluid import properties
@@ -78,13 +75,9 @@ def shortest_cell_time(links: Mapping[str, Any], meshes: Mapping[str, Any], flui
     return min([*times, *(float(mesh.area.min()) ** 0.5 for mesh in meshes.values())], default=math.inf)
 
 
-def _alternatives() -> list[tuple[str, ...]]:
-    """Groups of alternative keys of numerics, friction and all parts; a table may have at most one key of a group."""
-    return _alternatives_of((Numerics, Friction, *KINDS["nodes"].values(), *KINDS["links"].values()))
-
-
 @functools.lru_cache(maxsize=4)
-def _alternatives_of(models: tuple) -> list[tuple[str, ...]]:
+def alternatives_of(models: tuple) -> list[tuple[str, ...]]:
+    """Groups of alternative keys of classes of tables; a table may have at most one key of a group."""
     return list(dict.fromkeys(keys for model in models for keys in model.alternatives))
 
 
@@ -93,7 +86,8 @@ def read_case(raw: Raw, settings: Mapping[str, Any], previous: Case | None = Non
 
     settings : overrides, see `load`. Raises CaseError with all faults.
     """
-    refused = override(raw, chainage.settings(raw.table, settings), _alternatives())
+    models = (Numerics, Friction, *KINDS["nodes"].values(), *KINDS["links"].values())
+    refused = override(raw, chainage.settings(raw.table, settings), alternatives_of(models))
     if previous is not None and not refused:
         case = update_values(Reading(raw), previous)
         if case is not None:
@@ -377,10 +371,8 @@ def update_values(reading: Reading, previous: Case) -> Case | None:
                 return None
             if known[0] is not given:
                 try:
-                    known = (
-                        given,
-                        part_reading.read_part(reading, raw.table, type(known[1]), read_before(given, *known)),
-                    )
+                    part = part_reading.read_part(reading, raw.table, type(known[1]), read_before(given, *known))
+                    known = given, part
                 except ValueError:
                     return None
                 reading.read[group, name] = known
@@ -414,14 +406,8 @@ def is_self_contained(case: Case) -> bool:
 
     An exact solution, if the case has one, must also be stated in its file.
     """
-    no_outer_input = not (
-        chainage.placed(chainage.add_bends(case.raw))
-        or case.signals
-        or case.scalars
-        or case.compare
-        or case.copies
-        or case.equilibrium_nodes
-    )
+    outer = case.signals or case.scalars or case.compare or case.copies or case.equilibrium_nodes
+    no_outer_input = not (chainage.placed(chainage.add_bends(case.raw)) or outer)
     exact_in_file = case.exact is None or "exact" in case.raw
     return no_outer_input and exact_in_file and not any(isinstance(node, Basin) for node in case.nodes.values())
 

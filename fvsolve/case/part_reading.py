@@ -1,20 +1,17 @@
 """Stages of the reading of a case: cut pipes, parts, meshes, cells, and the kinds of places that probes may name."""
 
-from __future__ import annotations
-
 import functools
 from typing import Any, NamedTuple
 
 from fvsolve.case import basins, bodies, chainage, connections, resource_checks
 from fvsolve.case.case import default_cells
-from fvsolve.case.raw import fill_pipes, with_defaults
-from fvsolve.case.reading import GROUPS, Reading
+from fvsolve.case.reading import GROUPS, Reading, fill_pipes, with_defaults
 from fvsolve.case.sections import Numerics
 from fvsolve.data import read_table
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import KINDS, Basin, Chamber, Pipe
 from fvsolve.parts.body import Body, BodyPoint
-from fvsolve.parts.node import Node
+from fvsolve.parts.nodes_and_links import Node
 from fvsolve.parts.pipe.part import MOST_CELLS
 from fvsolve.units import show
 

@@ -1,7 +1,5 @@
 """Routes: consecutive pipes with one running chainage."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -44,15 +42,10 @@ class Route(Table):
     """Table `[routes.NAME]`: consecutive pipes with one running chainage."""
 
     pipes: Annotated[tuple[str, ...], PipeNames()]
-    start: Annotated[
-        float | None,
-        Quantity(
-            "length",
-            about="chainage of the start of the route [m]; "
-            "that of its first pipe (0 if reversed or without `profile`) if left out",
-            changes=VALUE,
-        ),
-    ] = None
+    start: Annotated[float | None, Quantity(
+        "length", about="chainage of the start of the route [m]; "
+        "that of its first pipe (0 if reversed or without `profile`) if left out", changes=VALUE,
+    )] = None  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -112,11 +105,8 @@ def route_faults(
 
     named : links as in the file, also faulty links; pieces : cut pipe -> names of its pieces
     """
-    pipes = [
-        item
-        for item, given in named.items()
-        if item not in links and (is_pipe(given) or kind_of("links", given) is None)
-    ]
+    pipes = [item for item, given in named.items()
+             if item not in links and (is_pipe(given) or kind_of("links", given) is None)]  # fmt: skip
     pipes += [item for item, link in links.items() if link.kind == "pipe"]
     for name, route in routes.items():
         if route is None:

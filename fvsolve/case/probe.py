@@ -153,12 +153,8 @@ def default_probes(kinds: Kinds) -> list[Probe]:
     for part, quantities in (("nodes", DEFAULT_OF_NODES), ("links", DEFAULT_OF_LINKS)):
         other = kinds["links" if part == "nodes" else "nodes"]
         for name, kind in kinds[part].items():
-            own = (
-                [quantity_name for quantity_name in quantities if quantity_name in kind.quantities]
-                if kind is not None
-                else []
-            )
-            own = [quantity_name for quantity_name in own if quantity_name not in getattr(kind, "on_request", ())]
+            known = {} if kind is None else kind.quantities
+            own = [key for key in quantities if key in known and key not in getattr(kind, "on_request", ())]
             for quantity in [*own, *_scalars_of(kind, kinds, "quantities")] if own else []:
                 text = f"{part}.{name}.{quantity}" if name in other else f"{name}.{quantity}"
                 probes.append(_probe(text, part, name, quantity, None, kinds))
@@ -199,11 +195,8 @@ def _quantity(
 ) -> tuple[float | None, str]:
     known = {**along, **own, **getattr(kind, "fields", {})}
     if quantity not in known:
-        has = (
-            f"it has {', '.join(known)}{did_you_mean(quantity, known)}"
-            if known
-            else 'with sloshing = "frozen" its water moves with its body; expected a probe of the body'
-        )
+        has = 'with sloshing = "frozen" its water moves with its body; expected a probe of the body'
+        has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}" if known else has
         raise ValueError(f"{name} is {article(kind.kind)}, which has no {show(quantity)}; {has}")
     if place is None:
         if quantity not in own:
@@ -323,8 +316,12 @@ def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) 
     if may_be_piece(name, kinds) or (name in ALL and None in kinds[ALL[name]].values()):
         return None
     if name in ALL:
-        included = (lambda kind: kind is Pipe) if name == "pipes" else (lambda kind: counts_as_node(kind, quantity))
-        matches = [(ALL[name], part) for part, kind in kinds[ALL[name]].items() if kind is not None and included(kind)]
+        known = {part: kind for part, kind in kinds[ALL[name]].items() if kind is not None}
+        if name == "pipes":
+            matches = [(ALL[name], part) for part, kind in known.items() if kind is Pipe]
+        else:  # without reservoirs, whose pressure is given
+            matches = [(ALL[name], part) for part, kind in known.items() if quantity in quantities_of(kind)
+                       and not (kind is Reservoir and quantity in OF_PRESSURE)]  # fmt: skip
         if not matches:
             if name == "pipes":
                 raise ValueError(f"{show(name)} means all pipes, but the case has none")
@@ -333,14 +330,6 @@ def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) 
     known = [*kinds["nodes"], *kinds["links"], *routes, *ALL]
     text = f"unknown part or route {show(name)}{did_you_mean(name, known) or f'; there are {listing(known)}'}"
     raise ValueError(text)
-
-
-def counts_as_node(kind: Any, quantity: str) -> bool:
-    """True if the word "nodes" in a limit or expectation includes this class of node for a quantity.
-
-    A reservoir is not included for pressures and heads, since its pressure is given.
-    """
-    return quantity in quantities_of(kind) and not (kind is Reservoir and quantity in OF_PRESSURE)
 
 
 def quantities_of(kind: Any) -> dict[str, str]:

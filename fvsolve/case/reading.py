@@ -1,16 +1,372 @@
-"""State of the reading of one case, shared by its stages: faults found, values read, origin of added parts."""
+"""Raw case (before its values are read), and the state of the reading of a case, which its stages share.
 
-from __future__ import annotations
+A raw case has nested dicts, line numbers, overrides and defaults of pipes. The table `[defaults.pipe]` has values of
+keys for all pipes that do not state these keys. The argument `table` of functions is a case as nested dicts, as in the
+file. The state of the reading holds the faults found, the values read and the origin of added parts.
+"""
 
-from collections.abc import Callable, Iterable, Iterator
+import functools
+import re
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from fvsolve.case import text
-from fvsolve.case.raw import Raw, default_place
-from fvsolve.errors import CaseError, Fault
-from fvsolve.parts.value import ROOT, ReadContext, faults_of
+from fvsolve.case.text import key_lines
+from fvsolve.errors import CaseError, Fault, article, did_you_mean, listing
+from fvsolve.parts import Pipe
+from fvsolve.parts.table_model import exclusive_key_faults
+from fvsolve.parts.value import ROOT, ReadContext, Value, faults_of
 from fvsolve.units import show
+
+DEEPEST = 40
+WITH_DEFAULTS = {"pipe": Pipe}  # types of links that may have defaults
+NOT_DEFAULT = ("from", "to")  # keys that each part must state itself
+COMPLETED = ("wall", "friction")  # tables that other keys may complete: checked only with their part
+
+
+@dataclass
+class Raw:
+    """Case before its values are read (raw case), with its source.
+
+    table : nested dicts as in the file; text : text of the file; folder : folder of the file, for other files
+    overridden : key paths whose values were replaced by overrides
+    """
+
+    table: dict[str, Any]
+    name: str = "case"
+    path: Path | None = None
+    folder: Path | None = None
+    text: str = ""
+    overridden: list[tuple] = field(default_factory=list)
+
+    @functools.cached_property
+    def lines(self) -> dict[tuple, int]:
+        """Line numbers in the file : key path -> number. They are computed at first use."""
+        return key_lines(self.text)
+
+    @property
+    def file(self) -> str:
+        """Name of the source in messages."""
+        return self.path.name if self.path else self.name
+
+    def line(self, keys: tuple) -> int | None:
+        """Line number of a key path, or of the innermost table that contains it; None if unknown."""
+        for count in range(len(keys), 0, -1):
+            if keys[:count] in self.lines:
+                return self.lines[keys[:count]]
+        return None
+
+    def is_override(self, keys: tuple) -> bool:
+        """True if an override replaced the value at a key path or a table around it, or created the key path."""
+        if any(keys[: len(path)] == path for path in self.overridden):
+            return True
+        created = bool(self.lines) and keys not in self.lines
+        return created and any(path[: len(keys)] == keys for path in self.overridden if keys)
+
+    def get(self, keys: tuple) -> Any:
+        """Value at a key path; None if the key path does not exist."""
+        value: Any = self.table
+        for key in keys:
+            try:
+                value = value[key]
+            except (KeyError, IndexError, TypeError):
+                return None
+        return value
+
+
+def read_raw(source: Any) -> Raw:
+    """Read a case from a TOML file or a dict, without interpretation of its values. Raises CaseError."""
+    if isinstance(source, Mapping):
+        return Raw(_copy(source))
+    if not isinstance(source, (str, Path)):
+        raise CaseError([Fault("", f"{article(type(source).__name__)} is not a case; expected a path or a dict")])
+    path = Path(source)
+    text = _read_text(path)
+    try:
+        table = tomllib.loads(text)
+    except RecursionError:
+        raise CaseError(
+            [Fault("", f"tables or lists are nested too deep; expected at most {DEEPEST} levels")], path.name
+        ) from None
+    except ValueError as error:
+        if re.search(r"^\s*\[(JUNCTIONS|RESERVOIRS|PIPES)\]", text, re.MULTILINE | re.IGNORECASE):
+            message = f"is an EPANET network, not a case; fvsolve import {path} translates it"
+            raise CaseError([Fault("", message)], path.name) from None
+        raise CaseError([syntax_fault(error, text)], path.name) from None
+    return Raw(_copy(table), path.stem, path, path.parent.absolute(), text)
+
+
+def copy_paths(table: dict[str, Any], paths: list[tuple[str, ...]]) -> dict[str, Any]:
+    """Copy of a table and of its inner tables along `paths`; all other values are shared with the original."""
+    copy = dict(table)
+    for key in {path[0] for path in paths}:
+        below = [path[1:] for path in paths if path[0] == key and path[1:]]
+        if below and isinstance(copy.get(key), dict):
+            copy[key] = copy_paths(copy[key], below)
+    return copy
+
+
+def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str, ...]]) -> list[Fault]:
+    """Override values in the table of `raw`; returns the faults of overrides that cannot be applied.
+
+    The key paths are added to `raw.overridden`.
+    settings : dotted key -> value; a text is parsed as TOML where possible
+    alternatives : groups of keys of which a table may have at most one; an override removes the other keys of its group
+    that are not overridden too
+    """
+    faults = []
+    groups = {group: raw.get((group,)) for group in ("nodes", "links")}
+    before = {group: list(parts) for group, parts in groups.items() if isinstance(parts, dict)}
+    for key, value in settings.items():
+        keys = split_key(str(key))
+        try:
+            _put(raw.table, keys, _copy(parsed(value)))
+            raw.overridden.append(keys)
+            for others in alternatives:
+                for other in others if keys[-1] in others else ():
+                    if (*keys[:-1], other) not in raw.overridden:
+                        raw.get(keys[:-1]).pop(other, None)
+        except ValueError as error:
+            faults.append(Fault(str(key), str(error), override=True))
+    for keys in raw.overridden:
+        group, name = (*keys, "", "")[:2]
+        if name and name not in before.get(group, [name]):
+            part = raw.get((group, name))
+            if not isinstance(part, dict) or "type" not in part:
+                hint = did_you_mean(name, before[group])
+                faults.append(Fault(".".join(keys), f"no {group[:-1]} named {show(name)}{hint}", override=True))
+                raw.table[group].pop(name, None)
+    return faults
+
+
+def locate_faults(error: CaseError, case: Any) -> CaseError:
+    """Copy of an error of the case `case`, with the file name and the source of each fault added.
+
+    The source is a line number of the file, or the mark that an override set the key. The error itself is returned if
+    the file cannot be read any more; for a case without a file only the name is added.
+    """
+    if case.path is None:
+        return CaseError(error.faults, case.name)
+    try:
+        source = read_raw(case.path)
+    except CaseError:  # the file has gone since
+        return error
+    now = Raw(case.raw)
+    faults = []
+    for fault in error.faults:
+        keys = default_place(case.raw, tuple(fault.place.split(".")))
+        fault = replace(fault, place=".".join(keys))
+        value, before = now.get(keys), source.get(keys)
+        is_part = len(keys) == 2 and isinstance(value, dict)  # some other key of the part may have been set
+        if value is not None and (before is None or (value != before and not is_part)):
+            faults.append(replace(fault, override=True))
+        else:
+            faults.append(replace(fault, line=fault.line or source.line(keys)))
+    return CaseError(faults, source.file)
+
+
+def _read_text(path: Path) -> str:
+    try:
+        return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
+    except FileNotFoundError:
+        near = [other.name for other in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+        raise CaseError([Fault("", f"there is no such file{did_you_mean(path.name, near)}")], str(path)) from None
+    except IsADirectoryError:
+        raise CaseError([Fault("", "is a directory; expected a TOML file")], str(path)) from None
+    except UnicodeDecodeError as error:
+        line = error.object.count(b"\n", 0, error.start) + 1
+        message = f"byte {show(error.object[error.start : error.start + 1])} is not UTF-8 text"
+        raise CaseError([Fault("", message, line)], path.name) from None
+    except (OSError, ValueError) as error:
+        message = getattr(error, "strerror", None) or str(error)
+        raise CaseError([Fault("", f"cannot be read: {message}")], str(path)) from None
+
+
+def syntax_fault(error: ValueError, text: str) -> Fault:
+    """Fault of a text that is not valid TOML, with its line; error : error that tomllib raised."""
+    message = str(error)
+    match = re.search(r"\s*\(at line (\d+), column (\d+)\)", message)
+    line = int(match[1]) if match else text.count("\n") + 1
+    line_text = text.splitlines()[line - 1].strip() if 0 < line <= len(text.splitlines()) else ""
+    message = message.replace(match[0], "") if match else message
+    message = message[:1].lower() + message[1:]
+    if bare := _bare_name(line_text):
+        return Fault("", f"TOML: {bare}: {show(line_text)}", line)
+    if message == "cannot overwrite a value":
+        message = "this key is given twice"
+    elif message.startswith("cannot declare"):
+        message = "this table is given twice"
+    return Fault("", f"TOML: {message}: {show(line_text)}" if line_text else f"TOML: {message}", line)
+
+
+def _bare_name(line_text: str) -> str:
+    """Description of an invalid unquoted name in a line of TOML; "" if all names are valid."""
+    match = re.fullmatch(r"\[+([^\[\]\"']+)\]+\s*(?:#.*)?|([^=\[\]\"'#]+?)\s*=.*", line_text)
+    names = [name.strip() for name in (match[1] or match[2]).split(".")] if match else []
+    odd = next((name for name in names if name and not re.fullmatch(r"[A-Za-z0-9_-]+", name)), None)
+    if odd is None:
+        return ""
+    if re.fullmatch(r"[\w-]+", odd):
+        return f"a name with letters beyond a to z needs quotes: {show(odd)}"
+    joined = re.sub(r"\s+", "_", odd)
+    if joined != odd:
+        return (
+            f"an unquoted name has no blank; write {joined} (a quoted key may have a blank, the name of a part may not)"
+        )
+    return f"an unquoted name has only letters, digits, _ and -; expected quotes: {show(odd)}"
+
+
+def _copy(value: Any, depth: int = 0) -> Any:
+    """Copy of a value as plain dicts, lists and scalars, without types of NumPy.
+
+    Raises CaseError for more than `DEEPEST` nested levels.
+    """
+    if depth > DEEPEST:
+        raise CaseError([Fault("", f"tables or lists are nested too deep; expected at most {DEEPEST} levels")])
+    if isinstance(value, Mapping):
+        return {str(key): _copy(item, depth + 1) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_copy(item, depth + 1) for item in value]
+    if isinstance(value, Path):
+        return str(value)
+    if type(value).__module__ == "numpy" and hasattr(value, "tolist"):
+        return _copy(value.tolist(), depth + 1)
+    return value
+
+
+@functools.lru_cache(maxsize=4096)
+def split_key(key: str) -> tuple[str, ...]:
+    """Keys of a dotted path as in TOML, such as "links.valve.area"; a text that is not valid is split at its dots."""
+    try:
+        table: Any = tomllib.loads(f"{key} = 0") if "\n" not in key and "=" not in key else None
+    except ValueError:
+        table = None
+    if not table:
+        return tuple(key.split("."))
+    keys = []
+    while isinstance(table, dict):
+        name = next(iter(table))
+        keys.append(name)
+        table = table[name]
+    return tuple(keys)
+
+
+def parsed(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    try:
+        table = tomllib.loads(f"value = {value}")
+    except (ValueError, RecursionError):
+        return value
+    return table["value"] if len(table) == 1 else value
+
+
+def _put(table: dict[str, Any], keys: tuple[str, ...], value: Any) -> None:
+    for key in keys[:-1]:
+        inner = table.setdefault(key, {})
+        if not isinstance(inner, dict):
+            raise ValueError(f"{show(key)} is {show(inner)}, not a table; no key can be set below it")
+        table = inner
+    table[keys[-1]] = value
+
+
+def default_values(kind: str) -> dict[str, Value]:
+    """Declarations of the keys that may have a default in a type of part : key -> declaration."""
+    return {key: value for key, value in WITH_DEFAULTS[kind].values().items() if key not in NOT_DEFAULT}
+
+
+def defaults_of(table: Mapping[str, Any], kind: Any) -> dict[str, Any]:
+    """Keys and values in `[defaults]` for a type of part; empty if there are none or if they are not a table."""
+    result = table.get("defaults")
+    result = result.get(kind) if isinstance(result, dict) and isinstance(kind, str) and kind in WITH_DEFAULTS else None
+    return result if isinstance(result, dict) else {}
+
+
+def with_defaults(table: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+    """Keys of a part in the file (`given`), completed by the defaults for its type.
+
+    A default is left out if the part states the key, or an alternative to the key.
+    """
+    general = defaults_of(table, given.get("type"))
+    if not general:
+        return given
+    known = WITH_DEFAULTS[given["type"]].keys()  # unknown keys are reported once, as faults of the defaults
+    groups = WITH_DEFAULTS[given["type"]].alternatives
+    stated = {key for group in groups if any(word in given for word in group) for key in group}
+    return {**{key: value for key, value in general.items() if key in known and key not in stated}, **given}
+
+
+def raw_link(table: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """Keys of a link in the file, completed by defaults; for a piece of a cut pipe, the keys of the whole pipe."""
+    return with_defaults(table, table["links"][pipe_of_piece(table, name)])
+
+
+def pipe_of_piece(table: Mapping[str, Any], name: str) -> str:
+    """Name in the file of the link `name`; for a piece of a cut pipe, the name of the pipe."""
+    return name if name in table.get("links", ()) else name.rpartition("-")[0]
+
+
+def fill_pipes(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Copy of a case, as nested dicts, with the defaults written into every pipe and without the table `defaults`."""
+    links = {
+        name: with_defaults(table, link) if isinstance(link, dict) else link for name, link in table["links"].items()
+    }
+    return {**{key: value for key, value in table.items() if key != "defaults"}, "links": links}
+
+
+def default_place(table: Mapping[str, Any], keys: tuple) -> tuple:
+    """Key path at which the file states a key: that of the part, or of `[defaults]` if only a default is stated."""
+    if len(keys) < 3 or keys[0] != "links":
+        return keys
+    links = table.get("links")
+    part = links.get(keys[1]) if isinstance(links, dict) else None
+    if not isinstance(part, dict) or keys[2] in part or keys[2] not in with_defaults(table, part):
+        return keys
+    return ("defaults", part["type"], *keys[2:])
+
+
+def default_faults(table: Mapping[str, Any], setting: ReadContext) -> Iterator[tuple[tuple, str]]:
+    """Faults (key path, message) of the table `[defaults]`: unknown types or keys, and invalid values."""
+    given = table.get("defaults", {})
+    if not isinstance(given, dict):
+        yield ("defaults",), f"{show(given)} is not a table; expected [defaults.pipe]"
+        return
+    for kind, keys in given.items():
+        if kind not in WITH_DEFAULTS:
+            text = f"{show(kind)} has no defaults{did_you_mean(kind, WITH_DEFAULTS)}; expected defaults of pipe"
+            yield ("defaults", kind), text
+        elif not isinstance(keys, dict):
+            yield ("defaults", kind), f"{show(keys)} is not a table; expected keys of a {kind}"
+        else:
+            yield from ((("defaults", kind, *below), text) for below, text in _faults_of_keys(kind, keys, setting))
+
+
+def _faults_of_keys(kind: str, given: dict[str, Any], setting: ReadContext) -> Iterator[tuple[tuple, str]]:
+    known = default_values(kind)
+    for group in WITH_DEFAULTS[kind].alternatives:
+        yield from exclusive_key_faults(given, group)
+    for key, value in given.items():
+        if key in known:
+            if key not in COMPLETED:
+                yield from _faults_of_value(key, known[key], value, setting)
+        elif key in (*NOT_DEFAULT, "type"):
+            yield (key,), f"cannot be a default; each {kind} states its own value"
+        else:
+            hint = WITH_DEFAULTS[kind].synonyms.get(key)
+            near = f"; use {hint}" if hint else did_you_mean(key, known) or f"; keys are {listing(list(known))}"
+            yield (key,), f"unknown key{near}"
+
+
+def _faults_of_value(key: str, value: Value, given: Any, setting: ReadContext) -> Iterator[tuple[tuple, str]]:
+    try:
+        value.read(given, setting)
+    except ValueError as error:
+        yield from faults_of(error, key)
+
 
 GROUPS = {
     "fluid": "the fluid",

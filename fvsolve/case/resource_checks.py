@@ -3,8 +3,6 @@
 Sizes were measured: a pipe cell takes 0.36 kB in a model (names of states, arrays) and 0.16 kB in an explicit run.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -1,7 +1,5 @@
 """JSON schema of a case file, for editors."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from json import dumps, loads
@@ -11,8 +9,7 @@ from fvsolve.case.claims import limit_keys
 from fvsolve.case.load import KEYS, TOP
 from fvsolve.case.part_reading import LINKLESS
 from fvsolve.case.pipe_routes import Route
-from fvsolve.case.raw import NOT_DEFAULT, WITH_DEFAULTS
-from fvsolve.case.reading import GROUPS
+from fvsolve.case.reading import GROUPS, NOT_DEFAULT, WITH_DEFAULTS
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.schedule import Scheduled

@@ -14,9 +14,9 @@ from fvsolve.exact import NAMES
 from fvsolve.fluid import LAWS
 from fvsolve.fluid.coolprop import OIL_WORDS
 from fvsolve.parts import value as val
+from fvsolve.parts.csv_rows import copy_name, find_file
 from fvsolve.parts.pipe.part import LINES
-from fvsolve.parts.table_model import NamedTables, Table
-from fvsolve.parts.time_series import copy_name, find_file
+from fvsolve.parts.table_model import NamedTables, Table, check_table
 from fvsolve.parts.value import BY_CELLS, SHAPE, VALUE, Choice, Number, Quantity, ReadContext, positive
 from fvsolve.schemes import LIMITERS, SCHEMES
 from fvsolve.steppers.structure import KINDS
@@ -40,9 +40,8 @@ DEFAULT_ACCURACY = 1e-2  # fraction of the largest jump
 
 
 # Ranges of liquids, after CoolProp and the CRC Handbook: liquid hydrogen to mercury, light liquids to cold heavy oil.
-TEMPERATURES = val.UsualRange(
-    60.0, 1000.0, "liquefied gases to molten salt"
-)  # for fluid "user"; other fluids have their own range
+# For fluid "user"; other fluids have their own range
+TEMPERATURES = val.UsualRange(60.0, 1000.0, "liquefied gases to molten salt")
 DENSITIES = val.UsualRange(60.0, 14e3, "liquid hydrogen to mercury")
 MODULI = val.UsualRange(1e7, 4e10, "liquefied gases to mercury")
 VISCOSITIES = val.UsualRange(1e-5, 5.0, "liquefied gases to heavy fuel oil")
@@ -58,12 +57,9 @@ class FluidSpec(Table):
     pressure: Annotated[
         float, Quantity("pressure", positive, "pressure at which properties are evaluated [Pa]", changes=BY_CELLS)
     ] = 101325.0
-    law: Annotated[
-        str,
-        Choice(
-            "density law", tuple(LAWS), "density law of the whole case; linear (mixture with cavitation) if left out"
-        ),
-    ] = "linear"
+    law: Annotated[str, Choice(
+        "density law", tuple(LAWS), "density law of the whole case; linear (mixture with cavitation) if left out",
+    )] = "linear"  # fmt: skip
     density: Annotated[float | None, Quantity("density", positive, "density [kg/m3]", DENSITIES, BY_CELLS)] = None
     bulk_modulus: Annotated[
         float | None, Quantity("modulus", positive, "isentropic bulk modulus [Pa]", MODULI, BY_CELLS)
@@ -72,13 +68,9 @@ class FluidSpec(Table):
         float | None, Quantity("viscosity", val.nonnegative, "dynamic viscosity [Pa s]", VISCOSITIES)
     ] = None
     vapor_pressure: Annotated[float | None, Quantity("pressure", val.nonnegative, "vapour pressure [Pa]")] = None
-    air_fraction: Annotated[
-        float | None,
-        Number(
-            val.between(0, 1),
-            f"volume fraction of air at 1 atm, law mixture; {CAVITY_AIR:g} with cavitation if left out",
-        ),
-    ] = None
+    air_fraction: Annotated[float | None, Number(
+        val.between(0, 1), f"volume fraction of air at 1 atm, law mixture; {CAVITY_AIR:g} with cavitation if left out",
+    )] = None  # fmt: skip
     gas_exponent: Annotated[
         float | None,
         Number(val.between(1, 2), "polytropic exponent of the gas, law mixture: 1 isothermal, 1.4 adiabatic"),
@@ -155,92 +147,52 @@ class Numerics(Table):
 
     end: Annotated[float, Quantity("time", about="end time of the run [s]")]
     start: Annotated[float, Quantity("time", about="start time of the run [s]")] = 0.0
-    initial: Annotated[
-        str,
-        Choice(
-            "start",
-            STARTS,
-            "steady: stated levels, pressures and flows are kept, the rest is in equilibrium; equilibrium: nothing "
-            "moves and bodies and masses are placed where their forces balance; rest: no flow",
-            changes=val.PROFILE,
-        ),
-    ] = "steady"
-    scheme: Annotated[
-        str | None,
-        Choice(
-            "scheme",
-            tuple(SCHEMES),
-            f"reconstruction scheme of the cells; {DEFAULT_SCHEME} (with cavitation {CAVITY_SCHEME}) if left out",
-        ),
-    ] = None
+    initial: Annotated[str, Choice(
+        "start", STARTS,
+        "steady: stated levels, pressures and flows are kept, the rest is in equilibrium; equilibrium: nothing "
+        "moves and bodies and masses are placed where their forces balance; rest: no flow", changes=val.PROFILE,
+    )] = "steady"  # fmt: skip
+    scheme: Annotated[str | None, Choice(
+        "scheme", tuple(SCHEMES),
+        f"reconstruction scheme of the cells; {DEFAULT_SCHEME} (with cavitation {CAVITY_SCHEME}) if left out",
+    )] = None  # fmt: skip
     limiter: Annotated[str, Choice("limiter", tuple(LIMITERS), "slope limiter of the scheme muscl")] = DEFAULT_LIMITER
-    method: Annotated[
-        str | None,
-        MethodChoice(
-            "method",
-            MethodNames(),
-            f"Runge-Kutta method; {DEFAULT_METHOD} (with rtol {DEFAULT_METHOD_RTOL}, with cavitation {CAVITY_METHOD}, "
-            f"with scalars or friction in basins {DEFAULT_METHOD_SSP}) if left out",
-            changes=val.PROFILE,
-        ),
-    ] = None
-    courant: Annotated[
-        float | None,
-        Number(
-            positive,
-            f"Courant number: step over the shortest wave travel time of a cell; {DEFAULT_COURANT} with cells "
-            f"(with cavitation {CAVITY_COURANT}) if left out",
-            changes=VALUE,
-        ),
-    ] = None
+    method: Annotated[str | None, MethodChoice(
+        "method", MethodNames(),
+        f"Runge-Kutta method; {DEFAULT_METHOD} (with rtol {DEFAULT_METHOD_RTOL}, with cavitation {CAVITY_METHOD}, "
+        f"with scalars or friction in basins {DEFAULT_METHOD_SSP}) if left out", changes=val.PROFILE,
+    )] = None  # fmt: skip
+    courant: Annotated[float | None, Number(
+        positive, f"Courant number: step over the shortest wave travel time of a cell; {DEFAULT_COURANT} with cells "
+        f"(with cavitation {CAVITY_COURANT}) if left out", changes=VALUE,
+    )] = None  # fmt: skip
     step: Annotated[float | None, Quantity("time", positive, "fixed step [s]", changes=VALUE)] = None
-    rtol: Annotated[
-        float | None,
-        Number(
-            val.between(0, 1, open=True),
-            f"relative tolerance of the error per step; {DEFAULT_RTOL:g} (without cells, with auto, or with adaptive "
-            "implicit methods) if left out",
-        ),
-    ] = None
-    linear_algebra: Annotated[
-        str | None,
-        Choice(
-            "linear algebra",
-            KINDS,
-            "linear solver of implicit steps; chosen by the structure of the case if left out",
-            changes=VALUE,
-        ),
-    ] = None
-    cell_time: Annotated[
-        float | None,
-        Quantity(
-            "time",
-            positive,
-            f"wave travel time of a cell, for pipes that state no cells [s]; longest travel time of a pipe / "
-            f"{DEFAULT_CELLS} if left out",
-            changes=SHAPE,
-        ),
-    ] = None
+    rtol: Annotated[float | None, Number(
+        val.between(0, 1, open=True),
+        f"relative tolerance of the error per step; {DEFAULT_RTOL:g} (without cells, with auto, or with adaptive "
+        "implicit methods) if left out",
+    )] = None  # fmt: skip
+    linear_algebra: Annotated[str | None, Choice(
+        "linear algebra", KINDS, "linear solver of implicit steps; chosen by the structure of the case if left out",
+        changes=VALUE,
+    )] = None  # fmt: skip
+    cell_time: Annotated[float | None, Quantity(
+        "time", positive,
+        f"wave travel time of a cell, for pipes that state no cells [s]; longest travel time of a pipe / "
+        f"{DEFAULT_CELLS} if left out", changes=SHAPE,
+    )] = None  # fmt: skip
     pipe_model: Annotated[
         str, Choice("pipe model", LINES, "model of pipes that state no pipe_model", changes=SHAPE)
     ] = "finite-volume"
-    delay_tolerance: Annotated[
-        float,
-        Number(
-            val.between(0, 1, open=True),
-            "allowed error of pipe models chosen by auto, and size below which jumps in a delay line are smoothed; "
-            "both as a fraction of the largest jump",
-            changes=SHAPE,
-        ),
-    ] = DEFAULT_ACCURACY
-    below_vapor: Annotated[
-        str,
-        Choice(
-            "choice",
-            ("continue", "stop"),
-            "action at pressures below vapour pressure: mark the results and continue, or stop",
-        ),
-    ] = "continue"
+    delay_tolerance: Annotated[float, Number(
+        val.between(0, 1, open=True),
+        "allowed error of pipe models chosen by auto, and size below which jumps in a delay line are smoothed; "
+        "both as a fraction of the largest jump", changes=SHAPE,
+    )] = DEFAULT_ACCURACY  # fmt: skip
+    below_vapor: Annotated[str, Choice(
+        "choice", ("continue", "stop"),
+        "action at pressures below vapour pressure: mark the results and continue, or stop",
+    )] = "continue"  # fmt: skip
 
     def filled(self, has_cells: bool, carries: bool, rubs: bool, parts: bool) -> Numerics:
         """Copy with the default scheme, step control and method filled in.
@@ -283,8 +235,7 @@ class OutputUnits(val.Value):
     )  # fmt: skip
 
     def read(self, given: Any, setting: ReadContext) -> dict[str, str]:
-        if not isinstance(given, dict):
-            raise ValueError(f'{show(given)} is not a table; expected for example {{ pressure = "barg" }}')
+        check_table(given, 'for example { pressure = "barg" }')
         faults = []
         for quantity, unit in given.items():
             if quantity not in self.quantities:
@@ -329,11 +280,9 @@ class OutputLine(Table):
     """Table of one line across a basin, along which its fields are written with every frame."""
 
     basin: Annotated[str, val.Text("name of the basin", VALUE)]
-    from_: Annotated[
-        tuple[float, float],
-        val.Rows("length", length=2, about="x, y of the start of the line [m]", changes=VALUE),
-        Field(alias="from"),
-    ]
+    from_: Annotated[tuple[float, float], val.Rows(
+        "length", length=2, about="x, y of the start of the line [m]", changes=VALUE,
+    ), Field(alias="from")]  # fmt: skip
     to: Annotated[
         tuple[float, float], val.Rows("length", length=2, about="x, y of the end of the line [m]", changes=VALUE)
     ]
@@ -345,15 +294,10 @@ class OutputLine(Table):
 class Output(Table):
     """Table `[output]`: recorded quantities, output times and units."""
 
-    every: Annotated[
-        float | None,
-        Quantity(
-            "time",
-            positive,
-            f"interval between rows of the history [s]; (end - start) / {DEFAULT_ROWS} if left out",
-            changes=VALUE,
-        ),
-    ] = None
+    every: Annotated[float | None, Quantity(
+        "time", positive, f"interval between rows of the history [s]; (end - start) / {DEFAULT_ROWS} if left out",
+        changes=VALUE,
+    )] = None  # fmt: skip
     fields: Annotated[int, val.Whole(val.between(0, 10**6), "number of frames of the fields, 0 for none", VALUE)] = (
         DEFAULT_FRAMES
     )

@@ -1,7 +1,5 @@
 """Cases that are shipped with the package: folder, names, paths, titles, copies."""
 
-from __future__ import annotations
-
 import shutil
 import tomllib
 from collections.abc import Callable

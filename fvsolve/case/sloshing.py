@@ -13,8 +13,6 @@ surface held flat the water has the inertia of an ideal fluid under a lid (Jouko
 Higher modes are left out: their water moves with the tank.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -338,12 +336,8 @@ def nodes_with_water(
         centre = np.array(basin.place) + turn @ centre
         both, own = body.mass + mass, np.array(body.centre_of_mass)
         middle = (body.mass * own + mass * centre) / both
-        total = (
-            body.inertia_matrix()
-            + point_inertia(body.mass, own - middle)
-            + turn @ inertia @ turn.T
-            + point_inertia(mass, centre - middle)
-        )
+        total = body.inertia_matrix() + point_inertia(body.mass, own - middle)
+        total = total + turn @ inertia @ turn.T + point_inertia(mass, centre - middle)
         change = {"mass": both, "centre_of_mass": tuple(middle.tolist()), "inertia": tuple(map(tuple, total.tolist()))}
         result[nodes[name].on] = body.model_copy(update=change)
     swinging = {name: mesh for name, mesh in lumped.items() if nodes[name].sloshing == "modes"}

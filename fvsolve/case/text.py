@@ -1,7 +1,5 @@
 """TOML text of a case, and line numbers of the keys in a TOML text."""
 
-from __future__ import annotations
-
 import bisect
 import json
 import re

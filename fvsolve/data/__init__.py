@@ -1,7 +1,5 @@
 """Printed tables: units, pipe materials and classes, pump characteristics, words of other programs."""
 
-from __future__ import annotations
-
 import functools
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Conversion of an EPANET file to the text of a case file."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,10 +46,8 @@ def import_network(path: str | Path, hour: float = 0.0, wave_speed: float = 1200
     network = read_network(Path(path))
     time = cell_time([pipe.length for _, pipe in network.pipes()], wave_speed)
     translation = Translation(network, state_at(network, hour), wave_speed, shortest)
-    short = sorted(
-        (name for name, length in translation.lengths.items() if length < wave_speed * time),
-        key=translation.lengths.get,
-    )
+    lengths = translation.lengths
+    short = sorted((name for name, length in lengths.items() if length < wave_speed * time), key=lengths.get)
     case_text = _text(Path(path), network, translation, hour, time, short)
     return Imported(case_text, translation.node_names.given, translation.link_names.given, translation.notes, short)
 
@@ -92,11 +88,8 @@ def _text(path: Path, network: Any, translation: Translation, hour: float, time:
         'pipe_model = "auto"' + (f"  # {_short_pipes_comment(translation, short)}" if short else ""),
     ]
     lines += [
-        "",
-        "[output]",
-        f"probes = {text.inline(_probes(translation))}",
-        'units = { flow = "l/s", pressure = "barg" }',
-    ]
+        "", "[output]", f"probes = {text.inline(_probes(translation))}", 'units = { flow = "l/s", pressure = "barg" }',
+    ]  # fmt: skip
     return "\n".join(lines) + "\n"
 
 

@@ -1,7 +1,5 @@
 """EPANET files, read by WNTR, and EPANET's solution at an hour of its run."""
 
-from __future__ import annotations
-
 import logging
 import re
 import subprocess
@@ -141,16 +139,9 @@ def _listed_faults(package: Any, path: Path) -> list[str]:
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "net.rpt"
         call = [
-            sys.executable,
-            "-I",
-            "-S",
-            "-c",
-            _OPEN_SCRIPT,
-            library,
-            str(path),
-            str(report),
+            sys.executable, "-I", "-S", "-c", _OPEN_SCRIPT, library, str(path), str(report),
             str(Path(folder) / "net.bin"),
-        ]
+        ]  # fmt: skip
         try:
             subprocess.run(call, capture_output=True, timeout=LISTING_TIME, check=False)
         except (OSError, subprocess.SubprocessError):

@@ -1,7 +1,5 @@
 """Tables of a case file for the types of parts that EPANET has."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -155,11 +153,8 @@ def leak(place: str, coefficient: float, exponent: float) -> Part:
     """
     per_pascal = coefficient / (DENSITY * GRAVITY) ** exponent
     return {
-        "type": "leak",
-        "from": place,
-        "coefficient": rounded_number(per_pascal),
-        "exponent": rounded_number(exponent),
-    }
+        "type": "leak", "from": place, "coefficient": rounded_number(per_pascal), "exponent": rounded_number(exponent),
+    }  # fmt: skip
 
 
 def loss_coefficient(drop: float, flow: float, diameter: float) -> float:

@@ -1,7 +1,5 @@
 """Translation of an EPANET network into parts of a case."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any
@@ -181,11 +179,8 @@ class Translation:
             place = self.junction_before_end(name, link)
             ours = self.link_names.new(f"{self.link_names.given[name]}-{'check' if link.check_valve else 'shut'}")
             last = (place, end)
-            self.links[ours] = (
-                part_tables.check_valve(last, link.diameter)
-                if link.check_valve
-                else part_tables.valve(last, link.diameter, 0.0, opening=0.0)
-            )
+            shut = part_tables.valve(last, link.diameter, 0.0, opening=0.0)
+            self.links[ours] = part_tables.check_valve(last, link.diameter) if link.check_valve else shut
             reason = "check valve" if link.check_valve else "shut at this hour"
             valve = "a check valve" if link.check_valve else "a shut valve"
             self.note(f"{reason}: imported as a pipe with {valve} at its end", name)

@@ -1,7 +1,5 @@
 """Exact solutions, which a case file names under `[exact]`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from importlib import import_module
 

@@ -13,8 +13,6 @@ instantaneous storage, is C(s) = 1 + sum of g / (1 + tau s), g = c D rho a^2 J /
 diameter D, wall thickness e, restraint factor c.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

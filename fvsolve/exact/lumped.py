@@ -19,8 +19,6 @@ Mass on linear springs and dampers between frames, under a constant force: m u''
 u from the start, force F at the start without damping, stiffness k of all springs, damping c of all dampers.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Callable
@@ -343,17 +341,13 @@ def spring_mass_solution(case, start: ExactStart) -> Solution:
 
 COLUMN = Exact(("reservoir", "junction"), ("rigid-column", "valve", "orifice"), column_faults, column_solution)
 LEVELLING = Exact(
-    ("reservoir", "tank", "chamber"),
-    ("valve", "orifice"),
-    with_level_faults(levelling_faults, levelling_solution),
+    ("reservoir", "tank", "chamber"), ("valve", "orifice"), with_level_faults(levelling_faults, levelling_solution),
     levelling_solution,
-)
+)  # fmt: skip
 OSCILLATION = Exact(
-    ("reservoir", "tank"),
-    ("rigid-column",),
-    with_level_faults(oscillation_faults, oscillation_solution),
+    ("reservoir", "tank"), ("rigid-column",), with_level_faults(oscillation_faults, oscillation_solution),
     oscillation_solution,
-)
+)  # fmt: skip
 SPRING_MASS = Exact(
     ("mass", "frame", "reservoir"), ("spring", "damper", "force"), spring_mass_faults, spring_mass_solution
 )

@@ -7,8 +7,6 @@ travel times. These paths form a finite list, evaluated for all times together (
 Allievi 1902).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.exact.solution import Exact, ExactStart, Solution, fault, kinks, reservoirs, value, valve_faults

@@ -3,8 +3,6 @@
 Values of schedules are computed independently of the compiled functions, so that tests can compare both.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple

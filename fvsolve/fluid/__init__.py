@@ -1,16 +1,12 @@
 """Properties of a fluid at its reference state."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any
 
 from fvsolve.errors import FluidError, did_you_mean
-from fvsolve.fluid.air import Air, check_cavities
-from fvsolve.fluid.coolprop import cached_properties, celsius
-from fvsolve.fluid.isentrope_table import FluidTable
-from fvsolve.fluid.laws import LAWS
+from fvsolve.fluid.coolprop import FluidTable, cached_properties, celsius
+from fvsolve.fluid.laws import LAWS, Air, check_cavities
 from fvsolve.fluid.oils import OILS, oil_name, oil_properties
 
 __all__ = ["LAWS", "Fluid", "FluidTable", "properties"]

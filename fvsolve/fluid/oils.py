@@ -5,8 +5,6 @@ value at 15 degC. Compressibility: Tait's equation of an HLP 32 for all grades, 
 1/K_s = 1/K_T - T a^2 / (rho cp): bulk moduli K at constant entropy (s) and temperature (T), thermal expansion a.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass
@@ -33,11 +31,8 @@ OILS = {  # ISO 3448 mid-point, viscosity index 100 by ASTM D2270, typical densi
     "ISO VG 68": Oil(68.0, 8.73, 881.0),
 }
 EXPANSION = 0.6278  # K1 of lubricating oils, ASTM D1250-80: thermal expansion at 15 degC is K1 / density [kg/m3/K]
-TAIT_COEFFICIENTS = (
-    0.0732965,
-    1965.02,
-    -2.96813,
-)  # C, b0 [bar], b1 [bar/K]: rho = rho(1 bar) / (1 - C ln((b + p) / b)), b = b0 + b1 T
+# C, b0 [bar], b1 [bar/K]: rho = rho(1 bar) / (1 - C ln((b + p) / b)), b = b0 + b1 T
+TAIT_COEFFICIENTS = 0.0732965, 1965.02, -2.96813
 HEAT_CAPACITY = 1895.4, 2118.1  # cp at 25 and 80 degC [J/kg/K]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from fvsolve.assembly.mechanics import PLAIN_LINE, distance_and_rate
 from fvsolve.assembly.schedule_tables import break_times
-from fvsolve.case import bodies, nodes_on_bodies
+from fvsolve.case import bodies
 from fvsolve.case.bodies import free_joints
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.body import Body
@@ -178,7 +178,7 @@ def lower_moving_segments(draft) -> None:
         rows.append((body, start, end, swept, -rise, heavy))
     draft.moving_segment_table = np.array(rows, rec.MOVING_SEGMENT) if rows else np.zeros(0, rec.MOVING_SEGMENT)
     if reads_joint_forces(draft):
-        for place, text in nodes_on_bodies.missing_reactions(draft.case.nodes, draft.case.links):
+        for place, text in bodies.missing_reactions(draft.case.nodes, draft.case.links):
             draft.fault(".".join(place), f"a probe reads forces of joints, but {text}")
 
 

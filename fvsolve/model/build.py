@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.assembly.device_lowering import lower_devices
-from fvsolve.assembly.lowering import lowering_of
+from fvsolve.assembly.lowering import lower_devices, lowering_of
 from fvsolve.assembly.model_draft import ModelDraft
 from fvsolve.assembly.pipe_terms import MAX_TERMS, add_terms, limit_creep_step
 from fvsolve.assembly.scheme_codes import scheme_settings

@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.assembly.lowering import lowering_of, rows_in
 from fvsolve.assembly.pipe_terms import elements, memory_shares
-from fvsolve.case.nodes_on_bodies import missing_reactions
+from fvsolve.case.bodies import missing_reactions
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.model import Model

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fvsolve.assembly.inputs import Input
-from fvsolve.assembly.lowering import lowering_of
+from fvsolve.assembly.lowering import Input, lowering_of
 from fvsolve.assembly.pipe_terms import mass_in_creep
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice

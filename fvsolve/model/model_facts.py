@@ -14,8 +14,7 @@ from fvsolve.case.basins import boundary_cells, patch_names
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.steady_friction import drag
-from fvsolve.parts.pipe.materials import materials
-from fvsolve.parts.pipe.pipe_wall import Wall, restraint_factor
+from fvsolve.parts.pipe.pipe_wall import Wall, materials, restraint_factor
 from fvsolve.steppers.automatic import first_method
 from fvsolve.steppers.tableau import AUTO, method_named
 

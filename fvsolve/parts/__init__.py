@@ -4,23 +4,20 @@ from importlib import import_module
 from pathlib import Path
 
 from fvsolve.parts.basin import Basin
+from fvsolve.parts.body_links import Torque
 from fvsolve.parts.carried_scalar import Scalar
-from fvsolve.parts.conduit import Friction
+from fvsolve.parts.conduit import Friction, RigidColumn
 from fvsolve.parts.cylinder import Cylinder
 from fvsolve.parts.hydraulic_nodes import Chamber, Inflow, Junction, Reservoir
-from fvsolve.parts.link import Link
-from fvsolve.parts.node import Node
+from fvsolve.parts.nodes_and_links import Link, Node
 from fvsolve.parts.outlet.part import Leak
 from fvsolve.parts.pipe.part import Pipe
 from fvsolve.parts.pipe.pipe_wall import Wall
 from fvsolve.parts.plugins import declare_installed
-from fvsolve.parts.rigid_column import RigidColumn
 from fvsolve.parts.schedule import Schedule
-from fvsolve.parts.spool_valve import EDGES, SpoolValve
 from fvsolve.parts.tank import AreaTable, Tank
-from fvsolve.parts.torque import Torque
 from fvsolve.parts.translational import Damper, EndStop, Force, Frame, Mass, Spring
-from fvsolve.parts.valve import Characteristic, Orifice, Valve
+from fvsolve.parts.valve import EDGES, Characteristic, Orifice, SpoolValve, Valve
 
 package = Path(__file__).parents[1]
 for pattern in ("parts/[a-z]*.py", "parts/*/part.py", "basins/*/part.py"):  # the last declares types of basins

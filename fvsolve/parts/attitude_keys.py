@@ -1,7 +1,5 @@
 """Attitude of a body: the keys of its representations, checked against each other."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -35,15 +33,9 @@ class Attitude(Table):
     roll: Annotated[float | None, Angle("angle about x, the last rotation [rad]; 0 if left out")] = None
     pitch: Annotated[float | None, Angle("angle about y, the second rotation [rad]; 0 if left out")] = None
     yaw: Annotated[float | None, Angle("angle about z, the first rotation [rad]; 0 if left out")] = None
-    zyz: Annotated[
-        tuple[float, ...] | None,
-        Rows(
-            "angle",
-            length=3,
-            about="classical Euler angles [psi, theta, phi] about z, y and z [rad]",
-            usual=USUAL_ANGLES,
-        ),
-    ] = None
+    zyz: Annotated[tuple[float, ...] | None, Rows(
+        "angle", length=3, about="classical Euler angles [psi, theta, phi] about z, y and z [rad]", usual=USUAL_ANGLES,
+    )] = None  # fmt: skip
     axis: Annotated[
         tuple[float, ...] | None, Rows("number", length=3, about="axis of a single rotation by `angle`")
     ] = None
@@ -105,12 +97,10 @@ class Attitude(Table):
         yield from length_notices("euler_parameters", self.euler_parameters)
         off = attitude.defect(np.array(self.matrix))[0] if self.matrix else 0.0
         if off > ROUNDING:
-            yield (
-                ("matrix",),
-                off,
-                ROUNDING,
-                f"is not exactly a rotation: R'R differs from the identity by {off:.2g}; the nearest rotation is used",
+            message = (
+                f"is not exactly a rotation: R'R differs from the identity by {off:.2g}; the nearest rotation is used"
             )
+            yield ("matrix",), off, ROUNDING, message
         for key, text, apart in self._deviations():
             if apart > ROUNDING:
                 yield (key,), apart, ROUNDING, f"{text}; the latter is used"
@@ -136,11 +126,10 @@ class Attitude(Table):
         for key, other in others:
             angle = attitude.axis_angle(attitude.deviation(other, rotation))[1]
             name = "roll, pitch, yaw" if first == "roll" else first
-            yield (
-                key,
-                f"is {math.degrees(angle):.3g} deg from the attitude that {name} give{'' if first == 'roll' else 's'}",
-                angle,
+            text = (
+                f"is {math.degrees(angle):.3g} deg from the attitude that {name} give{'' if first == 'roll' else 's'}"
             )
+            yield (key, text, angle)
 
 
 def valid_values(table: type[Table], given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:

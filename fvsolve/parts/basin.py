@@ -14,11 +14,11 @@ from fvsolve.errors import FvsolveError, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.carried_scalar import ScalarValues
+from fvsolve.parts.csv_rows import copy_name, find_file
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey, uniform
-from fvsolve.parts.node import Node, PlaceOnBody
+from fvsolve.parts.nodes_and_links import Node, PlaceOnBody
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import NamedTables, Nested, Table
-from fvsolve.parts.time_series import copy_name, find_file
 from fvsolve.parts.value import (
     SHAPE,
     VALUE,
@@ -46,39 +46,25 @@ class Patch(Table):
         str | None,
         Choice("side", SIDES, "side of the rectangle, required for a rectangle; a mesh file names its own patches"),
     ] = None
-    span: Annotated[
-        tuple[float, float] | None,
-        Rows(
-            "length",
-            nonnegative,
-            length=2,
-            about="start and end along the side, on grid lines [m]; the whole side if left out",
-            changes=SHAPE,
-        ),
-    ] = None
+    span: Annotated[tuple[float, float] | None, Rows(
+        "length", nonnegative, length=2,
+        about="start and end along the side, on grid lines [m]; the whole side if left out", changes=SHAPE,
+    )] = None  # fmt: skip
     boundary: Annotated[
         str | None,
         Choice("boundary", ("wall", "open"), "boundary condition: open (waves leave); a wall if left out"),
     ] = None
-    impedance: Annotated[
-        float | None,
-        Quantity(
-            "impedance",
-            nonnegative,
-            "ratio of pressure to velocity of waves in a liquid, instead of `boundary` [Pa s/m]",
-        ),
-    ] = None
+    impedance: Annotated[float | None, Quantity(
+        "impedance", nonnegative, "ratio of pressure to velocity of waves in a liquid, instead of `boundary` [Pa s/m]",
+    )] = None  # fmt: skip
     body: Annotated[str | None, Text("mass, or body on a prismatic joint, that moves this wall along x or y")] = None
     travel: Annotated[
         Schedule | None, Scheduled("position", about="displacement of this wall along x or y, instead of `body` [m]")
     ] = None
-    zone: Annotated[
-        float | None,
-        Quantity(
-            "length", positive, "width of the zone whose grid lines follow the wall [m]; the whole basin if left out",
-            changes=VALUE,
-        ),
-    ] = None  # fmt: skip
+    zone: Annotated[float | None, Quantity(
+        "length", positive, "width of the zone whose grid lines follow the wall [m]; the whole basin if left out",
+        changes=VALUE,
+    )] = None  # fmt: skip
     scalars: Annotated[
         dict[str, Any], ScalarValues("scalar values of the inflow, for a given velocity or an open boundary")
     ] = {}
@@ -276,28 +262,19 @@ class Basin(PlaceOnBody, kind="basin"):
         Rows("length", positive, length=2, about="lengths along x and y [m]; required without `mesh`", changes=SHAPE),
     ] = None
     cells: Annotated[Any, Cells()] = None
-    grading: Annotated[
-        tuple[float, float] | None,
-        Rows(
-            "number",
-            positive,
-            length=2,
-            about="ratio of last to first cell size along x and y [-]; 1 if left out",
-            changes=SHAPE,
-        ),
-    ] = None
+    grading: Annotated[tuple[float, float] | None, Rows(
+        "number", positive, length=2, about="ratio of last to first cell size along x and y [-]; 1 if left out",
+        changes=SHAPE,
+    )] = None  # fmt: skip
     holes: Annotated[Any, Holes()] = None
     mesh: Annotated[
         MeshFile | None,
         Nested(MeshFile, "mesh file (any format of meshio) and the unit of its coordinates, instead of a rectangle"),
     ] = None
     patches: Annotated[Any, NamedTables(Patch, "named parts of the boundary: { outlet = { side, span } }")] = {}
-    start: Annotated[
-        BasinStart | None,
-        Nested(
-            BasinStart, "initial level, or pressure above the pressure at rest, and velocities; at rest if left out"
-        ),
-    ] = None
+    start: Annotated[BasinStart | None, Nested(
+        BasinStart, "initial level, or pressure above the pressure at rest, and velocities; at rest if left out",
+    )] = None  # fmt: skip
 
     attitude: Annotated[Attitude | None, Nested(Attitude, "attitude of the basin axes relative to the body axes")] = (
         None
@@ -320,11 +297,8 @@ class Basin(PlaceOnBody, kind="basin"):
         known = isinstance(physics, str) and physics in Physics.kinds
         faults = Physics.kinds[physics].own_faults(given) if known else []
         if "mesh" in given:
-            faults += [
-                ((key,), "is a key of rectangles, but this basin has a `mesh`; remove this key or `mesh`")
-                for key in RECTANGLE_KEYS
-                if key in given
-            ]
+            text = "is a key of rectangles, but this basin has a `mesh`; remove this key or `mesh`"
+            faults += [((key,), text) for key in RECTANGLE_KEYS if key in given]
         else:
             faults += [((), f"{key} is missing") for key in RECTANGLE_KEYS[:2] if key not in given]
         for name, patch in given["patches"].items() if isinstance(given.get("patches"), dict) else ():

@@ -1,7 +1,5 @@
 """Rigid bodies in space, and their joints."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar
@@ -11,9 +9,9 @@ import numpy as np
 from fvsolve.assembly.lowering import Lowering
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import Attitude, is_zero_vector, length_notices
-from fvsolve.parts.node import Node
+from fvsolve.parts.nodes_and_links import Node
 from fvsolve.parts.schedule import Schedule, Scheduled
-from fvsolve.parts.table_model import Nested, Table
+from fvsolve.parts.table_model import Nested, Table, check_table
 from fvsolve.parts.value import (
     PROFILE,
     Choice,
@@ -25,6 +23,7 @@ from fvsolve.parts.value import (
     UsualRange,
     Value,
     ValueFault,
+    faults_of,
     nonnegative,
     positive,
 )
@@ -42,18 +41,15 @@ class NamedPoints(Value):
         self.about = about
 
     def read(self, given: Any, setting: ReadContext) -> dict[str, tuple[float, ...]]:
-        if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is not a table; expected {{ NAME = [x, y, z] }}")
+        check_table(given, "{ NAME = [x, y, z] }")
         points, faults = {}, []
         for name, place in given.items():
             if not re.fullmatch(r"[\w-]+", name):
                 faults.append(((name,), f"{show(name)} is not a valid name; a name has letters, digits, _ and -"))
             try:
                 points[name] = Rows("position", length=3).read(place, setting)
-            except ValueFault as error:
-                faults += [((name, *below), text) for below, text in error.faults]
             except ValueError as error:
-                faults.append(((name,), str(error)))
+                faults += faults_of(error, name)
         if faults:
             raise ValueFault(faults)
         return points
@@ -185,22 +181,14 @@ class Joint(Table):
         Schedule | None,
         Scheduled("position", about="travel at the start, or a schedule that drives the joint [m]; 0 if left out"),
     ] = None
-    rate: Annotated[
-        Any,
-        JointQuantity(
-            "angular_velocity",
-            "rate of angle or travel at the start; of a ball or free joint the angular velocity [x, y, z] in body axes"
-            "; 0 if left out",
-        ),
-    ] = None
-    velocity: Annotated[
-        tuple[float, ...] | None,
-        Rows(
-            "velocity",
-            length=3,
-            about="velocity of the centre of mass of a free body at the start [m/s]; 0 if left out",
-        ),
-    ] = None
+    rate: Annotated[Any, JointQuantity(
+        "angular_velocity",
+        "rate of angle or travel at the start; of a ball or free joint the angular velocity [x, y, z] in body axes"
+        "; 0 if left out",
+    )] = None  # fmt: skip
+    velocity: Annotated[tuple[float, ...] | None, Rows(
+        "velocity", length=3, about="velocity of the centre of mass of a free body at the start [m/s]; 0 if left out",
+    )] = None  # fmt: skip
     damping: Annotated[
         Any, JointQuantity("damping", "damping torque or force per rate of the joint; 0 if left out")
     ] = None
@@ -227,12 +215,8 @@ class Joint(Table):
             if all(isinstance(x, (int, float)) for x in given["axis"]) and is_zero_vector(given["axis"]):
                 faults.append((("axis",), "is all zeros; expected a direction, for example [0, 1, 0]"))
         if "at" in given and isinstance(given.get("on"), str) and "." in given["on"]:
-            faults.append(
-                (
-                    ("at",),
-                    f"{given['on']} gives the position already; remove `at`, or give a body without point in `on`",
-                )
-            )
+            text = f"{given['on']} gives the position already; remove `at`, or give a body without point in `on`"
+            faults.append((("at",), text))
         return faults
 
     @classmethod
@@ -250,10 +234,8 @@ class Joint(Table):
             try:
                 if key in given:
                     result[key] = value.read(given[key], setting)
-            except ValueFault as error:
-                faults += [((key, *below), text) for below, text in error.faults]
             except ValueError as error:
-                faults.append(((key,), str(error)))
+                faults += faults_of(error, key)
         driven = [key for key in ("angle", "travel") if isinstance(given.get(key), dict)]
         for key in ("rate", "damping", "stiffness") if driven else ():
             if key in given:

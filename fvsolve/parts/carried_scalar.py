@@ -1,13 +1,21 @@
 """Scalars transported by the fluid: temperature, concentration, tracer."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table_model import Table
-from fvsolve.parts.value import PROFILE, VALUE, Number, Quantity, ReadContext, Text, Value, ValueFault, nonnegative
+from fvsolve.parts.value import (
+    PROFILE,
+    VALUE,
+    Number,
+    Quantity,
+    ReadContext,
+    Text,
+    Value,
+    nonnegative,
+    read_each,
+)
 from fvsolve.units import show
 
 
@@ -37,17 +45,7 @@ class ScalarValues(Value):
     def read(self, given: Any, setting: ReadContext) -> dict[str, Any]:
         if not isinstance(given, dict):
             raise ValueError(f"{show(given)} is not a table of scalars; expected {{ NAME = VALUE }}")
-        values, faults = {}, []
-        for name, item in given.items():
-            try:
-                values[name] = self.value.read(item, setting)
-            except ValueFault as error:
-                faults += [((name, *below), message) for below, message in error.faults]
-            except ValueError as error:
-                faults.append(((name,), str(error)))
-        if faults:
-            raise ValueFault(faults)
-        return values
+        return read_each(given.items(), lambda item: self.value.read(item, setting))
 
     def below(self, key: str) -> Value | None:
         return self.value

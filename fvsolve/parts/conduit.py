@@ -1,14 +1,20 @@
-"""Friction of pipes and rigid columns, and the keys that both have."""
+"""Friction, nominal sizes and fittings of pipes and rigid columns, the keys that both have, and rigid columns.
 
-from __future__ import annotations
+Sizes and fittings are from the tables of the package `fluids`. Loss coefficients of fittings are those of Crane TP-410:
+K = (L / D) f_T, with the equivalent length L over the diameter D, and f_T the friction factor of clean commercial
+steel in fully turbulent flow. The fitting `entrance` has K = 0.5.
+"""
 
-from collections.abc import Iterator
+import math
+import re
+from collections.abc import Callable, Iterator
 from typing import Annotated, Any, ClassVar
 
 from fvsolve import units
+from fvsolve.assembly.lowering import Lowering
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts.link import TwoPort
-from fvsolve.parts.pipe_sizes import FITTINGS, fittings_loss, pipe_bore
+from fvsolve.kernels import dtypes as rec
+from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.table_model import Table, missing_key_faults
 from fvsolve.parts.value import (
     BY_CELLS,
@@ -18,6 +24,7 @@ from fvsolve.parts.value import (
     Number,
     Quantity,
     ReadContext,
+    Rows,
     Text,
     UsualRange,
     Value,
@@ -27,6 +34,74 @@ from fvsolve.parts.value import (
     positive,
 )
 from fvsolve.units import show
+
+# NPS of each DN below 100; from DN 100 on, DN = 25 NPS (ASME B36.10M).
+DN_NPS = {
+    6: 0.125, 8: 0.25, 10: 0.375, 15: 0.5, 20: 0.75, 25: 1.0, 32: 1.25, 40: 1.5, 50: 2.0, 65: 2.5, 80: 3.0, 90: 3.5,
+}  # fmt: skip
+
+# name -> loss coefficient from fluids.fittings (f), inner diameter d [m] and f_T
+FITTINGS: dict[str, Callable[[Any, float, float], float]] = {
+    "bend-90": lambda f, d, ft: f.bend_rounded(Di=d, angle=90, fd=ft, bend_diameters=1.5, method="Crane"),
+    "bend-45": lambda f, d, ft: f.bend_rounded(Di=d, angle=45, fd=ft, bend_diameters=1.5, method="Crane"),
+    "elbow-90": lambda f, d, ft: f.bend_rounded(Di=d, angle=90, fd=ft, method="Crane standard"),
+    "elbow-45": lambda f, d, ft: f.bend_rounded(Di=d, angle=45, fd=ft, method="Crane standard"),
+    "mitre-90": lambda f, d, ft: f.bend_miter(angle=90, Di=d, method="Crane"),
+    "tee-run": lambda f, d, ft: 20.0 * ft,
+    "tee-branch": lambda f, d, ft: 60.0 * ft,
+    "gate-valve": lambda f, d, ft: f.K_gate_valve_Crane(d, d, 0.0),
+    "globe-valve": lambda f, d, ft: f.K_globe_valve_Crane(d, d),
+    "angle-valve": lambda f, d, ft: f.K_angle_valve_Crane(d, d),
+    "ball-valve": lambda f, d, ft: f.K_ball_valve_Crane(d, d, 0.0),
+    "plug-valve": lambda f, d, ft: f.K_plug_valve_Crane(d, d, 0.0),
+    "butterfly-valve": lambda f, d, ft: f.K_butterfly_valve_Crane(d),
+    "swing-check-valve": lambda f, d, ft: f.K_swing_check_valve_Crane(d, angled=True),
+    "foot-valve": lambda f, d, ft: f.K_foot_valve_Crane(d),
+    "entrance": lambda f, d, ft: f.entrance_sharp(method="Crane"),
+}
+
+
+WHOLE, MIXED = r"\d+(?:\.\d+)?", r"(?:\d+(?:\s+|\s*-\s*))?[1-9]\d*\s*/\s*[1-9]\d*"  # 1.5; 1/2, 1-1/2, 1 1/2
+
+
+def parse_inches(text: str) -> float:
+    """Number of a text such as "1.5", "1/2", "1-1/2" or "1 1/2"."""
+    *whole, last = re.split(r"\s*-\s*|(?<!/)(?<!/ )\s+(?!/)", text)
+    top, _, bottom = last.partition("/")
+    return sum(map(float, whole)) + float(top) / float(bottom or 1)
+
+
+def pipe_bore(nominal: str, schedule: str) -> tuple[float, float]:
+    """(inner diameter [m], wall thickness [m]) of a nominal size such as "DN100" or "NPS 4" in a schedule.
+
+    Raises ValueError for an unknown size or schedule.
+    """
+    from fluids.piping import nearest_pipe, schedule_lookup
+
+    match = re.fullmatch(rf"(DN|NPS)\s*({WHOLE}|{MIXED})", nominal.strip(), re.IGNORECASE)
+    if match is None:
+        raise ValueError(f'{show(nominal)} is not a nominal size; expected for example "DN100", "NPS 4" or "NPS 1-1/2"')
+    if schedule not in schedule_lookup:
+        near = did_you_mean(schedule, schedule_lookup) or f"; schedules are {listing(schedule_lookup)}"
+        raise ValueError(f"no schedule named {show(schedule)}{near}")
+    number = parse_inches(match[2])
+    if match[1].upper() == "DN":
+        number = DN_NPS.get(number, number / 25.0)
+    sizes = schedule_lookup[schedule][0]
+    if number not in sizes:
+        near = ", ".join(f"NPS {size:g}" for size in sorted(sizes, key=lambda size: abs(size - number))[:3])
+        raise ValueError(f"{nominal} is not made in schedule {schedule}; the nearest sizes are {near}")
+    _, inner, _, wall = nearest_pipe(NPS=number, schedule=schedule)
+    return inner, wall
+
+
+def fittings_loss(names: list[str], diameter: float) -> float:
+    """Sum of the loss coefficients of fittings in a pipe with a given inner diameter [m]."""
+    from fluids import fittings
+    from fluids.friction import ft_Crane
+
+    return sum(FITTINGS[name](fittings, diameter, ft_Crane(diameter)) for name in names)
+
 
 MODELS = ("none", "steady", "quasi-steady", "unsteady", "hazen-williams", "chezy-manning")
 WEIGHTINGS = ("zielke", "vardy-brown")
@@ -79,23 +154,14 @@ class Friction(Table):
         float | None, Number(positive, "coefficient C of hazen-williams [-], or n of chezy-manning [s/m^(1/3)]")
     ] = None
 
-    weighting: Annotated[
-        str | None,
-        Choice(
-            "weighting function",
-            WEIGHTINGS,
-            "weighting function of past flow changes, model unsteady; "
-            "chosen by the initial Reynolds number if left out",
-        ),
-    ] = None
-    accuracy: Annotated[
-        float | None,
-        Number(
-            between(1e-6, 0.1),
-            "relative accuracy of the sum of exponentials, model unsteady; 1e-4 if left out",
-            changes=SHAPE,
-        ),
-    ] = None
+    weighting: Annotated[str | None, Choice(
+        "weighting function", WEIGHTINGS, "weighting function of past flow changes, model unsteady; "
+        "chosen by the initial Reynolds number if left out",
+    )] = None  # fmt: skip
+    accuracy: Annotated[float | None, Number(
+        between(1e-6, 0.1), "relative accuracy of the sum of exponentials, model unsteady; 1e-4 if left out",
+        changes=SHAPE,
+    )] = None  # fmt: skip
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
@@ -236,3 +302,68 @@ def pipe_size(nominal: str, schedule: Any) -> tuple[float, float]:
     except ValueError as error:
         key = "schedule" if "schedule named" in str(error) else "nominal"
         raise ValueFault([((key,), str(error))]) from None
+
+
+class Way(Value):
+    """Value of a case file for a list of points in space."""
+
+    takes = "list of [x, y, z], m"
+
+    def __init__(self, about: str) -> None:
+        self.about = about
+
+    def read(self, given: Any, setting: ReadContext) -> list[tuple[float, ...]]:
+        if not isinstance(given, (list, tuple)):
+            raise ValueError(f"{show(given)} is not a list of points; expected [[x, y, z], ...]")
+        points, faults = [], []
+        for index, point in enumerate(given):
+            try:
+                points.append(Rows("position", length=3).read(point, setting))
+            except ValueFault as error:
+                faults += [((index, *below), text) for below, text in error.faults]
+            except ValueError as error:
+                faults.append(((index,), str(error)))
+        if faults:
+            raise ValueFault(faults)
+        return points
+
+    def json(self) -> dict[str, Any]:
+        return {"type": "array", "items": Rows("position", length=3).json()}
+
+
+class RigidColumn(Conduit, kind="rigid-column"):
+    """An incompressible pipe, (rho length / A) dq/dt = drop of p + rho g z minus friction; its flow q is a state.
+
+    A is the area, p the pressure and z the elevation. Ports: from, to. Stored energy: rho length q^2 / (2 A) [J].
+    Dissipated power: friction and minor loss, pressure drop times flow [W].
+    """
+
+    route: Annotated[
+        list[tuple[float, ...]],
+        Way("points between the ends of a column on a body, in the axes of the body [m]; straight if left out"),
+    ] = []
+    no_scalars: ClassVar[str] = "it has no cells to carry scalars; use a pipe"
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list:
+        law = given.get("friction")
+        if isinstance(law, dict) and law.get("model") == "unsteady":
+            message = '"unsteady" friction is not available in a rigid column; expected "quasi-steady", or use a pipe'
+            return [*super().key_faults(given), (("friction", "model"), message)]
+        return super().key_faults(given)
+
+
+class RigidColumnRows(Lowering, kind="rigid-column"):
+    """Conversion to table rows of rigid columns, each with its flow as state."""
+
+    table = "column"
+
+    def fill(self, draft, name, link, rows) -> None:
+        (row,) = rows
+        draft.ends(link, row)
+        row["area"], row["length"] = math.pi / 4.0 * link.diameter**2, link.length
+        draft.hydraulics.friction(name, link, row, draft.fault)
+        row["y"] = draft.states([f"{name}.flow"], 0.1 * draft.fluid.density * row["area"])
+
+    def probe(self, draft, name, probe, row) -> None:
+        row["kind"], row["index"] = rec.COLUMN_FLOW, draft.column_names.index(name)

@@ -1,13 +1,10 @@
 """Throat between a vessel and its node: keys, the link made from them, and its table rows."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.assembly.inputs import opening_input
-from fvsolve.assembly.lowering import Restriction
-from fvsolve.parts.link import TwoPort
+from fvsolve.assembly.lowering import Restriction, opening_input
+from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import SHAPE, Number, Quantity, ReadContext, UsualRange, Value, positive
 from fvsolve.units import show
@@ -31,12 +28,9 @@ class Connection(Table):
         Quantity("length", positive, "diameter of the throat [m]", UsualRange(5e-5, 14.0, "capillaries to shafts")),
     ] = None
     # shape: with equal losses a pipe end has other roots
-    loss_in: Annotated[
-        float,
-        Number(
-            positive, "loss coefficient K in K rho v^2 / 2, v in the throat, for flow into the vessel", changes=SHAPE
-        ),
-    ]
+    loss_in: Annotated[float, Number(
+        positive, "loss coefficient K in K rho v^2 / 2, v in the throat, for flow into the vessel", changes=SHAPE,
+    )]  # fmt: skip
     loss_out: Annotated[float, Number(positive, "loss coefficient K for flow out of the vessel", changes=SHAPE)]
 
 

@@ -1,15 +1,13 @@
 """Hydraulic cylinders."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.assembly.mechanics import PushLowering, join_ports
 from fvsolve.kernels import dtypes as rec
-from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.hydraulic_nodes import Chamber
-from fvsolve.parts.link import Link, Ports
+from fvsolve.parts.nodes_and_links import Link, Ports
+from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.value import PROFILE, VALUE, Quantity, UsualRange, nonnegative, positive
 
 SIZES = UsualRange(5e-4, 30.0, "micro-hydraulics to ship lifts")
@@ -60,22 +58,16 @@ class Cylinder(Link, kind="cylinder"):
     dead_volume_B: Annotated[
         float, Quantity("volume", positive, "volume of chamber B with the rod out, lines included [m3]", changes=VALUE)
     ]
-    initial_pressure_A: Annotated[
-        float | None,
-        Quantity(
-            "pressure",
-            about="pressure of chamber A at the start [Pa]; that of its links, or the supporting pressure of a shut "
-            "chamber if left out",
-        ),
-    ] = None
-    initial_pressure_B: Annotated[
-        float | None,
-        Quantity(
-            "pressure",
-            about="pressure of chamber B at the start [Pa]; that of its links, or the supporting pressure of a shut "
-            "chamber if left out",
-        ),
-    ] = None
+    initial_pressure_A: Annotated[float | None, Quantity(
+        "pressure",
+        about="pressure of chamber A at the start [Pa]; that of its links, or the supporting pressure of a shut "
+        "chamber if left out",
+    )] = None  # fmt: skip
+    initial_pressure_B: Annotated[float | None, Quantity(
+        "pressure",
+        about="pressure of chamber B at the start [Pa]; that of its links, or the supporting pressure of a shut "
+        "chamber if left out",
+    )] = None  # fmt: skip
     leakage: Annotated[
         float, Quantity("leakage", nonnegative, "leakage flow from A to B per pressure difference [m3/s/Pa]")
     ] = 0.0

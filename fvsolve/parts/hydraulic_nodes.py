@@ -1,19 +1,16 @@
 """Junctions, given inflows, reservoirs and chambers."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
 from fvsolve import units
-from fvsolve.assembly.inputs import FLOW, HEAD, PRESSURE, Input, scalar_inputs
-from fvsolve.assembly.lowering import Lowering
+from fvsolve.assembly.lowering import FLOW, HEAD, PRESSURE, Input, Lowering, scalar_inputs
 from fvsolve.kernels import dtypes as rec
-from fvsolve.parts.context import CaseContext, Faults
-from fvsolve.parts.node import PlaceOnBody
+from fvsolve.parts.nodes_and_links import PlaceOnBody
 from fvsolve.parts.outlet.part import outlet_to_ambient
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
+from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.value import VALUE, Number, Quantity, UsualRange, between, positive
 
 
@@ -40,13 +37,10 @@ class Junction(PlaceOnBody, kind="junction"):
     minimum_pressure: Annotated[
         float | None, Quantity("pressure", about="pressure up to which no demand is supplied [Pa]; ambient if left out")
     ] = None
-    demand_exponent: Annotated[
-        float,
-        Number(
-            between(0, 3, open=True),
-            "exponent of the supplied demand over pressure, between minimum_pressure and required_pressure",
-        ),
-    ] = 0.5
+    demand_exponent: Annotated[float, Number(
+        between(0, 3, open=True),
+        "exponent of the supplied demand over pressure, between minimum_pressure and required_pressure",
+    )] = 0.5  # fmt: skip
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         if self.required_pressure is None:
@@ -71,13 +65,11 @@ class Junction(PlaceOnBody, kind="junction"):
             )
             yield ("required_pressure",), text
         if least < around.ambient:
-            yield (
-                ("minimum_pressure",),
-                (
-                    f"{least:g} Pa is below ambient pressure, at which nothing can flow out. "
-                    f"Expected at least {around.ambient:g} Pa"
-                ),
+            message = (
+                f"{least:g} Pa is below ambient pressure, at which nothing can flow out. "
+                f"Expected at least {around.ambient:g} Pa"
             )
+            yield ("minimum_pressure",), message
         if not (self.demand.value.min() >= 0.0 and self.demand.value.max() > 0.0):
             text = "is negative at some time, or always 0; `required_pressure` needs values of at least 0, not all 0"
             yield ("demand",), text

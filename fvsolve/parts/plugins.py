@@ -1,7 +1,5 @@
 """Part plugins: parts declared in a folder, or in an installed package."""
 
-from __future__ import annotations
-
 import os
 import sys
 import warnings

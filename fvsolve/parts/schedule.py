@@ -1,7 +1,5 @@
 """Schedules: values that may change with time, and the keys that declare them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -10,8 +8,8 @@ import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
+from fvsolve.parts.csv_rows import copy_name, find_file, read_columns
 from fvsolve.parts.table_model import keys_json, read_keys
-from fvsolve.parts.time_series import copy_name, find_file, read_columns
 from fvsolve.parts.value import NEEDED, Choice, Number, Quantity, Range, ReadContext, Rows, Text, Value, ValueFault
 from fvsolve.units import show
 
@@ -109,10 +107,8 @@ class Scheduled(Value):
         return {
             "table": {"time": (Rows("time"), NEEDED), "value": (Rows(*item), NEEDED), "kind": kind},
             "ramp": {
-                "start": (Quantity("time"), NEEDED),
-                "duration": (Quantity("time", val.nonnegative), NEEDED),
-                "value": (Rows(*item, length=2), NEEDED),
-                "exponent": (Number(val.positive), 1.0),
+                "start": (Quantity("time"), NEEDED), "duration": (Quantity("time", val.nonnegative), NEEDED),
+                "value": (Rows(*item, length=2), NEEDED), "exponent": (Number(val.positive), 1.0),
             },
             "wave": {
                 "mean": (Quantity(self.dimension), NEEDED),
@@ -122,7 +118,7 @@ class Scheduled(Value):
             },
             "file": {"file": (Text(), NEEDED), "time": (Text(), None), "value": (Text(), None), "kind": kind},
             "signal": {"signal": (Text(), NEEDED)},
-        }
+        }  # fmt: skip
 
     @property
     def takes(self) -> str:

@@ -1,19 +1,18 @@
-"""Tables of a case file: base class, keys, and faults of incompatible keys."""
+"""Tables of a case file: base class, keys, faults of incompatible keys, and context of a part in its case."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from fvsolve.errors import listing
-from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.value import (
     NEEDED,
     ReadContext,
     Value,
     ValueFault,
+    check_increasing,
     context_of,
     faults_of,
     key_hint,
@@ -21,6 +20,42 @@ from fvsolve.parts.value import (
     read_each,
 )
 from fvsolve.units import show
+
+Faults = Iterator[tuple[tuple[Any, ...], str]]  # (keys below the part, text of the fault)
+
+
+@dataclass(frozen=True)
+class CaseContext:
+    """Parts and properties of a case, for checks after its parts are read.
+
+    nodes, links : parts by name; ambient : ambient pressure [Pa]
+    gravity : acceleration of gravity [m/s2], None if faulty; fluid : properties of the fluid, None if faulty
+    boiling_faults : function of (group, name, key, pressures [Pa]) of a part, which yields a fault if the fluid boils
+    at one of the pressures
+    place_distance : function of two places: distance [m] from the first to the second at the start, None if unknown
+    """
+
+    nodes: dict[str, Any]
+    links: dict[str, Any]
+    ambient: float
+    gravity: float | None
+    fluid: Any
+    boiling_faults: Callable[[str, str, str, list[float]], Faults]
+    place_distance: Callable[[str, str], float | None]
+
+    def spatial(self, place: str | None) -> bool:
+        """True if a place is a body, or a point of a body or of the world."""
+        name, _, point = (place or "").partition(".")
+        node = self.nodes.get(name)
+        return getattr(node, "domain", "") == "spatial" or bool(point) and point in getattr(node, "points", {})
+
+    def separation(self, link: Any, first: str, second: str) -> float | None:
+        """Distance [m] from the place at port `first` of a link to that at port `second` at the start; None if unknown.
+
+        It is a signed difference of positions for masses on the axis, and a distance for points in space.
+        """
+        ends = [link.ports.get(port) for port in (first, second)]
+        return None if None in ends else self.place_distance(*ends)
 
 
 def read_keys(given: dict[str, Any], keys: dict[str, tuple[Value, Any]], setting: ReadContext) -> dict[str, Any]:
@@ -38,6 +73,50 @@ def read_keys(given: dict[str, Any], keys: dict[str, tuple[Value, Any]], setting
     if faults:
         raise ValueFault(faults)
     return result
+
+
+def check_table(given: Any, expected: str) -> None:
+    """Raise ValueError if a value is not a table; expected : text about the expected table"""
+    if not isinstance(given, dict):
+        raise ValueError(f"{show(given)} is not a table; expected {expected}")
+
+
+def read_lists(
+    given: dict[str, Any], keys: dict[str, tuple[Value, Any]], setting: ReadContext, noun: str, further=lambda *_: []
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Read a table of two lists of equal lengths, of which the first rises : (first list, second list).
+
+    keys : the two keys -> (declaration, default); noun : plural name of the values of the first list, for messages
+    further : function of both lists that returns further faults. Raises ValueFault with all faults.
+    """
+    (key, first), (other, second) = read_keys(given, keys, setting).items()
+    faults = []
+    if len(first) != len(second):
+        text = f"has length {len(second)}, but `{key}` has length {len(first)}; expected equal lengths"
+        faults.append(((other,), text))
+    faults += further(first, second)
+    try:
+        check_increasing(first, given[key], noun)
+    except ValueError as error:
+        faults.append(((key,), str(error)))
+    if faults:
+        raise ValueFault(faults)
+    return first, second
+
+
+@dataclass(frozen=True)
+class ListTable:
+    """Base of values of parts that are tables of lists of numbers, compared by their contents."""
+
+    def table(self) -> dict[str, list[float]]:
+        """Table of a case file: key -> list."""
+        return {field.name: [float(x) for x in getattr(self, field.name)] for field in fields(self)}
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is type(self) and self.table() == other.table()
+
+    def __hash__(self) -> int:
+        return hash(tuple(map(tuple, self.table().values())))
 
 
 def keys_json(keys: dict[str, tuple[Value, Any]]) -> dict[str, Any]:

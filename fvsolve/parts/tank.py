@@ -1,7 +1,5 @@
 """Open tanks."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
@@ -10,11 +8,10 @@ import numpy as np
 from fvsolve.assembly.lowering import Lowering
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.connection import Connection, ConnectionTable, with_connection
-from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.hydraulic_nodes import Junction
-from fvsolve.parts.node import PlaceOnBody
+from fvsolve.parts.nodes_and_links import PlaceOnBody
 from fvsolve.parts.schedule import constant
-from fvsolve.parts.table_model import keys_json, read_keys
+from fvsolve.parts.table_model import CaseContext, Faults, ListTable, keys_json, read_lists
 from fvsolve.parts.value import (
     NEEDED,
     PROFILE,
@@ -24,8 +21,6 @@ from fvsolve.parts.value import (
     Rows,
     UsualRange,
     Value,
-    ValueFault,
-    check_increasing,
     nonnegative,
     positive,
 )
@@ -34,7 +29,7 @@ LEVELS = UsualRange(0.0, 2000.0, "tanks to lakes and shafts")
 
 
 @dataclass(frozen=True, eq=False)
-class AreaTable:
+class AreaTable(ListTable):
     """Area of the free surface over the level, linear between entries and constant outside them.
 
     level : float64[n]  level above the bottom, ascending from 0 [m]; area : float64[n]  surface at that level [m2]
@@ -42,16 +37,6 @@ class AreaTable:
 
     level: np.ndarray
     area: np.ndarray
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, AreaTable) and self.table() == other.table()
-
-    def __hash__(self) -> int:
-        return hash((self.level.tobytes(), self.area.tobytes()))
-
-    def table(self) -> dict[str, list[float]]:
-        """Area table as a table of a case file: key -> list."""
-        return {"level": self.level.tolist(), "area": self.area.tolist()}
 
 
 class Surface(Value):
@@ -69,22 +54,9 @@ class Surface(Value):
             return given
         if not isinstance(given, dict):
             return Quantity("area", positive).read(given, setting)
-        values = read_keys(given, self.keys, setting)
-        level, area = values["level"], values["area"]
-        faults = []
-        if len(level) != len(area):
-            faults.append(
-                (("area",), f"has length {len(area)}, but `level` has length {len(level)}; expected equal lengths")
-            )
-        if level[0] != 0:
-            faults.append((("level",), "levels are measured from the bottom; the first must be 0"))
-        try:
-            check_increasing(level, given["level"], "levels")
-        except ValueError as error:
-            faults.append((("level",), str(error)))
-        if faults:
-            raise ValueFault(faults)
-        return AreaTable(np.array(level), np.array(area))
+        bottom = [(("level",), "levels are measured from the bottom; the first must be 0")]
+        lists = read_lists(given, self.keys, setting, "levels", lambda level, _: bottom * (level[0] != 0))
+        return AreaTable(*map(np.array, lists))
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [Quantity("area").json(), keys_json(self.keys)]}
@@ -104,12 +76,9 @@ class Tank(PlaceOnBody, kind="tank"):
 
     area: Annotated[Any, Surface()]
     level: Annotated[float, Quantity("level", nonnegative, "water level above the bottom at the start [m]", LEVELS)]
-    height: Annotated[
-        float | None,
-        Quantity(
-            "level", positive, "level above the bottom at which the tank spills [m]; never if left out", LEVELS, VALUE
-        ),
-    ] = None
+    height: Annotated[float | None, Quantity(
+        "level", positive, "level above the bottom at which the tank spills [m]; never if left out", LEVELS, VALUE,
+    )] = None  # fmt: skip
     connection: Annotated[Connection | None, ConnectionTable()] = None
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -1,23 +1,19 @@
 """Translational mechanics on one axis: masses, frames, springs, dampers, end stops and forces."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from fvsolve.assembly.inputs import FORCE, Input
-from fvsolve.assembly.lowering import rows_in
+from fvsolve.assembly.lowering import FORCE, Input, rows_in
 from fvsolve.assembly.mechanics import AxisLowering, PushLowering, join_ports
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
 from fvsolve.parts.body import NamedPoints
-from fvsolve.parts.context import CaseContext, Faults
-from fvsolve.parts.link import Coupling
-from fvsolve.parts.node import Node
+from fvsolve.parts.nodes_and_links import Coupling, Node
 from fvsolve.parts.schedule import Schedule, Scheduled
+from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.value import VALUE, Quantity, Rows, Text, UsualRange, nonnegative, positive
 
 
@@ -73,15 +69,9 @@ class Spring(Coupling, kind="spring"):
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("free_length", "preload"),)
 
     stiffness: Annotated[float, Quantity("stiffness", positive, "spring rate, force per length [N/m]", changes=VALUE)]
-    free_length: Annotated[
-        float | None,
-        Quantity(
-            "length",
-            nonnegative,
-            "length x_to - x_from without load [m]; 0 without `preload` if left out",
-            changes=VALUE,
-        ),
-    ] = None
+    free_length: Annotated[float | None, Quantity(
+        "length", nonnegative, "length x_to - x_from without load [m]; 0 without `preload` if left out", changes=VALUE,
+    )] = None  # fmt: skip
     preload: Annotated[
         float | None, Quantity("force", about="force at the start, positive in compression [N]", changes=VALUE)
     ] = None
@@ -154,10 +144,8 @@ class EndStop(Coupling, kind="end-stop"):
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if None not in (self.minimum, self.maximum) and self.minimum >= self.maximum:
-            yield (
-                ("maximum",),
-                f"{self.maximum:g} m is not above `minimum`, {self.minimum:g} m; expected a greater value",
-            )
+            text = f"{self.maximum:g} m is not above `minimum`, {self.minimum:g} m; expected a greater value"
+            yield ("maximum",), text
 
 
 NO_STOP = 1e300  # distance to a stop that does not exist
@@ -199,14 +187,10 @@ class Force(Coupling, kind="force"):
         Schedule,
         Scheduled("force", about="force on `to`, positive along `direction` (of masses: along their axis) [N]"),
     ]
-    direction: Annotated[
-        tuple[float, ...] | None,
-        Rows(
-            "number",
-            length=3,
-            about="direction of a force on a point, in world axes; the line from `from` to `to` if left out",
-        ),
-    ] = None
+    direction: Annotated[tuple[float, ...] | None, Rows(
+        "number", length=3,
+        about="direction of a force on a point, in world axes; the line from `from` to `to` if left out",
+    )] = None  # fmt: skip
 
     @property
     def ports(self) -> dict[str, str]:
@@ -217,15 +201,11 @@ class Force(Coupling, kind="force"):
         if is_zero_vector(self.direction):
             yield ("direction",), "is all zeros; expected for example [0, 0, -1]"
         if around.spatial(self.to) and self.from_ is None and self.direction is None:
-            yield (
-                (),
-                "direction is missing: a force on a point needs this key or `from`; for example [0, 0, -1], downward",
-            )
+            text = "direction is missing: a force on a point needs this key or `from`; for example [0, 0, -1], downward"
+            yield (), text
         if not around.spatial(self.to) and self.direction is not None:
-            yield (
-                ("direction",),
-                f"{self.to} moves along a single axis, which gives the direction of the force; remove this key",
-            )
+            text = f"{self.to} moves along a single axis, which gives the direction of the force; remove this key"
+            yield ("direction",), text
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         yield from length_notices("direction", self.direction)

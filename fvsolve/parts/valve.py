@@ -1,6 +1,4 @@
-"""Valves and orifices, and the keys for the size of all restrictions."""
-
-from __future__ import annotations
+"""Valves, orifices and spool valves, and the keys for the size of all restrictions."""
 
 import math
 from dataclasses import dataclass
@@ -9,13 +7,14 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from fvsolve.assembly.inputs import opening_input
-from fvsolve.assembly.lowering import LAMINAR_REYNOLDS, Restriction
-from fvsolve.parts.link import TwoPort
+from fvsolve.assembly.lowering import LAMINAR_REYNOLDS, POSITION, Input, Restriction, opening_input
+from fvsolve.kernels import dtypes as rec
+from fvsolve.parts.nodes_and_links import Link, Ports, TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
-from fvsolve.parts.table_model import Table, keys_json, read_keys
+from fvsolve.parts.table_model import ListTable, Table, keys_json, read_lists
 from fvsolve.parts.value import (
     NEEDED,
+    SHAPE,
     Choice,
     Number,
     Quantity,
@@ -23,9 +22,7 @@ from fvsolve.parts.value import (
     Rows,
     UsualRange,
     Value,
-    ValueFault,
     between,
-    check_increasing,
     positive,
 )
 
@@ -36,7 +33,7 @@ WATER_15, WATER_60F = 1000.0, 999.016  # densities for which Kv and Cv are defin
 
 
 @dataclass(frozen=True, eq=False)
-class Characteristic:
+class Characteristic(ListTable):
     """Relative flow area over the opening of the stem, linear between entries.
 
     opening : float64[n]  ascending from 0 to 1; flow_area : float64[n]  over the flow area at full opening, from 0
@@ -44,16 +41,6 @@ class Characteristic:
 
     opening: np.ndarray
     flow_area: np.ndarray
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Characteristic) and self.table() == other.table()
-
-    def __hash__(self) -> int:
-        return hash((self.opening.tobytes(), self.flow_area.tobytes()))
-
-    def table(self) -> dict[str, list[float]]:
-        """Characteristic as a table of a case file: key -> list."""
-        return {"opening": self.opening.tolist(), "flow_area": self.flow_area.tolist()}
 
 
 class CharacteristicValue(Value):
@@ -72,27 +59,17 @@ class CharacteristicValue(Value):
             return given
         if not isinstance(given, dict):
             return self.names.read(given, setting)
-        values = read_keys(given, self.keys, setting)
-        opening, flow_area = values["opening"], values["flow_area"]
+        lists = read_lists(given, self.keys, setting, "openings", self.end_faults)
+        return Characteristic(*map(np.array, lists))
+
+    def end_faults(self, opening: tuple[float, ...], flow_area: tuple[float, ...]) -> list:
+        """Faults of the first and last entries of both lists."""
         faults = []
-        if len(opening) != len(flow_area):
-            faults.append(
-                (
-                    ("flow_area",),
-                    f"has length {len(flow_area)}, but `opening` has length {len(opening)}; expected equal lengths",
-                )
-            )
         if opening[0] != 0 or opening[-1] != 1:
             faults.append((("opening",), "openings must begin at 0 and end at 1"))
         if flow_area[0] != 0:
             faults.append((("flow_area",), "opening 0 is shut: the first flow area must be 0"))
-        try:
-            check_increasing(opening, given["opening"], "openings")
-        except ValueError as error:
-            faults.append((("opening",), str(error)))
-        if faults:
-            raise ValueFault(faults)
-        return Characteristic(np.array(opening), np.array(flow_area))
+        return faults
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [self.names.json(), keys_json(self.keys)]}
@@ -106,13 +83,10 @@ class Sized(Table):
         ("area", "diameter"),
     )
 
-    discharge_coefficient: Annotated[
-        float | None,
-        Number(
-            between(0, 1, open=True),
-            f"discharge coefficient Cd, with `area` or `diameter`; {DISCHARGE_COEFFICIENT} if left out",
-        ),
-    ] = None
+    discharge_coefficient: Annotated[float | None, Number(
+        between(0, 1, open=True),
+        f"discharge coefficient Cd, with `area` or `diameter`; {DISCHARGE_COEFFICIENT} if left out",
+    )] = None  # fmt: skip
     loss_coefficient: Annotated[
         float | None, Number(positive, "loss coefficient K, referred to the velocity in `area` or `diameter`")
     ] = None
@@ -123,15 +97,10 @@ class Sized(Table):
         float | None,
         Number(positive, "flow coefficient Cv, US gpm of water of 999.016 kg/m3 (60 degF) at 1 psi", COEFFICIENTS),
     ] = None
-    area: Annotated[
-        float | None,
-        Quantity(
-            "area",
-            positive,
-            "area of the opening [m2]; needed unless `diameter`, `Kv` or `Cv` is given",
-            UsualRange(1e-12, 200.0, "leaks to sluices"),
-        ),
-    ] = None
+    area: Annotated[float | None, Quantity(
+        "area", positive, "area of the opening [m2]; needed unless `diameter`, `Kv` or `Cv` is given",
+        UsualRange(1e-12, 200.0, "leaks to sluices"),
+    )] = None  # fmt: skip
     diameter: Annotated[
         float | None,
         Quantity("length", positive, "diameter of the opening [m]", UsualRange(1e-6, 14.0, "leaks to sluices")),
@@ -230,3 +199,58 @@ class Orifice(Valve, kind="orifice"):
 
 class OrificeRows(ValveRows, kind="orifice"):
     """Conversion to table rows of orifices: the same rows as those of valves."""
+
+
+# From, to, sign of the position at which it opens
+EDGES = ("P", "A", 1), ("P", "B", -1), ("A", "T", -1), ("B", "T", 1)
+
+
+class SpoolValve(Sized, Link, kind="spool-valve"):
+    """Zero-lapped spool valve: edges P-A and B-T open by `position` above 0, edges P-B and A-T by -`position` below 0.
+
+    Each edge is a valve, q = |position| Cd A sqrt(2 |dp| / rho) sign(dp), with flow q and drop dp (docs/course.md, 79).
+    Ports: P, T, A, B; at position 0 there is no flow. Stored energy: none. Dissipated power: dp q [W], summed over the
+    edges.
+    """
+
+    joins: ClassVar[dict[str, str]] = dict.fromkeys(("P", "T", "A", "B"), "hydraulic")
+    quantities: ClassVar[dict[str, str]] = {f"flow_{port}": "flow" for port in ("P", "T", "A", "B")}
+
+    ports: Annotated[dict[str, str], Ports(("P", "T", "A", "B"))]
+    position: Annotated[  # the schedule is divided where it crosses zero
+        Schedule, Scheduled("number", between(-1, 1), "position of the spool, -1 to 1", changes=SHAPE)
+    ]
+
+
+FLOWS = {  # flow into the link at a port: weights of its four edges
+    f"flow_{port}": [float((port == start) - (port == end)) for start, end, _ in EDGES] for port in "PTAB"
+}
+
+
+class SpoolValveRows(Restriction, kind="spool-valve"):
+    """Conversion to table rows of spool valves: four rows for each valve, one for each metering edge.
+
+    The two edges that open on the same side of position zero have one opening schedule.
+    """
+
+    rows, rank = len(EDGES), 1
+
+    def fill(self, draft, name, link, rows) -> None:
+        parts = {side: draft.schedules.add_part(link.position, side) for side in (1, -1)}
+        for (start, end, side), row in zip(EDGES, rows, strict=True):
+            row["from_node"], row["to_node"] = (draft.node_index[link.ports[port]] for port in (start, end))
+            row["schedule"] = parts[side]
+            self.restriction(draft, name, link, row)
+
+    def row_names(self, name) -> list[str]:
+        return [f"{name}.{start}-{end}" for start, end, _ in EDGES]
+
+    def probe(self, draft, name, probe, row) -> None:
+        row["index"], row["kind"] = draft.valve_names.index(name), rec.SPOOL_FLOW
+        row["weights"] = len(draft.floats)
+        draft.floats += FLOWS[probe.quantity]
+
+    def inputs(self, model, name, part):
+        first = model.valve_names.index(name)
+        above, below = (int(model.tables.valves[first + k]["schedule"]) for k in (0, 1))
+        return {"position": Input(POSITION, above, other=below)}

@@ -9,7 +9,7 @@ from numbers import Real
 
 import numpy as np
 
-from fvsolve.assembly.inputs import HEAD, Input
+from fvsolve.assembly.lowering import HEAD, Input
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.model import Model, State
 from fvsolve.model.model import flags_of, inputs_of

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.assembly.inputs import PRESSURE, Input
+from fvsolve.assembly.lowering import PRESSURE, Input
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.model.energy_norm import EnergyForm

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 from fvsolve.case import Case, load
 from fvsolve.case.load import find_source
-from fvsolve.case.raw import Raw, read_raw
+from fvsolve.case.reading import Raw, read_raw
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.output.restart import program_versions
 from fvsolve.run.process_pool import ProcessPool, compute

@@ -14,7 +14,7 @@ import numpy as np
 from fvsolve import units
 from fvsolve.case import Case, load
 from fvsolve.case.changes import declaration_of
-from fvsolve.case.raw import parsed, split_key
+from fvsolve.case.reading import parsed, split_key
 from fvsolve.errors import CaseError, Fault, FvsolveError
 from fvsolve.parts.csv_rows import number, read_rows, split_header
 from fvsolve.parts.schedule import Scheduled

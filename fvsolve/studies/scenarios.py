@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.case import Case, load, shipped
-from fvsolve.case.raw import split_key, syntax_fault
+from fvsolve.case.reading import split_key, syntax_fault
 from fvsolve.case.text import key_lines
 from fvsolve.errors import CaseError, Fault, FvsolveError, did_you_mean
 from fvsolve.output.directory import clear_reports

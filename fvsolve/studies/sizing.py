@@ -10,7 +10,7 @@ import numpy as np
 
 from fvsolve.case import Case, load
 from fvsolve.errors import CaseError, Fault, FvsolveError, collect_faults, did_you_mean
-from fvsolve.parts.arithmetic import Arithmetic
+from fvsolve.parts.formula import Arithmetic
 from fvsolve.run import run
 from fvsolve.run.result import FAILS, OPEN
 from fvsolve.run.verdicts import SIZES

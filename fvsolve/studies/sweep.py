@@ -11,7 +11,7 @@ from typing import Any
 
 from fvsolve.case import Case, load
 from fvsolve.case.load import find_source
-from fvsolve.case.raw import read_raw, split_key
+from fvsolve.case.reading import read_raw, split_key
 from fvsolve.case.text import inline
 from fvsolve.display import Displayable
 from fvsolve.errors import CaseError, FvsolveError, RunError, did_you_mean, listing

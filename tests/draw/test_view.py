@@ -16,8 +16,7 @@ from fvsolve.draw.network_picture import NetworkPicture
 from fvsolve.draw.part_drawing import place_labels
 from fvsolve.draw.projection import Projection, choose_projection, round_scale
 from fvsolve.draw.sheet import OTHER_LINK, OTHER_NODE, SYMBOLS, strokes, symbol_of
-from fvsolve.parts.link import Link
-from fvsolve.parts.node import Node
+from fvsolve.parts.nodes_and_links import Link, Node
 from fvsolve.run.plot_scene import scene_of
 
 TOWN = {"works": (0, 0, 30), "market": (900, 0, 10), "mill": (1200, -300, 5), "tower": (1800, 400, 45)}

@@ -1,7 +1,5 @@
 """EPANET networks as cases: steady heads and flows agree with EPANET, nothing drifts, and bad files are explained."""
 
-from __future__ import annotations
-
 import math
 import sys
 import tomllib
@@ -135,10 +133,7 @@ def still(made):
     return case
 
 
-LINES = [
-    ("auto", 0.0),
-    ("finite-volume", 3.0),
-]  # numerics.pipe_model, and shortest pipe for steps of cells [m]
+LINES = [("auto", 0.0), ("finite-volume", 3.0)]  # numerics.pipe_model, and shortest pipe for steps of cells [m]
 
 
 @pytest.mark.parametrize("line, shortest", LINES)

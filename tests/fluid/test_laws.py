@@ -1,7 +1,5 @@
 """Density laws: all implement every function, differ from each other, and agree with quadrature."""
 
-from __future__ import annotations
-
 import inspect
 import math
 from functools import cache

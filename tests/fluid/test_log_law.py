@@ -1,7 +1,5 @@
 """Density law `log` compared with exact solutions, and its distance from `linear`. Soft fluid: c = 10 m/s."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference import scenes
@@ -14,14 +12,9 @@ import fvsolve
 
 EXACT = LogFluid(1000.0, 1e5, AMBIENT)
 SOFT = {
-    "name": "user",
-    "density": 1000.0,
-    "bulk_modulus": 1e5,
-    "viscosity": 1e-3,
-    "vapor_pressure": 100.0,
-    "pressure": AMBIENT,
-    "law": "log",
-}
+    "name": "user", "density": 1000.0, "bulk_modulus": 1e5, "viscosity": 1e-3, "vapor_pressure": 100.0,
+    "pressure": AMBIENT, "law": "log",
+}  # fmt: skip
 C = 10.0
 LENGTH, DIAMETER, END = 100.0, 0.5, 1.8
 AREA = scenes.area(DIAMETER)

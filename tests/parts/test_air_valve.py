@@ -1,12 +1,11 @@
 """Air valves against SciPy, a closed form and a plain junction, with staged outflow; pressure-dependent demand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 from reference.bores import HEAT, SMALL, bores
+from reference.refusals import refused
 from reference.scenes import AMBIENT, RHO, WATER, area, junction, lake, pipe, reservoir, scene, valve
 from scipy.integrate import solve_ivp
 
@@ -192,9 +191,7 @@ def test_what_is_wrong_with_an_air_valve_is_said(wrong, said):
     case = drained()
     given = case["nodes"]["v"] | wrong
     case["nodes"]["v"] = {key: value for key, value in given.items() if value is not None}
-    with pytest.raises(fvsolve.CaseError) as error:
-        fvsolve.load(case)
-    assert said in str(error.value)
+    assert said in str(refused(case))
 
 
 def test_a_demand_follows_the_pressure_between_none_and_all():
@@ -229,9 +226,7 @@ def test_a_demand_follows_the_pressure_between_none_and_all():
 )
 def test_what_is_wrong_with_such_a_demand_is_said(wrong, said):
     nodes = {"lake": reservoir(5e5), "j": {"type": "junction", "demand": 0.001, **wrong}}
-    with pytest.raises(fvsolve.CaseError) as error:
-        fvsolve.load(scene(nodes, {"gap": valve("lake", "j", 2e-4)}, 1.0, {"step": 0.1}))
-    assert said in str(error.value)
+    assert said in str(refused(scene(nodes, {"gap": valve("lake", "j", 2e-4)}, 1.0, {"step": 0.1})))
 
 
 STAGES = {"switch": 4e3, "throttled_outlet": 0.008, "automatic": 0.003}
@@ -254,12 +249,10 @@ def by_stages(case, speed: float | None = None):
     result = fvsolve.run(case)
     t, times = np.asarray(result.t), {e["what"]: e["time"] for e in reversed(result.summary["events"])}
     rows = (t >= 0.6) & (t < times.get("shuts", np.inf) - 0.02)
-    y, at, off, parted = (
-        [result[name][rows][0] for name in ("c.flow", "v.air_volume", "v.air_mass")],
-        t[rows][0],
-        [],
-        0.0,
-    )
+    y = [result[name][rows][0] for name in ("c.flow", "v.air_volume", "v.air_mass")]
+    at = t[rows][0]
+    off = []
+    parted = 0.0
     for wide, end in ((0.02, t[rows][-1]), (0.008, t[rows][-1])):
         out = math.hypot(wide, 0.003)
 
@@ -343,6 +336,4 @@ def test_staged_and_resumed_it_is_the_unbroken_run(tmp_path, end):
 )  # fmt: skip
 def test_what_is_wrong_with_its_stages_is_said(more, said):
     case = staged(**more)
-    with pytest.raises(fvsolve.CaseError) as error:
-        fvsolve.load(case)
-    assert said in str(error.value)
+    assert said in str(refused(case))

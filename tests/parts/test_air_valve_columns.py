@@ -1,7 +1,5 @@
 """Rigid columns at an air valve against SciPy: one flow while it is shut, two flows while it contains air."""
 
-from __future__ import annotations
-
 import math
 from importlib import import_module
 

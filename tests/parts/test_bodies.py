@@ -1,7 +1,5 @@
 """Bodies in space against closed forms, Lagrange's equations and SciPy, with conserved quantities and orders."""
 
-from __future__ import annotations
-
 import math
 from importlib import import_module
 
@@ -195,11 +193,9 @@ def test_the_terms_of_65_are_those_of_motion_seen_from_the_axes_that_move():
     r = rows("b2.p.")[k] - rows("b1.")[k]
     v = turned.apply(rates @ seen[about])
     expected = {
-        "relative": turned.apply(weights @ seen[about]),
-        "coriolis": 2.0 * np.cross(w, v),
-        "transversal": np.cross(rates @ rows("b1.w")[about], r),
-        "centripetal": np.cross(w, np.cross(w, r)),
-    }
+        "relative": turned.apply(weights @ seen[about]), "coriolis": 2.0 * np.cross(w, v),
+        "transversal": np.cross(rates @ rows("b1.w")[about], r), "centripetal": np.cross(w, np.cross(w, r)),
+    }  # fmt: skip
     for share, value in expected.items():
         found = [result[f"b2.p.a{axis}_{share}"][k] for axis in "xyz"]
         assert found == approx(value, abs=2e-6 * max(1.0, np.abs(value).max())), share
@@ -289,12 +285,9 @@ def test_shut_chambers_that_state_no_pressure_hold_what_stands_on_them(stated):
         if key[-1] not in stated:
             del links["lift"][key]
     links["shut"] = {
-        "type": "valve",
-        "from": "pump",
-        "to": "lift.A",
-        "area": 1e-5,
+        "type": "valve", "from": "pump", "to": "lift.A", "area": 1e-5,
         "opening": {"start": 0.5, "duration": 0.1, "value": [0, 1]},
-    }
+    }  # fmt: skip
     nodes = {**crane.nodes(), "pump": {"type": "reservoir", "pressure": 2e7}}
     case = bodies(nodes, 0.6, ["lift.A.pressure", "lift.B.pressure", "boom.angle"], links)
     case["fluid"] = dict(OIL)

@@ -1,7 +1,5 @@
 """Chambers and orifices against closed forms and SciPy, also beyond the finite time of filling."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -26,12 +24,7 @@ def test_a_chamber_fills_in_finite_time_and_rests(supply, numerics, near):
     slope = BETA / VOLUME * HOLE * math.sqrt(2 / RHO)
     filled = 2 * math.sqrt(abs(supply - P0)) / slope
     case = scene(
-        nodes,
-        {"hole": valve("pump", "pot", HOLE)},
-        filled + 60.0,
-        numerics,
-        ["pot.pressure", "hole.flow"],
-        0.1,
+        nodes, {"hole": valve("pump", "pot", HOLE)}, filled + 60.0, numerics, ["pot.pressure", "hole.flow"], 0.1
     )
     result = fvsolve.run(case)
     drop = vessels.filling(VOLUME, BETA, HOLE, RHO, abs(supply - P0), result.t)
@@ -62,12 +55,7 @@ def orifice(k: float, drop):
 
 def test_chambers_and_orifices_agree_with_scipy_to_ten_digits():
     """Supply, orifice, chamber, closing valve, chamber and two outlets, with all drops far from zero."""
-    nodes = {
-        "pump": reservoir(8e6),
-        "a": chamber(0.02, 5e6),
-        "b": chamber(0.05, 3e6),
-        "out": reservoir(5e5),
-    }
+    nodes = {"pump": reservoir(8e6), "a": chamber(0.02, 5e6), "b": chamber(0.05, 3e6), "out": reservoir(5e5)}
     links = {
         "in": valve("pump", "a", 2e-7),
         "mid": valve("a", "b", 4e-7, ramp(0.0, 4.0, 1.0, 0.2, 2.0)),
@@ -140,18 +128,12 @@ def test_a_chamber_on_a_pipe_swings_as_mass_on_a_spring():
 @pytest.mark.parametrize("opening", [0.0, 1.0], ids=["shut", "open"])
 def test_a_valve_between_pipe_and_chamber_and_a_junction_between_valves_run(opening):
     nodes = {
-        "lake": reservoir(2e6),
-        "gate": junction(),
-        "pot": chamber(0.01, 1e6),
-        "mid": junction(),
-        "out": reservoir(5e5),
-    }
+        "lake": reservoir(2e6), "gate": junction(), "pot": chamber(0.01, 1e6), "mid": junction(), "out": reservoir(5e5),
+    }  # fmt: skip
     links = {
-        "main": pipe("lake", "gate", 100.0, 0.1, 1000.0, 20),
-        "v1": valve("gate", "pot", 1e-4, opening),
-        "v2": valve("pot", "mid", 1e-4, opening),
-        "v3": valve("mid", "out", 2e-4, opening),
-    }
+        "main": pipe("lake", "gate", 100.0, 0.1, 1000.0, 20), "v1": valve("gate", "pot", 1e-4, opening),
+        "v2": valve("pot", "mid", 1e-4, opening), "v3": valve("mid", "out", 2e-4, opening),
+    }  # fmt: skip
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.9}
     result = fvsolve.run(scene(nodes, links, 3.0, numerics, ["pot.pressure", "mid.pressure", "v2.flow"], 0.1))
     assert result.ok

@@ -287,17 +287,12 @@ def rig(joint, law="linear", tanks=False, cells=8, gravity=1e-12, **numerics):
         "in": {**column, "from": "left", "to": "l", "length": 1.2},
         "first": {**pipe, "from": "l", "to": "m", "length": 2.05},
         "gate": {
-            "type": "valve",
-            "from": "m",
-            "to": "n",
-            "area": 0.004,
-            "opening": shuts,
-            "discharge_coefficient": 0.6,
+            "type": "valve", "from": "m", "to": "n", "area": 0.004, "opening": shuts, "discharge_coefficient": 0.6,
         },
         "drip": {"type": "orifice", "from": "n", "to": "pot", "area": 1e-4, "discharge_coefficient": 0.6},
         "second": {**pipe, "from": "r", "to": "n", "length": 2.4},
         "out": {**column, "from": "r", "to": "right", "length": 1.3},
-    }
+    }  # fmt: skip
     case = scene(nodes, links, 0.3, {"scheme": "upwind5", "method": "rk4", "step": 2e-4, "initial": "rest", **numerics},
                  ["rig.vx", "gate.flow"], every=1e-3, gravity=gravity)  # fmt: skip
     case["fluid"] = {**WATER, "law": law}
@@ -323,19 +318,15 @@ def momenta(model, t, y):
     line(body["mass"], body["centre"], body["centre"])
     found[3:] += turn @ body["inertia"].reshape(3, 3) @ turn.T @ spin
     for i, node in enumerate(tables.nodes):
-        r, mass = (
-            tables.moving_segments[node["moving_segment"]]["start"],
-            node["mass"] + (y[node["y"]] if node["y"] >= 0 else 0.0),
-        )
+        r = tables.moving_segments[node["moving_segment"]]["start"]
+        mass = node["mass"] + (y[node["y"]] if node["y"] >= 0 else 0.0)
         levels[i] = np.array([0, 0, mass / (node["density"] * node["area"]) if node["kind"] == rec.TANK else 0.0])
         line(mass, r, r + levels[i])
     for pipe in tables.pipes:
         for k in range(n := int(pipe["cells"])):
             forth, back, ride = (
-                y[pipe["y"] + k],
-                y[pipe["y"] + n + k],
-                tables.moving_segments[pipe["moving_segment"] + k],
-            )
+                y[pipe["y"] + k], y[pipe["y"] + n + k], tables.moving_segments[pipe["moving_segment"] + k],
+            )  # fmt: skip
             per = RHO * pipe["area"] if linear else tables.profile[pipe["center"] + k]
             mass = (per + (forth + back) / pipe["speed"]) * pipe["dx"]
             line(mass, ride["start"], ride["end"], pipe["flow"] + forth - back)

@@ -1,7 +1,5 @@
 """Junctions of pipes: series, branches, dead ends, arbitrary lengths and valves, without growing modes."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -146,14 +144,9 @@ def scatter(cells: int, scheme: str, numerics: dict) -> float:
 
 
 SCHEMES = {
-    "upwind": (1, 1600),
-    "linear-upwind": (2, 240),
-    "fromm": (2, 120),
-    "central": (2, 120),
-    "upwind3": (3, 240),
-    "upwind5": (5, 60),
-    "weno5": (5, 120),
-}
+    "upwind": (1, 1600), "linear-upwind": (2, 240), "fromm": (2, 120), "central": (2, 120), "upwind3": (3, 240),
+    "upwind5": (5, 60), "weno5": (5, 120),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -278,20 +271,12 @@ def test_no_mode_grows_in_random_networks(scheme):
     rng = np.random.default_rng(7)
     for _ in range(25):
         count = int(rng.integers(2, 4))
-        ends = [
-            reservoir(SUPPLY),
-            *(junction() if rng.random() < 0.5 else reservoir(SUPPLY) for _ in range(count - 1)),
-        ]
+        ends = [reservoir(SUPPLY), *(junction() if rng.random() < 0.5 else reservoir(SUPPLY) for _ in range(count - 1))]
         nodes = {"mid": junction(), **{f"end{i}": e for i, e in enumerate(ends)}}
         links = {}
         for i in range(count):
             way = ("mid", f"end{i}") if rng.random() < 0.5 else (f"end{i}", "mid")
-            sizes = (
-                rng.uniform(20, 500),
-                rng.uniform(0.1, 0.8),
-                rng.uniform(400, 1400),
-                int(rng.integers(1, 30)),
-            )
+            sizes = (rng.uniform(20, 500), rng.uniform(0.1, 0.8), rng.uniform(400, 1400), int(rng.integers(1, 30)))
             links[f"p{i}"] = pipe(*way, *map(float, sizes[:3]), sizes[3])
         numerics = {"scheme": scheme, "method": "rk4", "courant": 0.5}
         assert growth(scene(nodes, links, 1.0, numerics, ["mid.pressure"])) < 1e-8, links
@@ -310,13 +295,9 @@ def random_network(rng: np.random.Generator, dt: float) -> tuple[dict, dict, ray
     q, area, up = rng.uniform(0.005, 0.05), rng.uniform(0.002, 0.02), rng.uniform(0.7, 1.5)
     length = 10 * dt
     nodes = {
-        "n0": reservoir(step(when["n0"], SUPPLY, SUPPLY * up)),
-        "n1": junction(step(when["n1"], 0.0, q)),
-        "n2": junction(ramp(when["n2"], length, 0.0, q)),
-        "n3": junction(),
-        "n4": junction(),
-        "air": reservoir(AMBIENT),
-    }
+        "n0": reservoir(step(when["n0"], SUPPLY, SUPPLY * up)), "n1": junction(step(when["n1"], 0.0, q)),
+        "n2": junction(ramp(when["n2"], length, 0.0, q)), "n3": junction(), "n4": junction(), "air": reservoir(AMBIENT),
+    }  # fmt: skip
     links = {n: pipe(*row) for n, row in rows.items()}
     links["out"] = valve("n3", "air", area, ramp(when["n3"], length, 0.0, 1.0))
 

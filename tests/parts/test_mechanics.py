@@ -1,7 +1,5 @@
 """Cylinders, masses and force elements on an axis, against closed forms and SciPy."""
 
-from __future__ import annotations
-
 import math
 from importlib import import_module
 
@@ -264,11 +262,9 @@ def test_a_spool_opens_one_pair_of_edges_on_each_side_of_zero(kind):
     size = 0.61e-4 * math.sqrt(2.0 / 1000.0)
     plus, minus = np.maximum(u, 0.0), np.maximum(-u, 0.0)
     wanted = {
-        "P": plus * math.sqrt(2e6) + minus * math.sqrt(3e6),
-        "T": -(plus * math.sqrt(1.9e6) + minus * math.sqrt(2.9e6)),
-        "A": minus * math.sqrt(2.9e6) - plus * math.sqrt(2e6),
-        "B": plus * math.sqrt(1.9e6) - minus * math.sqrt(3e6),
-    }
+        "P": plus * math.sqrt(2e6) + minus * math.sqrt(3e6), "T": -(plus * math.sqrt(1.9e6) + minus * math.sqrt(2.9e6)),
+        "A": minus * math.sqrt(2.9e6) - plus * math.sqrt(2e6), "B": plus * math.sqrt(1.9e6) - minus * math.sqrt(3e6),
+    }  # fmt: skip
     for port, flow in wanted.items():
         assert result[f"spool.flow_{port}"][smooth] == approx(size * flow[smooth], abs=2e-3 * size * 1e3)
     zeros = {"linear": [0.5, 2 + 2 * 0.5 / 0.75], "ramp": [0.5 + 2.0 * (1 - (0.5 / 1.25) ** (1 / 1.7))]}.get(kind, [])

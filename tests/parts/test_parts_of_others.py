@@ -1,7 +1,5 @@
 """Worked example of docs/a-part-from-nothing.md, run as printed from a package outside fvsolve."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

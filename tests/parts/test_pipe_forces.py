@@ -1,10 +1,9 @@
 """Forces on legs of a pipe: the momentum that their fluid loses, against Joukowsky and the forces on ends and wall."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from fluids.friction import friction_factor
+from reference.refusals import refused
 from reference.scenes import AMBIENT, RHO, area, junction, lake, pipe, ramp, reservoir, scene, step, valve
 
 import fvsolve
@@ -45,10 +44,8 @@ def test_joukowskys_force_on_a_bend_is_exact(turned: bool) -> None:
 
 def throttled(law: str, friction: dict, **numerics) -> dict:
     nodes = {
-        "lake": lake(60.0, elevation=0.0),
-        "gate": junction(elevation=15.0),
-        "air": reservoir(AMBIENT, elevation=15.0),
-    }
+        "lake": lake(60.0, elevation=0.0), "gate": junction(elevation=15.0), "air": reservoir(AMBIENT, elevation=15.0),
+    }  # fmt: skip
     one = pipe("lake", "gate", 500.0, DIAMETER, SPEED, 25, friction=friction, bends=[300.0],
                profile={"chainage": [0, 300, 400, 500], "elevation": [0.0, 5.0, 30.0, 15.0]})  # fmt: skip
     tap = valve("gate", "air", 0.03 * area(DIAMETER), ramp(0.1, 0.4, 1.0, 0.2))
@@ -107,8 +104,6 @@ def test_what_has_no_force_is_named() -> None:
         fvsolve.run(shut(), set={"numerics.pipe_model": "delay-line", "numerics.method": "rk4"})
     case = shut()
     case["links"]["main"]["bends"] = [600.0, 900.0]
-    with pytest.raises(fvsolve.CaseError, match="links.main.bends.1.*is outside"):
-        fvsolve.load(case)
+    refused(case, "links.main.bends.1.*is outside")
     case["links"]["main"]["bends"] = "600 m"
-    with pytest.raises(fvsolve.CaseError, match="links.main.bends"):
-        fvsolve.load(case)
+    refused(case, "links.main.bends")

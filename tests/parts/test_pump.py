@@ -1,15 +1,17 @@
-"""Pumps against closed forms: operating points, affinity laws, series, parallel, constant states, density laws."""
+"""Pumps against closed forms: operating points, affinity laws, series, parallel, constant states, density laws.
 
-from __future__ import annotations
+Pumps in networks that change: flows and heads lie on their curves, and check valves do not chatter. Faults and notices.
+"""
 
 import math
 
 import numpy as np
 import pytest
 from pytest import approx
-from reference.scenes import GRAVITY, RHO, junction, lake, pipe, pump, scene
+from reference.scenes import GRAVITY, RHO, junction, lake, pipe, pump, scene, step, valve
 
 import fvsolve
+from fvsolve.errors import CaseError
 
 FACTOR, LENGTH, BORE = 0.02, 1000.0, 0.3
 RESISTANCE = FACTOR * LENGTH / BORE / (2.0 * GRAVITY * (math.pi / 4 * BORE**2) ** 2)  # head per flow squared
@@ -136,10 +138,8 @@ def test_elevations_are_lifted_too(law):
     flows = []
     for height in (-5.0, 4.0):
         nodes = {
-            "sump": lake(-3.0, elevation=height),
-            "out": junction(elevation=height),
-            "top": lake(25.0, elevation=20.0),
-        }
+            "sump": lake(-3.0, elevation=height), "out": junction(elevation=height), "top": lake(25.0, elevation=20.0),
+        }  # fmt: skip
         links = {"pump": pump("sump", "out", curve=ONE), "main": main("out", "top")}
         case = scene(nodes, links, 2.0, {}, ["pump.flow", "out.head", "pump.head"])
         case["fluid"] = {**case["fluid"], "law": law}
@@ -170,3 +170,205 @@ def test_its_speed_is_an_input():
     assert not np.any(state.y)
     state = fvsolve.advance(model, state, 1.0, {"pump.speed": 0.9})
     assert np.any(state.y)
+
+
+STEADY_NETWORK = {"model": "steady", "factor": 0.02}
+NETWORK_CURVES = [
+    {"curve": {"flow": [0.1], "head": [50.0]}},
+    {"curve": {"flow": [0.0, 0.1, 0.15], "head": [60.0, 50.0, 35.0]}},
+    {"curve": {"flow": [0.0, 0.05, 0.06, 0.15], "head": [60.0, 59.9, 30.0, 29.9]}},  # flat, steep, flat
+    {"curve": {"flow": [0.0, 0.1, 0.11], "head": [50.0, 49.999, 20.0]}},  # a power of 50
+    {"curve": {"flow": [0.0, 0.1, 0.4], "head": [60.0, 30.0, 15.0]}},  # a power below 1
+    {"curve": {"coefficients": [60.0, 0.0, 0.0, -8000.0]}},
+    {"power": 40e3},
+    {"suter": {"rated_flow": 0.1, "rated_head": 50.0, "table": "radial-35"}},
+]
+
+
+def random_scene(seed: int) -> dict:
+    """Return a case of random pumps with random speeds between lakes, with a pipe and a valve that closes and opens."""
+    rng = np.random.default_rng(seed)
+    many = int(rng.integers(1, 4))
+    nodes = {"sump": lake(0.0), "top": lake(float(rng.uniform(-10.0, 70.0))), "end": junction(), "out": junction()}
+    places = ["sump", *(f"n{k}" for k in range(many - 1)), "out"] if rng.random() < 0.5 else None
+    nodes |= {name: junction() for name in (places or [])[1:-1]}
+    links = {"main": pipe("out", "end", 300.0, 0.3, 1000.0, 8, friction=STEADY_NETWORK)}
+    times = [0.0, 0.2, 0.8, 1.0, 1.6]
+    links["tap"] = valve("end", "top", 0.02, {"time": times, "value": [1.0, 1.0, 0.0, 0.0, 1.0]})
+    for k in range(many):
+        start, stop = (places[k], places[k + 1]) if places else ("sump", "out")
+        values = rng.choice([0.0, 0.3, 1.0, 1.2], 5).tolist()
+        law = NETWORK_CURVES[int(rng.integers(len(NETWORK_CURVES)))]
+        links[f"p{k}"] = pump(
+            start, stop, **law, speed={"time": times, "value": values}, check_valve=bool(rng.random() < 0.5)
+        )
+    probes = [f"p{k}.{what}" for k in range(many) for what in ("flow", "head")] + [f"{name}.head" for name in nodes]
+    return scene(nodes, links, 2.5, {}, probes, 0.02)
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+@pytest.mark.parametrize("seed", range(12))
+def test_flows_and_heads_lie_on_the_curves(seed, law):
+    case = random_scene(seed)
+    case["fluid"] = {**case["fluid"], "law": law}
+    result = fvsolve.run(case)
+    assert result.ok, result.reason
+    for name, link in case["links"].items():
+        if link["type"] != "pump":
+            continue
+        flow, head = result[f"{name}.flow"], result[f"{name}.head"]
+        across = result[f"{link['to']}.head"] - result[f"{link['from']}.head"]
+        if link["check_valve"]:
+            assert flow.min() > -1e-9
+            assert np.all(across[flow == 0.0] >= head[flow == 0.0] - 1e-3)
+        flows = flow != 0.0 if link["check_valve"] else np.ones(flow.size, dtype=bool)
+        assert across[flows] == approx(head[flows], abs=2e-6)
+    assert len(result.summary["events"]) <= 24
+
+
+def test_two_pumps_in_parallel_of_which_one_is_too_weak_stand_as_a_steady_state():
+    """The check valve of the weak pump is shut at the start and opens after the strong pump stops."""
+    strong, weak = {"flow": [0.1], "head": [50.0]}, {"flow": [0.05], "head": [20.0]}
+    speed = {"time": [1.0, 2.0], "value": [1.0, 0.0]}
+    links = {
+        "strong": pump("sump", "out", curve=strong, check_valve=True, speed=speed),
+        "weak": pump("sump", "out", curve=weak, check_valve=True),
+        "main": pipe("out", "top", 1000.0, 0.2, 1000.0, 10, friction=STEADY_NETWORK),
+    }
+    nodes = {"sump": lake(0.0), "out": junction(), "top": lake(20.0)}
+    probes = ["strong.flow", "weak.flow"]
+    result = fvsolve.run(scene(nodes, links, 60.0, {}, probes, 0.1))
+    assert not result["weak.flow"][result.t < 1.0].any() and np.ptp(result["strong.flow"][result.t < 1.0]) == 0.0
+    assert result["strong.flow"][-1] == 0.0 and result["weak.flow"][-1] > 0.02
+    assert len(result.summary["events"]) <= 6
+
+
+def faults(more=None, **keys) -> str:
+    links = {"pump": pump("sump", "out", **keys), "main": pipe("out", "top", 100.0, 0.3, 1000.0, 5), **(more or {})}
+    case = scene({"sump": lake(0.0), "out": junction(), "top": lake(20.0)}, links, 1.0, {})
+    with pytest.raises(CaseError) as caught:
+        fvsolve.build(fvsolve.load(case))
+    return str(caught.value)
+
+
+FOUND = [
+    ({}, "expected one of curve, power, suter"),
+    ({"curve": ONE, "power": 1e4}, "curve and power are given; keep one"),
+    ({"curve": {"flow": [0.0, 0.1], "head": [50.0, 55.0]}}, "curve.head[1]: 55.0 comes after 50.0; the head must fall"),
+    ({"curve": {"flow": [0.0, 0.1], "head": [50.0, 50.0]}}, "the head must fall as the flow rises"),
+    ({"curve": {"flow": [0.0, 0.1, 0.1], "head": [50.0, 40.0, 30.0]}}, "flows out of order: 0.1 comes after 0.1"),
+    ({"curve": {"flow": [0.0], "head": [50.0]}}, "a single point must have a flow and a head above 0"),
+    ({"curve": {"flow": [], "head": []}}, "has no values; expected a list of values"),
+    ({"curve": {"flow": [0.0, 0.1], "head": [50.0]}}, "has length 1, but `flow` has length 2"),
+    ({"curve": {"coefficients": [50.0]}}, "fall to 0 at some flow"),
+    ({"curve": {"coefficients": [50.0, 100.0, -5000.0]}}, "the head rises at a flow of 0 m3/s"),
+    ({"curve": ONE, "trip": 1.0}, "trip: needs rated_speed"),
+    ({"curve": ONE, "inertia": 2.0}, 'inertia: needs rated_speed, for example "1480 rpm"'),
+    ({"curve": ONE, "inertia": -2.0, "rated_speed": 150.0}, "inertia: -2.0 is out of range; expected a value above 0"),
+    ({"curve": ONE, "inertia": "2 kg", "rated_speed": 150.0}, "is a mass; expected a moment of inertia"),
+    ({"curve": ONE, "inertia": 2.0, "rated_speed": 150.0, "trip": -1.0}, "-1 s lies before the start at 0 s"),
+    ({"curve": ONE, "speed": -1.0}, "speed: -1.0 is out of range"),
+    ({"curve": ONE, "efficiency": 1.2}, "efficiency: 1.2 is out of range"),
+    ({"curve": ONE, "efficiency": {"flow": [0.0], "efficiency": [0.0]}}, "no value above 0 at a flow above 0"),
+    ({"curve": ONE, "efficiency": 0.8, "shaft_power": {"flow": [0.1], "power": [1e4]}}, "keep one"),
+    ({"curve": ONE, "check_valve": 1}, "check_valve: 1 is neither true nor false"),
+    ({"suter": {"rated_flow": 0.1, "rated_head": 50.0}}, "expected `table`, or `head` and `torque`"),
+    ({"suter": {"rated_flow": 0.1, "rated_head": 50.0, "table": "radial"}}, 'did you mean "radial-35"?'),
+    ({"suter": {"rated_flow": 0.1, "rated_head": 50.0, "head": [1.0] * 5, "torque": [1.0] * 5}}, "expected at least 9"),
+    ({"suter": {"rated_flow": 0.1, "rated_head": 50.0, "head": [1.0] * 9, "torque": [1.0] * 8 + [2.0]}},
+     "x = 2 pi is x = 0 again"),
+    ({"suter": {"rated_flow": 0.1, "rated_head": 50.0, "table": "radial-35"},
+      "shaft_power": {"flow": [0.1], "power": [1.0]}}, "`suter` already gives the torque"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("keys, message", FOUND, ids=[message[:30] for _, message in FOUND])
+def test_a_fault_of_a_pump(keys, message):
+    assert message in faults(**keys)
+
+
+def test_all_faults_come_at_once():
+    said = faults(curve={"flow": [0.1, 0.1], "head": [40.0, 50.0]}, trip=1.0, speed=-1.0)
+    for part in ("flows out of order", "the head must fall", "needs rated_speed", "out of range"):
+        assert part in said
+
+
+def test_faults_of_torques():
+    motor = {"motor": {"type": "torque", "to": "pump.shaft", "torque": 1.0}}
+    assert "pump.shaft has no inertia" in faults(motor, curve=ONE)
+    held = {"curve": ONE, "inertia": 2.0, "rated_speed": 150.0, "trip": step(0.5, 0.0, 1.0)["time"][1]}
+    assert "is held at its speed until the trip" in faults(motor, **held)
+    wet = {"motor": {"type": "torque", "to": "out", "torque": 1.0}}
+    assert "a hydraulic place, and this port of a torque needs a rotational or spatial place" in faults(wet, curve=ONE)
+
+
+def rounded(by: float) -> dict:
+    """Return keys of a pump with a Suter table whose ends differ by `by`."""
+    x = np.linspace(0.0, 2.0 * np.pi, 9)
+    head, torque = 0.5 - np.cos(x), 0.4 - np.cos(x)
+    head[-1] += by
+    torque[-1] -= by
+    return {"suter": {"rated_flow": 0.1, "rated_head": 50.0, "head": head.tolist(), "torque": torque.tolist()}}
+
+
+@pytest.mark.parametrize("by", [1e-16, -4e-16, 1e-9, -1e-7])
+def test_ends_of_a_suter_table_that_differ_by_rounding_are_one(by):
+    case = scene({"sump": lake(0.0), "top": lake(20.0)}, {"pump": pump("sump", "top", **rounded(by))}, 1.0, {})
+    table = fvsolve.load(case).links["pump"].suter
+    assert table.head[0] == table.head[-1] and table.torque[0] == table.torque[-1]
+
+
+@pytest.mark.parametrize("by", [1e-3, -1e-4])
+def test_ends_of_a_suter_table_that_differ_by_more_are_a_fault(by):
+    assert "x = 2 pi is x = 0 again" in faults(**rounded(by))
+
+
+def notes(nodes: dict, start: str, end: str, **keys) -> list:
+    links = {"pump": pump(start, end, **keys), "main": pipe("out", "top", 100.0, 0.3, 1000.0, 5, minor_loss=20.0)}
+    made = fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, {})))
+    return [(one.key, one.text) for one in made.warnings if one.kind == "range" and one.place == "links.pump"]
+
+
+WATERS = {"sump": lake(0.0), "out": junction(), "top": lake(20.0)}
+
+
+def test_a_pump_drawn_backwards_is_asked_about_and_one_that_lifts_is_not():
+    assert notes(WATERS, "sump", "out", curve=ONE) == []
+    ((key, text),) = notes(WATERS, "out", "sump", curve=ONE)
+    assert key == "from" and "the lowest water level" in text and "check its direction" in text
+    down = {"sump": lake(60.0), "out": junction(), "top": lake(20.0)}
+    ((key, text),) = notes(down, "sump", "out", curve={"flow": [0.02], "head": [10.0]})
+    assert key == "from" and "m lower" in text
+    assert notes({**down, "top": lake(70.0)}, "sump", "out", curve={"flow": [0.02], "head": [10.0]}) == []  # a booster
+    assert notes(WATERS, "out", "sump", curve=ONE, speed=0.0) == []  # at rest
+
+
+@pytest.mark.parametrize("flow, unit", [(20.0, "l/s"), (2000.0, "m3/h"), (20000.0, "l/min")])
+def test_a_rated_flow_too_quick_for_the_pipes_beside_it_is_asked_about(flow, unit):
+    said = notes(WATERS, "sump", "out", curve={"flow": [flow], "head": [50.0]})
+    assert [key for key, _ in said] == ["curve"] and f'did you mean "{flow:.4g} {unit}"?' in said[0][1]
+    assert notes(WATERS, "sump", "out", curve={"flow": [1.0], "head": [50.0]}) == []
+
+
+@pytest.mark.parametrize("flow, asked", [("0.03 l/s", True), ("0.1 m3/h", True), ("2 l/s", False)])
+def test_a_rated_flow_that_hardly_moves_in_the_pipes_beside_it_is_asked_about(flow, asked):
+    said = notes(WATERS, "sump", "out", curve={"flow": [flow], "head": [50.0]})
+    assert [key for key, _ in said] == ["curve"] * asked and all("mean another unit?" in text for _, text in said)
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ({"inertia": 1.5e4}, '"15000 kg cm2"'),  # power and speed give 1.5 kg m2 to a factor of 2
+        ({"inertia": 0.0015}, "1.84 kg m2 is usual for 6.538e+04 W at 1480 rpm"),
+        ({"inertia": 1.5}, None),
+        ({"inertia": 15.0}, None),  # a flywheel
+        ({"shaft_power": {"flow": [0.1], "power": [65]}}, '"65 kW"'),
+        ({"shaft_power": {"flow": [0.1], "power": ["65 MW"]}}, "shaft_power is 6.5e+07 W"),
+        ({"shaft_power": {"flow": [0.1], "power": ["65 kW"]}}, None),
+    ],
+)
+def test_an_inertia_or_a_power_far_from_what_the_rated_point_says_is_noted_once(keys, says):
+    said = notes(WATERS, "sump", "out", curve=ONE, rated_speed="1480 rpm", **keys)
+    assert [key for key, _ in said] == ([] if says is None else [*keys][:1])
+    assert says is None or says in said[0][1]

@@ -1,7 +1,5 @@
 """Curves with a joined Suter table, estimated inertia and starting pumps, against SciPy at 1e-12."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -12,7 +10,7 @@ from reference.scenes import GRAVITY, RHO, area
 from scipy.integrate import solve_ivp
 
 import fvsolve
-from fvsolve.parts.pump.suter_tables import NAMES, quadrants, suter_tables
+from fvsolve.parts.pump.head_curve import NAMES, quadrants, suter_tables
 
 FLOW, HEAD, OMEGA, INERTIA, EFFICIENCY = 0.1, 50.0, 150.0, 2.0, 0.8
 TORQUE = RHO * GRAVITY * FLOW * HEAD / EFFICIENCY / OMEGA
@@ -135,20 +133,18 @@ def test_head_and_torque_meet_at_both_ends_of_every_curve(given):
     if "shaft_power" in given:
         keys.pop("efficiency")
     model = fvsolve.build(fvsolve.load(column(30.0, 1.0, ["pump.flow"], **keys, trip=0.5)))
-    from fvsolve.parts.pump import law, law_curve
+    from fvsolve.parts.pump import law
 
     floats, row = model.tables.floats, model.tables.devices[0]
     curve, at = int(model.tables.valves[row["valve"]]["data"]), int(row["data"])
-    last = floats[curve + law_curve.LAST]
+    last = floats[curve + law.LAST]
     for n in (1.0, 0.3):
         for q, side in ((0.0, -1.0), (n * last, 1.0)):
             inside, out = q - side * 1e-10, q + side * 1e-10
-            heads = [law_curve.curve_head(floats, curve, n, one)[0] for one in (inside, out)]
+            heads = [law.curve_head(floats, curve, n, one)[0] for one in (inside, out)]
             torques = [law.fluid_torque(floats, at, curve, n, one, 1.0) for one in (inside, out)]
             assert heads[0] == approx(heads[1], abs=1e-5) and torques[0] == approx(torques[1], abs=1e-4)
-            assert law_curve.is_off_curve(floats, curve, n, out) and not law_curve.is_off_curve(
-                floats, curve, n, inside
-            )
+            assert law.is_off_curve(floats, curve, n, out) and not law.is_off_curve(floats, curve, n, inside)
 
 
 def test_energy_is_never_made_while_it_runs_down_and_back():

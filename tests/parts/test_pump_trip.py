@@ -1,7 +1,5 @@
 """Pump trips: run-down of the shaft, rigid columns, pipes, four quadrants and energy, against SciPy at 1e-12."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -12,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.parts.pump.suter_tables import suter_tables
+from fvsolve.parts.pump.head_curve import suter_tables
 from fvsolve.studies.energy_balance import energy
 from fvsolve.studies.linearise import linearise
 
@@ -242,10 +240,8 @@ def test_every_dependence_of_a_tripped_pump_is_in_the_pattern():
 
     model = fvsolve.build(fvsolve.load(line(40.0, 3.0, {}, ["pump.flow"], 6, **SHAFT, trip=0.0)))
     rng = np.random.default_rng(1)
-    y, pattern = (
-        1e-2 * model.scale * rng.standard_normal(model.y_size),
-        jacobian_pattern(model).toarray()[: model.y_size],
-    )
+    y = 1e-2 * model.scale * rng.standard_normal(model.y_size)
+    pattern = jacobian_pattern(model).toarray()[: model.y_size]
     for k in range(model.y_size):
         step_y = np.zeros(model.y_size)
         step_y[k] = 1e-3 * model.scale[k]

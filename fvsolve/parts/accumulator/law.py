@@ -15,14 +15,8 @@ from fvsolve.kernels.density import density, log_density, pressure_of_log
 from fvsolve.kernels.dtypes import LAW_LINEAR
 from fvsolve.kernels.network_energy import height_pressure, vessel_energy, vessel_power
 
-EXPONENT, GAS_VOLUME, TOTAL_VOLUME, NECK_STIFFNESS, EMPTY_MASS, EMPTY_PRESSURE = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-)  # indices into the numbers of an accumulator
+# Indices into the numbers of an accumulator
+EXPONENT, GAS_VOLUME, TOTAL_VOLUME, NECK_STIFFNESS, EMPTY_MASS, EMPTY_PRESSURE = 0, 1, 2, 3, 4, 5
 NUMBER_COUNT = 6
 """Exponent n; gas volume at the start [m3]; volume of gas, fluid and neck [m3]; stiffness dp/dm of the neck [Pa/kg], 0
 without a neck; inflow since the start at which the gas just fills the vessel [kg], negative if fluid must flow out;
@@ -69,11 +63,8 @@ def full_bladder_gas(floats, node, at):
 def gas_state_dense(st, floats, node, at, y):
     """Results of `gas_state` under density laws other than `linear`, with its arguments."""
     n, gas, total, neck = (
-        floats[at + EXPONENT],
-        floats[at + GAS_VOLUME],
-        floats[at + TOTAL_VOLUME],
-        floats[at + NECK_STIFFNESS],
-    )
+        floats[at + EXPONENT], floats[at + GAS_VOLUME], floats[at + TOTAL_VOLUME], floats[at + NECK_STIFFNESS],
+    )  # fmt: skip
     p0, mass, empty = node["pressure"], node["mass"] + y, floats[at + EMPTY_MASS]
     if neck > 0.0 and y < empty:
         expansion = full_bladder_gas(floats, node, at)

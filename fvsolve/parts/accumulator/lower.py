@@ -1,14 +1,12 @@
 """Accumulators and air vessels in the tables of a model, and their states at the start."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 
-from fvsolve.assembly.device_lowering import Device
+from fvsolve.assembly.lowering import Device
 from fvsolve.errors import Notice
-from fvsolve.parts.accumulator import law, law_shape
+from fvsolve.parts.accumulator import law, law_vessel
 from fvsolve.parts.accumulator.part import UPRIGHT, height_of, length_of
 
 SLOPE_TOLERANCE = 1e-6  # axis rise over radius below which a cylinder counts as horizontal; likewise for upright
@@ -27,10 +25,10 @@ class VesselStart:
         shape = np.array(shape_numbers(part))
         self.gas = part.gas_volume
         if self.gas is None:
-            self.gas = part.volume - float(law_shape.volume_below(shape, 0, part.level))
+            self.gas = part.volume - float(law_vessel.volume_below(shape, 0, part.level))
         self.fluid_volume = part.volume - self.gas
-        self.level = float(law_shape.level_at(shape, 0, self.fluid_volume))
-        below = float(law_shape.moment_below(shape, 0, self.level))
+        self.level = float(law_vessel.level_at(shape, 0, self.fluid_volume))
+        below = float(law_vessel.moment_below(shape, 0, self.level))
         self.centroid = below / self.fluid_volume if self.fluid_volume > 0.0 else 0.0
 
     def gas_pressure(self, p: float) -> tuple[float, float]:
@@ -63,27 +61,23 @@ def shape_numbers(part) -> list[float]:
     if part.diameter is None:
         if not hasattr(part.area, "level") or len(part.area.level) == 1:
             area = part.area if not hasattr(part.area, "level") else part.area.area[0]
-            return [law_shape.PRISM, top, float(area), 0.0, 0.0]
+            return [law_vessel.PRISM, top, float(area), 0.0, 0.0]
         level, area = part.area.level, part.area.area
         steps = [
             0.5 * (a + b) * (high - low) for low, high, a, b in zip(level, level[1:], area, area[1:], strict=False)
         ]
         volume = [math.fsum(steps[:k]) for k in range(len(level))]
-        return [law_shape.AREA_TABLE, top, len(level), 0.0, 0.0, *map(float, (*level, *area, *volume))]
+        return [law_vessel.AREA_TABLE, top, len(level), 0.0, 0.0, *map(float, (*level, *area, *volume))]
     radius, length, slope = 0.5 * part.diameter, length_of(part), UPRIGHT if part.slope is None else part.slope
     if radius * math.cos(slope) <= SLOPE_TOLERANCE * length * math.sin(slope):
-        return [law_shape.PRISM, top, math.pi * radius**2, 0.0, 0.0]
-    kind = (
-        law_shape.HORIZONTAL_CYLINDER
-        if length * math.sin(slope) <= SLOPE_TOLERANCE * radius * math.cos(slope)
-        else law_shape.INCLINED_CYLINDER
-    )
-    return [kind, top, radius, length, 0.0 if kind == law_shape.HORIZONTAL_CYLINDER else slope]
+        return [law_vessel.PRISM, top, math.pi * radius**2, 0.0, 0.0]
+    if length * math.sin(slope) <= SLOPE_TOLERANCE * radius * math.cos(slope):
+        return [law_vessel.HORIZONTAL_CYLINDER, top, radius, length, 0.0]
+    return [law_vessel.INCLINED_CYLINDER, top, radius, length, slope]
 
 
-NECK_ERROR_SHARE = (
-    1e-5  # share of the released mass added to the scale of errors in the neck, so that it exceeds rounding
-)
+# Share of the released mass added to the scale of errors in the neck, so that it exceeds rounding
+NECK_ERROR_SHARE = 1e-5
 NECK_SHARE = 0.01  # volume of the neck of a bladder accumulator over its volume
 
 
@@ -106,7 +100,6 @@ class AccumulatorRows(Device, kind="accumulator"):
     def pressure_at_start(self, start, i, node, row) -> float | None:
         if node.initial_pressure is None or not node.has_shape:
             return node.initial_pressure
-
         return VesselStart(start, node).node_pressure(node.initial_pressure)
 
     def numbers(self, draft, name, part) -> list[float]:
@@ -188,23 +181,16 @@ class AccumulatorRows(Device, kind="accumulator"):
 class ShapedRows(AccumulatorRows, kind=""):
     """Conversion to table rows of air vessels with a shape; the weight of their fluid acts on the node."""
 
+    law = law_vessel
     quantities = (*AccumulatorRows.quantities, "level")
 
-    @property
-    def law(self):
-        from fvsolve.parts.accumulator import law_vessel
-
-        return law_vessel
-
     def numbers(self, draft, name, part) -> list[float]:
-
         compressor = [0.0, 0.0, 0.0]
         if part.compressor is not None:
             compressor = [0.0, part.compressor.start, part.compressor.stop]
         return [0.0] * law.NUMBER_COUNT + [0.0, 0.0, part.bottom or 0.0, *compressor] + shape_numbers(part)
 
     def begin(self, start, part, row) -> list[str]:
-
         draft, n = start.draft, part.exponent
         node, at = draft.node_table[row["node"]], row["data"]
         at_start = VesselStart(start, part)
@@ -212,10 +198,8 @@ class ShapedRows(AccumulatorRows, kind=""):
         if not p > 0.0:
             name = list(draft.case.places)[row["node"]].removesuffix(".inside")
             height = at_start.level + at_start.bottom
-            pressure, head = (
-                draft.case.amount(node["pressure"], "pressure", 6),
-                draft.case.amount(height, "head", span=True),
-            )
+            pressure = draft.case.amount(node["pressure"], "pressure", 6)
+            head = draft.case.amount(height, "head", span=True)
             text = (f"no steady state: the pressure at the node, {pressure}, is below that of the fluid column, {head} "
                     "high, so the gas would have no pressure; set the key `bottom` or `level` "
                     "lower, or `gas_volume` greater")  # fmt: skip

@@ -1,15 +1,12 @@
 """Accumulators and air vessels: keys, shapes, ranges and faults."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.connection import Connection, ConnectionTable, with_connection
-from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.hydraulic_nodes import Junction
-from fvsolve.parts.node import Node
-from fvsolve.parts.table_model import Nested, Table, missing_key_faults
+from fvsolve.parts.nodes_and_links import Node
+from fvsolve.parts.table_model import CaseContext, Faults, Nested, Table, missing_key_faults
 from fvsolve.parts.tank import Surface
 from fvsolve.parts.value import Number, Quantity, Range, UsualRange, nonnegative, positive
 
@@ -24,13 +21,10 @@ class Compressor(Table):
     stop: Annotated[
         float, Quantity("level", nonnegative, "fluid level, below `start`, at which the compressor stops [m]", LEVELS)
     ]
-    flow: Annotated[
-        float,
-        Quantity(
-            "flow", positive, "flow of free air, at ambient pressure and the initial temperature of the gas [m3/s]",
-            UsualRange(1e-5, 10.0, "workshops to stations"),
-        ),
-    ]  # fmt: skip
+    flow: Annotated[float, Quantity(
+        "flow", positive, "flow of free air, at ambient pressure and the initial temperature of the gas [m3/s]",
+        UsualRange(1e-5, 10.0, "workshops to stations"),
+    )]  # fmt: skip
 
 
 def length_of(vessel: Any) -> float:
@@ -86,32 +80,19 @@ class Accumulator(Node, kind="accumulator"):
     }  # fmt: skip
 
     volume: Annotated[float, Quantity("volume", positive, "total volume of gas and fluid [m3]", VOLUMES)]
-    precharge: Annotated[
-        float | None,
-        Quantity(
-            "pressure",
-            about="gas pressure at which the bladder fills `volume` [Pa]; required without `gas_volume` and `level`",
-            usual=GAS_PRESSURES,
-        ),
-    ] = None
-    gas_volume: Annotated[
-        float | None,
-        Quantity(
-            "volume",
-            positive,
-            "gas volume of an air vessel at the start [m3]; required without `precharge` and `level`",
-            VOLUMES,
-        ),
-    ] = None
-    level: Annotated[
-        float | None,
-        Quantity(
-            "level",
-            nonnegative,
-            "fluid level above the bottom at the start [m]; required without `precharge` and `gas_volume`",
-            LEVELS,
-        ),
-    ] = None
+    precharge: Annotated[float | None, Quantity(
+        "pressure",
+        about="gas pressure at which the bladder fills `volume` [Pa]; required without `gas_volume` and `level`",
+        usual=GAS_PRESSURES,
+    )] = None  # fmt: skip
+    gas_volume: Annotated[float | None, Quantity(
+        "volume", positive, "gas volume of an air vessel at the start [m3]; required without `precharge` and `level`",
+        VOLUMES,
+    )] = None  # fmt: skip
+    level: Annotated[float | None, Quantity(
+        "level", nonnegative,
+        "fluid level above the bottom at the start [m]; required without `precharge` and `gas_volume`", LEVELS,
+    )] = None  # fmt: skip
     diameter: Annotated[
         float | None,
         Quantity("length", positive, "diameter of a cylinder with flat ends, whose length follows from `volume` [m]",
@@ -187,15 +168,11 @@ class Accumulator(Node, kind="accumulator"):
         if self.compressor is not None:
             start, stop = self.compressor.start, self.compressor.stop
             if stop >= start:
-                yield (
-                    ("compressor", "stop"),
-                    f"{stop:g} m is not below the level `start`, {start:g} m; expected a lower level",
-                )
+                message = f"{stop:g} m is not below the level `start`, {start:g} m; expected a lower level"
+                yield ("compressor", "stop"), message
             if start >= top:
-                yield (
-                    ("compressor", "start"),
-                    f"{start:g} m is never reached; expected less than {top:.6g} m, at which the vessel is full",
-                )
+                message = f"{start:g} m is never reached; expected less than {top:.6g} m, at which the vessel is full"
+                yield ("compressor", "start"), message
 
 
 class Vessel(Accumulator):

@@ -1,10 +1,8 @@
 """Air valves in the tables of a model, and their states at the start."""
 
-from __future__ import annotations
-
 import math
 
-from fvsolve.assembly.device_lowering import Device
+from fvsolve.assembly.lowering import Device
 from fvsolve.errors import Notice
 from fvsolve.parts.air_valve import law
 

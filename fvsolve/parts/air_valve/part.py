@@ -1,15 +1,13 @@
 """Air valves: keys, ranges and faults."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.connection import Connection, behind_throat
-from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.hydraulic_nodes import Junction
-from fvsolve.parts.node import Node
+from fvsolve.parts.nodes_and_links import Node
 from fvsolve.parts.schedule import constant
+from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.value import Number, Quantity, UsualRange, between, positive
 
 BORE_RANGE = between(0, 1, open=True)  # m; a plain 50 would be in mm
@@ -38,24 +36,16 @@ class AirValve(Node, kind="air-valve"):
 
     inlet: Annotated[float, Quantity("length", BORE_RANGE, "diameter of the bore for air inflow [m]")]
     outlet: Annotated[float, Quantity("length", BORE_RANGE, "diameter of the bore for air outflow [m]")]
-    switch: Annotated[
-        float | None,
-        Quantity(
-            "pressure_drop",
-            positive,
-            "gauge pressure above which air leaves through `throttled_outlet` instead of `outlet` [Pa]",
-            UsualRange(100.0, 1e5, "anti-slam discs"),
-        ),
-    ] = None
-    switch_velocity: Annotated[
-        float | None,
-        Quantity(
-            "velocity",
-            positive,
-            "fluid velocity to the valve above which air leaves through `throttled_outlet`, instead of `switch` [m/s]",
-            UsualRange(0.01, 20.0, "anti-slam discs"),
-        ),
-    ] = None
+    switch: Annotated[float | None, Quantity(
+        "pressure_drop", positive,
+        "gauge pressure above which air leaves through `throttled_outlet` instead of `outlet` [Pa]",
+        UsualRange(100.0, 1e5, "anti-slam discs"),
+    )] = None  # fmt: skip
+    switch_velocity: Annotated[float | None, Quantity(
+        "velocity", positive,
+        "fluid velocity to the valve above which air leaves through `throttled_outlet`, instead of `switch` [m/s]",
+        UsualRange(0.01, 20.0, "anti-slam discs"),
+    )] = None  # fmt: skip
     throttled_outlet: Annotated[
         float | None, Quantity("length", BORE_RANGE, "diameter of the bore for throttled air outflow [m]")
     ] = None
@@ -65,23 +55,14 @@ class AirValve(Node, kind="air-valve"):
     discharge_coefficient: Annotated[
         float, Number(between(0, 1, open=True), "discharge coefficient Cd of all bores")
     ] = 0.6
-    volume: Annotated[
-        float | None,
-        Quantity(
-            "volume",
-            positive,
-            "volume of the float chamber [m3]; a cylinder three inlet diameters long and wide if left out",
-        ),
-    ] = None
-    temperature: Annotated[
-        float,
-        Quantity(
-            "temperature",
-            positive,
-            "constant temperature of the air [K]",
-            UsualRange(220.0, 370.0, "outdoors to hot rooms"),
-        ),
-    ] = 293.15
+    volume: Annotated[float | None, Quantity(
+        "volume", positive,
+        "volume of the float chamber [m3]; a cylinder three inlet diameters long and wide if left out",
+    )] = None  # fmt: skip
+    temperature: Annotated[float, Quantity(
+        "temperature", positive, "constant temperature of the air [K]",
+        UsualRange(220.0, 370.0, "outdoors to hot rooms"),
+    )] = 293.15  # fmt: skip
 
     initial_pressure: ClassVar[None] = None
 
@@ -102,16 +83,10 @@ class AirValve(Node, kind="air-valve"):
         if self.throttled_outlet is not None and not self.throttled_outlet < self.outlet:
             text = f"{self.throttled_outlet:g} m does not throttle; expected less than `outlet`, {self.outlet:g} m"
             yield ("throttled_outlet",), text
-        lines = [
-            link
-            for link in around.links.values()
-            if link.kind in ("pipe", "rigid-column") and name in link.ports.values()
-        ]
-        if self.switch_velocity is not None and not lines:
-            yield (
-                ("switch_velocity",),
-                "no pipe or rigid column joins this node to give a fluid velocity; give the key `switch` instead",
-            )
+        lines = [link for link in around.links.values() if link.kind in LINE_KINDS]
+        if self.switch_velocity is not None and not any(name in link.ports.values() for link in lines):
+            message = "no pipe or rigid column joins this node to give a fluid velocity; give the key `switch` instead"
+            yield ("switch_velocity",), message
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         size = Connection.model_construct(area=None, diameter=THROAT_SIZE * self.inlet, loss_in=1.0, loss_out=1.0)

@@ -5,7 +5,7 @@ the law to zero flow.
 """
 
 from fvsolve.jit import njit
-from fvsolve.parts.outlet.law import bends, emitter_slope, emitter_step, rule_of
+from fvsolve.parts.outlet.law_outlet import bends, emitter_slope, emitter_step, rule_of
 
 __all__ = ["bends", "slope", "step"]
 

@@ -1,12 +1,16 @@
-"""Outlets to ambient, and valves that open to ambient, in the tables of a model."""
+"""Outlets, rupture discs and surge-anticipating valves in the tables of a model."""
 
-from __future__ import annotations
-
-from fvsolve.assembly.device_lowering import Device
-from fvsolve.assembly.inputs import opening_input
-from fvsolve.assembly.lowering import Lowering, Restriction
+from fvsolve.assembly.lowering import Device, Lowering, Restriction, opening_input
+from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
-from fvsolve.parts.outlet import law
+from fvsolve.parts.outlet import (
+    law_outlet,
+    law_rupture_disc,
+    law_rupture_disc_outside,
+    law_surge_anticipating,
+    law_surge_anticipating_outside,
+)
+from fvsolve.parts.outlet.law_outlet import EVENT_COUNT
 
 SPAN = 1e5  # default drop at which an outlet has its nominal flow [Pa]
 
@@ -29,8 +33,8 @@ class OutsideRows(Lowering, kind="outside"):
 class OutletRows(Restriction, kind="outlet"):
     """Conversion to table rows of outlets: links whose flow is a power of the drop."""
 
-    law = law
-    events = ("",) * law.EVENT_COUNT
+    law = law_outlet
+    events = ("",) * law_outlet.EVENT_COUNT
 
     def restriction(self, draft, name, link, row) -> None:
         row["schedule"] = draft.schedules.add(link.opening, 1.0 / link.full)
@@ -65,7 +69,7 @@ class RelievingRows(Device, kind=""):
         raise NotImplementedError
 
     def numbers(self, draft, name, part) -> list[float]:
-        return [0.5, 0.0, SPAN, law.NO_LIMIT][: self.mode] + self.own_numbers(draft, name, part)
+        return [0.5, 0.0, SPAN, law_outlet.NO_LIMIT][: self.mode] + self.own_numbers(draft, name, part)
 
     def revise_state(self, start, part, row) -> bool:
         k = int(row["valve"])
@@ -75,3 +79,88 @@ class RelievingRows(Device, kind=""):
 
     def follow(self, start, k) -> None:
         """Do nothing: a shut valve has no flow at the start."""
+
+
+class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
+    """Conversion to table rows of rupture discs between two nodes."""
+
+    law, events_only = law_rupture_disc, True
+    events = ("bursts",)
+
+    def of(self, part) -> Device:
+        return DiscToAmbient() if part.outward else self
+
+    def own_numbers(self, draft, name, part) -> list[float]:
+        return [part.burst_pressure]
+
+    def begin(self, start, part, row) -> list[str]:
+        k = int(row["valve"])
+        drop, name = start.valve_drive(k)[0], start.draft.valve_names[k]
+        if drop >= part.burst_pressure:
+            across = start.case.amount(drop, "pressure", 6, span=True)
+            text = f"a drop of {across} at the start would burst the disc; raise `burst_pressure` or remove the disc"
+            start.draft.fault(f"links.{name}.burst_pressure", text)
+        return []
+
+
+class DiscToAmbient(RuptureDiscRows, kind=""):
+    """Conversion to table rows of rupture discs that open to ambient."""
+
+    law, mode = law_rupture_disc_outside, EVENT_COUNT
+    events = ("",) * EVENT_COUNT + ("bursts",)
+
+
+class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
+    """Conversion to table rows of surge-anticipating valves between two nodes."""
+
+    law = law_surge_anticipating
+    states = ("opening", "held")
+    events = ("is shut", "opens", "is fully open", "begins to shut", "", "", "")
+    remedy = "give the surge-anticipating valve a longer closing_time"
+
+    def of(self, part) -> Device:
+        return AnticipatingToAmbient() if part.outward else self
+
+    def own_numbers(self, draft, name, part) -> list[float]:
+        if part.trip is not None and part.trip < draft.case.numerics.start:
+            text = f"{part.trip:g} s lies before the start at {draft.case.numerics.start:g} s"
+            draft.fault(f"links.{name}.trip", f"{text}; expected a later time")
+        low = -law_surge_anticipating.NEVER if part.low_set is None else part.low_set
+        high, trip = (law_surge_anticipating.NEVER if value is None else value for value in (part.high_set, part.trip))
+        place = float(draft.node_index[part.sensed])
+        return [part.opening_time, part.hold, part.closing_time, low, high, trip, place]
+
+    def scales(self, draft, name, part) -> list[float]:
+        return [0.1, part.hold + part.opening_time]
+
+    def apply_event(self, run_data, row, t, y, scale) -> None:
+        at, o = row["event"] + row["mode"], row["y"]
+        if run_data.armed[at + law_surge_anticipating.SHUT] > 0.0:
+            y[o] = 0.0
+        elif run_data.armed[at + law_surge_anticipating.OPENING] > 0.0:
+            y[o + 1] = 0.0
+        elif run_data.armed[at + law_surge_anticipating.OPEN] > 0.0:
+            y[o] = 1.0
+
+    def begin(self, start, part, row) -> list[str]:
+        name, node = start.draft.valve_names[row["valve"]], start.nodes[start.draft.node_index[part.sensed]]
+        p, high = float(node["pressure"]), part.high_set is not None and float(node["pressure"]) >= part.high_set
+        amount = start.case.amount
+        if part.low_set is not None and p < part.low_set:
+            text = (f"{name}: the pressure at {part.sensed} is {amount(p, 'pressure', 6)} at the start, below low_set, "
+                    f"{amount(part.low_set, 'pressure', 6)}: a low pressure opens the valve only after the pressure "
+                    "has exceeded low_set")  # fmt: skip
+            start.draft.warnings.append(Notice("start", f"links.{name}", text, "low_set", p, part.low_set))
+        if not high:
+            return []
+        return [
+            f"{name}: opens at the start, because the pressure at {part.sensed}, {amount(p, 'pressure', 6)}, is not "
+            f"below high_set, {amount(part.high_set, 'pressure', 6)}"
+        ]
+
+
+class AnticipatingToAmbient(SurgeAnticipatingRows, kind=""):
+    """Conversion to table rows of surge-anticipating valves that open to ambient."""
+
+    law, mode = law_surge_anticipating_outside, EVENT_COUNT
+    events = ("",) * EVENT_COUNT + SurgeAnticipatingRows.events

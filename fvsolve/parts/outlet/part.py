@@ -1,17 +1,17 @@
-"""Outlets to ambient, leaks, and valves that may open to ambient: keys and faults."""
-
-from __future__ import annotations
+"""Leaks and outlets to ambient; rupture discs and surge-anticipating valves, which may open to ambient."""
 
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.parts.context import CaseContext, Faults
-from fvsolve.parts.link import Link, TwoPort
-from fvsolve.parts.node import Node
+from fvsolve.errors import did_you_mean, listing
+from fvsolve.parts.nodes_and_links import Link, Node, TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
-from fvsolve.parts.value import Number, Text, UsualRange, between, positive
+from fvsolve.parts.self_acting.part import DROPS, STROKES
+from fvsolve.parts.table_model import CaseContext, Faults
+from fvsolve.parts.value import Number, Quantity, Text, UsualRange, between, nonnegative, positive
 from fvsolve.parts.valve import Sized
+from fvsolve.units import show
 
 
 class Outside(Node):
@@ -94,12 +94,9 @@ class Leak(Link, kind="leak"):
     joins: ClassVar[dict[str, str]] = {"from": "hydraulic"}
 
     from_: Annotated[str, Text("place of the leak"), Field(alias="from")]
-    coefficient: Annotated[
-        float,
-        Number(
-            positive, "flow in m3/s at a pressure drop of 1 Pa", UsualRange(1e-15, 0.1, "seeping to a main torn off")
-        ),
-    ]
+    coefficient: Annotated[float, Number(
+        positive, "flow in m3/s at a pressure drop of 1 Pa", UsualRange(1e-15, 0.1, "seeping to a main torn off"),
+    )]  # fmt: skip
     exponent: Annotated[
         float, Number(between(0, 3, open=True), "exponent of the pressure drop, 0.5 for a hole of fixed size")
     ] = 0.5
@@ -120,3 +117,64 @@ class Leak(Link, kind="leak"):
         if getattr(around.nodes.get(self.from_), "kind", "") == "reservoir":
             text = "is a reservoir, whose pressure a leak cannot change; expected a junction, a tank or another place"
             yield ("from",), f"{self.from_} {text}"
+
+
+class RuptureDisc(Relieving, kind="rupture-disc"):
+    """Disc that is shut until p_from - p_to exceeds burst_pressure, and then always open.
+
+    The flow is then q = Cd A sqrt(2 |dp| / rho) sign(dp) at the drop dp. Without `to` it opens to ambient at the
+    elevation of its place, without backflow. Ports: from, to. Stored energy: none. Dissipated power: dp q [W].
+    """
+
+    burst_pressure: Annotated[
+        float, Quantity("pressure_drop", positive, "pressure drop above which the disc bursts [Pa]", DROPS)
+    ]
+
+
+class SurgeAnticipating(Relieving, kind="surge-anticipating"):
+    """Valve that opens at a pressure below `low_set`, or at `trip`, stays open for the time `hold`, and then shuts.
+
+    A pressure above `high_set` opens it while the pressure lasts. q = x Cd A sqrt(2 |dp| / rho) sign(dp), with flow q
+    and drop dp; the opening x moves at the constant rates 1 / opening_time and 1 / closing_time. Without `to` the valve
+    opens to ambient at the elevation of its place, without backflow. Ports: from, to. Stored energy: none. Dissipated
+    power: dp q [W].
+    """
+
+    low_set: Annotated[float | None, Quantity(
+        "pressure", about="pressure at `senses` below which the valve opens, gauge or absolute by its unit [Pa]",
+    )] = None  # fmt: skip
+    high_set: Annotated[float | None, Quantity(
+        "pressure", about="pressure at `senses` above which the valve opens, gauge or absolute by its unit [Pa]",
+    )] = None  # fmt: skip
+    trip: Annotated[
+        float | None, Quantity("time", about="time at which the valve opens regardless of pressure [s]")
+    ] = None
+    senses: Annotated[str | None, Text("place whose pressure opens the valve; `from` if left out")] = None
+    opening_time: Annotated[float, Quantity("time", positive, "time from shut to fully open [s]", STROKES)]
+    hold: Annotated[
+        float, Quantity("time", nonnegative, "time for which the valve stays fully open after `low_set` or `trip` [s]")
+    ] = 0.0
+    closing_time: Annotated[float, Quantity("time", positive, "time from fully open to shut [s]", STROKES)]
+
+    @property
+    def sensed(self) -> str:
+        """Place whose pressure opens the valve."""
+        return self.from_ if self.senses is None else self.senses
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list:
+        faults = super().key_faults(given)
+        if not {"low_set", "high_set", "trip"} & set(given):
+            faults.append(((), "nothing opens the valve; expected the key `low_set`, `high_set` or `trip`"))
+        return faults
+
+    def faults(self, name: str, around: CaseContext) -> Faults:
+        yield from super().faults(name, around)
+        if self.low_set is not None and self.high_set is not None and not self.low_set < self.high_set:
+            text = f"{self.high_set:.6g} Pa is not above low_set, {self.low_set:.6g} Pa"
+            yield ("high_set",), f"{text}; expected a higher pressure"
+        places = [place for place, node in around.nodes.items() if getattr(node, "domain", "") == "hydraulic"]
+        if self.senses is not None and self.senses not in places:
+            near = did_you_mean(self.senses, places)
+            message = f"unknown place of the fluid {show(self.senses)}; expected one of {listing(places)}{near}"
+            yield ("senses",), message

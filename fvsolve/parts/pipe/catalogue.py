@@ -11,8 +11,6 @@ outer diameter, allowable pressure 20 MRS / (C (SDR - 1)) bar, MRS the minimum r
 coefficient; by PN: the wall with that allowable pressure.
 """
 
-from __future__ import annotations
-
 import functools
 import re
 from typing import Any, NamedTuple
@@ -20,7 +18,7 @@ from typing import Any, NamedTuple
 from fvsolve.data import read_table
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.conduit import DARCY, KEYS_OF_MODEL, pipe_size
-from fvsolve.parts.pipe.materials import Material, materials
+from fvsolve.parts.pipe.pipe_wall import Material, materials
 from fvsolve.parts.value import ValueFault
 from fvsolve.units import parse, show
 
@@ -109,15 +107,11 @@ def _add_schedule(table: dict[str, Any], material: Material | None) -> None:
     Raises ValueFault if a material is given and is not a steel. Nothing is done for an unknown size.
     """
     if material is not None and material.name not in STEELS:
-        raise ValueFault(
-            [
-                (
-                    ("nominal",),
-                    f"is a steel size without the key `class`; expected a class for {material.name}, or `diameter` and "
-                    "a wall thickness instead of `nominal`",
-                )
-            ]
+        text = (
+            f"is a steel size without the key `class`; expected a class for {material.name}, or `diameter` and "
+            "a wall thickness instead of `nominal`"
         )
+        raise ValueFault([(("nominal",), text)])
     try:
         bore, thickness = pipe_size(table["nominal"], table.get("schedule", "40"))
     except ValueFault:

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.parts.csv_rows import read_rows
-from fvsolve.parts.time_series import copy_name, find_file
-from fvsolve.parts.value import ReadContext, Rows, Value, ValueFault, check_increasing
+from fvsolve.parts.csv_rows import copy_name, find_file, read_rows
+from fvsolve.parts.value import ReadContext, Rows, Value, ValueFault, check_increasing, faults_of
 from fvsolve.units import show
 
 COLUMN_SETS = (("chainage", "elevation"), ("x", "y", "z"))
@@ -121,10 +120,8 @@ def from_lists(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, n
     for key in keys:
         try:
             columns[key] = Rows("length", rising=key == "chainage").read(given[key], setting)
-        except ValueFault as error:
-            faults += [((key, *below), text) for below, text in error.faults]
         except ValueError as error:
-            faults.append(((key,), str(error)))
+            faults += faults_of(error, key)
     if not faults and len({len(values) for values in columns.values()}) > 1:
         counts = ", ".join(f"{len(values)} of {key}" for key, values in columns.items())
         faults.append(((), f"lists have different lengths: {counts}; expected equal lengths"))

@@ -1,7 +1,5 @@
 """Pipes in the tables of a model."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

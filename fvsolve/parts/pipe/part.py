@@ -1,7 +1,5 @@
 """Pipes: keys, faults, and names of catalogue entries turned into numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -9,7 +7,6 @@ from pydantic import Field
 
 from fvsolve.parts.carried_scalar import ScalarValues
 from fvsolve.parts.conduit import LENGTH, Conduit
-from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.pipe.elevation_profile import Profile, ProfileValue
 from fvsolve.parts.pipe.pipe_wall import (
     MODULI,
@@ -21,7 +18,7 @@ from fvsolve.parts.pipe.pipe_wall import (
     creep_elements,
     wall_faults,
 )
-from fvsolve.parts.table_model import Nested
+from fvsolve.parts.table_model import CaseContext, Faults, Nested
 from fvsolve.parts.value import (
     BY_CELLS,
     SHAPE,
@@ -36,6 +33,7 @@ from fvsolve.parts.value import (
     ValueFault,
     Whole,
     between,
+    faults_of,
     positive,
 )
 
@@ -47,9 +45,8 @@ END_VERBS = {"from": "begins", "to": "ends"}
 LINES = ("finite-volume", "delay-line", "auto")  # numerical methods for waves in a pipe
 
 
-WAVES = UsualRange(
-    30.0, 2000.0, "soft hoses to stiff pipes"
-)  # most are between 50 and 1500 m/s, Wylie and Streeter 1993
+# Most are between 50 and 1500 m/s, Wylie and Streeter 1993
+WAVES = UsualRange(30.0, 2000.0, "soft hoses to stiff pipes")
 SOFT_WALLS = (  # (modulus [Pa], least wall over bore of such a pipe, text); the thinnest plastics are SDR 26
     (2e8, 0.1, "softer than any plastic, like rubber"),
     (4e8, 0.04, "as soft as low-density polyethylene"),
@@ -89,26 +86,16 @@ class Pipe(Conduit, kind="pipe"):
     ] = None
     wall: Annotated[Wall | Literal["rigid"] | None, WallOrRigid()] = None
     material: Annotated[str | None, MaterialName()] = None
-    class_: Annotated[
-        str | None,
-        Text(
-            'pressure class or schedule: "K9", "C40", "SDR11", "PN16", "schedule 40"; with `nominal` it sets bore, '
-            "wall and allowable pressure",
-            BY_CELLS,
-        ),
-        Field(alias="class"),
-    ] = None
+    class_: Annotated[str | None, Text(
+        'pressure class or schedule: "K9", "C40", "SDR11", "PN16", "schedule 40"; with `nominal` it sets bore, '
+        "wall and allowable pressure", BY_CELLS,
+    ), Field(alias="class")] = None  # fmt: skip
     restraint: Annotated[str | float | None, Restraint()] = None
     lining: Annotated[Lining | None, Nested(Lining, "inner layer of the wall; `diameter` is the bore inside it")] = None
-    allowable_pressure: Annotated[
-        float | None,
-        Quantity(
-            "gauge_pressure",
-            positive,
-            "allowable pressure above ambient [Pa]; that of the key `class` if left out",
-            changes=VALUE,
-        ),
-    ] = None
+    allowable_pressure: Annotated[float | None, Quantity(
+        "gauge_pressure", positive, "allowable pressure above ambient [Pa]; that of the key `class` if left out",
+        changes=VALUE,
+    )] = None  # fmt: skip
     source: Annotated[
         str | None, Text("source of the data of the pipe; the sources of the catalogue if left out", VALUE)
     ] = None
@@ -116,15 +103,11 @@ class Pipe(Conduit, kind="pipe"):
         int | None,
         Whole(between(1, MOST_CELLS), "number of finite volumes; travel time over numerics.cell_time if left out"),
     ] = None
-    pipe_model: Annotated[
-        str | None,
-        Choice(
-            "pipe model",
-            LINES,
-            "method for waves: finite volumes, a delay line, whose cells are only output positions, or auto "
-            "(a delay line where its error bound is below numerics.delay_tolerance); numerics.pipe_model if left out",
-        ),
-    ] = None
+    pipe_model: Annotated[str | None, Choice(
+        "pipe model", LINES,
+        "method for waves: finite volumes, a delay line, whose cells are only output positions, or auto "
+        "(a delay line where its error bound is below numerics.delay_tolerance); numerics.pipe_model if left out",
+    )] = None  # fmt: skip
     scalars: Annotated[dict[str, Any], ScalarValues("scalar values in the pipe at the start", Number())] = {}
 
     @property
@@ -208,8 +191,6 @@ def add_profile_length(given: dict[str, Any], setting: ReadContext) -> dict[str,
         return given
     try:
         profile = ProfileValue().read(given["profile"], setting)
-    except ValueFault as error:
-        raise ValueFault([(("profile", *below), text) for below, text in error.faults]) from None
     except ValueError as error:
-        raise ValueFault([(("profile",), str(error))]) from None
+        raise ValueFault(faults_of(error, "profile")) from None
     return {"length": profile.length, **given, "profile": profile}

@@ -1,13 +1,18 @@
-"""Walls of pipes: elasticity, restraint, lining, and creep of plastics."""
+"""Walls of pipes: elasticity, restraint, lining, and creep of plastics; materials with their sources.
 
-from __future__ import annotations
+The materials are in data/pipe_materials.toml. Numbers of materials without a source are left out; the user gives them.
+Of several sources, the greatest modulus is used (fastest wave, greatest pressure jump), and the mean of least and
+greatest value of roughness and all other properties.
+"""
 
+import functools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
+from fvsolve.data import read_table
 from fvsolve.errors import did_you_mean
-from fvsolve.parts.table_model import Table, keys_json, read_keys
+from fvsolve.parts.table_model import ListTable, Table, check_table, keys_json, read_keys
 from fvsolve.parts.value import (
     BY_CELLS,
     NEEDED,
@@ -23,9 +28,78 @@ from fvsolve.parts.value import (
 )
 from fvsolve.units import parse, show
 
+SI = {"youngs_modulus": 1e9, "poisson_ratio": 1.0, "roughness": 1e-3, "density": 1.0}
+UNITS = {"youngs_modulus": " GPa", "poisson_ratio": "", "roughness": " mm", "density": " kg/m3"}
+WITHOUT_SOURCE = ("PVC-O", "PEX", "hydraulic-hose")  # pipe materials without a source for their figures
+
 
 @dataclass(frozen=True)
-class Creep:
+class Figure:
+    """Property of a material, such as its density, in SI: least and greatest value in its sources, and the value used.
+
+    key : name of the property; sources : keys of `sources()`
+    """
+
+    key: str
+    least: float
+    greatest: float
+    sources: tuple[str, ...]
+    material_form: str = ""  # form of the material in the source
+
+    @property
+    def used(self) -> float:
+        return self.greatest if self.key == "youngs_modulus" else 0.5 * (self.least + self.greatest)
+
+    def span(self, between: str) -> str:
+        """Text of the least and greatest value in the unit of the catalogue; between : text between both
+
+        It is a single number if both are equal.
+        """
+        low, high = (f"{x / SI[self.key]:.4g}" for x in (self.least, self.greatest))
+        return low if low == high else f"{low}{between}{high}"
+
+    @property
+    def description(self) -> str:
+        """Text with the value used, its range and its sources."""
+        choice = "the greatest" if self.key == "youngs_modulus" else "the mean"
+        span = "" if self.least == self.greatest else f", {choice} of {self.span(' to ')}"
+        form = f" ({self.material_form})" if self.material_form else ""
+        texts = "; ".join(sources()[key] for key in self.sources)
+        return f"{self.key.replace('_', ' ')} {self.used / SI[self.key]:.4g}{UNITS[self.key]}{span}{form}: {texts}"
+
+
+@dataclass(frozen=True)
+class Material:
+    """Material of the catalogue; figures : key of a property -> its values (`Figure`)."""
+
+    name: str
+    figures: dict[str, Figure] = field(default_factory=dict)
+
+    @property
+    def missing_keys(self) -> list[str]:
+        """Keys of the properties for which there is no source."""
+        return [key for key in SI if key not in self.figures]
+
+
+@functools.cache
+def materials() -> dict[str, Material]:
+    """Catalogue of materials: name -> material."""
+    catalogue: dict[str, Material] = {}
+    for name, figures in read_table("pipe_materials")["materials"].items():
+        catalogue[name] = Material(name)
+        for key, (least, greatest, source, *form) in figures.items():
+            bounds = least * SI[key], greatest * SI[key]
+            catalogue[name].figures[key] = Figure(key, *bounds, tuple(source.split(", ")), *form)
+    return catalogue
+
+
+def sources() -> dict[str, str]:
+    """Sources of the properties of materials : key -> text."""
+    return read_table("pipe_materials")["sources"]
+
+
+@dataclass(frozen=True)
+class Creep(ListTable):
     """Kelvin-Voigt elements: each adds a strain J (1 - exp(-t / tau)) per unit of hoop stress to the elastic strain.
 
     compliance : J of each element [1/Pa]; time : retardation time tau of each element [s]; t is the time since loading
@@ -33,10 +107,6 @@ class Creep:
 
     compliance: tuple[float, ...]
     time: tuple[float, ...]
-
-    def table(self) -> dict[str, list[float]]:
-        """Elements as a table of a case file: key -> list."""
-        return {"compliance": list(self.compliance), "time": list(self.time)}
 
 
 @dataclass(frozen=True)
@@ -71,8 +141,7 @@ class Elements(Value):
     def read(self, given: Any, setting: ReadContext) -> Creep:
         if isinstance(given, Creep):
             return given
-        if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is not a table; expected {{ compliance = [1e-10], time = [0.05] }}")
+        check_table(given, "{ compliance = [1e-10], time = [0.05] }")
         creep = Creep(**read_keys(given, CREEP_KEYS, setting))
         if len(creep.compliance) != len(creep.time):
             sizes = f"`compliance` has length {len(creep.compliance)}, and `time` has length {len(creep.time)}"
@@ -129,13 +198,9 @@ class MaterialName(Value):
 
     @property
     def names(self) -> list[str]:
-        from fvsolve.parts.pipe.materials import materials  # imported only for pipes with a material
-
         return list(materials())
 
     def read(self, given: Any, setting: ReadContext) -> str:
-        from fvsolve.parts.pipe.materials import WITHOUT_SOURCE
-
         if isinstance(given, str) and given in self.names:
             return given
         if not isinstance(given, str):
@@ -219,11 +284,6 @@ def restraint_factor(restraint: str | float | None, bore: float, wall: Wall) -> 
     return thin / (1.0 + ratio) + 2.0 * ratio * (1.0 + nu)
 
 
-def needs_poisson(restraint: str | float | None, bore: float, wall: Wall) -> bool:
-    """True if the restraint factor depends on Poisson's ratio of the wall."""
-    return restraint in ("upstream", "anchored") or (restraint == "joints" and wall.thickness * THIN_WALL > bore)
-
-
 def creep_elements(pipe: Any) -> tuple[tuple[float, float], ...]:
     """(final relative growth of the bore area per pressure [1/Pa], time constant [s]) of each creep element of a wall.
 
@@ -256,7 +316,8 @@ def wall_faults(pipe: Any) -> Iterator[tuple[tuple[Any, ...], str]]:
     wall = pipe.wall
     if not isinstance(wall, Wall):
         return
-    if wall.poisson_ratio is None and needs_poisson(pipe.restraint, pipe.diameter, wall):
+    thick_joints = pipe.restraint == "joints" and wall.thickness * THIN_WALL > pipe.diameter
+    if wall.poisson_ratio is None and (pipe.restraint in ("upstream", "anchored") or thick_joints):
         reason = f"the catalogue has no value for {pipe.material}" if pipe.material else "none is given"
         text = f"{show(pipe.restraint)} needs Poisson's ratio of the wall, and {reason}; give wall.poisson_ratio"
         yield ("restraint",), text

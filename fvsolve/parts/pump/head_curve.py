@@ -1,14 +1,14 @@
-"""Values of a case file for the head curve, efficiency, power and Suter table of a pump."""
+"""Values of a case file for head curve, efficiency, power and Suter table of a pump; published Suter tables."""
 
-from __future__ import annotations
-
+import functools
+import math
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
-from fvsolve.parts.pump.suter_tables import NAMES, suter_tables
-from fvsolve.parts.table_model import keys_json, read_keys
+from fvsolve.data import read_table
+from fvsolve.parts.table_model import check_table, keys_json, read_keys, read_lists
 from fvsolve.parts.value import (
     NEEDED,
     PROFILE,
@@ -20,11 +20,51 @@ from fvsolve.parts.value import (
     Value,
     ValueFault,
     between,
-    check_increasing,
     nonnegative,
     positive,
 )
 from fvsolve.units import show
+
+NAMES = ("radial-25", "radial-35", "mixed-94", "mixed-145", "axial-260")  # by rising specific speed
+
+
+@dataclass(frozen=True)
+class Quadrants:
+    """Values of WH and WB at equal intervals of x from 0 to 2 pi, and the names of the published tables used.
+
+    x = pi + atan2(v, n), with flow v and speed n over their rated values; head, torque : values of WH and WB
+    words : names of the tables
+    """
+
+    head: tuple[float, ...]
+    torque: tuple[float, ...]
+    words: str
+
+
+@functools.cache
+def suter_tables() -> dict[str, tuple[tuple[float, ...], tuple[float, ...]]]:
+    """Values of WH and of WB of each published table : name -> (WH, WB)."""
+    given = read_table("suter_tables")
+    return {name: (tuple(given[name]["head"]), tuple(given[name]["torque"])) for name in NAMES}
+
+
+def quadrants(speed: float) -> Quadrants:
+    """Suter table for a specific speed [rpm, m3/s, m], interpolated between published tables over its logarithm.
+
+    Outside their range it is the nearest table.
+    """
+    logs = [math.log(read_table("suter_tables")[name]["speed"]) for name in NAMES]
+    place = min(max(math.log(speed), logs[0]), logs[-1])
+    k = max(j for j in range(len(logs) - 1) if logs[j] <= place)
+    share = (place - logs[k]) / (logs[k + 1] - logs[k])
+    ends = suter_tables()[NAMES[k]], suter_tables()[NAMES[k + 1]]
+    if share in (0.0, 1.0):
+        return Quadrants(*ends[int(share)], NAMES[k + int(share)])
+    head, torque = (
+        tuple((1.0 - share) * a + share * b for a, b in zip(*pair, strict=True)) for pair in zip(*ends, strict=True)
+    )
+    return Quadrants(head, torque, f"{NAMES[k]} and {NAMES[k + 1]}")
+
 
 ROUNDING = 1e-6  # allowed difference of first and last value of a Suter table, over the greatest value
 
@@ -58,18 +98,8 @@ def points(
     faults_of : function of (table, flows, values) that returns further faults
     Raises ValueFault if flows do not rise, lengths differ, or `faults_of` finds faults.
     """
-    lists = read_keys(given, keys_of(word, dimension, range), setting)
-    flow, value = lists["flow"], lists[word]
-    faults = faults_of(given, flow, value)
-    if len(flow) != len(value):
-        faults.append(((word,), f"has length {len(value)}, but `flow` has length {len(flow)}; expected equal lengths"))
-    try:
-        check_increasing(flow, given["flow"], "flows")
-    except ValueError as error:
-        faults.append((("flow",), str(error)))
-    if faults:
-        raise ValueFault(faults)
-    return CurvePoints(flow, value, word)
+    further = functools.partial(faults_of, given)
+    return CurvePoints(*read_lists(given, keys_of(word, dimension, range), setting, "flows", further), word)
 
 
 def keys_of(word: str, dimension: str, range=nonnegative) -> dict[str, tuple[Value, Any]]:
@@ -86,10 +116,7 @@ class HeadCurve(Value):
     def read(self, given: Any, setting: ReadContext) -> CurvePoints:
         if isinstance(given, CurvePoints):
             return given
-        if not isinstance(given, dict):
-            raise ValueError(
-                f'{show(given)} is not a table; expected for example {{ flow = ["50 l/s"], head = ["40 m"] }}'
-            )
+        check_table(given, 'for example { flow = ["50 l/s"], head = ["40 m"] }')
         if "coefficients" in given:
             coefficients = read_keys(given, self.polynomial, setting)["coefficients"]
             self.check_polynomial(coefficients)
@@ -119,14 +146,8 @@ class HeadCurve(Value):
         flows = np.linspace(0.0, end, 1001)
         rises = np.flatnonzero(np.polynomial.polynomial.polyval(flows, slope) > 0.0)
         if rises.size:
-            raise ValueFault(
-                [
-                    (
-                        ("coefficients",),
-                        f"the head rises at a flow of {flows[rises[0]]:.4g} m3/s; the head must fall as the flow rises",
-                    )
-                ]
-            )
+            text = f"the head rises at a flow of {flows[rises[0]]:.4g} m3/s; the head must fall as the flow rises"
+            raise ValueFault([(("coefficients",), text)])
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [keys_json(keys_of("head", "head")), keys_json(self.polynomial)]}
@@ -171,10 +192,7 @@ class ShaftPower(Value):
     def read(self, given: Any, setting: ReadContext) -> CurvePoints:
         if isinstance(given, CurvePoints):
             return given
-        if not isinstance(given, dict):
-            raise ValueError(
-                f'{show(given)} is not a table; expected for example {{ flow = [0, "50 l/s"], power = [...] }}'
-            )
+        check_table(given, 'for example { flow = [0, "50 l/s"], power = [...] }')
         return points(given, "power", "power", setting)
 
     def json(self) -> dict[str, Any]:
@@ -218,8 +236,7 @@ class Suter(Value):
     def read(self, given: Any, setting: ReadContext) -> SuterTable:
         if isinstance(given, SuterTable):
             return given
-        if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is not a table; expected keys {', '.join(self.keys)}")
+        check_table(given, f"keys {', '.join(self.keys)}")
         values = read_keys(given, self.keys, setting)
         table = values.pop("table")
         if table is not None and ("head" in given or "torque" in given):
@@ -239,13 +256,11 @@ class Suter(Value):
             if len(series) < 9:
                 faults.append(((key,), f"{len(series)} values; expected at least 9, from x = 0 to x = 2 pi"))
             elif abs(series[0] - series[-1]) > ROUNDING * max(map(abs, series)):
-                faults.append(
-                    (
-                        (key,),
-                        f"ends at {series[-1]:g} and begins at {series[0]:g}; expected equal values, because "
-                        "x = 2 pi is x = 0 again",
-                    )
+                text = (
+                    f"ends at {series[-1]:g} and begins at {series[0]:g}; expected equal values, because "
+                    "x = 2 pi is x = 0 again"
                 )
+                faults.append(((key,), text))
         if faults:
             raise ValueFault(faults)
         values["head"], values["torque"] = ((*series[:-1], series[0]) for series in (head, torque))

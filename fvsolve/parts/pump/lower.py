@@ -1,20 +1,26 @@
 """Pumps in the tables of a model: their steady start, and notices about it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 
 from fvsolve import units
-from fvsolve.assembly.device_lowering import Device
-from fvsolve.assembly.inputs import SPEED, Input
+from fvsolve.assembly.lowering import SPEED, Device, Input
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.pump import law
-from fvsolve.parts.pump import law_curve as curves
-from fvsolve.parts.pump.lower_curve import curve_numbers, joined_table, rated_point, specific_speed
-from fvsolve.parts.pump.lower_shaft import ShaftLowering, inertia, numbers_of, rated_power, shaft_points, usual_inertia
+from fvsolve.parts.pump.lower_shaft import (
+    ShaftLowering,
+    curve_numbers,
+    inertia,
+    joined_table,
+    numbers_of,
+    rated_point,
+    rated_power,
+    shaft_points,
+    specific_speed,
+    usual_inertia,
+)
 from fvsolve.steady import Edge
 
 SPEED_TOLERANCE = 1e-6  # difference of heads regarded as rounding [m]
@@ -36,11 +42,8 @@ def reversed_pump(start, name: str, part, valve) -> list[Notice]:
     )
     if valve["drive"] <= 0.0 or start.rest or not (heads[i] > heads[j] + SPEED_TOLERANCE or lowest):
         return []
-    target = (
-        "which has the lowest water level"
-        if lowest
-        else f"where the head is {start.case.amount(heads[i] - heads[j], 'head', span=True)} lower"
-    )
+    target = f"where the head is {start.case.amount(heads[i] - heads[j], 'head', span=True)} lower"
+    target = "which has the lowest water level" if lowest else target
     text = (
         f"{name}: it pumps from {part.from_} to {part.to}, {target}; check its direction (`from` is the suction side)"
     )
@@ -196,10 +199,10 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         ratio = rho / start.draft.fluid.density
 
         def newton(flow, present):
-            a, s = curves.curve_step(floats, at, speed, rho, rho * gravity, g, float(flow), float(present * ratio))
+            a, s = law.curve_step(floats, at, speed, rho, rho * gravity, g, float(flow), float(present * ratio))
             return 1.0 / s, ratio, a / s
 
-        first = rho * floats[at + curves.SCALE] * speed
+        first = rho * floats[at + law.SCALE] * speed
         return Edge(i, j, newton, float(first), drives=True)
 
     def follow(self, start, k) -> None:
@@ -209,7 +212,7 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         """Pressure rise [Pa] of a pump at a mass flow [kg/s] in the steady start; row : its row in the valve table"""
         floats, rho = start.draft.tables.floats, start.density_at(int(row["from_node"]))
         at, speed = int(row["data"]), float(row["drive"])
-        return float(rho * start.case.gravity * curves.curve_head(floats, at, speed, float(flow) / rho)[0])
+        return float(rho * start.case.gravity * law.curve_head(floats, at, speed, float(flow) / rho)[0])
 
     def revise_state(self, start, part, row) -> bool:
         k = int(row["valve"])
@@ -236,16 +239,12 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
             elif draft.case.law.linear:
                 valve["drop"] = drop
         if valve["open"] == 0.0 and k not in start.shut:
-            moving.append(
-                f"pump {name}: its flow at the start is not on its characteristic at the relative speed "
-                f"{valve['drive']:.4g}"
-            )
+            text = f"pump {name}: its flow at the start is not on its characteristic at the relative speed "
+            moving.append(f"{text}{valve['drive']:.4g}")
         draft.warnings += [
-            *reversed_pump(start, name, part, valve),
-            *unusual_flow(draft, name, part),
-            *estimated_inertia(draft, name, part),
-            *rated_point_notes(draft, name, part),
-        ]
+            *reversed_pump(start, name, part, valve), *unusual_flow(draft, name, part),
+            *estimated_inertia(draft, name, part), *rated_point_notes(draft, name, part),
+        ]  # fmt: skip
         return moving + self.set_free_shaft(start, part, row, valve)
 
     def fluid_torque(self, start, row, valve) -> float:

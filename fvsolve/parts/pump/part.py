@@ -1,12 +1,10 @@
 """Pumps with shaft: keys and faults."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.parts.link import TwoPort
+from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.pump.head_curve import CurvePoints, Efficiency, HeadCurve, ShaftPower, Suter, SuterTable
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.value import PROFILE, VALUE, Choice, Flag, Quantity, UsualRange, nonnegative, positive
@@ -39,36 +37,23 @@ class Pump(TwoPort, kind="pump"):
         None
     )
     suter: Annotated[SuterTable | None, Suter()] = None
-    curve_extrapolation: Annotated[
-        str | None,
-        Choice(
-            "law",
-            ("suter", "parabola"),
-            "head outside the flows of `curve`: suter (a table by specific speed, joined to the curve; default with "
-            "`rated_speed`) or parabola",
-        ),
-    ] = None
-    speed: Annotated[
-        Schedule,
-        Scheduled(
-            "number",
-            nonnegative,
-            "relative speed, 1 at the speed of the curve",
-            UsualRange(0.0, 2.5, "of the rated speed"),
-        ),
-    ] = Field(default_factory=lambda: constant(1.0))
+    curve_extrapolation: Annotated[str | None, Choice(
+        "law", ("suter", "parabola"),
+        "head outside the flows of `curve`: suter (a table by specific speed, joined to the curve; default with "
+        "`rated_speed`) or parabola",
+    )] = None  # fmt: skip
+    speed: Annotated[Schedule, Scheduled(
+        "number", nonnegative, "relative speed, 1 at the speed of the curve",
+        UsualRange(0.0, 2.5, "of the rated speed"),
+    )] = Field(default_factory=lambda: constant(1.0))  # fmt: skip
     rated_speed: Annotated[
         float | None, Quantity("angular_velocity", positive, "speed at relative speed 1 [rad/s]", SPEEDS, PROFILE)
     ] = None
-    inertia: Annotated[
-        float | None,
-        Quantity(
-            "inertia",
-            positive,
-            "inertia of all rotating masses and water in the pump, with `rated_speed` [kg m2]; estimated if left out",
-            changes=VALUE,
-        ),
-    ] = None
+    inertia: Annotated[float | None, Quantity(
+        "inertia", positive,
+        "inertia of all rotating masses and water in the pump, with `rated_speed` [kg m2]; estimated if left out",
+        changes=VALUE,
+    )] = None  # fmt: skip
     trip: Annotated[
         float | None, Quantity("time", about="time at which the motor is switched off, requires `rated_speed` [s]")
     ] = None
@@ -86,23 +71,15 @@ class Pump(TwoPort, kind="pump"):
         if "inertia" in given and "rated_speed" not in given:
             faults.append((("inertia",), 'needs rated_speed, for example "1480 rpm"'))
         if "curve_extrapolation" in given and "curve" not in given:
-            faults.append(
-                (
-                    ("curve_extrapolation",),
-                    "applies outside the flows of a curve; give the key `curve`, or remove this key",
-                )
-            )
+            text = "applies outside the flows of a curve; give the key `curve`, or remove this key"
+            faults.append((("curve_extrapolation",), text))
         if given.get("curve_extrapolation") == "suter" and "curve" in given and "rated_speed" not in given:
             faults.append(
                 (("curve_extrapolation",), 'needs rated_speed, for example "1480 rpm", for the specific speed')
             )
         if "suter" in given and isinstance(given.get("efficiency"), dict):
-            faults.append(
-                (
-                    ("efficiency",),
-                    "`suter` already gives the torque; expected a number, the efficiency at the rated point",
-                )
-            )
+            text = "`suter` already gives the torque; expected a number, the efficiency at the rated point"
+            faults.append((("efficiency",), text))
         if "suter" in given and "shaft_power" in given:
             faults.append((("shaft_power",), "`suter` already gives the torque; leave `shaft_power` out"))
         return faults

@@ -1,15 +1,12 @@
 """Hill charts of turbines in a case file or a CSV file, and faults of their points."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from fvsolve.parts.csv_rows import CsvError, read_rows, split_header
-from fvsolve.parts.table_model import keys_json, read_keys
-from fvsolve.parts.time_series import copy_name, find_file
-from fvsolve.parts.value import NEEDED, Number, ReadContext, Rows, Value, ValueFault, between
+from fvsolve.parts.csv_rows import CsvError, copy_name, find_file, read_rows, split_header
+from fvsolve.parts.table_model import check_table, keys_json, read_keys
+from fvsolve.parts.value import NEEDED, Number, ReadContext, Rows, Value, ValueFault, between, faults_of
 from fvsolve.units import show
 
 LEAST = 1e-3  # least valid unit speed, unit flow and opening
@@ -41,25 +38,20 @@ def faults_of_curve(curve) -> list[tuple[str, str]]:
         faults.append(("opening", f"{curve.opening:g} is almost shut; expected at least {LEAST:g}, or 0"))
     if curve.quantity == EFFICIENCY and not all(n > 0.0 and q > 0.0 for n, q in points):
         k = next(k for k, (n, q) in enumerate(points) if not (n > 0.0 and q > 0.0))
-        faults.append(
-            (
-                EFFICIENCY,
-                f"gives no torque at point {k + 1}, {point_text(points[k])}; expected {TORQUE} instead for the whole "
-                "curve",
-            )
+        text = (
+            f"gives no torque at point {k + 1}, {point_text(points[k])}; expected {TORQUE} instead for the whole curve"
         )
+        faults.append((EFFICIENCY, text))
     if not any(q >= LEAST for _, q in points):
         faults.append(
             (FLOW, f"has no value of {LEAST:g} or more; expected at least one, a flow that drives the turbine")
         )
     if (dead := next((p for p in points if p[0] == 0.0 and p[1] <= 0.0), None)) is not None:
-        faults.append(
-            (
-                "",
-                f"{point_text(dead)} is not a valid point: through a runner at rest a positive head drives a positive "
-                "flow; expected a flow above 0 at unit speed 0",
-            )
+        text = (
+            f"{point_text(dead)} is not a valid point: through a runner at rest a positive head drives a positive "
+            "flow; expected a flow above 0 at unit speed 0"
         )
+        faults.append(("", text))
     return faults or angle_faults(points)
 
 
@@ -73,13 +65,11 @@ def angle_faults(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
     for k, ((n, q), (m, r)) in enumerate(pairwise(points)):
         across = n * r - q * m
         if abs(across) <= ANGLE_TOLERANCE * math.hypot(n, q) * math.hypot(m, r):
-            return [
-                (
-                    "",
-                    f"points {k + 1} and {k + 2}, {point_text((n, q))} and {point_text((m, r))}, are in line with the "
-                    f"origin; expected different angles, atan2({FLOW}, {SPEED})",
-                )
-            ]
+            text = (
+                f"points {k + 1} and {k + 2}, {point_text((n, q))} and {point_text((m, r))}, are in line with the "
+                f"origin; expected different angles, atan2({FLOW}, {SPEED})"
+            )
+            return [("", text)]
         if across * way < 0.0:
             rule = (
                 f"its angle, atan2({FLOW}, {SPEED}), must rise or fall throughout: list the points in their order "
@@ -88,13 +78,11 @@ def angle_faults(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
             return [("", f"turns back at point {k + 1}, {point_text((n, q))}; a curve may fold in {SPEED}, but {rule}")]
         way = across
         if (n > 0.0) != (m > 0.0) and (q * abs(m) + r * abs(n)) <= 0.0:
-            return [
-                (
-                    "",
-                    f"passes from {point_text((n, q))} to {point_text((m, r))} across reverse flow through a runner at "
-                    f"rest, through which a positive head drives a positive flow; expected {FLOW} above 0 at {SPEED} 0",
-                )
-            ]
+            text = (
+                f"passes from {point_text((n, q))} to {point_text((m, r))} across reverse flow through a runner at "
+                f"rest, through which a positive head drives a positive flow; expected {FLOW} above 0 at {SPEED} 0"
+            )
+            return [("", text)]
     if not (points[0] if way > 0.0 else points[-1])[0] >= LEAST:
         end = f"the end of the curve with the least angle, atan2({FLOW}, {SPEED})"
         return [(SPEED, f"is below {LEAST:g} at {end}; expected a forward speed, at which a turbine drives")]
@@ -128,11 +116,8 @@ class OpeningCurve(NamedTuple):
     def table(self) -> dict[str, Any]:
         """Curve as a table of a case file."""
         return {
-            "opening": self.opening,
-            SPEED: list(self.speed),
-            FLOW: list(self.flow),
-            self.quantity: list(self.value),
-        }
+            "opening": self.opening, SPEED: list(self.speed), FLOW: list(self.flow), self.quantity: list(self.value),
+        }  # fmt: skip
 
     def torques(self, weight: float) -> list[float]:
         """Unit torque T11 [N/m3] at the points; weight : rho g [N/m3]"""
@@ -188,17 +173,14 @@ class HillChartValue(Value):
         for k, entry in enumerate(given):
             try:
                 curves[k] = self.curve(entry, setting)
-            except ValueFault as error:
-                faults += [((k, *below), text) for below, text in error.faults]
             except ValueError as error:
-                faults.append(((k,), str(error)))
+                faults += faults_of(error, k)
         places = {k: (k,) for k in curves}
         return chart_of(curves, places, faults, [entry.table() for entry in curves.values()])
 
     def curve(self, given: Any, setting: ReadContext) -> OpeningCurve:
         """Read the curve of an opening from its table; raises ValueError, or ValueFault for faults of its keys."""
-        if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is not a table; expected for example {EXAMPLE}")
+        check_table(given, f"for example {EXAMPLE}")
         keys = read_keys(given, self.keys, setting)
         words = [word for word in (EFFICIENCY, TORQUE) if keys[word] is not None]
         if len(words) != 1:
@@ -270,13 +252,10 @@ def chart_of(curves: dict, places: dict, faults: list, source: Any, file: str = 
     for k, curve in curves.items():
         if curve.opening in seen:
             first = seen[curve.opening]
-            faults.append(
-                (
-                    (*places[k], "opening"),
-                    f"{curve.opening:g} is already the opening of hill_chart[{first}]; give a single curve for each "
-                    "opening",
-                )
+            message = (
+                f"{curve.opening:g} is already the opening of hill_chart[{first}]; give a single curve for each opening"
             )
+            faults.append(((*places[k], "opening"), message))
         seen.setdefault(curve.opening, k)
         keys, name = places[k], f"{file}opening {curve.opening:g}: "
         texts = faults_of_shut(curve) if curve.opening == 0.0 else faults_of_curve(curve)

@@ -5,22 +5,18 @@ and unit flow u = flow / (flow scale capacity), at a head of 1 m. The flow scale
 `capacity` the greatest flow of a curve over this scale.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 
 import numpy as np
 
-from fvsolve.assembly.device_lowering import Device
-from fvsolve.assembly.inputs import ANGULAR_SPEED, Input, opening_input
+from fvsolve.assembly.lowering import ANGULAR_SPEED, Device, Input, opening_input
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.pump.law import INERTIA, RATED
 from fvsolve.parts.pump.lower import unusual_inertia
 from fvsolve.parts.pump.lower_shaft import ShaftLowering, numbers_of
 from fvsolve.parts.turbine import law
-from fvsolve.parts.turbine import law_chart as charts
 from fvsolve.steady import Edge
 
 ANGLE_TOLERANCE = 1e-7  # angle below which two rays are merged [rad]
@@ -31,7 +27,7 @@ STANDING, BACKWARD = 0.5 * math.pi, math.pi  # angles of a runner at rest and in
 
 
 def chart_numbers(part, weight: float) -> list[float]:
-    """Parameters of the hill chart of a turbine, in the order that `law_chart` states; weight : rho g [N/m3]"""
+    """Parameters of the hill chart of a turbine, in the order that `law` states; weight : rho g [N/m3]"""
     chart, d = part.hill_chart, part.diameter
     speed = max(abs(n) for entry in chart.curves for n in entry.speed) * math.pi / 30.0 / d
     flow = max(q for entry in chart.curves for q in entry.flow) * d * d
@@ -128,13 +124,8 @@ def pump_nodes(angle: float, root: float, torque: float, torque_scale: float, di
     nodes = []
     for tilt in np.linspace(first_tilt, STANDING, count + 1)[1:]:
         ratio = min(math.tan(tilt), STEEPEST)
-        nodes.append(
-            (
-                tilt,
-                root_on_line(first_tilt, root, tilt),
-                direction * (PUMP_RATIO * torque_scale * ratio + max(excess, 0.0)),
-            )
-        )
+        shaft_torque = direction * (PUMP_RATIO * torque_scale * ratio + max(excess, 0.0))
+        nodes.append((tilt, root_on_line(first_tilt, root, tilt), shaft_torque))
     return [(-tilt if direction < 0.0 else BACKWARD + tilt, value, shaft_torque) for tilt, value, shaft_torque in nodes]
 
 
@@ -169,7 +160,7 @@ def curve_at_rays(
     i = np.clip(np.searchsorted(angles, rays) - 1, 0, len(angles) - 2)
     (a, b), (c, d), (x, y) = directions[i].T, directions[i + 1].T, ray_directions.T
     share_1, share_2 = (x * d - y * c) / (a * d - b * c), (a * y - b * x) / (a * d - b * c)
-    weights = share_1 * np.maximum(roots[i], charts.LEAST_ROOT), share_2 * np.maximum(roots[i + 1], charts.LEAST_ROOT)
+    weights = share_1 * np.maximum(roots[i], law.LEAST_ROOT), share_2 * np.maximum(roots[i + 1], law.LEAST_ROOT)
     root = share_1 * roots[i] + share_2 * roots[i + 1]
     torque = (weights[0] * torques[i] + weights[1] * torques[i + 1]) / (weights[0] + weights[1])
     nearest = np.abs(rays[:, None] - angles).argmin(axis=1)
@@ -194,7 +185,7 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
         density = draft.fluid.density
         row["data"], row["schedule"] = len(draft.floats), draft.schedules.add(link.opening)
         draft.floats += chart_numbers(link, density * draft.case.gravity)
-        row["conductance"] = density * draft.floats[row["data"] + charts.FLOW] ** 2 / draft.case.gravity
+        row["conductance"] = density * draft.floats[row["data"] + law.FLOW] ** 2 / draft.case.gravity
 
     def numbers(self, draft, name, part) -> list[float]:
         by_index = self.drive_numbers(draft, name, part) | {INERTIA: part.inertia or np.inf, RATED: 1.0}
@@ -229,11 +220,11 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
 
         def newton(flow, present):
             present = float(present * ratio)
-            first = charts.flow_bound(floats, at, vanes, weight, present)  # finds the greatest of several flows
-            a, s = charts.chart_step(floats, at, vanes, omega, rho, weight, 0.0, float(g), float(flow), present, first)
+            first = law.flow_bound(floats, at, vanes, weight, present)  # finds the greatest of several flows
+            a, s = law.chart_step(floats, at, vanes, omega, rho, weight, 0.0, float(g), float(flow), present, first)
             return 1.0 / s, ratio, a / s
 
-        first = rho * floats[at + charts.FLOW] * charts.capacity(floats, at, vanes)
+        first = rho * floats[at + law.FLOW] * law.capacity(floats, at, vanes)
         return Edge(i, j, newton, float(first), drives=omega != 0.0)
 
     def follow(self, start, k) -> None:
@@ -246,7 +237,7 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
             rho, floats = start.density_at(int(valve["from_node"])), draft.tables.floats
             vanes = float(start.schedule_value(valve["schedule"]))
             at = floats, int(valve["data"]), vanes, float(valve["drive"])
-            drop = rho * start.case.gravity * charts.chart_head(*at, float(valve["flow"]) / rho)[0]
+            drop = rho * start.case.gravity * law.chart_head(*at, float(valve["flow"]) / rho)[0]
             ratio = rho / draft.fluid.density
             if abs(drop - valve["drop"] * ratio) > FLOW_TOLERANCE * (abs(drop) + abs(valve["drop"])) + 1e-3:
                 moving.append(f"turbine {name}: its flow at the start is not on its hill chart")
@@ -263,9 +254,7 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
         rho = start.density_at(int(valve["from_node"]))
         vanes, omega = float(start.schedule_value(valve["schedule"])), float(valve["drive"])
         floats, density_ratio = start.draft.tables.floats, rho / start.draft.fluid.density
-        return -density_ratio * charts.chart_torque(
-            floats, int(valve["data"]), vanes, omega, float(valve["flow"]) / rho
-        )
+        return -density_ratio * law.chart_torque(floats, int(valve["data"]), vanes, omega, float(valve["flow"]) / rho)
 
 
 def folded_curve_notice(start, name: str, part, valve) -> list[Notice]:

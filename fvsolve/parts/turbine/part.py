@@ -1,16 +1,14 @@
 """Turbines and pump-turbines with shaft: keys and faults."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import pi
 from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from fvsolve.parts.context import CaseContext, Faults
-from fvsolve.parts.link import TwoPort
+from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
+from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.turbine.hill_chart import HillChart, HillChartValue, OpeningCurve
 from fvsolve.parts.value import VALUE, Quantity, UsualRange, anything, between, positive
 
@@ -42,15 +40,10 @@ class Turbine(TwoPort, kind="turbine"):
     opening: Annotated[Schedule, Scheduled("number", between(0, 1), "opening of the guide vanes, 0 shut to 1 open")] = (
         Field(default_factory=lambda: constant(1.0))
     )
-    inertia: Annotated[
-        float | None,
-        Quantity(
-            "inertia",
-            positive,
-            "inertia of runner, water in it and generator, required with `trip` [kg m2]",
-            changes=VALUE,
-        ),
-    ] = None
+    inertia: Annotated[float | None, Quantity(
+        "inertia", positive, "inertia of runner, water in it and generator, required with `trip` [kg m2]",
+        changes=VALUE,
+    )] = None  # fmt: skip
     trip: Annotated[
         float | None, Quantity("time", about="time of load rejection, when the generator is disconnected [s]")
     ] = None

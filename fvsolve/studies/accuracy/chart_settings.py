@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from fvsolve.case import load
 from fvsolve.case.case import Case
-from fvsolve.case.raw import raw_link
+from fvsolve.case.reading import raw_link
 from fvsolve.case.sections import (
     DEFAULT_COURANT,
     DEFAULT_METHOD,

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case.chainage import add_bends, placed
-from fvsolve.case.raw import raw_link
+from fvsolve.case.reading import raw_link
 from fvsolve.case.sloshing import slowest
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.fluid import LAWS

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fvsolve.case.raw import raw_link
+from fvsolve.case.reading import raw_link
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.model.model_facts import rhs_seconds
 from fvsolve.steppers import automatic

@@ -7,14 +7,11 @@ velocity at which the valve shuts [m/s] and the deceleration of the flow at the 
 
 from fvsolve.jit import njit
 from fvsolve.kernels.restrictions import head_drop
-from fvsolve.parts.check_valve.law import PRESSURE_MARGIN, joins_junction
+from fvsolve.parts.self_acting.law_check_valve import PRESSURE_MARGIN, joins_junction
 
 REVERSED, SHUT, OPEN, BEYOND_CURVE = 0, 1, 2, 3  # flags; the last: the deceleration exceeds the curve
-CRACKING_PRESSURE, UNIT_FLOW, LAST_RATE = (
-    0,
-    1,
-    2,
-)  # numbers: cracking pressure [Pa], mass flow at 1 m/s [kg/s], last rate of the curve [m/s2]
+# Numbers: cracking pressure [Pa], mass flow at 1 m/s [kg/s], last rate of the curve [m/s2]
+CRACKING_PRESSURE, UNIT_FLOW, LAST_RATE = 0, 1, 2
 UNKNOWN = -1
 FORWARD_VELOCITY = 1e-6  # velocity from which a reversed flow counts as forward again [m/s]
 SMALLEST = 1e-300
@@ -58,12 +55,8 @@ def events(t, y, out, tables, device, g):
     The last function is the last deceleration of the curve minus that at the reversal [m/s2].
     """
     k, at, data, o, present = (
-        device["valve"],
-        device["event"],
-        device["data"],
-        device["y"],
-        valve_mode(y, tables, device),
-    )
+        device["valve"], device["event"], device["data"], device["y"], valve_mode(y, tables, device),
+    )  # fmt: skip
     flow = out[tables.layout[0]["valve"] + k]
     v = flow / tables.floats[data + UNIT_FLOW]
     for mode in range(BEYOND_CURVE):

@@ -1,6 +1,6 @@
 """Rupture disc to ambient: functions of the disc law and of the outlet law."""
 
 from fvsolve.parts.outlet.law_root import bends, slope, step
-from fvsolve.parts.rupture_disc.law import events, set, value
+from fvsolve.parts.outlet.law_rupture_disc import events, set, value
 
 __all__ = ["bends", "events", "set", "slope", "step", "value"]

@@ -1,0 +1,184 @@
+"""Base classes of nodes and of links."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+from pydantic import Field
+
+from fvsolve.errors import FvsolveError
+from fvsolve.parts.carried_scalar import ScalarValues
+from fvsolve.parts.table_model import Table, check_table, keys_json, read_keys
+from fvsolve.parts.value import NEEDED, VALUE, Quantity, ReadContext, Rows, Text, UsualRange, Value
+from fvsolve.units import show
+
+USUAL_ELEVATIONS = UsualRange(-12e3, 9e3, "boreholes to mountains")
+
+
+class Part(Table):
+    """Base of nodes and links: type in the case file, and scalars.
+
+    kinds : type in the case file -> class; noun : word for messages; own_scalars : scalars that the part states, none
+    if empty: "start" or "inflow" of a node, "along" the length of a link
+    """
+
+    noun: ClassVar[str] = ""
+    kind: ClassVar[str] = ""
+    kinds: ClassVar[dict[str, type[Part]]] = {}
+    no_scalars: ClassVar[str] = ""  # reason why a case with scalars cannot have this part yet
+    own_scalars: ClassVar[str] = ""
+
+    def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
+        super().__init_subclass__(**rest)
+        if kind:
+            if kind in cls.kinds:
+                raise FvsolveError(f"a {cls.noun} of type {show(kind)} exists already; expected another name")
+            cls.kind = kind
+            cls.kinds[kind] = cls
+
+
+class Node(Part):
+    """Place with a single potential: pressure at its elevation (hydraulic), or velocity (translational or spatial).
+
+    Ports: those of the links that name it. Stored and dissipated energy: none, unless its type states otherwise.
+    """
+
+    noun: ClassVar[str] = "node"
+    kinds: ClassVar[dict[str, type[Node]]] = {}
+    quantities: ClassVar[dict[str, str]] = {
+        "pressure": "pressure", "gauge_pressure": "gauge_pressure", "head": "head"
+    }  # fmt: skip
+    fixes_pressure: ClassVar[bool] = False
+    # key of a prescribed flow, and its sign as flow into links; 0 for a prescribed pressure
+    driven: ClassVar[tuple[str, float] | None] = None
+    domain: ClassVar[str] = "hydraulic"  # | "translational" | "spatial"
+
+    elevation: Annotated[float | None, Quantity(
+        "length", about="elevation above datum, at all nodes or none [m]; "
+        "0 (reservoir with `head`: that of the other end of its first link) if left out", usual=USUAL_ELEVATIONS,
+    )] = None  # fmt: skip
+    position: Annotated[
+        tuple[float, float] | None, Rows("length", length=2, about="position [x, y] in drawings [m]", changes=VALUE)
+    ] = None
+    scalars: Annotated[
+        dict[str, Any], ScalarValues("scalar values of the inflow (reservoir, inflow), or at the start (tank, chamber)")
+    ] = {}
+
+    @classmethod
+    def variant(cls, given: dict[str, Any]) -> type[Node]:
+        """Class of a node with the given keys: this class, or a subclass with more quantities."""
+        return cls
+
+    @classmethod
+    def own_places(cls, given: dict[str, Any]) -> tuple[str, ...] | None:
+        """Names of the places that replace the node, as in the case file; None if the node itself is a place."""
+        return None
+
+    @classmethod
+    def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:
+        """Names of the bodies that carry the node or move its walls, as in the case file."""
+        return ()
+
+    def inner(self, name: str) -> tuple[dict[str, Node], dict[str, Any]]:
+        """(places, links) of the solved network for this node, each by name.
+
+        They contain the node itself, and its own places `NAME.PLACE`.
+        """
+        return {name: self}, {}
+
+
+class PlaceOnBody(Node):
+    """Node that a body may carry."""
+
+    on: Annotated[str | None, Text("body that carries the node; fixed in the world if left out")] = None
+    at: Annotated[tuple[float, ...] | None, Rows(
+        "position", length=3,
+        about="position (of a basin: of its origin) in axes of the body, instead of `elevation` [m]; 0 if left out",
+    )] = None  # fmt: skip
+
+    @classmethod
+    def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:
+        return (given["on"],) if isinstance(given.get("on"), str) else ()
+
+    @property
+    def position_keys(self) -> dict[str, Any]:
+        """Keys of the position of the node, with their values."""
+        return {"elevation": self.elevation, "on": self.on, "at": self.at}
+
+    @property
+    def place(self) -> tuple[float, ...]:
+        """Position [m] of the node in the axes of its body; the origin if not given."""
+        return self.at or (0.0, 0.0, 0.0)
+
+
+class Link(Part):
+    """Part with ports that join places; flow is positive into the part at each port.
+
+    The sum of potential times flow over the ports is the power [W] into the part. Potential and flow are pressure and
+    volume flow (hydraulic domain), velocity and force (translational), or angular velocity and torque (rotational).
+    """
+
+    noun: ClassVar[str] = "link"
+    kinds: ClassVar[dict[str, type[Link]]] = {}
+    quantities: ClassVar[dict[str, str]] = {"flow": "flow"}
+    on_request: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded only by explicit probes
+    along: ClassVar[dict[str, str]] = {}  # quantities that also exist at a fraction of the length
+    joins: ClassVar[dict[str, str]] = {}  # port -> required domain of its place
+    may_lack: ClassVar[tuple[str, ...]] = ()  # ports that may join nothing
+    owns: ClassVar[dict[str, str]] = {}  # own place, `LINK.PLACE` for other parts -> domain
+
+    def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
+        """(places, links) of the solved network for this link, each by name.
+
+        They contain the link itself, and its own places `NAME.PLACE`.
+        """
+        return {}, {name: self}
+
+
+class TwoPort(Link):
+    """Link with the ports `from` and `to`; its flow [m3/s] is the flow at `from`."""
+
+    joins: ClassVar[dict[str, str]] = {"from": "hydraulic", "to": "hydraulic"}
+
+    from_: Annotated[str, Text("place at its start"), Field(alias="from")]
+    to: Annotated[str, Text("place at its end")]
+
+    @property
+    def ports(self) -> dict[str, str]:
+        """Places that the ports join: port name -> place."""
+        return {"from": self.from_, "to": self.to}
+
+
+class Coupling(TwoPort):
+    """Link between two masses on an axis, or between two points in space.
+
+    Its force [N] acts on `to` in the positive direction and on `from` in the negative direction. Between points,
+    x_to - x_from is their distance, and a positive force pushes them apart.
+    """
+
+    joins: ClassVar[dict[str, str]] = {"from": "translational or spatial", "to": "translational or spatial"}
+    quantities: ClassVar[dict[str, str]] = {"force": "force"}
+
+
+@dataclass(frozen=True)
+class Ports(Value):
+    """Value of a case file for the key `ports` of a link with other ports than `from` and `to`: port name -> place."""
+
+    names: tuple[str, ...]
+    about: str = "place of each port"
+
+    def read(self, given: Any, setting: ReadContext) -> dict[str, str]:
+        example = ", ".join(f'{name} = "..."' for name in self.names)
+        check_table(given, f"{{ {example} }}")
+        return read_keys(given, self.keys(), setting)
+
+    def keys(self) -> dict[str, tuple[Value, Any]]:
+        return {name: (Text(), NEEDED) for name in self.names}
+
+    @property
+    def takes(self) -> str:
+        return f"`{{ {', '.join(self.names)} }}`"
+
+    def json(self) -> dict[str, Any]:
+        return keys_json(self.keys())
