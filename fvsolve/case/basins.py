@@ -26,7 +26,7 @@ from fvsolve.units import show
 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
-    from fvsolve.mesh.mesh_points import MeshPoints
+    from fvsolve.mesh.mesh import MeshPoints
 
 Faults = Iterator[tuple[tuple, str]]
 
@@ -67,7 +67,7 @@ class BasinFields:
     @cached_property
     def points(self) -> MeshPoints:
         """Locator that finds the cell of a point."""
-        from fvsolve.mesh.mesh_points import MeshPoints
+        from fvsolve.mesh.mesh import MeshPoints
 
         return MeshPoints(self.mesh)
 

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from fvsolve.draw import frame_meshes, style
-from fvsolve.draw.part_drawing import draw_parts
-from fvsolve.draw.projection import WATER_VIEW, Projection, box_corners, draw_box, fit_limits, round_scale
-from fvsolve.draw.scene import DrawnScene
+from fvsolve.draw.network_picture import draw_parts
+from fvsolve.draw.scene import WATER_VIEW, DrawnScene, Projection, box_corners, draw_box, fit_limits, round_scale
 from fvsolve.draw.sheet import COLOUR_MAP, HALF_SYMBOL, WATER, PictureSheet, write_animation
 
 FLAT_SHARE = 0.08  # height over width below which bodies are drawn in plan, or depth over width for a profile

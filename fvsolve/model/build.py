@@ -20,18 +20,24 @@ from fvsolve.case.case import Case
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tanks
-from fvsolve.model.body_tables import lower_bodies, lower_lines, lower_moving_segments
 from fvsolve.model.cluster_tables import classify_nodes
-from fvsolve.model.delay_history import history_size
-from fvsolve.model.delay_line_selection import (
+from fvsolve.model.delay_lines import (
     divide_lines,
     end_admittance_ratio,
+    history_size,
     jump_tables,
     line_methods,
     lower_delays,
 )
 from fvsolve.model.equilibrium_search import with_equilibrium
-from fvsolve.model.mass_tables import find_closed_chambers, lower_masses, supporting_pressures
+from fvsolve.model.mechanics_tables import (
+    find_closed_chambers,
+    lower_bodies,
+    lower_lines,
+    lower_masses,
+    lower_moving_segments,
+    supporting_pressures,
+)
 from fvsolve.model.model import Model
 from fvsolve.model.probe_tables import lower_probes, probe_offsets
 from fvsolve.model.scalar_tables import lower_scalars, scale_scalars, start_amounts

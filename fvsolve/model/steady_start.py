@@ -17,8 +17,7 @@ from fvsolve.kernels.restrictions import conductance_of, flow_at_drop, flow_slop
 from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.kernels.steady_friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.table_handle import make_handle
-from fvsolve.model.body_tables import driven_at_start
-from fvsolve.model.mass_tables import start_masses
+from fvsolve.model.mechanics_tables import driven_at_start, start_masses
 from fvsolve.model.run_data import zeros_for_run
 from fvsolve.model.static_forces import start_bodies
 from fvsolve.steady import Edge, solve_steady, union

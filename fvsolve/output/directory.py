@@ -20,8 +20,7 @@ from fvsolve.output.csv_files import (
     write_envelope,
     write_routes,
 )
-from fvsolve.output.fields import FieldSeries
-from fvsolve.output.parallel_vtk import ParallelBasinWriter
+from fvsolve.output.fields import FieldSeries, ParallelBasinWriter
 from fvsolve.output.restart import Restart, identity, read_restart, write_restart
 from fvsolve.output.summary_file import read_summary
 from fvsolve.output.unit_columns import probe_columns, time_column

@@ -6,9 +6,8 @@ from pathlib import Path
 from fvsolve.display import save_if_path
 from fvsolve.draw.plot import history_figure, phase_figure, section_figure
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.report.long_section import envelope_column, head_window, section_of
+from fvsolve.report.long_section import SectionPath, envelope_column, head_window, section_of, section_paths
 from fvsolve.report.report_files import open_checked_run
-from fvsolve.report.section_pipes import SectionPath, section_paths
 from fvsolve.run.result import not_valid
 from fvsolve.units import show
 

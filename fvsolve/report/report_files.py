@@ -10,9 +10,8 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, RunError, listing, visible
 from fvsolve.output.csv_files import ENVELOPE_QUANTITIES
-from fvsolve.report import import_library, model_tables, page, run_tables
-from fvsolve.report.long_section import Section, envelope_column, section_of
-from fvsolve.report.section_pipes import SectionPath, section_paths
+from fvsolve.report import import_library, page, tables
+from fvsolve.report.long_section import Section, SectionPath, envelope_column, section_of, section_paths
 from fvsolve.report.tables import ReportTable, is_number
 from fvsolve.run import open_run
 from fvsolve.studies.scenarios import STUDY, open_study
@@ -113,25 +112,25 @@ def write_tables(report_tables: list[ReportTable], path: Path) -> Path:
 
 def workbook_tables(result, sections: list[SectionPath]) -> list[ReportTable]:
     """All tables of a run for a workbook; a table of a section has a row for each point."""
-    words = ReportTable("Summary", ("", ""), [[item.head, item.text] for item in run_tables.top_sentences(result)])
+    words = ReportTable("Summary", ("", ""), [[item.head, item.text] for item in tables.top_sentences(result)])
     warnings = [[item.kind, item.place, item.text] for item in result.warnings]
     notes = ReportTable("Warnings", ("kind", "place", "text"), warnings)
-    versions = run_tables.versions(result)
+    versions = tables.versions(result)
     contents = [
         words,
-        run_tables.verdict_table(result),
-        *run_tables.worst_tables(result),
-        run_tables.extremes_of_pipes(result, sections),
-        *run_tables.ranked_pipes(result),
-        run_tables.extremes_of_probes(result),
+        tables.verdict_table(result),
+        *tables.worst_tables(result),
+        tables.extremes_of_pipes(result, sections),
+        *tables.ranked_pipes(result),
+        tables.extremes_of_probes(result),
         *(_section_table(result, section_of(result, way)) for way in sections),
-        run_tables.cavities(result),
-        run_tables.events(result),
-        *model_tables.all_tables(result),
-        run_tables.settings(result),
-        run_tables.ledgers(result),
-        run_tables.claim_table(result),
-        run_tables.comparisons(result),
+        tables.cavities(result),
+        tables.events(result),
+        *tables.model_tables(result),
+        tables.settings(result),
+        tables.ledgers(result),
+        tables.claim_table(result),
+        tables.comparisons(result),
         notes,
         ReportTable("Versions", versions.headers, versions.rows),
     ]

@@ -13,8 +13,8 @@ from fvsolve.output.memory_sink import MemorySink
 from fvsolve.output.restart import identity
 from fvsolve.output.summary_file import summary_data, write_summary
 from fvsolve.run import mpi_run
-from fvsolve.run.case_claims import claims
 from fvsolve.run.result import Result, check_summary
+from fvsolve.run.verdicts import claims
 from fvsolve.validation import COUNT_FROM_ONE, FLAG, FUNCTION, PATH, TABLE, validated
 
 __all__ = ["Result", "open_run", "run"]

@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.case.basins import patch_names
-from fvsolve.draw.projection import PLAUSIBLE_SCALE
-from fvsolve.draw.scene import DrawnPart, DrawnScene, DrawnUnit
+from fvsolve.draw.scene import PLAUSIBLE_SCALE, DrawnPart, DrawnScene, DrawnUnit
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.output import network_layout
 from fvsolve.output.fields import FIELD_UNITS, read_pipe_lines

@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.model import Model, State
 from fvsolve.model.scalar_tables import scalar_ledgers
-from fvsolve.solve.mpi_ranks import CLOSE_MESSAGE
+from fvsolve.solve.parallel_bands import CLOSE_MESSAGE, postponed_interrupts
 from fvsolve.solve.partition import threads_of
 from fvsolve.solve.run_checks import RunChecks, split_step_notices
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
@@ -27,7 +27,6 @@ from fvsolve.solve.run_summary import (
     mass_ledger,
     spill_notices,
 )
-from fvsolve.solve.thread_team import postponed_interrupts
 from fvsolve.steppers import automatic, loop_records
 from fvsolve.steppers.ledger import LEDGER_ROWS
 from fvsolve.units import show

@@ -23,7 +23,7 @@ from fvsolve.draw.scene import DrawnScene
 from fvsolve.draw.sheet import PictureSheet, colour_range
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.mesh import read, rectangle
-from fvsolve.mesh.mesh_points import MeshPoints
+from fvsolve.mesh.mesh import MeshPoints
 from fvsolve.model import RunData
 from fvsolve.output.fields import basin_geometry, split_blocks, write_frame
 from fvsolve.run.plot_scene import lengths_of, unit_of

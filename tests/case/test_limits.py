@@ -9,8 +9,7 @@ import pytest
 from reference.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, reservoir, scene, step, valve
 
 import fvsolve
-from fvsolve.report.long_section import section_of
-from fvsolve.report.section_pipes import section_paths
+from fvsolve.report.long_section import section_of, section_paths
 
 LENGTH, DIAMETER, SPEED = 1000.0, 0.3, 1000.0
 SHUT, VELOCITY, HEAD = 0.1, 0.5, 100.0

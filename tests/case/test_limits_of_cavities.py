@@ -15,9 +15,8 @@ from fvsolve.errors import FvsolveError
 from fvsolve.output.memory_sink import MemorySink
 from fvsolve.report.cycles import cycles
 from fvsolve.report.figures import section_figure
-from fvsolve.report.long_section import head_window, section_of
+from fvsolve.report.long_section import head_window, section_of, section_paths
 from fvsolve.report.report_files import write_report
-from fvsolve.report.section_pipes import section_paths
 from fvsolve.run import model_of
 from fvsolve.run.verdicts import nearest, part_extremes, verdict
 from fvsolve.solve import initial_state, solve

@@ -12,9 +12,8 @@ from reference.scenes import lake, pipe, scene, valve
 
 import fvsolve
 from fvsolve.draw import frame_meshes
-from fvsolve.draw.network_picture import NetworkPicture
-from fvsolve.draw.part_drawing import place_labels
-from fvsolve.draw.projection import Projection, choose_projection, round_scale
+from fvsolve.draw.network_picture import NetworkPicture, place_labels
+from fvsolve.draw.scene import Projection, choose_projection, round_scale
 from fvsolve.draw.sheet import OTHER_LINK, OTHER_NODE, SYMBOLS, strokes, symbol_of
 from fvsolve.parts.link import Link
 from fvsolve.parts.node import Node

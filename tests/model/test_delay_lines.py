@@ -28,7 +28,7 @@ import fvsolve
 from fvsolve import studies
 from fvsolve.case.text import write
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.model import delay_history
+from fvsolve.model import delay_lines
 from fvsolve.output.memory_sink import MemorySink
 from fvsolve.solve.solve import Run
 
@@ -332,8 +332,8 @@ def test_what_a_store_is_given_is_taken_from_its_own_line(control):
 
 def test_jumps_that_find_no_room_are_told(monkeypatch):
     """A notice reports jumps that do not fit into the storage, here of two jumps per wave."""
-    monkeypatch.setattr(delay_history, "LEAST_JUMPS", 2)
-    monkeypatch.setattr(delay_history, "TOTAL_JUMPS", 2)
+    monkeypatch.setattr(delay_lines, "LEAST_JUMPS", 2)
+    monkeypatch.setattr(delay_lines, "TOTAL_JUMPS", 2)
     found = fvsolve.run(fork({"pipe_model": "delay-line", "delay_tolerance": 1e-6, "method": "euler", "step": 0.04}))
     told = [one for one in found.summary["warnings"] if one["kind"] == "jumps"]
     assert len(told) == 1 and "numerics.delay_tolerance" in told[0]["text"] and 0.0 < told[0]["value"] <= 1.0

@@ -17,7 +17,7 @@ import fvsolve
 from fvsolve.case.changes import changes
 from fvsolve.errors import CaseError
 from fvsolve.model.build import tables_with_start
-from fvsolve.model.configuration import Configuration
+from fvsolve.model.equilibrium_search import Configuration
 from fvsolve.studies import order
 
 CEILING = {"type": "frame", "points": {"a": [0, 0, 0]}}

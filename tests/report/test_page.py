@@ -15,9 +15,9 @@ from reference.scenes import junction, lake, pipe, ramp, scene, tank, valve
 
 import fvsolve
 from fvsolve.report.figures import escape_markup
+from fvsolve.report.long_section import section_paths
 from fvsolve.report.page import page, script_json
 from fvsolve.report.report_files import write_report
-from fvsolve.report.section_pipes import section_paths
 from fvsolve.run.result import ROWS, Result
 
 WICKED = "</script><script>alert('x')</script> & \"quoted\" $5 {{ 7 * 7 }} <!-- \u2028 </style><b>bold"

@@ -9,8 +9,7 @@ from reference.scenes import GRAVITY, RHO, junction, lake, pipe, scene, step, va
 import fvsolve
 from fvsolve.draw.plot import LIMIT_LOOKS, LINE_LOOKS
 from fvsolve.report.figures import section_figure
-from fvsolve.report.long_section import head_animations, head_window, section_of
-from fvsolve.report.section_pipes import section_paths
+from fvsolve.report.long_section import head_animations, head_window, section_of, section_paths
 
 CHAINAGE, ELEVATION = [0.0, 130.0, 300.0, 500.0], [0.0, 42.0, 5.0, 20.0]
 SHUT = 0.3

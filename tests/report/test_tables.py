@@ -8,11 +8,9 @@ import pytest
 from reference.scenes import junction, lake, pipe, scene
 
 import fvsolve
-from fvsolve.report.long_section import section_of
-from fvsolve.report.model_tables import walls
+from fvsolve.report.long_section import section_of, section_paths
 from fvsolve.report.report_files import write_report
-from fvsolve.report.section_pipes import section_paths
-from fvsolve.report.tables import ReportTable, aligned_texts, value_text
+from fvsolve.report.tables import ReportTable, aligned_texts, value_text, walls
 
 
 @pytest.fixture(scope="module")

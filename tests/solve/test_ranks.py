@@ -144,7 +144,7 @@ for name""", 1)  # fmt: skip
 def test_a_rank_that_fails_in_the_middle_ends_all_with_its_message(tmp_path):
     failing = SCRIPT.replace("for name", """
 from mpi4py import MPI
-from fvsolve.solve.mpi_ranks import MpiRanks as Ranks
+from fvsolve.solve.parallel_bands import MpiRanks as Ranks
 def fails(self, name, at):
     raise MemoryError("planted")
 if MPI.COMM_WORLD.rank == 1:

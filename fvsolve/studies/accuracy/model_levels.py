@@ -12,7 +12,7 @@ import numpy as np
 from fvsolve.case.raw import raw_link
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.steady_friction import drag
-from fvsolve.model.delay_line_selection import reason_for_cells
+from fvsolve.model.delay_lines import reason_for_cells
 from fvsolve.studies.outcome import study_model
 
 SLOSHING = ("frozen", "modes", "cells")

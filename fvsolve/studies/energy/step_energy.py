@@ -3,7 +3,7 @@
 import numpy as np
 
 from fvsolve.kernels.delay_lines.wave_history import JUMPS_TRAVELLING, time_tolerance
-from fvsolve.model.delay_history import jump_times
+from fvsolve.model.delay_lines import jump_times
 from fvsolve.model.energy_accounts import Accounts
 from fvsolve.solve.run_loop import RunLoop
 from fvsolve.solve.solve import Run
