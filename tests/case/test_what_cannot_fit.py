@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from reference.fork import branched
-from reference.scenes import still
+from reference.scenes import branched, still
 
 import fvsolve
 from fvsolve.case.resource_checks import disk_size, free_memory

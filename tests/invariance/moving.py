@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from reference.bodies import OIL, bodies
+from reference.bodies import OIL, bodies, body
 from reference.scenes import GRAVITY, RHO, WATER, scene
-from reference.trees import body
 
 LAWS = {
     "linear": {**OIL, "law": "linear"},

@@ -13,9 +13,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from reference.bodies import OIL
+from reference.bodies import OIL, body
 from reference.scenes import scene
-from reference.trees import body
 
 import fvsolve
 from fvsolve.output.memory_sink import MemorySink

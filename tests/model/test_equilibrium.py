@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from reference.bodies import Crane, bodies, pendulum
+from reference.bodies import Crane, bodies, body, pendulum
 from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, reservoir, valve
-from reference.trees import body
 from scipy.optimize import brentq, minimize, root
 from scipy.spatial.transform import Rotation
 

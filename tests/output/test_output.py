@@ -10,8 +10,7 @@ from types import SimpleNamespace
 import meshio
 import numpy as np
 import pytest
-from reference.fork import PROBES, branched
-from reference.scenes import AMBIENT
+from reference.scenes import AMBIENT, BRANCHED_PROBES, branched
 
 import fvsolve
 from fvsolve.output import network_layout
@@ -41,9 +40,9 @@ def test_the_directory_holds_what_is_promised(folder):
 
 def test_history_reads_back_to_the_last_bit(folder):
     result, again = fvsolve.run(branched()), fvsolve.open_run(folder)
-    assert again.probes == PROBES
+    assert again.probes == BRANCHED_PROBES
     assert np.array_equal(again.t, result.t)
-    assert all(np.array_equal(again[name], result[name]) for name in PROBES)
+    assert all(np.array_equal(again[name], result[name]) for name in BRANCHED_PROBES)
     assert again.extremes == result.extremes and again.reason == result.reason == "finished"
 
 
@@ -71,7 +70,7 @@ def test_output_units_are_those_of_the_table_the_extremes_and_the_envelope(folde
 
 def test_the_resolved_case_runs_again_to_the_same_numbers(folder):
     again, result = fvsolve.run(folder / "case.toml"), fvsolve.open_run(folder)
-    assert all(np.array_equal(again[name], result[name]) for name in PROBES)
+    assert all(np.array_equal(again[name], result[name]) for name in BRANCHED_PROBES)
 
 
 def test_frames_read_back_through_meshio(folder):

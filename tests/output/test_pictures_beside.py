@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from reference.fork import branched
+from reference.scenes import branched
 
 import fvsolve
 from fvsolve.draw.plot_process import processor_count

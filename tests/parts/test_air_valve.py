@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from reference.bores import HEAT, SMALL, bores
+from reference.air import HEAT, SMALL, bores
 from reference.scenes import AMBIENT, RHO, WATER, area, junction, lake, pipe, reservoir, scene, valve
 from scipy.integrate import solve_ivp
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from reference import rays, scenes
-from reference.allievi import relative_drop
+from reference import frictionless, scenes
+from reference.frictionless import relative_drop
 from reference.scenes import AMBIENT, RHO, SHARP, junction, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
@@ -75,11 +75,11 @@ def test_valve_pressure_and_flow_are_exact_at_every_step(name):
     schedule, velocity = SCHEDULES[name], 1.0
     result = fvsolve.run(closure(velocity, schedule, STEP))
     area = flow_area(velocity, schedule)
-    main = rays.Pipe("lake", "gate", LENGTH, DIAMETER, SPEED, velocity * scenes.area(DIAMETER), AMBIENT + DROP)
-    exact = rays.Rays(
+    main = frictionless.Pipe("lake", "gate", LENGTH, DIAMETER, SPEED, velocity * scenes.area(DIAMETER), AMBIENT + DROP)
+    exact = frictionless.Rays(
         RHO,
         {"main": main},
-        {"lake": rays.held(AMBIENT + DROP)},
+        {"lake": frictionless.held(AMBIENT + DROP)},
         outlets={"gate": (lambda t: area * opening(schedule, t), AMBIENT)},
     )
     pressure = np.array([exact.pressure("gate", float(t)) for t in result.t])

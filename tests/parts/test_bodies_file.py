@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 from parts.test_bodies import parallelogram
-from reference.bodies import Crane, bodies, pendulum
-from reference.trees import body
+from reference.bodies import Crane, bodies, body, pendulum
 
 import fvsolve
 from fvsolve.errors import CaseError

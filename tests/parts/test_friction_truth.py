@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 from reference import scenes
-from reference.characteristics import ValvePipe, darcy, hazen_williams
-from reference.network import Line, Network
+from reference.characteristics import Line, Network, ValvePipe, darcy, hazen_williams
 from reference.orders import observed_order
 from reference.scenes import AMBIENT, GRAVITY, RHO, junction, lake, pipe, ramp, reservoir, scene, step, valve
 from scipy.optimize import brentq

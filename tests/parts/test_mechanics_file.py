@@ -229,7 +229,8 @@ def test_what_has_no_masses_loads_none_of_their_kernels(tmp_path):
     import sys
 
     code = ("import sys, fvsolve; result = fvsolve.run('cases/chamber-and-orifice.toml');"
-            "print([name for name in sys.modules if name.endswith(('mechanics_tables', 'mass_dynamics'))])")  # fmt: skip
+            "print([name for name in sys.modules"
+            " if name.endswith(('mechanics_tables', 'mass_dynamics'))])")  # fmt: skip
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "['fvsolve.model.mechanics_tables']"
     model = fvsolve.build(fvsolve.load("cases/chamber-and-orifice.toml"))

@@ -10,13 +10,10 @@ from pytest import approx
 from scipy.integrate import quad, solve_ivp
 
 from reference import vessels
-from reference.allievi import relative_drop
-from reference.bumps import gaussian_averages, scattered
-from reference.characteristics import ValvePipe, darcy, hazen_williams, laminar
+from reference.characteristics import Line, Network, ValvePipe, darcy, hazen_williams, laminar
+from reference.frictionless import Pipe, Rays, held, relative_drop, step
 from reference.log_law import LogFluid, Riemann, SimpleWave
-from reference.network import Line, Network
-from reference.orders import observed_order
-from reference.rays import Pipe, Rays, held, step
+from reference.orders import gaussian_averages, observed_order, scattered
 
 RHO, A, D, L = 1000.0, 1000.0, 0.3, 1000.0
 AREA = math.pi / 4 * D**2

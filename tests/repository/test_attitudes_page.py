@@ -8,7 +8,7 @@ import tomllib
 import numpy as np
 import pytest
 from reference import folders
-from reference.lines import printed_otherwise, python_of
+from reference.folders import printed_otherwise, python_of
 
 from fvsolve.parts.attitude_keys import Attitude
 

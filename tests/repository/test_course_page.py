@@ -10,7 +10,7 @@ from functools import cache
 
 import pytest
 from reference import folders
-from reference.lines import printed_otherwise, python_of
+from reference.folders import printed_otherwise, python_of
 
 TOP = folders.DOCS.parent
 PAGE = folders.page("course")

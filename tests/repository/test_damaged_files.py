@@ -11,7 +11,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from reference.fork import branched
+from reference.scenes import branched
 
 import fvsolve
 from fvsolve.errors import FvsolveError, RunError

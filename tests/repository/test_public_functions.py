@@ -8,8 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from reference.fork import branched
-from reference.scenes import still
+from reference.scenes import branched, still
 
 import fvsolve
 from fvsolve import FvsolveError, State, advance, initial_state, integrate, steppers, studies

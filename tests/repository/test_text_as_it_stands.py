@@ -13,8 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from reference.fork import branched
-from reference.scenes import scene, still
+from reference.scenes import branched, scene, still
 
 import fvsolve
 from fvsolve.draw.plot import history_figure

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from basins.test_basin import alone, basin
-from reference.fork import branched
+from reference.scenes import branched
 
 import fvsolve
 from fvsolve.output.memory_sink import MemorySink

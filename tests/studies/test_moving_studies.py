@@ -8,9 +8,8 @@ from importlib import import_module
 import numpy as np
 import pytest
 from invariance.moving import SCENES, flume, u_tube
-from reference.bodies import bodies
+from reference.bodies import bodies, body
 from reference.scenes import GRAVITY, RHO, scene
-from reference.trees import body
 from scipy.optimize import brentq
 
 from fvsolve.case.text import write
