@@ -1,7 +1,5 @@
 """Data of a plane mesh, all SI: cells, faces and named patches, quality measures, search for points, and weights."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -4,8 +4,6 @@ Each fault is an entry of an error message. Boundary faces may touch at their co
 touch elsewhere are searched.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re

@@ -1,7 +1,5 @@
 """Meshes of rectangles: graded grids of cells with holes, and patches on their sides."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """Assembly of the model of a case."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import fields, replace

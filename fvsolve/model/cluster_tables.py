@@ -1,7 +1,5 @@
 """Solution method of each node without storage: alone, with its valve by a closed formula, or in a group by Newton."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

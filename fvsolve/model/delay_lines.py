@@ -7,8 +7,6 @@ A line with a travel time tau shorter than the longest step h: curvature of the 
 The history is a single array: size, ring buffers, and storage in the memory of a state.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Collection

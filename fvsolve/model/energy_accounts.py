@@ -1,7 +1,5 @@
 """Energy accounts of a model: energy ledger, and available energy of its parts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -12,12 +12,10 @@ unstable position. A position that is stated and in balance is kept, stable or n
 and no stiffness act.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -416,7 +414,7 @@ class StaticState:
         """Greatest gap of a constraint [m]."""
         return float(np.max(np.abs(self.gaps), initial=0.0))
 
-    def clearly_better(self, other: StaticState) -> bool:
+    def clearly_better(self, other: Self) -> bool:
         """True if the unbalanced share or the greatest gap is less than half that of the other configuration.
 
         Values below the limits of rounding count as these limits.

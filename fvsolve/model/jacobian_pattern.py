@@ -7,8 +7,6 @@ masses. Cells of a basin depend on the cells around them (`basins.lower_pattern`
 set by the cells behind it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

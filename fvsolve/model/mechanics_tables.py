@@ -1,7 +1,5 @@
 """Tables of masses, force elements, bodies, joints, points, and networks on bodies; closed chambers at the start."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

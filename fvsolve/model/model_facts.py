@@ -1,7 +1,5 @@
 """Facts about a model before its run, for `fvsolve check`."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from time import process_time

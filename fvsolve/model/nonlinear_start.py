@@ -1,7 +1,5 @@
 """Initial steady state under density laws that are not linear."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

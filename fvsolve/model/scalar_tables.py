@@ -1,7 +1,5 @@
 """Table of scalars: amounts as states, values at nodes, balances of a run; bounds of amounts and of depths."""
 
-from __future__ import annotations
-
 from array import array
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Notices about the start of a model: few cells for cavities or waves, and unusual flows."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

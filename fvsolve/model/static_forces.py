@@ -1,7 +1,5 @@
 """Forces on joints at the start, computed by the kernels without a run, and the start of bodies and pins."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.basins.lower import basin_start

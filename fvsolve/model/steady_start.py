@@ -1,7 +1,5 @@
 """Initial steady state of a run: pressures, flows, and motions at the start. States are deviations from it."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from functools import cached_property

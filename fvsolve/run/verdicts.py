@@ -1,7 +1,5 @@
 """Comparison of a run with its case: extremes, design limits, expected values, measured series; and of two runs."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -276,23 +274,6 @@ def extremes(model, quantity: str, part: PartExtremes):
     return (low, t_low), (high, t_high)
 
 
-def row_of(row: Nearest, shown: UnitColumn, chainage: Chainages, extent) -> dict[str, Any]:
-    """Dict for a position: part, chainage and elevation [m], time [s]; value, limit, margin in the unit of `shown`."""
-    part, at, known = row.part, row.at, not math.isnan(row.margin)
-    return {
-        "place": part.part, "chainage": chainage.of(part, at, extent.on) if known else None,
-        "elevation": finite(part.elevation[at]), "time": finite(row.time) if known else None, "bound": row.bound,
-        "value": finite(shown.from_si(row.value)), "limit": finite(shown.from_si(row.limit)),
-        "margin": finite(shown.span_from_si(row.margin)), "unit": shown.unit, "error": None, "reason": None,
-        "state": row.state,
-    }  # fmt: skip
-
-
-def finite(value) -> float | None:
-    """Number for JSON; None if it is not finite."""
-    return float(value) if math.isfinite(value) else None
-
-
 class Chainages:
     """Chainages of positions: along a route that the limit names, else along another route, else along the pipe."""
 
@@ -323,6 +304,23 @@ class Chainages:
     def ordered(self, on: tuple[str, ...]) -> list[str]:
         """Names of all routes in order of preference: routes that the limit names first, those of a cut pipe last."""
         return sorted(self.legs, key=lambda name: (is_cut(name, self.case.routes[name].pipes), name not in on))
+
+
+def row_of(row: Nearest, shown: UnitColumn, chainage: Chainages, extent) -> dict[str, Any]:
+    """Dict for a position: part, chainage and elevation [m], time [s]; value, limit, margin in the unit of `shown`."""
+    part, at, known = row.part, row.at, not math.isnan(row.margin)
+    return {
+        "place": part.part, "chainage": chainage.of(part, at, extent.on) if known else None,
+        "elevation": finite(part.elevation[at]), "time": finite(row.time) if known else None, "bound": row.bound,
+        "value": finite(shown.from_si(row.value)), "limit": finite(shown.from_si(row.limit)),
+        "margin": finite(shown.span_from_si(row.margin)), "unit": shown.unit, "error": None, "reason": None,
+        "state": row.state,
+    }  # fmt: skip
+
+
+def finite(value) -> float | None:
+    """Number for JSON; None if it is not finite."""
+    return float(value) if math.isfinite(value) else None
 
 
 def comparison(compare, column: UnitColumn, result) -> dict:

@@ -1,7 +1,5 @@
 """Advance a state over an interval of time, for controllers and co-simulation."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -9,8 +9,6 @@ on rank 0, runs the time loop together with rank 0, and then sends the rows of i
 or signal.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 import os

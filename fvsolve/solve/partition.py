@@ -5,8 +5,6 @@ neighbouring rows come from the band that owns them. In large basins a band form
 in blocks of rows that fit into the processor cache.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,8 +8,6 @@ up to e (1 - r^n) / (1 - r). For a draining vessel r is near 1 and all errors re
 errors remain.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.case import sloshing

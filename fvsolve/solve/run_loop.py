@@ -1,7 +1,5 @@
 """Loop over the time steps of a run: arrays, step settings, events, and collisions of rigid water columns."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Summary of a run: reason of its end, first times outside validity, balances, extremes, envelopes, counts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

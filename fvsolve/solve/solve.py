@@ -1,7 +1,5 @@
 """Run of a model from its start to its end, in segments between jumps and kinks of schedules."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures of networks and basins show the parts of the case at their positions."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Cases with moving parts: mechanisms, moving walls, basin frames, tanks on bodies and moving networks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from reference.bodies import OIL, bodies, body

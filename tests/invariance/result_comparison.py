@@ -1,7 +1,5 @@
 """Outcomes of runs for the comparison of equivalent cases, and their differences."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

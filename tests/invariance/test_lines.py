@@ -4,8 +4,6 @@ Rounding may decide if a jump is kept or smoothed over a step. The results then 
 of `numerics.delay_tolerance` times the greatest jump, so the tests use a small tolerance.
 """
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -7,8 +7,6 @@ for the power of a liquid, 1e-5 for flows, 1e-6 for basins and 1e-7 for bodies. 
 agree to rounding.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -4,8 +4,6 @@ Rounding is `ROUND` times the greatest value of a quantity, for about a thousand
 found). Under error control rounding may decide if a step is accepted; the results then agree within the tolerance.
 """
 
-from __future__ import annotations
-
 import tomllib
 
 import numpy as np

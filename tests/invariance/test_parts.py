@@ -3,8 +3,6 @@
 Hypothesis draws one part of most kinds with random keys.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

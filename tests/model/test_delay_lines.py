@@ -1,7 +1,5 @@
 """Delay lines: exact waves without friction at any step, friction of the telegrapher's equations, closed balances."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Starts with `initial = "equilibrium"` against closed forms and against SciPy on potentials and forces."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 Jumps that arrive within a step at a junction with a valve or a rigid column are computed to second order.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference.delays import turned

@@ -3,8 +3,6 @@
 Probes along a pipe are independent of the direction of the pipe, and exact for polynomials.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

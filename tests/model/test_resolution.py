@@ -1,7 +1,5 @@
 """Notices for pipes with too few cells, for every scheme."""
 
-from __future__ import annotations
-
 from copy import deepcopy
 
 import pytest

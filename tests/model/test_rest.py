@@ -3,8 +3,6 @@
 Closed chambers without a stated pressure carry their load: pressures by balances of forces, without motion.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pytest import approx

@@ -1,7 +1,5 @@
 """The Jacobian pattern contains all slopes of the rates; coloured differences find them and conserve mass."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -4,8 +4,6 @@ Frames have the positions of bodies, and of basins on bodies. A folder has at mo
 lock ends with the process.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import signal

@@ -1,7 +1,5 @@
 """Pictures that a second process draws equal those drawn after the run; none is lost if that process fails."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Oil with air, independent of fvsolve: density law, trajectories by SciPy, flow through the bores of an air valve."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Cases with bodies in space, in SI units; random trees of bodies, and their models in Pinocchio."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

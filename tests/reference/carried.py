@@ -1,7 +1,5 @@
 """Advection and diffusion of scalars on a rectangle by the kernels of fvsolve and explicit steps in NumPy."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.basins import advection, fifth_order

@@ -6,8 +6,6 @@ wave. Each return lasts 2 L / a, and D = (p0 - pv) / (rho a). The cavity closes 
 The pipeline over a summit is that of Wylie and Streeter 1993, chapter 8.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -6,8 +6,6 @@ A network has a reservoir, junctions and a valve to a fixed pressure; its length
 is `k |M|^(n-1) M` [Pa/m]. The steady start is computed by the gradient method of Todini and Pilati (1988).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Cases with delay lines, and solutions by characteristics at Courant number 1."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from reference.scenes import RHO, scene

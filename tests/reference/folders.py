@@ -1,7 +1,5 @@
 """Folders of the shipped cases and of the documentation pages, and the Python examples of a page."""
 
-from __future__ import annotations
-
 import doctest
 import re
 from pathlib import Path

@@ -12,8 +12,6 @@ relative to that start, `d` the drop of the valve relative to dp, and `z |z| = d
 Streeter 1993). The recursion is also valid for reverse flow through the valve.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ In rarefactions `u` changes by the integral of `dp / (rho a)`.
 Shocks obey `(u_1 - u_2)^2 = (p_1 - p_2) (1/rho_2 - 1/rho_1)`.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

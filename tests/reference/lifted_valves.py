@@ -1,7 +1,5 @@
 """Lifted valves by SciPy, independent of fvsolve: discs with waves on a pipe, discs and stems with rigid columns."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

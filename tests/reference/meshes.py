@@ -1,7 +1,5 @@
 """Small meshes, meshes of triangles and mesh files; descriptions of a mesh that any order of its cells gives."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Observed orders of convergence, exact averages of smooth bumps, and scattering of a wave at a junction."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 Shared constants are read-only, and every case is a separate copy that a test may change.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from types import MappingProxyType

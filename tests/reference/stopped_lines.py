@@ -8,8 +8,6 @@ Creeping wall: Laplace inversion with mpmath. The elements are pairs (G, tau) wi
 travel times. The transform is tanh(s sqrt(C)) / (s sqrt(C)) with C = 1 + sum of G / (1 + tau s) (Covas et al. 2005).
 """
 
-from __future__ import annotations
-
 import functools
 
 import mpmath

@@ -1,7 +1,5 @@
 """Comparisons of the reference solutions with each other, with quadrature and with integration."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

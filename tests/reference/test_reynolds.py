@@ -3,8 +3,6 @@
 The terms are integrals over intervals, quadrilaterals and their sides, and derivatives by differences.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

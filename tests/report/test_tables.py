@@ -3,8 +3,6 @@
 Sections, tables and the workbook of a report are complete.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import zipfile

@@ -1,7 +1,5 @@
 """Parts that a case lacks cost no state, no table row and no compiled function."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import ModuleType
 

@@ -3,8 +3,6 @@
 Comparison of two dumps of commits: a difference of one bit is found, and the map of renamed keys is applied.
 """
 
-from __future__ import annotations
-
 import sys
 from importlib.util import find_spec
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Shipped cases run, satisfy their expectations and close their mass balance."""
 
-from __future__ import annotations
-
 import tomllib
 
 import numpy as np

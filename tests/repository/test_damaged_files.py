@@ -1,7 +1,5 @@
 """Files that are damaged, or do not fit on the disk, are written again or named in an error of the program."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

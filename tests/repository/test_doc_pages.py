@@ -4,8 +4,6 @@ The pages are docs/how-to, CONTRIBUTING.md, docs/developing.md, docs/attitudes.m
 course.
 """
 
-from __future__ import annotations
-
 import ast
 import os
 import re

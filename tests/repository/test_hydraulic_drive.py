@@ -1,7 +1,5 @@
 """Hydraulic drive with air in its oil: motion against SciPy, natural frequency and energy balance."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 

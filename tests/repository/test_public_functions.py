@@ -1,7 +1,5 @@
 """Public functions accept valid arguments and refuse others with a message; returned arrays are read-only."""
 
-from __future__ import annotations
-
 import inspect
 from functools import partial
 from types import SimpleNamespace

@@ -3,8 +3,6 @@
 An older Python is refused with a message that names it, the required version and the remedy.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -1,7 +1,5 @@
 """Texts of users are never markup: not on pictures, on the terminal or in the files of a run."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

@@ -4,8 +4,6 @@ The tally lists schemes, methods, parts, laws, commands and tests that did not r
 package. Hypothesis draws equal inputs whatever modules are loaded, and tries failed inputs first.
 """
 
-from __future__ import annotations
-
 import ast
 import importlib.util
 import sys

@@ -3,8 +3,6 @@
 No two classes of the package have equal names, so a search finds one definition.
 """
 
-from __future__ import annotations
-
 import ast
 import functools
 import re

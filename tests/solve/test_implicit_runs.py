@@ -1,7 +1,5 @@
 """Runs with implicit methods: solutions, ledgers, rest, events, resumption and linear algebra."""
 
-from __future__ import annotations
-
 import math
 import random
 import subprocess

@@ -1,7 +1,5 @@
 """MPI ranks that share the rows of basins give the bits of one process; cases that cannot be shared are reported."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """A run that is killed at random times and resumed equals the uninterrupted run to the bit."""
 
-from __future__ import annotations
-
 import json
 import random
 import subprocess

@@ -3,8 +3,6 @@
 Kinks and jumps within few rounding errors of a boundary of a run or advance do not cause extremely short steps.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ The growth check runs inside the compiled loop at every sixteenth step, with one
 states the time from which it is not valid, instead of numbers such as -2e30.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import math
