@@ -42,11 +42,7 @@ class SteadyStart:
         self.rest = self.case.numerics.initial == "rest"
         self.t = self.case.numerics.start
         self.weight = draft.fluid.density * self.case.gravity
-        sizes = [
-            1e-9,
-            *(draft.fluid.density * self.pipes["area"]),
-            *(draft.fluid.density * self.columns["area"]),
-        ]
+        sizes = [1e-9, *(draft.fluid.density * self.pipes["area"]), *(draft.fluid.density * self.columns["area"])]
         sizes += list(np.sqrt(self.valves["conductance"] * PRESSURE_SCALE))
         self.flow_scale = max(sizes)
         self.extra: dict[str, float] = {}  # pressure drop in addition to the law's [Pa], for laws with changing density
@@ -305,8 +301,7 @@ class SteadyStart:
             reason = f"the demand here is {self.case.amount(drawn, 'flow')}, but every path to it" if drawn > 0.0 else (
                 f"the inflow here is {self.case.amount(-drawn, 'flow')}, but every path out")  # fmt: skip
             self.draft.fault(
-                f"nodes.{names[i]}",
-                f'no steady state: {reason} is shut; open a valve, or use initial = "rest"',
+                f"nodes.{names[i]}", f'no steady state: {reason} is shut; open a valve, or use initial = "rest"'
             )
         for name, row in zip(self.draft.pipe_names, self.pipes, strict=True):
             ends = [int(row["from_node"]), int(row["to_node"])]

@@ -33,19 +33,7 @@ from fvsolve.steppers import loop_records
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.run_handle import JOIN
 
-COPIED = (
-    "state",
-    "control",
-    "progress",
-    "ledger",
-    "carry",
-    "g",
-    "g_new",
-    "out",
-    "out_row",
-    "values",
-    "ledger_rates",
-)
+COPIED = ("state", "control", "progress", "ledger", "carry", "g", "g_new", "out", "out_row", "values", "ledger_rates")
 WRITTEN = ("clock", "armed", "marks", "scratch", "spare", "envelope", "extremes", "past")
 
 

@@ -67,11 +67,7 @@ class RunLoop:
         self.fused_step = fused_step_function(fused_allowed)
         ledgers, structure = model.ledgers, structure or (lambda: model.structure)
         self.stepper = stepper = Integrator(method, model.y_size, ledgers, structure, model.scale.copy(), model.damped)
-        sums = [
-            *model.tables.nodes["y"],
-            *model.tables.masses["y"],
-            *amount_indices(model),
-        ]  # travel is stored too
+        sums = [*model.tables.nodes["y"], *model.tables.masses["y"], *amount_indices(model)]  # travel is stored too
         stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         stepper.carry = np.zeros(len(stepper.stored))
         stepper.bounded_states, stepper.bounds = state_bounds(model)

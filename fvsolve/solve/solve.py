@@ -277,10 +277,7 @@ class Run:
         """
         model, t = self.model, self.loop.t
         for k, flow in self.loop.stop_columns(self.bounds[self.segment][0]):
-            at, scale = (
-                len(model.pipes) + 3 * len(model.node_names) + k,
-                model.scale[model.tables.columns[k]["y"]],
-            )
+            at, scale = (len(model.pipes) + 3 * len(model.node_names) + k, model.scale[model.tables.columns[k]["y"]])
             if abs(flow) > 1e-3 * scale and np.isnan(self.run_data.marks[at]):
                 self.run_data.marks[at] = t
 

@@ -90,12 +90,7 @@ def test_parts_in_the_reverse_order(name, method):
 @pytest.mark.parametrize("name", SCENES)
 def test_at_a_later_time(name, method):
     """A delay changes results by rounding of times only, which enters differences of driven joints."""
-    alike(
-        first(name, method),
-        told(equivalent.at_a_later_time(SCENES[name](method), 64.0)),
-        near(method),
-        later=64.0,
-    )
+    alike(first(name, method), told(equivalent.at_a_later_time(SCENES[name](method), 64.0)), near(method), later=64.0)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -131,24 +126,14 @@ def test_axes_the_other_way(name, method):
     def change(probe, values):
         return -values if probe.endswith(SWINGS) else values
 
-    alike(
-        first(name, method),
-        told(equivalent.reversed_axes(SCENES[name](method))),
-        near(method),
-        change=change,
-    )
+    alike(first(name, method), told(equivalent.reversed_axes(SCENES[name](method))), near(method), change=change)
 
 
 @pytest.mark.parametrize("method", EACH)
 @pytest.mark.parametrize("name", IN_SPACE)
 def test_turned_about_the_vertical(name, method):
     one = spatial(first(name, method))
-    alike(
-        one,
-        told(equivalent.turned(SCENES[name](method), 0.7)),
-        near(method),
-        change=equivalent.as_turned(one, 0.7),
-    )
+    alike(one, told(equivalent.turned(SCENES[name](method), 0.7)), near(method), change=equivalent.as_turned(one, 0.7))
 
 
 def spatial(one: Told) -> Told:

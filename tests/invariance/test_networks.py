@@ -75,11 +75,7 @@ def test_other_names(case):
     def call(name):
         return f"{'zyxw'[len(name) % 4]}{name[::-1]}"
 
-    alike(
-        told(case),
-        told(equivalent.renamed(case, call)),
-        name=lambda probe: equivalent.called(probe, call),
-    )
+    alike(told(case), told(equivalent.renamed(case, call)), name=lambda probe: equivalent.called(probe, call))
 
 
 @examples(6)
@@ -176,12 +172,7 @@ def test_a_denser_fluid(case):
     def twice(probe, values):
         return 2.0 * values if ".pressure" in probe else values
 
-    alike(
-        told(equivalent.denser(case, 1.0)),
-        told(equivalent.denser(case, 2.0)),
-        near(case),
-        change=twice,
-    )
+    alike(told(equivalent.denser(case, 1.0)), told(equivalent.denser(case, 2.0)), near(case), change=twice)
 
 
 @examples(6)

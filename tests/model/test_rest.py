@@ -52,14 +52,7 @@ def town(friction: dict, numerics: dict, end: float = 60.0, demand=0.02, law: st
         "bc": pipe("c", "b", 315.7, 0.2, 1200.0, 13, **rough),
         "ac": pipe("a", "c", 402.0, 0.25, 900.0, 19, **rough),
         "cl": pipe("c", "low", 150.0, 0.3, 1150.0, 7, **rough),
-        "column": {
-            "type": "rigid-column",
-            "from": "hill",
-            "to": "low",
-            "length": 500.0,
-            "diameter": 0.2,
-            **rough,
-        },
+        "column": {"type": "rigid-column", "from": "hill", "to": "low", "length": 500.0, "diameter": 0.2, **rough},
         "tap": valve("c", "out", 0.002),
         "shut": valve("still", "a", 0.01, 0.0),
         "gap": valve("one", "two", 1e-4),
@@ -157,12 +150,7 @@ def pond(law: str, friction: dict, scheme: str = "muscl") -> dict:
     links = {n: pipe(*row, friction=friction) for n, row in rows.items()}
     links["tap"] = valve("c", "pool", 0.01)
     numerics = {"scheme": scheme, "method": "ssp-rk3", "courant": 0.9}
-    probes = [f"{n}.flow@{x}" for n in rows for x in (0.0, 0.4, 1.0)] + [
-        "tap.flow",
-        "a.head",
-        "b.head",
-        "c.head",
-    ]
+    probes = [f"{n}.flow@{x}" for n in rows for x in (0.0, 0.4, 1.0)] + ["tap.flow", "a.head", "b.head", "c.head"]
     return scene(nodes, links, 20.0, numerics, [*probes, "pool.level"], 1.0, fluid={**scenes.WATER, "law": law})
 
 

@@ -114,12 +114,7 @@ SOFT = LogFluid(1000.0, 1e5, 1e5)
 
 @pytest.mark.parametrize(
     "left, right",
-    [
-        ((1.3e5, 0.0), (1e5, 0.0)),
-        ((1e5, 1.0), (1e5, -1.0)),
-        ((1e5, -1.0), (1.1e5, 1.0)),
-        ((0.9e5, 0.5), (1.2e5, -0.3)),
-    ],
+    [((1.3e5, 0.0), (1e5, 0.0)), ((1e5, 1.0), (1e5, -1.0)), ((1e5, -1.0), (1.1e5, 1.0)), ((0.9e5, 0.5), (1.2e5, -0.3))],
     ids=["dam", "clash", "parting", "mixed"],
 )
 def test_exact_riemann_solution_conserves_mass_and_momentum(left, right):
@@ -162,10 +157,7 @@ def test_a_stopped_stream_exceeds_joukowsky_by_a_quarter_of_its_mach_number():
 
 def test_a_simple_wave_satisfies_the_balance_laws():
     wave = SimpleWave(
-        SOFT,
-        1e5,
-        lambda x: 0.5 * np.exp(-((x - 20) ** 2) / 9),
-        lambda x: -(x - 20) / 9 * np.exp(-((x - 20) ** 2) / 9),
+        SOFT, 1e5, lambda x: 0.5 * np.exp(-((x - 20) ** 2) / 9), lambda x: -(x - 20) / 9 * np.exp(-((x - 20) ** 2) / 9)
     )
     edges, dt = np.linspace(0, 160, 8001), 1e-3
     t = 0.5 * wave.breaks(edges)

@@ -56,10 +56,7 @@ def tanks(**numerics) -> dict:
 
 def line(**numerics) -> dict:
     nodes = {"lake": reservoir(1e6), "gate": junction(), "end": chamber(0.1)}
-    links = {
-        "main": pipe("lake", "gate", 100.0, 0.3, 1000.0, 20),
-        "hole": valve("gate", "end", 0.01),
-    }
+    links = {"main": pipe("lake", "gate", 100.0, 0.3, 1000.0, 20), "hole": valve("gate", "end", 0.01)}
     return scene(nodes, links, 1.0, numerics, ["gate.pressure"])
 
 

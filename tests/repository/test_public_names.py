@@ -60,18 +60,7 @@ def test_an_unknown_name_is_an_attribute_error():
 
 
 def test_importing_imports_nothing_heavy():
-    heavy = [
-        "numpy",
-        "numba",
-        "CoolProp",
-        "pint",
-        "matplotlib",
-        "pyvista",
-        "meshio",
-        "scipy",
-        "rich",
-        "pydantic",
-    ]
+    heavy = ["numpy", "numba", "CoolProp", "pint", "matplotlib", "pyvista", "meshio", "scipy", "rich", "pydantic"]
     code = f"import fvsolve, sys; print([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -170,9 +170,7 @@ fvsolve.run(sys.argv[1], out=sys.argv[2])
 
 
 @pytest.mark.parametrize(
-    "numerics",
-    [{"method": name, "rtol": 3e-7} for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "auto")],
-    ids=said,
+    "numerics", [{"method": name, "rtol": 3e-7} for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "auto")], ids=said
 )
 def test_dead_at_a_random_moment_and_resumed_is_the_unbroken_run(tmp_path, numerics):
     seed = random.randrange(10**6)

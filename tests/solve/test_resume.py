@@ -63,9 +63,7 @@ def same_files(one: Path, other: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "numerics",
-    [{"courant": 0.5}, {"method": "bogacki-shampine", "rtol": 1e-7}],
-    ids=["courant", "error control"],
+    "numerics", [{"courant": 0.5}, {"method": "bogacki-shampine", "rtol": 1e-7}], ids=["courant", "error control"]
 )
 def test_killed_at_random_moments_and_resumed_is_the_unbroken_run(tmp_path, numerics):
     seed = random.randrange(10**6)
