@@ -23,11 +23,8 @@ from fvsolve.model.cluster_tables import classify_nodes
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import AUTO, method_named
 
-TOTAL_JUMPS, LEAST_JUMPS, MOST_JUMPS = (
-    2**16,
-    32,
-    1024,
-)  # stored jumps: in all lines together, least and most of each wave
+# stored jumps: in all lines together, least and most of each wave
+TOTAL_JUMPS, LEAST_JUMPS, MOST_JUMPS = 2**16, 32, 1024
 # spare entries beyond a delay: in all lines together, least and most of each
 TOTAL_SPARE, LEAST_SPARE, MOST_SPARE = 2**14, 32, 256
 HISTORY_DELAYS = 1.1  # a history spans this many delays
@@ -86,9 +83,8 @@ def ring_factor(past: np.ndarray, delays: np.ndarray) -> int:
 def stored_history(memory: dict[str, np.ndarray]) -> np.ndarray:
     """History of delay lines in the memory of a state; raises ValueError if the memory contains no history."""
     if "past" not in memory:
-        raise ValueError(
-            "the memory of the state contains no history of delay lines; expected a State that a run returned"
-        )
+        text = "the memory of the state contains no history of delay lines; expected a State that a run returned"
+        raise ValueError(text)
     return memory["past"].copy()
 
 
@@ -235,10 +231,8 @@ def reason_for_cells(case, name: str, link) -> str:
         return "its wall creeps in every cell"
     if any(getattr(case.places[end], "on", None) for end in link.ports.values()):
         return "the acceleration of its body acts on its cells"
-    if any(
-        probe.quantity == "force" and (probe.part, probe.name) == ("links", name)
-        for probe in (*case.probes, *case.extreme_probes)
-    ):
+    probes = [*case.probes, *case.extreme_probes]
+    if any(probe.quantity == "force" and (probe.part, probe.name) == ("links", name) for probe in probes):
         return "a probe reads its force, which is computed from cells"
     return ""
 
@@ -254,10 +248,8 @@ def lower_delays(draft) -> None:
         stated = link.pipe_model or case.numerics.pipe_model
         if stated == "delay-line" and chosen.pipe_model == "finite-volume":
             key = f"links.{name}.pipe_model" if link.pipe_model else "numerics.pipe_model"
-            draft.fault(
-                key,
-                f'"delay-line" is not possible for links.{name}: {chosen.reason}; expected "finite-volume" or "auto"',
-            )
+            text = f'"delay-line" is not possible for links.{name}: {chosen.reason}'
+            draft.fault(key, f'{text}; expected "finite-volume" or "auto"')
         if chosen.pipe_model == "finite-volume":
             continue
         row = np.zeros((), rec.DELAY)
@@ -289,9 +281,8 @@ def jump_tables(draft) -> dict[str, np.ndarray]:
     if not short.any():
         return {}
     own, tables = copy.copy(draft), draft.tables
-    own.node_table, own.valve_table, own.delay_table = (
-        table.copy() for table in (draft.node_table, draft.valve_table, draft.delay_table)
-    )
+    copied = (draft.node_table, draft.valve_table, draft.delay_table)
+    own.node_table, own.valve_table, own.delay_table = (table.copy() for table in copied)
     own.integers, own.floats, own.faults = tables.integers.tolist(), tables.floats.tolist(), []
     for pipe in draft.pipe_table[draft.delay_table["pipe"][short]]:
         for end in ("from_node", "to_node"):
@@ -363,7 +354,8 @@ def divide_lines(draft) -> list[str]:
             draft.fault(f"links.{name}.pipe_model", '"delay-line" is not possible: friction attenuates a wave by a '
                         f"fraction of {attenuation:.3g} in this pipe, whose travel time is less than a step of "
                         f'{longest}; expected shorter steps, or "finite-volume"')  # fmt: skip
-    shape_history(draft)
+    set_rings(draft.delay_table, longest_step(draft))
+    draft.shapes = draft.shapes._replace(past=history_size(draft.delay_table))
     return unfit
 
 
@@ -415,14 +407,7 @@ def time_scales(draft) -> tuple[float, float]:
     return tuple(duration if math.isfinite(duration) else 0.0 for duration in (shortest, ramp))
 
 
-def shape_history(draft) -> None:
-    """Set the ring buffers of all delay lines, and the size of their history array."""
-    set_rings(draft.delay_table, longest_step(draft))
-    draft.shapes = draft.shapes._replace(past=history_size(draft.delay_table))
-
-
 def longest_step(draft) -> float:
     """Longest step, for which delay lines are divided into stretches [s]; infinite without delay lines."""
-    return min(
-        (method.longest for method in draft.followed.values() if method.pipe_model == "delay-line"), default=math.inf
-    )
+    lines = [method for method in draft.followed.values() if method.pipe_model == "delay-line"]
+    return min((method.longest for method in lines), default=math.inf)

@@ -170,9 +170,8 @@ class Couplings:
 
     def tree_states(self, root: int, order: int) -> np.ndarray:
         """States of the coordinates (`order` 0) or velocities (1) of a tree of bodies and trees that pins tie to it."""
-        return unique_states(
-            *(self.joint_states(body, order) for body in self.bodies if self.tree_root(body["root"]) == root)
-        )
+        bodies = [body for body in self.bodies if self.tree_root(body["root"]) == root]
+        return unique_states(*(self.joint_states(body, order) for body in bodies))
 
     def tree_root(self, root: int) -> int:
         """Root body that stands for all trees that pins tie to the tree of the body `root`."""
@@ -442,9 +441,8 @@ class ScalarCouplings:
         self.places = model.tables.integers[self.row["places"] : self.row["places"] + nodes]
         self.stores = np.isin(of.nodes["kind"], STORES)
         self.wide = max(LIMITER_CELLS, of.reach.behind, of.reach.ahead)
-        self.through = [
-            [] for _ in range(nodes)
-        ]  # for each node, states that set flows there, and values at ends of pipes
+        # for each node, states that set flows there, and values at ends of pipes
+        self.through: list[list] = [[] for _ in range(nodes)]
         for pipe in of.pipes:
             for right, i in enumerate(ends_of(pipe)):
                 self.through[i] += [of.sets[i], of.edge_cells(pipe, right), *self.edge(pipe, right)]
@@ -569,15 +567,8 @@ class ScalarCouplings:
         """
         enters, leaves = self.of.sides(pipe, right)
         reach = self.of.reach
-        return unique_states(
-            self.of.sets[i], self.of.edge_cells(pipe, right), enters[: reach.entering], leaves[: reach.leaving]
-        )
-
-
-def scalar_pairs(couplings, model) -> Iterator[Pairs]:
-    """Yield the couplings of all scalars of a model, see `ScalarCouplings`."""
-    for q in range(len(model.tables.scalars)):
-        yield from ScalarCouplings(couplings, model, q).pairs()
+        near = enters[: reach.entering], leaves[: reach.leaving]
+        return unique_states(self.of.sets[i], self.of.edge_cells(pipe, right), *near)
 
 
 def jacobian_pattern(model) -> csc_array:
@@ -587,11 +578,12 @@ def jacobian_pattern(model) -> csc_array:
     states.
     """
     n, couplings = model.y_size, Couplings(model)
-    pairs = [(np.arange(n), np.arange(n)), *couplings.pairs(), *scalar_pairs(couplings, model)]
+    pairs = [(np.arange(n), np.arange(n)), *couplings.pairs()]
+    for q in range(len(model.tables.scalars)):
+        pairs += ScalarCouplings(couplings, model, q).pairs()
     rows, states = (np.concatenate(side) for side in zip(*pairs, strict=True))
-    return csc_array(
-        coo_array((np.ones(rows.size, dtype=bool), (rows, states)), shape=(n + model.ledgers, n)), dtype=bool
-    )
+    entries = np.ones(rows.size, dtype=bool), (rows, states)
+    return csc_array(coo_array(entries, shape=(n + model.ledgers, n)), dtype=bool)
 
 
 def lumped_states(model) -> np.ndarray:
