@@ -247,14 +247,9 @@ def quality(mesh: Mesh) -> Quality:
     left, right = mesh.area[mesh.left[: mesh.inner]], mesh.area[mesh.right[: mesh.inner]]
     ratio = np.maximum(left, right) / np.minimum(left, right)
     steepest = int(np.argmax(ratio)) if ratio.size else -1
-    return Quality(
-        smallest=float(mesh.area.min()),
-        largest=float(mesh.area.max()),
-        angle=float(angle[sharpest]),
-        sharpest=sharpest,
-        ratio=float(ratio[steepest]) if ratio.size else 1.0,
-        steepest=steepest,
-    )
+    return Quality(smallest=float(mesh.area.min()), largest=float(mesh.area.max()), angle=float(angle[sharpest]),
+                   sharpest=sharpest, ratio=float(ratio[steepest]) if ratio.size else 1.0,
+                   steepest=steepest)  # fmt: skip
 
 
 OUTLINE_TOLERANCE = 1e-9  # of the mesh's extent: points this close to its outline count as inside

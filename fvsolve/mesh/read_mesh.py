@@ -170,11 +170,8 @@ def _touching(a: np.ndarray, b: np.ndarray, i: np.ndarray, j: np.ndarray) -> dic
     within_j = _within(a, b, j, a[i]) | _within(a, b, j, b[i])
     through = _on_both_sides(a, b, i, j) & _on_both_sides(a, b, j, i)
     pairs, reverse = np.stack([i, j], axis=1), np.stack([j, i], axis=1)
-    return {
-        "same": pairs[same],
-        "middle": np.concatenate([pairs[within_i], reverse[within_j]]),
-        "cross": pairs[through],
-    }
+    return {"same": pairs[same], "middle": np.concatenate([pairs[within_i], reverse[within_j]]),
+            "cross": pairs[through]}  # fmt: skip
 
 
 def _distance(p: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -409,13 +406,9 @@ def load_file(path: Path) -> Content:
     cells = [_padded(block.data) for block in file_mesh.cells if block.type in PLANE]
     lines = [block.data for block in file_mesh.cells if block.type == "line"]
     groups, unnamed = _groups(file_mesh)
-    content = Content(
-        points,
-        np.concatenate(cells).astype(np.int64),
-        np.concatenate(lines).astype(np.int64) if lines else np.empty((0, 2), np.int64),
-        groups,
-        (*notes, *unnamed),
-    )
+    content = Content(points, np.concatenate(cells).astype(np.int64),
+                      np.concatenate(lines).astype(np.int64) if lines else np.empty((0, 2), np.int64), groups,
+                      (*notes, *unnamed))  # fmt: skip
     for place, table, least in (("cells", content.cells, -1), ("lines", content.lines, 0)):
         low = np.where(np.arange(table.shape[1]) == 3, least, 0)
         rows = np.flatnonzero(np.any((table < low) | (table >= len(points)), axis=1))

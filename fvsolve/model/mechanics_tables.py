@@ -400,8 +400,6 @@ def driven_at_start(draft, start) -> list[str]:
                 count = int(row["cells" if "cells" in row.dtype.names else "moving_segments"])
                 push = float(drives[row["moving_segment"] : row["moving_segment"] + count].sum())
                 if abs(push) > ROUNDING:
-                    texts.append(
-                        f"{kind} {name}: the motion of its body drives its flow with "
-                        f"{draft.case.amount(rho * push, 'pressure', span=True)}"
-                    )
+                    texts.append(f"{kind} {name}: the motion of its body drives its flow with "
+                                 f"{draft.case.amount(rho * push, 'pressure', span=True)}")  # fmt: skip
     return texts

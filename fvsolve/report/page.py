@@ -262,10 +262,8 @@ def event_figures(event: str | None, number: int, runs: list, figures: dict[str,
         entries.append({"id": f"section-{number}-{k}", "name": visible(first.name), "caption": CAPTION})
     shared = [name for name in own[0][1].probes if all(name in result.units for _, result in own)]
     for k, probe in enumerate(shared[:MAX_PROBES]):
-        lines = [
-            plots.Series(name or "the case", *thin_series(result.t, result[probe], SERIES_POINTS), seen=True)
-            for name, result in own
-        ]
+        lines = [plots.Series(name or "the case", *thin_series(result.t, result[probe], SERIES_POINTS), seen=True)
+                 for name, result in own]  # fmt: skip
         panel = plots.HistoryPanel(probe_quantity(probe), own[0][1].units[probe], lines)
         figures[f"history-{number}-{k}"] = plots.history_figure(panel, own[0][1].summary["time_unit"], None)
         entries.append({"id": f"history-{number}-{k}", "name": visible(probe), "caption": ""})

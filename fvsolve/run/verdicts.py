@@ -388,13 +388,9 @@ def _difference(a, b, probe: str) -> dict:
         other = interpolated(theirs, other, t)
     difference = other - ours
     worst = int(np.argmax(np.abs(difference))) if len(t) else 0
-    return {
-        "unit": column.unit,
-        "rows": len(t),
-        "greatest": float(difference[worst]) if len(t) else None,
-        "t_greatest": float(t[worst]) if len(t) else None,
-        "rms": float(np.sqrt(np.mean(difference**2))) if len(t) else None,
-    }
+    return {"unit": column.unit, "rows": len(t), "greatest": float(difference[worst]) if len(t) else None,
+            "t_greatest": float(t[worst]) if len(t) else None,
+            "rms": float(np.sqrt(np.mean(difference**2))) if len(t) else None}  # fmt: skip
 
 
 def claims(model, summary, result) -> dict:
@@ -436,16 +432,10 @@ def expectation(text: str, expect, column: UnitColumn, value: float, complete: b
     tolerance = expect.atol + expect.rtol * abs(expect.value)
     known = math.isfinite(value)
     state = FAILS if known and abs(value - expect.value) > tolerance else HOLDS if known and complete else OPEN
-    return {
-        "text": text,
-        "claimed": float(column.from_si(expect.value)),
-        "found": float(column.from_si(value)) if known else None,
-        "tolerance": float(column.span_from_si(tolerance)),
-        "unit": column.unit,
-        "state": state,
-        "ok": state == HOLDS,
-        "error": None,
-    }
+    return {"text": text, "claimed": float(column.from_si(expect.value)),
+            "found": float(column.from_si(value)) if known else None,
+            "tolerance": float(column.span_from_si(tolerance)), "unit": column.unit, "state": state,
+            "ok": state == HOLDS, "error": None}  # fmt: skip
 
 
 def _at_places(model, summary, expect) -> tuple[float, float]:

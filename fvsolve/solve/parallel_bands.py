@@ -120,14 +120,8 @@ def copy_integrator(stepper: Integrator) -> Integrator:
 
     The two share only arrays that steps do not change.
     """
-    copy = Integrator(
-        stepper.method,
-        stepper.scale.size,
-        stepper.ledger_rates.shape[1],
-        stepper.jacobian_structure,
-        stepper.scale,
-        stepper.damped,
-    )
+    copy = Integrator(stepper.method, stepper.scale.size, stepper.ledger_rates.shape[1], stepper.jacobian_structure,
+                      stepper.scale, stepper.damped)  # fmt: skip
     copy.stored, copy.carry = stepper.stored, stepper.carry.copy()
     for name in ("out", "out_row", "values", "g", "g_new", "rows"):
         setattr(copy, name, getattr(stepper, name).copy())

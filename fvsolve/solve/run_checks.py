@@ -336,14 +336,8 @@ class StepDoubling:
         """
         if self.stepper is None:
             model = self.model
-            self.stepper = Integrator(
-                loop.stepper.method,
-                model.y_size,
-                model.ledgers,
-                lambda: model.structure,
-                model.scale.copy(),
-                model.damped,
-            )
+            self.stepper = Integrator(loop.stepper.method, model.y_size, model.ledgers, lambda: model.structure,
+                                      model.scale.copy(), model.damped)  # fmt: skip
             self.stepper.out = model.new_out()
         if first:
             self.stepper.discard_history()

@@ -408,9 +408,6 @@ def separate(run_data: RunData, t: float, y: np.ndarray, out: np.ndarray) -> int
         return None
     small = ROUNDING * model.scale[model.tables.columns["y"]].max()
     all_impulses = impact_impulses(model, flow_before(run_data, t, y), out, places)
-    separating = [
-        (impulse, event)
-        for impulse, event in zip(all_impulses, events, strict=True)
-        if event is not None and impulse < -small
-    ]
+    separating = [(impulse, event) for impulse, event in zip(all_impulses, events, strict=True)
+                  if event is not None and impulse < -small]  # fmt: skip
     return min(separating)[1] if separating else None

@@ -154,11 +154,8 @@ def device_notices(run_data: RunData) -> list[Notice]:
     model, marks = run_data.model, run_data.marks
     first = len(model.pipes) + 3 * len(model.node_names) + len(model.column_names) + len(model.piston_names)
     times = marks[first + len(model.devices) :]
-    return [
-        device.passing_notice(model, name, part, float(time))
-        for (name, part, device), time in zip(model.devices, times, strict=False)
-        if np.isfinite(time)
-    ]
+    return [device.passing_notice(model, name, part, float(time))
+            for (name, part, device), time in zip(model.devices, times, strict=False) if np.isfinite(time)]  # fmt: skip
 
 
 def drift_notices(model: Model, y: np.ndarray) -> list[Notice]:
@@ -272,11 +269,8 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     ]  # nodes with `made_up` and `spilled`
     words = [("made_up", "spilled") if in_cells else ("inflow", "outflow") for in_cells in own]
     rows = zip(model.node_names, words, ledger[0], ledger[1], strict=True)
-    nodes = {
-        name: {inflow_word: float(x), outflow_word: float(0.0 - y)}
-        for name, (inflow_word, outflow_word), x, y in rows
-        if x != 0.0 or y != 0.0
-    }
+    nodes = {name: {inflow_word: float(x), outflow_word: float(0.0 - y)}
+             for name, (inflow_word, outflow_word), x, y in rows if x != 0.0 or y != 0.0}  # fmt: skip
     total = {word: sum(row.get(word, 0.0) for row in nodes.values()) for pair in set(words) for word in pair}
     remainder = change - float(np.sum(ledger))
     terms = {word: total.get(word, 0.0) for word in ("inflow", "outflow", "spilled", "made_up")}

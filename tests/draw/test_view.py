@@ -86,14 +86,8 @@ def test_numbers_are_told_in_the_units_of_the_output_and_margins_as_differences(
 
 def test_names_cover_neither_each_other_nor_symbols_and_what_finds_no_room_is_left_out():
     at = [(10.0 * k, 50.0) for k in range(1, 10)]
-    found = place_labels(
-        at,
-        [(30.0, 8.0)] * 9,
-        [4.0] * 9,
-        [(x - 2, y - 2, x + 2, y + 2) for x, y in at],
-        np.zeros((0, 2)),
-        (0, 0, 100, 100),
-    )
+    found = place_labels(at, [(30.0, 8.0)] * 9, [4.0] * 9, [(x - 2, y - 2, x + 2, y + 2) for x, y in at],
+                         np.zeros((0, 2)), (0, 0, 100, 100))  # fmt: skip
     boxes = [(x, y, x + 30.0, y + 8.0) for x, y in filter(None, found)]
     assert 2 <= len(boxes) < 9 and found[0] is not None
     for i, a in enumerate(boxes):

@@ -161,15 +161,8 @@ def flume(method: str = "rk4", **more) -> dict:
             "start": {"level": "1 + 0.03 * cos(2 * x)"}}  # fmt: skip
     links = {"tap": {"type": "valve", "from": "b.gate", "to": "t", "area": 0.02}}
     nodes = {"b": pool, "t": {"type": "tank", "area": 0.3, "level": 0.9}}
-    probes = [
-        "b.paddle.force",
-        "b.paddle.power",
-        "b.paddle.travel",
-        "b.depth@0.3,0.2",
-        "b.u@0.9,0.1",
-        "tap.flow",
-        "t.level",
-    ]
+    probes = ["b.paddle.force", "b.paddle.power", "b.paddle.travel", "b.depth@0.3,0.2", "b.u@0.9,0.1", "tap.flow",
+              "t.level"]  # fmt: skip
     return scene(nodes, links, END, stepped(method, 8e-3), probes, 1 / 32) | more
 
 
@@ -198,13 +191,8 @@ def full(method: str = "rk4", law: str = "linear", free: bool = False, **more) -
               "attitude": {"yaw": 0.4, "roll": 1.2}, "size": [1.0, 0.8], "cells": [6, 5], "pressure": 3e5,
               "thickness": 0.05},
     }  # fmt: skip
-    probes = [
-        "b.pressure@0.2,0.3",
-        "b.u@0.7,0.4",
-        "b.v@0.7,0.4",
-        "cradle.angle",
-        *(f"cradle.w{axis}" for axis in "xyz"),
-    ]
+    probes = ["b.pressure@0.2,0.3", "b.u@0.7,0.4", "b.v@0.7,0.4", "cradle.angle",
+              *(f"cradle.w{axis}" for axis in "xyz")]  # fmt: skip
     numerics = stepped(method, 1e-4) | {"scheme": "upwind5"}
     return scene(nodes, {}, 0.01, numerics, probes, 1 / 1024) | {"fluid": dict(LAWS[law])} | more
 
@@ -242,14 +230,8 @@ def u_tube(method: str = "rk4", free: bool = True, **more) -> dict:
         "port": {"type": "tank", "on": "hull", "at": [0, 4, -1.5], "area": 1.2, "level": 0.8},
         "starboard": {"type": "tank", "on": "hull", "at": [0, -4, -1.5], "area": 1.2, "level": 0.8},
     }  # fmt: skip
-    duct = {
-        "type": "rigid-column",
-        "from": "port",
-        "to": "starboard",
-        "length": 8.0,
-        "diameter": 0.6,
-        "minor_loss": 1.0,
-    }
+    duct = {"type": "rigid-column", "from": "port", "to": "starboard", "length": 8.0, "diameter": 0.6,
+            "minor_loss": 1.0}  # fmt: skip
     probes = ["duct.flow", "port.level", "starboard.level", "hull.angle", "hull.ay"]
     return scene(nodes, {"duct": duct}, 10 * END, stepped(method, 0.05), probes, 1 / 8) | more
 

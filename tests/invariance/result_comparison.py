@@ -73,9 +73,7 @@ def alike(
     for probe, values in wanted.items():
         kind = kind_of(probe)
         greatest[kind] = max(greatest.get(kind, 1e-9), float(np.max(np.abs(values), initial=0.0)))
-    apart = {
-        probe: float(np.max(np.abs(other.rows[name(probe)] - values), initial=0.0)) / greatest[kind_of(probe)]
-        for probe, values in wanted.items()
-    }
+    apart = {probe: float(np.max(np.abs(other.rows[name(probe)] - values), initial=0.0)) / greatest[kind_of(probe)]
+             for probe, values in wanted.items()}  # fmt: skip
     worst = max(apart, key=apart.get, default=None)
     assert worst is None or apart[worst] <= within, (worst, apart[worst])

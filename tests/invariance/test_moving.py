@@ -211,15 +211,8 @@ def test_a_mass_on_a_cylinder_is_a_body_on_a_prismatic_joint(law, method):
         "maximum": 0.31,
             "stiffness": 1e6, "damping": 1e3}, "brake": {"type": "damper", "damping": 40.0}}  # fmt: skip
     push = {"type": "force", "force": {"mean": 100.0, "amplitude": 500.0, "period": 0.05}}
-    probes = [
-        "jack.force",
-        "jack.position",
-        "jack.velocity",
-        "jack.A.pressure",
-        "jack.B.pressure",
-        "spring.force",
-        "stop.force",
-    ]
+    probes = ["jack.force", "jack.position", "jack.velocity", "jack.A.pressure", "jack.B.pressure", "spring.force",
+              "stop.force"]  # fmt: skip
 
     def case(nodes, near, far, **force):
         links = {name: {**one, "from": near, "to": far} for name, one in rest.items()}

@@ -21,11 +21,9 @@ SLAMS = {"rate": [1.0, 10.0], "reverse_velocity": [0.05, 1.0]}
 COMPRESSOR = {"start": 0.28, "stop": 0.2, "flow": 1e-3}
 SWITCHES = {"switch": 3e3, "switch_velocity": 0.1}
 SLOW = {"time_constant": between(0.1, 5.0)}
-SIZE = st.one_of(
-    st.fixed_dictionaries({"area": between(1e-4, 5e-3)}),
-    st.fixed_dictionaries({"diameter": between(0.01, 0.08), "loss_coefficient": between(0.5, 20.0)}),
-    st.fixed_dictionaries({"Kv": between(3.0, 100.0)}),
-)
+SIZE = st.one_of(st.fixed_dictionaries({"area": between(1e-4, 5e-3)}),
+                 st.fixed_dictionaries({"diameter": between(0.01, 0.08), "loss_coefficient": between(0.5, 20.0)}),
+                 st.fixed_dictionaries({"Kv": between(3.0, 100.0)}))  # fmt: skip
 MOVING = st.one_of(
     st.fixed_dictionaries({"time_constant": between(0.02, 0.5)}),
     st.fixed_dictionaries({"natural_frequency": between(1.0, 10.0), "damping_ratio": between(0.3, 1.5)}),

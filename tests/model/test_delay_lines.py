@@ -150,14 +150,8 @@ def short(line: str, **numerics) -> dict:
     links = {"up": pipe("lake", "a", 300.0, cells=50), "stub": pipe("a", "b", 3.0, cells=1),
              "down": pipe("b", "gate", 240.0, cells=40), "spur": pipe("b", "c", 5.0, cells=1),
              "tap": {"type": "valve", "from": "c", "to": "sink", "area": 2e-4}}  # fmt: skip
-    return scene(
-        nodes,
-        links,
-        3.0,
-        {"pipe_model": line, **numerics},
-        ["gate.pressure", "b.pressure", "c.pressure", "tap.flow"],
-        0.05,
-    )
+    return scene(nodes, links, 3.0, {"pipe_model": line, **numerics},
+                 ["gate.pressure", "b.pressure", "c.pressure", "tap.flow"], 0.05)  # fmt: skip
 
 
 def test_lines_shorter_than_a_step_know_each_other():
@@ -264,12 +258,8 @@ def test_advanced_in_pieces():
 
 def test_more_steps_than_were_foreseen():
     """The storage for past waves grows if error control takes much shorter steps than expected."""
-    case = main(
-        3.0,
-        {"method": "bogacki-shampine", "rtol": 1e-10},
-        {"mean": FLOW, "amplitude": 0.1 * FLOW, "period": 0.1},
-        cells=1,
-    )
+    case = main(3.0, {"method": "bogacki-shampine", "rtol": 1e-10},
+                {"mean": FLOW, "amplitude": 0.1 * FLOW, "period": 0.1}, cells=1)  # fmt: skip
     found = fvsolve.run(case)
     assert found.reason == "finished" and found.summary["steps"] > 2000
 
@@ -362,11 +352,9 @@ def test_check_says_how_pipes_are_followed(fvs, tmp_path):
     )
 
 
-BAD = {
-    "law": ({"fluid": {"name": "Water", "law": "log"}}, 'law = "log" changes waves as they travel'),
-    "unsteady": ({}, "unsteady friction depends on the flow history of every cell"),
-    "rough": ({}, "friction attenuates"),
-}
+BAD = {"law": ({"fluid": {"name": "Water", "law": "log"}}, 'law = "log" changes waves as they travel'),
+       "unsteady": ({}, "unsteady friction depends on the flow history of every cell"),
+       "rough": ({}, "friction attenuates")}  # fmt: skip
 
 
 @pytest.mark.parametrize("which", BAD)

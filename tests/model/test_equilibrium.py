@@ -293,13 +293,9 @@ def test_a_tank_on_two_sides_and_its_duct_do_not_move_where_their_levels_agree()
 
 # stability in time ----------------------------------------------------------------------------------------------
 
-SCENES = {
-    "arm": lambda: arm_on_springs(),
-    "chain": lambda: four_bar(),
-    "plate": lambda: raft("bushing", load=(0.3, 0.1)),
-    "hull": lambda: (hull("cells", 0.3), {}),
-    "modes": lambda: (hull("modes", 0.3), {}),
-}
+SCENES = {"arm": lambda: arm_on_springs(), "chain": lambda: four_bar(),
+          "plate": lambda: raft("bushing", load=(0.3, 0.1)), "hull": lambda: (hull("cells", 0.3), {}),
+          "modes": lambda: (hull("modes", 0.3), {})}  # fmt: skip
 METHODS = {"dormand-prince": {"rtol": 1e-8}, "radau-iia-5": {"rtol": 1e-6}, "rodas-4": {"rtol": 1e-6}}
 
 

@@ -215,11 +215,8 @@ def test_an_air_valve_lets_air_in_as_a_jump_arrives(method):
     nodes = {"lake": lake(20.0), "n": {"type": "air-valve", "inlet": 0.1, "outlet": 0.05},
              "m": junction(step(0.5, 0.0, 0.1))}  # fmt: skip
     links = {"p": line("n", "m", 100.0), "p2": line("lake", "n", 400.0)}
-    numerics = {
-        "pipe_model": "delay-line",
-        "method": method,
-        **({"step": 0.002} if method == "euler" else METHODS[method]),
-    }
+    numerics = {"pipe_model": "delay-line", "method": method,
+                **({"step": 0.002} if method == "euler" else METHODS[method])}  # fmt: skip
     case = scene(nodes, links, 0.75, numerics, ["n.head", "p2.flow@1"], 0.01)
     found, truth = fvsolve.run(case), fvsolve.run(in_cells(case, 2.0))
     assert found.extremes["n.head"].minimum > -1.0

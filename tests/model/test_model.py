@@ -223,10 +223,8 @@ def test_a_pipe_drawn_the_other_way_reads_the_same(scheme, law):
     numerics = {"scheme": scheme, "method": "rk4", "step": 1e-3, "start": 0.0}
     found = []
     for start, end, side in (("lake", "gate", 1), ("gate", "lake", -1)):
-        links = {
-            "line": pipe(start, end, 100.0, 0.1, 1000.0, CELLS, friction=friction),
-            "valve": valve("gate", "sink", 1e-3, opening=shuts),
-        }
+        links = {"line": pipe(start, end, 100.0, 0.1, 1000.0, CELLS, friction=friction),
+                 "valve": valve("gate", "sink", 1e-3, opening=shuts)}  # fmt: skip
         at = PLACES if side > 0 else [1.0 - x for x in PLACES]
         probes = [f"line.{what}@{x!r}" for what in ("pressure", "flow") for x in at]
         result = fvsolve.run(scene(nodes, links, 0.15, numerics, probes, fluid=WATER | {"law": law}))

@@ -154,12 +154,8 @@ def pond(law: str, friction: dict, scheme: str = "muscl") -> dict:
     return scene(nodes, links, 20.0, numerics, [*probes, "pool.level"], 1.0, fluid={**scenes.WATER, "law": law})
 
 
-FRICTIONS = [
-    NO_FRICTION,
-    ROUGH,
-    {"model": "quasi-steady", "factor": 0.02},
-    {"model": "hazen-williams", "coefficient": 120.0},
-]
+FRICTIONS = [NO_FRICTION, ROUGH, {"model": "quasi-steady", "factor": 0.02},
+             {"model": "hazen-williams", "coefficient": 120.0}]  # fmt: skip
 
 
 @pytest.mark.parametrize("friction", FRICTIONS, ids=["none", "steady", "quasi-steady", "hazen-williams"])
@@ -225,11 +221,9 @@ def test_a_symmetric_network_stays_symmetric():
     """Two equal branches of opposite direction have equal pressures."""
     nodes = {"lake": reservoir(1e6), "fork": junction()}
     nodes |= {n: junction(step(0.2, 0.03, 0.0)) for n in ("left", "right")}
-    links = {
-        "main": pipe("lake", "fork", 200.0, 0.3, 1000.0, 20, friction=ROUGH),
-        "to": pipe("fork", "left", 150.0, 0.2, 1000.0, 15, friction=ROUGH),
-        "fro": pipe("right", "fork", 150.0, 0.2, 1000.0, 15, friction=ROUGH),
-    }
+    links = {"main": pipe("lake", "fork", 200.0, 0.3, 1000.0, 20, friction=ROUGH),
+             "to": pipe("fork", "left", 150.0, 0.2, 1000.0, 15, friction=ROUGH),
+             "fro": pipe("right", "fork", 150.0, 0.2, 1000.0, 15, friction=ROUGH)}  # fmt: skip
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.9}
     result = fvsolve.run(scene(nodes, links, 5.0, numerics, ["left.pressure", "right.pressure"]))
     assert result["left.pressure"] == pytest.approx(result["right.pressure"], rel=1e-10)

@@ -40,10 +40,8 @@ def folder(tmp_path_factory):
 
 def test_the_directory_holds_what_is_promised(folder):
     names = {path.name for path in folder.iterdir()}
-    assert names == {
-        *("summary.json", "history.csv", "history.png", "envelope.csv", "envelope.png"),
-        *("fields.pvd", "fields", "case.toml", "restart.npz"),
-    }
+    assert names == {*("summary.json", "history.csv", "history.png", "envelope.csv", "envelope.png"),
+                     *("fields.pvd", "fields", "case.toml", "restart.npz")}  # fmt: skip
     listed = set(json.loads((folder / "summary.json").read_text())["files"])
     assert listed == names - {"fields", "history.png", "envelope.png"}
 
@@ -171,13 +169,9 @@ def test_expectations_are_those_of_the_table(folder):
     result = fvsolve.open_run(folder)
     pressure = result["gate.pressure"]
     mean = np.sum(0.5 * (pressure[1:] + pressure[:-1]) * np.diff(result.t)) / (result.t[-1] - result.t[0])
-    claims = {
-        "max(gate.pressure)": result.extremes["gate.pressure"].maximum,
-        "min(gate.pressure)": result.extremes["gate.pressure"].minimum,
-        "final(gate.pressure)": pressure[-1],
-        "mean(gate.pressure)": mean,
-        "at(gate.pressure, 0.5)": np.interp(0.5, result.t, pressure),
-    }
+    claims = {"max(gate.pressure)": result.extremes["gate.pressure"].maximum,
+              "min(gate.pressure)": result.extremes["gate.pressure"].minimum, "final(gate.pressure)": pressure[-1],
+              "mean(gate.pressure)": mean, "at(gate.pressure, 0.5)": np.interp(0.5, result.t, pressure)}  # fmt: skip
     expect = {text: {"value": float(value), "rtol": 1e-12} for text, value in claims.items()}
     found = fvsolve.run(branched(expect=expect))
     assert [one.text for one in found.expectations if one.ok] == list(claims)
@@ -187,10 +181,8 @@ def test_expectations_are_those_of_the_table(folder):
 
 def test_a_comparison_finds_a_shifted_copy_of_the_run(folder, tmp_path):
     result = fvsolve.open_run(folder)
-    rows = [
-        f"{1e3 * (t - 0.05)!r},{(p - AMBIENT) / 1e5 + 0.5!r}"
-        for t, p in zip(result.t.tolist(), result["gate.pressure"].tolist(), strict=True)
-    ]
+    rows = [f"{1e3 * (t - 0.05)!r},{(p - AMBIENT) / 1e5 + 0.5!r}"
+            for t, p in zip(result.t.tolist(), result["gate.pressure"].tolist(), strict=True)]  # fmt: skip
     (tmp_path / "rig.csv").write_text("clock [ms],p [barg]\n" + "\n".join(rows))
     measured = {"file": str(tmp_path / "rig.csv"), "time": "clock [ms]", "value": "p [barg]", "shift": 0.05}
     found = fvsolve.run(branched(compare={"gate.pressure": measured}), out=tmp_path / "run")
@@ -230,12 +222,10 @@ def test_a_probe_that_is_not_there_is_named(folder):
 
 def network(links: dict[str, tuple[str, str]], **positions) -> SimpleNamespace:
     names = dict.fromkeys(name for ends in links.values() for name in ends)
-    return SimpleNamespace(
-        places=dict.fromkeys(names),
-        nodes={name: SimpleNamespace(position=positions.get(name)) for name in names},
-        links={name: SimpleNamespace(ports={"from": a, "to": b}) for name, (a, b) in links.items()},
-        routes={},
-    )
+    return SimpleNamespace(places=dict.fromkeys(names),
+                           nodes={name: SimpleNamespace(position=positions.get(name)) for name in names},
+                           links={name: SimpleNamespace(ports={"from": a, "to": b}) for name, (a, b) in links.items()},
+                           routes={})  # fmt: skip
 
 
 def test_stated_positions_are_used():

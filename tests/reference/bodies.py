@@ -59,12 +59,9 @@ def pinocchio_of(bodies: dict[str, dict], gravity: float):
     for name, one in bodies.items():
         joint = one["joint"]
         kind, axis = joint["kind"], np.array(joint.get("axis", [0.0, 0.0, 1.0]))
-        made = {
-            "revolute": lambda axis=axis: pin.JointModelRevoluteUnaligned(axis),
-            "prismatic": lambda axis=axis: pin.JointModelPrismaticUnaligned(axis),
-            "ball": pin.JointModelSpherical,
-            "free": pin.JointModelFreeFlyer,
-        }[kind]()
+        made = {"revolute": lambda axis=axis: pin.JointModelRevoluteUnaligned(axis),
+                "prismatic": lambda axis=axis: pin.JointModelPrismaticUnaligned(axis), "ball": pin.JointModelSpherical,
+                "free": pin.JointModelFreeFlyer}[kind]()  # fmt: skip
         rotation = np.array(joint.get("attitude", {}).get("matrix", np.eye(3).tolist()))
         frame = pin.SE3(rotation, np.array(joint.get("at", [0.0, 0.0, 0.0])))
         up = joints[joint["on"]] if "on" in joint else 0

@@ -196,8 +196,6 @@ BLOCKS = ((18.0, 6.0, 24.0, 12.0), (18.0, 18.0, 24.0, 24.0), (33.0, 12.0, 39.0, 
 def flood_plain(path: Path) -> None:
     """Write the mesh of cases/flooding.toml: 60 m by 30 m, three houses, west edge `breach`, east edge `drain`."""
     points, cells = triangles((60.0, 30.0), 1.5, BLOCKS)
-    groups = {
-        "breach": lambda x, y: (x < 1e-6) & (np.abs(y - 15.0) < 3.0),
-        "drain": lambda x, y: (x > 60.0 - 1e-6) & (np.abs(y - 15.0) < 5.0),
-    }
+    groups = {"breach": lambda x, y: (x < 1e-6) & (np.abs(y - 15.0) < 3.0), "drain": lambda x,
+              y: (x > 60.0 - 1e-6) & (np.abs(y - 15.0) < 5.0)}  # fmt: skip
     write_msh(path, points, cells, groups)

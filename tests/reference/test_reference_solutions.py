@@ -72,11 +72,8 @@ def test_gradients_are_the_textbook_ones():
 
 
 def test_rays_through_a_junction_scatter_as_impedances_say():
-    pipes = {
-        "one": Pipe("a", "mid", 100.0, 0.3, 1000.0),
-        "two": Pipe("mid", "b", 300.0, 0.2, 1100.0),
-        "three": Pipe("mid", "c", 300.0, 0.25, 900.0),
-    }
+    pipes = {"one": Pipe("a", "mid", 100.0, 0.3, 1000.0), "two": Pipe("mid", "b", 300.0, 0.2, 1100.0),
+             "three": Pipe("mid", "c", 300.0, 0.25, 900.0)}  # fmt: skip
     rays = Rays(RHO, pipes, {"a": step(0.01, 0.0, 1.0), "b": held(0.0), "c": held(0.0)})
     back, passed = scattered([p.impedance for p in pipes.values()])
     assert rays.pressure("mid", 0.15) == approx(1 + back)

@@ -174,15 +174,8 @@ def test_a_run_that_stopped_says_so_before_anything_else(tmp_path):
 
 def test_marks_and_warnings_that_spoil_numbers_stand_at_the_top(closure):
     mark = {"what": "below vapour pressure", "place": "main", "time": 1.25, "text": "main: pressure falls"}
-    bad = {
-        "kind": "growth",
-        "place": "links.main",
-        "key": None,
-        "value": None,
-        "limit": None,
-        "ok": False,
-        "text": "it grows",
-    }
+    bad = {"kind": "growth", "place": "links.main", "key": None, "value": None, "limit": None, "ok": False,
+           "text": "it grows"}  # fmt: skip
     text = read(changed(closure, marks=[mark], warnings=[bad], ok=False)).text
     places = [
         text.index(one) for one in ("it grows", "from 1.25 s on are not to be trusted", "No limits were stated", "Long")
@@ -191,15 +184,8 @@ def test_marks_and_warnings_that_spoil_numbers_stand_at_the_top(closure):
 
 
 def test_verdicts_stand_first_those_that_fail_before_others(closure):
-    holds = {
-        "name": "vacuum",
-        "ok": True,
-        "state": "holds",
-        "value": 0.5,
-        "limit": 0.2,
-        "margin": 0.3,
-        "bound": "minimum",
-    }
+    holds = {"name": "vacuum", "ok": True, "state": "holds", "value": 0.5, "limit": 0.2, "margin": 0.3,
+             "bound": "minimum"}  # fmt: skip
     verdicts = [VERDICT | holds, VERDICT]
     text = read(changed(closure, verdicts=verdicts)).text
     assert "1 of 2 limits does not hold. class" in text and "class gauge pressure at most 10 bar FAILS 13.5" in text

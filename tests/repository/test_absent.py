@@ -108,10 +108,8 @@ def test_a_scene_without_pipes_has_the_rates_that_it_has_beside_a_pipe(law):
     """The second case adds a pipe at rest, from a reservoir to a junction behind a shut valve."""
     alone = tanks() | {"fluid": {**tanks()["fluid"], "law": law}}
     nodes = alone["nodes"] | {"a": reservoir(101325.0 + 9806.65 * 4.0), "b": junction()}
-    links = alone["links"] | {
-        "line": pipe("a", "b", 10.0, 0.1, 1000.0, 8),
-        "way": valve("b", "high", 0.0, opening=0.0) | {"area": 1e-6},
-    }
+    links = alone["links"] | {"line": pipe("a", "b", 10.0, 0.1, 1000.0, 8),
+                              "way": valve("b", "high", 0.0, opening=0.0) | {"area": 1e-6}}  # fmt: skip
     both = alone | {"nodes": nodes, "links": links, "numerics": {"end": 10.0, "scheme": "upwind5"}}
     one, other = (fvsolve.build(fvsolve.load(case)) for case in (alone, both))
     y = np.array([-30.0, 20.0])

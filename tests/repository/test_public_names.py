@@ -66,10 +66,8 @@ def test_importing_imports_nothing_heavy():
     assert done.stdout.strip() == "[]"
 
 
-PAGES = {
-    page.name: page.read_text(encoding="utf-8")
-    for page in [*folders.DOCS.glob("*.md"), folders.DOCS.parent / "README.md"]
-}
+PAGES = {page.name: page.read_text(encoding="utf-8")
+         for page in [*folders.DOCS.glob("*.md"), folders.DOCS.parent / "README.md"]}  # fmt: skip
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -110,12 +108,8 @@ def test_ci_refuses_an_older_python(tmp_path):
     older = tmp_path / "python3.10"
     older.write_text('#!/bin/sh\nif [ "$1" = --version ]; then echo Python 3.10.13; else exit 1; fi\n')
     older.chmod(0o755)
-    found = subprocess.run(
-        [TOP / ".ci/run"],
-        capture_output=True,
-        text=True,
-        env=os.environ | {"PYTHON": str(older), "TMPDIR": str(tmp_path)},
-    )
+    found = subprocess.run([TOP / ".ci/run"], capture_output=True, text=True,
+                           env=os.environ | {"PYTHON": str(older), "TMPDIR": str(tmp_path)})  # fmt: skip
     assert found.returncode == 1
     assert all(part in found.stdout for part in (str(older), "3.10.13", "3.11 or later", "PYTHON="))
     assert list(tmp_path.iterdir()) == [older]

@@ -34,13 +34,8 @@ def long_run(**numerics) -> dict:
     """Case with about a second of steps."""
     case = branched(fields=20)
     case["nodes"]["tower"] = {"type": "tank", "area": 2.0, "level": 5.0, "height": 30.0, "elevation": 10.0}
-    case["links"]["riser"] = {
-        "type": "valve",
-        "from": "fork",
-        "to": "tower",
-        "area": 0.01,
-        "discharge_coefficient": 0.6,
-    }
+    case["links"]["riser"] = {"type": "valve", "from": "fork", "to": "tower", "area": 0.01,
+                              "discharge_coefficient": 0.6}  # fmt: skip
     case["numerics"] = {"end": 2500.0, "scheme": "muscl", "method": "ssp-rk3", **numerics}
     case["output"] |= {"every": 0.1, "probes": [*case["output"]["probes"], "tower.level"]}
     return case

@@ -67,11 +67,9 @@ def surging(numerics: dict) -> dict:
     """Case of two pipes and a closing valve, suitable for fused steps."""
     nodes = {"lake": lake(60.0), "fork": junction(ramp(0.3, 0.1, 0.0, 0.02)), "gate": junction(),
              "out": reservoir(AMBIENT)}  # fmt: skip
-    links = {
-        "main": pipe("lake", "fork", 1200.0, 0.5, 1000.0, 60, friction={"model": "steady", "factor": 0.018}),
-        "down": pipe("fork", "gate", 350.0, 0.4, 1100.0, 20),
-        "valve": valve("gate", "out", 0.02, ramp(0.5, 0.2, 1.0, 0.0)),
-    }
+    links = {"main": pipe("lake", "fork", 1200.0, 0.5, 1000.0, 60, friction={"model": "steady", "factor": 0.018}),
+             "down": pipe("fork", "gate", 350.0, 0.4, 1100.0, 20),
+             "valve": valve("gate", "out", 0.02, ramp(0.5, 0.2, 1.0, 0.0))}  # fmt: skip
     return scene(nodes, links, 2.0, numerics, ["gate.pressure", "main.pressure@0.37", "valve.flow", "down.flow@0.5"])
 
 

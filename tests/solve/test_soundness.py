@@ -156,14 +156,8 @@ def test_limits_in_the_plane_are_those_along_a_line_where_all_goes_along_it(sche
 def test_a_liquid_in_the_plane_holds_below_its_predicted_limit_and_grows_beyond_it(scheme, method):
     limit = plane_limit(scheme, method, 0.5)
     rng = np.random.default_rng(3)
-    box = {
-        "type": "basin",
-        "physics": "liquid",
-        "size": [1.0, 1.0],
-        "cells": [16, 16],
-        "pressure": 3e5,
-        "thickness": 0.1,
-    }
+    box = {"type": "basin", "physics": "liquid", "size": [1.0, 1.0], "cells": [16, 16], "pressure": 3e5,
+           "thickness": 0.1}  # fmt: skip
     for factor, grows in ((0.98, False), (1.05, True)):
         case = scene({"box": box}, {}, 1.0, {"scheme": scheme, "method": method, "step": 1.0}, ["box.pressure@0.5,0.5"])
         rate = model_of(case).basins[0].max_rate(model_of(case).start)[0]
