@@ -33,11 +33,6 @@ PVD_HEAD = """<?xml version="1.0"?>
 PVD_TAIL = "</Collection>\n</VTKFile>\n"
 
 
-def body_points(body) -> list[tuple[float, ...]]:
-    """Points of a body in its axes, without repetition: origin, centre of mass, then its named points [m]."""
-    return list(dict.fromkeys([(0.0, 0.0, 0.0), tuple(body.centre_of_mass), *map(tuple, body.points.values())]))
-
-
 class BodyLines:
     """Points fixed to bodies or to the world, and lines between them.
 
@@ -50,7 +45,11 @@ class BodyLines:
     def __init__(self, model) -> None:
         self.model, names = model, model.body_names
         owner, place, lines, line_body = [], [], [], []
-        drawn = [body_points(model.case.nodes[name]) if name in model.case.nodes else [] for name in names]
+        # for each body, points in its axes [m], without repetition: origin, centre of mass, named points
+        bodies = [model.case.nodes.get(name) for name in names]
+        drawn = [[] if body is None else
+                 list(dict.fromkeys([(0.0,) * 3, tuple(body.centre_of_mass), *map(tuple, body.points.values())]))
+                 for body in bodies]  # fmt: skip
         dots = max(map(len, drawn)) < 2  # if others have extent, a body with only an origin is just a joint of them
         for i, ends in enumerate(drawn):
             first = len(owner)

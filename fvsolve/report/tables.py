@@ -283,7 +283,7 @@ def _value_text(value: Any, given: Any, case) -> str:
         text = f"({', '.join(texts)})"
     elif isinstance(given, bool) or isinstance(given, str):
         text = inline(given).strip('"')
-    elif dimension is None or not _is_numeric(given):
+    elif dimension is None or not all(map(is_number, given if isinstance(given, list) else [given])):
         text = inline(given)
     else:
         shown = _pressure_column(column("", dimension, case), case)
@@ -307,11 +307,6 @@ def _value_of_key(value: Any, key: str) -> Any:
     except (AttributeError, KeyError):
         result = None
     return Quantity(key) if result is None and key in DIMENSIONS else result  # columns of a curve, such as `flow`
-
-
-def _is_numeric(given: Any) -> bool:
-    rows = given if isinstance(given, list) else [given]
-    return all(isinstance(number, (int, float)) and not isinstance(number, bool) for number in rows)
 
 
 def _pressure_column(shown, case):

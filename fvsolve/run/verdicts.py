@@ -61,7 +61,10 @@ def part_extremes(model, summary, extent) -> list[PartExtremes]:
         if group == "links" and name in envelope:
             parts.append(PartExtremes(group, name, *(np.asarray(envelope[name][key]) for key in ENVELOPE_KEYS)))
         elif group == "links" and name in rows:
-            parts.append(along_pipe(summary, pipes[name], rows[name]))
+            # probes of which only extremes are recorded
+            distance = np.array([probe.fraction for probe in rows[name]]) * pipes[name].length
+            found = np.array([summary.watched[probe.text] for probe in rows[name]])
+            parts.append(PartExtremes("links", name, distance, pipes[name].height(distance), *found.T))
         else:
             z = model.elevation.get(name, np.nan) if group == "nodes" else np.nan
             extremes = summary.watched[f"{group}.{name}.{quantity}"]
@@ -74,13 +77,6 @@ def valid(part: PartExtremes, until: float) -> PartExtremes:
     sides = {side: np.where(getattr(part, f"t_{side[:3]}") < until, getattr(part, side), np.nan)
              for side in ("minimum", "maximum")}  # fmt: skip
     return replace(part, **sides)
-
-
-def along_pipe(summary, pipe, rows: list) -> PartExtremes:
-    """Extremes along a pipe, from the probes `rows` of which only extremes are recorded."""
-    distance = np.array([probe.fraction for probe in rows]) * pipe.length
-    extremes = np.array([summary.watched[probe.text] for probe in rows])
-    return PartExtremes("links", pipe.name, distance, pipe.height(distance), *extremes.T)
 
 
 def in_quantity(model, quantity: str, pressure, elevation):
@@ -163,14 +159,10 @@ def places(model, summary) -> list[list[dict[str, Any]]]:
 
 def verdict(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Verdict on a limit, from its rows of `places`: the worst row, with the list `worst` of the worst rows added."""
-    rows = [{key: value for key, value in row.items() if key != PLACES_KEY} for row in sorted(rows, key=sort_key)]
+    rows = [{key: value for key, value in row.items() if key != PLACES_KEY} for row in rows]
+    rows.sort(key=lambda row: (STATES.index(row["state"]), -math.inf if row["margin"] is None else row["margin"]))
     listed = [{key: value for key, value in row.items() if key not in SHARED} for row in worst(rows)]
     return {**rows[0], "ok": rows[0]["state"] == HOLDS, "worst": listed}
-
-
-def sort_key(row: dict[str, Any]) -> tuple[int, float]:
-    """Key for sorting rows, worst first: by state, then by margin."""
-    return STATES.index(row["state"]), -math.inf if row["margin"] is None else row["margin"]
 
 
 def worst(rows: list[dict]) -> list[dict]:
@@ -187,9 +179,8 @@ def nearest(model, summary, limit, part: PartExtremes, complete: bool):
     complete : True if the run can decide that a limit holds
     """
     quantity = limit.extent.quantity
-    for bound, (values, times), sign in zip(
-        ("minimum", "maximum"), extremes(model, quantity, part), (1.0, -1.0), strict=True
-    ):
+    both = zip(("minimum", "maximum"), extremes(model, quantity, part), (1.0, -1.0), strict=True)
+    for bound, (values, times), sign in both:
         bounds = allowed(model, limit, bound, part)
         if bounds is None:
             continue

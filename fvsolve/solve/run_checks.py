@@ -292,7 +292,10 @@ class StepDoubling:
         self.restart_data[1] = steps + 1.0  # check the next step if this step cannot be checked
         end = loop.control["end"]
         full_step = self.step if loop.t < end else min(self.step, end - memory["t_mark"])
-        if h < FULL_STEP * full_step or corrected_store(loop):
+        # A step in which a jump in a delay line corrected masses of storing nodes or flows of columns is not checked,
+        # because half steps have no such correction. The mark is removed when the corrected state is recorded again.
+        past = loop.run_data.past
+        if h < FULL_STEP * full_step or (past.size > 0 and past[CORRECTED_TIME] == loop.t):
             return
         before, now = loop.before[self.states], loop.now[self.states]
         t = loop.t - h
@@ -372,13 +375,3 @@ class StepDoubling:
                 f"comparison with two half steps; {verdict}; halve the step")  # fmt: skip
         key = "step" if self.model.case.numerics.step is not None else "courant"
         return Notice("step-error", place, text, key, share, WRONG, ok)
-
-
-def corrected_store(loop) -> bool:
-    """True if the present state of the loop is marked as corrected for a jump in a delay line within the last step.
-
-    A correction changes masses of storing nodes and flows of rigid columns. Half steps have no such correction, so such
-    a step is not checked. The mark is removed when the corrected state is recorded again.
-    """
-    past = loop.run_data.past
-    return past.size > 0 and past[CORRECTED_TIME] == loop.t

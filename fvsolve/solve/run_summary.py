@@ -190,16 +190,15 @@ def find_cavities(run_data: RunData) -> list[Cavity]:
     return cavities
 
 
-def find_extremes(run_data: RunData) -> dict[str, tuple[float, float, float, float]]:
-    """Extremes over all accepted steps and rows: probe -> (least value, its time [s], greatest value, its time [s])."""
-    table = run_data.extremes
-    return {probe.text: tuple(map(float, table[:, k])) for k, probe in enumerate(run_data.model.probes)}
+def find_extremes(run_data: RunData) -> tuple[dict, dict]:
+    """Extremes over all accepted steps and rows of probes, and of what studies and limits need without a probe.
 
-
-def find_watched(run_data: RunData) -> dict[str, tuple[float, float, float, float]]:
-    """Extremes of the quantities that studies and limits need without a probe, in the form of `find_extremes`."""
-    table, probe_count = run_data.extremes, len(run_data.model.probes)
-    return {probe.text: tuple(map(float, table[:, probe_count + k])) for k, probe in enumerate(run_data.model.watched)}
+    Both are dicts: text of the probe -> (least value, its time [s], greatest value, its time [s]).
+    """
+    probes, watched = run_data.model.probes, run_data.model.watched
+    rows = [tuple(map(float, column)) for column in run_data.extremes.T]
+    found = [(probe.text, row) for probe, row in zip((*probes, *watched), rows, strict=False)]
+    return dict(found[: len(probes)]), dict(found[len(probes) :])
 
 
 def find_point_envelopes(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
@@ -264,9 +263,8 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     kinds = model.tables.nodes["kind"]
     initial, change = model.contents(y)
     passes = {int(row["node"]) for row in model.tables.patches if row["open"]}
-    own = [
-        kind in (rec.TANK, rec.PATCH) and i not in passes for i, kind in enumerate(kinds)
-    ]  # nodes with `made_up` and `spilled`
+    # nodes with `made_up` and `spilled`
+    own = [kind in (rec.TANK, rec.PATCH) and i not in passes for i, kind in enumerate(kinds)]
     words = [("made_up", "spilled") if in_cells else ("inflow", "outflow") for in_cells in own]
     rows = zip(model.node_names, words, ledger[0], ledger[1], strict=True)
     nodes = {name: {inflow_word: float(x), outflow_word: float(0.0 - y)}
