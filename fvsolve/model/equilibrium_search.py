@@ -182,9 +182,8 @@ class Configuration(StaticForces):
         if len(self.draft.pin_table):
             self.run(GAPS)
             at = int(self.layout["pin"])
-            pin_gaps = [
-                self.out[at + 3 * k + r] for k, row in enumerate(self.draft.pin_table) for r in range(row["rows"])
-            ]
+            rows = enumerate(self.draft.pin_table)
+            pin_gaps = [self.out[at + 3 * k + r] for k, row in rows for r in range(row["rows"])]
         return np.array([*pin_gaps, *(self.out[travel + 2 * (self.first + k)] for k in self.locked)])
 
     def mass(self, y: np.ndarray) -> np.ndarray:
@@ -206,9 +205,8 @@ class Configuration(StaticForces):
         matrix = np.zeros((self.size, self.size))
         for i in range(self.size):
             step = DIFFERENCE_STEP * np.eye(self.size)[i]
-            matrix[:, i] = (self.force(self.after_step(y, -step)) - self.force(self.after_step(y, step))) / (
-                2.0 * DIFFERENCE_STEP
-            )
+            change = self.force(self.after_step(y, -step)) - self.force(self.after_step(y, step))
+            matrix[:, i] = change / (2.0 * DIFFERENCE_STEP)
         return matrix
 
     def moving(self) -> bool:
@@ -271,9 +269,8 @@ def moved_nodes(at: Configuration, y: np.ndarray) -> dict[str, Any]:
     for name, row in zip(draft.body_names, at.bodies, strict=True):
         body, first = draft.case.nodes.get(name), int(row["y"])
         count = {rec.BALL: 4, rec.FREE: 7}.get(int(row["joint"]), int(row["freedoms"]))
-        if body is not None and np.any(
-            np.abs(y[first : first + count]) > MOVE_TOLERANCE * (1.0 + np.abs(row["start"][:count]))
-        ):
+        moves = np.abs(y[first : first + count]) > MOVE_TOLERANCE * (1.0 + np.abs(row["start"][:count]))
+        if body is not None and np.any(moves):
             change = joint_keys(body.joint, row, row["start"][:count] + y[first : first + count])
             nodes[name] = body.model_copy(update={"joint": body.joint.model_copy(update=change)})
     distance = np.abs(y[at.masses["y"][at.free]])
@@ -304,18 +301,15 @@ def position_notices(case) -> Iterator[Notice]:
     for name, node in case.equilibrium_nodes.items():
         before = case.nodes[name]
         if node.kind == "mass":
-            yield coordinate_notice(
-                case, name, "initial_position", before.initial_position, node.initial_position, "position"
-            )
+            stated, found = before.initial_position, node.initial_position
+            yield coordinate_notice(case, name, "initial_position", stated, found, "position")
         elif node.joint.kind in ("revolute", "prismatic"):
             key, dimension = ("angle", "angle") if node.joint.kind == "revolute" else ("travel", "position")
-            yield coordinate_notice(
-                case, name, f"joint.{key}", *(joint_coordinate(part.joint, 0.0) for part in (before, node)), dimension
-            )
+            stated, found = (joint_coordinate(part.joint, 0.0) for part in (before, node))
+            yield coordinate_notice(case, name, f"joint.{key}", stated, found, dimension)
         else:
-            yield from attitude_notices(
-                case, name, node.joint.kind == "free", case.poses[name], case.as_stated.poses[name]
-            )
+            stated, free = case.as_stated.poses[name], node.joint.kind == "free"
+            yield from attitude_notices(case, name, free, case.poses[name], stated)
 
 
 def attitude_notices(case, name: str, free: bool, pose, before) -> Iterator[Notice]:
@@ -361,11 +355,8 @@ def report_unbalanced(at: Configuration, force: np.ndarray, scale: np.ndarray) -
         residuals = [f"{np.linalg.norm(force[own & part]):.4g} {unit}"
                 for part, unit in ((~angular, "N"), (angular, "N m")) if np.any(unbalanced & own & part)]  # fmt: skip
         text = f'"equilibrium" finds no position where the forces on {name} balance: {" and ".join(residuals)} remain'
-        remedy = (
-            "add a spring, a cylinder or a driven joint as support, state a position nearer to equilibrium, "
-            'or use initial = "steady"'
-        )
-        at.draft.fault(f"nodes.{name}", f"{text}; {remedy}")
+        remedy = "add a spring, a cylinder or a driven joint as support, state a position nearer to equilibrium"
+        at.draft.fault(f"nodes.{name}", f'{text}; {remedy}, or use initial = "steady"')
 
 
 def refuse_overturned(at: Configuration, y: np.ndarray) -> None:

@@ -139,8 +139,7 @@ class Couplings:
     def places(self, row, order: int) -> np.ndarray:
         """States of the positions (`order` 0) or velocities (1) of the masses or bodies that a row joins."""
         if row["line"] >= 0:
-            ends = (self.points[k]["body"] for k in self.ends_of_line(row) if k >= 0)
-            return unique_states(*(self.chain_states(i, order) for i in ends if i >= 0))
+            return unique_states(*(self.chain_states(i, order) for i in self.bodies_at(self.ends_of_line(row))))
         ends = ("case", "rod") if "rod" in row.dtype.names else ("from_mass", "to_mass")
         return np.array([self.masses[row[end]] + order for end in ends if self.masses[row[end]] >= 0], dtype=np.int64)
 
@@ -148,6 +147,11 @@ class Couplings:
         """Rows of the two points of a force element's line of action; -1 for the world instead of a first point."""
         line = self.lines[row["line"]]
         return int(line["from_point"]), int(line["to_point"])
+
+    def bodies_at(self, points) -> list[int]:
+        """Bodies to which points belong; points of the world, and -1 in place of a point, are left out."""
+        bodies = (int(self.points[k]["body"]) for k in points if k >= 0)
+        return [i for i in bodies if i >= 0]
 
     def chain_states(self, i: int, order: int) -> np.ndarray:
         """States of the coordinates (`order` 0) or velocities (1) of body i and of all bodies that carry it."""
@@ -177,25 +181,10 @@ class Couplings:
         """Root body that stands for all trees that pins tie to the tree of the body `root`."""
         return self.ties[root]
 
-    def spatial(self) -> Iterator[Pairs]:
-        """Yield couplings of bodies with all bodies of their tree, and with the trees and chambers that push them."""
-        for root in np.unique([self.tree_root(root) for root in self.bodies["root"]]):
-            own = [self.tree_states(root, order) for order in (0, 1)]
-            yield all_pairs(unique_states(*own), unique_states(*own))
-        for row in self.bushings:
-            ends = [self.points[row[end]]["body"] for end in ("from_point", "to_point")]
-            read = [self.chain_states(i, order) for i in ends if i >= 0 for order in (0, 1)]
-            roots = {self.tree_root(self.bodies[i]["root"]) for i in ends if i >= 0}
-            yield all_pairs(unique_states(*(self.tree_states(root, 1) for root in roots)), unique_states(*read))
-        for row in [*self.braces, *self.pistons]:
-            if row["line"] < 0:
-                continue
-            ends = [self.points[k]["body"] for k in self.ends_of_line(row) if k >= 0]
-            roots = {self.tree_root(self.bodies[i]["root"]) for i in ends if i >= 0}
-            read = [self.places(row, 0), self.places(row, 1)]
-            if "rod" in row.dtype.names:
-                read += [self.own(row["a"]), self.own(row["b"])]
-            yield all_pairs(unique_states(*(self.tree_states(root, 1) for root in roots)), unique_states(*read))
+    def tree_velocities(self, points) -> np.ndarray:
+        """States of the velocities of all trees of bodies to which points belong."""
+        roots = {self.tree_root(self.bodies[i]["root"]) for i in self.bodies_at(points)}
+        return unique_states(*(self.tree_states(root, 1) for root in roots))
 
     def pressures(self) -> list[np.ndarray]:
         """For each node, the states that set its pressure.
@@ -249,18 +238,23 @@ class Couplings:
     def moving(self) -> Iterator[Pairs]:
         """Yield couplings of positions of masses with their velocities, and of these with adjacent masses and chambers.
 
-        The couplings of bodies, see `spatial`, follow.
+        Bodies are coupled with all bodies of their tree, and with the trees and chambers that push them.
         """
         at = self.masses[self.masses >= 0]
         yield at, at + 1
+        for root in np.unique([self.tree_root(root) for root in self.bodies["root"]]):
+            own = unique_states(*(self.tree_states(root, order) for order in (0, 1)))
+            yield all_pairs(own, own)
+        for row in self.bushings:
+            points = row["from_point"], row["to_point"]
+            read = [self.chain_states(i, order) for i in self.bodies_at(points) for order in (0, 1)]
+            yield all_pairs(self.tree_velocities(points), unique_states(*read))
         for row in [*self.braces, *self.pistons]:
-            if row["line"] >= 0:
-                continue
             read = [self.places(row, 0), self.places(row, 1)]
             if "rod" in row.dtype.names:
                 read += [self.own(row["a"]), self.own(row["b"])]
-            yield all_pairs(self.places(row, 1), unique_states(*read))
-        yield from self.spatial()
+            pushed = self.places(row, 1) if row["line"] < 0 else self.tree_velocities(self.ends_of_line(row))
+            yield all_pairs(pushed, unique_states(*read))
 
     def device_pairs(self) -> Iterator[Pairs]:
         """Yield couplings of the states of each device with each other, and with pressures.

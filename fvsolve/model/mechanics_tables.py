@@ -282,9 +282,8 @@ def drive_joint(draft, name: str, schedule, row) -> None:
         kind = "it jumps" if schedule.kind == "step" else "its rate jumps"
         time_text = draft.case.amount(kinks[0], "time", 6)
         text = f"drives the joint, and at t = {time_text} {kind}, which needs an infinite force"
-        draft.fault(
-            f"nodes.{name}.joint.{key}", f'{text}; expected kind = "smooth" with zero slope at both ends, or a harmonic'
-        )
+        remedy = 'expected kind = "smooth" with zero slope at both ends, or a harmonic'
+        draft.fault(f"nodes.{name}.joint.{key}", f"{text}; {remedy}")
     for time in schedule.time if np.all(np.isfinite(schedule.time)) else ():  # jumps of acceleration
         draft.schedules.breaks.setdefault(float(time), False)
 
@@ -356,9 +355,8 @@ def lower_moving_segments(draft) -> None:
             continue
         row["moving_segment"] = len(rows)
         foot, high = np.array(node.place), node.level if row["kind"] == rec.TANK else 0.0
-        body, start, end, swept, rise, heavy = moving_segment_row(
-            draft, node.on, np.array([foot, foot + [0.0, 0.0, high]])
-        )
+        points = np.array([foot, foot + [0.0, 0.0, high]])
+        body, start, end, swept, rise, heavy = moving_segment_row(draft, node.on, points)
         rows.append((body, start, end, swept, -rise, heavy))
     draft.moving_segment_table = np.array(rows, rec.MOVING_SEGMENT) if rows else np.zeros(0, rec.MOVING_SEGMENT)
     if reads_joint_forces(draft):
@@ -374,13 +372,8 @@ def reads_joint_forces(draft) -> bool:
 def moving_segment_row(draft, on: str, points: np.ndarray) -> tuple:
     """Row of the table `moving_segments` for a straight line between two points, given in axes of the body `on` [m]."""
     rise = (draft.case.poses[on].attitude @ (points[1] - points[0]))[2]
-    heavy = (
-        rec.JOINT_LOAD_READ
-        if reads_joint_forces(draft)
-        else rec.MOVED_BY_FORCES
-        if any(free_joints(on, draft.case.nodes))
-        else 0
-    )
+    heavy = rec.MOVED_BY_FORCES if any(free_joints(on, draft.case.nodes)) else 0
+    heavy = rec.JOINT_LOAD_READ if reads_joint_forces(draft) else heavy
     return draft.body_names.index(on), *points, np.cross(*points), -draft.case.gravity * rise, heavy
 
 

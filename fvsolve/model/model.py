@@ -139,7 +139,7 @@ class Model(Displayable):
     basins: list[BasinRows]  # in the order of their table
     watched: list[Probe]  # read in addition to the probes, for their extremes only
     watched_start: np.ndarray  # pressures of `watched` along pipes in the profile [Pa], nan for others
-    sharp: dict[str, np.ndarray]  # tables that replace these while a jump is solved, see `model.delay_line_selection`
+    sharp: dict[str, np.ndarray]  # tables that replace these while a jump is solved, see `model.delay_lines`
     # idle run data for evaluating single states; tables before the start is solved, reused by `vary`
     idle_run_data: deque[RunData] = field(default_factory=deque, init=False)
     tables_before_start: list = field(default_factory=list, init=False)

@@ -13,7 +13,7 @@ import pytest
 from solve.test_threads import SCENES, liquid, water
 
 import fvsolve
-from fvsolve.draw.frame_meshes import read_frame
+from fvsolve.draw.field_canvas import read_frame
 from fvsolve.draw.scene import DrawnScene, DrawnUnit
 from fvsolve.output.fields import read_series
 
