@@ -68,24 +68,11 @@ def machine(method: str = "rk4", law: str = "linear", **more) -> dict:
                    "rotational_stiffness": 1.5, "rotational_damping": 0.05},
     }  # fmt: skip
     probes = seen("arm.eye", "slider.tip", "wrist.grip", "plate.edge", "kite.nose", "kite")
-    probes += [
-        f"{one}.{what}{axis}"
-        for one in ("arm", "kite", "wrist")
-        for what in ("w", "angular_momentum_")
-        for axis in "xyz"
-    ]
+    probes += [f"{one}.{what}{axis}" for one in ("arm", "kite", "wrist") for what in ("w", "angular_momentum_")
+               for axis in "xyz"]  # fmt: skip
     probes += [f"arm.joint_f{axis}" for axis in "xyz"] + [f"base.joint_t{axis}" for axis in "xyz"]
-    probes += [
-        "lift.force",
-        "lift.A.pressure",
-        "lift.B.pressure",
-        "string.force",
-        "rubber.torque",
-        "rope.force",
-        "arm.rate",
-        "slider.rate",
-        "kite.kinetic_energy",
-    ]
+    probes += ["lift.force", "lift.A.pressure", "lift.B.pressure", "string.force", "rubber.torque", "rope.force",
+               "arm.rate", "slider.rate", "kite.kinetic_energy"]  # fmt: skip
     made = bodies(nodes, END, probes, links, 1 / 32, **stepped(method, 2e-3))
     made["fluid"] = dict(LAWS[law])
     return made | more
