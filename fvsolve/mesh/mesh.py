@@ -180,13 +180,8 @@ def corners(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarr
         at = points[cells[selected, :count]]
         outgoing = np.roll(at, -1, axis=1) - at
         incoming = np.roll(outgoing, 1, axis=1)
-        values = np.stack(
-            [
-                cross(incoming, outgoing),
-                np.sum(incoming * outgoing, axis=2),
-                np.hypot(outgoing[..., 0], outgoing[..., 1]),
-            ]
-        )
+        along = np.sum(incoming * outgoing, axis=2)
+        values = np.stack([cross(incoming, outgoing), along, np.hypot(outgoing[..., 0], outgoing[..., 1])])
         out[:, selected, :count] = values
         out[:, selected, 3] = values[:, :, 0 if count == 3 else 3]
     return out[0], out[1], out[2]
@@ -332,16 +327,9 @@ class MeshPoints:
 
         cells, attempts = [cell], []
         for _ in range(RINGS):
-            cells += sorted(
-                {
-                    int(near)
-                    for c in cells
-                    for p in self.mesh.cells[c]
-                    if p >= 0
-                    for near in self.cells_of_points[self.first[p] : self.first[p + 1]]
-                }
-                - set(cells)
-            )
+            points = {int(p) for c in cells for p in self.mesh.cells[c] if p >= 0}
+            near = {int(c) for p in points for c in self.cells_of_points[self.first[p] : self.first[p + 1]]}
+            cells += sorted(near - set(cells))
             away = (self.mesh.centre[cells] - (x, y)) / np.sqrt(self.mesh.area[cell])
             weights, residual = nnls(
                 np.vstack([np.full(len(cells), SUM_WEIGHT), away.T]), np.array([SUM_WEIGHT, 0.0, 0.0])

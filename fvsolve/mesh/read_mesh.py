@@ -65,15 +65,13 @@ def shape_faults(sketch: Sketch) -> tuple[list[Fault], np.ndarray, np.ndarray]:
     long = side.max(axis=1, keepdims=True)
     left, right = turn > LEAST_HEIGHT * long**2, turn < -LEAST_HEIGHT * long**2
     quad = sketch.cells[:, 3] >= 0
+    has_left, has_right, flat = left.any(axis=1), right.any(axis=1), (side <= LEAST_HEIGHT * long).any(axis=1)
+    bent = quad & has_left & has_right
     tests = {
-        "have coincident corners; expected three or four different corners: a collapsed quad is a triangle": (
-            side <= LEAST_HEIGHT * long
-        ).any(axis=1),
+        "have coincident corners; expected three or four different corners: a collapsed quad is a triangle": flat,
         "cross themselves; expected corners in order around the cell": quad & (left.sum(1) == 2) & (right.sum(1) == 2),
-        "are not convex; expected every corner below 180 degrees: split them into triangles": quad
-        & left.any(axis=1)
-        & right.any(axis=1),
-        "have no area; expected corners that do not lie on one line": ~left.any(axis=1) & ~right.any(axis=1),
+        "are not convex; expected every corner below 180 degrees: split them into triangles": bent,
+        "have no area; expected corners that do not lie on one line": ~has_left & ~has_right,
     }
     faults, bad = [], np.zeros(len(quad), bool)
     for text, failing in tests.items():
@@ -81,7 +79,7 @@ def shape_faults(sketch: Sketch) -> tuple[list[Fault], np.ndarray, np.ndarray]:
         bad[failing] = True
         if failing.size:
             faults.append(Fault("cells", f"{sketch.list(failing)} {text}"))
-    return faults, bad, right.any(axis=1)
+    return faults, bad, has_right
 
 
 def overlap_faults(sketch: Sketch, edges: Edges, number: np.ndarray) -> list[Fault]:
@@ -183,11 +181,8 @@ def _within(a: np.ndarray, b: np.ndarray, i: np.ndarray, p: np.ndarray) -> np.nd
     along, to = b[i] - a[i], p - a[i]
     square = np.sum(along * along, axis=1)
     share = np.sum(along * to, axis=1) / square
-    return (
-        (CONTACT_DISTANCE < share)
-        & (share < 1.0 - CONTACT_DISTANCE)
-        & (np.abs(cross(along, to)) <= CONTACT_DISTANCE * square)
-    )
+    near = np.abs(cross(along, to)) <= CONTACT_DISTANCE * square
+    return (CONTACT_DISTANCE < share) & (share < 1.0 - CONTACT_DISTANCE) & near
 
 
 def _on_both_sides(a: np.ndarray, b: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:

@@ -43,7 +43,6 @@ def page(result, ways: list[SectionPath]) -> str:
     figures: dict[str, Any] = {}
     probes = tables.extremes_of_probes(result)
     places = [*tables.worst_tables(result), *tables.ranked_pipes(result)]
-    numerics = tables.settings, tables.ledgers, tables.claim_table, tables.comparisons
     filled = {
         "invalid": not_valid(result.summary),
         "title": visible(result.summary["title"] or result.summary["case"]),
@@ -59,7 +58,7 @@ def page(result, ways: list[SectionPath]) -> str:
         "probes_left_out": len(result.probes) - len(plots.chosen_probes(result)),
         "places": [*places, *[probes] * bool(probes and result.envelope)],
         "model": [*filter(None, tables.model_tables(result))],
-        "numbers": [*filter(None, [table(result) for table in numerics])],
+        "numbers": [*filter(None, tables.numerics_tables(result))],
         "told": _warning_texts([notice.text for notice in result.warnings if notice.ok]),
         "happened": [table for table in (tables.cavities(result), tables.events(result)) if table],
         "versions": tables.versions(result),

@@ -127,10 +127,7 @@ def workbook_tables(result, sections: list[SectionPath]) -> list[ReportTable]:
         tables.cavities(result),
         tables.events(result),
         *tables.model_tables(result),
-        tables.settings(result),
-        tables.ledgers(result),
-        tables.claim_table(result),
-        tables.comparisons(result),
+        *tables.numerics_tables(result),
         notes,
         ReportTable("Versions", versions.headers, versions.rows),
     ]

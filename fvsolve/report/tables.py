@@ -533,6 +533,11 @@ def extremes_of_probes(result) -> ReportTable:
                  more="in summary.json and in the workbook (--xlsx)")  # fmt: skip
 
 
+def numerics_tables(result) -> list[ReportTable]:
+    """Tables of the settings, ledgers, expected values and measured series of a run."""
+    return [settings(result), ledgers(result), claim_table(result), comparisons(result)]
+
+
 def settings(result) -> ReportTable:
     """Table of scheme, method, time step, number of steps, and computing time of a run."""
     summary, numerics = result.summary, result.case.numerics

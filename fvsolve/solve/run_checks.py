@@ -74,9 +74,8 @@ class RunChecks:
         text = (f"{name} has grown to {times:.3g} times the range of its forcing at t = "
                 f"{self.model.case.amount(t, 'time', 6)}; the step is beyond the limit of the method: "
                 "halve the step")  # fmt: skip
-        self.grown = Notice(
-            "growth", name.partition("[")[0], text, None, float(abs(y[worst])), float(self.largest[worst]), False
-        )
+        place, size, limit = name.partition("[")[0], float(abs(y[worst])), float(self.largest[worst])
+        self.grown = Notice("growth", place, text, None, size, limit, False)
         return f"stopped: {text}"
 
     def warnings(self, ledgers: dict) -> list[Notice]:
@@ -120,9 +119,8 @@ def ledger_notices(name: str, ledger: dict) -> list[Notice]:
 
 
 SMALL_WAVE = 0.2  # wave height up to which a wave is small, as a fraction of the depth
-WEIGHT_CHANGE = (
-    0.1  # change of the water's weight by the motion of its body that may be neglected in its waves, as a fraction
-)
+# change of the water's weight by the motion of its body that may be neglected in its waves, as a fraction
+WEIGHT_CHANGE = 0.1
 WEIGHT_ROUNDING = 1e-6  # fraction of the weight that counts as rounding
 RISE, LOSS = slice(0, 2), slice(2, 4)
 
@@ -188,9 +186,8 @@ class SloshingCheck:
     def notices(self) -> list[Notice]:
         """Notices for waves that were not small, and for changes of weight that the waves neglect."""
         notices, amount = [], self.model.case.amount
-        for (name, *_), (height, rise_time, change, change_time) in zip(
-            self.tanks, self.restart_data.tolist(), strict=True
-        ):
+        rows = zip(self.tanks, self.restart_data.tolist(), strict=True)
+        for (name, *_), (height, rise_time, change, change_time) in rows:
             if height > SMALL_WAVE:
                 text = f"{name}: at {amount(rise_time, 'time')} its water rises by {height:.2g} of its depth, but "
                 text += 'modes are linear; sloshing = "cells" computes high waves of shallow water'

@@ -56,15 +56,13 @@ class RunLoop:
         method = method_named(automatic.first_method(numerics.method))
         self.switched: list[tuple[float, int]] = []  # time and number of every event of a device
         self.at_once, self.last_switch = 0, np.nan
-        self.recent_events: deque[float] = deque(
-            maxlen=MOST_EVENTS_IN_SPAN + 4 * self.armed.size
-        )  # times of the last events
+        # times of the last events
+        self.recent_events: deque[float] = deque(maxlen=MOST_EVENTS_IN_SPAN + 4 * self.armed.size)
         self.span = SPAN * (numerics.end - numerics.start)
         self.on_switch: Callable[[], None] = lambda: None  # called after every event, before the next step
         call = model.functions
         self.rhs, self.observe, self.record, self.events = call.rhs, call.observe, call.record, call.events
-        fused_allowed = fused_step_allowed(model, method)
-        self.fused_step = fused_step_function(fused_allowed)
+        self.fused_step = fused_step_function(fused_allowed := fused_step_allowed(model, method))
         ledgers, structure = model.ledgers, structure or (lambda: model.structure)
         self.stepper = stepper = Integrator(method, model.y_size, ledgers, structure, model.scale.copy(), model.damped)
         sums = [*model.tables.nodes["y"], *model.tables.masses["y"], *amount_indices(model)]  # travel is stored too
@@ -86,9 +84,8 @@ class RunLoop:
                 control["mode"], control["size"] = mode, getattr(numerics, key)
         if numerics.method == automatic.AUTO:
             automatic.watch(stepper, structure())
-        if (
-            numerics.courant is not None and not method.explicit
-        ):  # of waves only: implicit steps are stable for the rest
+        # of waves only: implicit steps are stable for the rest
+        if numerics.courant is not None and not method.explicit:
             control["mode"], control["size"] = loop_records.FIXED_STEP, numerics.courant / model.wave_rate
         self.run_data.clock["step"] = self.given_step
         self.team, single_band = None, make_partition(model, 1)
@@ -209,10 +206,8 @@ class RunLoop:
         self.at_once = self.at_once + 1 if self.t == self.last_switch else 1
         self.last_switch = self.t
         self.recent_events.append(self.t)
-        step = self.given_step
-        crowded = len(self.recent_events) == self.recent_events.maxlen and self.t - self.recent_events[0] <= max(
-            self.span, step
-        )
+        span, events = max(self.span, self.given_step), self.recent_events
+        crowded = len(events) == events.maxlen and self.t - events[0] <= span
         return self.at_once <= MOST_EVENTS_AT_ONCE + 4 * self.armed.size and not crowded
 
     def evaluate(self, limit: float) -> np.ndarray:
@@ -243,9 +238,8 @@ class RunLoop:
         places = shut_places(self.model, out)
         for k, row in enumerate(self.model.tables.columns):
             flow, new = float(row["flow"] + self.now[row["y"]]), float(out[layout["column"] + k])
-            collides = out[layout["valve_controlled"] + k] == 0.0 and (
-                row["from_node"] in places or row["to_node"] in places
-            )
+            ends = row["from_node"] in places or row["to_node"] in places
+            collides = out[layout["valve_controlled"] + k] == 0.0 and ends
             if flow != new and (collides or new == 0.0):
                 self.now[row["y"]] = new - row["flow"]
                 stopped.append((k, flow - new))
