@@ -1,4 +1,4 @@
-"""Pictures of basins and bodies from .vtu files, with surfaces drawn by PyVista."""
+"""Pictures of basins and bodies from .vtu files, with surfaces drawn by PyVista: canvas, and meshes of frames."""
 
 import math
 import pickle
@@ -193,21 +193,10 @@ class FieldCanvas:
         if plane and count and field in shape.point_data:
             levels = [low + (high - low) * (k + 1) / (count + 1) for k in range(count)]
             lines = shape.contour(levels, scalars=field)
-            lines.points[:] += (
-                LINE_OFFSET * shape.length * self.aspect.back
-            )  # the surface would hide parts of the lines
+            # the surface would hide parts of the lines
+            lines.points[:] += LINE_OFFSET * shape.length * self.aspect.back
             if lines.n_points:
                 self.plotter.add_mesh(lines, color="white", line_width=2)
-
-
-def main() -> None:
-    """Read a pickled (scene, path) from standard input and write its picture or animation."""
-    scene, out = pickle.load(sys.stdin.buffer)
-    write_animation(FieldCanvas(scene, len(scene.frames) > 1), len(scene.frames), Path(out))
-
-
-if __name__ == "__main__":
-    main()
 
 
 TUBE_RADIUS = 0.008  # radius of a pipe as a fraction of the diagonal of the scene
@@ -444,3 +433,13 @@ def boundary_edges(mesh: Any) -> Any:
     return mesh.extract_surface(algorithm=None).extract_feature_edges(
         boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
     )
+
+
+def main() -> None:
+    """Read a pickled (scene, path) from standard input and write its picture or animation."""
+    scene, out = pickle.load(sys.stdin.buffer)
+    write_animation(FieldCanvas(scene, len(scene.frames) > 1), len(scene.frames), Path(out))
+
+
+if __name__ == "__main__":
+    main()
