@@ -351,9 +351,8 @@ def _place_faults(content: Content, unit: str) -> list[Fault]:
     cell = int(np.argmax(far[content.cells].any(axis=1)))
     span = f"{points[:, 2].min():.6g} to {points[:, 2].max():.6g} {unit}"
     text = f"z runs from {span}; cell {cell} has a point in the upper half of this range"
-    constant = "".join(
-        f"; {axis} is constant: turn the mesh" for axis, e in zip("xy", extent, strict=False) if e <= near
-    )
+    level = [axis for axis, e in zip("xy", extent, strict=False) if e <= near]
+    constant = "".join(f"; {axis} is constant: turn the mesh" for axis in level)
     return [Fault("points", f"{text}; expected a mesh in one plane, z = constant{constant}")]
 
 
@@ -366,17 +365,15 @@ def _notes(sketch: Sketch, factor: float, patch: np.ndarray, grouped: bool) -> l
     notes = []
     unnamed = int((patch < 0).sum())
     if not grouped:
-        notes.append(
-            f'the file contains no named group of lines: the patch of all {unnamed} boundary faces is "{WALL}"'
-        )
+        text = f'the patch of all {unnamed} boundary faces is "{WALL}"'
+        notes.append(f"the file contains no named group of lines: {text}")
     elif unnamed:
         notes.append(f'boundary faces in no group: {unnamed} of {patch.size}; their patch is "{WALL}"')
     extent = factor * np.ptp(sketch.points, axis=0).max()
     if sketch.unit == "m" and not SMALL <= extent <= LARGE:
         guess = 'unit = "mm"' if extent > LARGE else 'unit = "km"'
-        notes.append(
-            f"the mesh is {extent:.6g} m across: is the file in another unit? Then state the unit, perhaps {guess}"
-        )
+        text = f"the mesh is {extent:.6g} m across: is the file in another unit?"
+        notes.append(f"{text} Then state the unit, perhaps {guess}")
     return notes
 
 

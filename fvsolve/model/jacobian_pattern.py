@@ -74,7 +74,8 @@ class Couplings:
             yield pattern.interior_pattern(basin)
         yield from self.boundary_pairs()
         yield from self.stored()
-        yield from self.column_pairs()
+        for column in self.columns:
+            yield all_pairs(unique_states(column["y"]), unique_states(*(self.sets[i] for i in ends_of(column))))
         yield from self.moving()
         yield from self.device_pairs()
         yield from self.wall_pairs()
@@ -229,11 +230,6 @@ class Couplings:
                 into[i] += [swept, *([self.pressure_states(other)] if row["leakage"] > 0.0 else [])]
         for i in np.flatnonzero(~self.inner):
             yield all_pairs(unique_states(self.own(i), self.behind(i), self.size + i), unique_states(*into[i]))
-
-    def column_pairs(self) -> Iterator[Pairs]:
-        """Yield couplings of the flow of each rigid column with the pressures at both ends."""
-        for column in self.columns:
-            yield all_pairs(unique_states(column["y"]), unique_states(*(self.sets[i] for i in ends_of(column))))
 
     def moving(self) -> Iterator[Pairs]:
         """Yield couplings of positions of masses with their velocities, and of these with adjacent masses and chambers.

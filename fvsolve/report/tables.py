@@ -187,9 +187,8 @@ def fluid(result) -> ReportTable:
     rows = []
     for key, words, dimension in FLUID_ROWS:
         shown = _pressure_column(column(key, dimension, case), case)
-        rows.append(
-            [words, "unknown" if liquid[key] is None else value_text(float(shown.from_si(liquid[key]))), shown.unit]
-        )
+        value = "unknown" if liquid[key] is None else value_text(float(shown.from_si(liquid[key])))
+        rows.append([words, value, shown.unit])
     ambient = column("", "pressure", case)
     rows.append(["ambient pressure", value_text(float(ambient.from_si(case.ambient_pressure))), ambient.unit])
     gravity = column("", "acceleration", case)
@@ -533,8 +532,8 @@ def extremes_of_probes(result) -> ReportTable:
                  more="in summary.json and in the workbook (--xlsx)")  # fmt: skip
 
 
-def numerics_tables(result) -> list[ReportTable]:
-    """Tables of the settings, ledgers, expected values and measured series of a run."""
+def numerics_tables(result) -> list[ReportTable | None]:
+    """Tables of settings, ledgers, expected values and measured series; None instead of ledgers without balances."""
     return [settings(result), ledgers(result), claim_table(result), comparisons(result)]
 
 
@@ -542,9 +541,8 @@ def settings(result) -> ReportTable:
     """Table of scheme, method, time step, number of steps, and computing time of a run."""
     summary, numerics = result.summary, result.case.numerics
     steps = {"courant": "Courant number", "step": "given, s", "rtol": "by error, rtol"}
-    given = [
-        f"{words} {value_text(getattr(numerics, key))}" for key, words in steps.items() if getattr(numerics, key, None)
-    ]
+    sizes = {key: getattr(numerics, key, None) for key in steps}
+    given = [f"{steps[key]} {value_text(size)}" for key, size in sizes.items() if size]
     time = column("", "time", result.case)
     span = [value_text(float(time.from_si(item))) for item in (numerics.start, summary["t"])]
     rows = [["time", f"{span[0]} to {span[1]} {time.unit}"]]
@@ -555,9 +553,8 @@ def settings(result) -> ReportTable:
              ["steps", summary["steps"]], ["repeated steps", summary["rejections"]],
              ["evaluations of rates", summary["rhs"]], ["computing time [s]", summary["seconds"]]]  # fmt: skip
     if "resolution" in summary:
-        rows.append(
-            ["errors of peaks (\u00b1)", "; ".join([summary["resolution"]["words"], *summary["resolution"]["reasons"]])]
-        )
+        words, reasons = summary["resolution"]["words"], summary["resolution"]["reasons"]
+        rows.append(["errors of peaks (\u00b1)", "; ".join([words, *reasons])])
     return ReportTable("Method", ("", ""), [[key, value_text(value)] for key, value in rows])
 
 

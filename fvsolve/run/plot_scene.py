@@ -89,9 +89,8 @@ def parts_of(case, plan: dict[str, np.ndarray]) -> list[DrawnPart]:
                                    joint=node.kind == "junction", held=fixed))  # fmt: skip
     nodes = {part.name: part for part in parts}
     for name, link in links.items():
-        ends = [
-            nodes[network_layout.place(port)].at for port in link.ports.values() if network_layout.place(port) in nodes
-        ]
+        owners = [network_layout.place(port) for port in link.ports.values()]
+        ends = [nodes[owner].at for owner in owners if owner in nodes]
         if not (ends or name in plan):
             continue
         at = np.array([*plan[name], np.mean([end[2] for end in ends]) if ends else 0.0]) if name in plan else None

@@ -143,9 +143,8 @@ class ThreadTeam:
         self.board = aligned_zeros(band_exchange.LINE * cut.count)
         self.buffer = aligned_zeros(2 * cut.sum_count)
         self.members = [BandWorker(self, 0, loop.run_data, loop.stepper)]
-        self.members += [
-            BandWorker(self, k, RunData(loop.model), copy_integrator(loop.stepper)) for k in range(1, cut.count)
-        ]
+        for k in range(1, cut.count):
+            self.members.append(BandWorker(self, k, RunData(loop.model), copy_integrator(loop.stepper)))
         self.stale = True  # True where the workers do not have the present rows of the loop
         self.requests = [SimpleQueue() for _ in self.members]
         self.answers: SimpleQueue = SimpleQueue()
@@ -262,12 +261,10 @@ class MpiRanks:
         self.member = BandWorker(self, comm.rank, loop.run_data, loop.stepper)
         ranks = range(comm.size)
         self.exchanges = Exchange(comm, [cut.states(k) for k in ranks]), Exchange(comm, [cut.flows(k) for k in ranks])
-        self.others = np.ones(cut.sum_count, dtype=bool)
-        for _, _, first, count in self.member.stepper.row_blocks[len(cut.common_states()) if comm.rank > 0 else 0 :]:
+        self.others, common = np.ones(cut.sum_count, dtype=bool), len(cut.common_states())
+        for _, _, first, count in self.member.stepper.row_blocks[common if comm.rank > 0 else 0 :]:
             self.others[first : first + count] = False
-        self.rows = [
-            [slice(*block[:2]) for block in cut.row_blocks(k)[len(cut.common_states()) :].tolist()] for k in ranks
-        ]
+        self.rows = [[slice(*block[:2]) for block in cut.row_blocks(k)[common:].tolist()] for k in ranks]
         self.stale = True
 
     def exchange(self, request: int, address: int, size: int) -> None:
