@@ -8,6 +8,8 @@ from hypothesis import reject
 
 import fvsolve
 from fvsolve.model.model_facts import cost_notices
+from fvsolve.output.memory_sink import MemorySink
+from fvsolve.solve.solve import Run
 
 
 @dataclass
@@ -47,6 +49,30 @@ def told(source, **more) -> Told:
         return Told("refused", np.empty(0), {})
     ended = result.reason.split(" at ")[0]
     return Told(ended, np.array(result.t), {str(p): np.array(result[str(p)]) for p in result.probes}, result)
+
+
+def broken_off_and_whole(case: dict, share: float) -> tuple[Run, Run]:
+    """Run of a case that was interrupted after a share of its end time and resumed by a new model, and whole run.
+
+    Asserts that final states and ledgers of both agree to the bit.
+    """
+    model, end = fvsolve.build(fvsolve.load(case)), case["numerics"]["end"]
+
+    def late(t, seconds, steps):
+        run.budget = 1.0  # steps until the next call
+        if t > share * end:
+            raise KeyboardInterrupt
+
+    run = Run(model, fvsolve.initial_state(model), MemorySink(model), late)
+    run.left = 1.0
+    assert run.go().reason.startswith("interrupted") and share * end < run.state().t < end
+    other = fvsolve.build(fvsolve.load(case))
+    again, whole = (Run(other, state, MemorySink(other), None) for state in (run.state(), fvsolve.initial_state(other)))
+    ended = again.go(), whole.go()
+    assert ended[0].reason == ended[1].reason == "finished" and ended[0].ledgers == ended[1].ledgers
+    ends = again.state(), whole.state()
+    assert ends[0].t == ends[1].t and np.array_equal(ends[0].y, ends[1].y)
+    return again, whole
 
 
 def kind_of(name: str) -> str:

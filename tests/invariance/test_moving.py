@@ -15,11 +15,9 @@ from reference.bodies import OIL, body
 from reference.scenes import scene
 
 import fvsolve
-from fvsolve.output.memory_sink import MemorySink
-from fvsolve.solve.solve import Run
 from invariance import equivalent_mechanisms as equivalent
 from invariance.moving import METHODS, SCENES, machine, piston, stepped
-from invariance.result_comparison import Told, alike, told
+from invariance.result_comparison import Told, alike, broken_off_and_whole, told
 
 EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # warning of numba while it compiles
 pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings fail, such as of NaN values
@@ -61,23 +59,7 @@ def test_broken_off_and_resumed(name, method):
     """An interrupted and resumed run agrees with the whole run to the bit, in its final state and ledgers."""
     case = SCENES[name](method)
     case["output"]["fields"] = 0
-    model = fvsolve.build(fvsolve.load(case))
-    early = 0.3 * case["numerics"]["end"]
-
-    def late(t, seconds, steps):
-        run.budget = 1.0  # steps until the next call
-        if t > early:
-            raise KeyboardInterrupt
-
-    run = Run(model, fvsolve.initial_state(model), MemorySink(model), late)
-    run.left = 1.0
-    assert run.go().reason.startswith("interrupted") and early < run.state().t < case["numerics"]["end"]
-    other = fvsolve.build(fvsolve.load(case))
-    again, whole = (Run(other, state, MemorySink(other), None) for state in (run.state(), fvsolve.initial_state(other)))
-    ended = again.go(), whole.go()
-    assert ended[0].reason == ended[1].reason == "finished" and ended[0].ledgers == ended[1].ledgers
-    ends = again.state(), whole.state()
-    assert ends[0].t == ends[1].t and np.array_equal(ends[0].y, ends[1].y)
+    broken_off_and_whole(case, 0.3)
 
 
 @pytest.mark.parametrize("name, method", MIXED)

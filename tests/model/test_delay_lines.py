@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from invariance.result_comparison import broken_off_and_whole
 from reference.delays import (
     AREA,
     BORE,
@@ -226,22 +227,7 @@ def case_of(name: str) -> dict:
 @pytest.mark.parametrize("name", ["fork", "short", "controlled"])
 def test_broken_off_and_resumed(name):
     """An interrupted and resumed run agrees with the whole run to the bit: final state, ledgers and envelopes."""
-    case = case_of(name)
-    model, early = fvsolve.build(fvsolve.load(case)), 0.4 * case["numerics"]["end"]
-
-    def late(t, seconds, steps):
-        run.budget = 1.0
-        if t > early:
-            raise KeyboardInterrupt
-
-    run = Run(model, fvsolve.initial_state(model), MemorySink(model), late)
-    run.left = 1.0
-    assert run.go().reason.startswith("interrupted") and early < run.state().t < case["numerics"]["end"]
-    again, whole = (Run(model, state, MemorySink(model), None) for state in (run.state(), fvsolve.initial_state(model)))
-    ended = again.go(), whole.go()
-    assert ended[0].reason == ended[1].reason == "finished" and ended[0].ledgers == ended[1].ledgers
-    ends = again.state(), whole.state()
-    assert ends[0].t == ends[1].t and np.array_equal(ends[0].y, ends[1].y)
+    again, whole = broken_off_and_whole(case_of(name), 0.4)
     assert np.array_equal(again.run_data.envelope, whole.run_data.envelope, equal_nan=True)
 
 

@@ -9,6 +9,19 @@ from scipy.optimize import brentq
 TIGHT = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-12, "dense_output": True}
 
 
+def stop_events(push, held: int, k: int) -> list:
+    """Terminal events of a lift y[k]: its drive `push` turns while it is held at a stop, or it reaches a stop."""
+    if held:
+        watch = [lambda s, z: push(s, z)]
+        watch[0].direction = -held
+    else:
+        watch = [lambda s, z: z[k] - 1.0, lambda s, z: z[k]]
+        watch[0].direction, watch[1].direction = 1, -1
+    for one in watch:
+        one.terminal = True
+    return watch
+
+
 def stopped(rates, push, start, kinks, t):
     """States at t of y' = rates(t, y, held) with the lift y[1] between stops at 0 and 1, and the times of events.
 
@@ -21,14 +34,7 @@ def stopped(rates, push, start, kinks, t):
     found, events = np.zeros((len(y), len(t))), []
     while now < t[-1] - 1e-12:
         end = next(k for k in [*kinks, t[-1]] if k > now + 1e-12)
-        if held:
-            watch = [lambda s, z: push(s, z)]
-            watch[0].direction = -held
-        else:
-            watch = [lambda s, z: z[1] - 1.0, lambda s, z: z[1]]
-            watch[0].direction, watch[1].direction = 1, -1
-        for one in watch:
-            one.terminal = True
+        watch = stop_events(push, held, 1)
         step = solve_ivp(lambda s, z, h=held: rates(s, z, h), (now, end), y, events=watch, **TIGHT)
         here = (t >= now - 1e-12) & (t <= step.t[-1] + 1e-12)
         if here.any():
@@ -80,14 +86,7 @@ def slam(source, g, impedance, delay, far, span, time, t_end, kinks):
     while now < t_end - 1e-12:
         end = next(k for k in [*sorted({*kinks, *np.arange(delay, t_end, delay)}), t_end] if k > now + 1e-12)
         end = min(end, now + delay)
-        if held:
-            watch = [lambda s, z: push(s, z)]
-            watch[0].direction = -held
-        else:
-            watch = [lambda s, z: z[0] - 1.0, lambda s, z: z[0]]
-            watch[0].direction, watch[1].direction = 1, -1
-        for one in watch:
-            one.terminal = True
+        watch = stop_events(push, held, 0)
         rate = (lambda s, z: [0.0]) if held else (lambda s, z: [push(s, z) / time])
         step = solve_ivp(rate, (now, end), y, events=watch, method="DOP853", rtol=1e-9, atol=1e-10, dense_output=True,
                          max_step=0.02)  # fmt: skip
