@@ -13,7 +13,7 @@ import fvsolve
 from fvsolve.draw.plot import LIMIT_LOOKS, LINE_LOOKS
 from fvsolve.report.figures import section_figure
 from fvsolve.report.long_section import head_animations, head_window, section_of, section_paths
-from fvsolve.report.pictures import parse_probes, write_pictures
+from fvsolve.report.report_files import parse_probes, write_pictures
 
 CHAINAGE, ELEVATION = [0.0, 130.0, 300.0, 500.0], [0.0, 42.0, 5.0, 20.0]
 SHUT = 0.3
