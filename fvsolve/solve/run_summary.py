@@ -274,11 +274,7 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     terms = {word: total.get(word, 0.0) for word in ("inflow", "outflow", "spilled", "made_up")}
     largest = max(initial, initial + change, *terms.values())
     return {
-        "initial": initial,
-        "final": initial + change,
-        **terms,
+        "initial": initial, "final": initial + change, **terms,
         "by_node": {name: row["inflow"] - row["outflow"] for name, row in nodes.items() if "inflow" in row},
-        "nodes": nodes,
-        "remainder": remainder,
-        "relative": relative(remainder, largest),
-    }
+        "nodes": nodes, "remainder": remainder, "relative": relative(remainder, largest),
+    }  # fmt: skip

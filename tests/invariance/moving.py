@@ -81,11 +81,9 @@ def machine(method: str = "rk4", law: str = "linear", **more) -> dict:
 def loop(method: str = "rk4", **more) -> dict:
     """Case of a parallelogram of three bars in an inclined plane, closed by a pin, with a spring."""
     bar = {
-        "mass": 2.0,
-        "inertia": [1 / 6, 1 / 6, 0.01],
-        "centre_of_mass": [0, 0, -0.5],
+        "mass": 2.0, "inertia": [1 / 6, 1 / 6, 0.01], "centre_of_mass": [0, 0, -0.5],
         "points": {"end": [0, 0, -1.0]},
-    }
+    }  # fmt: skip
     aslant = {"attitude": {"roll": 0.3, "yaw": 0.5}}
     nodes = {
         "world": {"type": "frame", "points": {"hook": [0.5, 0.4, -2.0]}},

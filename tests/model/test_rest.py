@@ -134,12 +134,9 @@ def test_no_method_moves_it(method):
 def pond(law: str, friction: dict, scheme: str = "muscl") -> dict:
     """Case of equal heads that are exact in binary, with various elevations, wave speeds and loops."""
     nodes = {
-        "lake": lake(47.25),
-        "pool": tank(50.0, 6.25, elevation=41.0),
-        "a": junction(elevation=12.7),
-        "b": junction(elevation=-31.9),
-        "c": junction(elevation=30.3),
-    }
+        "lake": lake(47.25), "pool": tank(50.0, 6.25, elevation=41.0), "a": junction(elevation=12.7),
+        "b": junction(elevation=-31.9), "c": junction(elevation=30.3),
+    }  # fmt: skip
     rows = {
         "la": ("lake", "a", 311.0, 0.31, 1234.5, 9),
         "ab": ("a", "b", 173.2, 0.22, 987.6, 6),

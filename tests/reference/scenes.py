@@ -27,15 +27,10 @@ def scene(
 ) -> dict:
     """Complete case that shares no object with its arguments; `top` adds or replaces top-level tables."""
     case = {
-        "schema": 1,
-        "ambient_pressure": AMBIENT,
-        "gravity": GRAVITY,
-        "fluid": WATER,
-        "nodes": nodes,
-        "links": links,
+        "schema": 1, "ambient_pressure": AMBIENT, "gravity": GRAVITY, "fluid": WATER, "nodes": nodes, "links": links,
         "numerics": {"end": end, **numerics},
         "output": {"every": every, "probes": list(probes)} if probes else {"every": every},
-    }
+    }  # fmt: skip
     return copied({**case, **top})
 
 
