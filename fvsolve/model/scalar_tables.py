@@ -148,24 +148,16 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
         decayed = -float(np.sum(decay[:, : row["losses"]]))
         initial, final = total_amount(model, q, model.start), total_amount(model, q, y)
         remainder = final - initial - (float(np.sum(flows)) - decayed)
+        net = zip(model.node_names, flows.sum(axis=0), strict=True)
         turnover = max(abs(initial), abs(final), float(np.sum(np.abs(flows))) + abs(decayed))
         ledgers[name] = {
-            "initial": initial,
-            "final": final,
-            "inflow": float(flows[0].sum()),
-            "outflow": float(0.0 - flows[1].sum()),
-            "decayed": decayed,
-            "by_node": {
-                node: float(x) for node, x in zip(model.node_names, flows.sum(axis=0), strict=True) if x != 0.0
-            },
-            "nodes": {
-                node: {"inflow": float(x), "outflow": float(0.0 - y)}
-                for node, x, y in zip(model.node_names, *flows, strict=True)
-                if x != 0.0 or y != 0.0
-            },
-            "remainder": remainder,
-            "relative": abs(remainder) / turnover if turnover > 0.0 else 0.0,
-        }
+            "initial": initial, "final": final, "inflow": float(flows[0].sum()),
+            "outflow": float(0.0 - flows[1].sum()), "decayed": decayed,
+            "by_node": {node: float(x) for node, x in net if x != 0.0},
+            "nodes": {node: {"inflow": float(x), "outflow": float(0.0 - y)}
+                      for node, x, y in zip(model.node_names, *flows, strict=True) if x != 0.0 or y != 0.0},
+            "remainder": remainder, "relative": abs(remainder) / turnover if turnover > 0.0 else 0.0,
+        }  # fmt: skip
     return ledgers
 
 

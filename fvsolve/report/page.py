@@ -44,17 +44,12 @@ def page(result, ways: list[SectionPath]) -> str:
     probes = tables.extremes_of_probes(result)
     places = [*tables.worst_tables(result), *tables.ranked_pipes(result)]
     filled = {
-        "invalid": not_valid(result.summary),
-        "title": visible(result.summary["title"] or result.summary["case"]),
-        "run": result.summary,
-        "description": visible(result.case.description),
-        "source": visible(result.case.source),
-        "ended": result.summary.get("ended", ""),
-        "words": tables.top_sentences(result),
-        "limits": tables.verdict_table(result),
+        "invalid": not_valid(result.summary), "title": visible(result.summary["title"] or result.summary["case"]),
+        "run": result.summary, "description": visible(result.case.description),
+        "source": visible(result.case.source), "ended": result.summary.get("ended", ""),
+        "words": tables.top_sentences(result), "limits": tables.verdict_table(result),
         "worst": tables.extremes_of_pipes(result, ways) or probes,
-        "sections": _sections(result, sections, figures),
-        "histories": _histories(result, figures),
+        "sections": _sections(result, sections, figures), "histories": _histories(result, figures),
         "probes_left_out": len(result.probes) - len(plots.chosen_probes(result)),
         "places": [*places, *[probes] * bool(probes and result.envelope)],
         "model": [*filter(None, tables.model_tables(result))],
@@ -62,7 +57,7 @@ def page(result, ways: list[SectionPath]) -> str:
         "told": _warning_texts([notice.text for notice in result.warnings if notice.ok]),
         "happened": [table for table in (tables.cavities(result), tables.events(result)) if table],
         "versions": tables.versions(result),
-    }
+    }  # fmt: skip
     return render_page("page", filled, figures)
 
 
