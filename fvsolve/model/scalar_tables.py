@@ -173,7 +173,7 @@ def state_bounds(model) -> tuple[np.ndarray, np.ndarray]:
     """
     rows = [*depths(model)]
     for q in range(len(model.tables.scalars)):
-        rows += [*in_pipes(model, q), *in_nodes(model, q), *in_basins(model, q)]
+        rows += scalar_bounds(model, q)
     if not rows:
         return np.zeros(0, dtype=np.int64), np.zeros((0, 4))
     at, by = (np.concatenate(column) for column in zip(*rows, strict=True))
@@ -197,41 +197,25 @@ def depths(model):
             yield bound_rows(states, NO_STATE, NO_STATE, basin.depth, 0.0, -1.0, np.inf)
 
 
-def in_pipes(model, q: int):
-    """Yield `bound_rows` of the amounts per length of scalar q in the cells of each pipe.
+def scalar_bounds(model, q: int):
+    """Yield `bound_rows` of the amounts of scalar q: its least and greatest value, times the mass or depth there.
 
-    The bounds are the least and the greatest value of the scalar, times the mass per length from both waves.
+    The mass per length in the cells of a pipe follows from both waves, the mass in a tank or chamber from its state. In
+    a basin it is the depth, or 1 without variable depth (`basin.deep` False).
     """
-    row, profile = model.tables.scalars[q], model.tables.profile
-    for pipe in model.tables.pipes:
+    row, tables = model.tables.scalars[q], model.tables
+    limits = row["least"], row["greatest"]
+    for pipe in tables.pipes:
         n, k = int(pipe["cells"]), np.arange(pipe["cells"])
-        states, wave = row["y"] + pipe["cell"] + k, pipe["y"] + k
-        masses = profile[pipe["center"] + k]
-        yield bound_rows(states, wave, wave + n, masses, 1.0 / pipe["speed"], row["least"], row["greatest"])
-
-
-def in_nodes(model, q: int):
-    """Yield `bound_rows` of the amount of scalar q in each tank and chamber.
-
-    They are its least and greatest value times the mass there.
-    """
-    row, nodes = model.tables.scalars[q], model.tables.nodes
-    places = model.tables.integers[row["places"] : row["places"] + len(nodes)]
-    for node, place in zip(nodes, places, strict=True):
+        states, wave, masses = row["y"] + pipe["cell"] + k, pipe["y"] + k, tables.profile[pipe["center"] + k]
+        yield bound_rows(states, wave, wave + n, masses, 1.0 / pipe["speed"], *limits)
+    places = tables.integers[row["places"] : row["places"] + len(tables.nodes)]
+    for node, place in zip(tables.nodes, places, strict=True):
         if node["kind"] in STORES:
-            yield bound_rows([place], node["y"], NO_STATE, node["mass"], 1.0, row["least"], row["greatest"])
-
-
-def in_basins(model, q: int):
-    """Yield `bound_rows` of the amounts per area of scalar q in each basin with scalars.
-
-    They are its least and greatest value times the depth, or times 1 in a basin without variable depth (`basin.deep`
-    False).
-    """
-    row = model.tables.scalars[q]
+            yield bound_rows([place], node["y"], NO_STATE, node["mass"], 1.0, *limits)
     for basin in model.basins:
         if basin.row["carried"] < 0:
             continue
         states = int(basin.row["carried"]) + q * basin.n + np.arange(basin.n)
-        reference = (int(basin.row["y"]) + np.arange(basin.n), basin.depth) if basin.deep else (NO_STATE, 1.0)
-        yield bound_rows(states, reference[0], NO_STATE, reference[1], 1.0, row["least"], row["greatest"])
+        depth = (int(basin.row["y"]) + np.arange(basin.n), basin.depth) if basin.deep else (NO_STATE, 1.0)
+        yield bound_rows(states, depth[0], NO_STATE, depth[1], 1.0, *limits)
