@@ -66,11 +66,11 @@ def shape_faults(sketch: Sketch) -> tuple[list[Fault], np.ndarray, np.ndarray]:
     left, right = turn > LEAST_HEIGHT * long**2, turn < -LEAST_HEIGHT * long**2
     quad = sketch.cells[:, 3] >= 0
     has_left, has_right, flat = left.any(axis=1), right.any(axis=1), (side <= LEAST_HEIGHT * long).any(axis=1)
-    bent = quad & has_left & has_right
+    concave = quad & has_left & has_right
     tests = {
         "have coincident corners; expected three or four different corners: a collapsed quad is a triangle": flat,
         "cross themselves; expected corners in order around the cell": quad & (left.sum(1) == 2) & (right.sum(1) == 2),
-        "are not convex; expected every corner below 180 degrees: split them into triangles": bent,
+        "are not convex; expected every corner below 180 degrees: split them into triangles": concave,
         "have no area; expected corners that do not lie on one line": ~has_left & ~has_right,
     }
     faults, bad = [], np.zeros(len(quad), bool)

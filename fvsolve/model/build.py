@@ -100,8 +100,8 @@ def changed_links(before: Case, case: Case) -> list[str] | None:
 
     The result is also None if the start of the first case is a static equilibrium.
     """
-    kept = [field.name for field in fields(Case) if field.name not in CHANGING_FIELDS]
-    same = all(getattr(before, name) is getattr(case, name) for name in kept)
+    constant = [field.name for field in fields(Case) if field.name not in CHANGING_FIELDS]
+    same = all(getattr(before, name) is getattr(case, name) for name in constant)
     same = same and before.nodes.keys() == case.nodes.keys()
     same = same and all(case.nodes[name] is node for name, node in before.nodes.items())
     if not same or before.needs_equilibrium or before.links.keys() != case.links.keys():

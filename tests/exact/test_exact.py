@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from pytest import approx
 from reference import folders, frictionless, pulses, scenes, vessels
-from reference.frictionless import relative_drop
 from scipy.integrate import quad, solve_ivp
 
 from fvsolve import exact
@@ -60,9 +59,8 @@ def traced() -> frictionless.Rays:
     }
     closing = lambda t: area * float(np.interp(t, [0.1, 0.4], [1.0, 0.0]))  # noqa: E731
     demand = lambda t: float(np.interp(t, [0.3, 0.5], [0.01, 0.03]))  # noqa: E731
-    return frictionless.Rays(
-        scenes.RHO, pipes, {"lake": frictionless.held(6e5)}, {"fork": demand}, {"gate": (closing, scenes.AMBIENT)}
-    )
+    lake, gate = {"lake": frictionless.held(6e5)}, {"gate": (closing, scenes.AMBIENT)}
+    return frictionless.Rays(scenes.RHO, pipes, lake, {"fork": demand}, gate)
 
 
 def test_rays_in_a_network_with_a_valve_are_those_of_the_other_tracer():
@@ -116,7 +114,7 @@ def test_a_closing_valve_is_allievis():
     flow = 0.01 * np.sqrt(2 * 9.80665 * 100.0)
     parameter = case.properties.density * speed * flow / area / (2 * weight * 100.0)
     opening = [1.0 - np.clip((k - 1.0) / 4.0, 0.0, 1.0) for k in range(9)]
-    heads = 100.0 * np.array(relative_drop(parameter, opening))
+    heads = 100.0 * np.array(frictionless.relative_drop(parameter, opening))
     assert found.probe(probe(case, "gate.head"), np.arange(9.0)) == approx(heads, abs=1e-6)
 
 

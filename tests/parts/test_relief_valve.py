@@ -60,9 +60,8 @@ def swing(t, y, held):
 def test_a_disc_follows_scipy_through_its_stops(kind, rates):
     result = fvsolve.run(filled(**DISCS[kind]))
     start = [3e5, 0.0, 0.0][: 3 if kind == "swing" else 2]
-    exact, events = lifted_valves.stopped(
-        rates, lambda t, y: (y[0] - SET) / SPAN - y[1], start, [0.5, 1, 6, 7], result.t
-    )
+    kinks = [0.5, 1, 6, 7]
+    exact, events = lifted_valves.stopped(rates, lambda t, y: (y[0] - SET) / SPAN - y[1], start, kinks, result.t)
     assert result.ok and len(events) >= 2
     assert [e["time"] for e in result.summary["events"]] == pytest.approx(events, abs=1e-7)
     assert result["pot.pressure"] == pytest.approx(exact[0], abs=1e-6 * SPAN)
