@@ -36,7 +36,7 @@ WHOLE = "import fvsolve; m = fvsolve.build(fvsolve.load({case!r})); m.rhs(0.0, m
 
 def chain(many: int) -> dict:
     """Bodies of a chain with revolute joints about random axes, each body on the one before."""
-    from reference.trees import random_tree
+    from reference.bodies import random_tree
 
     found = random_tree(np.random.default_rng(many), many, "revolute", kinds=("revolute",))
     for k in range(1, many):
@@ -89,7 +89,7 @@ def beside(call, peer) -> tuple[float, float]:
 
 def speed() -> None:
     """Print the times of accelerations of chains."""
-    from reference.trees import pinocchio_of
+    from reference.bodies import pinocchio_of
 
     print(f"{'bodies':>6} {'in a loop':>10} {'from Python':>12} {'pin.aba from Python':>20} {'ratios (goal 0.75)':>20}")
     for many in SIZES:

@@ -24,8 +24,7 @@ OPENS = ((0.1, 0.0), (0.12, 1.0), (0.5, 1.0), (0.52, 0.0))
 
 def chain_case(steps: int) -> dict:
     """Case of a chain of three uniform rods, stepped by rk4."""
-    from reference.bodies import bodies
-    from reference.trees import body
+    from reference.bodies import bodies, body
 
     found, half = {}, [0, 0, -LINK["length"] / 2]
     for k, angle in enumerate(CHAIN):
@@ -68,9 +67,8 @@ def held() -> float:
 
 def arm_case(rtol: float) -> dict:
     """Case of an arm that a cylinder lifts through a valve, which opens for 0.4 s."""
-    from reference.bodies import bodies
+    from reference.bodies import bodies, body
     from reference.scenes import AMBIENT, reservoir
-    from reference.trees import body
 
     hinge = {"kind": "revolute", "axis": [0, -1, 0]}
     nodes = {

@@ -9,7 +9,7 @@ import numpy as np
 from networks import WATER
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
-from reference.plain import triangles, write_msh  # noqa: E402
+from reference.meshes import triangles, write_msh  # noqa: E402
 
 SIZE = 10.0  # [m]
 BED = "0.3*sin(x)*cos(y)"

@@ -26,8 +26,8 @@ from fvsolve.kernels import band_exchange
 from fvsolve.model import build
 from fvsolve.run import mpi_run
 from fvsolve.solve import initial_state
+from fvsolve.solve.parallel_bands import yield_address
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
-from fvsolve.solve.thread_team import yield_address
 
 END = 1e6  # end that no run here reaches [s]
 WATER = "free surface with bed"

@@ -7,8 +7,6 @@ the number of quick tests that call it. The most expensive tests are removed unt
 test stays if no other test runs a part, scheme, method, density law, command or shipped case.
 """
 
-from __future__ import annotations
-
 import argparse
 import functools
 import json

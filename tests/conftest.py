@@ -4,8 +4,6 @@
 and `pytest PATH` run every test. `tests/choose_quick_tests.py` writes the list from a recording.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -8,8 +8,6 @@ The recording by coverage.py has two parts: the quick tests, for Python, and the
 compilation, for kernels. Tests of the second part that need a compiler, or more than LIMIT, fail as expected.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import signal

@@ -6,8 +6,6 @@ draws that many new inputs per test, for a long run. Store an input that fails: 
 prints, as a dictionary, into the list in `tests/failing_examples/MODULE.TEST.txt`.
 """
 
-from __future__ import annotations
-
 import ast
 import os
 from collections.abc import Callable

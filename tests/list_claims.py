@@ -5,8 +5,6 @@
 A claim is a test function: its file, its name, and the first line of its docstring.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 import subprocess

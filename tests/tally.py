@@ -1,7 +1,5 @@
 """Count of parts, schemes, methods, commands and shipped cases that the tests of a session ran."""
 
-from __future__ import annotations
-
 import functools
 from collections import defaultdict
 

@@ -209,7 +209,7 @@ class ModelDraft:
     basins: list[Any] = field(default_factory=list)
     # table -> links with rows in it, see `assembly.lowering.links_by_table`
     links: dict[str, list[tuple]] = field(default_factory=dict)
-    # pipe -> by cells or as a delay line, see `model.delay_line_selection`
+    # pipe -> by cells or as a delay line, see `model.delay_lines`
     followed: dict[str, Any] = field(default_factory=dict)
 
     # rows

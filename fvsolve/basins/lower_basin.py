@@ -27,7 +27,7 @@ from fvsolve.steppers.tableau import METHODS
 
 if TYPE_CHECKING:
     from fvsolve.kernels.rhs_assembly import RhsTerms
-    from fvsolve.mesh.mesh_points import MeshPoints
+    from fvsolve.mesh.mesh import MeshPoints
 
 ROUNDING = 1e-12  # relative error of rates
 VELOCITIES = {"u": U, "v": V, "speed": SPEED}
@@ -205,7 +205,7 @@ class BasinRows:
     @cached_property
     def points(self) -> MeshPoints:
         """`MeshPoints` of the mesh, which finds the cell at a given point."""
-        from fvsolve.mesh.mesh_points import MeshPoints
+        from fvsolve.mesh.mesh import MeshPoints
 
         return MeshPoints(self.mesh)
 

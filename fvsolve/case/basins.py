@@ -272,7 +272,7 @@ def crossing_faults(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) 
 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
-    from fvsolve.mesh.mesh_points import MeshPoints
+    from fvsolve.mesh.mesh import MeshPoints
 
 Faults = Iterator[tuple[tuple, str]]
 
@@ -313,7 +313,7 @@ class BasinFields:
     @cached_property
     def points(self) -> MeshPoints:
         """Locator that finds the cell of a point."""
-        from fvsolve.mesh.mesh_points import MeshPoints
+        from fvsolve.mesh.mesh import MeshPoints
 
         return MeshPoints(self.mesh)
 

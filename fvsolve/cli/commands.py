@@ -307,7 +307,7 @@ def compare(
     """Compare two runs: greatest and rms difference (RUN_B minus RUN_A) of each common probe."""
     from fvsolve.cli import printing
     from fvsolve.run import open_run
-    from fvsolve.run.case_claims import differences
+    from fvsolve.run.verdicts import differences
 
     first = open_run(run_a)
     result = differences(first, open_run(run_b))

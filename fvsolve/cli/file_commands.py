@@ -46,7 +46,7 @@ def plot(
     out: Annotated[Path | None, Option(metavar="DIR", help="folder of the pictures (default RUN)")] = None,
 ) -> None:  # fmt: skip
     """Draw long sections (heads, limits, devices), histories of probes and phase planes, without a browser."""
-    from fvsolve.report.pictures import write_pictures
+    from fvsolve.report.report_files import write_pictures
 
     for path in write_pictures(directory, probes, route, phase, out):
         print(path)

@@ -275,7 +275,7 @@ def _notices(warnings: list[dict], every: bool = False) -> Iterator:
 def difference_text(results: dict, summary: dict) -> Iterator:
     """Differences of two runs for each common probe, and the probes that only one of the runs has.
 
-    results : as from `differences` in `run.case_claims`; summary : of the first run, whose time unit is used
+    results : as from `differences` in `run.verdicts`; summary : of the first run, whose time unit is used
     """
     clock, rows = time_column(summary), []
     for name, probe in results["probes"].items():

@@ -1,4 +1,4 @@
-"""Printed tables: units, pipe materials and classes, pump characteristics, words of other programs."""
+"""Tables: units, pipe materials and classes, pump characteristics, words of other programs, symbols of parts."""
 
 import functools
 import tomllib

@@ -12,9 +12,8 @@ from fvsolve.draw import style
 
 CONSTANT_TOLERANCE = 1e-9  # greatest range of a constant curve, as a fraction of its size
 SAME_TOLERANCE = 1e-3  # greatest difference of coinciding curves, as a fraction of the range of their panel
-ALIKE_TOLERANCE = (
-    1e-6  # greatest residual of a curve after scaling and shifting another to it, as a fraction of its range
-)
+# greatest residual of a curve after scaling and shifting another to it, as a fraction of its range
+ALIKE_TOLERANCE = 1e-6
 OF_PRESSURE = ("pressure", "gauge_pressure", "head", "level")  # equivalent quantities at a fixed place
 MAX_PANELS = 6  # greatest number of panels
 MAX_LINES = 8  # greatest number of curves in a panel

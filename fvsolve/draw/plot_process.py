@@ -5,8 +5,6 @@
 reads pictures from standard input, one pickle each, and answers each with a pickle: the error text, or "".
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import pickle
@@ -15,7 +13,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 from fvsolve.display import save
 
@@ -98,7 +96,7 @@ class PlotProcess:
             self.process.stdout.close()
             self.process = None
 
-    def __enter__(self) -> PlotProcess:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: Any) -> None:

@@ -4,7 +4,7 @@ A band is a part of the states, which one thread or process steps with its own a
 the same order. A band writes its data, then all bands wait for each other before any band reads them, and again before
 any band overwrites them. The array `joint` of each band holds the addresses for this. It is empty for a single band,
 which calls none of these functions. Threads share memory; processes exchange data by a Python function
-(`solve.mpi_ranks`).
+(`solve.parallel_bands`).
 """
 
 import numpy as np

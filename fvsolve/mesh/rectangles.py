@@ -1,7 +1,5 @@
 """Meshes of rectangles: graded grids of cells with holes, and patches on their sides."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 
@@ -73,11 +71,8 @@ def _bad_numbers(size: Sequence, cells: Sequence, origin: Sequence, grading: Seq
         ("origin", origin, math.isfinite, "the two coordinates [m] of the south-west corner"),
         ("grading", grading, is_positive, "two positive ratios of last to first spacing, along x and y"),
     ]
-    faults = [
-        Fault(key, f"{_list_text(given)}; expected {expected}")
-        for key, given, is_valid, expected in checks
-        if not (is_pair(given) and all(is_valid(value) for value in given))
-    ]
+    faults = [Fault(key, f"{_list_text(given)}; expected {expected}") for key, given, is_valid, expected in checks
+              if not (is_pair(given) and all(is_valid(value) for value in given))]  # fmt: skip
     if not faults and any(n == 1 and g != 1.0 for n, g in zip(cells, grading, strict=True)):
         text = f"{_list_text(grading)} with cells {_list_text(cells)}; expected 1 along an axis with one cell"
         faults.append(Fault("grading", text))

@@ -1,7 +1,5 @@
 """Assembly of the model of a case."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import fields, replace
@@ -19,18 +17,24 @@ from fvsolve.case.case import Case
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tanks
-from fvsolve.model.body_tables import lower_bodies, lower_lines, lower_moving_segments
 from fvsolve.model.cluster_tables import classify_nodes
-from fvsolve.model.delay_history import history_size
-from fvsolve.model.delay_line_selection import (
+from fvsolve.model.delay_lines import (
     divide_lines,
     end_admittance_ratio,
+    history_size,
     jump_tables,
     line_methods,
     lower_delays,
 )
 from fvsolve.model.equilibrium_search import with_equilibrium
-from fvsolve.model.mass_tables import find_closed_chambers, lower_masses, supporting_pressures
+from fvsolve.model.mechanics_tables import (
+    find_closed_chambers,
+    lower_bodies,
+    lower_lines,
+    lower_masses,
+    lower_moving_segments,
+    supporting_pressures,
+)
 from fvsolve.model.model import Model
 from fvsolve.model.probe_tables import lower_probes, probe_offsets
 from fvsolve.model.scalar_tables import lower_scalars, scale_scalars, start_amounts
@@ -54,7 +58,8 @@ def start_profile(draft) -> dict[str, Any]:
         start = NonlinearStart(draft)
     start.solve()
     find_closed_chambers(draft, start)
-    if start.set_supporting_pressures(supporting_pressures(draft, start)):
+    start.loads = supporting_pressures(draft, start)
+    if start.loads:
         start.solve()
     start.report_frictionless()
     start.freeze_factors()
@@ -62,7 +67,8 @@ def start_profile(draft) -> dict[str, Any]:
     start.fill_pipes()
     start.fill_columns()
     start.fill_valves()
-    start.begin_devices()
+    for (_, part, device), row in zip(draft.devices, draft.device_table, strict=True):
+        start.moving += device.begin(start, part, row)
     probe_offsets(draft, start)
     unsteady = add_terms(draft)
     return {**start.report(), "unsteady": unsteady, "creep": limit_creep_step(draft, unsteady)}
@@ -93,25 +99,14 @@ def changed_links(before: Case, case: Case) -> list[str] | None:
 
     The result is also None if the start of the first case is a static equilibrium.
     """
-    same = all(
-        getattr(before, field.name) is getattr(case, field.name)
-        for field in fields(Case)
-        if field.name not in CHANGING_FIELDS
-    )
-    if (
-        not same
-        or before.needs_equilibrium
-        or not same_parts(before.nodes, case.nodes)
-        or before.links.keys() != case.links.keys()
-    ):
+    constant = [field.name for field in fields(Case) if field.name not in CHANGING_FIELDS]
+    same = all(getattr(before, name) is getattr(case, name) for name in constant)
+    same = same and before.nodes.keys() == case.nodes.keys()
+    same = same and all(case.nodes[name] is node for name, node in before.nodes.items())
+    if not same or before.needs_equilibrium or before.links.keys() != case.links.keys():
         return None
     changed = [name for name, link in case.links.items() if link is not before.links[name]]
     return changed if all(type(case.links[name]) is type(before.links[name]) for name in changed) else None
-
-
-def same_parts(before: dict[str, Any], now: dict[str, Any]) -> bool:
-    """True if two tables hold the identical part objects."""
-    return before.keys() == now.keys() and all(now[name] is part for name, part in before.items())
 
 
 def build(case) -> Model:
@@ -247,16 +242,22 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         settings, layout, draft.pipe_table, draft.node_table, draft.valve_table, draft.column_table,
         draft.cluster_table, schedules, draft.probe_table, draft.body_table, draft.freedom_table,
         np.array(draft.points, rec.POINT), draft.line_table, draft.pin_table, draft.bushing_table,
-        draft.moving_segment_table, draft.mass_table,
-        draft.brace_table, draft.stop_table,
-        draft.piston_table, draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table,
-        draft.wall_table, draft.delay_table,
+        draft.moving_segment_table, draft.mass_table, draft.brace_table, draft.stop_table, draft.piston_table,
+        draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table, draft.wall_table,
+        draft.delay_table,
         np.array(draft.integers, dtype=np.int64), np.array(draft.floats, dtype=float), profile, draft.plane(), pieces,
     )  # fmt: skip
+    pipes, nodes, out = len(draft.pipe_table), len(draft.node_table), int(layout["size"][0])
+    # `marks` has the first times at which the model does not hold. Density laws with cavities add three for each pipe:
+    # location of the first cavity, greatest cavity volume, and its time.
+    marks = pipes * (4 if draft.case.law.cavitates else 1) + 3 * nodes + len(draft.column_table)
+    marks += 2 * len(draft.device_table) + len(draft.piston_table)
+    # `spare` has a copy of `out`; with delay lines two copies, and three values for each probe and node
+    spare = 2 * out + 3 * (len(draft.probe_table) + nodes) if len(draft.delay_table) else out
     draft.shapes = rec.RunArrays(
-        clock=1, work=draft.work_size, marks=mark_count(draft),
+        clock=1, work=draft.work_size, marks=marks,
         armed=tanks.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),
-        scratch=scratch_size(draft), spare=spare_size(draft), seen=draft.size if len(draft.wall_table) else 0,
+        scratch=scratch_size(draft), spare=spare, seen=draft.size if len(draft.wall_table) else 0,
         bands=2 * len(draft.basin_table), joint=0, sums=0, sharp=int(len(draft.delay_table) > 0),
         envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)), past=history_size(draft.delay_table),
     )  # fmt: skip
@@ -295,9 +296,8 @@ def column_rates(draft: ModelDraft):
 
 def layout_of(draft: ModelDraft) -> np.ndarray:
     """Offsets in `out`, the array that the right-hand side writes in addition to dydt : `kernels.dtypes.LAYOUT`[1]."""
-    nodes, pipes, valves, columns = map(
-        len, (draft.node_table, draft.pipe_table, draft.valve_table, draft.column_table)
-    )
+    nodes, pipes = len(draft.node_table), len(draft.pipe_table)
+    valves, columns = len(draft.valve_table), len(draft.column_table)
     scalars, layout, at = len(draft.scalar_table), np.zeros(1, rec.LAYOUT), rec.OUT_HEAD
     for name, size in (
         ("pressure", nodes), ("supply", nodes), ("gain", scalars * nodes), ("loss", sum(draft.scalar_table["losses"])),
@@ -324,26 +324,6 @@ def most_states(draft: ModelDraft) -> int:
     return draft.size + MAX_TERMS * sum(unsteady)
 
 
-def mark_count(draft: ModelDraft) -> int:
-    """Number of entries of `marks`, the first times at which the model does not hold.
-
-    Density laws with cavities add three for each pipe: location of the first cavity, greatest cavity volume, and its
-    time.
-    """
-    parts = len(draft.pipe_table) + 3 * len(draft.node_table) + len(draft.column_table)
-    own = 2 * len(draft.device_table) + len(draft.piston_table)
-    return parts + own + (3 * len(draft.pipe_table) if draft.case.law.cavitates else 0)
-
-
-def spare_size(draft: ModelDraft) -> int:
-    """Size of the work array `spare`.
-
-    It contains a copy of `out`; with delay lines two copies, and three values for each probe and node.
-    """
-    size, values = int(draft.tables.layout["size"][0]), len(draft.probe_table) + len(draft.node_table)
-    return size if not len(draft.delay_table) else 2 * size + 3 * values
-
-
 def scratch_size(draft: ModelDraft) -> int:
     """Size of the work array `scratch`: the largest size that a function of the right-hand side needs."""
     scalars, nodes = len(draft.scalar_table), len(draft.node_table)
@@ -366,9 +346,8 @@ def model_of(draft: ModelDraft) -> Model:
     """
     case, start = draft.case, basin_start(draft.basins, draft.size)
     start_amounts(draft, start)
-    inside = sorted(
-        (t, jump) for t, jump in draft.schedules.breaks.items() if case.numerics.start <= t <= case.numerics.end
-    )
+    first, last = case.numerics.start, case.numerics.end
+    inside = sorted((t, jump) for t, jump in draft.schedules.breaks.items() if first <= t <= last)
     basin_notices = [notice for basin in draft.basins for notice in basin.notices(basin.deviations(start))]
     draft.warnings += [*basin_notices, *coarse_for_cavities(draft), *flow_notices(draft), *too_few_cells(draft)]
     return Model(

@@ -1,7 +1,5 @@
 """Solution method of each node without storage: alone, with its valve by a closed formula, or in a group by Newton."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -143,19 +141,19 @@ def store_gates(draft) -> None:
     Nodes with a demand, and nodes with a valve whose device senses a pressure, are left out.
     """
     nodes, valves, columns = draft.node_table, draft.valve_table, draft.column_table
-    nodes["gates"] = -1
+    nodes["gates"], places = -1, list(draft.case.places.values())
     bare = (nodes["kind"] == rec.JUNCTION) & (nodes["admittance"] == 0.0)
     for i in np.flatnonzero(bare):
         joined = [k for k, v in enumerate(valves) if i in (v["from_node"], v["to_node"])]
-        if any(is_sensed(draft, int(valves["device"][k])) for k in joined):
+        devices = [k for k in valves["device"][joined] if k >= 0 and not draft.devices[k][2].vessel]
+        if any(draft.device_table["node"][devices] >= 0):  # the device of a valve senses a pressure
             continue
-        column_count = sum(i in (c["from_node"], c["to_node"]) for c in columns)
-        if column_count > 0 and joined and has_no_demand(draft, i):
-            nodes["gates"][i], nodes["gate_count"][i], nodes["columns"][i] = (
-                len(draft.integers),
-                len(joined),
-                column_count,
-            )
+        column_count, place = sum(i in (c["from_node"], c["to_node"]) for c in columns), places[i]
+        if column_count == 0 or not joined:
+            continue
+        if not np.any((place.demand if place.kind == "junction" else place.flow).value):
+            nodes["gates"][i], nodes["gate_count"][i] = len(draft.integers), len(joined)
+            nodes["columns"][i] = column_count
             draft.integers += joined
 
 
@@ -181,17 +179,6 @@ def refuse_isolated_groups(draft, members) -> None:
         draft.fault(f"nodes.{place}", f"{reason} to {other}, and otherwise only rigid columns join these nodes, so "
                     f"nothing sets their pressure{span}; make {other} a chamber, or make one of the columns "
                     "a pipe")  # fmt: skip
-
-
-def is_sensed(draft, device: int) -> bool:
-    """True if a device that is not a vessel reads the pressure of a node; device : row of the device, -1 for none."""
-    return device >= 0 and draft.device_table["node"][device] >= 0 and not draft.devices[device][2].vessel
-
-
-def has_no_demand(draft, i: int) -> bool:
-    node = list(draft.case.places.values())[i]
-    schedule = node.demand if node.kind == "junction" else node.flow
-    return not np.any(schedule.value)
 
 
 def follows_column(draft, members, ks) -> bool:

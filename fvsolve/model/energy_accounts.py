@@ -1,7 +1,5 @@
 """Energy accounts of a model: energy ledger, and available energy of its parts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -188,7 +186,8 @@ class Accounts:
     def __init__(self, run_data: RunData) -> None:
         self.run_data, self.model = run_data, run_data.model
         model, case = run_data.model, run_data.model.case
-        refuse_unsupported(case)
+        if faults := [f"{'.'.join(place)}: {text}" for place, text in missing_reactions(case.nodes, case.links)]:
+            raise FvsolveError(f"the energy of this network on a body is not supported; {'; '.join(faults)}")
         if len(model.tables.moving_segments):
             run_data.tables.moving_segments["loads_body"] = rec.JOINT_LOAD_READ
         if any(basin.part.on is not None and basin.opening for basin in model.basins):
@@ -306,14 +305,10 @@ class Accounts:
         for name, part, _ in self.model.devices:
             at, kind = self.take(3), part.kind.replace("-", " ")
             own, resists = self.taken.get(name, (None, True))
-            rows = {"supplied": [at], "dissipated": [at + 2]}
-            if own is not None:
-                rows["dissipated" if resists else "supplied"].append(own)
-            for category, (sign, indices) in {
-                "supplied": (-1.0, rows["supplied"]),
-                "dissipated": (1.0, rows["dissipated"]),
-            }.items():
-                self.accounts.append(Account(category, name, kind, tuple(indices), (1.0, sign)[: len(indices)]))
+            for category, sign, first, has_own in (("supplied", -1.0, at, not resists),
+                                                   ("dissipated", 1.0, at + 2, resists)):  # fmt: skip
+                rows = (first, own) if own is not None and has_own else (first,)
+                self.accounts.append(Account(category, name, kind, rows, (1.0, sign)[: len(rows)]))
             self.hold(name, kind, at + 1)
 
     def walls(self) -> None:
@@ -332,8 +327,7 @@ class Accounts:
             self.hold(basin.name, "basin", at + 3)
             if basin.part.on is not None:
                 self.add("law", basin.name, "basin", at + 4)
-            rows = (at, at + 1, at + 2, at + 3, at + 4)
-            self.accounts.append(Account("scheme", basin.name, "basin", rows, (1, -1, -1, -1, -1)))
+            self.accounts.append(Account("scheme", basin.name, "basin", tuple(range(at, at + 5)), (1, *[-1] * 4)))
 
     def of(self, category: str) -> list[int]:
         """Indices of the accounts of a category."""
@@ -356,13 +350,6 @@ class Accounts:
         self.model.functions.rhs(t, y, np.zeros(0), out, self.run_data.handle)
         self.stored(t, y, np.zeros(0), out, self.run_data.handle, rows)
         return self.holding @ rows
-
-
-def refuse_unsupported(case) -> None:
-    """Raise FvsolveError if a network is mounted on a moving body and its energy cannot be computed."""
-    faults = [f"{'.'.join(place)}: {text}" for place, text in missing_reactions(case.nodes, case.links)]
-    if faults:
-        raise FvsolveError(f"the energy of this network on a body is not supported; {'; '.join(faults)}")
 
 
 def matrix_of(accounts: list[Account], rows: int) -> np.ndarray:

@@ -17,9 +17,8 @@ from fvsolve.model.static_forces import mass_factor
 
 RANK_TOLERANCE = 1e-12  # singular values below this share of a group's greatest: motions that store no energy
 MAX_GROUP = 2500  # largest group of positions joined by springs whose singular values are computed, in about 7 s
-SCALAR_WEIGHT = (
-    1e-6  # weight of a scalar's amount, as a share of that of its mass: less than waves do to it in 1000 steps
-)
+# weight of a scalar's amount, as a share of that of its mass: less than waves do to it in 1000 steps
+SCALAR_WEIGHT = 1e-6
 ROUNDING_SHARE = 1e-6  # rates below this share of the sum of magnitudes of their terms are round-off of differences
 
 
@@ -252,10 +251,8 @@ def chamber_rows(model, y: np.ndarray, elongations: Elongations):
     is e plus the gained volume times the density at the start.
     """
     nodes, pistons = model.tables.nodes, model.tables.pistons
-    per_mass, first = (
-        elongations.out[int(model.layout["stiffness"]) :],
-        len(model.tables.braces) + len(model.tables.stops),
-    )
+    per_mass = elongations.out[int(model.layout["stiffness"]) :]
+    first = len(model.tables.braces) + len(model.tables.stops)
     for k, row in enumerate(pistons, first):
         x = elongations.travel(k)
         for name, sign in (("a", 1.0), ("b", -1.0)):

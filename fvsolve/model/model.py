@@ -77,9 +77,8 @@ def as_numbers(name: str, values: Any) -> np.ndarray:
             raise TypeError
         return np.require(array, np.float64, ("C", "W")) if array.ndim else array.astype(np.float64)
     except (TypeError, ValueError):
-        raise FvsolveError(
-            f"{name} = {show(values)} does not consist of real numbers; expected a number or an array of numbers"
-        ) from None
+        text = f"{name} = {show(values)} does not consist of real numbers"
+        raise FvsolveError(f"{text}; expected a number or an array of numbers") from None
 
 
 def as_limit(limit: Any) -> float:
@@ -139,13 +138,10 @@ class Model(Displayable):
     basins: list[BasinRows]  # in the order of their table
     watched: list[Probe]  # read in addition to the probes, for their extremes only
     watched_start: np.ndarray  # pressures of `watched` along pipes in the profile [Pa], nan for others
-    sharp: dict[str, np.ndarray]  # tables that replace these while a jump is solved, see `model.delay_line_selection`
-    idle_run_data: deque[RunData] = field(
-        default_factory=deque, init=False
-    )  # idle run data for evaluating single states
-    tables_before_start: list = field(
-        default_factory=list, init=False
-    )  # tables before the start is solved, reused by `vary`
+    sharp: dict[str, np.ndarray]  # tables that replace these while a jump is solved, see `model.delay_lines`
+    # idle run data for evaluating single states; tables before the start is solved, reused by `vary`
+    idle_run_data: deque[RunData] = field(default_factory=deque, init=False)
+    tables_before_start: list = field(default_factory=list, init=False)
 
     picture = "fvsolve.draw.object_pictures:model_figure"
 
@@ -295,9 +291,8 @@ class Model(Displayable):
     def refuse_delay_lines(self, function: str) -> None:
         """Raise FvsolveError if the model has delay lines: their history is not part of y."""
         if len(self.tables.delays):
-            raise FvsolveError(f"{function}(t, y) is not defined for a model with delay lines: y does not contain "
-                               "their waves. Expected "
-                               'pipe_model = "finite-volume" (or rhs(State) instead of rhs(t, y))')  # fmt: skip
+            text = f"{function}(t, y) is not defined for a model with delay lines: y does not contain their waves"
+            raise FvsolveError(f'{text}. Expected pipe_model = "finite-volume" (or rhs(State) instead of rhs(t, y))')
 
     def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
         """Right-hand side and further values at (t, y), see `rhs` : (dydt, out).
@@ -366,11 +361,8 @@ class Model(Displayable):
         Raises FvsolveError if there is no such pipe, or if `waves` does not have a number for each of its cells.
         """
         waves = as_numbers("waves", waves)
-        if (
-            not isinstance(k, (int, np.integer))
-            or not 0 <= k < len(self.pipes)
-            or waves.shape != (self.pipes[k].cells,)
-        ):
+        known = isinstance(k, (int, np.integer)) and 0 <= k < len(self.pipes)
+        if not known or waves.shape != (self.pipes[k].cells,):
             raise FvsolveError(f"waves has shape {waves.shape} for pipe {k}; expected a number for each cell of "
                                f"the pipe, and a pipe number less than {len(self.pipes)}")  # fmt: skip
         return self.case.law.cell_pressure(self.tables.pipes[k], self.profiles[k], self.tables.profile, waves)
@@ -410,8 +402,7 @@ class Model(Displayable):
                 "velocity": flow / law.area(row, pressure), "flow": flow,
                 "min_pressure": pressure, "max_pressure": pressure, **pipe_values(self, k, y),
             }  # fmt: skip
-        nodes = self.tables.nodes
-        at = int(self.layout["pressure"])
+        nodes, at = self.tables.nodes, int(self.layout["pressure"])
         for basin in self.basins:
             fields[basin.name] = basin.fields(basin.deviations(y)) | (basin.values(y) if basin.scalars else {})
         fields["points"] = {basin.name: basin.points_at(y, out, self.layout) for basin in self.basins
@@ -419,10 +410,8 @@ class Model(Displayable):
         fields["nodes"] = {}
         for i, name in enumerate(self.node_names):
             pressure = float(nodes[i]["pressure"] + out[at + i])
-            fields["nodes"][name] = {
-                "pressure": pressure,
-                "head": float(self.head(pressure, self.elevation[name])), **node_values(self, i, out),
-            }  # fmt: skip
+            head = float(self.head(pressure, self.elevation[name]))
+            fields["nodes"][name] = {"pressure": pressure, "head": head, **node_values(self, i, out)}
         return fields
 
     def contents(self, y: np.ndarray) -> tuple[float, float]:

@@ -1,7 +1,5 @@
 """Facts about a model before its run, for `fvsolve check`."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from time import process_time
@@ -21,15 +19,12 @@ from fvsolve.steppers.tableau import AUTO, method_named
 TEST_DEVIATION = 1e-3  # relative to a small deviation: states for the timing of rates, as much is skipped at rest
 LEAST_TIMING = 1e-3  # least duration of a timing [s]
 SECONDS_PER_STEP = 5e-7  # in addition to the rates
-LOCAL_EXCESS = (
-    0.05  # relative excess of sound speed at a pressure over that at the reference, for laws that are not linear
-)
+# relative excess of sound speed at a pressure over that at the reference, for laws that are not linear
+LOCAL_EXCESS = 0.05
 VALVE_SHARE = 0.1  # least share of the greatest rate by which a valve must exceed all else to be reported as the cause
 MAX_VALVES = 100  # greatest number of valves that are tried
-COSTLY_RATIO, COSTLY_STEPS = (
-    10.0,
-    20_000,
-)  # ratio to the rate of waves, and number of steps, above which `check` warns of the cost
+# ratio to the rate of waves, and number of steps, above which `check` warns of the cost
+COSTLY_RATIO, COSTLY_STEPS = 10.0, 20_000
 STABILITY_LIMIT = 3.3  # of h times the greatest rate: approximate limit of explicit methods with an error estimate
 STIFF_RATIO = 3.0  # ratio of steps to those that waves need, above which an implicit method is recommended
 
@@ -53,12 +48,15 @@ def checks(model) -> dict[str, Any]:
         dynamic = row["area"] * mesh.length / (mesh.diameter * row["area"]) * rho * velocity**2 / 2.0
         law = (row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))
         loss, link = drag(*law) / row["area"] * mesh.length, model.case.links[mesh.name]
+        wall_loss = abs(loss) - link.minor_loss * rho * velocity**2 / 2.0  # without the minor loss [Pa]
+        # in its liquid and wall; under the density law `mixture` the harmonic mean along the pipe at the start [m/s]
+        speed = model.case.law.wave_speed(row, model.cell_pressure(k, np.zeros(mesh.cells)))
         has_friction = dynamic > 0 and link.friction.model != "none"
         pipes[mesh.name] = {
-            "length": mesh.length, "cells": mesh.cells, "wave_speed": (speed := start_speed(model, k)),
+            "length": mesh.length, "cells": mesh.cells, "wave_speed": speed,
             "travel_time": mesh.length / speed, "velocity": float(velocity),
             "reynolds": float(rho * abs(velocity) * mesh.diameter / viscosity) if viscosity else None,
-            "friction_factor": float(wall_loss(loss, link, rho, velocity) / dynamic) if has_friction else None,
+            "friction_factor": float(wall_loss / dynamic) if has_friction else None,
             "from_head": nodes[mesh.from_]["head"], "to_head": nodes[mesh.to]["head"],
             **model.steady["lines"][mesh.name],
             **({"unsteady": unsteady[mesh.name]} if mesh.name in unsteady else {}),
@@ -66,18 +64,15 @@ def checks(model) -> dict[str, Any]:
         }  # fmt: skip
     step, set_by = step_and_reason(model)
     numerics = model.case.numerics
-    span = numerics.end - numerics.start
-    steps = math.ceil(span / step) if step else None
+    steps = math.ceil((numerics.end - numerics.start) / step) if step else None
     method = method_named(first_method(numerics.method))
     timed = steps is not None and method.explicit
     expected = steps * (SECONDS_PER_STEP + method.stages * rhs_seconds(model)) if timed else None
     return {
         "fluid": model.case.properties.plain(), "nodes": nodes, "masses": masses, "bodies": bodies,
-        "pipes": pipes,
-        "basins": {item.name: basin_facts(item) for item in model.basins},
-        "states": model.y_size, "cells": model.all_cells, "step": step,
-        "step_set_by": set_by, "steps": steps, "expected_seconds": expected,
-        "moving": model.steady["moving"],
+        "pipes": pipes, "basins": {item.name: basin_facts(item) for item in model.basins},
+        "states": model.y_size, "cells": model.all_cells, "step": step, "step_set_by": set_by, "steps": steps,
+        "expected_seconds": expected, "moving": model.steady["moving"],
         "warnings": [item.plain() for item in (*model.warnings, *cost_notices(model, steps, set_by))],
     }  # fmt: skip
 
@@ -87,9 +82,8 @@ def wall_facts(link) -> dict[str, Any]:
 
     The entry "unread" lists properties of the material without a source that the case does not state either.
     """
-    facts = {
-        key: value for key in ("material", "allowable_pressure", "source") if (value := getattr(link, key)) is not None
-    }
+    keys = ("material", "allowable_pressure", "source")
+    facts = {key: getattr(link, key) for key in keys if getattr(link, key) is not None}
     if link.material is not None:
         stated = vars(link.wall) | {"roughness": link.friction.roughness} if isinstance(link.wall, Wall) else {}
         unread = materials()[link.material].missing_keys
@@ -104,11 +98,6 @@ def pose_facts(pose) -> dict[str, float]:
     place = dict(zip("xyz", pose.place.tolist(), strict=True))
     angles = dict(zip(("roll", "pitch", "yaw"), roll_pitch_yaw(pose.attitude), strict=True))
     return place | angles | {"speed": float(np.linalg.norm(pose.velocity)), "spin": float(np.linalg.norm(pose.spin))}
-
-
-def wall_loss(loss: float, link, rho: float, velocity: float) -> float:
-    """Pressure loss by wall friction [Pa]: magnitude of the total loss minus the minor loss."""
-    return abs(loss) - link.minor_loss * rho * velocity**2 / 2.0
 
 
 def cost_notices(model, steps: int | None, set_by: str) -> list[Notice]:
@@ -149,15 +138,6 @@ def basin_facts(basin) -> dict[str, Any]:
         "area": float(mesh.area.sum()), "least_width": float(np.sqrt(mesh.area.min())),
         **{key: list(limits) for key, limits in basin.ranges().items()}, "memory": basin.memory, "patches": patches,
     }  # fmt: skip
-
-
-def start_speed(model, k: int) -> float:
-    """Wave speed of pipe k in its liquid and wall [m/s].
-
-    Under the density law `mixture` it is the harmonic mean along the pipe at the start.
-    """
-    mesh = model.pipes[k]
-    return model.case.law.wave_speed(model.tables.pipes[k], model.cell_pressure(k, np.zeros(mesh.cells)))
 
 
 def rhs_seconds(model) -> float:
@@ -240,11 +220,6 @@ def fastest_parts(model) -> str:
     """Names of all parts other than pipes that can limit the step, as text."""
     stores = [name for name, row in zip(model.node_names, model.tables.nodes, strict=True)
               if row["kind"] not in (rec.FIXED, rec.JUNCTION, rec.PATCH)]  # fmt: skip
-    names = [
-        *(basin.name for basin in model.basins),
-        *stores,
-        *model.column_names,
-        *model.mass_names,
-        *model.body_names,
-    ]
+    names = [*(basin.name for basin in model.basins), *stores]
+    names += [*model.column_names, *model.mass_names, *model.body_names]
     return names[0] if len(names) == 1 else f"one of {listing(names)}"

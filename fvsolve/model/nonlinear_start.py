@@ -1,7 +1,5 @@
 """Initial steady state under density laws that are not linear."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -83,20 +81,15 @@ class NonlinearStart(SteadyStart):
                 self.draft.check()
             exit_loss = 0.5 * (flow / self.ends[1]) ** 2 if flow > 0.0 and self.at_rest(j) else 0.0
             self.exit_losses[names[k]] = self.jet(row, *self.ends)
-            constant_density = (
-                row["drag"] / row["area"] * mesh.length + self.exit_losses[names[k]][flow > 0.0] * abs(flow) * flow
-            )
-            self.extra[names[k]] = (
-                (potential[i] - self.rho * (b_to - exit_loss)) - constant_density if flow != 0.0 else 0.0
-            )
+            jet = self.exit_losses[names[k]][flow > 0.0] * abs(flow) * flow
+            constant_density = row["drag"] / row["area"] * mesh.length + jet
+            drop = potential[i] - self.rho * (b_to - exit_loss)
+            self.extra[names[k]] = drop - constant_density if flow != 0.0 else 0.0
         for k, row in enumerate(self.valves):
             i, j = int(row["from_node"]), int(row["to_node"])
             density_ratio, drive_ratio = self.density_and_drive(i, j)
-            self.density_ratios[k], self.factor[k], self.ratio[k] = (
-                (density_ratio, drive_ratio),
-                density_ratio * drive_ratio,
-                drive_ratio,
-            )
+            self.density_ratios[k], self.ratio[k] = (density_ratio, drive_ratio), drive_ratio
+            self.factor[k] = density_ratio * drive_ratio
         for k, row in enumerate(self.pistons):
             self.factor[len(self.valves) + k] = self.dense(int(row["a"]), int(row["b"]))
 
@@ -130,9 +123,8 @@ class NonlinearStart(SteadyStart):
             m, _ = kernels.mass_of_pressure(self.st, self.floats, row, self.pressure(i))
             start += 0.5 * (flow / m) ** 2
         faces, centers = np.zeros(mesh.cells + 1), np.zeros(mesh.cells)
-        b_to = profile_along(
-            self.st, self.floats, self.draft.tables.profile, row, float(start), z, flow, faces, centers
-        )
+        profile = self.draft.tables.profile
+        b_to = profile_along(self.st, self.floats, profile, row, float(start), z, flow, faces, centers)
         self.ends = faces[0], faces[-1]
         return faces, centers, b_to
 
@@ -147,9 +139,8 @@ class NonlinearStart(SteadyStart):
             faces, centers, b_to = self.march(row, mesh, flow)
             exit_loss = 0.5 * (flow / faces[-1]) ** 2 if flow > 0.0 and self.at_rest(j) else 0.0
             shortfall = self.answer.potential[j] - self.rho * (b_to - exit_loss)
-            if sweep == 0 and not self.set_unbalanced_drop(
-                mesh, row, self.pipe_drop(row) / row["area"] * mesh.length - shortfall
-            ):
+            change = self.pipe_drop(row) / row["area"] * mesh.length - shortfall
+            if sweep == 0 and not self.set_unbalanced_drop(mesh, row, change):
                 break
             if abs(shortfall) <= 1e-9 * PRESSURE_SCALE:
                 break
@@ -199,10 +190,8 @@ class NonlinearStart(SteadyStart):
         row, mesh = self.pipes[k], self.draft.meshes[k]
         profile, n = self.draft.tables.profile, mesh.cells
         masses = np.empty(2 * n + 1)
-        masses[0::2], masses[1::2] = (
-            profile[row["face"] : row["face"] + n + 1],
-            profile[row["center"] : row["center"] + n],
-        )
+        masses[0::2] = profile[row["face"] : row["face"] + n + 1]
+        masses[1::2] = profile[row["center"] : row["center"] + n]
         m = float(np.interp(fraction, np.linspace(0.0, 1.0, 2 * n + 1), masses))
         return m if row["rise"] < 0 else self.mass_between(row, mesh, fraction, m)
 

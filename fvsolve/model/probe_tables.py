@@ -1,7 +1,5 @@
 """Table of probes: data that each probe reads, with scale and offset, in SI units."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.assembly.lowering import lowering_of

@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.assembly.model_draft import aligned_zeros
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.delay_lines.wave_history import COUNT
-from fvsolve.model.delay_history import LEAST_STEPS, reset_history, steps_left, stored_history, with_doubled_rings
+from fvsolve.model.delay_lines import LEAST_STEPS, reset_history, steps_left, stored_history, with_doubled_rings
 
 if TYPE_CHECKING:
     from fvsolve.model.model import Model

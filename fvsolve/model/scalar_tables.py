@@ -1,6 +1,4 @@
-"""Table of scalars: amounts as states, values at nodes, and balances of a run."""
-
-from __future__ import annotations
+"""Table of scalars: amounts as states, values at nodes, balances of a run; bounds of amounts and of depths."""
 
 from array import array
 from typing import Any
@@ -150,22 +148,74 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
         decayed = -float(np.sum(decay[:, : row["losses"]]))
         initial, final = total_amount(model, q, model.start), total_amount(model, q, y)
         remainder = final - initial - (float(np.sum(flows)) - decayed)
+        net = zip(model.node_names, flows.sum(axis=0), strict=True)
         turnover = max(abs(initial), abs(final), float(np.sum(np.abs(flows))) + abs(decayed))
         ledgers[name] = {
-            "initial": initial,
-            "final": final,
-            "inflow": float(flows[0].sum()),
-            "outflow": float(0.0 - flows[1].sum()),
-            "decayed": decayed,
-            "by_node": {
-                node: float(x) for node, x in zip(model.node_names, flows.sum(axis=0), strict=True) if x != 0.0
-            },
-            "nodes": {
-                node: {"inflow": float(x), "outflow": float(0.0 - y)}
-                for node, x, y in zip(model.node_names, *flows, strict=True)
-                if x != 0.0 or y != 0.0
-            },
-            "remainder": remainder,
-            "relative": abs(remainder) / turnover if turnover > 0.0 else 0.0,
-        }
+            "initial": initial, "final": final, "inflow": float(flows[0].sum()),
+            "outflow": float(0.0 - flows[1].sum()), "decayed": decayed,
+            "by_node": {node: float(x) for node, x in net if x != 0.0},
+            "nodes": {node: {"inflow": float(x), "outflow": float(0.0 - y)}
+                      for node, x, y in zip(model.node_names, *flows, strict=True) if x != 0.0 or y != 0.0},
+            "remainder": remainder, "relative": abs(remainder) / turnover if turnover > 0.0 else 0.0,
+        }  # fmt: skip
     return ledgers
+
+
+NO_STATE = -1
+
+
+def state_bounds(model) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of states, arguments of `steppers.output_rows.limit_to_bounds` : (at, by).
+
+    at : int64[3 q]  a bounded state, and up to two states that give the amount of which it is a share, else -1
+    by : float64[q, 4]  base and gain of this amount, least share, greatest share
+    Bounds of depths come first, because depths bound the amounts of scalars.
+    """
+    rows = [*depths(model)]
+    for q in range(len(model.tables.scalars)):
+        rows += scalar_bounds(model, q)
+    if not rows:
+        return np.zeros(0, dtype=np.int64), np.zeros((0, 4))
+    at, by = (np.concatenate(column) for column in zip(*rows, strict=True))
+    return at.ravel(), by
+
+
+def bound_rows(states, first, second, base, gain, least, most) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of `states` : (int64[q, 3], float64[q, 4]), see `state_bounds`; arguments are arrays or numbers.
+
+    A state lies between `least` and `most` times the amount base + gain (y[first] + y[second]).
+    """
+    at = np.column_stack(np.broadcast_arrays(states, first, second)).astype(np.int64)
+    return at, np.column_stack(np.broadcast_arrays(base, gain, least, most, np.zeros(len(at)))[:4])
+
+
+def depths(model):
+    """Yield `bound_rows` that keep depths of water in basin cells at 0 or above."""
+    for basin in model.basins:
+        if basin.deep:
+            states = int(basin.row["y"]) + np.arange(basin.n)
+            yield bound_rows(states, NO_STATE, NO_STATE, basin.depth, 0.0, -1.0, np.inf)
+
+
+def scalar_bounds(model, q: int):
+    """Yield `bound_rows` of the amounts of scalar q: its least and greatest value, times the mass or depth there.
+
+    The mass per length in the cells of a pipe follows from both waves, the mass in a tank or chamber from its state. In
+    a basin it is the depth, or 1 without variable depth (`basin.deep` False).
+    """
+    row, tables = model.tables.scalars[q], model.tables
+    limits = row["least"], row["greatest"]
+    for pipe in tables.pipes:
+        n, k = int(pipe["cells"]), np.arange(pipe["cells"])
+        states, wave, masses = row["y"] + pipe["cell"] + k, pipe["y"] + k, tables.profile[pipe["center"] + k]
+        yield bound_rows(states, wave, wave + n, masses, 1.0 / pipe["speed"], *limits)
+    places = tables.integers[row["places"] : row["places"] + len(tables.nodes)]
+    for node, place in zip(tables.nodes, places, strict=True):
+        if node["kind"] in STORES:
+            yield bound_rows([place], node["y"], NO_STATE, node["mass"], 1.0, *limits)
+    for basin in model.basins:
+        if basin.row["carried"] < 0:
+            continue
+        states = int(basin.row["carried"]) + q * basin.n + np.arange(basin.n)
+        depth = (int(basin.row["y"]) + np.arange(basin.n), basin.depth) if basin.deep else (NO_STATE, 1.0)
+        yield bound_rows(states, depth[0], NO_STATE, depth[1], 1.0, *limits)

@@ -1,7 +1,5 @@
 """Notices about the start of a model: few cells for cavities or waves, and unusual flows."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -77,9 +75,8 @@ def _behind_events(draft: Any, cells: np.ndarray) -> list[Notice]:
     key = min(durations, key=durations.get)
     cell = draft.pipe_table["dx"] / draft.pipe_table["speed"]
     travel = cell * draft.pipe_table["cells"]
-    few &= ((travel > SHORT_PIPE * travel.max()) & (durations[key] < SLOW_EVENT * travel)) | _near_events(
-        draft, durations, travel
-    )
+    slow = (travel > SHORT_PIPE * travel.max()) & (durations[key] < SLOW_EVENT * travel)
+    few &= slow | _near_events(draft, durations, travel)
     if not few.any():
         return []
     worst = int(np.argmax(np.where(few, cell, 0.0)))

@@ -1,7 +1,5 @@
 """Forces on joints at the start, computed by the kernels without a run, and the start of bodies and pins."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.basins.lower import basin_start
@@ -14,23 +12,15 @@ FOLDER = "kernels.mechanism"
 MOTION, LINES = f"{FOLDER}.body_kinematics: kinematics", f"{FOLDER}.force_elements: add_element_forces"
 WEIGH, ACCELERATE = f"{FOLDER}.mass_matrix: start_mass_matrix", f"{FOLDER}.mass_matrix: solve_accelerations"
 BUSHINGS = f"{FOLDER}.force_elements: add_bushing_loads"
-PINNED, GAPS, HOLD = (
-    f"{FOLDER}.loop_constraints: {name}"
-    for name in ("solve_pinned_accelerations", "start_gaps", "add_start_pin_forces")
-)
+PINNED, GAPS, HOLD = (f"{FOLDER}.loop_constraints: {name}" for name in
+                      ("solve_pinned_accelerations", "start_gaps", "add_start_pin_forces"))  # fmt: skip
 # loads on bodies of fluid at rest, in addition to pushes
 FLUID_LOADS = ("basins.basin_frames: set_frames", "basins.frame_forces: add_frame_forces")
 WALL_LOADS = ("basins.moving_walls: push_bodies_at_rest",)
-DRIVES = f"{FOLDER}.inertial_forces: set_segment_drives"
 LOADS = f"{FOLDER}.fluid_loads: add_fluid_loads"
-NETWORKS = (
-    DRIVES,
-    *(
-        f"{FOLDER}.inertial_forces: {name}"
-        for name in ("moving_tank_pressures", "add_cell_drives", "moving_column_rates")
-    ),
-    LOADS,
-)
+INERTIAL = ("set_segment_drives", "moving_tank_pressures", "add_cell_drives", "moving_column_rates")
+DRIVES, *DRIVEN = (f"{FOLDER}.inertial_forces: {name}" for name in INERTIAL)
+NETWORKS = (DRIVES, *DRIVEN, LOADS)
 NONE = np.zeros(0)
 
 
@@ -91,10 +81,8 @@ class StaticForces:
         if len(draft.moving_segment_table):
             self.pushes += NETWORKS
         if moving_basins:
-            self.y, self.tables = (
-                basin_start(draft.basins, draft.size),
-                draft.tables._replace(plane=draft.tables.plane.copy()),
-            )
+            self.y = basin_start(draft.basins, draft.size)
+            self.tables = draft.tables._replace(plane=draft.tables.plane.copy())
         self.run(MOTION)
 
     def run(self, *pieces: str) -> None:
@@ -152,10 +140,8 @@ class StaticForces:
         self.run(LINES)
         before = self.loads().copy()
         self.run(*self.pushes[2:])
-        loads += [
-            (i, np.zeros(3), *np.linalg.norm(load.reshape(2, 3), axis=1))
-            for i, load in enumerate(self.loads() - before)
-        ]
+        added = enumerate(self.loads() - before)
+        loads += [(i, np.zeros(3), *np.linalg.norm(load.reshape(2, 3), axis=1)) for i, load in added]
         for row in draft.line_table:
             size, is_torque = abs(pushes[row["push"]]), row["acts"] == rec.ABOUT
             loads += self.at_ends(row, 0.0 if is_torque else size, size if is_torque else 0.0)
@@ -217,9 +203,8 @@ class StaticForces:
 RANK_TOLERANCE = 1e-8  # a row of pins is redundant if its independent part is below this share of the largest row
 PIN_RATE_TOLERANCE = 1e-6  # greatest rate at which a pin may open at the start [m/s]
 ROUNDING_SHARE = 1e-12  # a sum of forces of a joint below this share of their magnitudes is rounding
-EQUILIBRIUM_SHARE = (
-    1e-9  # likewise in a computed equilibrium: stiff springs amplify the rounding of a length by this much
-)
+# likewise in a computed equilibrium: stiff springs amplify the rounding of a length by this much
+EQUILIBRIUM_SHARE = 1e-9
 
 
 def refuse_massless(draft, at: StaticForces) -> None:
@@ -240,9 +225,8 @@ def refuse_massless(draft, at: StaticForces) -> None:
                 return draft.fault(f"nodes.{name}.mass", f"{text}; {remedy}")
             if not left > least:
                 text = "the inertia of the body is 0 in a direction in which its joint allows motion"
-                return draft.fault(
-                    f"nodes.{name}.inertia", f"{text}. Expected an inertia above 0 about the axis of the joint"
-                )
+                remedy = "Expected an inertia above 0 about the axis of the joint"
+                return draft.fault(f"nodes.{name}.inertia", f"{text}. {remedy}")
 
 
 def start_bodies(draft, start) -> list[str]:
@@ -311,11 +295,8 @@ def start_pins(draft, at: StaticForces) -> np.ndarray:
         slips[name] = float(np.hypot(slips.get(name, 0.0), slip))
     for name, slip in slips.items():
         if slip > PIN_RATE_TOLERANCE:
-            rate = draft.case.amount(slip, "velocity")
-            draft.fault(
-                f"links.{name}",
-                f"velocities at the start separate the two points of this pin at {rate}. Expected equal velocities",
-            )
+            text = f"separate the two points of this pin at {draft.case.amount(slip, 'velocity')}"
+            draft.fault(f"links.{name}", f"velocities at the start {text}. Expected equal velocities")
     draft.check()
     forces = at.out[int(at.layout["pin"]) :][: 3 * len(draft.pin_table)].reshape(-1, 3)
     for row, force in zip(draft.pin_table, forces, strict=True):

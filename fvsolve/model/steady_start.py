@@ -1,7 +1,5 @@
 """Initial steady state of a run: pressures, flows, and motions at the start. States are deviations from it."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from functools import cached_property
@@ -17,8 +15,7 @@ from fvsolve.kernels.restrictions import conductance_of, flow_at_drop, flow_slop
 from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.kernels.steady_friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.table_handle import make_handle
-from fvsolve.model.body_tables import driven_at_start
-from fvsolve.model.mass_tables import start_masses
+from fvsolve.model.mechanics_tables import driven_at_start, start_masses
 from fvsolve.model.run_data import zeros_for_run
 from fvsolve.model.static_forces import start_bodies
 from fvsolve.steady import Edge, solve_steady, union
@@ -45,28 +42,20 @@ class SteadyStart:
         self.rest = self.case.numerics.initial == "rest"
         self.t = self.case.numerics.start
         self.weight = draft.fluid.density * self.case.gravity
-        sizes = [
-            1e-9,
-            *(draft.fluid.density * self.pipes["area"]),
-            *(draft.fluid.density * self.columns["area"]),
-        ]
+        sizes = [1e-9, *(draft.fluid.density * self.pipes["area"]), *(draft.fluid.density * self.columns["area"])]
         sizes += list(np.sqrt(self.valves["conductance"] * PRESSURE_SCALE))
         self.flow_scale = max(sizes)
         self.extra: dict[str, float] = {}  # pressure drop in addition to the law's [Pa], for laws with changing density
-        self.exit_losses: dict[
-            str, tuple[float, float]
-        ] = {}  # of pipes: loss of the flow that leaves at each end, per M^2 [Pa s2/kg2]
-        self.density_ratios: dict[
-            int, tuple[float, float]
-        ] = {}  # of valves: density relative to reference, driving pressure drop relative to potential drop
+        # of pipes: loss of the flow that leaves at each end, per M^2 [Pa s2/kg2]
+        self.exit_losses: dict[str, tuple[float, float]] = {}
+        # of valves: density relative to reference, driving pressure drop relative to potential drop
+        self.density_ratios: dict[int, tuple[float, float]] = {}
         self.factor: dict[int, float] = {}  # factor on the conductance of valves, likewise
-        self.ratio: dict[
-            int, float
-        ] = {}  # ratio of the pressure drop that drives a valve to its drop of potential, likewise
+        self.ratio: dict[int, float] = {}  # driving pressure drop of valves relative to potential drop, likewise
         self.moving: list[str] = []
         self.shut: set[int] = set()  # valves that a device holds shut
         self.valve_modes: dict[int, str] = {}  # modes of valves that regulate
-        self.loads: dict[int, float] = {}  # of closed chambers: pressures that support bodies [Pa]
+        self.loads: dict[int, float] = {}  # of closed chambers: pressures that support bodies, held by `solve` [Pa]
 
     @cached_property
     def out(self) -> np.ndarray:
@@ -108,9 +97,8 @@ class SteadyStart:
         for turn in range(MAX_REVISIONS):
             self.balance()
             revised = (device.revise_state(self, part, row) for (_, part, device), row in devices)
-            if not (
-                any(revised) if turn > SIMULTANEOUS_REVISIONS else sum(revised)
-            ):  # later one by one, to avoid cycles
+            # later one by one, to avoid cycles
+            if not (any(revised) if turn > SIMULTANEOUS_REVISIONS else sum(revised)):
                 return self.report_faults(self.fixed_potentials)
             random.shuffle(devices)
             if turn % RESTART_INTERVAL == RESTART_INTERVAL - 1:
@@ -183,14 +171,6 @@ class SteadyStart:
             elif (pressure := lowering_of(type(node)).pressure_at_start(self, i, node, row)) is not None:
                 held[i] = self.law.potential_of(pressure, row["elevation"])
         return held, np.zeros_like(demand) if self.rest else demand
-
-    def set_supporting_pressures(self, pressures: dict[int, float]) -> bool:
-        """Hold closed chambers that support loads at given pressures in the next `solve`; True if there are any.
-
-        pressures : node -> pressure [Pa]
-        """
-        self.loads = pressures
-        return bool(pressures)
 
     def connected_nodes(self, i: int) -> list[int]:
         """Nodes that open links join to node i, directly or through other nodes, including node i."""
@@ -308,8 +288,7 @@ class SteadyStart:
             reason = f"the demand here is {self.case.amount(drawn, 'flow')}, but every path to it" if drawn > 0.0 else (
                 f"the inflow here is {self.case.amount(-drawn, 'flow')}, but every path out")  # fmt: skip
             self.draft.fault(
-                f"nodes.{names[i]}",
-                f'no steady state: {reason} is shut; open a valve, or use initial = "rest"',
+                f"nodes.{names[i]}", f'no steady state: {reason} is shut; open a valve, or use initial = "rest"'
             )
         for name, row in zip(self.draft.pipe_names, self.pipes, strict=True):
             ends = [int(row["from_node"]), int(row["to_node"])]
@@ -317,11 +296,9 @@ class SteadyStart:
             if free and not self.rest and abs(held[ends[0]] - held[ends[1]]) > 1e-6 * PRESSURE_SCALE:
                 a, b = ((held[k] - self.case.ambient_pressure) / self.weight for k in ends)
                 a, b = (self.case.amount(head, "head", 6) for head in (a, b))
-                self.draft.fault(
-                    f"links.{name}",
-                    f"no steady state: this pipe has no friction, but different heads at its ends, {a} and {b}; "
-                    'give it `friction` or `initial_flow`, or use initial = "rest"',
-                )
+                self.draft.fault(f"links.{name}", "no steady state: this pipe has no friction, but different heads at "
+                                 f"its ends, {a} and {b}; give it `friction` or `initial_flow`, or use "
+                                 'initial = "rest"')  # fmt: skip
         if not self.draft.faults and not self.answer.converged:
             self.draft.fault("numerics.initial", "no steady state was found; check for demands that cannot be supplied "
                              'and frictionless paths between unequal heads, or use initial = "rest"')  # fmt: skip
@@ -338,14 +315,9 @@ class SteadyStart:
                 *zip(self.draft.column_names, self.columns, strict=True)]  # fmt: skip
         ends = {name: [merged.get(int(row[end]), int(row[end])) for end in ("from_node", "to_node")]
                 for name, row in rows if row["friction"] == rec.FRICTION_NONE and row["loss"] == 0.0}  # fmt: skip
-        swinging = [
-            name
-            for name, row in rows
-            if name in ends
-            and self.case.links[name].initial_flow is None
-            and abs(self.fixed_potentials[int(row["from_node"])] - self.fixed_potentials[int(row["to_node"])])
-            > 1e-6 * PRESSURE_SCALE
-        ]
+        fixed, free = self.fixed_potentials, [row for row in rows if row[0] in ends]
+        swinging = [name for name, row in free if self.case.links[name].initial_flow is None and
+                    abs(fixed[row["from_node"]] - fixed[row["to_node"]]) > 1e-6 * PRESSURE_SCALE]  # fmt: skip
         for name in swinging:
             text = f"{name}: without friction between unequal heads no flow is steady"
             text += "; the flow starts from rest, and oscillates or grows"
@@ -383,16 +355,14 @@ class SteadyStart:
     def fill_nodes(self) -> None:
         for i, (node, row) in enumerate(zip(self.case.places.values(), self.nodes, strict=True)):
             held = row["kind"] in FIXED_PRESSURE
-            row["pressure"] = (
-                lowering_of(type(node)).pressure_at_start(self, i, node, row) if held else self.pressure(i)
-            )
+            own = lowering_of(type(node))
+            row["pressure"] = own.pressure_at_start(self, i, node, row) if held else self.pressure(i)
             if row["kind"] in STORING:
                 row["mass"] = self.law.mass_in(row["pressure"], row["volume"])
         self.nodes["demand"], self.nodes["inflow"] = self.demand, self.inflow
 
     def pipe_drop(self, row) -> float:
-        law = (row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))
-        return drag(*law)
+        return drag(*(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow")))
 
     def fill_pipes(self) -> None:
         """Set the steady pressures along pipes, from a potential that is linear between the ends.
@@ -444,9 +414,8 @@ class SteadyStart:
         for k, (row, flow) in enumerate(zip(self.valves, self.valve_flow, strict=True)):
             row["flow"] = flow
             row["drop"] = self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
-            if flow == 0.0 and abs(row["drop"]) <= ROUNDING_SHARE * (
-                PRESSURE_SCALE + abs(self.answer.potential[row["from_node"]])
-            ):
+            size = PRESSURE_SCALE + abs(self.answer.potential[row["from_node"]])
+            if flow == 0.0 and abs(row["drop"]) <= ROUNDING_SHARE * size:
                 row["drop"] = 0.0
             if row["hooks"] >= 0:
                 self.valve_lowering(k).follow(self, k)
@@ -457,11 +426,6 @@ class SteadyStart:
                 row["open"] = 0.0
             elif row["transition"] == 0.0 and row["open"] > 0.0:
                 row["drop"] = abs(flow) * flow / here
-
-    def begin_devices(self) -> None:
-        """Fill in data of every device that depend on the initial steady state."""
-        for (_, part, device), row in zip(self.draft.devices, self.draft.device_table, strict=True):
-            self.moving += device.begin(self, part, row)
 
     def set_point_tolerance(self, end: str) -> float:
         """Tolerance of a regulated pressure [Pa], 1e-6 of PRESSURE_SCALE.
@@ -491,9 +455,8 @@ class SteadyStart:
         for (name, node), row, inflow in zip(self.case.places.items(), self.nodes, net, strict=True):
             name = name.removesuffix(".inside")
             if inflow != 0.0:
-                text = lowering_of(type(node)).motion_text(
-                    name, node, row, inflow, inflow / fluid.density, self.case.amount
-                )
+                own = lowering_of(type(node))
+                text = own.motion_text(name, node, row, inflow, inflow / fluid.density, self.case.amount)
                 moving += [text] if text else []
         amount = self.case.amount
         for name, pressure in self.unbalanced_drops.items():
@@ -504,11 +467,10 @@ class SteadyStart:
                 drop = amount(row["offset"], "pressure", span=True)
                 moving.append(f"rigid column {name}: an unbalanced pressure of {drop} drives its flow")
         for k, (name, row) in enumerate(zip(self.draft.valve_names, self.valves, strict=True)):
-            if row["drop"] != 0.0 and row["open"] == 0.0 and row["flow"] == 0.0:
-                if self.conductance(k) > 0.0:
-                    moving.append(
-                        f"valve {name}: open with {amount(row['drop'], 'pressure', span=True)} across it; a flow starts"
-                    )
+            still = row["drop"] != 0.0 and row["open"] == 0.0 and row["flow"] == 0.0
+            if still and self.conductance(k) > 0.0:
+                drop = amount(row["drop"], "pressure", span=True)
+                moving.append(f"valve {name}: open with {drop} across it; a flow starts")
         if self.case.numerics.initial == "equilibrium":
             for text in moving:
                 self.draft.fault("numerics.initial", f'"equilibrium" expects that nothing moves, but {text}')

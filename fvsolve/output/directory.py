@@ -9,19 +9,9 @@ from filelock import FileLock, Timeout
 
 from fvsolve.case.resource_checks import LEAST_TEXT, byte_text, disk_size
 from fvsolve.errors import RunError
-from fvsolve.output.csv_files import (
-    HistoryFile,
-    LineSeries,
-    clear_lines,
-    envelope_in_units,
-    read_envelope,
-    read_table,
-    with_initial_heads,
-    write_envelope,
-    write_routes,
-)
-from fvsolve.output.fields import FieldSeries
-from fvsolve.output.parallel_vtk import ParallelBasinWriter
+from fvsolve.output import csv_files
+from fvsolve.output.csv_files import read_envelope, read_table
+from fvsolve.output.fields import FieldSeries, ParallelBasinWriter
 from fvsolve.output.restart import Restart, identity, read_restart, write_restart
 from fvsolve.output.summary_file import read_summary
 from fvsolve.output.unit_columns import probe_columns, time_column
@@ -78,10 +68,10 @@ class RunDirectory:
             raise RunError("--resume continues a run and --force starts it again; state only one of them")
         _refuse_reserved_names(model.case)
         self.identity = identity(model.case)
-        self.history = HistoryFile(self.folder / "history.csv", time_column(model.case), probe_columns(model))
+        self.history = csv_files.HistoryFile(self.folder / "history.csv", time_column(model.case), probe_columns(model))
         drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.basins) + len(model.body_names) > 0
         self.fields = FieldSeries(self.folder, model) if drawn else None
-        self.lines = LineSeries(self.folder, model) if model.case.output.lines else None
+        self.lines = csv_files.LineSeries(self.folder, model) if model.case.output.lines else None
         if self.folder.exists() and not self.folder.is_dir():
             raise RunError(f"{self.folder} is a file. Expected a directory; choose another directory with --out DIR")
         self.lock = lock_folder(self.folder, "a run")
@@ -167,10 +157,11 @@ class RunDirectory:
             self.history.close()
             if summary.envelope:
                 case = self.model.case
-                envelope = envelope_in_units(with_initial_heads(summary, self.model), case)
-                write_envelope(self.folder / "envelope.csv", envelope, case)
+                envelope = csv_files.with_initial_heads(summary, self.model)
+                envelope = csv_files.envelope_in_units(envelope, case)
+                csv_files.write_envelope(self.folder / "envelope.csv", envelope, case)
                 if case.routes:
-                    write_routes(self.folder / "routes.csv", envelope, case)
+                    csv_files.write_routes(self.folder / "routes.csv", envelope, case)
 
     def close(self) -> None:
         """Close open files and release the lock of the directory, also after a failed run."""
@@ -232,12 +223,9 @@ def read_directory(folder: Path) -> tuple:
     The functions read the files when called. Raises RunError if the folder contains no finished run.
     """
     summary = read_summary(folder / SUMMARY_FILE)
-    return (
-        summary,
-        lambda: read_table(folder / "history.csv"),
-        lambda: read_envelope(folder / "envelope.csv") if "envelope.csv" in summary["files"] else {},
-        folder,
-    )
+    envelope = folder / "envelope.csv"
+    read = (lambda: read_envelope(envelope)) if envelope.name in summary["files"] else dict
+    return summary, lambda: read_table(folder / "history.csv"), read, folder
 
 
 def clear_run_files(folder: Path) -> None:
@@ -246,7 +234,7 @@ def clear_run_files(folder: Path) -> None:
         (folder / name).unlink(missing_ok=True)
     for path in (folder / "fields").glob("*.*vtu"):
         path.unlink()
-    clear_lines(folder)
+    csv_files.clear_lines(folder)
 
 
 def clear_reports(folder: Path) -> None:
@@ -259,18 +247,15 @@ def clear_reports(folder: Path) -> None:
 def _refuse_reserved_names(case) -> None:
     for name, path in case.copies.items():
         if name in (SUMMARY_FILE, *RUN_FILES, *PICTURE_FILES, *REPORT_FILES):
-            raise RunError(
-                f"{path} has the name of a file that a run writes ({name}); rename your file, and correct the case"
-            )
+            text = f"{path} has the name of a file that a run writes ({name})"
+            raise RunError(f"{text}; rename your file, and correct the case")
 
 
 def _refuse_full_disk(folder: Path, case) -> None:
     least, free = disk_size(case, LEAST_TEXT, 0), shutil.disk_usage(folder).free
     if least > free:
-        raise RunError(
-            f"{folder}: history.csv needs at least {byte_text(least)}, but {byte_text(free)} are free. Expected a "
-            "longer interval `output.every`, or another directory with --out DIR"
-        )
+        text = f"{folder}: history.csv needs at least {byte_text(least)}, but {byte_text(free)} are free"
+        raise RunError(f"{text}. Expected a longer interval `output.every`, or another directory with --out DIR")
 
 
 def existing_pictures(folder: Path) -> list[str]:
@@ -282,7 +267,5 @@ def _refuse_existing_run(folder: Path) -> None:
     if (folder / SUMMARY_FILE).exists():
         raise RunError(f"{folder} holds a run; replace it with --force, or keep it and choose another --out DIR")
     if (folder / "restart.npz").exists():
-        raise RunError(
-            f"{folder} holds an unfinished run; continue it with --resume, start it again with --force, "
-            "or choose another directory with --out DIR"
-        )
+        text = f"{folder} holds an unfinished run; continue it with --resume, start it again with --force"
+        raise RunError(f"{text}, or choose another directory with --out DIR")

@@ -33,12 +33,8 @@ def plan_positions(case, lengths: dict[str, float]) -> dict[str, np.ndarray]:
     names = [*case.nodes, *owners]
     index = {name: i for i, name in enumerate(names)}
     short = SHORT_LINK * max(lengths.values(), default=1.0)
-    edges = [
-        (index[hub], index[other], max(lengths.get(name, short), short))
-        for name, ends in ports.items()
-        for hub, *others in [[name, *ends] if name in owners else ends]
-        for other in others
-    ]
+    edges = [(index[hub], index[other], max(lengths.get(name, short), short)) for name, ends in ports.items()
+             for hub, *others in [[name, *ends] if name in owners else ends] for other in others]  # fmt: skip
     plan = _plan(len(names), edges)
     return dict(zip(names, plan, strict=True))
 

@@ -1,7 +1,5 @@
 """restart.npz: state and arrays from which a run continues with exactly the same results."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import json

@@ -21,30 +21,17 @@ REQUIRED_KEYS = (
 def summary_data(summary, model) -> dict:
     """Results of a run as plain data in SI for summary.json; only the extremes are in the units of the probes."""
     return {
-        "title": model.case.title,
-        "case": model.case.name,
-        "reason": summary.reason,
-        "ok": bool(summary.ok),
-        "t": float(summary.t),
-        "invalid_from": plain(float(summary.invalid_from)),
-        "marks": [{"what": mark.what, "place": mark.place, "time": float(mark.time), "text": mark.text}
-                  for mark in summary.marks],
-        "cavities": [asdict(cavity) for cavity in summary.cavities],
-        "events": [{"time": float(item.time), "name": item.name, "what": item.what} for item in summary.events],
+        "title": model.case.title, "case": model.case.name, "reason": summary.reason, "ok": bool(summary.ok),
+        "t": float(summary.t), "invalid_from": plain(float(summary.invalid_from)),
+        "marks": [asdict(mark) for mark in summary.marks], "cavities": [asdict(cavity) for cavity in summary.cavities],
+        "events": [asdict(event) for event in summary.events],
         "probes": {item.name: {"dimension": item.dimension, "unit": item.unit} for item in probe_columns(model)},
         "time_unit": time_column(model.case).unit,
         "envelope_units": {item.name: item.unit for item in envelope_columns(model.case)},
-        "ambient_pressure": model.case.ambient_pressure,
-        "fluid": model.case.properties.plain(),
-        "extremes": _extremes(summary, model),
-        "ledgers": plain(summary.ledgers),
-        **summary.counts,
-        "methods": summary.methods,
-        "cells": int(summary.cells),
-        "threads": int(summary.threads),
-        "seconds": float(summary.seconds),
-        "seconds_setup": float(summary.seconds_setup),
-        "cost": plain(summary.cost),
+        "ambient_pressure": model.case.ambient_pressure, "fluid": model.case.properties.plain(),
+        "extremes": _extremes(summary, model), "ledgers": plain(summary.ledgers), **summary.counts,
+        "methods": summary.methods, "cells": int(summary.cells), "threads": int(summary.threads),
+        "seconds": float(summary.seconds), "seconds_setup": float(summary.seconds_setup), "cost": plain(summary.cost),
         "warnings": [item.plain() for item in (*model.warnings, *summary.warnings)],
     }  # fmt: skip
 

@@ -204,20 +204,15 @@ def _layout(y: str, x: str, height: int) -> dict[str, Any]:
             "separatethousands": True}  # fmt: skip
     background = {"bgcolor": BACKGROUND, "bordercolor": HAIR}
     return {
-        "height": height,
-        "margin": {"l": 62, "r": 14, "t": TOOLBAR_HEIGHT + 6, "b": 50},
-        "paper_bgcolor": BACKGROUND,
-        "plot_bgcolor": BACKGROUND,
+        "height": height, "margin": {"l": 62, "r": 14, "t": TOOLBAR_HEIGHT + 6, "b": 50},
+        "paper_bgcolor": BACKGROUND, "plot_bgcolor": BACKGROUND,
         "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": MUTED, "activecolor": INK},
-        "font": {"family": FONT, "size": 12, "color": INK},
-        "separators": ".\u202f",
-        "hovermode": "x unified",
+        "font": {"family": FONT, "size": 12, "color": INK}, "separators": ".\u202f", "hovermode": "x unified",
         "hoverlabel": {"namelength": -1, "font": {"size": 11, "color": INK}} | background,
-        "dragmode": "zoom",
-        "showlegend": False,
+        "dragmode": "zoom", "showlegend": False,
         "xaxis": axis | {"title": {"text": escape_markup(x), "standoff": 8}},
         "yaxis": axis | {"title": {"text": escape_markup(y), "standoff": 8}},
-    }
+    }  # fmt: skip
 
 
 def _band(a: float, b: float, colour: str, opacity: float) -> dict[str, Any]:

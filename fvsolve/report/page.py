@@ -13,11 +13,17 @@ from fvsolve.draw.plot import probe_quantity, thin_series
 from fvsolve.errors import visible
 from fvsolve.output.unit_columns import column
 from fvsolve.report import figures as plots
-from fvsolve.report import import_library, model_tables, run_tables
-from fvsolve.report.long_section import MAX_BINS, Section, envelope_column, head_animations, section_of
-from fvsolve.report.run_tables import Sentence, open_reason
-from fvsolve.report.section_pipes import SectionPath, section_paths
-from fvsolve.report.tables import ERROR_HEADER, ReportTable, in_unit, value_text
+from fvsolve.report import import_library, tables
+from fvsolve.report.long_section import (
+    MAX_BINS,
+    Section,
+    SectionPath,
+    envelope_column,
+    head_animations,
+    section_of,
+    section_paths,
+)
+from fvsolve.report.tables import ERROR_HEADER, ReportTable, Sentence, in_unit, open_reason, value_text
 from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN, not_valid
 from fvsolve.units import span
 
@@ -35,29 +41,23 @@ def page(result, ways: list[SectionPath]) -> str:
     """HTML text of the report of a run; ways : paths of its long sections."""
     sections = [section_of(result, way) for way in ways]
     figures: dict[str, Any] = {}
-    probes = run_tables.extremes_of_probes(result)
-    places = [*run_tables.worst_tables(result), *run_tables.ranked_pipes(result)]
-    numerics = run_tables.settings, run_tables.ledgers, run_tables.claim_table, run_tables.comparisons
+    probes = tables.extremes_of_probes(result)
+    places = [*tables.worst_tables(result), *tables.ranked_pipes(result)]
     filled = {
-        "invalid": not_valid(result.summary),
-        "title": visible(result.summary["title"] or result.summary["case"]),
-        "run": result.summary,
-        "description": visible(result.case.description),
-        "source": visible(result.case.source),
-        "ended": result.summary.get("ended", ""),
-        "words": run_tables.top_sentences(result),
-        "limits": run_tables.verdict_table(result),
-        "worst": run_tables.extremes_of_pipes(result, ways) or probes,
-        "sections": _sections(result, sections, figures),
-        "histories": _histories(result, figures),
+        "invalid": not_valid(result.summary), "title": visible(result.summary["title"] or result.summary["case"]),
+        "run": result.summary, "description": visible(result.case.description),
+        "source": visible(result.case.source), "ended": result.summary.get("ended", ""),
+        "words": tables.top_sentences(result), "limits": tables.verdict_table(result),
+        "worst": tables.extremes_of_pipes(result, ways) or probes,
+        "sections": _sections(result, sections, figures), "histories": _histories(result, figures),
         "probes_left_out": len(result.probes) - len(plots.chosen_probes(result)),
         "places": [*places, *[probes] * bool(probes and result.envelope)],
-        "model": [*filter(None, model_tables.all_tables(result))],
-        "numbers": [*filter(None, [table(result) for table in numerics])],
+        "model": [*filter(None, tables.model_tables(result))],
+        "numbers": [*filter(None, tables.numerics_tables(result))],
         "told": _warning_texts([notice.text for notice in result.warnings if notice.ok]),
-        "happened": [table for table in (run_tables.cavities(result), run_tables.events(result)) if table],
-        "versions": run_tables.versions(result),
-    }
+        "happened": [table for table in (tables.cavities(result), tables.events(result)) if table],
+        "versions": tables.versions(result),
+    }  # fmt: skip
     return render_page("page", filled, figures)
 
 
@@ -147,8 +147,8 @@ def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) ->
         "version": first.summary["versions"]["fvsolve"], "description": visible(first.case.description),
         "words": study_sentences(study, runs), "matrix": [run_matrix(runs)], "events": events,
         "failing": failing_limits(runs), "changes": change_tables(study), "first": run_name(runs[0][0]),
-        "model": [table for table in model_tables.all_tables(first) if table is not None],
-        "told": warning_texts(runs), "versions": run_tables.versions(first),
+        "model": [table for table in tables.model_tables(first) if table is not None],
+        "told": warning_texts(runs), "versions": tables.versions(first),
     }  # fmt: skip
     return render_page("study", filled, figures)
 
@@ -256,10 +256,8 @@ def event_figures(event: str | None, number: int, runs: list, figures: dict[str,
         entries.append({"id": f"section-{number}-{k}", "name": visible(first.name), "caption": CAPTION})
     shared = [name for name in own[0][1].probes if all(name in result.units for _, result in own)]
     for k, probe in enumerate(shared[:MAX_PROBES]):
-        lines = [
-            plots.Series(name or "the case", *thin_series(result.t, result[probe], SERIES_POINTS), seen=True)
-            for name, result in own
-        ]
+        lines = [plots.Series(name or "the case", *thin_series(result.t, result[probe], SERIES_POINTS), seen=True)
+                 for name, result in own]  # fmt: skip
         panel = plots.HistoryPanel(probe_quantity(probe), own[0][1].units[probe], lines)
         figures[f"history-{number}-{k}"] = plots.history_figure(panel, own[0][1].summary["time_unit"], None)
         entries.append({"id": f"history-{number}-{k}", "name": visible(probe), "caption": ""})

@@ -1,21 +1,28 @@
-"""Report files of a run or study: HTML pages, and workbooks (.xlsx) of all tables with all rows."""
+"""Report files of a run or study: HTML pages, and workbooks (.xlsx) of all tables with all rows.
+
+Picture files of a run: long sections, histories of chosen probes, and phase planes.
+"""
 
 import math
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from urllib.parse import quote
 
 import numpy as np
 
-from fvsolve.errors import FvsolveError, RunError, listing, visible
+from fvsolve.display import save_if_path
+from fvsolve.draw.plot import history_figure, phase_figure, section_figure
+from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing, visible
 from fvsolve.output.csv_files import ENVELOPE_QUANTITIES
-from fvsolve.report import import_library, model_tables, page, run_tables
-from fvsolve.report.long_section import Section, envelope_column, section_of
-from fvsolve.report.section_pipes import SectionPath, section_paths
+from fvsolve.report import import_library, page, tables
+from fvsolve.report.long_section import Section, SectionPath, envelope_column, head_window, section_of, section_paths
 from fvsolve.report.tables import ReportTable, is_number
 from fvsolve.run import open_run
+from fvsolve.run.result import not_valid
 from fvsolve.studies.scenarios import STUDY, open_study
+from fvsolve.units import show
 
 PAGE_FILE = "report.html"
 REQUIRED_KEYS = ("fluid", "cells", "methods", "steps", "rejections", "rhs", "seconds", "events", "cavities")
@@ -113,25 +120,22 @@ def write_tables(report_tables: list[ReportTable], path: Path) -> Path:
 
 def workbook_tables(result, sections: list[SectionPath]) -> list[ReportTable]:
     """All tables of a run for a workbook; a table of a section has a row for each point."""
-    words = ReportTable("Summary", ("", ""), [[item.head, item.text] for item in run_tables.top_sentences(result)])
+    words = ReportTable("Summary", ("", ""), [[item.head, item.text] for item in tables.top_sentences(result)])
     warnings = [[item.kind, item.place, item.text] for item in result.warnings]
     notes = ReportTable("Warnings", ("kind", "place", "text"), warnings)
-    versions = run_tables.versions(result)
+    versions = tables.versions(result)
     contents = [
         words,
-        run_tables.verdict_table(result),
-        *run_tables.worst_tables(result),
-        run_tables.extremes_of_pipes(result, sections),
-        *run_tables.ranked_pipes(result),
-        run_tables.extremes_of_probes(result),
+        tables.verdict_table(result),
+        *tables.worst_tables(result),
+        tables.extremes_of_pipes(result, sections),
+        *tables.ranked_pipes(result),
+        tables.extremes_of_probes(result),
         *(_section_table(result, section_of(result, way)) for way in sections),
-        run_tables.cavities(result),
-        run_tables.events(result),
-        *model_tables.all_tables(result),
-        run_tables.settings(result),
-        run_tables.ledgers(result),
-        run_tables.claim_table(result),
-        run_tables.comparisons(result),
+        tables.cavities(result),
+        tables.events(result),
+        *tables.model_tables(result),
+        *tables.numerics_tables(result),
         notes,
         ReportTable("Versions", versions.headers, versions.rows),
     ]
@@ -190,3 +194,90 @@ def _sheet_name(title: str, taken: set[str]) -> str:
         name = f"{plain[: MAX_SHEET_NAME - 1 - len(str(k))]} {k}"
     taken.add(name.casefold())
     return name
+
+
+def write_pictures(
+    directory: str | Path, probes: str = "", route: str = "", phases: Sequence[str] = (), out: str | Path | None = None
+) -> list[Path]:
+    """Write pictures of a run into the folder `out` (default: the run directory); returns their paths.
+
+    probes : names separated by commas, drawn in probes.png
+    route : name of a section; all sections are drawn if probes, route and phases are empty
+    phases : pairs of probes "X:Y", drawn in phase.png
+    Raises RunError if the directory holds no finished run, FvsolveError with all unknown names, or if there is nothing
+    to draw.
+    """
+    result, folder = open_checked_run(Path(directory)), Path(out) if out is not None else Path(directory)
+    faults: list[str] = []
+    picked = parse_probes(result, probes, faults)
+    pairs = [_phase_pair(result, text, faults) for text in phases]
+    sections = _chosen_sections(section_paths(result), route, bool(picked or phases), faults)
+    if faults:
+        raise FvsolveError("\n".join(faults))
+    title, drawn = result.summary["title"], {}
+    for k, way in enumerate(sections, 1):
+        section = section_of(result, way)
+        window = head_window([section], envelope_column(result, "max_head").unit)
+        names = "\n".join(filter(None, [title, way.name]))
+        figure = section_figure(section, window, result.summary["envelope_units"], names)
+        drawn["section.png" if len(sections) == 1 else f"section-{k}.png"] = figure
+    if picked:
+        data = result.history_drawn()
+        columns = [result.probes.index(name) for name in picked]
+        measured = {name: series for name, series in data["measured"].items() if name in picked}
+        drawn["probes.png"] = history_figure(**{**data, "values": data["values"][:, columns], "measured": measured,
+                                                "probes": [data["probes"][k] for k in columns]})  # fmt: skip
+    if pairs:
+        drawn["phase.png"] = phase_figure([[(n, result.units[n], result[n]) for n in pair] for pair in pairs], title)
+    if not drawn:
+        reason = f"run is {text}" if (text := not_valid(result.summary)) else "case has no pipes"
+        raise FvsolveError(f"{directory}: the {reason}, so it has no long section. Choose --probes or --phase X:Y")
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, figure in drawn.items():
+        save_if_path(figure, folder / name)
+    return [folder / name for name in drawn]
+
+
+def parse_probes(result, text: str, faults: list[str]) -> list[str]:
+    """Names of probes in a list such as `a.head,tank.depth@1,2`, in which a name may contain commas.
+
+    Unknown names are added to `faults`.
+    """
+    names, pieces = [], [piece.strip() for piece in text.split(",")] if text else []
+    while pieces:
+        ends = [k for k in range(1, len(pieces) + 1) if ",".join(pieces[:k]) in result.units]
+        n = ends[-1] if ends else 1
+        name, pieces = ",".join(pieces[:n]), pieces[n:]
+        if ends:
+            names.append(name)
+        else:
+            faults.append(_unknown_probe(result, name))
+    return list(dict.fromkeys(names))
+
+
+def _phase_pair(result, text: str, faults: list[str]) -> list[str]:
+    names = [name.strip() for name in text.split(":")]
+    if len(names) != 2:
+        faults.append(f"--phase {show(text)}: expected two probes, X:Y")
+    faults += [_unknown_probe(result, name) for name in names if len(names) == 2 and name not in result.units]
+    return names
+
+
+def _unknown_probe(result, name: str) -> str:
+    hint = did_you_mean(name, result.units) or f"; the run has {listing(result.units) or 'none'}"
+    return f"{show(name)}: unknown probe{hint}"
+
+
+def _chosen_sections(sections: list[SectionPath], route: str, others: bool, faults: list[str]) -> list[SectionPath]:
+    """Sections to draw: the section `route`, or all sections unless `others` (probes or phase planes) are drawn.
+
+    Adds an unknown route to `faults`.
+    """
+    if not route:
+        return [] if others else sections
+    named = [way for way in sections if way.name == route]
+    if not named:
+        names = [way.name for way in sections]
+        hint = did_you_mean(route, names) or f"; the run has {listing(names) or 'none'}"
+        faults.append(f"{show(route)}: unknown route{hint}")
+    return named

@@ -13,8 +13,8 @@ from fvsolve.output.memory_sink import MemorySink
 from fvsolve.output.restart import identity
 from fvsolve.output.summary_file import summary_data, write_summary
 from fvsolve.run import mpi_run
-from fvsolve.run.case_claims import claims
 from fvsolve.run.result import Result, check_summary
+from fvsolve.run.verdicts import claims
 from fvsolve.validation import COUNT_FROM_ONE, FLAG, FUNCTION, PATH, TABLE, validated
 
 __all__ = ["Result", "open_run", "run"]
@@ -97,9 +97,8 @@ def sink_of(model, out: str | Path | None, force: bool, resume: bool, threads: i
     """
     with mpi_run.rank_zero_first(comm := mpi_run.world()):
         if comm is not None and threads > 1:
-            raise RunError(
-                f"threads = {threads}: under MPI each of the {comm.size} ranks is one thread; leave out `threads`"
-            )
+            text = f"threads = {threads}: under MPI each of the {comm.size} ranks is one thread"
+            raise RunError(f"{text}; leave out `threads`")
         if out is not None:
             return RunDirectory(Path(out), model, force, resume)
         if resume:

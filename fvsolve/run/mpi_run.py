@@ -30,9 +30,8 @@ def world():
     try:
         from mpi4py import MPI
     except ImportError as error:
-        raise FvsolveError(
-            f"MPI started {count} processes, but mpi4py is not installed ({error}); {EXTRA} installs mpi4py"
-        ) from None
+        text = f"MPI started {count} processes, but mpi4py is not installed ({error})"
+        raise FvsolveError(f"{text}; {EXTRA} installs mpi4py") from None
     if MPI.COMM_WORLD.size < 2:
         text = f"MPI started {count} processes, but the MPI of mpi4py sees each of them as a single process"
         raise FvsolveError(f"{text}; start them with the mpiexec of the MPI that mpi4py uses; {EXTRA} installs an MPI")
@@ -49,8 +48,7 @@ def digest(model) -> str:
     hashed = hashlib.sha256()
     for array in (*model.tables, model.start, model.scale):
         hashed.update(array.tobytes())
-    numerics = model.case.numerics
-    return hashed.hexdigest() + repr(numerics)
+    return hashed.hexdigest() + repr(model.case.numerics)
 
 
 @contextmanager

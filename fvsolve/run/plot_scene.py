@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.case.basins import patch_names
-from fvsolve.draw.projection import PLAUSIBLE_SCALE
-from fvsolve.draw.scene import DrawnPart, DrawnScene, DrawnUnit
+from fvsolve.draw.scene import PLAUSIBLE_SCALE, DrawnPart, DrawnScene, DrawnUnit
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.output import network_layout
 from fvsolve.output.fields import FIELD_UNITS, read_pipe_lines
@@ -90,9 +89,8 @@ def parts_of(case, plan: dict[str, np.ndarray]) -> list[DrawnPart]:
                                    joint=node.kind == "junction", held=fixed))  # fmt: skip
     nodes = {part.name: part for part in parts}
     for name, link in links.items():
-        ends = [
-            nodes[network_layout.place(port)].at for port in link.ports.values() if network_layout.place(port) in nodes
-        ]
+        owners = [network_layout.place(port) for port in link.ports.values()]
+        ends = [nodes[owner].at for owner in owners if owner in nodes]
         if not (ends or name in plan):
             continue
         at = np.array([*plan[name], np.mean([end[2] for end in ends]) if ends else 0.0]) if name in plan else None

@@ -70,9 +70,8 @@ def _folder() -> Path:
         raise FvsolveError("NUMBA_DISABLE_JIT is set, so nothing is compiled; unset this variable")
     requested, folder = os.environ.get("FVSOLVE_CACHE"), jit.cache_folder()
     if requested and Path(requested).expanduser().absolute() != folder:
-        raise FvsolveError(
-            f"FVSOLVE_CACHE = {requested}: cannot be written; expected a writable folder for compiled code"
-        )
+        text = f"FVSOLVE_CACHE = {requested}: cannot be written"
+        raise FvsolveError(f"{text}; expected a writable folder for compiled code")
     return jit.code_folder()
 
 

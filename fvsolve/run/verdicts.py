@@ -1,6 +1,4 @@
-"""Extremes over all steps in the parts of a limit or claim, and verdicts on the design limits of a case."""
-
-from __future__ import annotations
+"""Comparison of a run with its case: extremes, design limits, expected values, measured series; and of two runs."""
 
 import math
 from dataclasses import dataclass, replace
@@ -13,8 +11,8 @@ from fvsolve.case.claims import VACUUM
 from fvsolve.case.pipe_routes import Leg, is_cut, legs, pipe_leg
 from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.output.csv_files import with_initial_heads
-from fvsolve.output.unit_columns import UnitColumn, column
-from fvsolve.run.result import FAILS, HOLDS, OPEN
+from fvsolve.output.unit_columns import UnitColumn, column, probe_columns
+from fvsolve.run.result import FAILS, HOLDS, OPEN, Comparison
 
 ENVELOPE_KEYS = ("distance", "elevation", "min_pressure", "t_min", "max_pressure", "t_max")
 ROUNDING = 1e-9  # relative to a limit and the typical size of its quantity; a smaller excess is within the limit
@@ -63,7 +61,10 @@ def part_extremes(model, summary, extent) -> list[PartExtremes]:
         if group == "links" and name in envelope:
             parts.append(PartExtremes(group, name, *(np.asarray(envelope[name][key]) for key in ENVELOPE_KEYS)))
         elif group == "links" and name in rows:
-            parts.append(along_pipe(summary, pipes[name], rows[name]))
+            # probes of which only extremes are recorded
+            distance = np.array([probe.fraction for probe in rows[name]]) * pipes[name].length
+            found = np.array([summary.watched[probe.text] for probe in rows[name]])
+            parts.append(PartExtremes("links", name, distance, pipes[name].height(distance), *found.T))
         else:
             z = model.elevation.get(name, np.nan) if group == "nodes" else np.nan
             extremes = summary.watched[f"{group}.{name}.{quantity}"]
@@ -76,13 +77,6 @@ def valid(part: PartExtremes, until: float) -> PartExtremes:
     sides = {side: np.where(getattr(part, f"t_{side[:3]}") < until, getattr(part, side), np.nan)
              for side in ("minimum", "maximum")}  # fmt: skip
     return replace(part, **sides)
-
-
-def along_pipe(summary, pipe, rows: list) -> PartExtremes:
-    """Extremes along a pipe, from the probes `rows` of which only extremes are recorded."""
-    distance = np.array([probe.fraction for probe in rows]) * pipe.length
-    extremes = np.array([summary.watched[probe.text] for probe in rows])
-    return PartExtremes("links", pipe.name, distance, pipe.height(distance), *extremes.T)
 
 
 def in_quantity(model, quantity: str, pressure, elevation):
@@ -165,14 +159,10 @@ def places(model, summary) -> list[list[dict[str, Any]]]:
 
 def verdict(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Verdict on a limit, from its rows of `places`: the worst row, with the list `worst` of the worst rows added."""
-    rows = [{key: value for key, value in row.items() if key != PLACES_KEY} for row in sorted(rows, key=sort_key)]
+    rows = [{key: value for key, value in row.items() if key != PLACES_KEY} for row in rows]
+    rows.sort(key=lambda row: (STATES.index(row["state"]), -math.inf if row["margin"] is None else row["margin"]))
     listed = [{key: value for key, value in row.items() if key not in SHARED} for row in worst(rows)]
     return {**rows[0], "ok": rows[0]["state"] == HOLDS, "worst": listed}
-
-
-def sort_key(row: dict[str, Any]) -> tuple[int, float]:
-    """Key for sorting rows, worst first: by state, then by margin."""
-    return STATES.index(row["state"]), -math.inf if row["margin"] is None else row["margin"]
 
 
 def worst(rows: list[dict]) -> list[dict]:
@@ -189,9 +179,8 @@ def nearest(model, summary, limit, part: PartExtremes, complete: bool):
     complete : True if the run can decide that a limit holds
     """
     quantity = limit.extent.quantity
-    for bound, (values, times), sign in zip(
-        ("minimum", "maximum"), extremes(model, quantity, part), (1.0, -1.0), strict=True
-    ):
+    both = zip(("minimum", "maximum"), extremes(model, quantity, part), (1.0, -1.0), strict=True)
+    for bound, (values, times), sign in both:
         bounds = allowed(model, limit, bound, part)
         if bounds is None:
             continue
@@ -276,23 +265,6 @@ def extremes(model, quantity: str, part: PartExtremes):
     return (low, t_low), (high, t_high)
 
 
-def row_of(row: Nearest, shown: UnitColumn, chainage: Chainages, extent) -> dict[str, Any]:
-    """Dict for a position: part, chainage and elevation [m], time [s]; value, limit, margin in the unit of `shown`."""
-    part, at, known = row.part, row.at, not math.isnan(row.margin)
-    return {
-        "place": part.part, "chainage": chainage.of(part, at, extent.on) if known else None,
-        "elevation": finite(part.elevation[at]), "time": finite(row.time) if known else None, "bound": row.bound,
-        "value": finite(shown.from_si(row.value)), "limit": finite(shown.from_si(row.limit)),
-        "margin": finite(shown.span_from_si(row.margin)), "unit": shown.unit, "error": None, "reason": None,
-        "state": row.state,
-    }  # fmt: skip
-
-
-def finite(value) -> float | None:
-    """Number for JSON; None if it is not finite."""
-    return float(value) if math.isfinite(value) else None
-
-
 class Chainages:
     """Chainages of positions: along a route that the limit names, else along another route, else along the pipe."""
 
@@ -323,3 +295,176 @@ class Chainages:
     def ordered(self, on: tuple[str, ...]) -> list[str]:
         """Names of all routes in order of preference: routes that the limit names first, those of a cut pipe last."""
         return sorted(self.legs, key=lambda name: (is_cut(name, self.case.routes[name].pipes), name not in on))
+
+
+def row_of(row: Nearest, shown: UnitColumn, chainage: Chainages, extent) -> dict[str, Any]:
+    """Dict for a position: part, chainage and elevation [m], time [s]; value, limit, margin in the unit of `shown`."""
+    part, at, known = row.part, row.at, not math.isnan(row.margin)
+    return {
+        "place": part.part, "chainage": chainage.of(part, at, extent.on) if known else None,
+        "elevation": finite(part.elevation[at]), "time": finite(row.time) if known else None, "bound": row.bound,
+        "value": finite(shown.from_si(row.value)), "limit": finite(shown.from_si(row.limit)),
+        "margin": finite(shown.span_from_si(row.margin)), "unit": shown.unit, "error": None, "reason": None,
+        "state": row.state,
+    }  # fmt: skip
+
+
+def finite(value) -> float | None:
+    """Number for JSON; None if it is not finite."""
+    return float(value) if math.isfinite(value) else None
+
+
+def comparison(compare, column: UnitColumn, result) -> dict:
+    """Entry of the summary for one measured series: differences at the measured times in the run, and both peaks.
+
+    compare : series of the case; column : unit of its probe. Differences are computed minus measured values; they and
+    the peaks are in the unit of the probe, times in s. All are None if no measured time is within the run.
+    """
+    t, computed = result.seconds, result[column.name]
+    time, measured = compare.t + compare.shift, column.from_si(compare.v)
+    within = (time >= t[0]) & (time <= t[-1]) if len(t) else np.zeros(len(time), bool)
+    time, measured = time[within], measured[within]
+    head = [column.name, column.unit, compare.file, float(compare.shift), len(time)]
+    if not len(time):
+        return dict.fromkeys(Comparison._fields) | dict(zip(Comparison._fields, head, strict=False))
+    difference = interpolated(t, computed, time) - measured
+    overlap = (t >= time.min()) & (t <= time.max())
+    peak, top = int(np.argmax(measured)), int(np.argmax(np.where(overlap, computed, -np.inf)))
+    worst = int(np.argmax(np.abs(difference)))
+    values = [np.sqrt(np.mean(difference**2)), difference[worst], time[worst]]
+    values += [measured[peak], time[peak], computed[top], t[top]]
+    return dict(zip(Comparison._fields, [*head, *map(float, values)], strict=True))
+
+
+def interpolated(t: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Values at `times`, linear between rows (t, values); at a jump (two rows at one time) the value of the later row.
+
+    Beyond the rows they are those of the first and last row.
+    """
+    times = np.asarray(times, float)
+    after = np.clip(np.searchsorted(t, times, side="right"), 1, max(len(t) - 1, 1))
+    if len(t) == 1:
+        return np.full(times.shape, values[0])
+    before = after - 1
+    gap = t[after] - t[before]
+    part = np.where(gap > 0.0, (times - t[before]) / np.where(gap > 0.0, gap, 1.0), 1.0)
+    exact = values[before] + part * (values[after] - values[before])
+    return np.where(part >= 1.0, values[after], np.where(part <= 0.0, values[before], exact))
+
+
+def differences(a, b) -> dict:
+    """Greatest and rms difference `b` - `a` of two results, for each probe that both have.
+
+    The differences are in the units of `a`, at those times of `a` that are within both runs; if the times of `b`
+    differ, its values are interpolated. The greatest is that of the greatest magnitude, with its sign. Without common
+    times they are None. "only_a" and "only_b" list probes of one run only.
+    """
+    shared = [probe for probe in a.probes if probe in b.units]
+    return {
+        "a": str(a.directory),
+        "b": str(b.directory),
+        "probes": {probe: _difference(a, b, probe) for probe in shared},
+        "only_a": [probe for probe in a.probes if probe not in b.units],
+        "only_b": [probe for probe in b.probes if probe not in a.units],
+    }
+
+
+def _difference(a, b, probe: str) -> dict:
+    column = a.column(probe)
+    other = b[probe] if a.units[probe] == b.units[probe] else column.from_si(b.si(probe))
+    t, ours, theirs = a.seconds, a[probe], b.seconds
+    if not np.array_equal(t, theirs):
+        within = (t >= theirs[0]) & (t <= theirs[-1])
+        t, ours = t[within], ours[within]
+        other = interpolated(theirs, other, t)
+    difference = other - ours
+    worst = int(np.argmax(np.abs(difference))) if len(t) else 0
+    return {"unit": column.unit, "rows": len(t), "greatest": float(difference[worst]) if len(t) else None,
+            "t_greatest": float(t[worst]) if len(t) else None,
+            "rms": float(np.sqrt(np.mean(difference**2))) if len(t) else None}  # fmt: skip
+
+
+def claims(model, summary, result) -> dict:
+    """Entries `expectations`, `verdicts` and `comparisons` of the summary of a run; also sets `result.places`."""
+    columns = {column_.name: column_ for column_ in probe_columns(model)}
+    case = model.case
+    result.places = places(model, summary)
+    return {
+        "expectations": expectations(model, summary, result),
+        "verdicts": [verdict(rows) for rows in result.places],
+        "comparisons": [comparison(compare, columns[compare.probe.text], result) for compare in case.compare.values()],
+    }
+
+
+def expectations(model, summary, result) -> list[dict]:
+    """Entries of the summary for `[expect]`, in the order of the file."""
+    columns = {column_.name: column_ for column_ in probe_columns(model)}
+    first = min((mark.time for mark in summary.marks), default=math.inf)
+    rows = []
+    for text, expect in model.case.expect.items():
+        if expect.extent is None:
+            shown = columns[expect.probe.text]
+            value, time = _at_probe(expect, shown.name, summary, result)
+        else:
+            shown = column(text, expect.extent.dimension, model.case)
+            value, time = _at_places(model, summary, expect)
+        value = value if time < summary.invalid_from else math.nan
+        rows.append(expectation(text, expect, shown, value, bool(summary.ok and time < first)))
+    return rows
+
+
+def expectation(text: str, expect, column: UnitColumn, value: float, complete: bool) -> dict:
+    """Entry of the summary for one claim: claimed and found value and tolerance in the unit of `column`, and state.
+
+    text, expect : name and data of the claim; value : value in the run [SI], not finite if unknown
+    complete : True if the run is ok and valid at the time of the value; if False, a claim that is met is open
+    `error` of the entry is None until an error estimate sets it.
+    """
+    tolerance = expect.atol + expect.rtol * abs(expect.value)
+    known = math.isfinite(value)
+    state = FAILS if known and abs(value - expect.value) > tolerance else HOLDS if known and complete else OPEN
+    return {"text": text, "claimed": float(column.from_si(expect.value)),
+            "found": float(column.from_si(value)) if known else None,
+            "tolerance": float(column.span_from_si(tolerance)), "unit": column.unit, "state": state,
+            "ok": state == HOLDS, "error": None}  # fmt: skip
+
+
+def _at_places(model, summary, expect) -> tuple[float, float]:
+    """Greatest or least value [SI] in all parts of the extent of a claim, over all steps, and its time [s].
+
+    It is nan if an extreme of a part is not valid.
+    """
+    extent, low = expect.extent, expect.function == "min"
+    values, times = [], []
+    for part in part_extremes(model, summary, extent):
+        extreme = part.minimum if low else part.maximum
+        times.append(part.t_min if low else part.t_max)
+        values.append(
+            in_quantity(model, extent.quantity, extreme, part.elevation) if extent.quantity in OF_PRESSURE else extreme
+        )
+    at = int((np.argmin if low else np.argmax)(np.concatenate(values)))
+    return float(np.concatenate(values)[at]), float(np.concatenate(times)[at])
+
+
+def _at_probe(expect, probe: str, summary, result) -> tuple[float, float]:
+    """Value of a probe [SI] for a claim, and its time [s].
+
+    `max` and `min` are over all steps and rows; `final` is the last row; `at` is interpolated between rows; `mean` is
+    over time (trapezoids), with the end of the run as its time. The value is nan if there are no rows, and for an `at`
+    outside their times.
+    """
+    if expect.function == "min":
+        return summary.extremes[probe][:2]
+    if expect.function == "max":
+        return summary.extremes[probe][2:]
+    t, values = result.seconds, result.si(probe)
+    if not len(t):
+        return math.nan, summary.t
+    if expect.function == "final":
+        return float(values[-1]), summary.t
+    if expect.function == "at":
+        inside = t[0] <= expect.time <= t[-1]
+        return float(interpolated(t, values, np.array([expect.time]))[0]) if inside else math.nan, expect.time
+    span = t[-1] - t[0]
+    area = np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(t))
+    return float(area / span) if span > 0.0 else float(values[0]), summary.t

@@ -1,7 +1,5 @@
 """Advance a state over an interval of time, for controllers and co-simulation."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -34,9 +32,8 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     if not math.isfinite(until):
         raise FvsolveError(f"until = {until} is not a time. Expected a finite number of seconds")
     if not until >= state.t:
-        raise FvsolveError(
-            f"until = {until:g} s is before the time of the state, {state.t:g} s. Expected at least {state.t:g} s"
-        )
+        text = f"until = {until:g} s is before the time of the state, {state.t:g} s"
+        raise FvsolveError(f"{text}. Expected at least {state.t:g} s")
     model.checked(state.t, state.y)
     held = hold(model, inputs or {})
     loop = RunLoop(held, lambda: model.structure)  # the structure does not depend on the held inputs
@@ -75,10 +72,7 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
         return model
     tables = model.tables
     schedules, pieces, nodes = tables.schedules.copy(), tables.pieces, tables.nodes.copy()
-    scalars = tables.scalars.copy()
-    known = inputs_of(model)
-    linear = model.case.law.linear
-    rows = []
+    scalars, known, linear, rows = tables.scalars.copy(), inputs_of(model), model.case.law.linear, []
     for name, value in inputs.items():
         if name not in known:
             near = nearest(str(name), known)

@@ -5,8 +5,6 @@ neighbouring rows come from the band that owns them. In large basins a band form
 in blocks of rows that fit into the processor cache.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -158,16 +156,16 @@ def make_partition(model: Model, count: int) -> Partition:
     return Partition(model, count, basins, np.arange(count + 1) * rows[:, None] // count)
 
 
+EXPLICIT_ONLY = "only explicit methods can be distributed over threads"
+
+
 def single_thread_reason(model: Model) -> str:
     """Reason why a model is stepped by a single thread; "" if several threads are possible."""
     method = model.case.numerics.method
     if method == automatic.AUTO:
-        return (
-            f"method {method} may change to a method that solves for all states at once; "
-            "only explicit methods can be distributed over threads"
-        )
+        return f"method {method} may change to a method that solves for all states at once; {EXPLICIT_ONLY}"
     if not method_named(method).explicit:
-        return f"method {method} solves for all states at once; only explicit methods can be distributed over threads"
+        return f"method {method} solves for all states at once; {EXPLICIT_ONLY}"
     if not model.basins:
         return "the case has no basin; only rows of basins are distributed over threads"
     return "" if not all(basin.undivided_reason for basin in model.basins) else undivided_basins(model)
@@ -200,14 +198,11 @@ def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
     divisible = divisible_rows(model)
     if reason := divisible["why"]:
         return 1, [Notice("threads", "numerics", f"threads = {threads}, but one thread is used: {reason}", "threads")]
-    few = [
-        f"{name} has {rows} row{'' if rows == 1 else 's'}" for name, rows in divisible["rows"].items() if rows < threads
-    ]
+    few = {name: rows for name, rows in divisible["rows"].items() if rows < threads}
     if few:
-        raise FvsolveError(
-            f"threads = {threads}: {listing(few)}, and each thread needs a row of cells. Expected "
-            f"at most {divisible['most']}"
-        )
+        counts = listing(f"{name} has {rows} row{'' if rows == 1 else 's'}" for name, rows in few.items())
+        text = f"threads = {threads}: {counts}, and each thread needs a row of cells"
+        raise FvsolveError(f"{text}. Expected at most {divisible['most']}")
     text = f"each thread computes all rows of these basins: {undivided_basins(model)}"
     return threads, [Notice("threads", "numerics", text, "threads")] if divisible["whole"] else []
 
@@ -222,11 +217,8 @@ def blocked_sums(cut: Partition, k: int) -> np.ndarray:
     A basin uses blocks if it has at least 2^17 states and `forms_stages` is True.
     """
     model = cut.model
-    blocked_basins = [
-        b
-        for b in cut.basins
-        if model.basins[b].forms_stages and quantities(model, b) * model.basins[b].n >= LEAST_STATES
-    ]
+    forming = [b for b in cut.basins if model.basins[b].forms_stages]
+    blocked_basins = [b for b in forming if quantities(model, b) * model.basins[b].n >= LEAST_STATES]
     if not blocked_basins:
         return np.zeros(0, dtype=np.int64)
     others, common_cells, edges = list(cut.common_states()), [], []

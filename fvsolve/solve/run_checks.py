@@ -8,8 +8,6 @@ up to e (1 - r^n) / (1 - r). For a draining vessel r is near 1 and all errors re
 errors remain.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.case import sloshing
@@ -17,7 +15,7 @@ from fvsolve.case.bodies import free_joints
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.delay_lines.wave_history import CORRECTED_TIME
-from fvsolve.model.delay_history import jump_overflow_notices
+from fvsolve.model.delay_lines import jump_overflow_notices
 from fvsolve.solve.run_loop import STATUS_FAILURES
 from fvsolve.step_limits.forcing_ranges import forcing_sizes, state_ranges, states_outside_cells
 from fvsolve.step_limits.step_notices import DOUBTFUL, WRONG, step_limits
@@ -76,9 +74,8 @@ class RunChecks:
         text = (f"{name} has grown to {times:.3g} times the range of its forcing at t = "
                 f"{self.model.case.amount(t, 'time', 6)}; the step is beyond the limit of the method: "
                 "halve the step")  # fmt: skip
-        self.grown = Notice(
-            "growth", name.partition("[")[0], text, None, float(abs(y[worst])), float(self.largest[worst]), False
-        )
+        place, size, limit = name.partition("[")[0], float(abs(y[worst])), float(self.largest[worst])
+        self.grown = Notice("growth", place, text, None, size, limit, False)
         return f"stopped: {text}"
 
     def warnings(self, ledgers: dict) -> list[Notice]:
@@ -122,9 +119,8 @@ def ledger_notices(name: str, ledger: dict) -> list[Notice]:
 
 
 SMALL_WAVE = 0.2  # wave height up to which a wave is small, as a fraction of the depth
-WEIGHT_CHANGE = (
-    0.1  # change of the water's weight by the motion of its body that may be neglected in its waves, as a fraction
-)
+# change of the water's weight by the motion of its body that may be neglected in its waves, as a fraction
+WEIGHT_CHANGE = 0.1
 WEIGHT_ROUNDING = 1e-6  # fraction of the weight that counts as rounding
 RISE, LOSS = slice(0, 2), slice(2, 4)
 
@@ -190,9 +186,8 @@ class SloshingCheck:
     def notices(self) -> list[Notice]:
         """Notices for waves that were not small, and for changes of weight that the waves neglect."""
         notices, amount = [], self.model.case.amount
-        for (name, *_), (height, rise_time, change, change_time) in zip(
-            self.tanks, self.restart_data.tolist(), strict=True
-        ):
+        rows = zip(self.tanks, self.restart_data.tolist(), strict=True)
+        for (name, *_), (height, rise_time, change, change_time) in rows:
             if height > SMALL_WAVE:
                 text = f"{name}: at {amount(rise_time, 'time')} its water rises by {height:.2g} of its depth, but "
                 text += 'modes are linear; sloshing = "cells" computes high waves of shallow water'
@@ -294,7 +289,10 @@ class StepDoubling:
         self.restart_data[1] = steps + 1.0  # check the next step if this step cannot be checked
         end = loop.control["end"]
         full_step = self.step if loop.t < end else min(self.step, end - memory["t_mark"])
-        if h < FULL_STEP * full_step or corrected_store(loop):
+        # A step in which a jump in a delay line corrected masses of storing nodes or flows of columns is not checked,
+        # because half steps have no such correction. The mark is removed when the corrected state is recorded again.
+        past = loop.run_data.past
+        if h < FULL_STEP * full_step or (past.size > 0 and past[CORRECTED_TIME] == loop.t):
             return
         before, now = loop.before[self.states], loop.now[self.states]
         t = loop.t - h
@@ -338,14 +336,8 @@ class StepDoubling:
         """
         if self.stepper is None:
             model = self.model
-            self.stepper = Integrator(
-                loop.stepper.method,
-                model.y_size,
-                model.ledgers,
-                lambda: model.structure,
-                model.scale.copy(),
-                model.damped,
-            )
+            self.stepper = Integrator(loop.stepper.method, model.y_size, model.ledgers, lambda: model.structure,
+                                      model.scale.copy(), model.damped)  # fmt: skip
             self.stepper.out = model.new_out()
         if first:
             self.stepper.discard_history()
@@ -380,13 +372,3 @@ class StepDoubling:
                 f"comparison with two half steps; {verdict}; halve the step")  # fmt: skip
         key = "step" if self.model.case.numerics.step is not None else "courant"
         return Notice("step-error", place, text, key, share, WRONG, ok)
-
-
-def corrected_store(loop) -> bool:
-    """True if the present state of the loop is marked as corrected for a jump in a delay line within the last step.
-
-    A correction changes masses of storing nodes and flows of rigid columns. Half steps have no such correction, so such
-    a step is not checked. The mark is removed when the corrected state is recorded again.
-    """
-    past = loop.run_data.past
-    return past.size > 0 and past[CORRECTED_TIME] == loop.t

@@ -1,6 +1,4 @@
-"""Loop over the time steps of a run: its arrays, its step settings, and the handling of events."""
-
-from __future__ import annotations
+"""Loop over the time steps of a run: arrays, step settings, events, and collisions of rigid water columns."""
 
 from collections import deque
 from collections.abc import Callable
@@ -10,11 +8,10 @@ import numpy as np
 from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tanks
+from fvsolve.kernels.column_junctions import gate_inflow
 from fvsolve.kernels.compiled_functions import fused_step_function
 from fvsolve.model import Model, RunData
-from fvsolve.model.scalar_tables import amount_indices
-from fvsolve.model.state_bounds import state_bounds
-from fvsolve.solve.column_impact import separate, shut_places
+from fvsolve.model.scalar_tables import amount_indices, state_bounds
 from fvsolve.solve.partition import blocked_sums, make_partition
 from fvsolve.steppers import automatic, loop_records
 from fvsolve.steppers.integrator import Integrator
@@ -59,22 +56,16 @@ class RunLoop:
         method = method_named(automatic.first_method(numerics.method))
         self.switched: list[tuple[float, int]] = []  # time and number of every event of a device
         self.at_once, self.last_switch = 0, np.nan
-        self.recent_events: deque[float] = deque(
-            maxlen=MOST_EVENTS_IN_SPAN + 4 * self.armed.size
-        )  # times of the last events
+        # times of the last events
+        self.recent_events: deque[float] = deque(maxlen=MOST_EVENTS_IN_SPAN + 4 * self.armed.size)
         self.span = SPAN * (numerics.end - numerics.start)
         self.on_switch: Callable[[], None] = lambda: None  # called after every event, before the next step
         call = model.functions
         self.rhs, self.observe, self.record, self.events = call.rhs, call.observe, call.record, call.events
-        fused_allowed = fused_step_allowed(model, method)
-        self.fused_step = fused_step_function(fused_allowed)
+        self.fused_step = fused_step_function(fused_allowed := fused_step_allowed(model, method))
         ledgers, structure = model.ledgers, structure or (lambda: model.structure)
         self.stepper = stepper = Integrator(method, model.y_size, ledgers, structure, model.scale.copy(), model.damped)
-        sums = [
-            *model.tables.nodes["y"],
-            *model.tables.masses["y"],
-            *amount_indices(model),
-        ]  # travel is stored too
+        sums = [*model.tables.nodes["y"], *model.tables.masses["y"], *amount_indices(model)]  # travel is stored too
         stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         stepper.carry = np.zeros(len(stepper.stored))
         stepper.bounded_states, stepper.bounds = state_bounds(model)
@@ -93,9 +84,8 @@ class RunLoop:
                 control["mode"], control["size"] = mode, getattr(numerics, key)
         if numerics.method == automatic.AUTO:
             automatic.watch(stepper, structure())
-        if (
-            numerics.courant is not None and not method.explicit
-        ):  # of waves only: implicit steps are stable for the rest
+        # of waves only: implicit steps are stable for the rest
+        if numerics.courant is not None and not method.explicit:
             control["mode"], control["size"] = loop_records.FIXED_STEP, numerics.courant / model.wave_rate
         self.run_data.clock["step"] = self.given_step
         self.team, single_band = None, make_partition(model, 1)
@@ -105,11 +95,11 @@ class RunLoop:
         if numerics.rtol is not None:  # errors are summed by rows
             stepper.row_blocks, stepper.sums = single_band.row_blocks(0), np.zeros(single_band.sum_count)
         if comm is not None:
-            from fvsolve.solve.mpi_ranks import MpiRanks
+            from fvsolve.solve.parallel_bands import MpiRanks
 
             self.team = MpiRanks(self, make_partition(model, comm.size), comm)
         elif threads > 1:
-            from fvsolve.solve.thread_team import ThreadTeam
+            from fvsolve.solve.parallel_bands import ThreadTeam
 
             self.team = ThreadTeam(self, make_partition(model, threads))
 
@@ -216,10 +206,8 @@ class RunLoop:
         self.at_once = self.at_once + 1 if self.t == self.last_switch else 1
         self.last_switch = self.t
         self.recent_events.append(self.t)
-        step = self.given_step
-        crowded = len(self.recent_events) == self.recent_events.maxlen and self.t - self.recent_events[0] <= max(
-            self.span, step
-        )
+        span, events = max(self.span, self.given_step), self.recent_events
+        crowded = len(events) == events.maxlen and self.t - events[0] <= span
         return self.at_once <= MOST_EVENTS_AT_ONCE + 4 * self.armed.size and not crowded
 
     def evaluate(self, limit: float) -> np.ndarray:
@@ -250,9 +238,8 @@ class RunLoop:
         places = shut_places(self.model, out)
         for k, row in enumerate(self.model.tables.columns):
             flow, new = float(row["flow"] + self.now[row["y"]]), float(out[layout["column"] + k])
-            collides = out[layout["valve_controlled"] + k] == 0.0 and (
-                row["from_node"] in places or row["to_node"] in places
-            )
+            ends = row["from_node"] in places or row["to_node"] in places
+            collides = out[layout["valve_controlled"] + k] == 0.0 and ends
             if flow != new and (collides or new == 0.0):
                 self.now[row["y"]] = new - row["flow"]
                 stopped.append((k, flow - new))
@@ -333,3 +320,88 @@ def fused_step_allowed(model: Model, method: Method) -> bool:
         and model.y_size == 2 * model.cells and model.shapes.armed == 0 and not len(model.tables.moving_segments)
         and {*laws.tolist()} <= {rec.FRICTION_NONE, rec.FRICTION_FACTOR}
     )  # fmt: skip
+
+
+ROUNDING = 1e-9  # relative to a small flow: columns that separate more slowly separate by rounding
+
+
+def shut_places(model: Model, out: np.ndarray) -> list[int]:
+    """Numbers of the nodes that join only rigid columns and shut valves; out : output array of the right-hand side."""
+    places, nodes, at = [], model.tables.nodes, model.layout["conductance"]
+    for i in np.flatnonzero(nodes["gates"] >= 0):
+        if not out[at + gates_of(model, i)].any():
+            places.append(int(i))
+    return places
+
+
+def gates_of(model: Model, i: int) -> np.ndarray:
+    """Numbers of the valves at node i, a junction of rigid columns and valves."""
+    row = model.tables.nodes[i]
+    return model.tables.integers[row["gates"] : row["gates"] + row["gate_count"]]
+
+
+def air_valve_of(model: Model, i: int) -> int | None:
+    """Number of the opening event of the air valve at node i; None without an air valve."""
+    valves, devices = model.tables.valves, model.tables.devices
+    for device in valves["device"][gates_of(model, i)]:
+        if device >= 0 and devices[device]["row"] >= 0:
+            return int(devices[device]["event"])
+    return None
+
+
+def flow_before(run_data: RunData, t: float, y: np.ndarray) -> np.ndarray:
+    """Mass flow of each rigid column just before t, minus its initial steady flow : float64[columns] [kg/s].
+
+    At the start time of the run it is the state of each column.
+    """
+    model = run_data.model
+    before, columns = model.new_out(), model.tables.columns
+    if t <= model.case.numerics.start:
+        return y[columns["y"]]
+    limit, run_data.clock["limit"] = float(run_data.clock["limit"]), t
+    model.functions.rhs(t, y, np.zeros(0), before, run_data.handle)
+    run_data.clock["limit"] = limit
+    return before[model.layout["column"] :][: len(columns)] - columns["flow"]
+
+
+def impact_impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: list[int]) -> np.ndarray:
+    """Mass flow that the pressure impulse J [Pa s] at each node stops [kg/s]; negative where columns separate.
+
+    J follows from the momentum: at each node, the sum over its columns of A / L (J - J_far) is the sum of their
+    inflows, with area A [m2] and length L [m] of a column and the impulse J_far at its far end. Columns whose flow a
+    valve controls keep their flow. The result is J times the sum of A / L.
+    carried : float64[columns]  result of `flow_before`; out : output array of the right-hand side
+    places : nodes from `shut_places`
+    """
+    sums = np.array([model.tables.nodes["inflow"][i] - gate_inflow(model.tables, i) for i in places])
+    matrix = np.zeros((len(places), len(places)))
+    row = {i: r for r, i in enumerate(places)}
+    for k, column in enumerate(model.tables.columns):
+        ends = [(row.get(int(column["from_node"]), -1), -1.0), (row.get(int(column["to_node"]), -1), 1.0)]
+        at = model.layout["column"] + k
+        valve_controlled = out[model.layout["valve_controlled"] + k] != 0.0 and out[at] != 0.0
+        change = out[at] - column["flow"] if valve_controlled else carried[k]
+        for r, sign in ends:
+            if r >= 0:
+                sums[r] += sign * change
+            for other, other_sign in ends if r >= 0 and not valve_controlled else ():
+                if other >= 0:
+                    matrix[r, other] += sign * other_sign * column["area"] / column["length"]
+    return np.diag(matrix) * np.linalg.lstsq(matrix, sums)[0]
+
+
+def separate(run_data: RunData, t: float, y: np.ndarray, out: np.ndarray) -> int | None:
+    """Number of the opening event of the air valve where columns separate fastest; None if no columns separate.
+
+    run_data : data of the run; y : state at time t [s]; out : output array of the right-hand side there
+    """
+    model = run_data.model
+    places = shut_places(model, out)
+    events = [air_valve_of(model, i) for i in places]
+    if all(event is None for event in events):
+        return None
+    small = ROUNDING * model.scale[model.tables.columns["y"]].max()
+    all_impulses = impact_impulses(model, flow_before(run_data, t, y), out, places)
+    separating = [(impulse, event) for impulse, event in zip(all_impulses, events, strict=True)
+                  if event is not None and impulse < -small]  # fmt: skip
+    return min(separating)[1] if separating else None

@@ -1,7 +1,5 @@
 """Summary of a run: reason of its end, first times outside validity, balances, extremes, envelopes, counts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -156,11 +154,8 @@ def device_notices(run_data: RunData) -> list[Notice]:
     model, marks = run_data.model, run_data.marks
     first = len(model.pipes) + 3 * len(model.node_names) + len(model.column_names) + len(model.piston_names)
     times = marks[first + len(model.devices) :]
-    return [
-        device.passing_notice(model, name, part, float(time))
-        for (name, part, device), time in zip(model.devices, times, strict=False)
-        if np.isfinite(time)
-    ]
+    return [device.passing_notice(model, name, part, float(time))
+            for (name, part, device), time in zip(model.devices, times, strict=False) if np.isfinite(time)]  # fmt: skip
 
 
 def drift_notices(model: Model, y: np.ndarray) -> list[Notice]:
@@ -195,16 +190,15 @@ def find_cavities(run_data: RunData) -> list[Cavity]:
     return cavities
 
 
-def find_extremes(run_data: RunData) -> dict[str, tuple[float, float, float, float]]:
-    """Extremes over all accepted steps and rows: probe -> (least value, its time [s], greatest value, its time [s])."""
-    table = run_data.extremes
-    return {probe.text: tuple(map(float, table[:, k])) for k, probe in enumerate(run_data.model.probes)}
+def find_extremes(run_data: RunData) -> tuple[dict, dict]:
+    """Extremes over all accepted steps and rows of probes, and of what studies and limits need without a probe.
 
-
-def find_watched(run_data: RunData) -> dict[str, tuple[float, float, float, float]]:
-    """Extremes of the quantities that studies and limits need without a probe, in the form of `find_extremes`."""
-    table, probe_count = run_data.extremes, len(run_data.model.probes)
-    return {probe.text: tuple(map(float, table[:, probe_count + k])) for k, probe in enumerate(run_data.model.watched)}
+    Both are dicts: text of the probe -> (least value, its time [s], greatest value, its time [s]).
+    """
+    probes, watched = run_data.model.probes, run_data.model.watched
+    rows = [tuple(map(float, column)) for column in run_data.extremes.T]
+    found = [(probe.text, row) for probe, row in zip((*probes, *watched), rows, strict=False)]
+    return dict(found[: len(probes)]), dict(found[len(probes) :])
 
 
 def find_point_envelopes(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
@@ -269,26 +263,18 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     kinds = model.tables.nodes["kind"]
     initial, change = model.contents(y)
     passes = {int(row["node"]) for row in model.tables.patches if row["open"]}
-    own = [
-        kind in (rec.TANK, rec.PATCH) and i not in passes for i, kind in enumerate(kinds)
-    ]  # nodes with `made_up` and `spilled`
+    # nodes with `made_up` and `spilled`
+    own = [kind in (rec.TANK, rec.PATCH) and i not in passes for i, kind in enumerate(kinds)]
     words = [("made_up", "spilled") if in_cells else ("inflow", "outflow") for in_cells in own]
     rows = zip(model.node_names, words, ledger[0], ledger[1], strict=True)
-    nodes = {
-        name: {inflow_word: float(x), outflow_word: float(0.0 - y)}
-        for name, (inflow_word, outflow_word), x, y in rows
-        if x != 0.0 or y != 0.0
-    }
+    nodes = {name: {inflow_word: float(x), outflow_word: float(0.0 - y)}
+             for name, (inflow_word, outflow_word), x, y in rows if x != 0.0 or y != 0.0}  # fmt: skip
     total = {word: sum(row.get(word, 0.0) for row in nodes.values()) for pair in set(words) for word in pair}
     remainder = change - float(np.sum(ledger))
     terms = {word: total.get(word, 0.0) for word in ("inflow", "outflow", "spilled", "made_up")}
     largest = max(initial, initial + change, *terms.values())
     return {
-        "initial": initial,
-        "final": initial + change,
-        **terms,
+        "initial": initial, "final": initial + change, **terms,
         "by_node": {name: row["inflow"] - row["outflow"] for name, row in nodes.items() if "inflow" in row},
-        "nodes": nodes,
-        "remainder": remainder,
-        "relative": relative(remainder, largest),
-    }
+        "nodes": nodes, "remainder": remainder, "relative": relative(remainder, largest),
+    }  # fmt: skip

@@ -1,7 +1,5 @@
 """Run of a model from its start to its end, in segments between jumps and kinks of schedules."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np
@@ -9,25 +7,12 @@ import numpy as np
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.model import Model, State
 from fvsolve.model.scalar_tables import scalar_ledgers
-from fvsolve.solve.mpi_ranks import CLOSE_MESSAGE
+from fvsolve.solve import run_summary as found
+from fvsolve.solve.parallel_bands import CLOSE_MESSAGE, postponed_interrupts
 from fvsolve.solve.partition import threads_of
 from fvsolve.solve.run_checks import RunChecks, split_step_notices
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
-from fvsolve.solve.run_summary import (
-    Event,
-    Summary,
-    device_notices,
-    drift_notices,
-    find_cavities,
-    find_envelope,
-    find_extremes,
-    find_marks,
-    find_point_envelopes,
-    find_watched,
-    mass_ledger,
-    spill_notices,
-)
-from fvsolve.solve.thread_team import postponed_interrupts
+from fvsolve.solve.run_summary import Event, Summary, mass_ledger
 from fvsolve.steppers import automatic, loop_records
 from fvsolve.steppers.ledger import LEDGER_ROWS
 from fvsolve.units import show
@@ -69,17 +54,15 @@ def solve(model: Model, state: State, sink, progress=None, threads: int = 1, com
     if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
         raise FvsolveError(f"threads = {show(threads)} is not a number of threads. Expected an integer of 1 or more")
     if comm is not None and not callable(getattr(comm, "bcast", None)):
-        raise FvsolveError(
-            f"comm = {show(comm)} is not an MPI communicator. Expected MPI.COMM_WORLD of mpi4py, or None"
-        )
+        text = f"comm = {show(comm)} is not an MPI communicator"
+        raise FvsolveError(f"{text}. Expected MPI.COMM_WORLD of mpi4py, or None")
     missing = [name for name in ("rows", "field", "checkpoint", "end") if not callable(getattr(sink, name, None))]
     try:
         model.checked(state.t, state.y)
         run = Run(model, state, sink, progress, threads, comm)
         if missing:
-            raise FvsolveError(
-                f"sink = {show(sink)} is not a sink: it has no {listing(f'{name}()' for name in missing)}"
-            )
+            lacks = listing(f"{name}()" for name in missing)
+            raise FvsolveError(f"sink = {show(sink)} is not a sink: it has no {lacks}")
     except BaseException:
         if comm is not None:
             comm.bcast(CLOSE_MESSAGE)
@@ -126,13 +109,8 @@ class Run:
         if not self.fresh:
             try:
                 self.restore(state.memory)
-            except (
-                KeyError,
-                TypeError,
-                ValueError,
-                IndexError,
-                OverflowError,
-            ):  # damaged checkpoint, or from another solver
+            except (KeyError, TypeError, ValueError, IndexError, OverflowError):
+                # damaged checkpoint, or from another solver
                 if comm is None:
                     self.loop.close()
                 numbers = sum(map(np.size, state.memory.values()))
@@ -280,10 +258,7 @@ class Run:
         """
         model, t = self.model, self.loop.t
         for k, flow in self.loop.stop_columns(self.bounds[self.segment][0]):
-            at, scale = (
-                len(model.pipes) + 3 * len(model.node_names) + k,
-                model.scale[model.tables.columns[k]["y"]],
-            )
+            at, scale = len(model.pipes) + 3 * len(model.node_names) + k, model.scale[model.tables.columns[k]["y"]]
             if abs(flow) > 1e-3 * scale and np.isnan(self.run_data.marks[at]):
                 self.run_data.marks[at] = t
 
@@ -393,17 +368,18 @@ class Run:
         ledgers = {"mass": mass_ledger(model, loop.now, ledger[:, : len(model.node_names)])}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
         basin_notices = [notice for entry in self.watches for notice in entry.notices()]
-        warnings = [*self.notices, *basin_notices, *self.checks.warnings(ledgers), *device_notices(self.run_data),
-                    *spill_notices(self.run_data)]  # fmt: skip
-        warnings += drift_notices(model, loop.now)
+        warnings = [*self.notices, *basin_notices, *self.checks.warnings(ledgers)]
+        warnings += found.device_notices(self.run_data) + found.spill_notices(self.run_data)
+        warnings += found.drift_notices(model, loop.now)
         warnings += split_step_notices(model.case.numerics, loop.stepper.counts())
         ok = reason == "finished" and all(entry.ok for entry in warnings)
+        extremes, watched = found.find_extremes(self.run_data)
         summary = Summary(
-            reason, ok, loop.t, find_marks(self.run_data), ledgers, find_extremes(self.run_data),
-            find_envelope(self.run_data), find_point_envelopes(self.run_data), find_watched(self.run_data),
+            reason, ok, loop.t, found.find_marks(self.run_data), ledgers, extremes,
+            found.find_envelope(self.run_data), found.find_point_envelopes(self.run_data), watched,
             loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
             self.setup, [Event(t, *model.events[k]) for t, k in loop.switched],
-            find_cavities(self.run_data), warnings, self.threads, self.invalid_from,
+            found.find_cavities(self.run_data), warnings, self.threads, self.invalid_from,
         )  # fmt: skip
         self.sink.end(summary)
         return summary

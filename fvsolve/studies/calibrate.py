@@ -8,7 +8,7 @@ import numpy as np
 
 from fvsolve.case import Case, load
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.run.case_claims import interpolated
+from fvsolve.run.verdicts import interpolated
 from fvsolve.studies.outcome import end_if_interrupted, refusal_text
 from fvsolve.studies.parallel import TaskPool
 from fvsolve.studies.result_table import Column, PlainData, ResultTable

@@ -8,7 +8,7 @@ import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError, did_you_mean
 from fvsolve.kernels.delay_lines.wave_history import JUMPS_TRAVELLING, time_tolerance
-from fvsolve.model.delay_history import jump_times
+from fvsolve.model.delay_lines import jump_times
 from fvsolve.model.energy_accounts import Account, Accounts, available_energy, datum_of
 from fvsolve.schemes import SCHEMES
 from fvsolve.solve import initial_state

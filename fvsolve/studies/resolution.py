@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError, listing
-from fvsolve.model.delay_line_selection import line_methods, slowest_pipe
+from fvsolve.model.delay_lines import line_methods, slowest_pipe
 from fvsolve.parts import Basin, Pipe
 from fvsolve.schemes import SCHEMES
 from fvsolve.studies.outcome import study_model

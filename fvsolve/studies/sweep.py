@@ -114,7 +114,7 @@ def row_of(model, summary, sink) -> dict[str, Any]:
 def expectations_of(model, summary, sink) -> list[dict[str, Any]]:
     """Expectations of the case with their results, as in the summary of a run; sink : output of the run."""
     from fvsolve.run import Result
-    from fvsolve.run.case_claims import expectations
+    from fvsolve.run.verdicts import expectations
 
     columns = {column.name: column for column in sink.columns}
     probes = {name: {"dimension": column.dimension, "unit": column.unit} for name, column in columns.items()}

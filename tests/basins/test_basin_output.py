@@ -18,12 +18,12 @@ from scipy.spatial import Delaunay
 import fvsolve
 from fvsolve.basins.basin_probes import observe_dense_flows, observe_flows
 from fvsolve.basins.liquid.liquid_patches import observe_liquid
-from fvsolve.draw import frame_meshes as of_view
+from fvsolve.draw import field_canvas as of_view
 from fvsolve.draw.scene import DrawnScene
 from fvsolve.draw.sheet import PictureSheet, colour_range
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.mesh import read, rectangle
-from fvsolve.mesh.mesh_points import MeshPoints
+from fvsolve.mesh.mesh import MeshPoints
 from fvsolve.model import RunData
 from fvsolve.output.fields import basin_geometry, split_blocks, write_frame
 from fvsolve.run.plot_scene import lengths_of, unit_of

@@ -8,8 +8,7 @@ from basins import test_faces
 from basins.test_liquid import RHO, SCHEMES, Box, C, noise
 from pytest import approx
 from reference.isentrope import Isentrope, Riemann
-from reference.meshes import write
-from reference.plain import boundary, triangles
+from reference.meshes import boundary, triangles, write
 from reference.scenes import NO_FRICTION, junction, ramp, reservoir, scene, stiff_pipe, valve
 
 import fvsolve

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from model.test_sparsity import stray
 from pytest import approx
-from reference.meshes import write
-from reference.plain import boundary, triangles
+from reference.meshes import boundary, triangles, write
 from reference.scenes import RHO, WATER, scene
 
 import fvsolve

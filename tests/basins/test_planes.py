@@ -8,8 +8,7 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from reference.meshes import write
-from reference.plain import boundary, triangles
+from reference.meshes import boundary, triangles, write
 from reference.scenes import AMBIENT, RHO, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve

@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 from model.test_sparsity import stray
-from reference.meshes import write
-from reference.plain import boundary, triangles
+from reference.meshes import boundary, triangles, write
 from reference.scenes import AMBIENT, GRAVITY, RHO, scene
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation

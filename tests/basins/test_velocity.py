@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from reference.meshes import shaken, write
-from reference.plain import triangles, write_msh
+from reference.meshes import shaken, triangles, write, write_msh
 from reference.scenes import scene
 
 import fvsolve

@@ -3,9 +3,7 @@
 import re
 
 import pytest
-from reference.fork import branched
-from reference.refusals import refused
-from reference.scenes import still
+from reference.scenes import branched, still
 
 import fvsolve
 from fvsolve.case.resource_checks import disk_size, free_memory

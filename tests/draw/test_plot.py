@@ -1,9 +1,9 @@
-"""Long series are thinned for pictures without loss of their extremes."""
+"""Curves of histories in pictures: none twice, none constant, each named; long series thinned without loss of peaks."""
 
 import numpy as np
 import pytest
 
-from fvsolve.draw.plot import thin_series
+from fvsolve.draw.plot import select_curves, thin_series
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -23,3 +23,31 @@ def test_a_short_series_is_drawn_as_it_is():
     t = np.arange(5.0)
     times, kept = thin_series(t, t**2, 5)
     assert times is t and np.array_equal(kept, t**2)
+
+
+T = np.linspace(0.0, 1.0, 200)
+WAVE, OTHER = np.sin(7.0 * T), np.cos(5.0 * T)
+
+
+def labels(columns: dict, measured=()) -> tuple[dict, list]:
+    panels, still = select_curves(np.column_stack(list(columns.values())), [(name, "x") for name in columns], measured)
+    return {panel.quantity: [line.label for line in panel.lines] for panel in panels}, still
+
+
+def test_pressure_and_head_of_a_place_are_one_curve():
+    both = {"gate.pressure": 1e5 + 9.8e3 * WAVE, "gate.head": 3.0 + WAVE, "top.head": OTHER}
+    assert labels(both)[0] == {"pressure": ["gate (head alike)"], "head": ["top"]}
+    assert labels(both, ["gate.head"])[0]["head"] == ["gate", "top"]  # compared with a measurement
+    moved = both | {"gate.head": 3.0 + WAVE + 1e-3 * OTHER}  # at a place that moves
+    assert labels(moved)[0] == {"pressure": ["gate"], "head": ["gate", "top"]}
+
+
+def test_what_stands_still_is_named_and_not_drawn_but_in_a_picture_of_rest():
+    lake = np.full(T.size, 45.0) + 1e-12 * WAVE
+    assert labels({"lake.head": lake, "a.flow": WAVE}) == ({"flow": ["a"]}, [("lake.head", "x", lake[0])])
+    assert labels({"lake.head": lake}) == ({"head": ["lake"]}, [])
+
+
+def test_a_curve_that_would_lie_on_another_is_named_beside_it():
+    flows = {"main.flow@0": WAVE, "valve.flow": WAVE + 1e-4 * OTHER, "leak.flow": 0.9 * WAVE}
+    assert labels(flows)[0] == {"flow": ["main at 0, valve", "leak"]}

@@ -1,7 +1,5 @@
 """Pictures of networks and basins show the parts of the case at their positions."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -11,10 +9,9 @@ from pytest import approx
 from reference.scenes import lake, pipe, scene, valve
 
 import fvsolve
-from fvsolve.draw import frame_meshes
-from fvsolve.draw.network_picture import NetworkPicture
-from fvsolve.draw.part_drawing import place_labels
-from fvsolve.draw.projection import Projection, choose_projection, round_scale
+from fvsolve.draw import field_canvas
+from fvsolve.draw.network_picture import NetworkPicture, place_labels
+from fvsolve.draw.scene import Projection, choose_projection, round_scale
 from fvsolve.draw.sheet import OTHER_LINK, OTHER_NODE, SYMBOLS, strokes, symbol_of
 from fvsolve.parts.nodes_and_links import Link, Node
 from fvsolve.run.plot_scene import scene_of
@@ -88,14 +85,8 @@ def test_numbers_are_told_in_the_units_of_the_output_and_margins_as_differences(
 
 def test_names_cover_neither_each_other_nor_symbols_and_what_finds_no_room_is_left_out():
     at = [(10.0 * k, 50.0) for k in range(1, 10)]
-    found = place_labels(
-        at,
-        [(30.0, 8.0)] * 9,
-        [4.0] * 9,
-        [(x - 2, y - 2, x + 2, y + 2) for x, y in at],
-        np.zeros((0, 2)),
-        (0, 0, 100, 100),
-    )
+    found = place_labels(at, [(30.0, 8.0)] * 9, [4.0] * 9, [(x - 2, y - 2, x + 2, y + 2) for x, y in at],
+                         np.zeros((0, 2)), (0, 0, 100, 100))  # fmt: skip
     boxes = [(x, y, x + 30.0, y + 8.0) for x, y in filter(None, found)]
     assert 2 <= len(boxes) < 9 and found[0] is not None
     for i, a in enumerate(boxes):
@@ -142,8 +133,8 @@ def bowl():
 
 def test_the_shore_is_where_the_surface_meets_the_bed_to_a_part_of_a_cell(bowl):
     mesh, radius, cell = bowl
-    found = frame_meshes.water_mesh(mesh, 1.0, ("depth",))
-    shore = np.vstack(frame_meshes.boundary_loops(found))
+    found = field_canvas.water_mesh(mesh, 1.0, ("depth",))
+    shore = np.vstack(field_canvas.boundary_loops(found))
     off = np.hypot(shore[:, 0], shore[:, 1]) - radius
     assert len(shore) > 60 and np.abs(off).max() < 0.15 * cell
     assert np.asarray(found.points)[:, 2] == approx(np.full(found.n_points, 0.1 * radius), abs=1e-6)
@@ -154,7 +145,7 @@ def test_the_shore_of_a_basin_that_rides_is_as_good_in_its_own_axes(bowl):
     turn, place = np.array([[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]), (3.0, 4.0, 5.0)
     mesh.points = mesh.points @ turn.T + place
     mesh.cell_data["normal"] = np.tile(turn[:, 2], (mesh.n_cells, 1))
-    shore = (np.vstack(frame_meshes.boundary_loops(frame_meshes.water_mesh(mesh, 1.0, ()))) - place) @ turn
+    shore = (np.vstack(field_canvas.boundary_loops(field_canvas.water_mesh(mesh, 1.0, ()))) - place) @ turn
     assert np.abs(np.hypot(shore[:, 0], shore[:, 1]) - radius).max() < 0.15 * cell
     assert shore[:, 2] == approx(np.full(len(shore), 0.1 * radius), abs=1e-3)
 
@@ -163,11 +154,11 @@ def test_what_is_cut_out_of_a_basin_and_what_rises_from_its_bed_are_houses(bowl)
     mesh, _, _ = bowl
     middle = mesh.cell_centers().points
     inside = (np.abs(middle[:, 0] - 2.0) < 0.5) & (np.abs(middle[:, 1]) < 0.5)
-    walls, roof = frame_meshes.buildings(mesh.extract_cells(~inside), 2.0)
+    walls, roof = field_canvas.buildings(mesh.extract_cells(~inside), 2.0)
     assert roof.area == approx(1.0, rel=0.1) and (walls.bounds[5], roof.bounds[4]) == (2.0, 2.0)
-    assert not frame_meshes.buildings(mesh, 2.0) and not frame_meshes.raised_cells(mesh).any()
+    assert not field_canvas.buildings(mesh, 2.0) and not field_canvas.raised_cells(mesh).any()
     at = np.asarray(mesh.points)
     at[(np.abs(at[:, 0] - 2.0) < 0.45) & (np.abs(at[:, 1]) < 0.45), 2] += 3.0
     mesh.points = at
-    rises = frame_meshes.raised_cells(mesh)
+    rises = field_canvas.raised_cells(mesh)
     assert inside[rises].sum() >= 16 and rises.sum() <= 40

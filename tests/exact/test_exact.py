@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 from pytest import approx
-from reference import folders, pulses, rays, scenes, vessels
-from reference.allievi import relative_drop
-from reference.refusals import refused
+from reference import folders, frictionless, pulses, scenes, vessels
 from scipy.integrate import quad, solve_ivp
 
 from fvsolve import exact
@@ -48,18 +46,19 @@ def fork(opening, **numerics) -> dict:
     return scenes.scene(nodes, links, 3.0, given, probes, exact={"name": "rays"})
 
 
-def traced() -> rays.Rays:
+def traced() -> frictionless.Rays:
     """Solution of the case `fork` by the tracer of the tests."""
     area = 5e-4
     flow = area * np.sqrt(2 * (6e5 - scenes.AMBIENT) / scenes.RHO)
     pipes = {
-        "supply": rays.Pipe("lake", "fork", 500.0, 0.4, 1230.0, flow + 0.01, 6e5),
-        "branch": rays.Pipe("fork", "blind", 347.1, 0.3, 1111.0, 0.0, 6e5),
-        "lower": rays.Pipe("fork", "gate", 271.9, 0.25, 1017.0, flow, 6e5),
+        "supply": frictionless.Pipe("lake", "fork", 500.0, 0.4, 1230.0, flow + 0.01, 6e5),
+        "branch": frictionless.Pipe("fork", "blind", 347.1, 0.3, 1111.0, 0.0, 6e5),
+        "lower": frictionless.Pipe("fork", "gate", 271.9, 0.25, 1017.0, flow, 6e5),
     }
     closing = lambda t: area * float(np.interp(t, [0.1, 0.4], [1.0, 0.0]))  # noqa: E731
     demand = lambda t: float(np.interp(t, [0.3, 0.5], [0.01, 0.03]))  # noqa: E731
-    return rays.Rays(scenes.RHO, pipes, {"lake": rays.held(6e5)}, {"fork": demand}, {"gate": (closing, scenes.AMBIENT)})
+    lake, gate = {"lake": frictionless.held(6e5)}, {"gate": (closing, scenes.AMBIENT)}
+    return frictionless.Rays(scenes.RHO, pipes, lake, {"fork": demand}, gate)
 
 
 def test_rays_in_a_network_with_a_valve_are_those_of_the_other_tracer():
@@ -113,7 +112,7 @@ def test_a_closing_valve_is_allievis():
     flow = 0.01 * np.sqrt(2 * 9.80665 * 100.0)
     parameter = case.properties.density * speed * flow / area / (2 * weight * 100.0)
     opening = [1.0 - np.clip((k - 1.0) / 4.0, 0.0, 1.0) for k in range(9)]
-    heads = 100.0 * np.array(relative_drop(parameter, opening))
+    heads = 100.0 * np.array(frictionless.relative_drop(parameter, opening))
     assert found.probe(probe(case, "gate.head"), np.arange(9.0)) == approx(heads, abs=1e-6)
 
 

@@ -1,7 +1,5 @@
 """Equivalent descriptions of a mechanism; each function returns a changed copy of a case."""
 
-from __future__ import annotations
-
 import copy
 import math
 from typing import Any

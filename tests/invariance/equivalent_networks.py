@@ -1,9 +1,9 @@
 """Equivalent descriptions of a network; each function returns a changed copy of a case."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
+
+from invariance.random_scenes import some_of
 
 STRAIGHT = ("pipe", "valve", "orifice", "rigid-column")  # symmetric kinds
 
@@ -47,6 +47,16 @@ def swapped(case: dict, chosen: set[str]) -> dict:
             link["profile"] = {"chainage": turned, "elevation": elevation[::-1]}
     said["output"]["probes"] = [from_other_end(probe, case, chosen) for probe in said["output"]["probes"]]
     return said
+
+
+def drawn_from_other_end(case: dict, seed: int) -> tuple[dict, dict]:
+    """Case with the ends of some links swapped, and arguments `name` and `change` of `alike` for it."""
+    chosen = some_of([name for name, link in case["links"].items() if link["type"] in STRAIGHT], seed)
+
+    def sign(probe, values):
+        return -values if ".flow" in probe and probe.split(".")[1] in chosen else values
+
+    return swapped(case, chosen), {"name": lambda probe: from_other_end(probe, case, chosen), "change": sign}
 
 
 def from_other_end(probe: str, case: dict, chosen: set[str]) -> str:

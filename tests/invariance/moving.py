@@ -1,12 +1,9 @@
 """Cases with moving parts: mechanisms, moving walls, basin frames, tanks on bodies and moving networks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
-from reference.bodies import OIL, bodies
+from reference.bodies import OIL, bodies, body
 from reference.scenes import GRAVITY, RHO, WATER, scene
-from reference.trees import body
 
 LAWS = {
     "linear": {**OIL, "law": "linear"},
@@ -71,24 +68,11 @@ def machine(method: str = "rk4", law: str = "linear", **more) -> dict:
                    "rotational_stiffness": 1.5, "rotational_damping": 0.05},
     }  # fmt: skip
     probes = seen("arm.eye", "slider.tip", "wrist.grip", "plate.edge", "kite.nose", "kite")
-    probes += [
-        f"{one}.{what}{axis}"
-        for one in ("arm", "kite", "wrist")
-        for what in ("w", "angular_momentum_")
-        for axis in "xyz"
-    ]
+    probes += [f"{one}.{what}{axis}" for one in ("arm", "kite", "wrist") for what in ("w", "angular_momentum_")
+               for axis in "xyz"]  # fmt: skip
     probes += [f"arm.joint_f{axis}" for axis in "xyz"] + [f"base.joint_t{axis}" for axis in "xyz"]
-    probes += [
-        "lift.force",
-        "lift.A.pressure",
-        "lift.B.pressure",
-        "string.force",
-        "rubber.torque",
-        "rope.force",
-        "arm.rate",
-        "slider.rate",
-        "kite.kinetic_energy",
-    ]
+    probes += ["lift.force", "lift.A.pressure", "lift.B.pressure", "string.force", "rubber.torque", "rope.force",
+               "arm.rate", "slider.rate", "kite.kinetic_energy"]  # fmt: skip
     made = bodies(nodes, END, probes, links, 1 / 32, **stepped(method, 2e-3))
     made["fluid"] = dict(LAWS[law])
     return made | more
@@ -97,11 +81,9 @@ def machine(method: str = "rk4", law: str = "linear", **more) -> dict:
 def loop(method: str = "rk4", **more) -> dict:
     """Case of a parallelogram of three bars in an inclined plane, closed by a pin, with a spring."""
     bar = {
-        "mass": 2.0,
-        "inertia": [1 / 6, 1 / 6, 0.01],
-        "centre_of_mass": [0, 0, -0.5],
+        "mass": 2.0, "inertia": [1 / 6, 1 / 6, 0.01], "centre_of_mass": [0, 0, -0.5],
         "points": {"end": [0, 0, -1.0]},
-    }
+    }  # fmt: skip
     aslant = {"attitude": {"roll": 0.3, "yaw": 0.5}}
     nodes = {
         "world": {"type": "frame", "points": {"hook": [0.5, 0.4, -2.0]}},
@@ -164,15 +146,8 @@ def flume(method: str = "rk4", **more) -> dict:
             "start": {"level": "1 + 0.03 * cos(2 * x)"}}  # fmt: skip
     links = {"tap": {"type": "valve", "from": "b.gate", "to": "t", "area": 0.02}}
     nodes = {"b": pool, "t": {"type": "tank", "area": 0.3, "level": 0.9}}
-    probes = [
-        "b.paddle.force",
-        "b.paddle.power",
-        "b.paddle.travel",
-        "b.depth@0.3,0.2",
-        "b.u@0.9,0.1",
-        "tap.flow",
-        "t.level",
-    ]
+    probes = ["b.paddle.force", "b.paddle.power", "b.paddle.travel", "b.depth@0.3,0.2", "b.u@0.9,0.1", "tap.flow",
+              "t.level"]  # fmt: skip
     return scene(nodes, links, END, stepped(method, 8e-3), probes, 1 / 32) | more
 
 
@@ -201,13 +176,8 @@ def full(method: str = "rk4", law: str = "linear", free: bool = False, **more) -
               "attitude": {"yaw": 0.4, "roll": 1.2}, "size": [1.0, 0.8], "cells": [6, 5], "pressure": 3e5,
               "thickness": 0.05},
     }  # fmt: skip
-    probes = [
-        "b.pressure@0.2,0.3",
-        "b.u@0.7,0.4",
-        "b.v@0.7,0.4",
-        "cradle.angle",
-        *(f"cradle.w{axis}" for axis in "xyz"),
-    ]
+    probes = ["b.pressure@0.2,0.3", "b.u@0.7,0.4", "b.v@0.7,0.4", "cradle.angle",
+              *(f"cradle.w{axis}" for axis in "xyz")]  # fmt: skip
     numerics = stepped(method, 1e-4) | {"scheme": "upwind5"}
     return scene(nodes, {}, 0.01, numerics, probes, 1 / 1024) | {"fluid": dict(LAWS[law])} | more
 
@@ -245,14 +215,8 @@ def u_tube(method: str = "rk4", free: bool = True, **more) -> dict:
         "port": {"type": "tank", "on": "hull", "at": [0, 4, -1.5], "area": 1.2, "level": 0.8},
         "starboard": {"type": "tank", "on": "hull", "at": [0, -4, -1.5], "area": 1.2, "level": 0.8},
     }  # fmt: skip
-    duct = {
-        "type": "rigid-column",
-        "from": "port",
-        "to": "starboard",
-        "length": 8.0,
-        "diameter": 0.6,
-        "minor_loss": 1.0,
-    }
+    duct = {"type": "rigid-column", "from": "port", "to": "starboard", "length": 8.0, "diameter": 0.6,
+            "minor_loss": 1.0}  # fmt: skip
     probes = ["duct.flow", "port.level", "starboard.level", "hull.angle", "hull.ay"]
     return scene(nodes, {"duct": duct}, 10 * END, stepped(method, 0.05), probes, 1 / 8) | more
 

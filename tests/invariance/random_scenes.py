@@ -1,7 +1,5 @@
 """Strategies for random networks and their settings, for hypothesis."""
 
-from __future__ import annotations
-
 import random
 
 from hypothesis import strategies as st

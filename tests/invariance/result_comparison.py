@@ -1,7 +1,5 @@
 """Outcomes of runs for the comparison of equivalent cases, and their differences."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -10,6 +8,8 @@ from hypothesis import reject
 
 import fvsolve
 from fvsolve.model.model_facts import cost_notices
+from fvsolve.output.memory_sink import MemorySink
+from fvsolve.solve.solve import Run
 
 
 @dataclass
@@ -51,6 +51,30 @@ def told(source, **more) -> Told:
     return Told(ended, np.array(result.t), {str(p): np.array(result[str(p)]) for p in result.probes}, result)
 
 
+def broken_off_and_whole(case: dict, share: float) -> tuple[Run, Run]:
+    """Run of a case that was interrupted after a share of its end time and resumed by a new model, and whole run.
+
+    Asserts that final states and ledgers of both agree to the bit.
+    """
+    model, end = fvsolve.build(fvsolve.load(case)), case["numerics"]["end"]
+
+    def late(t, seconds, steps):
+        run.budget = 1.0  # steps until the next call
+        if t > share * end:
+            raise KeyboardInterrupt
+
+    run = Run(model, fvsolve.initial_state(model), MemorySink(model), late)
+    run.left = 1.0
+    assert run.go().reason.startswith("interrupted") and share * end < run.state().t < end
+    other = fvsolve.build(fvsolve.load(case))
+    again, whole = (Run(other, state, MemorySink(other), None) for state in (run.state(), fvsolve.initial_state(other)))
+    ended = again.go(), whole.go()
+    assert ended[0].reason == ended[1].reason == "finished" and ended[0].ledgers == ended[1].ledgers
+    ends = again.state(), whole.state()
+    assert ends[0].t == ends[1].t and np.array_equal(ends[0].y, ends[1].y)
+    return again, whole
+
+
 def kind_of(name: str) -> str:
     return name.rsplit(".", 1)[1].split("@")[0]
 
@@ -75,9 +99,7 @@ def alike(
     for probe, values in wanted.items():
         kind = kind_of(probe)
         greatest[kind] = max(greatest.get(kind, 1e-9), float(np.max(np.abs(values), initial=0.0)))
-    apart = {
-        probe: float(np.max(np.abs(other.rows[name(probe)] - values), initial=0.0)) / greatest[kind_of(probe)]
-        for probe, values in wanted.items()
-    }
+    apart = {probe: float(np.max(np.abs(other.rows[name(probe)] - values), initial=0.0)) / greatest[kind_of(probe)]
+             for probe, values in wanted.items()}  # fmt: skip
     worst = max(apart, key=apart.get, default=None)
     assert worst is None or apart[worst] <= within, (worst, apart[worst])

@@ -3,8 +3,6 @@
 The results agree to rounding, which limited slopes may increase; a repeated run agrees to the bit.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -4,8 +4,6 @@ Rounding may decide if a jump is kept or smoothed over a step. The results then 
 of `numerics.delay_tolerance` times the greatest jump, so the tests use a small tolerance.
 """
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +11,7 @@ from hypothesis_profiles import examples
 
 import fvsolve
 from invariance import equivalent_networks as equivalent
-from invariance.random_scenes import SEEDS, networks, shuffled, some_of
+from invariance.random_scenes import SEEDS, networks, shuffled
 from invariance.result_comparison import alike, told
 from invariance.test_networks import EXPERIMENTAL, near
 
@@ -102,16 +100,8 @@ def test_other_order(case, seed):
 @examples(4)
 @given(case=given_steps(), seed=SEEDS)
 def test_links_drawn_from_the_other_end(case, seed):
-    able = [name for name, link in case["links"].items() if link["type"] in equivalent.STRAIGHT]
-    chosen = some_of(able, seed)
-
-    def sign(probe, values):
-        return -values if ".flow" in probe and probe.split(".")[1] in chosen else values
-
-    def name(probe):
-        return equivalent.from_other_end(probe, case, chosen)
-
-    same(told_lines(case), told_lines(equivalent.swapped(case, chosen)), nearly(case), name=name, change=sign)
+    other, how = equivalent.drawn_from_other_end(case, seed)
+    same(told_lines(case), told_lines(other), nearly(case), **how)
 
 
 @examples(3)

@@ -7,22 +7,17 @@ for the power of a liquid, 1e-5 for flows, 1e-6 for basins and 1e-7 for bodies. 
 agree to rounding.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np
 import pytest
-from reference.bodies import OIL
+from reference.bodies import OIL, body
 from reference.scenes import scene
-from reference.trees import body
 
 import fvsolve
-from fvsolve.output.memory_sink import MemorySink
-from fvsolve.solve.solve import Run
 from invariance import equivalent_mechanisms as equivalent
 from invariance.moving import METHODS, SCENES, machine, piston, stepped
-from invariance.result_comparison import Told, alike, told
+from invariance.result_comparison import Told, alike, broken_off_and_whole, told
 
 EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # warning of numba while it compiles
 pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings fail, such as of NaN values
@@ -64,23 +59,7 @@ def test_broken_off_and_resumed(name, method):
     """An interrupted and resumed run agrees with the whole run to the bit, in its final state and ledgers."""
     case = SCENES[name](method)
     case["output"]["fields"] = 0
-    model = fvsolve.build(fvsolve.load(case))
-    early = 0.3 * case["numerics"]["end"]
-
-    def late(t, seconds, steps):
-        run.budget = 1.0  # steps until the next call
-        if t > early:
-            raise KeyboardInterrupt
-
-    run = Run(model, fvsolve.initial_state(model), MemorySink(model), late)
-    run.left = 1.0
-    assert run.go().reason.startswith("interrupted") and early < run.state().t < case["numerics"]["end"]
-    other = fvsolve.build(fvsolve.load(case))
-    again, whole = (Run(other, state, MemorySink(other), None) for state in (run.state(), fvsolve.initial_state(other)))
-    ended = again.go(), whole.go()
-    assert ended[0].reason == ended[1].reason == "finished" and ended[0].ledgers == ended[1].ledgers
-    ends = again.state(), whole.state()
-    assert ends[0].t == ends[1].t and np.array_equal(ends[0].y, ends[1].y)
+    broken_off_and_whole(case, 0.3)
 
 
 @pytest.mark.parametrize("name, method", MIXED)
@@ -93,12 +72,7 @@ def test_parts_in_the_reverse_order(name, method):
 @pytest.mark.parametrize("name", SCENES)
 def test_at_a_later_time(name, method):
     """A delay changes results by rounding of times only, which enters differences of driven joints."""
-    alike(
-        first(name, method),
-        told(equivalent.at_a_later_time(SCENES[name](method), 64.0)),
-        near(method),
-        later=64.0,
-    )
+    alike(first(name, method), told(equivalent.at_a_later_time(SCENES[name](method), 64.0)), near(method), later=64.0)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -134,24 +108,14 @@ def test_axes_the_other_way(name, method):
     def change(probe, values):
         return -values if probe.endswith(SWINGS) else values
 
-    alike(
-        first(name, method),
-        told(equivalent.reversed_axes(SCENES[name](method))),
-        near(method),
-        change=change,
-    )
+    alike(first(name, method), told(equivalent.reversed_axes(SCENES[name](method))), near(method), change=change)
 
 
 @pytest.mark.parametrize("method", EACH)
 @pytest.mark.parametrize("name", IN_SPACE)
 def test_turned_about_the_vertical(name, method):
     one = spatial(first(name, method))
-    alike(
-        one,
-        told(equivalent.turned(SCENES[name](method), 0.7)),
-        near(method),
-        change=equivalent.as_turned(one, 0.7),
-    )
+    alike(one, told(equivalent.turned(SCENES[name](method), 0.7)), near(method), change=equivalent.as_turned(one, 0.7))
 
 
 def spatial(one: Told) -> Told:
@@ -229,15 +193,8 @@ def test_a_mass_on_a_cylinder_is_a_body_on_a_prismatic_joint(law, method):
         "maximum": 0.31,
             "stiffness": 1e6, "damping": 1e3}, "brake": {"type": "damper", "damping": 40.0}}  # fmt: skip
     push = {"type": "force", "force": {"mean": 100.0, "amplitude": 500.0, "period": 0.05}}
-    probes = [
-        "jack.force",
-        "jack.position",
-        "jack.velocity",
-        "jack.A.pressure",
-        "jack.B.pressure",
-        "spring.force",
-        "stop.force",
-    ]
+    probes = ["jack.force", "jack.position", "jack.velocity", "jack.A.pressure", "jack.B.pressure", "spring.force",
+              "stop.force"]  # fmt: skip
 
     def case(nodes, near, far, **force):
         links = {name: {**one, "from": near, "to": far} for name, one in rest.items()}

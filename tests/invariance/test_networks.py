@@ -4,8 +4,6 @@ Rounding is `ROUND` times the greatest value of a quantity, for about a thousand
 found). Under error control rounding may decide if a step is accepted; the results then agree within the tolerance.
 """
 
-from __future__ import annotations
-
 import tomllib
 
 import numpy as np
@@ -18,7 +16,7 @@ from reference.scenes import GRAVITY, WATER
 import fvsolve
 from fvsolve.case.text import write
 from invariance import equivalent_networks as equivalent
-from invariance.random_scenes import IMPLICIT, SEEDS, networks, shuffled, some_of
+from invariance.random_scenes import IMPLICIT, SEEDS, networks, shuffled
 from invariance.result_comparison import IN_PARTS, alike, told
 
 EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # warning of numba while it compiles
@@ -77,11 +75,7 @@ def test_other_names(case):
     def call(name):
         return f"{'zyxw'[len(name) % 4]}{name[::-1]}"
 
-    alike(
-        told(case),
-        told(equivalent.renamed(case, call)),
-        name=lambda probe: equivalent.called(probe, call),
-    )
+    alike(told(case), told(equivalent.renamed(case, call)), name=lambda probe: equivalent.called(probe, call))
 
 
 @examples(6)
@@ -96,16 +90,8 @@ def test_other_order(case, seed):
 @given(case=networks(), seed=SEEDS)
 def test_links_drawn_from_the_other_end(case, seed):
     """Reversed links give the same results with the opposite sign of flows."""
-    able = [name for name, link in case["links"].items() if link["type"] in equivalent.STRAIGHT]
-    chosen = some_of(able, seed)
-
-    def sign(probe, values):
-        return -values if ".flow" in probe and probe.split(".")[1] in chosen else values
-
-    def name(probe):
-        return equivalent.from_other_end(probe, case, chosen)
-
-    alike(told(case), told(equivalent.swapped(case, chosen)), near(case), name, sign)
+    other, how = equivalent.drawn_from_other_end(case, seed)
+    alike(told(case), told(other), near(case), **how)
 
 
 @examples(6)
@@ -178,12 +164,7 @@ def test_a_denser_fluid(case):
     def twice(probe, values):
         return 2.0 * values if ".pressure" in probe else values
 
-    alike(
-        told(equivalent.denser(case, 1.0)),
-        told(equivalent.denser(case, 2.0)),
-        near(case),
-        change=twice,
-    )
+    alike(told(equivalent.denser(case, 1.0)), told(equivalent.denser(case, 2.0)), near(case), change=twice)
 
 
 @examples(6)

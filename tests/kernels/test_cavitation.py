@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from reference import column_separation, scenes, summit
-from reference.column_separation import cavity
+from reference import cavities, scenes
+from reference.cavities import cavity
 from reference.folders import CASES
 from reference.scenes import AMBIENT, junction, lake, pipe, reservoir, scene, valve
 
@@ -314,9 +314,9 @@ def test_the_error_that_the_note_says_is_that_behind_a_stop(cells):
 
 def test_a_line_over_a_summit_parts_there_and_meets_as_by_characteristics():
     """Time, place, volume and collapse of the cavity agree, and the heads at five times."""
-    rows, events = summit.line(reaches=480, end=40.0)
+    rows, events = cavities.line(reaches=480, end=40.0)
     (opens, _, where), (meets, _, _) = events
-    assert where == summit.SUMMIT
+    assert where == cavities.SUMMIT
     result = fvsolve.run(CASES / "summit-cavity.toml")
     (found,) = result.summary["cavities"]
     assert found["distance"] == approx(where, abs=25.0) and found["time"] == approx(opens, abs=0.05)
@@ -360,7 +360,7 @@ def upstream_gate(cells: int, end: float) -> dict:
 def test_a_cavity_at_an_end_is_not_squeezed_by_what_the_pipe_loses_at_the_start():
     """The head at the gate stays near that of vapour until the column returns."""
     vapor = (WATER["vapor_pressure"] - AMBIENT) / (WATER["density"] * 9.80665)
-    truth = column_separation.behind_a_gate(30.0, 25.0, 600.0, 0.2, 1100.0, 0.02, 0.5, 0.5, vapor, 200, 6.0)
+    truth = cavities.behind_a_gate(30.0, 25.0, 600.0, 0.2, 1100.0, 0.02, 0.5, 0.5, vapor, 200, 6.0)
     shuts = truth[(truth[:, 0] > 1.0) & (truth[:, 2] == 0.0)][0, 0]
     run = fvsolve.run(upstream_gate(200, 5.0))
     held, head = run.t - 0.5, run["gate.head"]

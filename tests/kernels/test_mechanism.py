@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from reference.bodies import pinocchio_of, random_tree
 from reference.scenes import GRAVITY, scene
-from reference.trees import pinocchio_of, random_tree
 
 import fvsolve
 from fvsolve.kernels.dtypes import BODY_OUT

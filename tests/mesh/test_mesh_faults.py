@@ -9,7 +9,7 @@ from pytest import approx
 from reference.meshes import MSH4, SQUARE, TWO, write
 
 from fvsolve.errors import CaseError, MeshError
-from fvsolve.mesh import mesh_checks, read, rectangle
+from fvsolve.mesh import read, read_mesh, rectangle
 
 UNIT = dict(size=(1.0, 1.0), cells=(4, 4))
 BAD_RECTANGLES = {
@@ -137,7 +137,7 @@ def test_a_thin_wall_may_be_named(tmp_path, monkeypatch):
     assert mesh.length[mesh.patch("baffle")].tolist() == [1.0] and mesh.inner == 3
     with pytest.raises(MeshError, match="at 1 place faces coincide .* a group of lines that marks the face as a thin"):
         read(write(tmp_path / "none.msh", points, cells))
-    monkeypatch.setattr(mesh_checks, "BLOCK", 1)  # as for a long boundary
+    monkeypatch.setattr(read_mesh, "BLOCK", 1)  # as for a long boundary
     assert read(tmp_path / "wall.msh").inner == 3
     with pytest.raises(MeshError, match="at 1 or more places faces coincide"):
         read(tmp_path / "none.msh")

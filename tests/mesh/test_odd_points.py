@@ -7,7 +7,7 @@ import math
 import pytest
 
 from fvsolve.mesh import rectangle
-from fvsolve.mesh.mesh_points import MeshPoints
+from fvsolve.mesh.mesh import MeshPoints
 
 
 @pytest.mark.parametrize("x", [1e300, -1e300, 1e155, math.inf, math.nan, 1.0 + 1e-6])

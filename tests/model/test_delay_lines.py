@@ -1,11 +1,10 @@
 """Delay lines: exact waves without friction at any step, friction of the telegrapher's equations, closed balances."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
 import pytest
+from invariance.result_comparison import broken_off_and_whole
 from reference.delays import (
     AREA,
     BORE,
@@ -28,7 +27,7 @@ import fvsolve
 from fvsolve import studies
 from fvsolve.case.text import write
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.model import delay_history
+from fvsolve.model import delay_lines
 from fvsolve.output.memory_sink import MemorySink
 from fvsolve.solve.solve import Run
 
@@ -152,14 +151,8 @@ def short(line: str, **numerics) -> dict:
     links = {"up": pipe("lake", "a", 300.0, cells=50), "stub": pipe("a", "b", 3.0, cells=1),
              "down": pipe("b", "gate", 240.0, cells=40), "spur": pipe("b", "c", 5.0, cells=1),
              "tap": {"type": "valve", "from": "c", "to": "sink", "area": 2e-4}}  # fmt: skip
-    return scene(
-        nodes,
-        links,
-        3.0,
-        {"pipe_model": line, **numerics},
-        ["gate.pressure", "b.pressure", "c.pressure", "tap.flow"],
-        0.05,
-    )
+    return scene(nodes, links, 3.0, {"pipe_model": line, **numerics},
+                 ["gate.pressure", "b.pressure", "c.pressure", "tap.flow"], 0.05)  # fmt: skip
 
 
 def test_lines_shorter_than_a_step_know_each_other():
@@ -234,22 +227,7 @@ def case_of(name: str) -> dict:
 @pytest.mark.parametrize("name", ["fork", "short", "controlled"])
 def test_broken_off_and_resumed(name):
     """An interrupted and resumed run agrees with the whole run to the bit: final state, ledgers and envelopes."""
-    case = case_of(name)
-    model, early = fvsolve.build(fvsolve.load(case)), 0.4 * case["numerics"]["end"]
-
-    def late(t, seconds, steps):
-        run.budget = 1.0
-        if t > early:
-            raise KeyboardInterrupt
-
-    run = Run(model, fvsolve.initial_state(model), MemorySink(model), late)
-    run.left = 1.0
-    assert run.go().reason.startswith("interrupted") and early < run.state().t < case["numerics"]["end"]
-    again, whole = (Run(model, state, MemorySink(model), None) for state in (run.state(), fvsolve.initial_state(model)))
-    ended = again.go(), whole.go()
-    assert ended[0].reason == ended[1].reason == "finished" and ended[0].ledgers == ended[1].ledgers
-    ends = again.state(), whole.state()
-    assert ends[0].t == ends[1].t and np.array_equal(ends[0].y, ends[1].y)
+    again, whole = broken_off_and_whole(case_of(name), 0.4)
     assert np.array_equal(again.run_data.envelope, whole.run_data.envelope, equal_nan=True)
 
 
@@ -266,12 +244,8 @@ def test_advanced_in_pieces():
 
 def test_more_steps_than_were_foreseen():
     """The storage for past waves grows if error control takes much shorter steps than expected."""
-    case = main(
-        3.0,
-        {"method": "bogacki-shampine", "rtol": 1e-10},
-        {"mean": FLOW, "amplitude": 0.1 * FLOW, "period": 0.1},
-        cells=1,
-    )
+    case = main(3.0, {"method": "bogacki-shampine", "rtol": 1e-10},
+                {"mean": FLOW, "amplitude": 0.1 * FLOW, "period": 0.1}, cells=1)  # fmt: skip
     found = fvsolve.run(case)
     assert found.reason == "finished" and found.summary["steps"] > 2000
 
@@ -332,8 +306,8 @@ def test_what_a_store_is_given_is_taken_from_its_own_line(control):
 
 def test_jumps_that_find_no_room_are_told(monkeypatch):
     """A notice reports jumps that do not fit into the storage, here of two jumps per wave."""
-    monkeypatch.setattr(delay_history, "LEAST_JUMPS", 2)
-    monkeypatch.setattr(delay_history, "TOTAL_JUMPS", 2)
+    monkeypatch.setattr(delay_lines, "LEAST_JUMPS", 2)
+    monkeypatch.setattr(delay_lines, "TOTAL_JUMPS", 2)
     found = fvsolve.run(fork({"pipe_model": "delay-line", "delay_tolerance": 1e-6, "method": "euler", "step": 0.04}))
     told = [one for one in found.summary["warnings"] if one["kind"] == "jumps"]
     assert len(told) == 1 and "numerics.delay_tolerance" in told[0]["text"] and 0.0 < told[0]["value"] <= 1.0
@@ -364,11 +338,9 @@ def test_check_says_how_pipes_are_followed(fvs, tmp_path):
     )
 
 
-BAD = {
-    "law": ({"fluid": {"name": "Water", "law": "log"}}, 'law = "log" changes waves as they travel'),
-    "unsteady": ({}, "unsteady friction depends on the flow history of every cell"),
-    "rough": ({}, "friction attenuates"),
-}
+BAD = {"law": ({"fluid": {"name": "Water", "law": "log"}}, 'law = "log" changes waves as they travel'),
+       "unsteady": ({}, "unsteady friction depends on the flow history of every cell"),
+       "rough": ({}, "friction attenuates")}  # fmt: skip
 
 
 @pytest.mark.parametrize("which", BAD)

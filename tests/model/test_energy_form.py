@@ -1,7 +1,5 @@
 """Energy norm of states: springs between bodies, idle motions, and moving chambers."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,15 +1,12 @@
 """Starts with `initial = "equilibrium"` against closed forms and against SciPy on potentials and forces."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 from pytest import approx
-from reference.bodies import Crane, bodies, pendulum
+from reference.bodies import Crane, bodies, body, pendulum
 from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, reservoir, valve
-from reference.trees import body
 from scipy.optimize import brentq, minimize, root
 from scipy.spatial.transform import Rotation
 
@@ -17,7 +14,7 @@ import fvsolve
 from fvsolve.case.changes import changes
 from fvsolve.errors import CaseError
 from fvsolve.model.build import tables_with_start
-from fvsolve.model.configuration import Configuration
+from fvsolve.model.equilibrium_search import Configuration
 from fvsolve.studies import order
 
 CEILING = {"type": "frame", "points": {"a": [0, 0, 0]}}
@@ -296,13 +293,9 @@ def test_a_tank_on_two_sides_and_its_duct_do_not_move_where_their_levels_agree()
 
 # stability in time ----------------------------------------------------------------------------------------------
 
-SCENES = {
-    "arm": lambda: arm_on_springs(),
-    "chain": lambda: four_bar(),
-    "plate": lambda: raft("bushing", load=(0.3, 0.1)),
-    "hull": lambda: (hull("cells", 0.3), {}),
-    "modes": lambda: (hull("modes", 0.3), {}),
-}
+SCENES = {"arm": lambda: arm_on_springs(), "chain": lambda: four_bar(),
+          "plate": lambda: raft("bushing", load=(0.3, 0.1)), "hull": lambda: (hull("cells", 0.3), {}),
+          "modes": lambda: (hull("modes", 0.3), {})}  # fmt: skip
 METHODS = {"dormand-prince": {"rtol": 1e-8}, "radau-iia-5": {"rtol": 1e-6}, "rodas-4": {"rtol": 1e-6}}
 
 

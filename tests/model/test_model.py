@@ -1,26 +1,30 @@
-"""Models: pure right-hand side, state names, Jacobian, advances with inputs, and compiled against plain Python."""
+"""Models: pure right-hand side, state names, Jacobian, advances with inputs, and compiled against plain Python.
 
-from __future__ import annotations
+Probes along a pipe are independent of the direction of the pipe, and exact for polynomials. The work of reading and
+building a network is linear in its pipes, counted in executed lines of Python.
+"""
 
 import json
 import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from reference.scenes import WATER, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
+from fvsolve.assembly.scheme_codes import cells_around
 from fvsolve.errors import FvsolveError
+from fvsolve.schemes import SCHEMES
 
-WATER = {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2000.0}
 
-
-def scene(law: str = "linear", scheme: str = "muscl", **numerics) -> dict:
+def every_kind(law: str = "linear", scheme: str = "muscl", **numerics) -> dict:
     """Case of a lake, a pipe, a chamber, two valves in series, a tank and a rigid column, with states of each kind."""
     return {
-        "fluid": {**WATER, "law": law},
+        "fluid": {**WATER, "vapor_pressure": 2000.0, "law": law},
         "nodes": {
             "lake": {"type": "reservoir", "head": 60.0},
             "gate": {"type": "junction", "demand": 0.002},
@@ -46,7 +50,7 @@ def scene(law: str = "linear", scheme: str = "muscl", **numerics) -> dict:
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_the_rhs_is_pure(law):
-    model = fvsolve.build(fvsolve.load(scene(law)))
+    model = fvsolve.build(fvsolve.load(every_kind(law)))
     rng = np.random.default_rng(0)
     states = [model.scale * rng.normal(scale=0.1, size=model.y_size) for _ in range(3)]
     first = [model.rhs(0.2, y) for y in states]
@@ -56,7 +60,7 @@ def test_the_rhs_is_pure(law):
 
 
 def test_states_have_names_and_the_jacobian_is_the_slope_of_the_rhs():
-    model = fvsolve.build(fvsolve.load(scene(scheme="upwind5")))  # a limiter is not differentiable at rest
+    model = fvsolve.build(fvsolve.load(every_kind(scheme="upwind5")))  # a limiter is not differentiable at rest
     assert len(model.state_names) == model.y_size == 2 * 9 + 3
     assert {"main.forward[0]", "main.backward[8]", "pot.mass", "pond.mass", "drain.flow"} <= set(model.state_names)
     y = np.zeros(model.y_size)
@@ -66,7 +70,7 @@ def test_states_have_names_and_the_jacobian_is_the_slope_of_the_rhs():
 
 
 def test_check_tells_what_was_understood():
-    checks = fvsolve.build(fvsolve.load(scene())).checks
+    checks = fvsolve.build(fvsolve.load(every_kind())).checks
     assert checks["nodes"]["lake"]["head"] == pytest.approx(60.0)
     assert checks["pipes"]["main"]["cells"] == 9
     assert 0.015 < checks["pipes"]["main"]["friction_factor"] < 0.03
@@ -76,7 +80,7 @@ def test_check_tells_what_was_understood():
 
 
 def test_a_loop_of_advances_is_the_run_with_the_schedule():
-    held = scene(step=0.001)
+    held = every_kind(step=0.001)
     held["links"]["v1"]["opening"] = {"time": [0.2], "value": [1.0]}
     model = fvsolve.build(fvsolve.load(held))
     state = fvsolve.initial_state(model)
@@ -91,7 +95,7 @@ def test_a_loop_of_advances_is_the_run_with_the_schedule():
 
 
 def test_advance_refuses_inputs_that_name_nothing_and_times_gone_by():
-    model = fvsolve.build(fvsolve.load(scene()))
+    model = fvsolve.build(fvsolve.load(every_kind()))
     state = fvsolve.initial_state(model)
     with pytest.raises(FvsolveError, match='no input named "v1.openning"; did you mean "v1.opening"'):
         fvsolve.advance(model, state, 0.1, {"v1.openning": 0.3})
@@ -102,7 +106,7 @@ def test_advance_refuses_inputs_that_name_nothing_and_times_gone_by():
 
 
 def test_advance_stops_for_the_reason_for_which_a_run_stops():
-    case = scene("log")
+    case = every_kind("log")
     case["nodes"]["gate"]["demand"] = {"time": [0.0, 0.1], "value": [0.002, 0.2]}
     case["numerics"]["below_vapor"] = "stop"
     model = fvsolve.build(fvsolve.load(case))
@@ -126,7 +130,7 @@ def test_advance_stops_for_the_reason_for_which_a_run_stops():
     ],
 )
 def test_advance_refuses_inputs_out_of_range(name, value, said):
-    model = fvsolve.build(fvsolve.load(scene()))
+    model = fvsolve.build(fvsolve.load(every_kind()))
     with pytest.raises(FvsolveError, match=re.escape(said)):
         fvsolve.advance(model, fvsolve.initial_state(model), 0.1, {name: value})
 
@@ -134,7 +138,7 @@ def test_advance_refuses_inputs_out_of_range(name, value, said):
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_a_reservoir_held_by_head_or_by_pressure_is_one_that_says_so(law):
     """A reservoir held at a head or pressure by an input equals a reservoir with this head as its schedule."""
-    given = scene(law)
+    given = every_kind(law)
     held = fvsolve.build(fvsolve.load(given))
     start = fvsolve.initial_state(held)
     by_head = fvsolve.advance(held, start, 0.1, {"lake.head": np.float64(70.0), "sea.head": 0.0})
@@ -166,7 +170,7 @@ print(json.dumps({"reason": result.reason, "t": list(result.t),
 
 @pytest.mark.parametrize("law, scheme", [("linear", "muscl"), ("linear", "upwind5"), ("log", "weno5")])
 def test_compiled_and_plain_python_agree(law, scheme):
-    case = scene(law, scheme)
+    case = every_kind(law, scheme)
     case["numerics"]["end"] = 0.35  # the valve is constant from 0.3 s on
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-c", PLAIN], input=json.dumps(case), env=environment, capture_output=True,
@@ -181,10 +185,118 @@ def test_compiled_and_plain_python_agree(law, scheme):
 
 def test_a_restriction_is_laminar_below_the_mass_flow_of_its_reynolds_number():
     """Re = 4 M / (pi d mu), with the stated diameter, or that of the flow area Cd A."""
-    case = scene()
+    case = every_kind()
     case["links"]["v1"] |= {"laminar_reynolds": 40.0, "discharge_coefficient": 0.6}
     case["links"]["v2"] = {"type": "valve", "from": "pot", "to": "mid", "diameter": 0.05, "laminar_reynolds": 30.0}
     model = fvsolve.build(fvsolve.load(case))
     flows = dict(zip(model.valve_names, model.tables.valves["transition"], strict=True))
     for name, reynolds, diameter in (("v1", 40.0, np.sqrt(4 * 2e-3 / np.pi)), ("v2", 30.0, 0.05)):
         assert 4.0 * flows[name] / (np.pi * diameter * 1e-3) == pytest.approx(reynolds, rel=1e-12)
+
+
+CELLS = 10
+PLACES = (0.05, 0.1, 0.15, 0.3, 0.37, 0.45, 0.5, 0.6, 0.65, 0.7, 0.9, 0.95)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4])
+@pytest.mark.parametrize("n", [7, 8, 10, 30])
+def test_a_place_is_read_with_the_same_weights_from_either_end(degree, n):
+    """The weights of a place are equal from both ends and exact for polynomials.
+
+    They do not depend on rounding of n times the fraction at a face or a centre.
+    """
+    for k in range(1, 4 * n):
+        there, back = (cells_around(k / (4 * n) * n, degree, n), cells_around((1.0 - k / (4 * n)) * n, degree, n))
+        assert there[0] == n - back[0] - back[1].size
+        assert there[1] == pytest.approx(back[1][::-1], abs=1e-11)
+        cells = there[0] + np.arange(there[1].size)
+        power = np.arange(degree + 1)[:, None]
+        averages = ((cells + 1.0) ** (power + 1) - cells ** (power + 1.0)) / (power + 1) / n**power
+        assert averages @ there[1] == pytest.approx((k / (4 * n)) ** power[:, 0], rel=1e-9)
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_pipe_drawn_the_other_way_reads_the_same(scheme, law):
+    """A reversed pipe gives the same pressures and opposite flows, to rounding, at faces, centres and between."""
+    nodes = {"lake": reservoir(6e5), "gate": junction(), "sink": reservoir(2e5)}
+    shuts = {"start": 0.0, "duration": 0.02, "value": [1.0, 0.3]}
+    friction = {"model": "quasi-steady", "roughness": 1e-4}
+    numerics = {"scheme": scheme, "method": "rk4", "step": 1e-3, "start": 0.0}
+    found = []
+    for start, end, side in (("lake", "gate", 1), ("gate", "lake", -1)):
+        links = {"line": pipe(start, end, 100.0, 0.1, 1000.0, CELLS, friction=friction),
+                 "valve": valve("gate", "sink", 1e-3, opening=shuts)}  # fmt: skip
+        at = PLACES if side > 0 else [1.0 - x for x in PLACES]
+        probes = [f"line.{what}@{x!r}" for what in ("pressure", "flow") for x in at]
+        result = fvsolve.run(scene(nodes, links, 0.15, numerics, probes, fluid=WATER | {"law": law}))
+        flow = ["flow" in probe for probe in probes]
+        found.append(np.array([result[probe] for probe in probes]) * np.where(flow, side, 1)[:, None])
+    one, other = found
+    for rows in (slice(0, len(PLACES)), slice(len(PLACES), None)):
+        assert np.abs(one[rows] - other[rows]).max() < 1e-9 * np.abs(one[rows]).max()
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_where_nothing_weighs_there_is_no_head_and_all_else(law):
+    nodes = {"lake": reservoir(1.5e5), "end": {"type": "chamber", "volume": 1.0, "initial_pressure": 1e5}}
+    case = scene(nodes, {"gate": valve("lake", "end", 1e-3)}, 0.1, {"rtol": 1e-6}, ["end.head", "end.pressure"], 0.01)
+    result = fvsolve.run({**case, "gravity": 0.0, "fluid": {**WATER, "law": law}})
+    assert result.ok and np.all(np.isnan(result["end.head"])) and np.ptp(result["end.pressure"]) > 1e3
+
+
+PACKAGE = str(Path(fvsolve.__file__).parent)
+HAZEN = {"model": "hazen-williams", "coefficient": 110.0}
+
+
+def ladder(rungs: int, line: str) -> dict:
+    """Case of two rows of junctions, each behind a lake, with cross connections: three pipes per rung."""
+    nodes = {f"{side}{k}": junction(1e-4, elevation=0.0) for k in range(rungs) for side in "ab"}
+    nodes |= {"lake-a": lake(60.0), "lake-b": lake(60.0)}
+    links = {}
+    for k in range(rungs):
+        for side in "ab":
+            before = f"{side}{k - 1}" if k else f"lake-{side}"
+            links[f"{side}{k}"] = pipe(before, f"{side}{k}", 60.0, 0.3, 1200.0, 4, friction=HAZEN)
+        links[f"r{k}"] = pipe(f"a{k}", f"b{k}", 60.0, 0.2, 1200.0, 4, friction=HAZEN)
+    return scene(nodes, links, 1.0, {"pipe_model": line}, ["a0.head"])
+
+
+def effort(rungs: int, line: str) -> int:
+    """Number of lines of the package that are executed to read and build a network."""
+    count = 0
+
+    def watch(frame, event, _):
+        nonlocal count
+        if not frame.f_code.co_filename.startswith(PACKAGE):
+            return None
+        count += event == "line"
+        return watch
+
+    given = ladder(rungs, line)
+    before = sys.gettrace()
+    sys.settrace(watch)
+    try:
+        assert fvsolve.build(fvsolve.load(given)).checks["pipes"]
+    finally:
+        sys.settrace(before)
+    return count
+
+
+@pytest.mark.parametrize("line", ["finite-volume", "delay-line"])
+def test_four_times_the_pipes_take_less_than_four_times_the_work(line):
+    effort(5, line)  # caches
+    few, many = effort(12, line), effort(48, line)
+    assert many < 3.8 * few  # work proportional to pairs of pipes gives 3.95 and more
+
+
+def test_a_ladder_of_like_halves_flows_alike_in_both():
+    """A symmetric ladder with a large sparse system has no cross flow."""
+    model = fvsolve.build(fvsolve.load(ladder(120, "finite-volume")))
+    flow = dict(zip([p.name for p in model.pipes], model.tables.pipes["flow"], strict=True))
+    rho = model.case.properties.density
+    drawn = rho * 1e-4 * np.arange(120, 0, -1)
+    assert [flow[f"a{k}"] for k in range(120)] == pytest.approx(drawn, rel=1e-9)
+    assert [flow[f"b{k}"] for k in range(120)] == pytest.approx(drawn, rel=1e-9)
+    assert max(abs(flow[f"r{k}"]) for k in range(120)) < 1e-9 * drawn[0]

@@ -1,7 +1,5 @@
 """Notices for pipes with too few cells, for every scheme."""
 
-from __future__ import annotations
-
 from copy import deepcopy
 
 import pytest
@@ -63,11 +61,9 @@ def test_what_is_slow_or_is_exact_needs_no_cells() -> None:
 
 def behind_a_stub(closure: dict | float, length: float = 8.0, cells: int = 1) -> dict:
     nodes = {"lake": lake(50.0), "j": junction(), "gate": junction(), "out": reservoir(101325.0)}
-    links = {
-        "main": pipe("lake", "j", 1000.0, 0.3, 1000.0, 100),
-        "short": pipe("j", "gate", length, 0.15, 1000.0, cells),
-        "tap": valve("gate", "out", 1e-3, closure),
-    }
+    links = {"main": pipe("lake", "j", 1000.0, 0.3, 1000.0, 100),
+             "short": pipe("j", "gate", length, 0.15, 1000.0, cells),
+             "tap": valve("gate", "out", 1e-3, closure)}  # fmt: skip
     return scene(nodes, links, 2.0, {"scheme": "muscl", "pipe_model": "finite-volume"}, ["gate.head"])
 
 

@@ -1,8 +1,14 @@
-"""Files of a run read back to the last bit, open in other programs, and are not overwritten by accident."""
+"""Files of a run read back to the last bit, open in other programs, and are not overwritten by accident.
 
-from __future__ import annotations
+Frames have the positions of bodies, and of basins on bodies. A folder has at most one writer, a run or a study; its
+lock ends with the process.
+"""
 
 import json
+import math
+import signal
+import subprocess
+import sys
 import tomllib
 import tracemalloc
 from types import SimpleNamespace
@@ -10,14 +16,17 @@ from types import SimpleNamespace
 import meshio
 import numpy as np
 import pytest
-from reference.fork import PROBES, branched
-from reference.scenes import AMBIENT
+from reference.scenes import AMBIENT, BRANCHED_PROBES, branched, scene, still
 
 import fvsolve
+from fvsolve import run
+from fvsolve.errors import RunError
 from fvsolve.output import network_layout
 from fvsolve.output.csv_files import HistoryFile, read_headers, read_table
 from fvsolve.output.fields import FieldSeries, read_series
 from fvsolve.output.unit_columns import UnitColumn
+from fvsolve.studies import sweep
+from fvsolve.studies.result_cache import ResultCache
 
 UNITS = {"pressure": "barg", "flow": "l/s", "time": "ms"}
 
@@ -31,19 +40,17 @@ def folder(tmp_path_factory):
 
 def test_the_directory_holds_what_is_promised(folder):
     names = {path.name for path in folder.iterdir()}
-    assert names == {
-        *("summary.json", "history.csv", "history.png", "envelope.csv", "envelope.png"),
-        *("fields.pvd", "fields", "case.toml", "restart.npz"),
-    }
+    assert names == {*("summary.json", "history.csv", "history.png", "envelope.csv", "envelope.png"),
+                     *("fields.pvd", "fields", "case.toml", "restart.npz")}  # fmt: skip
     listed = set(json.loads((folder / "summary.json").read_text())["files"])
     assert listed == names - {"fields", "history.png", "envelope.png"}
 
 
 def test_history_reads_back_to_the_last_bit(folder):
     result, again = fvsolve.run(branched()), fvsolve.open_run(folder)
-    assert again.probes == PROBES
+    assert again.probes == BRANCHED_PROBES
     assert np.array_equal(again.t, result.t)
-    assert all(np.array_equal(again[name], result[name]) for name in PROBES)
+    assert all(np.array_equal(again[name], result[name]) for name in BRANCHED_PROBES)
     assert again.extremes == result.extremes and again.reason == result.reason == "finished"
 
 
@@ -71,7 +78,7 @@ def test_output_units_are_those_of_the_table_the_extremes_and_the_envelope(folde
 
 def test_the_resolved_case_runs_again_to_the_same_numbers(folder):
     again, result = fvsolve.run(folder / "case.toml"), fvsolve.open_run(folder)
-    assert all(np.array_equal(again[name], result[name]) for name in PROBES)
+    assert all(np.array_equal(again[name], result[name]) for name in BRANCHED_PROBES)
 
 
 def test_frames_read_back_through_meshio(folder):
@@ -162,13 +169,9 @@ def test_expectations_are_those_of_the_table(folder):
     result = fvsolve.open_run(folder)
     pressure = result["gate.pressure"]
     mean = np.sum(0.5 * (pressure[1:] + pressure[:-1]) * np.diff(result.t)) / (result.t[-1] - result.t[0])
-    claims = {
-        "max(gate.pressure)": result.extremes["gate.pressure"].maximum,
-        "min(gate.pressure)": result.extremes["gate.pressure"].minimum,
-        "final(gate.pressure)": pressure[-1],
-        "mean(gate.pressure)": mean,
-        "at(gate.pressure, 0.5)": np.interp(0.5, result.t, pressure),
-    }
+    claims = {"max(gate.pressure)": result.extremes["gate.pressure"].maximum,
+              "min(gate.pressure)": result.extremes["gate.pressure"].minimum, "final(gate.pressure)": pressure[-1],
+              "mean(gate.pressure)": mean, "at(gate.pressure, 0.5)": np.interp(0.5, result.t, pressure)}  # fmt: skip
     expect = {text: {"value": float(value), "rtol": 1e-12} for text, value in claims.items()}
     found = fvsolve.run(branched(expect=expect))
     assert [one.text for one in found.expectations if one.ok] == list(claims)
@@ -178,10 +181,8 @@ def test_expectations_are_those_of_the_table(folder):
 
 def test_a_comparison_finds_a_shifted_copy_of_the_run(folder, tmp_path):
     result = fvsolve.open_run(folder)
-    rows = [
-        f"{1e3 * (t - 0.05)!r},{(p - AMBIENT) / 1e5 + 0.5!r}"
-        for t, p in zip(result.t.tolist(), result["gate.pressure"].tolist(), strict=True)
-    ]
+    rows = [f"{1e3 * (t - 0.05)!r},{(p - AMBIENT) / 1e5 + 0.5!r}"
+            for t, p in zip(result.t.tolist(), result["gate.pressure"].tolist(), strict=True)]  # fmt: skip
     (tmp_path / "rig.csv").write_text("clock [ms],p [barg]\n" + "\n".join(rows))
     measured = {"file": str(tmp_path / "rig.csv"), "time": "clock [ms]", "value": "p [barg]", "shift": 0.05}
     found = fvsolve.run(branched(compare={"gate.pressure": measured}), out=tmp_path / "run")
@@ -221,12 +222,10 @@ def test_a_probe_that_is_not_there_is_named(folder):
 
 def network(links: dict[str, tuple[str, str]], **positions) -> SimpleNamespace:
     names = dict.fromkeys(name for ends in links.values() for name in ends)
-    return SimpleNamespace(
-        places=dict.fromkeys(names),
-        nodes={name: SimpleNamespace(position=positions.get(name)) for name in names},
-        links={name: SimpleNamespace(ports={"from": a, "to": b}) for name, (a, b) in links.items()},
-        routes={},
-    )
+    return SimpleNamespace(places=dict.fromkeys(names),
+                           nodes={name: SimpleNamespace(position=positions.get(name)) for name in names},
+                           links={name: SimpleNamespace(ports={"from": a, "to": b}) for name, (a, b) in links.items()},
+                           routes={})  # fmt: skip
 
 
 def test_stated_positions_are_used():
@@ -269,3 +268,143 @@ def test_a_network_is_laid_out_alike_every_time_with_no_two_nodes_in_one_place(c
 def test_parallel_links_bend_apart():
     bends = network_layout.link_bends(network({"x": ("a", "b"), "y": ("b", "a"), "z": ("b", "c")}).links)
     assert bends["z"] == 0.0 and bends["x"] == bends["y"] != 0.0  # x and y start at opposite ends
+
+
+def test_a_turning_boom_and_its_tank_are_written_where_they_are(tmp_path):
+    rate = 0.4
+    boom = {
+        "type": "body", "mass": 10.0, "inertia": [1.0, 1.0, 1.0], "centre_of_mass": [1.0, 0, 0],
+        "points": {"tip": [2.0, 0, 0]},
+        "joint": {"kind": "revolute", "axis": [0, 0, 1], "at": [5.0, 0, 1.0],
+                  "angle": {"time": [0, 9], "value": [0, 9 * rate]}},
+    }  # fmt: skip
+    tank = {"type": "basin", "on": "boom", "at": [2.0, 0, 0.5], "size": [1.0, 1.0], "cells": [2, 2], "level": 0.2}
+    world = {"type": "frame", "points": {"post": [5.0, 3.0, 1.0]}}
+    stay = {"type": "spring", "from": "world.post", "to": "boom.tip", "stiffness": 1.0}
+    case = scene({"boom": boom, "b": tank, "world": world}, {"stay": stay}, 2.0, {"scheme": "upwind"})
+    case["output"]["fields"] = 4
+    run(case, out=tmp_path / "r")
+    frames = read_series(tmp_path / "r" / "fields.pvd")
+    bodies = [(t, meshio.read(path)) for t, path in frames if path.name.startswith("bodies")]
+    tanks = [(t, meshio.read(path)) for t, path in frames if path.name.startswith("b-")]
+    assert len(bodies) == len(tanks) == 5
+    for (t, one), (_, other) in zip(bodies, tanks, strict=True):
+        east = np.array([math.cos(rate * t), math.sin(rate * t), 0.0])
+        north = np.array([-east[1], east[0], 0.0])
+        tip = np.array([5.0, 0, 1.0]) + 2.0 * east
+        assert np.abs(one.points - tip).sum(axis=1).min() < 1e-9
+        assert np.abs(one.points - [5.0, 3.0, 1.0]).sum(axis=1).min() < 1e-9
+        assert set(one.cell_data["body"][0]) == {0, -1}
+        corner = tip + east + north + [0, 0, 0.5]
+        assert np.abs(other.points - corner).sum(axis=1).min() < 1e-9
+        assert other.cell_data["normal"][0] == pytest.approx(np.tile([0, 0, 1.0], (4, 1)))
+
+
+@pytest.mark.parametrize(
+    ("physics", "attitude", "along"),
+    [
+        ({"level": 0.2}, {"yaw": "90 deg"}, [0.0, 1.0, 0.0]),
+        ({"physics": "liquid", "thickness": 0.1, "pressure": "2 bar"}, {"yaw": "90 deg"}, [0.0, 1.0, 0.0]),
+        (
+            {"physics": "liquid", "thickness": 0.1, "pressure": "2 bar"},
+            {"pitch": "-30 deg"},
+            [math.sqrt(0.75), 0.0, 0.5],
+        ),
+    ],
+)
+def test_velocities_in_frames_are_along_axes_of_the_world_and_on_lines_along_those_of_the_basin(
+    physics, attitude, along, tmp_path
+):
+    hull = {"type": "body", "mass": 10.0, "inertia": [1.0, 1.0, 1.0], "joint": {"kind": "fixed", "attitude": attitude}}
+    tank = {"type": "basin", "on": "hull", "size": [1.0, 1.0], "cells": [4, 4], "start": {"u": 0.3}, **physics}
+    case = scene({"hull": hull, "tank": tank}, {}, 1e-6, {"scheme": "upwind"})
+    case["output"] |= {"fields": 1, "lines": {"cut": {"basin": "tank", "from": [0.2, 0.5], "to": [0.8, 0.5]}}}
+    run(case, out=tmp_path / "r")
+    frame = meshio.read(tmp_path / "r" / "fields" / "tank-000000.vtu")
+    assert frame.cell_data["velocity"][0] == pytest.approx(np.tile(0.3 * np.array(along), (16, 1)), abs=1e-12)
+    line = np.genfromtxt(tmp_path / "r" / "lines" / "cut-000000.csv", delimiter=",", names=True)
+    assert line["u_ms"] == pytest.approx(np.full(line.size, 0.3)) and np.abs(line["v_ms"]).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("fields", "out", "reason"),
+    [(0, True, "fields is 0"), (2, False, "nothing was written"), (2, None, "the case has no ")],
+)
+def test_a_run_without_frames_says_the_one_reason(fields, out, reason, tmp_path):
+    stone = {"type": "body", "mass": 1.0, "inertia": [1.0, 1.0, 1.0]}
+    weight = {"type": "mass", "mass": 1.0}
+    coil = {"type": "spring", "from": "wall", "to": "weight", "stiffness": 1.0}
+    lone = out is None
+    nodes = {"weight": weight, "wall": {"type": "frame"}} if lone else {"stone": stone}
+    case = scene(nodes, {"coil": coil} if lone else {}, 0.1, {"method": "rk4", "step": 0.01, "scheme": "upwind"})
+    case["output"]["fields"] = fields
+    found = run(case, out=None if out is False else tmp_path / "r")
+    with pytest.raises(RunError, match=reason) as told:
+        found.view(field="speed")
+    assert sum(one in str(told.value) for one in ("fields is 0", "nothing was written", "the case has no ")) == 1
+
+
+WAITING = """
+import sys
+import fvsolve
+
+def wait(t, seconds, steps):
+    print("going", flush=True)
+    sys.stdin.readline()
+
+fvsolve.run(sys.argv[1], out=sys.argv[2], progress=wait)
+"""
+
+
+@pytest.fixture
+def running(tmp_path):
+    """Folder and process of a run that waits in its first call of `progress`."""
+    case = tmp_path / "case.toml"
+    case.write_text(fvsolve.load(still(), {"numerics.step": "1 us", "numerics.method": "rk4"}).resolved())
+    (tmp_path / "wait.py").write_text(WAITING)
+    command = [sys.executable, str(tmp_path / "wait.py"), str(case), str(tmp_path / "out")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "going\n"
+        yield tmp_path / "out", process
+        process.kill()
+
+
+@pytest.mark.parametrize("how", [{}, {"force": True}, {"resume": True}], ids=["anew", "force", "resume"])
+def test_a_run_that_is_going_is_let_alone(running, how):
+    folder, process = running
+    before = (folder / "restart.npz").read_bytes(), (folder / "history.csv").stat().st_size
+    with pytest.raises(RunError, match=r"out is in use: a run still writes there\. .*--out"):
+        fvsolve.run(folder.parent / "case.toml", out=folder, **how)
+    assert before == ((folder / "restart.npz").read_bytes(), (folder / "history.csv").stat().st_size)
+    assert process.poll() is None
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no such signal")
+def test_the_lock_goes_with_its_process(running):
+    folder, process = running
+    process.kill()
+    process.wait()
+    short = {"numerics.end": "1 ms", "output.every": "0.1 ms"}
+    assert fvsolve.run(folder.parent / "case.toml", short, out=folder, force=True).ok
+    assert not (folder / ".lock").exists()
+
+
+def test_a_run_that_fails_lets_go(tmp_path):
+    for _ in range(2):
+        with pytest.raises(ZeroDivisionError):
+            fvsolve.run(still(), {"numerics.step": "1 us", "numerics.method": "rk4"}, tmp_path, force=True,
+                        progress=lambda *_: 1 / 0)  # fmt: skip
+    assert fvsolve.run(still(), out=tmp_path, force=True).ok
+    with pytest.raises(RunError, match="holds a run; replace it"):
+        fvsolve.run(still(), out=tmp_path)
+    assert fvsolve.run(still(), out=tmp_path, resume=True).ok
+    assert not (tmp_path / ".lock").exists()
+
+
+def test_studies_share_no_folder(tmp_path):
+    vary = {"nodes.pond.level": [1.0, 2.0]}
+    with ResultCache(tmp_path), pytest.raises(RunError, match="is in use: a study still writes there"):
+        sweep(still(), vary, out=tmp_path)
+    assert len(sweep(still(), vary, out=tmp_path).rows) == 2
+    written = {path.name for path in tmp_path.iterdir()}
+    assert written - {"sweep.parquet"} == {"points.jsonl", "sweep.csv"}  # sweep.parquet needs pyarrow

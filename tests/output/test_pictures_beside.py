@@ -1,14 +1,12 @@
 """Pictures that a second process draws equal those drawn after the run; none is lost if that process fails."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from reference.fork import branched
+from reference.scenes import branched
 
 import fvsolve
 from fvsolve.draw.plot_process import processor_count

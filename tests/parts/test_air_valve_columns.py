@@ -5,7 +5,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from reference.bores import HEAT, bores
+from reference.air import HEAT, bores
 from reference.scenes import (
     AMBIENT,
     GRAVITY,

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from model.test_sparsity import stray
 from pytest import approx
-from reference.bodies import CLOSE, OIL, Crane, bodies, pendulum
+from reference.bodies import CLOSE, OIL, Crane, bodies, body, pendulum, random_tree, turn
 from reference.cylinders import valve_flow
 from reference.scenes import AMBIENT, GRAVITY, scene
-from reference.trees import body, random_tree, turn
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation

@@ -2,9 +2,7 @@
 
 import pytest
 from parts.test_bodies import parallelogram
-from reference.bodies import Crane, bodies, pendulum
-from reference.refusals import refused
-from reference.trees import body
+from reference.bodies import Crane, bodies, body, pendulum
 
 import fvsolve
 from fvsolve.case import load

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from reference import discs
+from reference import lifted_valves
 from reference.folders import CASES
 from reference.pairs import pairs
 from reference.refusals import refused
@@ -188,7 +188,7 @@ def slam():
     weight, z = RHO * GRAVITY, 1200.0 / area(0.3)
     head = lambda t: 101325.0 + weight * np.interp(t, [0.5, 1.0], [30.3, 10.0])  # noqa: E731
     g, far = 2.0 * RHO * (0.61 * 0.05) ** 2, 101325.0 + weight * 30.0
-    return discs.slam(head, g, z, 1.0, far, 2e3, 0.2, 4.5, [0.5, 1.0])
+    return lifted_valves.slam(head, g, z, 1.0, far, 2e3, 0.2, 4.5, [0.5, 1.0])
 
 
 def test_a_disc_that_shuts_late_slams_as_waves_and_its_own_equation_say():
@@ -277,7 +277,7 @@ def leaving_of(disc, felt):
     friction = 0.02 * 50.0 / (0.1 * 2.0 * RHO * area(0.1) ** 2)
     source = lambda t: np.interp(t, [4.0, 9.0], [-1.1e5, 1e4])  # noqa: E731
     g = 2.0 * RHO * (0.61 * 0.01) ** 2
-    return discs.leaves_with_column(source, 9.0, g, 2e3, 1e4, disc, inertia, friction, felt, (8.8, 9.0, 10.0))
+    return lifted_valves.leaves_with_column(source, 9.0, g, 2e3, 1e4, disc, inertia, friction, felt, (8.8, 9.0, 10.0))
 
 
 def assert_leaves(case, name, disc, felt):

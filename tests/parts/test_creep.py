@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from model.test_sparsity import random_state, stray
 from pytest import approx
-from reference import creeping, laminar
-from reference.refusals import refused
+from reference import stopped_lines
 from reference.scenes import WATER, area, junction, reservoir, scene
 
 import fvsolve
@@ -59,7 +58,7 @@ def test_the_exact_line_is_that_of_another_inversion():
              for compliance, time in zip(*ELEMENTS.values(), strict=True)]  # fmt: skip
     ages = np.array([0.01, 0.5, 1.9, 2.1, 3.3])
     found = (probe(0, START + ages * travel) - float(run["gate.pressure"][0])) / jump
-    assert found == approx([creeping.jump(share, age) for age in ages], abs=1e-8)
+    assert found == approx([stopped_lines.creep_jump(share, age) for age in ages], abs=1e-8)
 
 
 def test_a_smooth_and_a_sudden_closure_are_within_1e_3_of_the_jump():
@@ -259,4 +258,4 @@ def test_the_shipped_main_without_friction_is_the_transform_of_two_lines_in_seri
     start, jump = float(run["gate.gauge_pressure"][0]), np.ptp(run["gate.gauge_pressure"])
     for t in (2.5, 5.0, 9.0, 11.0, 18.0, 33.0):
         found = float(np.interp(t, run.t, run["gate.gauge_pressure"])) - start
-        assert found == approx(1e-5 * laminar.euler(gate, t, 2000), abs=1e-3 * jump)
+        assert found == approx(1e-5 * stopped_lines.euler(gate, t, 2000), abs=1e-3 * jump)

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from model.test_sparsity import random_state, stray
 from pytest import approx
-from reference import laminar, scenes
-from reference.characteristics import ValvePipe, darcy, hazen_williams
+from reference import stopped_lines
+from reference.characteristics import Line, Network
 from reference.folders import CASES
-from reference.network import Line, Network
 from reference.orders import observed_order
 from reference.refusals import refused
 from reference.scenes import (
@@ -344,7 +343,7 @@ def errors(number: float, cells: int, kind: str):
 
 def test_the_transform_of_zielkes_function_is_his_sum_over_the_zeros_of_a_bessel_function():
     s = np.array([0.3, 20.0, 5.0 + 40.0j, 2000.0j])
-    assert unsteady_terms.zielke(s) == approx((laminar.inertia(s) - 1.0 - 8.0 / s) / 4.0, rel=1e-8)
+    assert unsteady_terms.zielke(s) == approx((stopped_lines.inertia(s) - 1.0 - 8.0 / s) / 4.0, rel=1e-8)
 
 
 def printed(weighting: str, tau: np.ndarray, reynolds: float, roughness: float) -> np.ndarray:
@@ -408,18 +407,18 @@ def test_the_exact_line_is_that_of_another_inversion(number):
     run, probe, _ = solved(line(number, 5, "step"))
     start = float(run["gate.pressure"][0])
     t = np.array([0.01, 0.5, 1.9, 2.1, 3.7]) + START
-    other = [laminar.jump(number, late - START) for late in t]
+    other = [stopped_lines.laminar_jump(number, late - START) for late in t]
     assert (probe(0, t) - start) / joukowsky(number) == approx(other, abs=1e-9)
     _, probe, _ = solved(line(number, 5))
     t = np.array([0.3, 0.8, 2.35, 3.0])
-    other = [laminar.smooth(number, START, DURATION, late) for late in t]
+    other = [stopped_lines.smooth(number, START, DURATION, late) for late in t]
     assert (probe(0, t) - start) / joukowsky(number) == approx(other, abs=5e-8)
 
 
 def test_the_first_plateau_rises_as_boundary_layers_do():
     """Early after a jump sqrt(I0 / I2) = 1 + 1/x + O(1/x^2): the pressure is 1 + 2 sqrt(tau / pi) Joukowsky jumps."""
     for t in (1e-6, 1e-4):
-        assert laminar.jump(0.05, t) - 1.0 == approx(
+        assert stopped_lines.laminar_jump(0.05, t) - 1.0 == approx(
             2.0 * math.sqrt(0.05 * t / math.pi), rel=20.0 * math.sqrt(0.05 * t)
         )
 
@@ -487,7 +486,7 @@ def test_its_port_is_the_impedance_of_the_exact_line_and_passive():
     """Impedance Z tanh(G L) of the linearised cells, with a real part that is never negative."""
     found = response(line(0.02, 40), "gate")
     s = 1j * np.array([0.2, 0.7, 1.5, 2.3])
-    root = np.sqrt(laminar.inertia(s / 0.02))
+    root = np.sqrt(stopped_lines.inertia(s / 0.02))
     exact_z = WATER["density"] * 1000.0 / area(0.02) * root * np.tanh(s * root)
     assert found.transfer(s) == approx(exact_z, rel=1e-4)
     assert found.verdict.positive_real

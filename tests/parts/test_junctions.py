@@ -4,9 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from reference import rays, scenes
-from reference.bumps import gaussian_averages, scattered
-from reference.orders import mean_error, observed_order
+from reference import frictionless, scenes
+from reference.orders import gaussian_averages, mean_error, observed_order, scattered
 from reference.scenes import (
     AMBIENT,
     RHO,
@@ -34,13 +33,13 @@ def network(pipes: dict[str, tuple], demand: dict, end: float, numerics: dict, p
     return scene(nodes, {n: pipe(*row) for n, row in pipes.items()}, end, numerics, probes, every)
 
 
-def traced(pipes: dict[str, tuple], flows: dict[str, float], demand: dict) -> rays.Rays:
+def traced(pipes: dict[str, tuple], flows: dict[str, float], demand: dict) -> frictionless.Rays:
     """Exact solution of the case of `network` by ray tracing, from given initial flows."""
-    laid = {n: rays.Pipe(*row[:5], flows.get(n, 0.0), SUPPLY) for n, row in pipes.items()}
-    return rays.Rays(RHO, laid, {"lake": rays.held(SUPPLY)}, demand)
+    laid = {n: frictionless.Pipe(*row[:5], flows.get(n, 0.0), SUPPLY) for n, row in pipes.items()}
+    return frictionless.Rays(RHO, laid, {"lake": frictionless.held(SUPPLY)}, demand)
 
 
-def clear_of_jumps(exact: rays.Rays, place: str, t: np.ndarray, width: float, size: float) -> np.ndarray:
+def clear_of_jumps(exact: frictionless.Rays, place: str, t: np.ndarray, width: float, size: float) -> np.ndarray:
     """Mask of times at which the exact pressure of a node varies by less than `size` [Pa] within `width` [s]."""
     shifts = np.linspace(-width, width, 21)
     around = np.array([[exact.pressure(place, float(s + d)) for d in shifts] for s in t])
@@ -62,7 +61,7 @@ def test_pipes_whose_cells_take_the_same_time_are_exact_at_courant_one(pipes):
     places = sorted({p for row in pipes.values() for p in row[:2]} - {"lake"})
     case = network(pipes, {"gate": step(shut, q, 0.0)}, 3.0, SHARP, [f"{p}.pressure" for p in places], dt / 2)
     result = fvsolve.run(case)
-    exact = traced(pipes, dict.fromkeys(set(pipes) - {"dead"}, q), {"gate": rays.step(shut, q, 0.0)})
+    exact = traced(pipes, dict.fromkeys(set(pipes) - {"dead"}, q), {"gate": frictionless.step(shut, q, 0.0)})
     jump = RHO * 1000.0 * q / scenes.area(0.25)
     t = np.asarray(result.t)
     for place in places:
@@ -86,7 +85,7 @@ def test_plateaus_are_those_of_ray_tracing_whatever_the_lengths(scheme):
     numerics = {"scheme": scheme, "method": "ssp-rk3", "courant": 0.8}
     pipes = {n: (*row[:5], 2 * row[5]) for n, row in ODD.items()}
     result = fvsolve.run(network(pipes, {"gate": step(shut, q, 0.0)}, 1.6, numerics, probes, 0.004))
-    exact = traced(ODD, {"main": q, "left": q}, {"gate": rays.step(shut, q, 0.0)})
+    exact = traced(ODD, {"main": q, "left": q}, {"gate": frictionless.step(shut, q, 0.0)})
     t, jump = np.asarray(result.t), RHO * 1111.0 * q / scenes.area(0.4)
     for probe in probes:
         wanted = np.array([exact.pressure(probe.split(".")[0], s) for s in t])
@@ -282,7 +281,7 @@ def test_no_mode_grows_in_random_networks(scheme):
         assert growth(scene(nodes, links, 1.0, numerics, ["mid.pressure"])) < 1e-8, links
 
 
-def random_network(rng: np.random.Generator, dt: float) -> tuple[dict, dict, rays.Rays]:
+def random_network(rng: np.random.Generator, dt: float) -> tuple[dict, dict, frictionless.Rays]:
     """Return (nodes, links, exact solution) of five random pipes with a loop, and events at multiples of the step."""
     rows: dict[str, tuple] = {}
     for k in range(5):
@@ -304,11 +303,11 @@ def random_network(rng: np.random.Generator, dt: float) -> tuple[dict, dict, ray
     def rising(name: str, t: float) -> float:
         return min(max((t - when[name]) / length, 0.0), 1.0)
 
-    exact = rays.Rays(
+    exact = frictionless.Rays(
         RHO,
-        {n: rays.Pipe(*row[:5], 0.0, SUPPLY) for n, row in rows.items()},
-        {"n0": rays.step(when["n0"] - 1e-9, SUPPLY, SUPPLY * up)},
-        {"n1": rays.step(when["n1"] - 1e-9, 0.0, q), "n2": lambda t: q * rising("n2", t)},
+        {n: frictionless.Pipe(*row[:5], 0.0, SUPPLY) for n, row in rows.items()},
+        {"n0": frictionless.step(when["n0"] - 1e-9, SUPPLY, SUPPLY * up)},
+        {"n1": frictionless.step(when["n1"] - 1e-9, 0.0, q), "n2": lambda t: q * rising("n2", t)},
         {"n3": (lambda t: area * rising("n3", t), AMBIENT)},
     )
     return nodes, links, exact

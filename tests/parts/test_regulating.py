@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from reference import discs, stems
+from reference import lifted_valves
 from reference.scenes import (
     AMBIENT,
     GRAVITY,
@@ -67,7 +67,7 @@ def test_it_follows_scipy_through_both_stops(method):
         ]
 
     start = [SET, through(8e-4 * 0.6, 4e5) / through(6e-4, 5e5)]
-    exact, events = discs.stopped(rates, lambda t, y: SET - y[0], start, [1.0, 2.0, 4.0, 5.0], result.t)
+    exact, events = lifted_valves.stopped(rates, lambda t, y: SET - y[0], start, [1.0, 2.0, 4.0, 5.0], result.t)
     near = 1e-6 if method == "dormand-prince" else 1e-4
     assert [e["time"] for e in result.summary["events"]] == pytest.approx(events, abs=near)
     assert result["pot.pressure"] == pytest.approx(exact[0], abs=near * BAND)
@@ -226,7 +226,7 @@ def held_column(kind, after, ends, law, numerics):
 
 
 def equations(kind, after, ends):
-    """Return (source, lifted, G, stroke, inertia, friction) for `reference.stems`."""
+    """Return (source, lifted, G, stroke, inertia, friction) for `reference.lifted_valves`."""
     bore = math.pi * 0.05**2
     up, down = (lambda t, p=p: np.interp(t, p["time"], p["value"]) if isinstance(p, dict) else p for p in ends)
 
@@ -245,13 +245,13 @@ def opening_ends(kind):
 @functools.cache
 def leaving(kind, after, at):
     """Lift and mass flow at the times `at` while the valve opens, by SciPy."""
-    return stems.leaves_with_column(*equations(kind, after, opening_ends(kind)), 8.0 / 3.0, [4.0], at)
+    return lifted_valves.stem_leaves_with_column(*equations(kind, after, opening_ends(kind)), 8.0 / 3.0, [4.0], at)
 
 
 @functools.cache
 def shutting(kind, after):
     """Time at which the valve shuts, by SciPy [s]."""
-    return stems.shuts_with_column(*equations(kind, after, shutting_ends(kind)), 2.0)
+    return lifted_valves.shuts_with_column(*equations(kind, after, shutting_ends(kind)), 2.0)
 
 
 def shutting_ends(kind):

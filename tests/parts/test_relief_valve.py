@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from reference import discs
-from reference.refusals import refused
+from reference import lifted_valves
 from reference.scenes import RHO, SMOOTH, WATER, chamber, junction, lake, pipe, reservoir, scene, valve
 from scipy.optimize import brentq
 
@@ -59,7 +58,8 @@ def swing(t, y, held):
 def test_a_disc_follows_scipy_through_its_stops(kind, rates):
     result = fvsolve.run(filled(**DISCS[kind]))
     start = [3e5, 0.0, 0.0][: 3 if kind == "swing" else 2]
-    exact, events = discs.stopped(rates, lambda t, y: (y[0] - SET) / SPAN - y[1], start, [0.5, 1, 6, 7], result.t)
+    kinks = [0.5, 1, 6, 7]
+    exact, events = lifted_valves.stopped(rates, lambda t, y: (y[0] - SET) / SPAN - y[1], start, kinks, result.t)
     assert result.ok and len(events) >= 2
     assert [e["time"] for e in result.summary["events"]] == pytest.approx(events, abs=1e-7)
     assert result["pot.pressure"] == pytest.approx(exact[0], abs=1e-6 * SPAN)
@@ -74,7 +74,7 @@ def test_without_a_disc_it_is_the_pressure_alone_that_lifts_it():
     exact, now, p = np.zeros(result.t.size), 0.0, 3e5
     lift = lambda p: (p - SET) / SPAN  # noqa: E731
     for end in (0.5, 1.0, 6.0, 7.0, 14.0):
-        step = solve_ivp(lambda t, y: [pot(t, y[0], lift(y[0]))], (now, end), [p], max_step=0.02, **discs.TIGHT)
+        step = solve_ivp(lambda t, y: [pot(t, y[0], lift(y[0]))], (now, end), [p], max_step=0.02, **lifted_valves.TIGHT)
         here = (result.t >= now) & (result.t <= end)
         exact[here], now, p = step.sol(result.t[here])[0], end, step.y[0, -1]
     assert result["pot.pressure"] == pytest.approx(exact, abs=1e-6 * SPAN)

@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 import pytest
-from reference import rays, scenes
-from reference.allievi import relative_drop
+from reference import scenes
+from reference.frictionless import relative_drop
 from reference.scenes import AMBIENT, RHO, SHARP, WATER, junction, pipe, ramp, reservoir, scene, step, valve
 
 import fvsolve
@@ -16,6 +16,7 @@ from fvsolve import run
 from fvsolve.assembly.schedule_tables import Schedules
 from fvsolve.case.load import load
 from fvsolve.errors import CaseError
+from fvsolve.exact import rays
 from fvsolve.exact.solution import value
 from fvsolve.kernels.schedule_pieces import piece_slopes, piece_value
 from fvsolve.parts.schedule import Schedule

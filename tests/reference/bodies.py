@@ -1,12 +1,91 @@
-"""Cases with bodies in space, in SI units."""
-
-from __future__ import annotations
+"""Cases with bodies in space, in SI units; random trees of bodies, and their models in Pinocchio."""
 
 import math
 from typing import Any
 
+import numpy as np
+
 from reference.scenes import AMBIENT, GRAVITY, scene
-from reference.trees import body
+
+AXES = ("X", "Y", "Z")
+
+
+def body(mass: float, inertia: Any, joint: dict, **more: Any) -> dict:
+    return {"type": "body", "mass": mass, "inertia": inertia, "joint": joint, **more}
+
+
+def turn(rng) -> np.ndarray:
+    """Random rotation matrix, from random Euler parameters."""
+    h, a, b, c = (e := rng.standard_normal(4)) / np.linalg.norm(e)
+    return np.array([
+        [1 - 2 * (b * b + c * c), 2 * (a * b - h * c), 2 * (a * c + h * b)],
+        [2 * (a * b + h * c), 1 - 2 * (a * a + c * c), 2 * (b * c - h * a)],
+        [2 * (a * c - h * b), 2 * (b * c + h * a), 1 - 2 * (a * a + b * b)],
+    ])  # fmt: skip
+
+
+def random_tree(rng, many: int, first: str = "", kinds=("revolute", "prismatic", "ball")) -> dict[str, dict]:
+    """Bodies b0, b1, ... of a random tree; `first` is the kind of joint of b0, by default random."""
+    found = {}
+    for i in range(many):
+        kind = first if i == 0 and first else str(rng.choice(kinds))
+        spread, frame = rng.uniform(0.5, 1.5, 3), turn(rng)  # principal moments obey the triangle inequality
+        moments = np.diag(np.sum(spread) - spread) * 0.3
+        joint: dict[str, Any] = {"kind": kind, "at": rng.uniform(-1, 1, 3).tolist(),
+                                 "attitude": {"matrix": turn(rng).tolist()}}  # fmt: skip
+        if i > 0:
+            joint["on"] = f"b{rng.integers(0, i)}"
+        if kind in ("revolute", "prismatic"):
+            axis = rng.standard_normal(3)
+            joint |= {"axis": (axis / np.linalg.norm(axis)).tolist(), "rate": float(rng.uniform(-1, 1))}
+            joint["angle" if kind == "revolute" else "travel"] = float(rng.uniform(-1, 1))
+        if kind in ("ball", "free"):
+            joint["rate"] = rng.uniform(-1, 1, 3).tolist()
+        if kind == "free":
+            joint["velocity"] = rng.uniform(-1, 1, 3).tolist()
+        found[f"b{i}"] = body(
+            float(rng.uniform(0.5, 3.0)), (frame @ moments @ frame.T).tolist(), joint,
+            centre_of_mass=rng.uniform(-0.5, 0.5, 3).tolist(), points={"p": rng.uniform(-1, 1, 3).tolist()},
+        )  # fmt: skip
+    return found
+
+
+def pinocchio_of(bodies: dict[str, dict], gravity: float):
+    """(pinocchio, model, data, q, v, first row of v of each body), with bodies in the order of the file."""
+    import pinocchio as pin
+
+    model, joints, start = pin.Model(), {}, {}
+    model.gravity.linear = np.array([0.0, 0.0, -gravity])
+    for name, one in bodies.items():
+        joint = one["joint"]
+        kind, axis = joint["kind"], np.array(joint.get("axis", [0.0, 0.0, 1.0]))
+        made = {"revolute": lambda axis=axis: pin.JointModelRevoluteUnaligned(axis),
+                "prismatic": lambda axis=axis: pin.JointModelPrismaticUnaligned(axis), "ball": pin.JointModelSpherical,
+                "free": pin.JointModelFreeFlyer}[kind]()  # fmt: skip
+        rotation = np.array(joint.get("attitude", {}).get("matrix", np.eye(3).tolist()))
+        frame = pin.SE3(rotation, np.array(joint.get("at", [0.0, 0.0, 0.0])))
+        up = joints[joint["on"]] if "on" in joint else 0
+        joints[name] = j = model.addJoint(up, made, frame, name)
+        inertia = np.array(one["inertia"], dtype=float)
+        inertia = np.diag(inertia) if inertia.ndim == 1 else inertia
+        centre = np.array(one.get("centre_of_mass", [0.0, 0.0, 0.0]))
+        model.appendBodyToJoint(j, pin.Inertia(one["mass"], centre, inertia), pin.SE3.Identity())
+        start[name] = (kind, joint, rotation, centre)
+    data, q, v = model.createData(), pin.neutral(model), np.zeros(model.nv)
+    rows = {}
+    for name, (kind, joint, rotation, centre) in start.items():
+        j = model.joints[joints[name]]
+        if kind in ("revolute", "prismatic"):
+            q[j.idx_q], v[j.idx_v] = joint.get("angle", joint.get("travel", 0.0)), joint.get("rate", 0.0)
+        elif kind == "ball":
+            v[j.idx_v : j.idx_v + 3] = joint.get("rate", [0.0] * 3)
+        else:  # velocities of the origin of the body, in its axes
+            w = np.array(joint.get("rate", [0.0] * 3))
+            v[j.idx_v + 3 : j.idx_v + 6] = w
+            v[j.idx_v : j.idx_v + 3] = rotation.T @ np.array(joint.get("velocity", [0.0] * 3)) - np.cross(w, centre)
+        rows[name] = j.idx_v
+    return pin, model, data, q, v, rows
+
 
 OIL = {"name": "user", "density": 870.0, "bulk_modulus": 1.2e9, "viscosity": 0.028, "vapor_pressure": 100.0}
 CLOSE = {"method": "dormand-prince", "rtol": 1e-10}

@@ -1,7 +1,5 @@
 """Advection and diffusion of scalars on a rectangle by the kernels of fvsolve and explicit steps in NumPy."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.basins import advection, fifth_order
@@ -11,13 +9,9 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.mesh import rectangle
 
 SCHEMES = {
-    "upwind": (rec.UPWIND, 0),
-    "minmod": (rec.MUSCL, rec.MINMOD),
-    "van-leer": (rec.MUSCL, rec.VAN_LEER),
-    "monotonized-central": (rec.MUSCL, rec.MONOTONIZED_CENTRAL),
-    "upwind5": (rec.LINEAR, 0),
-    "weno5": (rec.WENO5, 0),
-}
+    "upwind": (rec.UPWIND, 0), "minmod": (rec.MUSCL, rec.MINMOD), "van-leer": (rec.MUSCL, rec.VAN_LEER),
+    "monotonized-central": (rec.MUSCL, rec.MONOTONIZED_CENTRAL), "upwind5": (rec.LINEAR, 0), "weno5": (rec.WENO5, 0),
+}  # fmt: skip
 NONE = np.zeros(0)
 
 

@@ -1,7 +1,5 @@
 """Hydraulic cylinder with its load, integrated by SciPy with pressures as states and independent of fvsolve."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

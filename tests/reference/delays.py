@@ -1,7 +1,5 @@
 """Cases with delay lines, and solutions by characteristics at Courant number 1."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from reference.scenes import RHO, scene
@@ -51,10 +49,8 @@ def fork(numerics: dict, end: float = 6.0, every: float = 0.05, **keys) -> dict:
 def turned(case: dict) -> dict:
     """Copy of a case with `from` and `to` of every pipe exchanged."""
     ends = {"from": "to", "to": "from"}
-    links = {
-        name: {ends.get(key, key): value for key, value in link.items()} if link["type"] == "pipe" else link
-        for name, link in case["links"].items()
-    }
+    links = {name: {ends.get(key, key): value for key, value in link.items()} if link["type"] == "pipe" else link
+             for name, link in case["links"].items()}  # fmt: skip
     return {**case, "links": links}
 
 

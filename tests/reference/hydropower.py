@@ -4,8 +4,6 @@ The module imports nothing from fvsolve. `python tests/reference/hydropower.py c
 without an argument it prints the reference values of the case.
 """
 
-from __future__ import annotations
-
 import sys
 from math import pi, sqrt
 

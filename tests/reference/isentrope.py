@@ -4,8 +4,6 @@ In rarefactions `u` changes by the integral of `dp / (rho a)`.
 Shocks obey `(u_1 - u_2)^2 = (p_1 - p_2) (1/rho_2 - 1/rho_1)`.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -60,10 +58,8 @@ class Riemann:
     def at(self, rays: np.ndarray) -> np.ndarray:
         """Density [kg/m3] and mass flow density [kg/(m2 s)] on rays x / t : float64[2, n]."""
         p, u = self.middle()
-        found = [
-            self._wave(*self.right, p, u, ray, 1.0) if ray > u else self._wave(*self.left, p, u, ray, -1.0)
-            for ray in rays
-        ]
+        found = [self._wave(*self.right, p, u, ray, 1.0) if ray > u else self._wave(*self.left, p, u, ray, -1.0)
+                 for ray in rays]  # fmt: skip
         rho = self.fluid.rho(np.array(found)[:, 0])
         return np.array([rho, rho * np.array(found)[:, 1]])
 

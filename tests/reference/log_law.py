@@ -4,8 +4,6 @@
 `(u_1 - u_2)^2 = (p_1 - p_2) (1/rho_2 - 1/rho_1)` (Rankine-Hugoniot for mass and momentum).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ F = integral of A dp. Shocks obey Rankine-Hugoniot, [v]^2 = [F] [-1 / m]. Rarefa
 over ln(p - floor), in which the integrand is smooth although c decreases by orders of magnitude.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Calls of `fvsolve order` from the command line, and its JSON output."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

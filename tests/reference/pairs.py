@@ -1,7 +1,5 @@
 """Pairwise combinations: few rows that contain every pair of values of two lists, instead of a full product."""
 
-from __future__ import annotations
-
 from itertools import combinations, product
 
 

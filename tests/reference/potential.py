@@ -4,8 +4,6 @@ phi_z = w^2 phi / g holds at the mean level of the free surface, and phi_n is th
 added inertia is the integral of phi phi_n over the walls. The gravity torque of still water is omitted.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import spsolve

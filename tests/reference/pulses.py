@@ -1,7 +1,5 @@
 """Cases with a smooth pulse of demand on frictionless pipes, for order studies."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from reference import scenes

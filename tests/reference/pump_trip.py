@@ -5,8 +5,6 @@ of the shaft, with iteration of both. The torque is that of a Suter table. The c
 opens if the pump at zero flow exceeds the head behind the valve.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Comparisons of the reference solutions with each other, with quadrature and with integration."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -10,13 +8,10 @@ from pytest import approx
 from scipy.integrate import quad, solve_ivp
 
 from reference import vessels
-from reference.allievi import relative_drop
-from reference.bumps import gaussian_averages, scattered
-from reference.characteristics import ValvePipe, darcy, hazen_williams, laminar
+from reference.characteristics import Line, Network, ValvePipe, darcy, hazen_williams, laminar
+from reference.frictionless import Pipe, Rays, held, relative_drop, step
 from reference.log_law import LogFluid, Riemann, SimpleWave
-from reference.network import Line, Network
-from reference.orders import observed_order
-from reference.rays import Pipe, Rays, held, step
+from reference.orders import gaussian_averages, observed_order, scattered
 
 RHO, A, D, L = 1000.0, 1000.0, 0.3, 1000.0
 AREA = math.pi / 4 * D**2
@@ -77,11 +72,8 @@ def test_gradients_are_the_textbook_ones():
 
 
 def test_rays_through_a_junction_scatter_as_impedances_say():
-    pipes = {
-        "one": Pipe("a", "mid", 100.0, 0.3, 1000.0),
-        "two": Pipe("mid", "b", 300.0, 0.2, 1100.0),
-        "three": Pipe("mid", "c", 300.0, 0.25, 900.0),
-    }
+    pipes = {"one": Pipe("a", "mid", 100.0, 0.3, 1000.0), "two": Pipe("mid", "b", 300.0, 0.2, 1100.0),
+             "three": Pipe("mid", "c", 300.0, 0.25, 900.0)}  # fmt: skip
     rays = Rays(RHO, pipes, {"a": step(0.01, 0.0, 1.0), "b": held(0.0), "c": held(0.0)})
     back, passed = scattered([p.impedance for p in pipes.values()])
     assert rays.pressure("mid", 0.15) == approx(1 + back)
@@ -119,12 +111,7 @@ SOFT = LogFluid(1000.0, 1e5, 1e5)
 
 @pytest.mark.parametrize(
     "left, right",
-    [
-        ((1.3e5, 0.0), (1e5, 0.0)),
-        ((1e5, 1.0), (1e5, -1.0)),
-        ((1e5, -1.0), (1.1e5, 1.0)),
-        ((0.9e5, 0.5), (1.2e5, -0.3)),
-    ],
+    [((1.3e5, 0.0), (1e5, 0.0)), ((1e5, 1.0), (1e5, -1.0)), ((1e5, -1.0), (1.1e5, 1.0)), ((0.9e5, 0.5), (1.2e5, -0.3))],
     ids=["dam", "clash", "parting", "mixed"],
 )
 def test_exact_riemann_solution_conserves_mass_and_momentum(left, right):
@@ -167,10 +154,7 @@ def test_a_stopped_stream_exceeds_joukowsky_by_a_quarter_of_its_mach_number():
 
 def test_a_simple_wave_satisfies_the_balance_laws():
     wave = SimpleWave(
-        SOFT,
-        1e5,
-        lambda x: 0.5 * np.exp(-((x - 20) ** 2) / 9),
-        lambda x: -(x - 20) / 9 * np.exp(-((x - 20) ** 2) / 9),
+        SOFT, 1e5, lambda x: 0.5 * np.exp(-((x - 20) ** 2) / 9), lambda x: -(x - 20) / 9 * np.exp(-((x - 20) ** 2) / 9)
     )
     edges, dt = np.linspace(0, 160, 8001), 1e-3
     t = 0.5 * wave.breaks(edges)

@@ -4,8 +4,6 @@ A drop `d` that drives `q = Cd A sqrt(2 d / rho)` and decreases by `k q` has a r
 `sqrt(d) = sqrt(d0) - s t / 2`, and the drop is zero from the time `2 sqrt(d0) / s` on.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,7 +4,7 @@ import re
 from itertools import pairwise
 
 import pytest
-from reference import browser, paper
+from reference import browser
 from reference.scenes import junction, lake, pipe, ramp, scene, valve
 
 import fvsolve
@@ -124,7 +124,7 @@ def test_no_page_of_paper_but_the_last_is_half_empty_and_each_has_title_and_numb
     if int(chromium.version.partition(".")[0]) < 131:
         pytest.skip("this Chromium writes nothing on the margins of pages")
     page.evaluate("n => document.querySelector('#verdict').append(...Array(n).fill('word '.repeat(12)))", words)
-    found = paper.pages(page.pdf(prefer_css_page_size=True))
+    found = browser.pages(page.pdf(prefer_css_page_size=True))
     assert len(found) > 3
     for number, one in enumerate(found, 1):
         over, under = ("".join(text for y, text in one if low < y < high) for low, high in ((0, 18), (281, 297)))

@@ -1,7 +1,5 @@
 """Parts that a case lacks cost no state, no table row and no compiled function."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import ModuleType
 
@@ -58,10 +56,7 @@ def tanks(**numerics) -> dict:
 
 def line(**numerics) -> dict:
     nodes = {"lake": reservoir(1e6), "gate": junction(), "end": chamber(0.1)}
-    links = {
-        "main": pipe("lake", "gate", 100.0, 0.3, 1000.0, 20),
-        "hole": valve("gate", "end", 0.01),
-    }
+    links = {"main": pipe("lake", "gate", 100.0, 0.3, 1000.0, 20), "hole": valve("gate", "end", 0.01)}
     return scene(nodes, links, 1.0, numerics, ["gate.pressure"])
 
 
@@ -113,10 +108,8 @@ def test_a_scene_without_pipes_has_the_rates_that_it_has_beside_a_pipe(law):
     """The second case adds a pipe at rest, from a reservoir to a junction behind a shut valve."""
     alone = tanks() | {"fluid": {**tanks()["fluid"], "law": law}}
     nodes = alone["nodes"] | {"a": reservoir(101325.0 + 9806.65 * 4.0), "b": junction()}
-    links = alone["links"] | {
-        "line": pipe("a", "b", 10.0, 0.1, 1000.0, 8),
-        "way": valve("b", "high", 0.0, opening=0.0) | {"area": 1e-6},
-    }
+    links = alone["links"] | {"line": pipe("a", "b", 10.0, 0.1, 1000.0, 8),
+                              "way": valve("b", "high", 0.0, opening=0.0) | {"area": 1e-6}}  # fmt: skip
     both = alone | {"nodes": nodes, "links": links, "numerics": {"end": 10.0, "scheme": "upwind5"}}
     one, other = (fvsolve.build(fvsolve.load(case)) for case in (alone, both))
     y = np.array([-30.0, 20.0])

@@ -1,6 +1,7 @@
-"""Benchmarks: their rates agree with the model, their bands contain the errors, and each script has `--quick`."""
+"""Benchmarks: their rates agree with the model, their bands contain the errors, and each script has `--quick`.
 
-from __future__ import annotations
+Comparison of two dumps of commits: a difference of one bit is found, and the map of renamed keys is applied.
+"""
 
 import sys
 from importlib.util import find_spec
@@ -84,3 +85,120 @@ def test_a_missing_peer_is_a_line_and_a_difference_an_error(capsys):
     for difference in (1e-3, np.nan):
         with pytest.raises(SystemExit, match="heads: .*, expected at most 1e-06"):
             measure.agree("heads", difference, 1e-6)
+
+
+BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+SUMMARY = "summary.json"
+
+
+@pytest.fixture(autouse=True)
+def dumps(monkeypatch):
+    """Module compare_dumps, which is removed after the test."""
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    import compare_dumps
+
+    yield compare_dumps
+    del sys.modules["compare_dumps"]
+
+
+def run() -> dict:
+    """Dump of a small run."""
+    return {
+        ("start", "dydt"): np.array([[1.0, -0.0], [np.nan, 2.0]]),
+        ("history.csv", "gate.pressure [Pa]"): np.array([1e5, 2e5]),
+        (SUMMARY, "extremes", "gate.pressure", "least"): 0.1,
+        (SUMMARY, "extremes", "gate.pressure", "t_least"): None,
+        (SUMMARY, "expectations", "0", "text"): "max(gate.pressure) - min_p",
+        (SUMMARY, "warnings", "0", "text"): "the tank is full",
+        (SUMMARY, "reason"): "stopped: a value is not finite",
+        (SUMMARY, "steps"): 3,
+    }
+
+
+def moved(dump: dict, old: tuple, new: tuple) -> dict:
+    """Copy of a dump with a value at another place."""
+    return {new if place == old else place: value for place, value in dump.items()}
+
+
+def test_equal_dumps_have_no_difference(dumps):
+    assert dumps.compare(run(), run(), dumps.Names()) == []
+
+
+@pytest.mark.parametrize("place", [("start", "dydt"), (SUMMARY, "extremes", "gate.pressure", "least")])
+def test_one_bit_is_a_difference(place, dumps):
+    new = run()
+    new[place] = np.nextafter(new[place], 3.0)
+    (found,) = dumps.compare(run(), new, dumps.Names())
+    assert found.place.startswith("/".join(place)) and found.old != found.new and "0x1." in found.old
+
+
+def test_the_first_number_that_differs_is_said(dumps):
+    new = run()
+    new["start", "dydt"] = np.array([[1.0, 0.0], [np.nan, 3.0]])
+    (found,) = dumps.compare(run(), new, dumps.Names())
+    assert found == ("start/dydt[0, 1] and 1 more", "-0.0 (-0x0.0p+0)", "0.0 (0x0.0p+0)")
+
+
+def test_kinds_of_numbers_and_shapes_count(dumps):
+    new = run() | {(SUMMARY, "steps"): 3.0, ("history.csv", "gate.pressure [Pa]"): np.array([1e5])}
+    assert {one.new for one in dumps.compare(run(), new, dumps.Names())} == {"3.0 (0x1.8000000000000p+1)", "float64[1]"}
+
+
+def test_a_place_that_lacks_is_a_difference_on_either_side(dumps):
+    new = run()
+    del new[SUMMARY, "steps"]
+    assert dumps.compare(run(), new, dumps.Names()) == [(f"{SUMMARY}/steps", "3", "nothing")]
+    assert dumps.compare(new, run(), dumps.Names()) == [(f"{SUMMARY}/steps", "nothing", "3")]
+
+
+def test_names_of_the_map_are_equal(dumps):
+    """The map renames a key path, words of a column and of an expression, but not these words under other keys."""
+    above = (SUMMARY, "extremes", "gate.pressure")
+    new = moved(run(), (*above, "least"), (*above, "minimum"))
+    new = moved(new, ("history.csv", "gate.pressure [Pa]"), ("history.csv", "gate.p [Pa]"))
+    new[SUMMARY, "expectations", "0", "text"] = "max(gate.p) - min_pressure"
+    lines = ["# words", "", "public\textremes.least\textremes.minimum", "public\tmin_p\tmin_pressure"]
+    names = dumps.Names([*lines, "public\tpressure\tp", "public\tverdicts.least\tverdicts.minimum"])
+    assert dumps.compare(run(), new, names) == []
+    assert names.unused() == ["verdicts.least"]
+    assert len(dumps.compare(run(), new, dumps.Names(lines[:3]))) == 3
+
+
+def test_a_name_of_the_map_hides_no_number(dumps):
+    new = moved(run(), (SUMMARY, "steps"), (SUMMARY, "count"))
+    names = dumps.Names(["public\tsteps\tcount"])
+    assert dumps.compare(run(), new, names) == []
+    assert dumps.compare(run(), new | {(SUMMARY, "count"): 4}, names) == [
+        (f"{SUMMARY}/steps ({SUMMARY}/count)", "3", "4")
+    ]
+
+
+def test_names_that_change_places_are_told_apart(dumps):
+    names = dumps.Names(["public\ta\tb", "public\tb\ta"])
+    assert dumps.compare({("a",): 1, ("b",): 2}, {("b",): 1, ("a",): 2}, names) == []
+    assert len(dumps.compare({("a",): 1, ("b",): 2}, {("a",): 1, ("b",): 2}, names)) == 2
+
+
+def test_texts_for_people_may_have_other_words(dumps):
+    new = run() | {(SUMMARY, "warnings", "0", "text"): "a full tank", (SUMMARY, "reason"): "stopped: look at the step"}
+    assert dumps.compare(run(), new, dumps.Names()) == []
+    assert len(dumps.compare(run(), new | {(SUMMARY, "reason"): "finished"}, dumps.Names())) == 1
+    assert len(dumps.compare(run(), new | {(SUMMARY, "expectations", "0", "text"): "max(x)"}, dumps.Names())) == 1
+
+
+def test_names_of_python_are_found_from_both_ends(dumps):
+    names = dumps.Names(["member\tModel.evaluate\tModel.rates", "name\trates\tslopes"])
+    assert names.spellings("rates") == ["rates", "slopes", "evaluate"]
+    assert names.unused() == []
+
+
+def test_a_faulty_map_says_all_its_faults(dumps):
+    lines = ["public\ta", "public\ta.b\tc", "word\ta\tb", "public\ta\tb", "public\ta\tc"]
+    with pytest.raises(ValueError) as found:
+        dumps.Names(lines)
+    assert [line.partition(":")[0] for line in str(found.value).splitlines()] == [
+        "line 1",
+        "line 2",
+        "line 3",
+        "line 5",
+    ]

@@ -1,7 +1,5 @@
 """Files that are damaged, or do not fit on the disk, are written again or named in an error of the program."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -11,7 +9,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from reference.fork import branched
+from reference.scenes import branched
 
 import fvsolve
 from fvsolve.errors import FvsolveError, RunError
@@ -51,11 +49,8 @@ def test_compiled_code_that_is_damaged_is_compiled_anew(ending, harm, tmp_path):
     (path,) = tmp_path.rglob(f"*.{ending}")
     data = path.read_bytes()
     half = len(data) // 2
-    harmed = {
-        "cut to nothing": b"",
-        "cut short": data[:half],
-        "zeros in the middle": data[:half] + bytes(len(data) - half),
-    }
+    harmed = {"cut to nothing": b"", "cut short": data[:half],
+              "zeros in the middle": data[:half] + bytes(len(data) - half)}  # fmt: skip
     path.write_bytes(harmed[harm])
     if ending != "code":
         next(tmp_path.rglob("*.code")).unlink()

@@ -1,7 +1,5 @@
 """Import rules: no cycle, and compiled files of parts and basins import compiled code only."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from graphlib import CycleError, TopologicalSorter

@@ -98,13 +98,8 @@ def python(package: Path, code: str, told: str = "", **environment: str) -> list
     stated = {"FVSOLVE_CACHE": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
     stated["PYTHONDONTWRITEBYTECODE"] = "1"  # bytecode files do not show an edit within a second
     inherited = {k: v for k, v in os.environ.items() if k != "NUMBA_DISABLE_JIT"}
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env=inherited | stated | environment,
-        cwd=package.parent,
-        capture_output=True,
-        text=True,
-    )
+    done = subprocess.run([sys.executable, "-c", code], env=inherited | stated | environment, cwd=package.parent,
+                          capture_output=True, text=True)  # fmt: skip
     assert done.returncode == 0 and (re.search(told, done.stderr) if told else done.stderr == ""), done.stderr
     return done.stdout.split()
 

@@ -1,15 +1,12 @@
 """Public functions accept valid arguments and refuse others with a message; returned arrays are read-only."""
 
-from __future__ import annotations
-
 import inspect
 from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from reference.fork import branched
-from reference.scenes import still
+from reference.scenes import branched, still
 
 import fvsolve
 from fvsolve import FvsolveError, State, advance, initial_state, integrate, steppers, studies

@@ -1,8 +1,10 @@
-"""Public names: at most twenty, documented, present and fast to import."""
+"""Public names: at most twenty, documented, present and fast to import.
 
-from __future__ import annotations
+An older Python is refused with a message that names it, the required version and the remedy.
+"""
 
 import math
+import os
 import re
 import shutil
 import subprocess
@@ -58,27 +60,14 @@ def test_an_unknown_name_is_an_attribute_error():
 
 
 def test_importing_imports_nothing_heavy():
-    heavy = [
-        "numpy",
-        "numba",
-        "CoolProp",
-        "pint",
-        "matplotlib",
-        "pyvista",
-        "meshio",
-        "scipy",
-        "rich",
-        "pydantic",
-    ]
+    heavy = ["numpy", "numba", "CoolProp", "pint", "matplotlib", "pyvista", "meshio", "scipy", "rich", "pydantic"]
     code = f"import fvsolve, sys; print([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 
 
-PAGES = {
-    page.name: page.read_text(encoding="utf-8")
-    for page in [*folders.DOCS.glob("*.md"), folders.DOCS.parent / "README.md"]
-}
+PAGES = {page.name: page.read_text(encoding="utf-8")
+         for page in [*folders.DOCS.glob("*.md"), folders.DOCS.parent / "README.md"]}  # fmt: skip
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -100,3 +89,27 @@ def importable(room, name):
 def test_names_of_studies_are_functions_or_kinds_and_no_modules():
     for name in fvsolve.studies.__all__:
         assert callable(getattr(fvsolve.studies, name)), name
+
+
+TOP = Path(__file__).parents[2]
+PRETEND = "import sys; sys.version_info = (3, 10, 13); import fvsolve"
+
+
+def test_the_package_refuses_an_older_python():
+    found = subprocess.run([sys.executable, "-c", PRETEND], capture_output=True, text=True, cwd=TOP)
+    assert found.returncode == 1
+    assert "needs Python 3.11 or later" in found.stderr
+    assert sys.executable in found.stderr and "-m venv" in found.stderr
+    assert "numba" not in found.stderr
+
+
+@pytest.mark.skipif(not (TOP / ".ci/run").exists() or os.name == "nt", reason="no .ci/run here")
+def test_ci_refuses_an_older_python(tmp_path):
+    older = tmp_path / "python3.10"
+    older.write_text('#!/bin/sh\nif [ "$1" = --version ]; then echo Python 3.10.13; else exit 1; fi\n')
+    older.chmod(0o755)
+    found = subprocess.run([TOP / ".ci/run"], capture_output=True, text=True,
+                           env=os.environ | {"PYTHON": str(older), "TMPDIR": str(tmp_path)})  # fmt: skip
+    assert found.returncode == 1
+    assert all(part in found.stdout for part in (str(older), "3.10.13", "3.11 or later", "PYTHON="))
+    assert list(tmp_path.iterdir()) == [older]

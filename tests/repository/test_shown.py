@@ -1,7 +1,5 @@
 """Objects as text, notebook table, frame and picture; shipped cases by name; tableaus from arrays and files."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

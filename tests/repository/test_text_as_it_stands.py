@@ -1,7 +1,5 @@
 """Texts of users are never markup: not on pictures, on the terminal or in the files of a run."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re
@@ -13,8 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from reference.fork import branched
-from reference.scenes import scene, still
+from reference.scenes import branched, scene, still
 
 import fvsolve
 from fvsolve.draw.plot import history_figure

@@ -1,10 +1,12 @@
-"""Names and texts of the package: forbidden words do not occur, and docstrings begin with a verb or a noun."""
+"""Names and texts of the package: forbidden words do not occur, and docstrings begin with a verb or a noun.
 
-from __future__ import annotations
+No two classes of the package have equal names, so a search finds one definition.
+"""
 
 import ast
 import functools
 import re
+from collections import defaultdict
 from pathlib import Path
 
 import fvsolve
@@ -92,3 +94,23 @@ def test_no_message_nor_help_has_a_forbidden_word():
 
 def test_no_docstring_begins_with_a_relative_clause():
     assert [(place, text) for place, text in found()["docstrings"] if OPENINGS.match(text)] == []
+
+
+def doubles(sources: dict[str, str]) -> dict[str, list[str]]:
+    """Names of classes that several sources define, with these sources."""
+    homes = defaultdict(list)
+    for home, text in sources.items():
+        for one in ast.walk(ast.parse(text)):
+            if isinstance(one, ast.ClassDef):
+                homes[one.name].append(home)
+    return {name: found for name, found in homes.items() if len(set(found)) > 1}
+
+
+def test_a_class_name_is_used_once():
+    top = Path(fvsolve.__file__).parent
+    found = doubles({str(path.relative_to(top)): path.read_text(encoding="utf-8") for path in top.rglob("*.py")})
+    assert not found
+
+
+def test_a_double_is_seen():
+    assert doubles({"a": "class One: pass", "b": "class Two: pass\nclass One: pass"}) == {"One": ["a", "b"]}

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from reference.bumps import gaussian_averages
-from reference.orders import mean_error, observed_order
+from reference.orders import gaussian_averages, mean_error, observed_order
 from reference.scenes import NO_FRICTION, RHO, WATER, chamber, junction, pipe, ramp, reservoir, scene, valve
 from scipy.integrate import solve_ivp
 

@@ -1,7 +1,5 @@
 """Runs with implicit methods: solutions, ledgers, rest, events, resumption and linear algebra."""
 
-from __future__ import annotations
-
 import math
 import random
 import subprocess
@@ -38,12 +36,10 @@ def harbour(**numerics) -> dict:
     """Case of pipes, a tank, a chamber and a closing valve."""
     rough = {"friction": {"model": "quasi-steady", "roughness": 2.6e-4}}
     nodes = {"lake": lake(50.0), "fork": junction(), "tower": tank(2.0, 45.0), "pot": chamber(0.01), "sea": lake(0.0)}
-    links = {
-        "main": pipe("lake", "fork", 300.0, 0.2, 1000.0, 15, **rough),
-        "side": pipe("fork", "tower", 200.0, 0.2, 1000.0, 10, **rough),
-        "neck": pipe("fork", "pot", 100.0, 0.2, 1000.0, 5, **rough),
-        "tap": valve("pot", "sea", 2e-3, ramp(0.2, 0.5, 1.0, 0.3)),
-    }
+    links = {"main": pipe("lake", "fork", 300.0, 0.2, 1000.0, 15, **rough),
+             "side": pipe("fork", "tower", 200.0, 0.2, 1000.0, 10, **rough),
+             "neck": pipe("fork", "pot", 100.0, 0.2, 1000.0, 5, **rough),
+             "tap": valve("pot", "sea", 2e-3, ramp(0.2, 0.5, 1.0, 0.3))}  # fmt: skip
     probes = ["fork.pressure", "pot.pressure", "tower.level", "tap.flow", "main.flow@0.5"]
     return scene(nodes, links, 2.0, {"scheme": "upwind", **numerics}, probes, 0.05)
 
@@ -56,10 +52,8 @@ def jack(**numerics) -> dict:
 
 @pytest.fixture(scope="module")
 def explicit() -> dict:
-    return {
-        harbour: fvsolve.run(harbour(method="rk4", courant=0.2)),
-        jack: fvsolve.run(jack(method="dormand-prince", rtol=1e-10)),
-    }
+    return {harbour: fvsolve.run(harbour(method="rk4", courant=0.2)),
+            jack: fvsolve.run(jack(method="dormand-prince", rtol=1e-10))}  # fmt: skip
 
 
 def agrees(result, wanted, near: float) -> None:
@@ -103,10 +97,8 @@ def test_a_looped_network_without_an_event_does_not_move_by_one_bit(numerics):
 def test_twenty_travel_times_a_step_is_no_limit_for_implicit_methods(method):
     """Implicit steps at Courant number 20 end at the steady flow after a slow closure."""
     nodes = {"lake": lake(50.0), "gate": junction(), "sea": lake(0.0)}
-    links = {
-        "main": pipe("lake", "gate", 500.0, 0.3, 1000.0, 100),
-        "tap": valve("gate", "sea", 5e-3, ramp(1.0, 20.0, 1.0, 0.5)),
-    }
+    links = {"main": pipe("lake", "gate", 500.0, 0.3, 1000.0, 100),
+             "tap": valve("gate", "sea", 5e-3, ramp(1.0, 20.0, 1.0, 0.5))}  # fmt: skip
     numerics = {"scheme": "upwind", "method": method, "courant": 20.0}
     result = fvsolve.run(scene(nodes, links, 60.0, numerics, ["gate.head", "tap.flow"], 0.5))
     assert result.ok, result.reason
@@ -172,9 +164,7 @@ fvsolve.run(sys.argv[1], out=sys.argv[2])
 
 
 @pytest.mark.parametrize(
-    "numerics",
-    [{"method": name, "rtol": 3e-7} for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "auto")],
-    ids=said,
+    "numerics", [{"method": name, "rtol": 3e-7} for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "auto")], ids=said
 )
 def test_dead_at_a_random_moment_and_resumed_is_the_unbroken_run(tmp_path, numerics):
     seed = random.randrange(10**6)

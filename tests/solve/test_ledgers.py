@@ -1,7 +1,5 @@
 """Mass ledger: gross amounts, amounts by node, and accuracy, for every family of methods."""
 
-from __future__ import annotations
-
 import functools
 import math
 

@@ -1,7 +1,5 @@
 """MPI ranks that share the rows of basins give the bits of one process; cases that cannot be shared are reported."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -15,7 +13,7 @@ import pytest
 from solve.test_threads import SCENES, liquid, water
 
 import fvsolve
-from fvsolve.draw.frame_meshes import read_frame
+from fvsolve.draw.field_canvas import read_frame
 from fvsolve.draw.scene import DrawnScene, DrawnUnit
 from fvsolve.output.fields import read_series
 
@@ -144,7 +142,7 @@ for name""", 1)  # fmt: skip
 def test_a_rank_that_fails_in_the_middle_ends_all_with_its_message(tmp_path):
     failing = SCRIPT.replace("for name", """
 from mpi4py import MPI
-from fvsolve.solve.mpi_ranks import MpiRanks as Ranks
+from fvsolve.solve.parallel_bands import MpiRanks as Ranks
 def fails(self, name, at):
     raise MemoryError("planted")
 if MPI.COMM_WORLD.rank == 1:

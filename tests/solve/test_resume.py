@@ -1,7 +1,5 @@
 """A run that is killed at random times and resumed equals the uninterrupted run to the bit."""
 
-from __future__ import annotations
-
 import json
 import random
 import subprocess
@@ -13,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from basins.test_basin import alone, basin
-from reference.fork import branched
+from reference.scenes import branched
 
 import fvsolve
 from fvsolve.output.memory_sink import MemorySink
@@ -36,13 +34,8 @@ def long_run(**numerics) -> dict:
     """Case with about a second of steps."""
     case = branched(fields=20)
     case["nodes"]["tower"] = {"type": "tank", "area": 2.0, "level": 5.0, "height": 30.0, "elevation": 10.0}
-    case["links"]["riser"] = {
-        "type": "valve",
-        "from": "fork",
-        "to": "tower",
-        "area": 0.01,
-        "discharge_coefficient": 0.6,
-    }
+    case["links"]["riser"] = {"type": "valve", "from": "fork", "to": "tower", "area": 0.01,
+                              "discharge_coefficient": 0.6}  # fmt: skip
     case["numerics"] = {"end": 2500.0, "scheme": "muscl", "method": "ssp-rk3", **numerics}
     case["output"] |= {"every": 0.1, "probes": [*case["output"]["probes"], "tower.level"]}
     return case
@@ -65,9 +58,7 @@ def same_files(one: Path, other: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "numerics",
-    [{"courant": 0.5}, {"method": "bogacki-shampine", "rtol": 1e-7}],
-    ids=["courant", "error control"],
+    "numerics", [{"courant": 0.5}, {"method": "bogacki-shampine", "rtol": 1e-7}], ids=["courant", "error control"]
 )
 def test_killed_at_random_moments_and_resumed_is_the_unbroken_run(tmp_path, numerics):
     seed = random.randrange(10**6)

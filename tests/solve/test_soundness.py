@@ -1,26 +1,32 @@
-"""Invalid runs report themselves: steps beyond limits, growth and ledgers; valid runs give no such notices."""
+"""Invalid runs report themselves: steps beyond limits, growth and ledgers; valid runs give no such notices.
 
-from __future__ import annotations
+The growth check runs inside the compiled loop at every sixteenth step, with one thread or several. A run that blows up
+states the time from which it is not valid, instead of numbers such as -2e30.
+"""
 
 import csv
 import json
 import math
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from reference.scenes import chamber, lake, reservoir, scene, tank, valve
+from reference.scenes import area, chamber, junction, lake, pipe, ramp, reservoir, scene, tank, valve
+from solve.test_threads import liquid
 
 import fvsolve
+from fvsolve.case.text import write
 from fvsolve.model import RunData
 from fvsolve.run import model_of
-from fvsolve.solve.run_checks import LEDGER_TOLERANCE, RunChecks, ledger_notices
+from fvsolve.solve.run_checks import GROWTH_LIMIT, LEDGER_TOLERANCE, RunChecks, ledger_notices
 from fvsolve.solve.run_loop import MOST_EVENTS_IN_SPAN, SPAN, RunLoop
 from fvsolve.step_limits.advection_limit import advection_limit
 from fvsolve.step_limits.grid_limits import plane_limit
 from fvsolve.step_limits.step_notices import step_limits
-from fvsolve.studies import sweep
+from fvsolve.steppers.loop_records import GROWTH_CHECK_STEPS
+from fvsolve.studies import scenarios, sweep
 
 MAIN = "cases/valve-closure.toml"
 
@@ -150,14 +156,8 @@ def test_limits_in_the_plane_are_those_along_a_line_where_all_goes_along_it(sche
 def test_a_liquid_in_the_plane_holds_below_its_predicted_limit_and_grows_beyond_it(scheme, method):
     limit = plane_limit(scheme, method, 0.5)
     rng = np.random.default_rng(3)
-    box = {
-        "type": "basin",
-        "physics": "liquid",
-        "size": [1.0, 1.0],
-        "cells": [16, 16],
-        "pressure": 3e5,
-        "thickness": 0.1,
-    }
+    box = {"type": "basin", "physics": "liquid", "size": [1.0, 1.0], "cells": [16, 16], "pressure": 3e5,
+           "thickness": 0.1}  # fmt: skip
     for factor, grows in ((0.98, False), (1.05, True)):
         case = scene({"box": box}, {}, 1.0, {"scheme": scheme, "method": method, "step": 1.0}, ["box.pressure@0.5,0.5"])
         rate = model_of(case).basins[0].max_rate(model_of(case).start)[0]
@@ -296,3 +296,107 @@ def test_a_tank_that_fills_within_a_few_linearised_steps_is_reported(level, area
     assert told.place == "pot.mass" and wrong > 0.005 and told.value > 0.5 * wrong
     case["numerics"]["method"] = "radau-iia-5"
     assert "step-error" not in {one.kind for one in fvsolve.run(case).warnings}
+
+
+@pytest.fixture
+def returns(monkeypatch):
+    """Counter of the returns of the time loop to Python."""
+    count, steps = Counter(), RunLoop.steps
+
+    def counted(loop, budget):
+        count["returns"] += 1
+        return steps(loop, budget)
+
+    monkeypatch.setattr(RunLoop, "steps", counted)
+    return count
+
+
+def test_growth_is_seen_within_sixteen_steps():
+    """Growth by 2 c - 1 = 1.04 per step, of upwind and Euler at Courant number c, is reported within sixteen steps."""
+    case = closing(scheme="upwind", method="euler", courant=1.02)
+    case["numerics"]["end"] = 100.0
+    result = fvsolve.run(case)
+    (grown,) = said(result, "growth")
+    assert result.summary["steps"] % GROWTH_CHECK_STEPS == 0
+    assert 1.0 < grown.value / grown.limit <= 1.04**GROWTH_CHECK_STEPS
+    assert f"{GROWTH_LIMIT * grown.value / grown.limit:.3g}" in grown.text
+
+
+def test_a_run_beyond_a_limit_that_does_not_grow_stays_in_the_loop(returns):
+    case = closing(scheme="upwind", method="euler", courant=1.0 + 1e-8)
+    case["numerics"]["end"] = 100.0
+    result = fvsolve.run(case)
+    assert said(result, "step-limit") and not said(result, "growth")
+    assert returns["returns"] < result.summary["steps"] / (4 * GROWTH_CHECK_STEPS)
+
+
+def test_threads_stop_at_the_same_step(returns):
+    case = liquid()
+    case["numerics"] |= {"courant": 2.0, "end": 1.0}
+    one, three = (fvsolve.run(case, threads=many) for many in (1, 3))
+    assert [one.summary["threads"], three.summary["threads"]] == [1, 3] and returns["returns"] < 10
+    assert one.summary["steps"] % GROWTH_CHECK_STEPS == 0 and one.summary["steps"] == three.summary["steps"]
+    assert said(one, "growth") == said(three, "growth") != []
+
+
+LARGEST = 1e4  # [m], far above true heads: a closure from 2 m/s gives 200 m by Joukowsky
+
+
+def blown(step: float = 0.02, scheme: str = "muscl", **more) -> dict:
+    """Case of a pipe in steady flow at Courant number 4 by default, with a valve that shuts from 0.5 s on."""
+    nodes = {"lake": lake(50.0, elevation=0.0), "gate": junction(elevation=0.0),
+             "air": reservoir(1e5, elevation=0.0)}  # fmt: skip
+    links = {"main": pipe("lake", "gate", 300.0, 0.2, 1000.0, 60),
+             "tap": valve("gate", "air", 0.02 * area(0.2), ramp(0.5, 0.1, 1.0, 0.0))}  # fmt: skip
+    limits = {"top": {"on": "main", "maximum": "200 bar"}, "low": {"on": "main", "quantity": "head", "minimum": -1e3},
+              "start": {"on": "main", "quantity": "head", "maximum": 40.0}}  # fmt: skip
+    claims = {text: {"value": 0.0, "atol": 1e60}
+              for text in ("max(gate.head)", "final(gate.head)", "max(main.head)", "mean(gate.head)")}  # fmt: skip
+    numerics = {"scheme": scheme, "method": "ssp-rk2", "step": step}
+    return scene(nodes, links, 5.0, numerics, ["gate.head", "lake.pressure"], limits=limits, expect=claims, **more)
+
+
+def numbers(value) -> list[float]:
+    """All numbers in nested dicts and lists."""
+    if isinstance(value, dict):
+        return [x for one in value.values() for x in numbers(one)]
+    if isinstance(value, list):
+        return [x for one in value for x in numbers(one)]
+    return [] if isinstance(value, (str, bool)) or value is None else [value]
+
+
+@pytest.mark.parametrize("scheme", ["muscl", "upwind5"])
+@pytest.mark.parametrize("step", [0.02, 0.2])
+def test_extremes_margins_and_claims_are_no_numbers(step: float, scheme: str) -> None:
+    result = fvsolve.run(blown(step, scheme))
+    said = result.summary
+    assert not result.ok and said["invalid_from"] is not None and said["invalid_from"] <= said["t"]
+    heads = [one for key in ("extremes", "verdicts", "expectations") for one in numbers(said[key])]
+    assert max(map(abs, heads)) <= 1e60  # tolerance of the expectations
+    assert max(map(abs, numbers({name: one for name, one in said["extremes"].items() if "head" in name}))) < LARGEST
+    assert {one.state for one in result.expectations} == {"open"}
+    states = {one.name: one.state for one in result.verdicts}
+    assert states["top"] == states["low"] == "open"
+    assert all(one.margin is None for one in result.verdicts if one.state == "open")
+    assert result.extremes["lake.pressure"].maximum is not None  # constant pressure
+
+
+def test_all_that_is_printed_says_from_when(fvs, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_text(write(blown()))
+    status, text, _ = fvs("run", "scene.toml", "--no-pictures", "--out", "run")
+    assert status == 1 and text.count("not valid from t = ") >= 6
+    assert "e+1" not in text.replace("1e+60", "").partition("note:")[0]
+    said = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert fvs("report", "run", "--xlsx")[0] == 0
+    assert f"not valid from t = {said['invalid_from']:.6g} s on" in (tmp_path / "run" / "report.html").read_text()
+    (tmp_path / "two.toml").write_text('case = "scene.toml"\n[events.close]\n')
+    found = scenarios.study(tmp_path / "two.toml", tmp_path / "out")
+    assert not found.ok and found.holds == [] and "not valid from t = " in fvs("study", "two.toml", "--out", "out")[1]
+    assert fvs("report", "out")[0] == 0
+    assert "not valid from t = " in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_sound_run_is_valid_to_its_end() -> None:
+    result = fvsolve.run(blown(0.004))
+    assert result.ok and result.summary["invalid_from"] is None and result.extremes["gate.head"].maximum < LARGEST

@@ -1,7 +1,5 @@
 """Threads that share the rows of basins give the bits of one thread: states, ledgers, rows, frames and resumed runs."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import signal

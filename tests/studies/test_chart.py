@@ -8,9 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from reference import rays, vessels
+from reference import frictionless, vessels
 from reference.scenes import (
     AMBIENT,
     RHO,
@@ -69,11 +67,11 @@ def line(opening=None, cells=40, end=END, **numerics) -> dict:
     return scene(nodes, links, end, numerics, ["gate.pressure", "tap.flow", "main.pressure@0.5"], 0.005)
 
 
-def line_rays(opening=lambda t: 1.0 - smooth_step(t, START, DURATION)) -> rays.Rays:
+def line_rays(opening=lambda t: 1.0 - smooth_step(t, START, DURATION)) -> frictionless.Rays:
     flow = OPEN * math.sqrt(2 * (PRESSURE - AMBIENT) / RHO)
-    main = rays.Pipe("lake", "gate", LENGTH, DIAMETER, SPEED, flow, PRESSURE)
+    main = frictionless.Pipe("lake", "gate", LENGTH, DIAMETER, SPEED, flow, PRESSURE)
     outlets = {"gate": (lambda t: OPEN * opening(t), AMBIENT)}
-    return rays.Rays(RHO, {"main": main}, {"lake": rays.held(PRESSURE)}, outlets=outlets)
+    return frictionless.Rays(RHO, {"main": main}, {"lake": frictionless.held(PRESSURE)}, outlets=outlets)
 
 
 def exact_rows(t) -> np.ndarray:
@@ -234,7 +232,7 @@ def test_the_floor_of_a_sudden_closure_covers_the_true_error_of_its_reference():
     jump = 0.0837
     case = line(step(jump, 1.0, 0.0))
     found = chart(case, schemes=["muscl"], methods=["ssp-rk3"], cells=[20, 40])
-    truth = line_rays(rays.step(jump, 1.0, 0.0))
+    truth = line_rays(frictionless.step(jump, 1.0, 0.0))
     run = fvsolve.run(case, {"numerics.scheme": "muscl", "numerics.method": "ssp-rk3", "links.main.cells": 40})
     gate = np.array([truth.pressure("gate", t) for t in run.t])
     twice = np.flatnonzero(np.diff(run.t) == 0)

@@ -9,11 +9,10 @@ import pytest
 from invariance.moving import SCENES, flume, u_tube
 from model.test_delay_lines import vessel
 from reference import pulses, pump_trip
-from reference.bodies import bodies
+from reference.bodies import bodies, body
 from reference.delays import fork, main, turned
 from reference.folders import CASES
 from reference.scenes import GRAVITY, RHO, scene, tank
-from reference.trees import body
 from scipy.optimize import brentq
 
 import fvsolve

@@ -21,7 +21,7 @@ from fvsolve.fluid import LAWS
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.kernels.steady_friction import drag
-from fvsolve.model.delay_line_selection import reason_for_cells
+from fvsolve.model.delay_lines import reason_for_cells
 from fvsolve.model.model_facts import velocities
 from fvsolve.studies.distance import Deviation, moving_probes
 from fvsolve.studies.outcome import GIVEN_UP, Outcome, capped, outcome, refuse_basins, study_model

@@ -1,14 +1,16 @@
-"""Pressure at the end of a laminar line after a stop, by Zielke's sum over Bessel zeros and Euler summation.
+"""Pressure at the end of a laminar or a creeping line after a stop, independent of fvsolve.exact.
 
-The result is relative to Joukowsky's jump, for a flow from 1 to 0, and independent of fvsolve.exact. Times are in
-travel times L / a; `number` is nu L / (a R^2). With s in this time and u = s / number, the momentum balance is
-s M (1 + 8/u + 4 W(u)) = -p_x. W(u) is the sum of 1 / (u + j^2) over the zeros j of J_2 (Zielke 1968).
+The result is relative to Joukowsky's jump, for a flow from 1 to 0. Times are in travel times L / a.
+Laminar flow: Zielke's sum over Bessel zeros and Euler summation. `number` is nu L / (a R^2). With s in this time and
+u = s / number, the momentum balance is s M (1 + 8/u + 4 W(u)) = -p_x. W(u) is the sum of 1 / (u + j^2) over the zeros j
+of J_2 (Zielke 1968).
+Creeping wall: Laplace inversion with mpmath. The elements are pairs (G, tau) with G = c D rho a^2 J / e and tau in
+travel times. The transform is tanh(s sqrt(C)) / (s sqrt(C)) with C = 1 + sum of G / (1 + tau s) (Covas et al. 2005).
 """
-
-from __future__ import annotations
 
 import functools
 
+import mpmath
 import numpy as np
 from scipy.special import binom, jn_zeros
 
@@ -39,7 +41,7 @@ def euler(transform, t: float, terms: int = 60) -> float:
     return float(np.exp(0.5 * a) / t * mean)
 
 
-def jump(number: float, t: float) -> float:
+def laminar_jump(number: float, t: float) -> float:
     """Pressure at the end of a line whose flow stops at once at t = 0, away from the fronts at 2, 4, ... [-]."""
     total, k = 0.0, 0
     while 2.0 * k < t:
@@ -70,6 +72,19 @@ def smooth(number: float, start: float, duration: float, t: float) -> float:
         sigma, w = high - (high - low) * v**2, (high - low) * v * weights
         age = t - start - sigma
         here = age > 0.0
-        found += sum(w_ * ninth(s_ / duration) / duration * jump(number, a_)
+        found += sum(w_ * ninth(s_ / duration) / duration * laminar_jump(number, a_)
                      for w_, s_, a_ in zip(w[here], sigma[here], age[here], strict=True))  # fmt: skip
     return float(found)
+
+
+def creep_jump(elements, t: float) -> float:
+    """Pressure at the end of a line whose flow stops at once at t = 0, away from the fronts at 2, 4, ... [-]."""
+
+    def passage(s, k):
+        taken = sum((share / (1 + tau * s) for share, tau in elements), mpmath.mpf(0))
+        root = mpmath.sqrt(1 + taken)
+        return (1 if k == 0 else 2 * (-1) ** k) / (s * root) * mpmath.exp(-2 * k * s * (root - 1))
+
+    late = [t - 2.0 * k for k in range(1 + int(t // 2))]
+    return float(sum(mpmath.invertlaplace(lambda s, k=k: passage(s, k), one, method="dehoog")
+                     for k, one in enumerate(late) if one > 0.0))  # fmt: skip

@@ -1,15 +1,19 @@
-"""Exact waves in a frictionless network by ray tracing, under the linear density law.
+"""Exact waves without friction under the linear density law: ray tracing in networks, and Allievi's recursion.
 
 Every pipe end receives an incoming characteristic `P + Z M` (at `to`) or `P - Z M` (at `from`), with
 `Z = a / A`. It equals `2 P_opposite - incoming_opposite` at the opposite end, one travel time earlier.
 The recursion in time ends at the uniform start, so values are exact at all times and for all lengths.
 `P` is the pressure [Pa] at a common elevation, `M` the mass flow [kg/s].
+
+Allievi's interlocking recursion is for a reservoir, a pipe and a closing valve:
+`d_k + d_(k-1) - 2 = 2 A (tau_(k-1) z_(k-1) - tau_k z_k)` at the times `t_k = 2 L k / a`, with
+`A = rho a v / (2 dp)` from the velocity v and the drop dp of the valve in the steady start. `tau` is the opening
+relative to that start, `d` the drop of the valve relative to dp, and `z |z| = d` (Allievi 1902; Wylie and
+Streeter 1993). The recursion is also valid for reverse flow through the valve.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 Schedule = Callable[[float], float]
@@ -102,3 +106,14 @@ class Rays:
         if key not in self._known:
             self._known[key] = 2 * self.pressure(getattr(p, end), t) - self._incoming(pipe, end, t)
         return self._known[key]
+
+
+def relative_drop(parameter: float, opening: Sequence[float]) -> list[float]:
+    """Drop of the valve at `t = 2 L k / a` over that at the start, for relative openings at these times."""
+    z, drops = 1.0, [1.0]
+    for before, now in zip(opening[:-1], opening[1:], strict=True):
+        known = 2 + 2 * parameter * before * z - drops[-1]
+        size = -parameter * now + math.sqrt((parameter * now) ** 2 + abs(known))
+        z = math.copysign(size, known)
+        drops.append(z * abs(z))
+    return drops

@@ -1,6 +1,4 @@
-"""Lifted valves: ordinary differential equations by SciPy, and waves on a frictionless pipe."""
-
-from __future__ import annotations
+"""Lifted valves by SciPy, independent of fvsolve: discs with waves on a pipe, discs and stems with rigid columns."""
 
 import math
 
@@ -9,6 +7,19 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 TIGHT = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-12, "dense_output": True}
+
+
+def stop_events(push, held: int, k: int) -> list:
+    """Terminal events of a lift y[k]: its drive `push` turns while it is held at a stop, or it reaches a stop."""
+    if held:
+        watch = [lambda s, z: push(s, z)]
+        watch[0].direction = -held
+    else:
+        watch = [lambda s, z: z[k] - 1.0, lambda s, z: z[k]]
+        watch[0].direction, watch[1].direction = 1, -1
+    for one in watch:
+        one.terminal = True
+    return watch
 
 
 def stopped(rates, push, start, kinks, t):
@@ -23,14 +34,7 @@ def stopped(rates, push, start, kinks, t):
     found, events = np.zeros((len(y), len(t))), []
     while now < t[-1] - 1e-12:
         end = next(k for k in [*kinks, t[-1]] if k > now + 1e-12)
-        if held:
-            watch = [lambda s, z: push(s, z)]
-            watch[0].direction = -held
-        else:
-            watch = [lambda s, z: z[1] - 1.0, lambda s, z: z[1]]
-            watch[0].direction, watch[1].direction = 1, -1
-        for one in watch:
-            one.terminal = True
+        watch = stop_events(push, held, 1)
         step = solve_ivp(lambda s, z, h=held: rates(s, z, h), (now, end), y, events=watch, **TIGHT)
         here = (t >= now - 1e-12) & (t <= step.t[-1] + 1e-12)
         if here.any():
@@ -82,14 +86,7 @@ def slam(source, g, impedance, delay, far, span, time, t_end, kinks):
     while now < t_end - 1e-12:
         end = next(k for k in [*sorted({*kinks, *np.arange(delay, t_end, delay)}), t_end] if k > now + 1e-12)
         end = min(end, now + delay)
-        if held:
-            watch = [lambda s, z: push(s, z)]
-            watch[0].direction = -held
-        else:
-            watch = [lambda s, z: z[0] - 1.0, lambda s, z: z[0]]
-            watch[0].direction, watch[1].direction = 1, -1
-        for one in watch:
-            one.terminal = True
+        watch = stop_events(push, held, 0)
         rate = (lambda s, z: [0.0]) if held else (lambda s, z: [push(s, z) / time])
         step = solve_ivp(rate, (now, end), y, events=watch, method="DOP853", rtol=1e-9, atol=1e-10, dense_output=True,
                          max_step=0.02)  # fmt: skip
@@ -140,3 +137,54 @@ def leaves_with_column(source, kink, g, beyond, span, disc, inertia, friction, f
         step = solve_ivp(rates, (now, end), y, method="Radau", t_eval=wanted, rtol=1e-9, atol=1e-14)
         found, now, y = [*found, *step.y[:2].T], end, step.y[:, -1]
     return start, np.array(found).T
+
+
+def rates_of(source, lifted, g, stroke, inertia, friction):
+    """Function that returns the rates of [lift, mass flow]."""
+
+    def rates(t, y):
+        drop = (y[1] / y[0]) ** 2 / g
+        return [lifted(t, drop) / stroke, (source(t) - drop - friction * y[1] * abs(y[1])) / inertia]
+
+    return rates
+
+
+def stem_leaves_with_column(source, lifted, g, stroke, inertia, friction, start, kinks, at):
+    """[lift, mass flow] at times `at` of a stem that opens at `start` for the rigid column that it blocks.
+
+    inertia dM/dt = source(t) - M^2 / (G x^2) - friction M |M|, stroke dx/dt = lifted(t, drop). Lift and flow start as
+    powers of the time s since `start`: x = a s^2, M = a s^2 sqrt(G source), at s = 1e-5.
+    """
+    s = 1e-5
+    drop = source(start + s)
+    steep = (lifted(start + s, drop) - lifted(start, source(start))) / s
+    felt = lifted(start, 1.0) - lifted(start, 0.0)  # slope over the drop
+    root = math.sqrt(g * drop)
+    x = 0.5 * steep * s**2 / (stroke + felt * inertia * root)  # stroke x' = steep s - felt inertia root x'
+
+    rates = rates_of(source, lifted, g, stroke, inertia, friction)
+    y, now, found = [x, root * x], start + s, {}
+    for end in [*(k for k in kinks if k > now), max(at)]:
+        step = solve_ivp(rates, (now, end), y, method="Radau", rtol=1e-10, atol=1e-14, dense_output=True)
+        found |= {t: step.sol(t) for t in at if now <= t <= end}
+        now, y = end, step.y[:, -1]
+    return np.array([found[t] for t in at]).T
+
+
+def shuts_with_column(source, lifted, g, stroke, inertia, friction, start):
+    """Closing time of a stem whose sensed value is the set value until `start` [s].
+
+    The last part of the stroke, from a lift of 1e-5, is extrapolated at constant speed.
+    """
+    drop = brentq(lambda drop: lifted(0.0, drop), 1.0, 1e6)
+    flow = math.sqrt((source(0.0) - drop) / friction)
+    seat = lambda t, y: y[0] - 1e-5  # noqa: E731
+    seat.terminal = True
+    rates = rates_of(source, lifted, g, stroke, inertia, friction)
+    now, y = start, [flow / math.sqrt(g * drop), flow]
+    for end in (start + 2.0, start + 6.0):
+        step = solve_ivp(rates, (now, end), y, method="Radau", rtol=1e-9, atol=1e-13, events=seat)
+        now, y = step.t[-1], step.y[:, -1]
+        if step.status == 1:
+            break
+    return now - y[0] / rates(now, y)[0]

@@ -1,12 +1,11 @@
-"""Choice of the pipes that become delay lines, their division into stretches, and bounds of the error.
+"""Delay lines of a model: choice of their pipes, stretches, bounds of the error, and the history of their waves.
 
 Bounds are relative to the greatest jump of a schedule, and have three causes:
 Friction acts in the middle of a stretch only: a quarter of the attenuation of a wave in a stretch.
 Interpolation of a change that a schedule smooths over a time T: derivatives of half a cosine of duration T.
 A line with a travel time tau shorter than the longest step h: curvature of the wave over it, tau (h - tau) / 2.
+The history is a single array: size, ring buffers, and storage in the memory of a state.
 """
-
-from __future__ import annotations
 
 import copy
 import math
@@ -17,12 +16,143 @@ import numpy as np
 
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.delay_lines import wave_history as at
 from fvsolve.kernels.delay_lines.line_rates import drag_and_slope
 from fvsolve.kernels.schedule_pieces import POWER, WAVE
 from fvsolve.model.cluster_tables import classify_nodes
-from fvsolve.model.delay_history import history_size, set_rings
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import AUTO, method_named
+
+# stored jumps: in all lines together, least and most of each wave
+TOTAL_JUMPS, LEAST_JUMPS, MOST_JUMPS = 2**16, 32, 1024
+# spare entries beyond a delay: in all lines together, least and most of each
+TOTAL_SPARE, LEAST_SPARE, MOST_SPARE = 2**14, 32, 256
+HISTORY_DELAYS = 1.1  # a history spans this many delays
+MARGIN_ENTRIES = 8  # and so many entries before that
+LEAST_STEPS = 16  # steps
+
+
+def set_rings(delays: np.ndarray, longest: float) -> None:
+    """Set the size of the ring buffer of each stretch of delay lines, in entries, and its place among the rings.
+
+    A ring holds HISTORY_DELAYS times the delay in steps of `longest` [s], and spare entries; sizes are powers of two.
+    """
+    if not len(delays):
+        return
+    count = int(delays["stretches"].sum())
+    spare = min(MOST_SPARE, max(LEAST_SPARE, TOTAL_SPARE // max(1, count)))
+    entries = HISTORY_DELAYS * delays["hold"] / longest + MARGIN_ENTRIES + spare
+    delays["ring_size"] = 1 << np.ceil(np.log2(entries)).astype(np.int64)
+    sizes = delays["ring_size"] * delays["stretches"]
+    delays["ring"] = np.cumsum(sizes) - sizes
+
+
+def history_size(delays: np.ndarray, wider: int = 1) -> int:
+    """Size of the history array of these delay lines, with ring buffers `wider` times as long as at first."""
+    if not len(delays):
+        return 0
+    count, entries = int(delays["stretches"].sum()), wider * int((delays["ring_size"] * delays["stretches"]).sum())
+    per_stretch = at.ARRIVALS_SIZE + 2 * at.HEAD_SIZE + 6 * jump_capacity(count) + at.RING_GAP
+    return at.HEADER_SIZE + wider * int(delays["ring_size"].max()) + per_stretch * count + 2 * entries
+
+
+def jump_capacity(count: int) -> int:
+    """Number of jumps of each wave that can be stored at the same time, for `count` stretches."""
+    return max(LEAST_JUMPS, min(MOST_JUMPS, TOTAL_JUMPS // count))
+
+
+def reset_history(past: np.ndarray, delays: np.ndarray) -> None:
+    """Clear the history array and write its sizes."""
+    if not len(delays):
+        return
+    past[:], count = 0.0, int(delays["stretches"].sum())
+    sizes = [at.CAPACITY, at.JUMP_CAPACITY, at.STRETCHES, at.RING_FACTOR, at.ARRIVALS_TIME, at.CORRECTED_TIME]
+    wider = 1 if past.size == history_size(delays) else ring_factor(past, delays)
+    past[sizes] = wider * int(delays["ring_size"].max()), jump_capacity(count), count, wider, math.nan, -math.inf
+    past[at.NEXT_ARRIVAL] = at.INFINITE
+
+
+def ring_factor(past: np.ndarray, delays: np.ndarray) -> int:
+    """Factor by which ring buffers are longer than at first, from the size of the history array."""
+    wider = 1
+    while history_size(delays, wider) < past.size:
+        wider *= 2
+    return wider
+
+
+def stored_history(memory: dict[str, np.ndarray]) -> np.ndarray:
+    """History of delay lines in the memory of a state; raises ValueError if the memory contains no history."""
+    if "past" not in memory:
+        text = "the memory of the state contains no history of delay lines; expected a State that a run returned"
+        raise ValueError(text)
+    return memory["past"].copy()
+
+
+def stored_entries(past: np.ndarray) -> np.ndarray:
+    """Numbers of all entries whose times are still stored, without those of the initial steady state."""
+    return np.arange(max(at.PROFILE_ENTRIES, int(past[at.COUNT]) - int(past[at.CAPACITY])), int(past[at.COUNT]))
+
+
+def jump_times(past: np.ndarray, delays: np.ndarray, begin: float, end: float) -> np.ndarray:
+    """Times at which jumps reach ends or middles of stretches, between `begin` and `end` [s], increasing."""
+    places, queue = at.offsets_of(past), int(past[at.JUMP_CAPACITY])
+    heads = past[places[1] : places[2]].reshape(-1, at.HEAD_SIZE)
+    line_of, arrivals = np.repeat(np.arange(len(delays)), delays["stretches"]), []
+    for head in np.flatnonzero(heads[:, at.JUMP_COUNT]):
+        line, first = delays[line_of[head // 2]], places[2] + 3 * queue * head
+        order = (int(heads[head, at.FIRST_JUMP]) + np.arange(int(heads[head, at.JUMP_COUNT]))) % queue
+        sent = past[first + order]
+        arrivals += [sent + line["tau"], sent + 0.5 * line["tau"]]
+    times, tolerance = np.sort(np.concatenate([[], *arrivals])), at.time_tolerance(past)
+    times = times[(times > begin + tolerance) & (times < end - tolerance)]
+    return times[np.diff(times, prepend=-np.inf) > tolerance]
+
+
+def steps_left(past: np.ndarray, delays: np.ndarray) -> int:
+    """Number of steps that can be taken before an entry that is still needed is overwritten."""
+    count, sizes = int(past[at.COUNT]), int(past[at.RING_FACTOR]) * delays["ring_size"]
+    if count == 0:
+        return int(sizes.min()) - MARGIN_ENTRIES - LEAST_STEPS
+    stored = stored_entries(past)
+    times = past[at.HEADER_SIZE + (stored & (int(past[at.CAPACITY]) - 1))]
+    oldest = stored[0] + np.maximum(
+        0, np.searchsorted(times, times[-1] - HISTORY_DELAYS * delays["hold"]) - MARGIN_ENTRIES
+    )
+    return int((sizes - (count - oldest)).min())
+
+
+def with_doubled_rings(past: np.ndarray, delays: np.ndarray) -> np.ndarray:
+    """Copy of the history with ring buffers twice as long, with the same entries."""
+    wider = 2 * int(past[at.RING_FACTOR])
+    result = np.zeros(history_size(delays, wider))
+    result[: at.HEADER_SIZE] = past[: at.HEADER_SIZE]
+    result[[at.CAPACITY, at.RING_FACTOR]] *= 2.0
+    stored = stored_entries(past)
+    old, new = at.HEADER_SIZE, at.HEADER_SIZE
+    result[new + (stored & (int(result[at.CAPACITY]) - 1))] = past[old + (stored & (int(past[at.CAPACITY]) - 1))]
+    here, there = at.offsets_of(past), at.offsets_of(result)
+    result[there[0] : there[3]] = past[here[0] : here[3]]  # all except rings
+    for row in delays:
+        for q in range(row["stretches"]):
+            (old, old_mask), (new, new_mask) = at.ring_of(here, row, q), at.ring_of(there, row, q)
+            own = stored[max(0, stored.size - old_mask - 1) :]
+            for wave in range(2):
+                result[new + 2 * (own & new_mask) + wave] = past[old + 2 * (own & old_mask) + wave]
+    return result
+
+
+def jump_overflow_notices(past: np.ndarray) -> list[Notice]:
+    """List with a notice if there was no storage for some jumps, which were smoothed; else empty."""
+    if not past.size or past[at.GREATEST_UNSTORED_JUMP] == 0.0:
+        return []
+    share = past[at.GREATEST_UNSTORED_JUMP] / past[at.GREATEST_JUMP]
+    text = (
+        f"more than {int(past[at.JUMP_CAPACITY])} jumps were travelling in one pipe: some of them, of up to "
+        f"{share:.3g} times the greatest jump, were smoothed over a step; raise `numerics.delay_tolerance`, so that "
+        'fewer jumps are stored, or set pipe_model = "finite-volume"'
+    )
+    return [Notice("jumps", "numerics", text, "delay_tolerance", float(share), None)]
+
 
 FRICTION_PRESSURE = 0.02 * 1e5  # pressure [Pa] whose flow is added to that of the start to evaluate friction
 UNBALANCED_SHARE = 1e-9  # relative to the wave of 1 bar: pressure drop that friction does not balance
@@ -101,10 +231,8 @@ def reason_for_cells(case, name: str, link) -> str:
         return "its wall creeps in every cell"
     if any(getattr(case.places[end], "on", None) for end in link.ports.values()):
         return "the acceleration of its body acts on its cells"
-    if any(
-        probe.quantity == "force" and (probe.part, probe.name) == ("links", name)
-        for probe in (*case.probes, *case.extreme_probes)
-    ):
+    probes = [*case.probes, *case.extreme_probes]
+    if any(probe.quantity == "force" and (probe.part, probe.name) == ("links", name) for probe in probes):
         return "a probe reads its force, which is computed from cells"
     return ""
 
@@ -120,10 +248,8 @@ def lower_delays(draft) -> None:
         stated = link.pipe_model or case.numerics.pipe_model
         if stated == "delay-line" and chosen.pipe_model == "finite-volume":
             key = f"links.{name}.pipe_model" if link.pipe_model else "numerics.pipe_model"
-            draft.fault(
-                key,
-                f'"delay-line" is not possible for links.{name}: {chosen.reason}; expected "finite-volume" or "auto"',
-            )
+            text = f'"delay-line" is not possible for links.{name}: {chosen.reason}'
+            draft.fault(key, f'{text}; expected "finite-volume" or "auto"')
         if chosen.pipe_model == "finite-volume":
             continue
         row = np.zeros((), rec.DELAY)
@@ -155,9 +281,8 @@ def jump_tables(draft) -> dict[str, np.ndarray]:
     if not short.any():
         return {}
     own, tables = copy.copy(draft), draft.tables
-    own.node_table, own.valve_table, own.delay_table = (
-        table.copy() for table in (draft.node_table, draft.valve_table, draft.delay_table)
-    )
+    copied = (draft.node_table, draft.valve_table, draft.delay_table)
+    own.node_table, own.valve_table, own.delay_table = (table.copy() for table in copied)
     own.integers, own.floats, own.faults = tables.integers.tolist(), tables.floats.tolist(), []
     for pipe in draft.pipe_table[draft.delay_table["pipe"][short]]:
         for end in ("from_node", "to_node"):
@@ -229,7 +354,8 @@ def divide_lines(draft) -> list[str]:
             draft.fault(f"links.{name}.pipe_model", '"delay-line" is not possible: friction attenuates a wave by a '
                         f"fraction of {attenuation:.3g} in this pipe, whose travel time is less than a step of "
                         f'{longest}; expected shorter steps, or "finite-volume"')  # fmt: skip
-    shape_history(draft)
+    set_rings(draft.delay_table, longest_step(draft))
+    draft.shapes = draft.shapes._replace(past=history_size(draft.delay_table))
     return unfit
 
 
@@ -281,14 +407,7 @@ def time_scales(draft) -> tuple[float, float]:
     return tuple(duration if math.isfinite(duration) else 0.0 for duration in (shortest, ramp))
 
 
-def shape_history(draft) -> None:
-    """Set the ring buffers of all delay lines, and the size of their history array."""
-    set_rings(draft.delay_table, longest_step(draft))
-    draft.shapes = draft.shapes._replace(past=history_size(draft.delay_table))
-
-
 def longest_step(draft) -> float:
     """Longest step, for which delay lines are divided into stretches [s]; infinite without delay lines."""
-    return min(
-        (method.longest for method in draft.followed.values() if method.pipe_model == "delay-line"), default=math.inf
-    )
+    lines = [method for method in draft.followed.values() if method.pipe_model == "delay-line"]
+    return min((method.longest for method in lines), default=math.inf)

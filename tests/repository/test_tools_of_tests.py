@@ -1,0 +1,140 @@
+"""Tools of the tests: names of their folders, the tally, planted faults, and profiles of hypothesis.
+
+The tally lists schemes, methods, parts, laws, commands and tests that did not run. The planted faults fit the present
+package. Hypothesis draws equal inputs whatever modules are loaded, and tries failed inputs first.
+"""
+
+import ast
+import importlib.util
+import sys
+from collections import Counter
+from pathlib import Path
+
+import hypothesis_profiles
+import planted_faults
+import pytest
+from hypothesis import given, seed
+from hypothesis import strategies as st
+from hypothesis.internal import constants_ast
+from hypothesis.internal.conjecture import providers
+from hypothesis_profiles import examples
+from reference import folders
+from reference.scenes import lake, pipe, reservoir, scene
+from tally import Tally, expected
+
+import fvsolve
+
+OTHERS = {"repository", "invariance", "reference"}  # tests of several packages or of none
+
+
+def test_every_folder_of_tests_is_a_package_or_one_of_three_others():
+    tests = folders.CASES.parent / "tests"
+    stand = {path.parent.relative_to(tests).as_posix() for path in tests.rglob("test_*.py")}
+    assert stand - OTHERS <= {path.stem for path in Path(fvsolve.__file__).parent.iterdir()}
+
+
+def test_a_name_that_was_not_run_is_missing():
+    tally = Tally()
+    tally.add({kind: sorted(names) for kind, names in expected().items()})
+    assert tally.missing() == []
+    tally.names["scheme"].remove("weno5")
+    tally.names["command"] -= {"run", "check"}
+    assert tally.missing() == ["scheme: weno5", "command: check, run"]
+
+
+def test_a_listed_test_that_is_not_there_is_named():
+    tally = Tally()
+    tally.add({kind: sorted(names) for kind, names in expected().items()} | {"unknown": ["tests/a.py::test_gone"]})
+    assert tally.missing() == ["tests/durations.json: tests/a.py::test_gone is not a test"]
+
+
+def test_a_run_counts_its_parts_scheme_method_and_law(request):
+    from conftest import TALLY
+
+    tally = request.config.stash[TALLY]
+    before, tally.names = tally.names, Tally().names
+    try:
+        nodes = {"a": lake(30.0), "b": reservoir(2e5)}
+        links = {"p": pipe("a", "b", 100.0, 0.1, 1000.0, 4, initial_flow=0.0)}
+        fvsolve.run(scene(nodes, links, 0.1, {"scheme": "fromm", "method": "heun", "courant": 0.4}))
+        assert tally.plain() == {
+            "law": ["linear"], "method": ["heun"], "part": ["pipe", "reservoir"], "scheme": ["fromm"]
+        }  # fmt: skip
+    finally:
+        for kind, names in tally.names.items():
+            before[kind] |= names
+        tally.names = before
+
+
+PACKAGE = Path(fvsolve.__file__).parent
+
+
+@pytest.mark.parametrize("fault", planted_faults.FAULTS, ids=lambda fault: fault.path)
+def test_each_fault_changes_one_place_and_still_compiles(fault):
+    text = (PACKAGE / fault.path).read_text(encoding="utf-8")
+    planted = fault.planted(text)
+    assert planted != text
+    compile(planted, fault.path, "exec")
+
+
+def test_there_are_forty_two_and_each_folder_of_the_package_has_one():
+    folders = {path.parent.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py")}
+    folders.remove(Path("data"))  # printed tables, and one function that reads them
+    of_parts = {folder for folder in folders if folder.parts[:1] == ("parts",) and len(folder.parts) > 1}
+    count = Counter(Path(fault.path).parent for fault in planted_faults.FAULTS)
+    assert sum(count.values()) == 42
+    assert folders - of_parts <= set(count)
+    assert sum(count[folder] for folder in count if folder.parts[:1] == ("parts",)) >= 4
+
+
+def drawn() -> list[float]:
+    values = []
+
+    @seed(1)
+    @examples(100)
+    @given(st.lists(st.floats(), min_size=20, max_size=20))
+    def record(numbers):
+        values.append(repr(numbers))
+
+    record()
+    return values
+
+
+def load_constants(folder, first: int) -> None:
+    """Load a module with 400 numbers that occur nowhere else."""
+    path = folder / f"constants_{first}.py"
+    path.write_text("\n".join(f"x{k} = {first + k}.015625" for k in range(400)), encoding="utf-8")
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module
+    spec.loader.exec_module(module)
+
+
+def test_constants_of_a_module_that_is_loaded_are_not_drawn(tmp_path, monkeypatch):
+    before = drawn()
+    load_constants(tmp_path, 700_000)
+    assert drawn() == before
+    monkeypatch.setattr(providers, "is_local_module_file", constants_ast.is_local_module_file)
+    monkeypatch.setattr(providers, "_local_constants", providers._local_constants | constants_ast.Constants())
+    load_constants(tmp_path, 900_000)
+    assert drawn() != before  # hypothesis draws constants by default, so this test can fail
+
+
+def test_an_input_that_failed_once_is_tried_first(tmp_path, monkeypatch):
+    monkeypatch.setattr(hypothesis_profiles, "KEPT", tmp_path)
+    (tmp_path / "test_tools_of_tests.check.txt").write_text("[{'number': 41.25}]", encoding="utf-8")
+    tried = []
+
+    def check(number):
+        tried.append(number)
+
+    examples(3)(given(number=st.floats(0.0, 1.0))(check))()
+    assert tried[0] == 41.25 and len(tried) == 4
+
+
+def test_each_file_of_failing_inputs_names_a_single_test():
+    for path in hypothesis_profiles.KEPT.glob("*.txt"):
+        module, test = path.stem.split(".")
+        texts = [file.read_text(encoding="utf-8") for file in path.parents[1].rglob(f"{module}.py")]
+        assert sum(f"def {test}(" in text for text in texts) == 1
+        assert ast.literal_eval(path.read_text(encoding="utf-8"))
