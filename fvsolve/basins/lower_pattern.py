@@ -1,7 +1,5 @@
 """Dependence of the rates of a basin on its states, for the sparsity pattern of Jacobians."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import coo_array, csr_array, eye_array, kron
 

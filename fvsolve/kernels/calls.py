@@ -7,8 +7,6 @@ is a module with functions named as in `HOOKS`, each with arguments of its own. 
 address are lost.
 """
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np
@@ -239,7 +237,7 @@ def run_job(job, t, y, dydt, out, handle):
 def rhs_in_turn(t, y, dydt, out, handle):
     """Call every function of the right-hand side in order: rates go to `dydt`, network values to `out`.
 
-    The functions read the state y itself and not the values of `derive_state`, see `basins.cell_stretching`. If `dydt`
+    The functions read the state y itself and not the values of `derive_state`, see `basins.cell_sides`. If `dydt`
     is empty and `out` depends on rates, the rates are computed in a work array.
     """
     tables = open_tables(handle)
@@ -325,3 +323,26 @@ def stored_in_turn(t, y, dydt, out, handle, stored):
     while calls[STORED, k] != 0:
         call_energies(calls[STORED, k], t, seen, dydt, out, handle, stored)
         k += 1
+
+
+if COMPILING:
+
+    @Intrinsic
+    def prevent_inlining(typingctx):
+        """Prevent LLVM from inlining the function that contains this call; halves the compile time of that function."""
+        from fvsolve.compile.code_generation import no_inlining
+
+        return no_inlining()
+else:
+
+    def prevent_inlining():
+        """Do nothing, because without numba no function is inlined."""
+
+
+def law_njit(function):
+    """Compile by `njit` a function that only compiled functions call: without wrappers for Python and C.
+
+    `forceinline` is set explicitly: numba otherwise takes it from the first caller that compiles the function, and
+    `prevent_inlining` forbids it.
+    """
+    return njit(function, forceinline=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)

@@ -17,6 +17,7 @@ from fvsolve.kernels.density import pressure_of_mass
 from fvsolve.kernels.density.mixture_law import enthalpy, relative_volume
 from fvsolve.kernels.dtypes import JUNCTION, NOT_CONVERGED, STATUS, WHERE
 from fvsolve.kernels.node_clusters import (
+    BAR,
     MAX_SWEEPS,
     begin_clusters,
     check_clusters,
@@ -25,7 +26,6 @@ from fvsolve.kernels.node_clusters import (
     step_clusters,
     write_clusters,
 )
-from fvsolve.kernels.node_newton import BAR
 from fvsolve.kernels.riemann import FALL, UNBOUNDED, intermediate_pressure, sample_wave, state_at, wave_jump
 from fvsolve.kernels.table_handle import open_tables
 

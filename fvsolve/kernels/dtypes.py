@@ -417,7 +417,7 @@ SURFACE_VALUE = 24  # of a surface described by modes
 PIPE_FORCE = 25  # on a whole pipe
 
 BASIN = record(
-    kind=i8,  # code of its physics, see `basins.physics_codes`
+    kind=i8,  # code of its physics, see `basins.basin_patches`
     deep=i8,  # 1: its first quantity is a depth above that in `plan`, which carries scalars
     given=i8,  # 1: flows through its faces follow a given velocity, in `plane`; others are in `work`
     scheme=i8,

@@ -16,7 +16,7 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.spatial import Delaunay
 
 import fvsolve
-from fvsolve.basins.basin_probes import observe_dense_flows, observe_flows
+from fvsolve.basins.basin_output import observe_dense_flows, observe_flows
 from fvsolve.basins.liquid.liquid_patches import observe_liquid
 from fvsolve.draw import frame_meshes as of_view
 from fvsolve.draw.scene import DrawnScene

@@ -20,7 +20,7 @@ from fvsolve.basins.free_surface.surface_rates import water_mesh_rates
 from fvsolve.basins.liquid import liquid_mesh
 from fvsolve.basins.liquid.liquid_rates import mesh_rates
 from fvsolve.basins.liquid.liquid_sides import LiquidScheme
-from fvsolve.basins.lower_mesh import lower_mesh
+from fvsolve.basins.lower_motion import lower_mesh
 from fvsolve.basins.mesh_blocks import work_size
 from fvsolve.kernels.dtypes import LAW_LINEAR, LAW_LOG, MUSCL, UPWIND
 from fvsolve.mesh import Mesh, read, rectangle

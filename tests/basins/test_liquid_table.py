@@ -14,7 +14,7 @@ from reference.scenes import NO_FRICTION, junction, ramp, reservoir, scene, stif
 
 import fvsolve
 from fvsolve.basins.liquid import riemann_invariants
-from fvsolve.basins.liquid.lower_invariants import RiemannInvariants
+from fvsolve.basins.liquid.lower import RiemannInvariants
 from fvsolve.errors import CaseError
 from fvsolve.fluid import Fluid, FluidTable
 from fvsolve.kernels import density as law

@@ -12,7 +12,7 @@ from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 
 from fvsolve import advance, build, load, run
-from fvsolve.basins.lower_mesh import lower_mesh
+from fvsolve.basins.lower_motion import lower_mesh
 from fvsolve.errors import CaseError
 from fvsolve.mesh import rectangle
 from fvsolve.mesh.mesh import assemble, edges_of

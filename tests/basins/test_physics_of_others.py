@@ -46,7 +46,7 @@ class Belt(Physics, name="belt"):
 ''',
     "rates.py": '''
 """Rates of the cells of a belt, and what probes read there."""
-from fvsolve.basins.physics_codes import physics_code
+from fvsolve.basins.basin_patches import physics_code
 from fvsolve.jit import njit
 from fvsolve.kernels.table_handle import open_tables
 from fvsolve.kernels.dtypes import CELL_FIELD, RATE

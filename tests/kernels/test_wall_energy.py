@@ -5,7 +5,7 @@ import pytest
 from reference.scenes import junction, lake, pipe, scene
 
 import fvsolve
-from fvsolve.kernels.relaxation_energy import creep_energy, creep_power
+from fvsolve.kernels.relaxation import creep_energy, creep_power
 
 WALL = {"youngs_modulus": 1.4e9, "thickness": 0.01, "creep": {"compliance": [4e-10, 2e-10], "time": [0.05, 0.5]}}
 

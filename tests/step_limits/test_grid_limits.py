@@ -16,8 +16,14 @@ from reference import folders
 
 from fvsolve.cli import main
 from fvsolve.errors import FvsolveError
-from fvsolve.step_limits.advection_limit import advection_limit, advection_limits, growth_of, limit_of
-from fvsolve.step_limits.polynomial_sign import negative_point, polynomial_value
+from fvsolve.step_limits.advection_limit import (
+    advection_limit,
+    advection_limits,
+    growth_of,
+    limit_of,
+    negative_point,
+    polynomial_value,
+)
 from fvsolve.step_limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
 from fvsolve.steppers import METHODS, analyse, method_named
 from fvsolve.steppers.tableau import tableau

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import root
 
 from fvsolve.steppers import METHODS, analyse, integrate, method_named
-from fvsolve.steppers.rosenbrock import Rosenbrock
+from fvsolve.steppers.implicit import Rosenbrock
 
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 EXPLICIT = [name for name in NAMES if METHODS[name].explicit]
