@@ -6,9 +6,8 @@ from fvsolve.kernels.dtypes import DEVICE_VALUE
 from fvsolve.kernels.energy_rows import DEVICE_ROWS, device_power_row, device_stored_row
 from fvsolve.kernels.table_handle import open_tables
 
-SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, STORED, STEP, SLOPE, LIFT, BENDS, LEAD = range(
-    len(calls.HOOKS)
-)  # columns of `hooks`
+# columns of `hooks`
+SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, STORED, STEP, SLOPE, LIFT, BENDS, LEAD = range(len(calls.HOOKS))
 TEMPORARY = 2  # result of a hook `outside`: to be reported, but it ends by itself when a check valve closes
 
 

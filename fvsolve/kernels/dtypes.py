@@ -342,15 +342,7 @@ SCHEDULE = record(first=i8, pieces=i8)
 # a, b, c, d or v0, v1, duration, exponent or mean, amplitude, frequency [1/s], phase
 PIECE_COLUMNS = 7
 
-CLUSTER_RECORD = record(
-    first_node=i8,
-    nodes=i8,
-    first_valve=i8,
-    valves=i8,
-    first_couple=i8,
-    couples=i8,
-    inverse=i8,
-)
+CLUSTER_RECORD = record(first_node=i8, nodes=i8, first_valve=i8, valves=i8, first_couple=i8, couples=i8, inverse=i8)
 
 LAYOUT = record(
     pressure=i8,  # offsets in `out`

@@ -104,10 +104,7 @@ READ = {
         stored="network_energy: stored_barotropic",
     ),
 }
-UNSTEADY_FRICTION = {
-    "power": "relaxation: add_friction_power",
-    "stored": "relaxation: add_friction_stored",
-}
+UNSTEADY_FRICTION = {"power": "relaxation: add_friction_power", "stored": "relaxation: add_friction_stored"}
 FLUID_LOADS = {
     "boundary_inflow": "mechanism.fluid_loads: add_fluid_loads",
     "accelerate": "mechanism.inertial_forces: pipe_rate_limit",
@@ -191,9 +188,7 @@ COMPONENTS = {
         stored="relaxation: add_creep_stored_barotropic",
     ),
     "creep": RhsTerms(
-        rates="relaxation: add_wall_creep",
-        power="relaxation: add_creep_power",
-        stored="relaxation: add_creep_stored",
+        rates="relaxation: add_wall_creep", power="relaxation: add_creep_power", stored="relaxation: add_creep_stored"
     ),
 }
 DELAYS = RhsTerms(

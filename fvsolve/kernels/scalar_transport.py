@@ -22,10 +22,8 @@ from fvsolve.kernels.table_handle import open_tables
 
 # Flow in a loop of nodes without volume is mixed by iteration: greatest number of sweeps, relative tolerance.
 MAX_SWEEPS, CHANGE_TOLERANCE = 10000, 4e-16
-DRY_DEPTH, RATE_DEPTH = (
-    1e-9,
-    1e-3,
-)  # depths of a tank below which it has no value of its own; its rate stays constant [m]
+# depths of a tank below which it has no value of its own; its rate stays constant [m]
+DRY_DEPTH, RATE_DEPTH = 1e-9, 1e-3
 
 
 @njit(forceinline=True)

@@ -10,6 +10,7 @@ friction.
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -102,11 +103,6 @@ def surface_waves(basin, y: np.ndarray, seen: float = LEAST_AT_START) -> Surface
     return SurfaceWaves(1.0 - math.sqrt(math.tanh(k * mean) / (k * mean)), k, mean)
 
 
-def waves_in_run(basin, y: np.ndarray) -> SurfaceWaves:
-    """Properties of the waves of a basin at deviations y in a run: `surface_waves` with the threshold LEAST_IN_RUN."""
-    return surface_waves(basin, y, LEAST_IN_RUN)
-
-
 def is_even(basin) -> bool:
     """True if the mesh is a full rectangle of equal rectangular cells."""
     grid = basin.mesh.grid
@@ -157,11 +153,6 @@ def wave_notices(basin, y: np.ndarray) -> list[Notice]:
     """List with the notice that waves at deviations y are too short for shallow-water theory; empty if they are not."""
     state = surface_waves(basin, y)
     return [wave_notice(basin, state)] if state.speed_error > WAVE_ERROR else []
-
-
-def wave_watches(basin, y: np.ndarray) -> list[ErrorWatch]:
-    """List with a check of a run for waves that are too short; empty if `wave_notices` reports them at y."""
-    return [] if wave_notices(basin, y) else [ErrorWatch(basin, waves_in_run, wave_notice, WAVE_ERROR)]
 
 
 def body_notices(basin) -> list[Notice]:
@@ -235,22 +226,6 @@ def fast_film_notice(basin, error: tuple[float, float, float], when: str = "") -
         f"use {remedy}, where the rate has no cap"
     )
     return Notice("friction", f"nodes.{basin.name}", text, "method", error[0], FILM_ERROR)
-
-
-def film_watches(basin, y: np.ndarray) -> list[ErrorWatch]:
-    """Checks (`ErrorWatch`) of a run for films with a wrong speed, one for each pair of `film_checks`.
-
-    A check reports errors above FILM_ERROR and above REPEAT_FACTOR times the error at the start, at deviations y.
-    """
-    return [
-        ErrorWatch(basin, look, notice, max(FILM_ERROR, REPEAT_FACTOR * look(basin, y)[0]))
-        for look, notice in film_checks(basin)
-    ]
-
-
-def film_notices(basin, y: np.ndarray) -> list[Notice]:
-    """Notices of films whose speed is wrong at deviations y."""
-    return [notice(basin, error) for look, notice in film_checks(basin) if (error := look(basin, y))[0] > FILM_ERROR]
 
 
 def film_checks(basin) -> list[tuple]:
@@ -340,10 +315,13 @@ class FreeSurfaceRows(BasinRows):
             row["friction"] = rec.DARCY if part.manning is None else rec.MANNING
             row["roughness"] = part.factor if part.manning is None else part.manning
             row["held"], row["damped"] = self.rate_cap, self.damped
+        row["unsplit"] = COURANT_FACTOR
         if self.is_grid:
-            self.lower_grid(draft, row)
+            dry = not (self.depth.min() > 0.0 and (self.depth + self.start()[0]).min() > 0.0)
+            row["unsplit"] = SHORE_COURANT_FACTOR if dry and self.is_fifth_order else COURANT_FACTOR
+            row["work"] = draft.to_work(surface_grid.MOVING if self.moves else surface_grid.WORK)
         else:
-            self.lower_faces(draft, row)
+            row["work"] = draft.to_work(mesh_blocks.work_size(surface_mesh, self.integers))
         row["plan"] = draft.to_plane(plan)
         if not (self.depth + self.start()[0]).max() > 0.0:
             amount = draft.case.amount
@@ -381,15 +359,6 @@ class FreeSurfaceRows(BasinRows):
         if self.has_rate_cap:
             return RATE_CAP
         return NO_CAP if self.case.numerics.method == AUTO else math.inf
-
-    def lower_grid(self, draft, row) -> None:
-        dry = not (self.depth.min() > 0.0 and (self.depth + self.start()[0]).min() > 0.0)
-        row["unsplit"] = SHORE_COURANT_FACTOR if dry and self.is_fifth_order else COURANT_FACTOR
-        row["work"] = draft.to_work(surface_grid.MOVING if self.moves else surface_grid.WORK)
-
-    def lower_faces(self, draft, row) -> None:
-        row["unsplit"] = COURANT_FACTOR
-        row["work"] = draft.to_work(mesh_blocks.work_size(surface_mesh, self.integers))
 
     def start(self, attitude: np.ndarray | None = None) -> np.ndarray:
         states, given = np.zeros((3, self.n)), self.part.start
@@ -454,11 +423,18 @@ class FreeSurfaceRows(BasinRows):
         return float(self.case.properties.density * np.sum(self.mesh.area * (height + moves)))
 
     def notices(self, y: np.ndarray) -> list[Notice]:
-        waves, bodies = wave_notices(self, y), body_notices(self)
-        return [*waves, *bodies, *film_notices(self, y)]
+        films = [notice(self, error) for look, notice in film_checks(self) if (error := look(self, y))[0] > FILM_ERROR]
+        return [*wave_notices(self, y), *body_notices(self), *films]
 
     def watches(self, y: np.ndarray) -> list[Any]:
-        return [*wave_watches(self, y), *film_watches(self, y)]
+        """Check for short waves, unless `wave_notices` reports them at y, and one check for each pair of `film_checks`.
+
+        A check for films reports errors above FILM_ERROR and above REPEAT_FACTOR times the error at y.
+        """
+        waves = ErrorWatch(self, partial(surface_waves, seen=LEAST_IN_RUN), wave_notice, WAVE_ERROR)
+        films = [ErrorWatch(self, look, notice, max(FILM_ERROR, REPEAT_FACTOR * look(self, y)[0]))
+                 for look, notice in film_checks(self)]  # fmt: skip
+        return films if wave_notices(self, y) else [waves, *films]
 
     def depth_of(self, y: np.ndarray) -> np.ndarray:
         return np.maximum(self.depth + y[0], 0.0)

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
@@ -40,6 +39,8 @@ class RiemannInvariants:
     """
 
     def __init__(self, fluid, pressure: float, wave_speed: float | None = None) -> None:
+        from scipy.interpolate import CubicHermiteSpline
+
         settings, floats = np.zeros(1, rec.SETTINGS), []
         TableLaw.lower(fluid, settings[0], floats)
         n, start, step = (settings[0][key] for key in ("table_size", "table_start", "table_step"))
@@ -88,8 +89,10 @@ class RiemannInvariants:
         return np.unique(np.append(np.linspace(*self.ends, PANELS * self.interval_count + 1), self.rest))
 
     @cached_property
-    def invariant(self) -> CubicHermiteSpline:
-        """Invariant w [m/s] as a function of pressure [Pa], integrated with six Gauss points per interval of `grid`."""
+    def invariant(self):
+        """Spline of w [m/s] over pressure [Pa], integrated with six Gauss points per interval of `grid`."""
+        from scipy.interpolate import CubicHermiteSpline
+
         nodes, weights = np.polynomial.legendre.leggauss(6)
         half = 0.5 * np.diff(self.grid)
         places = self.grid[:-1, None] + half[:, None] * (1.0 + nodes)
@@ -161,8 +164,6 @@ class LiquidRows(BasinRows):
         fluid = case.properties
         self.linear, self.waves = case.law.linear, None
         if case.law.tabulated:
-            from fvsolve.basins.liquid.lower import RiemannInvariants
-
             self.waves = RiemannInvariants(fluid, self.part.pressure, self.part.wave_speed)
             self.density, self.speed = self.waves.density, self.waves.speed
             return
