@@ -1,7 +1,5 @@
 """Physics of basins from outside: a folder that is declared, checked, lowered, compiled, run and read."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Courant limits of linear advection on a uniform grid: closed forms, exact steps of exact waves, random schemes."""
 
-from __future__ import annotations
-
 import json
 import math
 import sys
@@ -189,10 +187,8 @@ def test_an_implicit_method_that_is_not_a_stable_has_a_limit(less_implicit):
 
 def brute(weights, method, courant: float) -> float:
     """Greatest |R|^2 - 1 on sampled waves in extended precision."""
-    r, theta = (
-        analyse(method).stability_function,
-        np.concatenate([np.geomspace(1e-4, 0.05, 60), np.linspace(0.05, np.pi, 3000)]),
-    )
+    r = analyse(method).stability_function
+    theta = np.concatenate([np.geomspace(1e-4, 0.05, 60), np.linspace(0.05, np.pi, 3000)])
     wave = np.exp(1j * theta.astype(np.longdouble))
     z = -(1 - 1 / wave) * sum(
         np.longdouble(w.numerator) / w.denominator * wave ** (k - 2) for k, w in enumerate(weights)

@@ -1,7 +1,5 @@
 """One step against equations (14), (23) and (8) of the course, by formulas, SciPy's solver and exact Taylor series."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np
