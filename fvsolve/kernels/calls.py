@@ -122,7 +122,7 @@ def call_at_address(name: str, letters: str, returned: str = "", home: str = __n
         return call_by_address(argument_types(letters), argument_types(returned))
 
     names = ["typingctx", "address", *(f"argument_{k}" for k in range(len(letters)))]
-    define.__signature__ = Signature([Parameter(one, Parameter.POSITIONAL_OR_KEYWORD) for one in names])
+    define.__signature__ = Signature([Parameter(label, Parameter.POSITIONAL_OR_KEYWORD) for label in names])
     define.__name__, define.__qualname__, define.__module__ = name, name, home
     return Intrinsic(define)
 
