@@ -16,7 +16,7 @@ from fvsolve.jit import njit
 from fvsolve.model import RunData, build
 from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.steppers.integrator import Integrator
-from fvsolve.steppers.run_handle import RATES, addresses, call_rhs, evaluate, open_run
+from fvsolve.steppers.run_handle import RHS_CALL, addresses, call_rhs, evaluate, open_run
 from fvsolve.steppers.structure import Structure, differences
 from fvsolve.steppers.tableau import method_named
 
@@ -92,7 +92,7 @@ def parts(model) -> tuple[Structure, Costs, csc_array]:
     shape, n, m, handle = structure.shape, structure.n, structure.m, slate.handle
     where, out, y = int(model.layout["supply"]), model.new_out(), np.zeros(n)
     stepper = Integrator(method_named(METHOD), n, m, lambda: structure, model.scale.copy())
-    stepper.out, stepper.calls, stepper.control["ledger_offset"] = out, addresses((rhs,) * (RATES + 1)), where
+    stepper.out, stepper.calls, stepper.control["ledger_offset"] = out, addresses((rhs,) * (RHS_CALL + 1)), where
     jacobian, store = stepper.jacobian, np.zeros(structure.store_size)
     f, f_work, x = np.zeros((3, n))
     step = COURANT * min(p.length / p.cells / p.wave_speed for p in model.pipes)

@@ -82,7 +82,7 @@ FAULTS = [
     ),
     Fault("kernels/mechanism/body_layout.py", "rz * fx - rx * fz", "rz * fx + rx * fz"),
     Fault(
-        "kernels/relaxation_energy.py",
+        "kernels/relaxation.py",
         "return per * taken, per * rate",
         "return per * taken, 1.01 * per * rate",
     ),

@@ -1,14 +1,12 @@
 """Functions that basins of all types add to the right-hand side and to the probes (`kernels.rhs_assembly`)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from fvsolve.kernels.rhs_assembly import MIXED, RhsTerms
 
 PACKAGE = "fvsolve.basins"
-COMMON = RhsTerms(package=PACKAGE, observe="basin_probes: observe_flows", power="basin_energy: patch_power")
-DENSITY_LAWS = RhsTerms(package=PACKAGE, observe="basin_probes: observe_dense_flows")  # all laws but linear
+COMMON = RhsTerms(package=PACKAGE, observe="basin_output: observe_flows", power="basin_output: patch_power")
+DENSITY_LAWS = RhsTerms(package=PACKAGE, observe="basin_output: observe_dense_flows")  # all laws but linear
 SHORTAGES = RhsTerms(package=PACKAGE, record="basin_patches: record_patches")
 WALLS = RhsTerms(
     package=PACKAGE,

@@ -29,8 +29,8 @@ the deviation of depth from rest, 0 for the depth at rest; twice : 2 W_z [1/s]; 
 """
 
 from fvsolve.basins import basin_frames as frame
-from fvsolve.basins.basin_energy import basin_first_row
 from fvsolve.basins.basin_frames import CELL_POSITIONS, FRAME_GRAVITY, bed_height, cell_position
+from fvsolve.basins.basin_output import basin_first_row
 from fvsolve.basins.free_surface.surface_energy import velocity_factor
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import LAW_LINEAR, RATE, TANK_OUT
@@ -304,7 +304,7 @@ def body_load(tables, basin, b, out):
 def add_power(t, y, dydt, out, handle, power):
     """Add the power that bodies supply to the water in their basins to `power` [W].
 
-    The rate of storage and the power that the model dissipates are written to the entries of `basin_energy` too.
+    The rate of storage and the power that the model dissipates are written to the entries of `basin_output` too.
     """
     tables = open_tables(handle)
     plane = tables.plane

@@ -1,7 +1,5 @@
 """Tables of a model for basins; loaded for models that contain a basin."""
 
-from __future__ import annotations
-
 from importlib import import_module
 
 import numpy as np

@@ -12,10 +12,10 @@ from fvsolve.assembly.scheme_codes import CODES, family
 from fvsolve.assembly.state_names import Numbered
 from fvsolve.basins import advection_faces
 from fvsolve.basins.advection import THIN, advection_work, diffusion_work
-from fvsolve.basins.basin_probes import SPEED, U, V
+from fvsolve.basins.basin_output import SPEED, U, V
+from fvsolve.basins.basin_patches import physics_code
 from fvsolve.basins.fifth_order import fifth_order_work
-from fvsolve.basins.lower_mesh import lower_mesh
-from fvsolve.basins.physics_codes import physics_code
+from fvsolve.basins.lower_motion import lower_mesh
 from fvsolve.case.basins import boundary_cells
 from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.errors import Notice, listing

@@ -1,7 +1,5 @@
 """Dependence of the rates of a basin on its states, for the sparsity pattern of Jacobians."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import coo_array, csr_array, eye_array, kron
 
@@ -86,9 +84,8 @@ def neighbours(basin) -> csr_array:
         reached = ring
         for _ in range(reach - 1):
             reached = reached @ ring
-        pattern = (
-            pattern + reached + at_edge @ reached @ ring
-        )  # outgoing waves of a liquid are extrapolated by a polynomial of five cells
+        # outgoing waves of a liquid are extrapolated by a polynomial of five cells
+        pattern = pattern + reached + at_edge @ reached @ ring
     return csr_array(pattern, dtype=bool)
 
 

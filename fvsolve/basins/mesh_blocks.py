@@ -22,8 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fvsolve.basins import cell_sides
-from fvsolve.basins.cell_sides import BLOCK, HEAD, INDICES, MEASURES, blocks, edges_before
-from fvsolve.basins.cell_stretching import stretch_rates
+from fvsolve.basins.cell_sides import BLOCK, HEAD, INDICES, MEASURES, blocks, edges_before, stretch_rates
 from fvsolve.jit import inline
 from fvsolve.kernels.dtypes import UPWIND
 

@@ -280,7 +280,7 @@ class MeshMotion(NamedTuple):
     thrust : values on boundary faces. For a liquid they are pressures above that at rest [Pa], then, under the density
     law `linear`, speed (c^2 r^2 - |m|^2) there [kg^2/(m3 s3)]; divided by 2 rho, this is the power lost per area.
     For water they are thrusts minus those at rest, over density and length [m3/s2]
-    wide : areas of cells over undeformed areas, see `basins.cell_stretching`
+    wide : areas of cells over undeformed areas, see `basins.cell_sides`
     """
 
     speeds: np.ndarray

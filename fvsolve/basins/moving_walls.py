@@ -14,10 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.basins import cell_stretching as stretching
-from fvsolve.basins.basin_energy import basin_first_row
-from fvsolve.basins.cell_sides import BLOCK, MEASURES, blocks
-from fvsolve.basins.cell_stretching import row_across, stretch_of_cell
+from fvsolve.basins import cell_sides as stretching
+from fvsolve.basins.basin_output import basin_first_row
+from fvsolve.basins.cell_sides import BLOCK, MEASURES, blocks, row_across, stretch_of_cell
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import NO_DRAG, NO_WIDTH, RATE, STATUS, WALL_VALUE, WHERE
 from fvsolve.kernels.energy_rows import WALL_ROWS, wall_power_row

@@ -92,11 +92,7 @@ else:
         return ctypes.c_int64.from_address(int(address)).value
 
     def call_processes(address, content, numbers, size):
-        """Call the function at `address`, which exchanges an array with other processes.
-
-        content : kind of exchange, SEND_STATES, SEND_FLOWS, SEND_RATES or SEND_SUMS
-        numbers, size : memory address and length of the array
-        """
+        """Call the function at `address`, with arguments as in compiled code."""
         ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3)(int(address))(content, numbers, int(size))
 
     def yield_thread(address):

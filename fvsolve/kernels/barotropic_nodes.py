@@ -9,17 +9,10 @@ import numpy as np
 
 from fvsolve.jit import njit
 from fvsolve.kernels import density as law
+from fvsolve.kernels import node_clusters as clusters
 from fvsolve.kernels.dtypes import CHAMBER, CLUSTER, FIXED, JUNCTION, TANK
 from fvsolve.kernels.ghost_cells import end_value
 from fvsolve.kernels.linear_nodes import junction_flows
-from fvsolve.kernels.node_clusters import (
-    MAX_SWEEPS,
-    begin_clusters,
-    check_clusters,
-    node_work,
-    step_clusters,
-    write_clusters,
-)
 from fvsolve.kernels.pipes import scheme_family
 from fvsolve.kernels.restrictions import conductance, valve_target
 from fvsolve.kernels.schedule_pieces import schedule_value
@@ -200,13 +193,13 @@ def solve_nodes_barotropic(t, y, dydt, out, handle):
     evaluated again. An undisturbed cluster is left as it is.
     """
     tables = open_tables(handle)
-    space = node_work(tables)
+    space = clusters.node_work(tables)
     given_flows(t, y, out, tables)
-    begin_clusters(out, tables, space)
-    for sweep in range(1, MAX_SWEEPS + 1):
+    clusters.begin_clusters(out, tables, space)
+    for sweep in range(1, clusters.MAX_SWEEPS + 1):
         end_inflows_barotropic(out, tables, space[0], False)
-        step_clusters(sweep, out, tables, space)
-        if not check_clusters(out, tables, space):
+        clusters.step_clusters(sweep, out, tables, space)
+        if not clusters.check_clusters(out, tables, space):
             break
-    write_clusters(out, tables, space)
+    clusters.write_clusters(out, tables, space)
     end_inflows_barotropic(out, tables, space[0], True)

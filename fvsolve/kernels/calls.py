@@ -7,14 +7,13 @@ is a module with functions named as in `HOOKS`, each with arguments of its own. 
 address are lost.
 """
 
-from __future__ import annotations
-
 import functools
+from inspect import Parameter, Signature
 
 import numpy as np
 
 from fvsolve.errors import FvsolveError
-from fvsolve.jit import COMPILING, Intrinsic, declare_function, njit, plain_kinds
+from fvsolve.jit import COMPILING, Intrinsic, declare_function, njit, plain_kinds, specialise
 from fvsolve.kernels.dtypes import AMENDED, STATUS, table_types
 from fvsolve.kernels.table_handle import open_tables
 
@@ -29,24 +28,23 @@ HOOKS = {  # functions of the law of a part: types of arguments and of the resul
     # out : network values (node pressures as changes since the start [Pa], mass flows [kg/s], ...), read and written at
     # the offsets in tables.layout[0] (LAYOUT of `kernels.dtypes`); tables : open handle, its attributes are the tables
     # device : row of the part in tables.devices; t, y, dydt : time [s], states and their rates (empty if not requested)
-    "set": (
-        "tVVTD",
-        "",
-    ),  # t, y, out, tables, device: writes conductances, speeds, pressures of vessels, from (t, y) and flags
+    # t, y, out, tables, device: writes conductances, speeds, pressures of vessels, from (t, y) and flags
+    "set": ("tVVTD", ""),
     "move": ("tVVVTD", ""),  # t, y, dydt, out, tables, device: rates of its states if dydt.size > 0; out[RATE]
     "events": ("tVVTDV", ""),  # t, y, out, tables, device, g: its event functions, from solved nodes
     "value": ("tVVTDi", "t"),  # t, y, out, tables, device, quantity: value of its quantity of that number
-    "outside": ("VTD", "i"),  # out, tables, device: 1 outside the range of validity of its law, or TEMPORARY
-    "power": (
-        "tVVVTD",
-        "ttt",
-    ),  # t, y, dydt, out, tables, device: power supplied, rate of stored energy, dissipation [W]
+    # out, tables, device: 1 outside the range of validity of its law, TEMPORARY if this ends by itself, otherwise 0
+    "outside": ("VTD", "i"),
+    # t, y, dydt, out, tables, device: power supplied, rate of stored energy, dissipation [W]
+    "power": ("tVVVTD", "ttt"),
     "stored": ("VTD", "t"),  # y, tables, device: stored energy, change since the profile [J]
+    # Restriction k, conductance g [kg2/s2/Pa], drop [Pa]; denser, wide : see `restrictions.restriction_step`
     "step": ("VTittttb", "tt"),  # out, tables, k, g, m, drop, denser, wide: Newton step, see `kernels.restrictions`
     "slope": ("VTitt", "t"),  # out, tables, k, g, drop: d flow / d drop [kg/s/Pa]
     "lift": ("VTitttb", "t"),  # out, tables, k, g, drop, denser, wide: d flow / d upstream pressure at constant drop
     "bends": ("TitV", ""),  # tables, k, drop, g: event functions of a restriction, from the drop alone
-    # t, y, tables, device, p' upstream, p' downstream, drop, ahead: dx/dt of the lift and its slope over the drop
+    # t, y, tables, device, p' upstream, p' downstream (changes since the start [Pa]), drop, ahead: dx/dt of the lift x
+    # and its slope over the drop [1/s/Pa], for a change of the upstream (`ahead`) or of the downstream pressure
     "lead": ("tVTDtttb", "tt"),
 }
 
@@ -104,114 +102,47 @@ def empty_calls(rows: int, columns: int) -> np.ndarray:
     return np.zeros((rows, columns), dtype=np.int64 if COMPILING else object)
 
 
-if COMPILING:
+def call_python(function, *arguments):
+    """Call a function with these arguments."""
+    return function(*arguments)
 
-    def call(letters: str, returned: str = ""):
-        """Numba signature and code generator of a call whose first argument is the address of the function.
 
-        letters, returned : types of the other arguments and of the results, see `argument_types`
-        """
+def call_at_address(name: str, letters: str, returned: str = "", home: str = __name__):
+    """Function (address, *arguments) of compiled code that calls the function at an address; without JIT `call_python`.
+
+    name, home : name of the result and its module, which must assign the result to it, because code is pickled by name
+    letters, returned : types of the arguments and of the results, see `argument_types`
+    """
+    if not COMPILING:
+        return call_python
+
+    def define(typingctx, address, *arguments):
         from fvsolve.compile.code_generation import call_by_address
 
         return call_by_address(argument_types(letters), argument_types(returned))
 
-    @Intrinsic
-    def call_rates(typingctx, address, t, y, dydt, out, handle):
-        """Call the function at `address`, which has the arguments of the right-hand side."""
-        return call(RATES)
+    names = ["typingctx", "address", *(f"argument_{k}" for k in range(len(letters)))]
+    define.__signature__ = Signature([Parameter(label, Parameter.POSITIONAL_OR_KEYWORD) for label in names])
+    define.__name__, define.__qualname__, define.__module__ = name, name, home
+    return Intrinsic(define)
 
-    @Intrinsic
-    def call_reader(typingctx, address, t, y, out, handle, values):
-        """Call the function at `address`, which reads a state and fills `values`."""
-        return call(READS)
 
-    @Intrinsic
-    def call_energies(typingctx, address, t, y, dydt, out, handle, rows):
-        """Call the function at `address`, which fills `rows` with powers [W] or stored energies [J]."""
-        return call(ENERGIES)
-
-    @Intrinsic
-    def call_set(typingctx, address, t, y, out, tables, device):
-        """Call the function `set` of a device's law at `address`; see `HOOKS`."""
-        return call(*HOOKS["set"])
-
-    @Intrinsic
-    def call_move(typingctx, address, t, y, dydt, out, tables, device):
-        """Call the function `move` of a device's law at `address`; see `HOOKS`."""
-        return call(*HOOKS["move"])
-
-    @Intrinsic
-    def call_events(typingctx, address, t, y, out, tables, device, g):
-        """Call the function `events` of a device's law at `address`, which writes event functions to g; see `HOOKS`."""
-        return call(*HOOKS["events"])
-
-    @Intrinsic
-    def call_value(typingctx, address, t, y, out, tables, device, quantity):
-        """Call the function `value` of a device's law at `address`: value of a quantity by its number; see `HOOKS`."""
-        return call(*HOOKS["value"])
-
-    @Intrinsic
-    def call_outside(typingctx, address, out, tables, device):
-        """Call the function `outside` of a device's law at `address`, see `HOOKS`.
-
-        The result is 1 outside the range of validity, TEMPORARY if this ends by itself, otherwise 0.
-        """
-        return call(*HOOKS["outside"])
-
-    @Intrinsic
-    def call_power(typingctx, address, t, y, dydt, out, tables, device):
-        """Call the function `power` of a device's law at `address`: three powers [W]; see `HOOKS`."""
-        return call(*HOOKS["power"])
-
-    @Intrinsic
-    def call_stored(typingctx, address, y, tables, device):
-        """Call the function `stored` of a device's law at `address`: stored energy [J]; see `HOOKS`."""
-        return call(*HOOKS["stored"])
-
-    @Intrinsic
-    def call_step(typingctx, address, out, tables, k, g, m, drop, denser, wide):
-        """Call the function `step` of the law of restriction k at `address`; see `restrictions.restriction_step`."""
-        return call(*HOOKS["step"])
-
-    @Intrinsic
-    def call_slope(typingctx, address, out, tables, k, g, drop):
-        """Call the function `slope` of the law of restriction k at `address`: d flow / d drop [kg/s/Pa].
-
-        g : present conductance [kg2/s2/Pa]; drop : present drop [Pa]
-        """
-        return call(*HOOKS["slope"])
-
-    @Intrinsic
-    def call_lift(typingctx, address, out, tables, k, g, drop, denser, wide):
-        """Call the function `lift` of the law of restriction k at `address`; see `restrictions.restriction_lift`."""
-        return call(*HOOKS["lift"])
-
-    @Intrinsic
-    def call_bends(typingctx, address, tables, k, drop, g):
-        """Call the function `bends` of the law of restriction k at `address`.
-
-        It writes event functions of the restriction at the drop `drop` [Pa] to g; see `HOOKS`.
-        """
-        return call(*HOOKS["bends"])
-
-    @Intrinsic
-    def call_lead(typingctx, address, t, y, tables, device, before, behind, drop, ahead):
-        """Call the function `lead` of a device's law at `address`, which returns dx/dt of its lift x and its slope.
-
-        before, behind : upstream and downstream pressure changes since the start [Pa]; drop : drop of the valve [Pa]
-        The slope is the derivative of dx/dt with respect to the drop [1/s/Pa]. It is that for a change of the upstream
-        pressure if `ahead` is True, otherwise of the downstream pressure; see `HOOKS`.
-        """
-        return call(*HOOKS["lead"])
-else:
-
-    def call_rates(function, *arguments):
-        """Call a function with these arguments."""
-        return function(*arguments)
-
-    call_reader = call_energies = call_rates
-    call_set = call_move = call_events = call_value = call_outside = call_power = call_stored = call_lead = call_rates
-    call_step = call_slope = call_lift = call_bends = call_rates
+call_rates = call_at_address("call_rates", RATES)  # of the right-hand side
+call_reader = call_at_address("call_reader", READS)  # reads a state and fills `values`
+call_energies = call_at_address("call_energies", ENERGIES)  # fills `rows` with powers [W] or stored energies [J]
+# Functions of the law of a device, or of restriction k (from `step` on).
+call_set = call_at_address("call_set", *HOOKS["set"])
+call_move = call_at_address("call_move", *HOOKS["move"])
+call_events = call_at_address("call_events", *HOOKS["events"])
+call_value = call_at_address("call_value", *HOOKS["value"])
+call_outside = call_at_address("call_outside", *HOOKS["outside"])
+call_power = call_at_address("call_power", *HOOKS["power"])
+call_stored = call_at_address("call_stored", *HOOKS["stored"])
+call_lead = call_at_address("call_lead", *HOOKS["lead"])
+call_step = call_at_address("call_step", *HOOKS["step"])
+call_slope = call_at_address("call_slope", *HOOKS["slope"])
+call_lift = call_at_address("call_lift", *HOOKS["lift"])
+call_bends = call_at_address("call_bends", *HOOKS["bends"])
 
 
 @njit(forceinline=True)
@@ -239,7 +170,7 @@ def run_job(job, t, y, dydt, out, handle):
 def rhs_in_turn(t, y, dydt, out, handle):
     """Call every function of the right-hand side in order: rates go to `dydt`, network values to `out`.
 
-    The functions read the state y itself and not the values of `derive_state`, see `basins.cell_stretching`. If `dydt`
+    The functions read the state y itself and not the values of `derive_state`, see `basins.cell_sides`. If `dydt`
     is empty and `out` depends on rates, the rates are computed in a work array.
     """
     tables = open_tables(handle)
@@ -260,15 +191,21 @@ def damp_in_turn(h, y, rates, quick, handle):
     run_job(DAMP, h, y, rates, quick, handle)
 
 
-@njit
-def observe_in_turn(t, y, out, handle, values):
-    """Write all probe values to `values`: call every function that computes some of them."""
+@njit(forceinline=True)
+def run_readers(job, t, y, out, handle, values):
+    """Call every function of a job, such as OBSERVE, in order, each of which reads a state and writes to `values`."""
     tables, k = open_tables(handle), 0
     derive_state(t, y, tables.seen, out, handle)
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
-    while calls[OBSERVE, k] != 0:
-        call_reader(calls[OBSERVE, k], t, seen, out, handle, values)
+    while calls[job, k] != 0:
+        call_reader(calls[job, k], t, seen, out, handle, values)
         k += 1
+
+
+@njit
+def observe_in_turn(t, y, out, handle, values):
+    """Write all probe values to `values`."""
+    run_readers(OBSERVE, t, y, out, handle, values)
 
 
 @njit
@@ -295,33 +232,45 @@ def solve_nodes_in_turn(t, y, out, handle, g):
 
 @njit
 def events_in_turn(t, y, handle, g):
-    """Write all event functions at (t, y) to g: call every function that computes some of them."""
-    tables, k = open_tables(handle), 0
-    calls, out = tables.calls, tables.spare
-    derive_state(t, y, tables.seen, out, handle)
-    seen = tables.seen if tables.seen.size > 0 else y
-    while calls[EVENTS, k] != 0:
-        call_reader(calls[EVENTS, k], t, seen, out, handle, g)
-        k += 1
+    """Write all event functions at (t, y) to g."""
+    run_readers(EVENTS, t, y, open_tables(handle).spare, handle, g)
 
 
-@njit
-def power_in_turn(t, y, dydt, out, handle, power):
-    """Fill `power` [W]: call every function that computes some of its entries."""
+JOB = None  # of the template: POWER or STORED
+
+
+def _energies_in_turn(t, y, dydt, out, handle, rows):
+    """Fill `rows` with powers [W] or stored energies [J]: call every function that computes some of its entries."""
     tables, k = open_tables(handle), 0
     derive_state(t, y, tables.seen, out, handle)
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
-    while calls[POWER, k] != 0:
-        call_energies(calls[POWER, k], t, seen, dydt, out, handle, power)
+    while calls[JOB, k] != 0:
+        call_energies(calls[JOB, k], t, seen, dydt, out, handle, rows)
         k += 1
 
 
-@njit
-def stored_in_turn(t, y, dydt, out, handle, stored):
-    """Fill `stored` [J]: call every function that computes some of its entries."""
-    tables, k = open_tables(handle), 0
-    derive_state(t, y, tables.seen, out, handle)
-    calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
-    while calls[STORED, k] != 0:
-        call_energies(calls[STORED, k], t, seen, dydt, out, handle, stored)
-        k += 1
+power_in_turn = specialise(_energies_in_turn, "power_in_turn", JOB=POWER)
+stored_in_turn = specialise(_energies_in_turn, "stored_in_turn", JOB=STORED)
+
+
+if COMPILING:
+
+    @Intrinsic
+    def prevent_inlining(typingctx):
+        """Prevent LLVM from inlining the function that contains this call; halves the compile time of that function."""
+        from fvsolve.compile.code_generation import no_inlining
+
+        return no_inlining()
+else:
+
+    def prevent_inlining():
+        """Do nothing, because without numba no function is inlined."""
+
+
+def law_njit(function):
+    """Compile by `njit` a function that only compiled functions call: without wrappers for Python and C.
+
+    `forceinline` is set explicitly: numba otherwise takes it from the first caller that compiles the function, and
+    `prevent_inlining` forbids it.
+    """
+    return njit(function, forceinline=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)

@@ -6,17 +6,12 @@ the floor pressure of the law.
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.barotropic_nodes import (
-    add_end_inflow,
-    clear_inflows,
-    given_flows,
-    node_beyond,
-    write_end_waves,
-)
+from fvsolve.kernels.barotropic_nodes import add_end_inflow, clear_inflows, given_flows, node_beyond, write_end_waves
 from fvsolve.kernels.density import pressure_of_mass
 from fvsolve.kernels.density.mixture_law import enthalpy, relative_volume
 from fvsolve.kernels.dtypes import JUNCTION, NOT_CONVERGED, STATUS, WHERE
 from fvsolve.kernels.node_clusters import (
+    BAR,
     MAX_SWEEPS,
     begin_clusters,
     check_clusters,
@@ -25,7 +20,6 @@ from fvsolve.kernels.node_clusters import (
     step_clusters,
     write_clusters,
 )
-from fvsolve.kernels.node_newton import BAR
 from fvsolve.kernels.riemann import FALL, UNBOUNDED, intermediate_pressure, sample_wave, state_at, wave_jump
 from fvsolve.kernels.table_handle import open_tables
 
@@ -150,13 +144,11 @@ def bound_steps(sweep, out, tables, before, low, high):
             elif q != p:
                 if sure[c] == 1.0 or sweep > BISECTION_START:
                     low[i], high[i] = (p, high[i]) if q > p else (low[i], p)
-                if sweep <= BISECTION_START and high[i] - low[i] <= NARROW * (
-                    BAR + p
-                ):  # a bound was wrong, or there is a kink
+                # a bound was wrong, or there is a kink
+                if sweep <= BISECTION_START and high[i] - low[i] <= NARROW * (BAR + p):
                     low[i], high[i] = floor, UNBOUNDED
-                if (
-                    sweep > BISECTION_START or not low[i] < q < high[i]
-                ):  # at a kink Newton can alternate between two points
+                # at a kink Newton can alternate between two points
+                if sweep > BISECTION_START or not low[i] < q < high[i]:
                     lower, upper = (p, high[i]) if q > p else (low[i], p)
                     q = max(intermediate_pressure(floor, lower, upper, p), least)
             out[pressure + i] = q - base

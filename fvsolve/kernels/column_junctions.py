@@ -15,7 +15,7 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import JUNCTION, NO_SOLUTION, STATUS, WHERE
-from fvsolve.kernels.node_newton import solve_dense
+from fvsolve.kernels.node_clusters import solve_dense
 from fvsolve.kernels.restrictions import conductance
 from fvsolve.kernels.steady_friction import drag
 

@@ -1,23 +1,13 @@
 """Loops over all devices of a model, which call the functions of the devices' laws by address."""
 
 from fvsolve.jit import njit
-from fvsolve.kernels.calls import (
-    HOOKS,
-    call_events,
-    call_move,
-    call_outside,
-    call_power,
-    call_set,
-    call_stored,
-    call_value,
-)
+from fvsolve.kernels import calls
 from fvsolve.kernels.dtypes import DEVICE_VALUE
 from fvsolve.kernels.energy_rows import DEVICE_ROWS, device_power_row, device_stored_row
 from fvsolve.kernels.table_handle import open_tables
 
-SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, STORED, STEP, SLOPE, LIFT, BENDS, LEAD = range(
-    len(HOOKS)
-)  # columns of `hooks`
+# columns of `hooks`
+SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, STORED, STEP, SLOPE, LIFT, BENDS, LEAD = range(len(calls.HOOKS))
 TEMPORARY = 2  # result of a hook `outside`: to be reported, but it ends by itself when a check valve closes
 
 
@@ -29,7 +19,7 @@ def set_devices(t, y, dydt, out, handle):
         device = tables.devices[k]
         hook = tables.hooks[device["hooks"], SET]
         if hook != 0:
-            call_set(hook, t, y, out, tables, device)
+            calls.call_set(hook, t, y, out, tables, device)
 
 
 @njit
@@ -40,7 +30,7 @@ def device_rates(t, y, dydt, out, handle):
         device = tables.devices[k]
         hook = tables.hooks[device["hooks"], MOVE]
         if hook != 0:
-            call_move(hook, t, y, dydt, out, tables, device)
+            calls.call_move(hook, t, y, dydt, out, tables, device)
 
 
 @njit
@@ -51,7 +41,7 @@ def device_events(t, y, out, handle, g):
         device = tables.devices[k]
         hook = tables.hooks[device["hooks"], EVENTS]
         if hook != 0:
-            call_events(hook, t, y, out, tables, device, g)
+            calls.call_events(hook, t, y, out, tables, device, g)
 
 
 @njit
@@ -64,7 +54,7 @@ def observe_devices(t, y, out, handle, values):
             device = tables.devices[probes[k]["index"]]
             hook = tables.hooks[device["hooks"], VALUE]
             if hook != 0:
-                values[k] = call_value(hook, t, y, out, tables, device, probes[k]["side"])
+                values[k] = calls.call_value(hook, t, y, out, tables, device, probes[k]["side"])
 
 
 @njit
@@ -78,7 +68,7 @@ def record_devices(t, y, out, handle, values):
     first = tables.pipes.size + 3 * tables.nodes.size + tables.columns.size + tables.pistons.size
     for k in range(devices.size):
         hook = tables.hooks[devices[k]["hooks"], OUTSIDE]
-        beyond = call_outside(hook, out, tables, devices[k]) if hook != 0 else 0
+        beyond = calls.call_outside(hook, out, tables, devices[k]) if hook != 0 else 0
         at = first + k + (devices.size if beyond == TEMPORARY else 0)
         if beyond != 0 and marks[at] != marks[at]:
             marks[at] = t
@@ -93,7 +83,7 @@ def power_devices(t, y, dydt, out, handle, power):
         hook = tables.hooks[devices[k]["hooks"], POWER]
         power[at], power[at + 1], power[at + 2] = 0.0, 0.0, 0.0
         if hook != 0:
-            power[at], power[at + 1], power[at + 2] = call_power(hook, t, y, dydt, out, tables, devices[k])
+            power[at], power[at + 1], power[at + 2] = calls.call_power(hook, t, y, dydt, out, tables, devices[k])
         at += DEVICE_ROWS
 
 
@@ -104,4 +94,4 @@ def stored_devices(t, y, dydt, out, handle, stored):
     devices, first = tables.devices, device_stored_row(tables, stored)
     for k in range(devices.size):
         hook = tables.hooks[devices[k]["hooks"], STORED]
-        stored[first + k] = call_stored(hook, y, tables, devices[k]) if hook != 0 else 0.0
+        stored[first + k] = calls.call_stored(hook, y, tables, devices[k]) if hook != 0 else 0.0

@@ -342,15 +342,7 @@ SCHEDULE = record(first=i8, pieces=i8)
 # a, b, c, d or v0, v1, duration, exponent or mean, amplitude, frequency [1/s], phase
 PIECE_COLUMNS = 7
 
-CLUSTER_RECORD = record(
-    first_node=i8,
-    nodes=i8,
-    first_valve=i8,
-    valves=i8,
-    first_couple=i8,
-    couples=i8,
-    inverse=i8,
-)
+CLUSTER_RECORD = record(first_node=i8, nodes=i8, first_valve=i8, valves=i8, first_couple=i8, couples=i8, inverse=i8)
 
 LAYOUT = record(
     pressure=i8,  # offsets in `out`
@@ -420,7 +412,7 @@ SURFACE_VALUE = 24  # of a surface described by modes
 PIPE_FORCE = 25  # on a whole pipe
 
 BASIN = record(
-    kind=i8,  # code of its physics, see `basins.physics_codes`
+    kind=i8,  # code of its physics, see `basins.basin_patches`
     deep=i8,  # 1: its first quantity is a depth above that in `plan`, which carries scalars
     given=i8,  # 1: flows through its faces follow a given velocity, in `plane`; others are in `work`
     scheme=i8,

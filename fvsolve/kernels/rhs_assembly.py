@@ -5,8 +5,6 @@ dydt it computes `out` alone. Bands of a state (`band_exchange`) use the same fu
 parts of the tables.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from importlib import import_module
@@ -106,10 +104,7 @@ READ = {
         stored="network_energy: stored_barotropic",
     ),
 }
-UNSTEADY_FRICTION = {
-    "power": "relaxation_energy: add_friction_power",
-    "stored": "relaxation_energy: add_friction_stored",
-}
+UNSTEADY_FRICTION = {"power": "relaxation: add_friction_power", "stored": "relaxation: add_friction_stored"}
 FLUID_LOADS = {
     "boundary_inflow": "mechanism.fluid_loads: add_fluid_loads",
     "accelerate": "mechanism.inertial_forces: pipe_rate_limit",
@@ -138,18 +133,18 @@ COMPONENTS = {
     ),
     "no pins": RhsTerms(accelerate="mechanism.mass_matrix: solve_accelerations"),
     "pins": RhsTerms(
-        accelerate="mechanism.loop_constraints: solve_pinned_accelerations",
-        observe="mechanism.loop_constraints: observe_pins",
+        accelerate="mechanism.bushings_and_pins: solve_pinned_accelerations",
+        observe="mechanism.bushings_and_pins: observe_pins",
     ),
     "bushings": RhsTerms(
-        move="mechanism.force_elements: add_bushing_loads",
-        accelerate="mechanism.force_elements: bushing_rate_limit",
-        observe="mechanism.force_elements: observe_bushings",
-        power="mechanism.force_elements: power_bushings",
-        stored="mechanism.force_elements: stored_bushings",
+        move="mechanism.bushings_and_pins: add_bushing_loads",
+        accelerate="mechanism.bushings_and_pins: bushing_rate_limit",
+        observe="mechanism.bushings_and_pins: observe_bushings",
+        power="mechanism.bushings_and_pins: power_bushings",
+        stored="mechanism.bushings_and_pins: stored_bushings",
     ),
     "stretches": RhsTerms(events="mechanism.body_kinematics: kinematics_for_events"),
-    "lines": RhsTerms(move="mechanism.force_elements: add_element_forces"),
+    "lines": RhsTerms(move="mechanism.bushings_and_pins: add_element_forces"),
     "moving segments": RhsTerms(
         prepare="mechanism.inertial_forces: set_segment_drives",
         known_pressures="mechanism.inertial_forces: moving_tank_pressures",
@@ -189,13 +184,11 @@ COMPONENTS = {
     "memory, barotropic": RhsTerms(rates="relaxation: add_unsteady_friction_barotropic", **UNSTEADY_FRICTION),
     "creep, barotropic": RhsTerms(
         rates="relaxation: add_wall_creep_barotropic",
-        power="relaxation_energy: add_creep_power_barotropic",
-        stored="relaxation_energy: add_creep_stored_barotropic",
+        power="relaxation: add_creep_power_barotropic",
+        stored="relaxation: add_creep_stored_barotropic",
     ),
     "creep": RhsTerms(
-        rates="relaxation: add_wall_creep",
-        power="relaxation_energy: add_creep_power",
-        stored="relaxation_energy: add_creep_stored",
+        rates="relaxation: add_wall_creep", power="relaxation: add_creep_power", stored="relaxation: add_creep_stored"
     ),
 }
 DELAYS = RhsTerms(

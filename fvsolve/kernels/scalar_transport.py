@@ -1,4 +1,9 @@
-"""Scalars in pipes, carried by the mass flow of the mass equation.
+"""Scalars in pipes, carried by the mass flow of the mass equation, and at nodes, where inflows are mixed by mass.
+
+A node has a single value of each scalar. With storage it is the value of the stored mass. At a given pressure or flow
+it is the given value of inflow from outside, and elsewhere the mean of all inflows. A pipe end also exchanges the
+amount g (c_cell - c_node) [kg/s] by diffusion, g = 2 D m / dx, with the values c_cell in the end cell and c_node at the
+node, diffusivity D [m2/s], mass per length m [kg/m] and cell length dx.
 
 State of a cell: amount per length s = m c [kg/m], with mass per length m and value c of the scalar. Its equation, with
 mass flow M [kg/s] and diffusivity D [m2/s], is
@@ -10,10 +15,246 @@ remains uniform.
 """
 
 from fvsolve.jit import inline, njit
-from fvsolve.kernels.dtypes import FLAT, NODE_SCALAR, PIPE_SCALAR, RATE, UPWIND
-from fvsolve.kernels.node_mixing import end_flow, exchange_amounts, mix_nodes, outlet_values, record_loss
+from fvsolve.kernels.dtypes import CHAMBER, FIXED, FLAT, JUNCTION, NODE_SCALAR, PATCH, PIPE_SCALAR, RATE, TANK, UPWIND
 from fvsolve.kernels.reconstruction import by_limiter, limited, slope
+from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
+
+# Flow in a loop of nodes without volume is mixed by iteration: greatest number of sweeps, relative tolerance.
+MAX_SWEEPS, CHANGE_TOLERANCE = 10000, 4e-16
+# depths of a tank below which it has no value of its own; its rate stays constant [m]
+DRY_DEPTH, RATE_DEPTH = 1e-9, 1e-3
+
+
+@njit(forceinline=True)
+def end_flow(out, tables, p, right):
+    """Mass flow along pipe p at its `from` (0) or `to` (1) end [kg/s]."""
+    at = tables.layout[0]["ends"] + 4 * p + 2 * right
+    return tables.pipes[p]["flow"] + (out[at] - out[at + 1])
+
+
+@njit(forceinline=True)
+def cell_mass(y, tables, p, i):
+    """Mass per length in cell i of pipe p [kg/m]."""
+    pipe = tables.pipes[p]
+    waves = y[pipe["y"] + i] + y[pipe["y"] + pipe["cells"] + i]
+    return tables.profile[pipe["center"] + i] + waves * (1.0 / pipe["speed"])
+
+
+@njit(forceinline=True)
+def cell_value(y, tables, q, p, i):
+    """Value of scalar q in cell i of pipe p."""
+    return y[tables.scalars[q]["y"] + tables.pipes[p]["cell"] + i] / cell_mass(y, tables, p, i)
+
+
+@njit(forceinline=True)
+def end_cell(tables, p, right, k):
+    """Index of cell k from the end of pipe p: its `from` end (right = 0) or its `to` end (right = 1).
+
+    k is 0 for the end cell. If there are fewer cells, it is the index of the last one.
+    """
+    n = tables.pipes[p]["cells"]
+    k = min(k, n - 1)
+    return n - 1 - k if right == 1 else k
+
+
+@njit(forceinline=True)
+def bounded(value, scalar):
+    """Value limited to the bounds `least` and `greatest` of the scalar."""
+    return min(max(value, scalar["least"]), scalar["greatest"])
+
+
+@njit
+def outlet_values(y, out, tables, q):
+    """Write the value of scalar q in the water that leaves each pipe through each end to `out`.
+
+    It follows from a limited slope, within the bounds of the scalar.
+    """
+    st, scalar, at = tables.settings[0], tables.scalars[q], tables.layout[0]["edge"]
+    pipes, limiter = tables.pipes, st["limiter"]
+    for p in range(pipes.size):
+        for right in range(2):
+            a = cell_value(y, tables, q, p, end_cell(tables, p, right, 0))
+            value = a
+            if st["scheme"] != UPWIND:
+                b = cell_value(y, tables, q, p, end_cell(tables, p, right, 1))
+                c = cell_value(y, tables, q, p, end_cell(tables, p, right, 2))
+                near, far = a - b, b - c if pipes[p]["cells"] > 2 else a - b
+                slope = limited(limiter, near, far)
+                if slope != 0.0:
+                    value = bounded(a + 0.5 * slope, scalar)
+            out[at + 2 * (q * pipes.size + p) + right] = value
+
+
+@njit(forceinline=True)
+def end_conductance(y, tables, q, p, right):
+    """Diffusive exchange of scalar q between node and end cell of pipe p per difference of values, 2 D m / dx [kg/s].
+
+    D : diffusivity [m2/s]; m : mass per length [kg/m]; dx : length of the cell [m]; right : 0 or 1, `from` or `to` end
+    """
+    scalar, pipe = tables.scalars[q], tables.pipes[p]
+    if scalar["diffusivity"] == 0.0:
+        return 0.0
+    return 2.0 * scalar["diffusivity"] * cell_mass(y, tables, p, end_cell(tables, p, right, 0)) / pipe["dx"]
+
+
+@njit
+def pipe_inflows(y, out, tables, q, amount, weight, cells, count):
+    """Sum the inflows of scalar q from pipes into every node.
+
+    amount, weight : float64[nodes]  receive amount of scalar, and mass flow plus diffusive conductance [kg/s]
+    cells, count : float64[nodes]  receive the sum and the number of the values in pipe cells beside the node
+    """
+    pipes, edge = tables.pipes, tables.layout[0]["edge"]
+    for i in range(amount.size):
+        amount[i] = weight[i] = cells[i] = count[i] = 0.0
+    for p in range(pipes.size):
+        for right in range(2):
+            node = pipes[p]["to_node"] if right == 1 else pipes[p]["from_node"]
+            flow = end_flow(out, tables, p, right) * (1.0 if right == 1 else -1.0)
+            cell = cell_value(y, tables, q, p, end_cell(tables, p, right, 0))
+            g = end_conductance(y, tables, q, p, right)
+            amount[node] += g * cell
+            weight[node] += g
+            cells[node] += cell
+            count[node] += 1.0
+            if flow > 0.0:
+                amount[node] += flow * out[edge + 2 * (q * pipes.size + p) + right]
+                weight[node] += flow
+
+
+@njit(forceinline=True)
+def given_value(t, tables, q, i):
+    """Value of scalar q in the inflow from outside at node i."""
+    scalar, kind = tables.scalars[q], tables.nodes[i]["kind"]
+    place = tables.integers[scalar["places"] + i]
+    return schedule_value(tables, place, t) if place >= 0 and not has_storage(kind) else scalar["initial"]
+
+
+@njit(forceinline=True)
+def has_storage(kind):
+    """True if a node of this kind stores an amount of scalar: a tank or a chamber."""
+    return kind == TANK or kind == CHAMBER
+
+
+@njit(forceinline=True)
+def mixes(y, out, tables, i):
+    """True if the value of a scalar at node i is that of the present inflow: the node is a junction or a dry tank."""
+    node = tables.nodes[i]
+    if not has_storage(node["kind"]):
+        return node["kind"] == JUNCTION
+    dry = node["mass"] + y[node["y"]] <= DRY_DEPTH * node["density"] * node["area"]
+    return dry or out[tables.layout[0]["supply"] + i] > 0.0
+
+
+@njit
+def start_values(t, y, out, tables, q, amount, weight, cells, count):
+    """Write the values of scalar q at all nodes, as far as they do not depend on other nodes.
+
+    A junction or a dry tank, whose value is that of its inflow, gets the mean of the pipe cells beside it at first.
+    amount, weight, cells, count : sums of `pipe_inflows`; a supply from outside is added to the first two
+    """
+    nodes, layout, scalar = tables.nodes, tables.layout[0], tables.scalars[q]
+    at = layout["value"] + q * nodes.size
+    for i in range(nodes.size):
+        kind = nodes[i]["kind"]
+        if kind == FIXED:
+            out[at + i] = given_value(t, tables, q, i)
+        elif mixes(y, out, tables, i):
+            supply = out[layout["supply"] + i]
+            if supply > 0.0:
+                amount[i] += supply * given_value(t, tables, q, i)
+                weight[i] += supply
+            out[at + i] = cells[i] / count[i] if count[i] > 0.0 else scalar["initial"]
+        elif kind != PATCH:  # the basin has set its value
+            mass = nodes[i]["mass"] + y[nodes[i]["y"]]
+            out[at + i] = bounded(y[tables.integers[scalar["places"] + i]] / mass, scalar)
+
+
+@njit
+def mix_nodes(t, y, out, tables, q):
+    """Write the value of scalar q at every node, in sweeps over nodes without volume until no value changes.
+
+    Raises out[RATE] to the rate at which inflow replaces stored mass [1/s].
+    """
+    nodes, valves, layout, scratch = tables.nodes, tables.valves, tables.layout[0], tables.scratch
+    n, at = nodes.size, layout["value"] + q * nodes.size
+    amount, weight, total, share = scratch[:n], scratch[n : 2 * n], scratch[2 * n : 3 * n], scratch[3 * n : 4 * n]
+    pipe_inflows(y, out, tables, q, amount, weight, total, share)
+    start_values(t, y, out, tables, q, amount, weight, total, share)
+    for _ in range(MAX_SWEEPS):
+        for i in range(n):
+            total[i], share[i] = amount[i], weight[i]
+        for k in range(valves.size):
+            flow = out[layout["valve"] + k]
+            upstream, downstream = valves[k]["from_node"], valves[k]["to_node"]
+            if flow < 0.0:
+                upstream, downstream = downstream, upstream
+            total[downstream] += abs(flow) * out[at + upstream]
+            share[downstream] += abs(flow)
+        changed = False
+        for i in range(n):
+            if share[i] > 0.0 and mixes(y, out, tables, i):
+                value = total[i] / share[i]
+                changed = changed or abs(value - out[at + i]) > CHANGE_TOLERANCE * abs(value)
+                out[at + i] = value
+        if not changed or valves.size == 0:
+            break
+    for i in range(n):
+        if has_storage(nodes[i]["kind"]):
+            mass = max(nodes[i]["mass"] + y[nodes[i]["y"]], RATE_DEPTH * nodes[i]["density"] * nodes[i]["area"])
+            out[RATE] = max(out[RATE], share[i] / mass + 0.5 * tables.scalars[q]["decay"])
+
+
+@njit(forceinline=True)
+def record_loss(out, tables, q, k, lost):
+    """Subtract the decay `lost` [kg/s] of state k of scalar q from its entries in the record of gains and losses.
+
+    A scalar has a single entry there, or an entry for each state.
+    """
+    scalar, at = tables.scalars[q], tables.layout[0]["loss"] + tables.scalars[q]["loss"]
+    if scalar["losses"] == 1:
+        out[at] -= lost
+    elif scalar["losses"] > 1:
+        out[at + k] = -lost
+
+
+@njit
+def exchange_amounts(t, y, dydt, out, tables, q):
+    """Write flows of scalar q through pipe ends and into nodes, rates of storage in nodes, gains and losses [kg/s]."""
+    nodes, pipes, valves, layout = tables.nodes, tables.pipes, tables.valves, tables.layout[0]
+    scalar, n = tables.scalars[q], nodes.size
+    value, inflow, gain = layout["value"] + q * n, layout["scalar_inflow"] + q * n, layout["gain"] + q * n
+    for i in range(n):
+        out[inflow + i] = 0.0
+    for p in range(pipes.size):
+        for right in range(2):
+            sign, at = (1.0 if right == 1 else -1.0), 2 * (q * pipes.size + p) + right
+            node = pipes[p]["to_node"] if right == 1 else pipes[p]["from_node"]
+            flow = end_flow(out, tables, p, right)
+            cell = cell_value(y, tables, q, p, end_cell(tables, p, right, 0))
+            through = flow * (out[layout["edge"] + at] if sign * flow > 0.0 else out[value + node])
+            through += sign * end_conductance(y, tables, q, p, right) * (cell - out[value + node])
+            out[layout["carried"] + at] = through
+            out[inflow + node] += sign * through
+    for k in range(valves.size):
+        i, j, flow = valves[k]["from_node"], valves[k]["to_node"], out[layout["valve"] + k]
+        amount = flow * (out[value + i] if flow > 0.0 else out[value + j])
+        out[inflow + i] -= amount
+        out[inflow + j] += amount
+    for i in range(n):
+        kind, supply = nodes[i]["kind"], out[layout["supply"] + i]
+        if kind == FIXED:
+            out[gain + i] = -out[inflow + i]
+        elif kind != PATCH and supply > 0.0:
+            out[gain + i] = supply * given_value(t, tables, q, i)
+        else:
+            out[gain + i] = supply * out[value + i]
+        if has_storage(kind) and dydt.size > 0:
+            at = tables.integers[scalar["places"] + i]
+            fades = scalar["decay"] * (y[at] - scalar["ambient"] * (nodes[i]["mass"] + y[nodes[i]["y"]]))
+            dydt[at] = out[inflow + i] + out[gain + i] - fades
+            record_loss(out, tables, q, at - scalar["y"], fades)
 
 
 @njit

@@ -3,7 +3,7 @@
 A disc controls the single rigid column connected to it from the time at which it leaves its seat; the stem of a
 regulating valve also before it reaches its seat. The flag is armed[event + 4], that of a stem armed[event + 6]. Control
 ends when the lift exceeds CONTROL_LIFT and a given step resolves the exchange between lift and flow:
-`kernels.column_valve_control`. A disc that moves to its seat may slam.
+`kernels.rigid_columns`. A disc that moves to its seat may slam.
 """
 
 from math import sqrt

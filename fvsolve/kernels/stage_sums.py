@@ -17,9 +17,8 @@ HUGE = 1e100  # greater values count as not finite
 # block. From HEAD on 1 for each basin whose rows are formed in blocks, else 0; then the runs, first and last + 1.
 MODE, BAD, NOW, TO, RATES, WEIGHTS, SIZE, COUNT, STAGES, STEP, LAST, OTHERS, CHECKED, EDGES, BASINS, CELLS = range(16)
 HEAD = 16
-OFF, CHECK, STAGE, STAGE_AND_END = range(
-    4
-)  # MODE: nothing; check that all is finite; form the stage before rates; and the end after them
+# MODE: nothing; check that all is finite; form the stage before rates; and the end after them
+OFF, CHECK, STAGE, STAGE_AND_END = range(4)
 
 
 @njit(forceinline=True)

@@ -9,11 +9,13 @@ from fvsolve.model.run_data import zeros_for_run
 
 PACKAGE = "fvsolve"  # package of the kernel functions
 FOLDER = "kernels.mechanism"
-MOTION, LINES = f"{FOLDER}.body_kinematics: kinematics", f"{FOLDER}.force_elements: add_element_forces"
+MOTION, LINES = f"{FOLDER}.body_kinematics: kinematics", f"{FOLDER}.bushings_and_pins: add_element_forces"
 WEIGH, ACCELERATE = f"{FOLDER}.mass_matrix: start_mass_matrix", f"{FOLDER}.mass_matrix: solve_accelerations"
-BUSHINGS = f"{FOLDER}.force_elements: add_bushing_loads"
-PINNED, GAPS, HOLD = (f"{FOLDER}.loop_constraints: {name}" for name in
-                      ("solve_pinned_accelerations", "start_gaps", "add_start_pin_forces"))  # fmt: skip
+BUSHINGS = f"{FOLDER}.bushings_and_pins: add_bushing_loads"
+PINNED, GAPS, HOLD = (
+    f"{FOLDER}.bushings_and_pins: {name}"
+    for name in ("solve_pinned_accelerations", "start_gaps", "add_start_pin_forces")
+)
 # loads on bodies of fluid at rest, in addition to pushes
 FLUID_LOADS = ("basins.basin_frames: set_frames", "basins.frame_forces: add_frame_forces")
 WALL_LOADS = ("basins.moving_walls: push_bodies_at_rest",)

@@ -17,7 +17,7 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.delay_lines.wave_history import CORRECTED_TIME
 from fvsolve.model.delay_lines import jump_overflow_notices
 from fvsolve.solve.run_loop import STATUS_FAILURES
-from fvsolve.step_limits.forcing_ranges import forcing_sizes, state_ranges, states_outside_cells
+from fvsolve.step_limits.growing_modes import forcing_sizes, state_ranges, states_outside_cells
 from fvsolve.step_limits.step_notices import DOUBTFUL, WRONG, step_limits
 from fvsolve.steppers import automatic
 from fvsolve.steppers.integrator import Integrator

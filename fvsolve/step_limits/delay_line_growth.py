@@ -8,8 +8,6 @@ trapezoidal rule at any step, but not under Euler, nor under the implicit midpoi
 of the step: there waves grow, unless friction or the interpolation between steps damps them as much.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.errors import Notice

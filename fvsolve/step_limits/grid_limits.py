@@ -20,8 +20,6 @@ pressure reflection factors p and q at its ends has the eigenvalues of A + s b v
 two shut ends, -1 between an open and a shut end, 0 without reflection.
 """
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -6,8 +6,6 @@ of a pipe of few cells, which its ends reduce, is an estimate too; there the not
 computed with the reflection factors of the pipe's ends.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ wave u_j = exp(i j theta) changes by du/dt = (a / dx) z(theta) u; z is the symbo
 in t = sin^2(theta / 2), from t = 0 (longest waves) to t = 1 (two cells a wave).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 

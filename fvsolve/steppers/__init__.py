@@ -1,20 +1,20 @@
 """Runge-Kutta methods as data, their properties, and the compiled time loop that steps them."""
 
 from fvsolve.lazy_exports import lazy_names
-from fvsolve.steppers import explicit, implicit, rosenbrock  # noqa: F401  (declare the built-in methods)
+from fvsolve.steppers import explicit, implicit  # noqa: F401  (declare the built-in methods)
 
 _HOMES = {
-    "Facts": "analysis.method_facts",
+    "Facts": "analysis.stability_properties",
     "METHODS": "tableau",
     "Method": "tableau",
     "StabilityFunction": "analysis.stability_function",
-    "analyse": "analysis.method_facts",
-    "global_error": "analysis.method_facts",
+    "analyse": "analysis.stability_properties",
+    "global_error": "analysis.stability_properties",
     "integrate": "ode",
-    "local_error": "analysis.method_facts",
+    "local_error": "analysis.stability_properties",
     "method_named": "tableau",
     "pade": "analysis.stability_function",
-    "seen_frequency": "analysis.method_facts",
+    "seen_frequency": "analysis.stability_properties",
     "stability_function": "analysis.stability_function",
 }
 

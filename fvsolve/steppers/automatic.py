@@ -1,7 +1,5 @@
 """Method `auto`: explicit steps while stability allows them, implicit steps where stiffness makes those cheaper."""
 
-from __future__ import annotations
-
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import AUTO, method_named

@@ -6,8 +6,6 @@ length. If the first stage of an implicit method is not the rate f at the start 
 first stage with weight zero.
 """
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np
@@ -97,7 +95,7 @@ def error_of(coefficients, s):
 
 
 def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
-    """Matrices T, T^-1, L, T L, P, C, T^-1 A^-1 a0, A^-1 a0 by rows in one flat array, for `irk` and `stage_sweeps`.
+    """Matrices T, T^-1, L, T L, P, C, T^-1 A^-1 a0, A^-1 a0 by rows in one flat array, for `irk` and `irk`.
 
     a : float64[q, q]  coefficients A of the implicit stages; c : their times
     a0 : float64[q]  weights of the explicit first stage in these stages

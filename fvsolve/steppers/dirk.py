@@ -1,27 +1,11 @@
 """One diagonally implicit Runge-Kutta step; simplified Newton solves one stage after another."""
 
-from __future__ import annotations
-
 from math import sqrt
 
 from fvsolve.jit import inline, njit
 from fvsolve.steppers import loop_records as rec
+from fvsolve.steppers import newton as iterations
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
-from fvsolve.steppers.newton import (
-    CONVERGED,
-    FAILED,
-    MOST,
-    begin,
-    book_increment,
-    convergence,
-    evaluate_stage,
-    factor_for,
-    find_worst,
-    renew_at_start,
-    size_of,
-    smoothed_error,
-    solve_stage_from_start,
-)
 from fvsolve.steppers.run_handle import REAL_SOLVE, call_solve, open_run, stage_rates, store_ledger_rates
 from fvsolve.steppers.step_operations import combine, copy, error_norm
 
@@ -54,22 +38,22 @@ def solve_stage(handle, r, t, h_gamma, i):
     The stored stage is exactly f + J d with the last increment d, so it conserves the quantities that f and the
     Jacobian J conserve.
     """
-    d, before, status, shift, ki = r.increment, 0.0, FAILED, 1.0 / h_gamma, r.k[i]
-    for turn in range(MOST):
-        evaluate_stage(handle, r, t, h_gamma, ki, d)
+    d, before, status, shift, ki = r.increment, 0.0, iterations.FAILED, 1.0 / h_gamma, r.k[i]
+    for turn in range(iterations.MOST):
+        iterations.evaluate_stage(handle, r, t, h_gamma, ki, d)
         call_solve(r.calls[REAL_SOLVE], r.structure, r.factors, d)
         for j in range(ki.size):
             ki[j] += shift * d[j]
-        size = sqrt(size_of(d, r.weights) / max(ki.size, 1))
-        done, status = convergence(r, turn, size, before)
+        size = sqrt(iterations.size_of(d, r.weights) / max(ki.size, 1))
+        done, status = iterations.convergence(r, turn, size, before)
         before = size
         if done:
             break
-    if status == FAILED:
-        find_worst(r, d, r.rate)
+    if status == iterations.FAILED:
+        iterations.find_worst(r, d, r.rate)
     elif r.ledger_rates.shape[1] > 0:
         store_ledger_rates(r, i)
-        book_increment(r, d, i)
+        iterations.book_increment(r, d, i)
     return status
 
 
@@ -90,21 +74,21 @@ def try_stages(handle, r, t, h, now):
             store_ledger_rates(r, i)
             continue
         shift = 1.0 / (h * row[i])
-        if factor_for(r, shift) != 0:
-            return FAILED
+        if iterations.factor_for(r, shift) != 0:
+            return iterations.FAILED
         if r.newton[0]["known_steps"] > 0.0:
             predict(b, c, c[i] * h / state["last"], k[0], r.last_stages, ki)
         else:
             copy(k[i - 1], ki)
         status = solve_stage(handle, r, t + c[i] * h, h * row[i], i)
-        if status == FAILED and fresh:
+        if status == iterations.FAILED and fresh:
             if adaptive:
                 for j in range(y.size):
                     ki[j] = shift * (y[j] - base[j])
-            status = solve_stage_from_start(handle, r, t + c[i] * h, h * row[i], i, y)
-        if status == FAILED:
-            return FAILED
-    return CONVERGED
+            status = iterations.solve_stage_from_start(handle, r, t + c[i] * h, h * row[i], i, y)
+        if status == iterations.FAILED:
+            return iterations.FAILED
+    return iterations.CONVERGED
 
 
 @njit
@@ -117,11 +101,11 @@ def attempt(handle, run, t, h, now, new):
     r = open_run(run)
     k, y, state, newton = r.k, r.y[now], r.state[0], r.newton[0]
     s, error = k.shape[0], error_of(r.coefficients, k.shape[0])
-    begin(r, now)
+    iterations.begin(r, now)
     while True:
         if newton["has_jacobian"] == 0.0:
-            renew_at_start(handle, r, t, now)
-        if try_stages(handle, r, t, h, now) == CONVERGED:
+            iterations.renew_at_start(handle, r, t, now)
+        if try_stages(handle, r, t, h, now) == iterations.CONVERGED:
             break
         if newton["jacobian_step"] == state["steps"]:
             return rec.NEWTON_FAILED
@@ -131,5 +115,5 @@ def attempt(handle, run, t, h, now, new):
         return 0.0
     if newton["damped_step"] == state["steps"]:
         shift = 1.0 / (h * row_of(r.coefficients, s, s - 1)[s - 1])
-        return smoothed_error(handle, r, t, h, now, new, error, shift)
+        return iterations.smoothed_error(handle, r, t, h, now, new, error, shift)
     return error_norm(r, h, now, new)

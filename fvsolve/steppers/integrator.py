@@ -1,7 +1,5 @@
 """Arrays and compiled functions of one run of the time loop, for any method and any number of states."""
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Callable
 from operator import attrgetter, is_not

@@ -1,14 +1,19 @@
-"""One fully implicit Runge-Kutta step; simplified Newton solves all stages together.
+"""One fully implicit Runge-Kutta step; simplified Newton solves all stages together, or one by one in sweeps.
+
+Let A = C U be the coefficients of the q implicit stages, C lower triangular and U upper triangular with unit diagonal,
+and K the slopes of the stages. The sweep K <- F(y + h (a_0 k_0 + C K + (A - C) K_before)) is a diagonally implicit
+step, whose stages `newton.damped_newton` solves; a_0 are the weights of the slope k_0 at the start. Stiff components
+converge in q sweeps, as I - U is nilpotent; the error of other components falls by a factor of 4 or more in each sweep
+(van der Houwen and de Swart 1997). Limiters and weno weights can reduce this factor or make sweeps oscillate: then K is
+extrapolated to the point where the last two changes cancel (Anderson 1965, depth one).
 
 Z are the increments of the q implicit stages over the start of the step, and K = (h A)^-1 (Z - h a_0 k_0) their slopes;
 a_0 are the weights of an explicit first stage with slope k_0, h is the step and J the Jacobian. A^-1 = T L T^-1 with L
 block diagonal: a real shift for every real eigenvalue, a complex shift for every complex pair (Butcher 1976; Hairer and
 Wanner 1996, IV.8). With W = T^-1 Z and the rates F of the stages, Newton solves
 (L / h x I - I x J) dW = T^-1 (F - K), block by block (x is the Kronecker product).
-Where a single Jacobian is not sufficient for all stages, `stage_sweeps.py` solves the stages one after another.
+Where a single Jacobian is not sufficient for all stages, `irk.py` solves the stages one after another.
 """
-
-from __future__ import annotations
 
 import functools
 from math import sqrt
@@ -17,24 +22,116 @@ import numpy as np
 
 from fvsolve.jit import inline, njit
 from fvsolve.steppers import loop_records as rec
+from fvsolve.steppers import newton as iterations
 from fvsolve.steppers import run_handle
-from fvsolve.steppers.coefficients import error_of, nodes_of, weights_of
-from fvsolve.steppers.newton import (
-    CONVERGED,
-    FAILED,
-    MOST,
-    begin,
-    book_increment,
-    convergence,
-    find_worst,
-    renew_at_start,
-    smoothed_error,
-    spectral_radius,
-)
+from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.run_handle import open_run, stage_rates, store_ledger_rates
-from fvsolve.steppers.stage_sweeps import sweep
 from fvsolve.steppers.step_operations import combine, copy, error_norm, error_scale
 from fvsolve.steppers.tableau import Method
+
+MOST_SWEEPS = 40
+# Ratio of successive changes above which K is extrapolated; greatest extrapolation, in changes.
+SLOW, GREATEST_EXTRAPOLATION = 0.4, 10.0
+
+
+@inline
+def base_of_stage(r, low, h, i, y):
+    """Compute the state `base` of stage i in a sweep, from the slopes of this sweep and of the last one.
+
+    low : as in `sweep`; y : state at the start of the step
+    """
+    s, k, base, row = r.k.shape[0], r.k, r.base, row_of(r.coefficients, r.k.shape[0], i)
+    first = (i - 1) * (s - 1)
+    for e in range(y.size):
+        base[e] = y[e] + h * row[0] * k[0, e]
+    for j in range(1, s):
+        c_ij, slope, last = low[first + j - 1], k[j], r.transformed[j - 1]
+        lead, lag = h * c_ij if j < i else 0.0, h * (row[j] - c_ij)
+        for e in range(y.size):
+            base[e] += lead * slope[e] + lag * last[e]
+
+
+@inline
+def sweep_once(handle, r, low, t, h, now, turn):
+    """Solve all stages in turn; returns the sum of squares of the changes of the slopes, or -1 if a stage fails.
+
+    turn : number of the sweep, from 0; other arguments as for `sweep`
+    """
+    k, y, base, weights, c = r.k, r.y[now], r.base, r.weights, nodes_of(r.coefficients, r.k.shape[0])
+    s, total = k.shape[0], 0.0
+    for i in range(1, s):
+        copy(k[i], r.transformed[i - 1])
+    for i in range(1, s):
+        own, ki, last = h * low[(i - 1) * s], k[i], r.transformed[i - 1]
+        base_of_stage(r, low, h, i, y)
+        if turn == 0:
+            for e in range(y.size):
+                ki[e] = (y[e] - base[e]) / own
+        if iterations.solve_stage_from_start(handle, r, t + c[i] * h, own, i, y) == iterations.FAILED:
+            return -1.0
+        for e in range(y.size):
+            change = h * (ki[e] - last[e]) * weights[e]
+            total += change * change
+    return total
+
+
+@inline
+def sweep(handle, r, low, t, h, now):
+    """Compute the slopes k of the stages and their ledger rates in sweeps; returns CONVERGED or FAILED.
+
+    low : float64[q q]  lower triangular matrix C by rows, with A = C U, see `coefficients.lower`
+    The rows of `transformed` receive the slopes before a sweep, their changes, and the slopes after it.
+    handle, r : handle of the model, open handle of the run; t, h, now : as for `irk.attempt`
+    """
+    k, s, n = r.k, r.k.shape[0], r.k.shape[1]
+    q = s - 1
+    enough, rounded, floor = iterations.damped_limits(r.control[0])
+    settled = floor if r.control[0]["mode"] == rec.TOLERANCE else rounded
+    before = 0.0
+    for i in range(1, s):
+        if low[(i - 1) * s] == 0.0:
+            return iterations.FAILED
+        copy(k[0], k[i])
+    for turn in range(MOST_SWEEPS):
+        total = sweep_once(handle, r, low, t, h, now, turn)
+        if total == -1.0:
+            return iterations.FAILED
+        size = sqrt(total / max(q * n, 1))
+        slow = turn >= q and size >= 0.5 * before
+        if size <= enough or size <= settled and slow or size <= floor and turn == MOST_SWEEPS - 1:
+            return iterations.CONVERGED
+        extrapolate(r, 1.0 if turn >= q and size > SLOW * before else 0.0)
+        before = size
+    return iterations.FAILED
+
+
+@inline
+def extrapolate(r, weight):
+    """Extrapolate the slopes K after a sweep, and store the change d and the result of this sweep.
+
+    The new slopes are K - weight g (K - K_last), g = <d, d - d_before> / |d - d_before|^2, but g is at least
+    -GREATEST_EXTRAPOLATION.
+    d, d_before : changes in this and in the last sweep; K_last : result of the last sweep before its extrapolation
+    weight : 1 to extrapolate, 0 to store only
+    """
+    k, rows, weights, dot, square = r.k, r.transformed, r.weights, 0.0, 0.0
+    q = k.shape[0] - 1
+    for i in range(q):
+        ki, last, change = k[i + 1], rows[i], rows[q + i]
+        for e in range(weights.size):
+            d = (ki[e] - last[e]) * weights[e]
+            difference = d - change[e] * weights[e]
+            dot += d * difference
+            square += difference * difference
+    g = weight * max(dot / square, -GREATEST_EXTRAPOLATION) if square > 0.0 and square < np.inf else 0.0
+    for i in range(q):
+        ki, last, change, swept = k[i + 1], rows[i], rows[q + i], rows[2 * q + i]
+        for e in range(weights.size):
+            new = ki[e]
+            change[e] = new - last[e]
+            ki[e] = new - g * (new - swept[e])
+            swept[e] = new
+
 
 # Matrices q x q behind the Butcher array (`coefficients.py`), and last T^-1 A^-1 a_0 and A^-1 a_0.
 T, T_INVERSE, BLOCKS, SLOPES, EXTRAPOLATION, CROUT, START = range(7)
@@ -211,22 +308,22 @@ def iterate(handle, r, t, h, now):
     W is stored in `transformed`, in place of its prediction.
     Z : increments of the implicit stages over the start of the step; T : see `coefficients.transformed`
     """
-    rows, f, q, before, status = r.transformed, r.rate, r.k.shape[0] - 1, 0.0, FAILED
-    for turn in range(MOST):
+    rows, f, q, before, status = r.transformed, r.rate, r.k.shape[0] - 1, 0.0, iterations.FAILED
+    for turn in range(iterations.MOST):
         evaluate_stages(handle, r, t, h, now)
         residuals(r, h)
         solve_blocks(r)
         size = add_increments(r)
-        done, status = convergence(r, turn, size, before)
+        done, status = iterations.convergence(r, turn, size, before)
         before = size
         if done:
             break
-    if status == FAILED:
+    if status == iterations.FAILED:
         copy(rows[F * q], f)
         for i in range(1, q):
             for e in range(f.size):
                 f[e] += rows[F * q + i, e]
-        find_worst(r, rows[R * q], f)
+        iterations.find_worst(r, rows[R * q], f)
     return status
 
 
@@ -243,7 +340,7 @@ def try_stages(handle, r, t, h, now):
         count = factor_blocks(r, h)
         state["factorisations"] += 0.0 if known else count
         if count == 0:
-            return FAILED
+            return iterations.FAILED
         newton["shift"] = 1.0 / h
     # high powers of h / h_last extrapolate badly
     if newton["known_steps"] > 0.0 and (q < 5 or h <= 2.0 * state["last"]):
@@ -270,7 +367,7 @@ def finish(r, h):
         blend(-start[q + i], k[0], buffer, i * q, q, W * q, rows, k[i + 1])
         if r.ledger_rates.shape[1] > 0:
             blend(0.0, k[0], matrix(r.coefficients, s, T), i * q, q, R * q, rows, d)
-            book_increment(r, d, i + 1)
+            iterations.book_increment(r, d, i + 1)
 
 
 @inline
@@ -358,7 +455,7 @@ def step_error(handle, r, t, h, now, new, retry):
     collocates = error[0] != 0.0 and matrix(r.coefficients, s, START)[0] == 0.0
     if r.newton[0]["damped_step"] == r.state[0]["steps"]:
         shift = matrix(r.coefficients, s, BLOCKS)[0] / h
-        size = smoothed_error(handle, r, t, h, now, new, error, shift)
+        size = iterations.smoothed_error(handle, r, t, h, now, new, error, shift)
     elif collocates:
         size = filtered_error(handle, r, t, now, new, retry)
     else:
@@ -373,25 +470,25 @@ def attempt(handle, run, t, h, now, new):
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
     The error is 0 unless the step is under error control, and NEWTON_FAILED if Newton with a fresh Jacobian and the
-    sweeps of `stage_sweeps` fail. Arguments as for `erk.attempt`.
+    sweeps of `irk` fail. Arguments as for `erk.attempt`.
     """
     r = open_run(run)
     y, state, newton, s = r.y[now], r.state[0], r.newton[0], r.k.shape[0]
     # a repeated step, or the first after a kink
     retry = newton["stages_step"] == state["steps"] or newton["stages_step"] < 0.0
-    begin(r, now)
+    iterations.begin(r, now)
     while True:
         if newton["has_jacobian"] == 0.0:
-            renew_at_start(handle, r, t, now)
+            iterations.renew_at_start(handle, r, t, now)
             if r.control[0]["watch"] != 0:
-                state["radius"] = spectral_radius(r)
-        if try_stages(handle, r, t, h, now) == CONVERGED:
+                state["radius"] = iterations.spectral_radius(r)
+        if try_stages(handle, r, t, h, now) == iterations.CONVERGED:
             finish(r, h)
             break
         if newton["jacobian_step"] == state["steps"]:
             status = sweep(handle, r, matrix(r.coefficients, s, CROUT), t, h, now)
             newton["shift"] = 0.0  # the factors are those of a stage
-            if status == FAILED:
+            if status == iterations.FAILED:
                 return rec.NEWTON_FAILED
             break
         newton["has_jacobian"] = 0.0

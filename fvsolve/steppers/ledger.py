@@ -62,10 +62,8 @@ def smaller_side(total, r0, r1, m, ledger_rates, dense):
     Arguments as for `amount_and_rate`.
     """
     low, high = 0.0, 1.0
-    at_low, at_high = (
-        amount_and_rate(0.0, total, r0, r1, m, ledger_rates, dense)[1],
-        amount_and_rate(1.0, total, r0, r1, m, ledger_rates, dense)[1],
-    )
+    at_low = amount_and_rate(0.0, total, r0, r1, m, ledger_rates, dense)[1]
+    at_high = amount_and_rate(1.0, total, r0, r1, m, ledger_rates, dense)[1]
     if at_low * at_high >= 0.0:
         return 0.0
     for _ in range(TURNS):

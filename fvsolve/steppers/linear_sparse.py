@@ -5,8 +5,6 @@ once. The array `factors` holds the blocks of L and U by rows, the inverses of t
 block is four numbers, row by row.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.jit import njit

@@ -11,8 +11,6 @@ The functions have these arguments: handle : handle of the model; r : open handl
 a step; now, new : rows of y at its start and its end; i : number of a stage.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 
 import numpy as np

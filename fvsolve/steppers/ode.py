@@ -1,7 +1,5 @@
 """Integration of any y' = f(t, y) by the compiled time loop."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 import itertools

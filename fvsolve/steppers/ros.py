@@ -5,8 +5,6 @@ with the step h, the Jacobian J, the time slope f_t = df/dt and the coefficients
 and Wanner 1996, (IV.7.25)). Stages are stored as k_i = u_i / h.
 """
 
-from __future__ import annotations
-
 from fvsolve.jit import inline, njit
 from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers.coefficients import nodes_of, row_of, weights_of

@@ -12,7 +12,7 @@ from collections import namedtuple
 import numpy as np
 
 from fvsolve.jit import ARRAYS, COMPILING, Intrinsic, njit, plain_kinds
-from fvsolve.kernels.calls import RATES, READS, compile_as
+from fvsolve.kernels.calls import RATES, READS, call_at_address, compile_as
 from fvsolve.kernels.dtypes import RATE_UNWANTED
 from fvsolve.kernels.table_handle import addresses_of, handle_of
 from fvsolve.steppers import loop_records as rec
@@ -96,7 +96,6 @@ def boxed_run(arrays: RunArrays) -> np.ndarray:
 
 
 if COMPILING:
-    from fvsolve.kernels.calls import call
 
     @Intrinsic
     def open_run(typingctx, run):
@@ -104,68 +103,25 @@ if COMPILING:
         from fvsolve.compile.code_generation import Tables, handle_address
 
         return Tables("Run", run_types)(run), handle_address
-
-    @Intrinsic
-    def call_attempt(typingctx, address, handle, run, t, h, now, new):
-        """Call the step of a method at `address`, with arguments as `erk.attempt`."""
-        return call(ATTEMPT, "t")
-
-    @Intrinsic
-    def call_fused_step(typingctx, address, t, h, y, y_new, out, handle, values):
-        """Call the fused step at `address`, see `Integrator.call`."""
-        return call(FUSED_STEP)
-
-    @Intrinsic
-    def call_observer(typingctx, address, t, y, out, handle, values):
-        """Call the function at `address` for the probes of a row or the record of a state, see `Integrator.call`."""
-        return call(OBSERVE)
-
-    @Intrinsic
-    def call_events(typingctx, address, t, y, handle, g):
-        """Call the event functions at `address`, which are written to g."""
-        return call(EVENTS)
-
-    @Intrinsic
-    def call_rhs(typingctx, address, t, y, dydt, out, handle):
-        """Call the right-hand side at `address`."""
-        return call(RHS)
-
-    @Intrinsic
-    def call_factor(typingctx, address, structure, jacobian, shift, factors):
-        """Call the function at `address` that factors shift I - J for a real shift, see `Structure.functions`."""
-        return call(FACTOR, "i")
-
-    @Intrinsic
-    def call_solve(typingctx, address, structure, factors, x):
-        """Call the function at `address` that solves with the factors for a real shift."""
-        return call(SOLVE)
-
-    @Intrinsic
-    def call_factor_complex(typingctx, address, structure, jacobian, shift, factors):
-        """Call the function at `address` that factors shift I - J for a complex shift."""
-        return call(FACTOR_COMPLEX, "i")
-
-    @Intrinsic
-    def call_solve_complex(typingctx, address, structure, factors, x):
-        """Call the function at `address` that solves with the factors for a complex shift."""
-        return call(SOLVE_COMPLEX)
-
-    @Intrinsic
-    def call_join(typingctx, address, sums, row_blocks, handle):
-        """Call the function at `address` that exchanges partial sums between bands."""
-        return call(JOIN)
 else:
 
     def open_run(run):
         """Arrays of a run, given as `RunArrays` or as an array that contains it."""
         return run[0] if isinstance(run, np.ndarray) else run
 
-    def call_attempt(function, *arguments):
-        """Call a function with these arguments."""
-        return function(*arguments)
 
-    call_fused_step = call_observer = call_events = call_rhs = call_join = call_attempt
-    call_factor = call_solve = call_factor_complex = call_solve_complex = call_attempt
+# Calls of the functions at addresses in `calls`.
+call_attempt = call_at_address("call_attempt", ATTEMPT, "t", __name__)  # step of a method, arguments as `erk.attempt`
+call_fused_step = call_at_address("call_fused_step", FUSED_STEP, "", __name__)  # see `Integrator.call`
+call_observer = call_at_address("call_observer", OBSERVE, "", __name__)  # probes of a row or record of a state
+call_events = call_at_address("call_events", EVENTS, "", __name__)  # event functions, which are written to g
+call_rhs = call_at_address("call_rhs", RHS, "", __name__)
+# factors of shift I - J, and solution with them, for a real and a complex shift, see `Structure.functions`
+call_factor = call_at_address("call_factor", FACTOR, "i", __name__)
+call_solve = call_at_address("call_solve", SOLVE, "", __name__)
+call_factor_complex = call_at_address("call_factor_complex", FACTOR_COMPLEX, "i", __name__)
+call_solve_complex = call_at_address("call_solve_complex", SOLVE_COMPLEX, "", __name__)
+call_join = call_at_address("call_join", JOIN, "", __name__)  # exchange of partial sums between bands
 
 
 def addresses(functions: tuple):

@@ -13,8 +13,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.steppers.analysis.trees import Conditions, stage_order
-from fvsolve.steppers.numbers.algebraic import MIXED_ROOTS, Algebraic
-from fvsolve.steppers.numbers.expression import digits, root, value_of
+from fvsolve.steppers.numbers.algebraic import MIXED_ROOTS, Algebraic, digits, root, value_of
 from fvsolve.steppers.numbers.polynomial import collocation, extrapolated
 from fvsolve.units import show
 from fvsolve.validation import COUNT, ROW, TABLE, TEXT, validated

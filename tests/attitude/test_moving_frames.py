@@ -1,7 +1,5 @@
 """Positions, velocities and accelerations of points in moving axes (59) to (68), by differences and by symbols."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

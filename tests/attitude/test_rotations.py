@@ -1,17 +1,19 @@
-"""Rotations compared with SciPy, the matrix exponential and differences."""
-
-from __future__ import annotations
+"""Rotations compared with SciPy, the matrix exponential and differences; steps and probes of attitudes."""
 
 import subprocess
 import sys
+from math import pi
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from reference.scenes import scene
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
+from scipy.special import ellipj
 
 from fvsolve import attitude as at
+from fvsolve import build, integrate, load
 
 STEP = 1e-5
 RANDOM = [*np.random.default_rng(15).uniform(-3.0, 3.0, (20, 3))]
@@ -181,3 +183,149 @@ def test_a_deviation_turns_by_w_less_the_turned_w_d_56_to_58():
 def test_it_wants_no_scipy():
     code = "import sys, fvsolve.parts.attitude_keys; sys.exit('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+INERTIA = np.array([1.0, 2.0, 3.0])
+START = at.euler_parameters(at.of_axis([0.6, 0.8, 0.0], 0.6))
+
+
+def free(t, y):
+    """Rates of Euler parameters, and Euler's equations (68) without torque."""
+    w = y[4:]
+    return np.concatenate([at.euler_parameters_rate(y[:4], w), -np.cross(w, INERTIA * w) / INERTIA])
+
+
+def momentum(y):
+    """Moment of momentum in inertial axes."""
+    return at.of_euler_parameters(y[:4]) @ (INERTIA * y[4:])
+
+
+def test_a_free_top_turns_by_jacobis_functions():
+    """(68) without torque, moments 1, 2, 3: w1 = a cn, w2 = b sn, w3 = c dn (Landau and Lifshitz, Mechanics, 37)."""
+    i1, i2, i3 = INERTIA
+    w1, w3 = 0.3, 1.2  # w2 = 0 at the start
+    energy, square = i1 * w1**2 + i3 * w3**2, (i1 * w1) ** 2 + (i3 * w3) ** 2
+    rate = np.sqrt((i3 - i2) * (square - energy * i1) / (i1 * i2 * i3))
+    share = (i2 - i1) * (energy * i3 - square) / ((i3 - i2) * (square - energy * i1))
+    b = np.sqrt((energy * i3 - square) / (i2 * (i3 - i2)))
+    t = np.linspace(0.0, 20.0, 41)
+    sn, cn, dn, _ = ellipj(rate * t, share)
+    y = integrate(free, [*START, w1, 0.0, w3], t, "verner-7", rtol=1e-11)
+    assert np.abs(y[:, 4:] - np.stack([w1 * cn, b * sn, w3 * dn], axis=1)).max() < 1e-9
+    off = [np.abs(momentum(one) - momentum(y[0])).max() for one in y]
+    assert max(off) < 1e-9  # the attitude is exact as well: this vector is constant
+
+
+def test_a_heavy_symmetric_top_precesses_steadily():
+    """Moments a, a, c, tilt theta, spin n along the axis: (c n - a p cos theta) p = m g l; R = Rz(p t) Rx Rz(s t)."""
+    a, c, tilt, precession, weight = 1.0, 0.4, 0.7, 1.3, 2.0
+    n = (weight / precession + a * precession * np.cos(tilt)) / c
+    own = n - precession * np.cos(tilt)
+    moments = np.array([a, a, c])
+
+    def exact(t):
+        return at.about_z(precession * t) @ at.about_x(tilt) @ at.about_z(own * t)
+
+    def heavy(t, y):
+        up = at.of_euler_parameters(y[:4])[2]
+        torque = weight * np.array([up[1], -up[0], 0.0])
+        rate = (torque - np.cross(y[4:], moments * y[4:])) / moments
+        return np.concatenate([at.euler_parameters_rate(y[:4], y[4:]), rate])
+
+    w = exact(0.0).T @ [0.0, 0.0, precession] + [0.0, 0.0, own]
+    start, errors = np.concatenate([at.euler_parameters(exact(0.0)), w]), []
+    for steps in (100, 200):
+        end = integrate(heavy, start, [0.0, 5.0], "rk4", step=5.0 / steps)[-1]
+        errors.append(np.abs(at.of_euler_parameters(end[:4]) - exact(5.0)).max())
+    assert errors[1] < 1e-4 and errors[0] / errors[1] == pytest.approx(16.0, rel=0.2)
+
+
+def test_gauss_methods_keep_squares_and_rk4_does_not():
+    """|e|^2, energy and the square of the moment of momentum are quadratic in the states."""
+    off = {}
+    for method in ("rk4", "gauss-4"):
+        end = integrate(free, [*START, 0.3, 0.05, 1.2], [0.0, 40.0], method, step=0.1)[-1]
+        begun = np.array([0.3, 0.05, 1.2])
+        pairs = [(end[:4] @ end[:4], 1.0), (end[4:] @ (INERTIA * end[4:]), begun @ (INERTIA * begun))]
+        pairs.append((np.linalg.norm(INERTIA * end[4:]), np.linalg.norm(INERTIA * begun)))
+        off[method] = max(abs(one / other - 1.0) for one, other in pairs)
+    assert off["gauss-4"] < 1e-11 and off["rk4"] > 1e-8
+
+
+def test_angles_lose_their_order_next_to_their_pole_and_euler_parameters_know_none():
+    """A body rolled by delta turns about its y axis, so its pitch passes 90 degrees at a distance of delta."""
+    turn, h, end = np.array([0.0, 1.0, 0.0]), 0.02, 3.0
+
+    def angles(t, y):
+        rotation = at.of_roll_pitch_yaw(*y)
+        return np.linalg.solve(at.jacobian_roll_pitch_yaw(y[1], y[2]), rotation @ turn)
+
+    def errors(delta, h):
+        exact = at.about_x(delta) @ at.about_y(end)
+        e = at.euler_parameters(at.about_x(delta))
+        by_angles = integrate(angles, [delta, 0.0, 0.0], [0.0, end], "rk4", step=h)[-1]
+        by_parameters = integrate(lambda t, y: at.euler_parameters_rate(y, turn), e, [0.0, end], "rk4", step=h)[-1]
+        found = at.of_roll_pitch_yaw(*by_angles), at.of_euler_parameters(by_parameters)
+        return [np.abs(one - exact).max() for one in found]
+
+    (far, whole), (near, same) = errors(0.3, h), errors(0.01, h)
+    assert far < 1e-7 and near > 1e-3 and near > 1e4 * far
+    assert whole == pytest.approx(same, rel=0.1) and same < 1e-9
+    assert errors(0.3, 2 * h)[0] / far > 10.0  # the order remains away from the pole
+
+
+ANGLES, PARAMETERS = ("roll", "pitch", "yaw"), ("eta", "eps_x", "eps_y", "eps_z")
+KINDS = ("free", "fixed", "ball")
+PITCHES = [0.3, -1.2, pi / 2 - 1e-6, pi / 2 - 1e-9, pi / 2 - 1e-14, pi / 2, -pi / 2, -pi / 2 + 1e-10]
+
+
+def said(*attitudes: dict) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Name, angles and Euler parameters that probes of bodies read at the start, for each attitude and joint kind."""
+    bodies = {
+        f"b{k}_{kind}": {
+            "type": "body", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "joint": {"kind": kind, "attitude": given}
+        }
+        for k, given in enumerate(attitudes) for kind in KINDS
+    }  # fmt: skip
+    probes = [f"{name}.{one}" for name in bodies for one in ANGLES + PARAMETERS]
+    model = build(load(scene(bodies, {}, 1.0, {"method": "rk4", "step": 0.1}, probes)))
+    read = model.observe(0.0, model.start).reshape(len(bodies), 7)
+    return [(name, row[:3], row[3:]) for name, row in zip(bodies, read, strict=True)]
+
+
+def test_angles_and_parameters_say_the_rotation_of_the_case():
+    found = said(*({"roll": 0.4, "pitch": pitch, "yaw": 1.1} for pitch in PITCHES))
+    for pitch, (name, angles, e) in zip(np.repeat(PITCHES, len(KINDS)), found, strict=True):
+        wanted = at.of_roll_pitch_yaw(0.4, pitch, 1.1)
+        assert at.of_euler_parameters(e) == pytest.approx(wanted, abs=1e-14), name
+        # within 1e-12 of 90 deg yaw is 0
+        assert at.of_roll_pitch_yaw(*angles) == pytest.approx(wanted, abs=1e-13), name
+        if abs(pitch) < 1.5:
+            assert angles == pytest.approx([0.4, pitch, 1.1], abs=1e-14)
+
+
+def test_at_the_pole_yaw_is_zero_as_the_page_says():
+    for _, angles, _ in said({"roll": 0.4, "pitch": pi / 2, "yaw": 1.1}):
+        assert angles == pytest.approx([0.4 - 1.1, pi / 2, 0.0], abs=1e-12)
+
+
+FORMS = [
+    {"zyz": [0.3, 2.0, -1.0]},
+    {"axis": [0.6, 0.0, 0.8], "angle": 2.5},
+    {"euler_parameters": [0.5, -0.5, 0.5, 0.5]},
+    {"matrix": [[0, 0, 1], [1, 0, 0], [0, 1, 0]]},
+    {"axis": [0, 1, 0], "angle": "180 deg"},
+]
+WANTED = [
+    at.of_zyz(0.3, 2.0, -1.0),
+    at.of_axis([0.6, 0.0, 0.8], 2.5),
+    at.of_euler_parameters([0.5, -0.5, 0.5, 0.5]),
+    np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]]),
+    np.diag([-1.0, 1.0, -1.0]),
+]
+
+
+def test_every_form_of_the_case_is_the_attitude_of_the_run():
+    for (name, angles, e), wanted in zip(said(*FORMS), np.repeat(WANTED, len(KINDS), axis=0), strict=True):
+        assert at.of_euler_parameters(e) == pytest.approx(wanted, abs=1e-14), name
+        assert at.of_roll_pitch_yaw(*angles) == pytest.approx(wanted, abs=1e-14), name

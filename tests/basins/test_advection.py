@@ -1,7 +1,5 @@
 """Advection of scalars over grids: orders, bounds, closed forms, uniform values, conservation and symmetries."""
 
-from __future__ import annotations
-
 import copy
 
 import numpy as np

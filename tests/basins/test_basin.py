@@ -1,12 +1,11 @@
 """Shallow water in basins: dam breaks, a lake at rest, sloshing, symmetry, starts, and coupling to a network."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 from pytest import approx
+from reference.basins import PLANE, assert_equal_files, ended, model_of, run_in_two_parts
 from reference.scenes import AMBIENT, GRAVITY, WATER, junction, lake, pipe, ramp, reservoir, scene, tank, valve
 from scipy.optimize import brentq
 
@@ -14,8 +13,6 @@ import fvsolve
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.studies.accuracy.model_hierarchy import ladder
 from fvsolve.studies.failure_map import failure_map
-
-PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
 
 
 def basin(size, cells, level, **more) -> dict:
@@ -32,8 +29,7 @@ def alone(pool: dict, end: float, **numerics) -> dict:
 
 def depths(case: dict) -> tuple[np.ndarray, np.ndarray]:
     """Return (depth, velocity) of the basin at the end of a case, by rows and columns."""
-    model = fvsolve.build(fvsolve.load(case))
-    state = fvsolve.advance(model, fvsolve.initial_state(model), case["numerics"]["end"])
+    model, state = ended(case, case["numerics"]["end"])
     nx, ny = case["nodes"]["pool"]["cells"]
     found = model.fields(state.y, model.new_out())["pool"]
     return found["depth"].reshape(ny, nx), found["velocity"].reshape(ny, nx, 3)
@@ -73,7 +69,7 @@ def test_a_dam_breaks_as_in_the_exact_solution(low):
 
 def test_a_lake_at_rest_does_not_move_by_one_bit_on_a_bank_and_behind_a_shut_valve():
     case = alone(basin((20.0, 10.0), (40, 20), 1.0, bed="0.13*x + 0.07*y"), 20.0)
-    model = fvsolve.build(fvsolve.load(case))
+    model = model_of(case)
     assert (model.fields(np.zeros(model.y_size), model.new_out())["pool"]["depth"] == 0.0).sum() > 100  # dry bank
     state = fvsolve.advance(model, fvsolve.initial_state(model), 20.0)
     assert not state.y.any()
@@ -87,7 +83,7 @@ def test_small_waves_slosh_at_the_periods_of_long_waves(mode):
     """
     size, lost, late = 10.0, [], []
     for nx in (40 * mode, 80 * mode):
-        model = fvsolve.build(fvsolve.load(alone(basin((size, 2.0), (nx, 2), 1.0), 10.0)))
+        model = model_of(alone(basin((size, 2.0), (nx, 2), 1.0), 10.0))
         x = (np.arange(nx) + 0.5) * size / nx
         state = fvsolve.initial_state(model)
         shape = 1e-5 * np.cos(mode * math.pi * x / size)
@@ -131,8 +127,8 @@ def test_a_dam_over_a_step_of_the_bed_keeps_the_error_that_the_page_tells():
 
 def test_a_mirrored_and_a_turned_basin_have_the_same_bits():
     lying = alone(basin((12.0, 6.0), (24, 12), 1.0, bed="0.1*x"), 1.0)
-    model = fvsolve.build(fvsolve.load(lying))
-    standing = fvsolve.build(fvsolve.load(alone(basin((6.0, 12.0), (12, 24), 1.0, bed="0.1*y"), 1.0)))
+    model = model_of(lying)
+    standing = model_of(alone(basin((6.0, 12.0), (12, 24), 1.0, bed="0.1*y"), 1.0))
     rng = np.random.default_rng(3)
     h, u, v = 0.1 * rng.random((3, 12, 24))
     y = np.concatenate([h.ravel(), u.ravel(), v.ravel()])
@@ -159,9 +155,8 @@ def test_a_deep_and_quiet_basin_drains_as_its_tank_and_as_torricelli():
     twin = fvsolve.run(drained("pool", {"pool": tank(40.0, 2.0)}, 200.0))
     assert found.ok and found["tap.flow"] == approx(twin["tap.flow"], abs=5e-5)  # of 0.075: waves of the start
     assert abs(found.ledger["mass"]["relative"]) < 1e-13
-    level = (
-        math.sqrt(2.0) - 0.012 * math.sqrt(2 * GRAVITY) / 80.0 * 190.0
-    ) ** 2  # the ramp counts for half of its 20 s
+    # the ramp counts for half of its 20 s
+    level = (math.sqrt(2.0) - 0.012 * math.sqrt(2 * GRAVITY) / 80.0 * 190.0) ** 2
     assert twin["tap.flow"][-1] == approx(0.012 * math.sqrt(2 * GRAVITY * level), rel=1e-9)
     assert found["tap.flow"][-1] == approx(twin["tap.flow"][-1], rel=5e-4)
 
@@ -170,8 +165,7 @@ def test_a_patch_that_falls_dry_stops_the_outflow_and_no_depth_falls_below_zero(
     pool = basin((4.0, 2.0), (8, 4), 0.2, patches={"outlet": {"side": "east"}}, elevation=5.0)
     nodes = {"pool": pool, "out": reservoir(AMBIENT) | {"elevation": 0.0}}
     case = scene(nodes, {"tap": valve("pool.outlet", "out", 0.02)}, 60.0, PLANE, ["tap.flow"], 1.0)
-    model = fvsolve.build(fvsolve.load(case))
-    state = fvsolve.advance(model, fvsolve.initial_state(model), 60.0)
+    model, state = ended(case, 60.0)
     depth = model.fields(state.y, model.new_out())["pool"]["depth"]
     assert depth.min() >= 0.0 and depth.max() < 5e-3
     result = fvsolve.run(case)
@@ -214,17 +208,15 @@ def test_what_the_network_gives_a_basin_gets():
     assert h.mean() * 25.0 == approx(0.5 * 25.0 + 0.5, rel=1e-13)
 
 
+def patches(east: dict, **more) -> dict:
+    return {"patches": {"east": {"side": "east"} | east, **more}}
+
+
 FAULTS = {
-    "cut": (
-        {"patches": {"east": {"side": "east", "span": [0.3, 1.4]}}},
-        "not consist of whole faces .*; nearest is 0.5 to 1.5 m",
-    ),
-    "span": (
-        {"patches": {"east": {"side": "east", "span": [1.0, 9.0]}}},
-        "not consist of whole faces of the east side",
-    ),
-    "side": ({"patches": {"east": {"side": "wst"}}}, r'patches.east.side: no side named "wst"; did you mean "west"'),
-    "shared": ({"patches": {"east": {"side": "east"}, "b": {"side": "east", "span": [0.0, 1.0]}}}, 'overlaps "east"'),
+    "cut": (patches({"span": [0.3, 1.4]}), "not consist of whole faces .*; nearest is 0.5 to 1.5 m"),
+    "span": (patches({"span": [1.0, 9.0]}), "not consist of whole faces of the east side"),
+    "side": (patches({"side": "wst"}), r'patches.east.side: no side named "wst"; did you mean "west"'),
+    "shared": (patches({}, b={"side": "east", "span": [0.0, 1.0]}), 'overlaps "east"'),
     "cells": ({"cells": [4.5, 3]}, "not a pair of numbers of cells"),
     "physics": ({"pressure": "1 bar"}, 'is not a key of physics "free-surface"; it belongs to liquid'),
     "needs": ({"physics": "liquid"}, "thickness is missing"),
@@ -256,18 +248,8 @@ def test_what_basins_do_not_go_with_yet_is_said():
 def test_a_run_interrupted_and_resumed_is_the_unbroken_one_frames_too(tmp_path):
     case = alone(basin((40.0, 20.0), (160, 80), 0.2, start={"level": "where(x < 20, 0.2, 0.1)"}), 60.0)
     case["output"] |= {"fields": 12, "every": 1.0}
-    times = []
-
-    def interrupt(t, seconds, steps):
-        times.append(t)
-        if t > 5.0:
-            raise KeyboardInterrupt
-
-    assert not fvsolve.run(case, out=tmp_path / "run", progress=interrupt).ok and 5.0 < times[-1] < 60.0
-    assert fvsolve.run(case, out=tmp_path / "run", resume=True).ok
-    assert fvsolve.run(case, out=tmp_path / "whole").ok
-    for name in ("history.csv", *(f"fields/pool-{k:06d}.vtu" for k in range(13)), "fields.pvd"):
-        assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
+    run_in_two_parts(case, tmp_path, 5.0)
+    assert_equal_files(tmp_path, ["history.csv", *(f"fields/pool-{k:06d}.vtu" for k in range(13)), "fields.pvd"])
 
 
 def test_what_is_wrong_in_a_mesh_file_is_named_by_the_file_and_by_no_key(tmp_path):
@@ -296,7 +278,7 @@ PARABOLOID = "0.1*((x - 1.5)^2 + (y - 1.5)^2)"
 def at_start(level: str, bed: str = PARABOLOID, rest: float = 0.05, cells: int = 24, **more):
     """Return (depths, areas) of a square bowl for a level at the start."""
     pool = basin((3.0, 3.0), (cells, cells), rest, bed=bed, start={"level": level}, **more)
-    model = fvsolve.build(fvsolve.load(alone(pool, 1.0)))
+    model = model_of(alone(pool, 1.0))
     return model.basins[0].fields(model.basins[0].start())["depth"], model.basins[0].mesh.area
 
 
@@ -317,7 +299,7 @@ def test_a_level_that_is_never_below_the_bed_does_as_one_that_runs_on_under_it()
 def test_a_start_at_rest_is_rest_to_the_bit_on_banks_too():
     for level in ("0.05", f"max({PARABOLOID}, 0.05)"):
         pool = basin((3.0, 3.0), (24, 24), 0.05, bed=PARABOLOID, start={"level": level})
-        model = fvsolve.build(fvsolve.load(alone(pool, 1.0)))
+        model = model_of(alone(pool, 1.0))
         assert np.all(model.start == 0.0)
 
 

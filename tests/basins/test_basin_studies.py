@@ -1,19 +1,17 @@
 """Basins in studies: orders, Jacobian patterns and implicit steps, step limits, energy, dispersion, charts."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 from model.test_sparsity import stray
 from pytest import approx
+from reference.basins import PLANE, model_of
 from reference.folders import CASES
 from reference.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.basins.free_surface.lower import FreeSurfaceRows
-from fvsolve.basins.free_surface.lower_notices import on_grid, on_mesh, surface_waves
+from fvsolve.basins.free_surface.lower import FreeSurfaceRows, on_grid, on_mesh, surface_waves
 from fvsolve.errors import FvsolveError
 from fvsolve.model import RunData
 from fvsolve.model.energy_accounts import Accounts
@@ -27,7 +25,6 @@ from fvsolve.studies.peak_error import description
 from fvsolve.studies.resolution import cell_counts, cell_keys_of, project_to, scaled
 from fvsolve.studies.stability.stability import stability
 
-PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
 SLOSH = "1 + 0.05*cos(0.3141592653589793*x) + 0.03*cos(0.6283185307179586*y)"  # in 10 m by 5 m
 
 
@@ -38,10 +35,6 @@ def pool(cells, level: str | None = None, size=(10.0, 5.0), depth: float = 1.0, 
 
 def alone(basin: dict, end: float, **numerics) -> dict:
     return scene({"pool": basin}, {}, end, PLANE | numerics, every=end / 20)
-
-
-def built(case: dict):
-    return fvsolve.build(fvsolve.load(case))
 
 
 # order ----------------------------------------------------------------------------------------------------------
@@ -133,7 +126,7 @@ def fed(scheme: str, end: float = 1.0, **numerics) -> dict:
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
 def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme):
-    model, rng = built(fed(scheme)), np.random.default_rng(1)
+    model, rng = model_of(fed(scheme)), np.random.default_rng(1)
     for t in (0.0, 0.1, 0.9):
         y = model.start + model.scale * rng.normal(scale=0.2, size=model.y_size)
         assert stray(model, t, y) < 1e-9
@@ -144,7 +137,7 @@ def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme):
 def test_a_cell_feels_its_row_and_column_and_no_corner():
     """A row of the pattern has three quantities of five cells for upwind, and of nine for muscl."""
     for scheme, cells in (("upwind", 5), ("muscl", 9)):
-        model = built(alone(pool((7, 7)), 1.0, scheme=scheme))
+        model = model_of(alone(pool((7, 7)), 1.0, scheme=scheme))
         per_row = np.diff(jacobian_pattern(model).tocsr().indptr)
         assert per_row[24] == 3 * cells
 
@@ -155,7 +148,7 @@ def test_implicit_steps_come_to_where_explicit_ones_do(method):
     for name, rtol in ((method, 1e-6), ("dormand-prince", 1e-8)):
         case = fed("muscl", method=name, rtol=rtol, limiter="van-leer")
         del case["numerics"]["courant"]
-        model = built(case)
+        model = model_of(case)
         runs[name] = fvsolve.advance(model, fvsolve.initial_state(model), 1.0).y / model.scale
     assert np.abs(runs[method] - runs["dormand-prince"]).max() < 2e-3
     assert fvsolve.run(case).ledger["mass"]["relative"] < 1e-13
@@ -175,7 +168,7 @@ def test_what_leaves_by_an_open_side_is_in_the_ledger_of_implicit_steps(physics)
     case = alone(pool((12, 8), SLOSH), 3.0) if physics == "free-surface" else block((12, 8), 1e-3)
     (basin,) = case["nodes"].values()
     basin["patches"] = {"east": {"side": "east", "boundary": "open"}}
-    model = built(case)
+    model = model_of(case)
     assert (
         stray(model, 0.0, model.start + 0.05 * model.scale * np.random.default_rng(0).normal(size=model.y_size)) < 1e-9
     )
@@ -281,7 +274,7 @@ def test_what_passes_a_patch_is_no_loss_of_the_scheme(head):
         basin = pool((6, 4), patches={"west": {"side": "west"}}, elevation=0.0, bed="0.1*x")
         nodes = {"pool": basin, "lake": {"type": "reservoir", "head": head, "elevation": 0.0}}
         links = {"tap": valve("pool.west", "lake", 0.2) | {"opening": opening}}
-        model = built(scene(nodes, links, 1.0, PLANE, ["tap.flow"]))
+        model = model_of(scene(nodes, links, 1.0, PLANE, ["tap.flow"]))
         y = model.scale * np.random.default_rng(5).normal(scale=0.5, size=model.y_size)
         accounts = Accounts(RunData(model))
         power = accounts.power_at(0.5, y, np.zeros(model.y_size), model.new_out())
@@ -307,7 +300,7 @@ def test_a_slosh_is_warned_of_where_it_is_short_against_its_depth(more):
     k = math.pi / 10.0
     for depth in (0.5, 1.8):
         basin = pool((32, 8), f"{depth} + 0.01*cos({k!r}*x)", depth=depth, **more)
-        said = [one for one in built(alone(basin, 1.0)).warnings if "slower" in one.text]
+        said = [one for one in model_of(alone(basin, 1.0)).warnings if "slower" in one.text]
         assert len(said) == (1 if depth > 1.0 else 0)
     assert f"waves about 20 m long in 1.8 m of water (k h = 0.57): real waves are {slower(k, 1.8):.2g} %" in (
         said[0].text
@@ -318,12 +311,12 @@ def test_wavenumbers_are_those_of_the_waves_that_there_are():
     """Exact by cosines, of second order by faces; a dam break in a basin of length L has k = sqrt(12) / L."""
     k = math.hypot(2.0 * math.pi / 10.0, math.pi / 5.0)
     level = f"1 + 0.01*cos({2.0 * math.pi / 10.0!r}*x)*cos({math.pi / 5.0!r}*y)"
-    model = built(alone(pool((32, 16), level), 1.0))
+    model = model_of(alone(pool((32, 16), level), 1.0))
     (basin,), y = model.basins, model.start
     assert surface_waves(basin, basin.deviations(y)).k == approx(k, rel=1e-12)
     surface = basin.deviations(y)[0]
     assert on_mesh(basin, surface) == approx(on_grid(basin, surface), rel=2.0 * (k * 10.0 / 32.0) ** 2 / 12.0)
-    dam = built(alone(pool((64, 4), "where(x < 5, 1, 0.4)"), 1.0))
+    dam = model_of(alone(pool((64, 4), "where(x < 5, 1, 0.4)"), 1.0))
     assert surface_waves(dam.basins[0], dam.basins[0].deviations(dam.start)).k == approx(
         math.sqrt(12.0) / 10.0, rel=1e-3
     )
@@ -337,7 +330,7 @@ def test_waves_that_come_about_in_a_run_are_warned_of_once(tmp_path):
     }
     case = scene(nodes, {"tap": valve("lake", "pool.in", 0.3, ramp(0.0, 0.2, 0.0, 1.0))}, 3.0, PLANE, ["tap.flow"], 0.1)
     case["output"]["fields"] = 4
-    assert not built(case).warnings
+    assert not model_of(case).warnings
     said = [one["text"] for one in fvsolve.run(case).summary["warnings"] if one["kind"] == "dispersion"]
     assert len(said) == 1 and said[0].startswith("pool: waves about") and " s" in said[0].rsplit("at", 1)[1]
 
@@ -399,7 +392,7 @@ def test_a_dye_in_a_vortex_that_turns_back_keeps_its_bounds_and_shows_its_order(
     found = order(swirl(), levels=4, cells=32)
     assert found.fits["sheet at the end: dye"]["L1"].order == approx(2.1, abs=0.3)
     for cells in (32, 64):
-        model = built(swirl() | {"nodes": {"sheet": swirl()["nodes"]["sheet"] | {"cells": [cells, cells]}}})
+        model = model_of(swirl() | {"nodes": {"sheet": swirl()["nodes"]["sheet"] | {"cells": [cells, cells]}}})
         basin, start = model.basins[0], model.start
         y = fvsolve.advance(model, fvsolve.initial_state(model), 1.5).y
         assert basin.amounts(y).max() <= basin.amounts(start).max() and basin.amounts(y).min() >= 0.0

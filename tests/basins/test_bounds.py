@@ -1,10 +1,9 @@
 """Bounds of scalars in basins: kept by default in steps, rows and frames; a notice where a choice breaks them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from basins.test_faces import triangles
+from reference.basins import model_of
 from reference.scenes import pipe, reservoir, scene
 
 import fvsolve
@@ -35,7 +34,7 @@ def rows(case: dict, probes=PROBES) -> np.ndarray:
 
 
 def notices(case: dict) -> list:
-    return [one for one in fvsolve.build(fvsolve.load(case)).warnings if one.kind == "bounds"]
+    return [one for one in model_of(case).warnings if one.kind == "bounds"]
 
 
 SHAPES = ("triangles", "quadrilaterals", "rectangle")
@@ -50,7 +49,7 @@ WAYS = {  # numerics without a notice of bounds
 @pytest.mark.parametrize("way", WAYS)
 def test_what_no_notice_warns_of_stays_in_its_bounds(way, shape, tmp_path):
     case = swirled(shaped(tmp_path, shape), WAYS[way])
-    found, model = rows(case), fvsolve.build(fvsolve.load(case))
+    found, model = rows(case), model_of(case)
     assert notices(case) == []
     assert found.min() > -ROUND and found.max() < 1.0 + ROUND
     state = fvsolve.initial_state(model)

@@ -1,7 +1,5 @@
 """Kernels on meshes: orders on distorted triangles, lakes at rest, conservation, reflection and bounds."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -20,7 +18,7 @@ from fvsolve.basins.free_surface.surface_rates import water_mesh_rates
 from fvsolve.basins.liquid import liquid_mesh
 from fvsolve.basins.liquid.liquid_rates import mesh_rates
 from fvsolve.basins.liquid.liquid_sides import LiquidScheme
-from fvsolve.basins.lower_mesh import lower_mesh
+from fvsolve.basins.lower_motion import lower_mesh
 from fvsolve.basins.mesh_blocks import work_size
 from fvsolve.kernels.dtypes import LAW_LINEAR, LAW_LOG, MUSCL, UPWIND
 from fvsolve.mesh import Mesh, read, rectangle
@@ -223,10 +221,8 @@ def test_a_vortex_stands_over_a_hill_with_the_order_of_its_scheme(tmp_path, sche
 @pytest.mark.parametrize(("scheme", "angle"), [(UPWIND, 0.7), (MUSCL, 0.5 * math.pi)], ids=["upwind", "muscl"])
 def test_a_turned_mesh_gives_turned_rates(tmp_path, scheme, angle):
     """The rotation for muscl is a right angle, because slopes of both components are limited separately."""
-    rng, turn = (
-        np.random.default_rng(4),
-        np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]),
-    )
+    rng = np.random.default_rng(4)
+    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     fields = [triangles(tmp_path, 10, 8, angle=a) for a in (0.0, angle)]
     assert np.array_equal(fields[0].mesh.cells, fields[1].mesh.cells)  # same numbering
     n = len(fields[0].area)

@@ -1,12 +1,11 @@
 """Films of water on rough beds with the steps of waves: Manning's and Darcy's law, backwater, lakes, notices."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 from pytest import approx
+from reference.basins import ended, halved, model_of
 from reference.meshes import write
 from reference.scenes import GRAVITY as G
 from reference.scenes import reservoir, scene
@@ -69,11 +68,8 @@ def test_films_run_as_darcy_says():
 
 
 def test_films_run_as_manning_says_on_triangles_and_down_a_diagonal(tmp_path):
-    nx, ny, size = 30, 30, 2.0
-    points = np.array([[size * i, size * j] for j in range(ny + 1) for i in range(nx + 1)])
-    corners = [[j * (nx + 1) + i + k for k in (0, 1, nx + 2, nx + 1)] for j in range(ny) for i in range(nx)]
-    cells = [half for p, q, r, s in corners for half in ([p, q, r], [p, r, s])]
-    right, bed = manning(0.05, 0.1, 0.005), f"0.05*({nx * size}-(x + y)/sqrt(2))"
+    points, cells, _ = halved((60.0, 60.0), (30, 30))
+    right, bed = manning(0.05, 0.1, 0.005), "0.05*(60.0-(x + y)/sqrt(2))"
     hill = {"type": "basin", "mesh": {"file": str(write(tmp_path / "hill.vtk", points, cells))}, "level": -9.0,
             "elevation": 0.0, "bed": bed, "manning": 0.1, "start": {"level": f"{bed} + 0.005"}}  # fmt: skip
     found = fvsolve.run(
@@ -146,9 +142,9 @@ def test_backwater_is_of_second_order():
     assert math.log2(errors[0] / errors[1]) > 1.7 and errors[1] < 3e-5
 
 
-def ended(basin, end):
+def both_ends(basin, end):
     """Return the states of a basin at the start and at the end."""
-    model = fvsolve.build(fvsolve.load(scene({"box": basin}, {}, end, {"scheme": "muscl"})))
+    model = model_of(scene({"box": basin}, {}, end, {"scheme": "muscl"}))
     start = fvsolve.initial_state(model)
     return start.y.copy(), fvsolve.advance(model, start, end).y
 
@@ -156,14 +152,14 @@ def ended(basin, end):
 def test_a_lake_with_islands_and_friction_lies_still():
     lake = {"type": "basin", "size": [10.0, 8.0], "cells": [40, 30], "level": 0.0, "manning": 0.1,
             "bed": "0.5*sin(3*x)*cos(2*y) - 0.3"}  # fmt: skip
-    for y in ended(lake, 5.0):
+    for y in both_ends(lake, 5.0):
         assert not y.any()
 
 
 def test_water_that_breaks_over_a_rough_dry_slope_is_all_there():
     box = {"type": "basin", "size": [60.0, 6.0], "cells": [60, 6], "level": -1.0, "elevation": 0.0, "manning": 0.05,
            "bed": "0.02*(60-x)", "start": {"level": "where(x < 15, 2, -1)"}}  # fmt: skip
-    before, after = ended(box, 60.0)
+    before, after = both_ends(box, 60.0)
     assert after[:360].min() >= 0.0 and after[:360].sum() == approx(before[:360].sum(), rel=1e-13)
     assert after[:360].reshape(6, 60)[:, -1].min() > 0.1
 
@@ -178,14 +174,8 @@ def test_upwind_says_by_how_much_films_are_too_slow():
 
 
 def test_upwind_says_nothing_of_a_lake_and_its_shore():
-    lake = {
-        "type": "basin",
-        "size": [20.0, 2.0],
-        "cells": [20, 2],
-        "level": 0.0,
-        "bed": "0.3*(x - 10.2)",
-        "manning": 0.1,
-    }
+    shape = {"size": [20.0, 2.0], "cells": [20, 2], "bed": "0.3*(x - 10.2)"}
+    lake = {"type": "basin", "level": 0.0, "manning": 0.1, **shape}
     assert "film" not in kinds(fvsolve.run(scene({"lake": lake}, {}, 1.0, {"scheme": "upwind"}, every=0.5)))
 
 
@@ -210,22 +200,16 @@ PLATE = {"type": "body", "mass": 1e3, "inertia": [1e3, 1e3, 1e3]}
 
 
 def slid(joint):
-    return {
-        "plate": {**PLATE, "joint": {"kind": "prismatic", "axis": [1, 0, 0], **joint}},
-        "b": {**THIN, "on": "plate"},
-    }
+    plate = {**PLATE, "joint": {"kind": "prismatic", "axis": [1, 0, 0], **joint}}
+    return {"plate": plate, "b": {**THIN, "on": "plate"}}
 
 
 def between_walls(tmp_path, kind):
     """Return nodes with a film that a moving wall compresses, on a rectangle or on triangles."""
     if kind == "wall":
         return {"b": {**THIN, "patches": {"lid": {"side": "east", "travel": SLOWLY}}}}
-    nx, ny = 20, 2
-    points = np.array([[0.1 * i, 0.5 * j] for j in range(ny + 1) for i in range(nx + 1)])
-    corners = [[j * (nx + 1) + i + k for k in (0, 1, nx + 2, nx + 1)] for j in range(ny) for i in range(nx)]
-    east = np.array([[j * (nx + 1) + nx, (j + 1) * (nx + 1) + nx] for j in range(ny)])
-    file = write(tmp_path / "film.msh", points, [half for p, q, r, s in corners for half in ([p, q, r], [p, r, s])],
-                 {"lid": east})  # fmt: skip
+    points, cells, sides = halved((2.0, 1.0), (20, 2))
+    file = write(tmp_path / "film.msh", points, cells, {"lid": sides["east"]})
     rest = {key: one for key, one in THIN.items() if key not in ("size", "cells")}
     return {"b": {**rest, "mesh": {"file": str(file)}, "patches": {"lid": {"travel": SLOWLY}}}}
 
@@ -234,8 +218,7 @@ def between_walls(tmp_path, kind):
 def test_films_that_move_go_as_an_implicit_method_has_them(tmp_path, kind):
     nodes, found = slid({"travel": SHAKEN}) if kind == "body" else between_walls(tmp_path, kind), []
     for numerics in ({"method": "ssp-rk2", "courant": 0.5}, {"method": "rodas-5p", "rtol": 1e-6}):
-        model = fvsolve.build(fvsolve.load(scene(nodes, {}, 0.8, {"scheme": "muscl", **numerics})))
-        state = fvsolve.advance(model, fvsolve.initial_state(model), 0.8)
+        model, state = ended(scene(nodes, {}, 0.8, {"scheme": "muscl", **numerics}), 0.8)
         found.append(model.basins[0].deviations(state.y)[1])
     size = np.abs(found[1]).max()
     assert size > 1e-4 and np.abs(found[0] - found[1]).max() < 0.02 * size

@@ -1,27 +1,20 @@
-"""Basins on driven bodies: water at rest in rotating, decelerated or tilted boxes, forced waves, a bowl, faults."""
-
-from __future__ import annotations
+"""Basins on driven bodies: water at rest in rotating, decelerated or tilted boxes, forced waves, moments, faults."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from reference.basins import HEAVY, ended, model_of, sliding, slowing, straight, turning
 from reference.scenes import GRAVITY, scene
 
-from fvsolve import advance, build, load, run
+from fvsolve import advance, load, run
+from fvsolve.basins import frame_forces
+from fvsolve.basins.basin_frames import CELL_POSITIONS, REST_LEVEL, REST_SURFACE
 from fvsolve.errors import CaseError
 from fvsolve.model.model import State
 
-HEAVY = {"type": "body", "mass": 10.0, "inertia": [1.0, 1.0, 1.0]}
 METHODS = ("ssp-rk3", "gauss-4", "rodas-4")
-
-
-def turning(angle, axis=(0, 0, 1), **more):
-    return {**HEAVY, "joint": {"kind": "revolute", "axis": list(axis), "angle": angle, **more}}
-
-
-def sliding(travel, axis=(1, 0, 0), **more):
-    return {**HEAVY, "joint": {"kind": "prismatic", "axis": list(axis), "travel": travel, **more}}
 
 
 def tank(cells=(20, 20), size=(2.0, 2.0), level=0.3, on="body", **more):
@@ -30,13 +23,8 @@ def tank(cells=(20, 20), size=(2.0, 2.0), level=0.3, on="body", **more):
 
 def moved(body, basin, until, numerics=None, **nodes):
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5, **(numerics or {})}
-    model = build(load(scene({"body": body, "b": basin, **nodes}, {}, until, numerics)))
-    state = advance(model, State(0.0, model.start.copy()), until)
+    model, state = ended(scene({"body": body, "b": basin, **nodes}, {}, until, numerics), until)
     return model, state, model.basins[0].deviations(state.y)
-
-
-def steady(rate, span=100.0):
-    return {"time": [0.0, span], "value": [0.0, rate * span]}
 
 
 # water at rest ----------
@@ -49,8 +37,7 @@ def test_water_that_turns_with_its_box_rests_as_a_paraboloid_wherever_the_axis_i
     bowl = f"0.3 + {rate**2 / (2 * GRAVITY)} * ((x - {cx})**2 + (y - {cy})**2)"
     basin = tank((10, 10), at=[-cx, -cy, 0.0], start={"level": bowl})
     case = {"scheme": "muscl", "method": method, **({"courant": 0.5} if method == "ssp-rk3" else {"step": 0.05})}
-    model = build(load(scene({"body": turning(steady(rate), axis), "b": basin}, {}, 1.0, case)))
-    state = advance(model, State(0.0, model.start.copy()), 1.0)
+    model, state = ended(scene({"body": turning(straight(rate, 100.0), axis), "b": basin}, {}, 1.0, case), 1.0)
     found = model.basins[0].deviations(state.y)
     assert np.abs(found[1:]).max() < (1e-13 if method == "ssp-rk3" else 1e-10)
     assert found[0] == pytest.approx(model.basins[0].deviations(model.start)[0], abs=1e-10)
@@ -62,13 +49,13 @@ def test_a_box_that_turns_so_fast_that_its_middle_is_dry_rests_too():
     flows = []
     for n in (20, 40):  # cells at the curved shore adjust
         basin = tank((n, n), at=[-1, -1, 0], start={"level": bowl})
-        flows.append(np.abs(moved(turning(steady(rate)), basin, 1.0)[2][1:]).mean())
+        flows.append(np.abs(moved(turning(straight(rate, 100.0)), basin, 1.0)[2][1:]).mean())
     assert flows[1] < 0.5 * flows[0] < 1e-3
 
 
 def test_a_box_that_slows_down_steadily_holds_its_water_aslant_and_a_tilted_one_level():
-    slows = 2.0 * 10.0 / 10.0**2  # x = 10 (1 - (1 - t / 10)^2)
-    travel = {"start": 0.0, "duration": 10.0, "value": [0.0, 10.0], "exponent": 2}
+    slows = 0.2  # x = 10 (1 - (1 - t / 10)^2)
+    travel = slowing(slows)
     slope = slows / GRAVITY
     _, _, found = moved(sliding(travel), tank(start={"level": f"0.3 + {slope} * (x - 1)"}), 2.0)
     assert np.abs(found[1:]).max() < 1e-13
@@ -119,7 +106,7 @@ def test_a_box_that_swings_a_little_has_the_waves_of_the_closed_form(way):
         cells, size = ((n, 2), (length, 1.0)) if along == "x" else ((2, n), (1.0, length))
         numerics = {"scheme": "upwind5", "method": "rk4", "step": 0.2 * length / n}
         case = scene({"body": body, "b": tank(cells, size, **more)}, {}, 1.0, numerics)
-        model = build(load(case))
+        model = model_of(case)
         found = model.basins[0].deviations(advance(model, State(0.0, model.start.copy()), 1.0).y)
         x = model.basins[0].mesh.centre[:, 0 if along == "x" else 1]
         wanted = 0.3 * forced(x, length, w, push) * math.cos(w)
@@ -163,9 +150,8 @@ def test_thackers_bowl_seen_from_axes_that_swing_is_the_bowl_that_stands_still()
 
 
 def test_a_tank_that_falls_freely_ends_the_run_by_name():
-    travel = {"start": 0.0, "duration": 10.0, "value": [0.0, 600.0], "exponent": 2}  # upward, slowing by 12 m/s2
-    basin = tank((4, 4))
-    case = scene({"body": sliding(travel, (0, 0, 1)), "b": basin}, {}, 1.0, {"scheme": "upwind"}, every=0.1)
+    rises = sliding(slowing(12.0), (0, 0, 1))
+    case = scene({"body": rises, "b": tank((4, 4))}, {}, 1.0, {"scheme": "upwind"}, every=0.1)
     result = run(case)
     assert not result.ok and "the water in b has no weight left" in result.reason
 
@@ -177,13 +163,11 @@ FAULTS = {
     "expected a body: body; did you mean": ({}, {"on": "bdy"}),
     "give the body as `on = BODY`": ({}, {"on": None, "at": [0, 0, 1]}),
     "and the reaction to outflow is not modelled": (
-        {"joint": {"kind": "revolute", "axis": [0, 0, 1]}},
-        {"patches": {"gap": {"side": "east", "boundary": "open"}}},
-    ),
+        {"joint": {"kind": "revolute", "axis": [0, 0, 1]}}, {"patches": {"gap": {"side": "east", "boundary": "open"}}}),
     "cannot be on a body; expected": ({}, {"physics": "transport", "level": None, "velocity": {"u": 0.0, "v": 0.0}}),
     "a basin on a body cannot have moving walls": ({}, {"patches": {"lid": {"side": "east", "travel": 0.1}}}),
     "unknown key": ({}, {"attitude": {"rol": 0.1}}),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("text", FAULTS)
@@ -191,4 +175,42 @@ def test_what_cannot_ride_is_refused_by_name(text):
     body, keys = FAULTS[text]
     basin = {key: value for key, value in {**tank(), **keys}.items() if value is not None}
     with pytest.raises(CaseError, match=text):
-        load(scene({"body": {**turning(steady(1.0)), **body}, "b": basin}, {}, 1.0, {}))
+        load(scene({"body": {**turning(straight(1.0, 100.0)), **body}, "b": basin}, {}, 1.0, {}))
+
+
+WIDE, LONG, DENSITY, THICKNESS, LEVEL = 4, 3, 998.0, 0.7, 0.25
+N = WIDE * LONG
+
+
+@pytest.mark.parametrize("deep", [True, False])
+@pytest.mark.parametrize("grid", [True, False])
+def test_moments_are_sums_over_cells(monkeypatch, deep, grid):
+    """deep : water with a free surface, else a liquid of constant thickness; grid : rows of cells, else any mesh"""
+    for name in ("mass_factor", "row_sums"):
+        monkeypatch.setattr(frame_forces, name, getattr(frame_forces, name).py_func)
+    random = np.random.default_rng(8)
+    columns, lines = random.normal(0.0, 2.0, WIDE), random.normal(0.0, 2.0, LONG)
+    x, y = np.tile(columns, LONG), np.repeat(lines, WIDE)
+    area, rest, surface = random.uniform(0.5, 2.0, (3, N))
+    h, qx, qy, dh, dx, dy = random.normal(0.0, 0.1, (6, N))
+    places = np.concatenate([columns, lines] if grid else [x, y])
+    frame = np.zeros(1 + max(CELL_POSITIONS, REST_LEVEL, REST_SURFACE))
+    frame[REST_LEVEL] = LEVEL
+    start = frame.size + places.size
+    frame[CELL_POSITIONS], frame[REST_SURFACE] = frame.size, start + 2 * N
+    basin = {"n": N, "y": 0, "frame": 0, "deep": int(deep), "thickness": THICKNESS, "area": start, "plan": start + N,
+             "nx": WIDE if grid else 0, "ny": LONG if grid else 0}  # fmt: skip
+    tables = SimpleNamespace(plane=np.concatenate([frame, places, area, rest, surface]), settings=[{"rho": DENSITY}])
+    found = frame_forces.mass_moments.py_func(
+        tables, basin, np.concatenate([h, qx, qy]), np.concatenate([dh, dx, dy]), 0, 0.0, 0.0, 0.0
+    )
+
+    per = (DENSITY if deep else THICKNESS) * area
+    mass, rate = per * (rest + h), per * dh
+    height = surface - rest + LEVEL + 0.5 * (rest + h) if deep else 0.0 * x
+    wanted = [
+        *(np.sum(mass * one) for one in (np.ones(N), x, y, x * x, x * y, y * y, height)),
+        *(np.sum(rate * one) for one in (x, y, x * x, x * y, y * y)),
+        *(np.sum(per * one) for one in (qx, qy, x * qy - y * qx, dx, dy, x * dy - y * dx)),
+    ]
+    assert found == pytest.approx(wanted, rel=1e-12)

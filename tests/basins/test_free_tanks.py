@@ -1,15 +1,14 @@
 """Water that moves its body: heave, sway and roll on springs in closed form, momentum, energy, frozen water."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
+from reference.basins import cart, model_of
 from reference.scenes import GRAVITY, RHO, scene
 from scipy.optimize import brentq
 
-from fvsolve import advance, build, load, run
+from fvsolve import advance, run
 from fvsolve.model.model import State
 from fvsolve.studies.energy_balance import energy
 
@@ -19,13 +18,6 @@ LENGTH, DEPTH = 2.0, 0.1
 def tank(n=20, along="x", level=DEPTH, **more):
     cells, size = ((n, 1), (LENGTH, 1.0)) if along == "x" else ((1, n), (1.0, LENGTH))
     return {"type": "basin", "on": "cart", "size": list(size), "cells": list(cells), "level": level, **more}
-
-
-def cart(mass=100.0, axis=(1, 0, 0), **more):
-    return {
-        "type": "body", "mass": mass, "inertia": [50.0, 50.0, 50.0],
-        "joint": {"kind": "prismatic", "axis": list(axis), **more},
-    }  # fmt: skip
 
 
 def sprung(basin, body, stiffness, end, numerics, probes, toward=(5.0, 0, 0), **spring):
@@ -84,7 +76,7 @@ def test_a_free_tank_on_rails_keeps_its_momentum():
     basin = tank(30, start={"level": f"{DEPTH} + 0.03 * cos(1.5 * x)"})
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5}
     case = scene({"cart": cart(50.0, rate=0.3), "b": basin}, {}, 2.0, numerics)
-    model = build(load(case))
+    model = model_of(case)
     basin, at = model.basins[0], model.state_names.index("cart.travel_rate")
 
     def momentum(y):

@@ -1,6 +1,4 @@
-"""Kernels of pressure waves in a liquid: modes of a box, reflecting sides, a vortex, exact Riemann problems."""
-
-from __future__ import annotations
+"""Kernels of pressure waves in a liquid: modes of a box, sides that reflect or move, vortices, Riemann problems."""
 
 import itertools
 import math
@@ -9,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 from pytest import approx
+from reference.basins import model_of
 from reference.log_law import LogFluid, Riemann, SimpleWave
 from reference.orders import mean_error, observed_order
 from reference.scenes import NO_FRICTION, junction, reservoir, scene, stiff_pipe
@@ -17,8 +16,10 @@ from scipy.interpolate import CubicSpline
 from scipy.special import j0
 
 import fvsolve
+from fvsolve.basins.cell_sides import BLOCK, MEASURES, NX, NY, REACH
 from fvsolve.basins.liquid import liquid_grid
 from fvsolve.basins.liquid.grid_nonlinear import log1p_vector
+from fvsolve.basins.liquid.liquid_mesh import ROWS, add_side_linear, add_side_linear_moving
 from fvsolve.basins.liquid.liquid_sides import LiquidGrid, LiquidScheme, side_kinds, work_size
 from fvsolve.kernels.dtypes import LINEAR, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
 
@@ -152,7 +153,7 @@ def test_a_row_of_cells_is_a_pipe(scheme):
     nodes = {"left": reservoir(101325.0), "right": junction()}
     links = {"main": stiff_pipe("left", "right", length, diameter, n, friction=NO_FRICTION)}
     case = scene(nodes, links, 10.0, numerics, ["right.pressure"], 0.1, fluid=fluid | {"law": "linear"})
-    model = fvsolve.build(fvsolve.load(case))
+    model = model_of(case)
     box = Box(n, 1, scheme, (length, 1.0), reflect=np.array([-1.0] + [1.0] * (1 + 2 * n)))
 
     def of_waves(y):
@@ -423,3 +424,46 @@ def test_a_simple_wave_steepens_as_the_exact_one(size, scheme):
     wanted = ORDERS[scheme] if size < 0.1 else min(ORDERS[scheme], 2)
     sizes, end = ((100, 200), 3.0) if wanted == 5 else ((800, 1600), 0.3 if scheme == "upwind" else 3.0)
     assert order(Box(4, 1, scheme, (100.0, 1.0), log=True), exact, end, sizes) == approx(wanted, abs=0.3)
+
+
+SOUND, DENSITY = 1200.0, 998.0
+RATE_MASS, RATE_X, RATE_Y = (slice(k * BLOCK, (k + 1) * BLOCK) for k in (3, 4, 5))  # rows of the scratch of a block
+
+
+def block(random) -> tuple[np.ndarray, ...]:
+    """Directions, reach, deviation of pressure over wave speed, and both flows of the cells of a block."""
+    angle = random.uniform(0.0, 2.0 * np.pi, BLOCK)
+    return np.cos(angle), np.sin(angle), random.uniform(0.5, 2.0, BLOCK), *random.normal(0.0, 50.0, (3, BLOCK))
+
+
+def measures(nx, ny, reach) -> np.ndarray:
+    geometry = np.zeros(MEASURES * BLOCK)
+    for k, values in ((NX, nx), (NY, ny), (REACH, reach)):
+        geometry[k * BLOCK : (k + 1) * BLOCK] = values
+    return geometry
+
+
+def test_a_uniform_liquid_passes_a_moving_side_by_its_flux_less_what_the_side_sweeps():
+    """Flux of mass m - speed rho, and of momentum p n - speed (mx, my), with p = c^2 (rho - rho_0) and m along n."""
+    random = np.random.default_rng(3)
+    nx, ny, reach, w, mx, my = block(random)
+    speed, scratch = random.uniform(-3.0, 3.0, BLOCK), np.zeros(ROWS * BLOCK)
+    scratch[: 3 * BLOCK] = np.concatenate([w, mx, my])
+    add_side_linear_moving.py_func(SOUND, DENSITY, w, mx, my, measures(nx, ny, reach), scratch, speed)
+    mass = mx * nx + my * ny - speed * (DENSITY + w / SOUND)
+    pressure = SOUND * w
+    assert scratch[RATE_MASS] == pytest.approx(-reach * mass, rel=1e-12)
+    assert scratch[RATE_X] == pytest.approx(-reach * (pressure * nx - speed * mx), rel=1e-10)
+    assert scratch[RATE_Y] == pytest.approx(-reach * (pressure * ny - speed * my), rel=1e-10)
+
+
+def test_a_moving_side_of_no_speed_is_a_fixed_side():
+    random = np.random.default_rng(4)
+    nx, ny, reach, *inside = block(random)
+    beyond, found = random.normal(0.0, 50.0, 3 * BLOCK), []
+    for add, own, more in ((add_side_linear, (), ()), (add_side_linear_moving, (DENSITY,), (np.zeros(BLOCK),))):
+        scratch = np.zeros(ROWS * BLOCK)
+        scratch[: 3 * BLOCK] = beyond
+        add.py_func(SOUND, *own, *inside, measures(nx, ny, reach), scratch, *more)
+        found.append(np.concatenate([scratch[rows] for rows in (RATE_MASS, RATE_X, RATE_Y)]))
+    assert found[1] == pytest.approx(found[0], rel=1e-12)

@@ -1,19 +1,18 @@
 """Liquid basins under the law `table`: against CoolProp's isentrope, pipes under this law, and the law `log`."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from basins import test_faces
 from basins.test_liquid import RHO, SCHEMES, Box, C, noise
 from pytest import approx
+from reference.basins import model_of, on_sides
 from reference.isentrope import Isentrope, Riemann
 from reference.meshes import boundary, triangles, write
 from reference.scenes import NO_FRICTION, junction, ramp, reservoir, scene, stiff_pipe, valve
 
 import fvsolve
 from fvsolve.basins.liquid import riemann_invariants
-from fvsolve.basins.liquid.lower_invariants import RiemannInvariants
+from fvsolve.basins.liquid.lower import RiemannInvariants
 from fvsolve.errors import CaseError
 from fvsolve.fluid import Fluid, FluidTable
 from fvsolve.kernels import density as law
@@ -30,13 +29,13 @@ def basin(**more) -> dict:
             "thickness": 0.1, **more}  # fmt: skip
 
 
-def model_of(pool: dict, end: float = 1.0, **more):
+def single(pool: dict, end: float = 1.0, **more):
     """Return the model of a single basin; `more` are numerics."""
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5} | more
-    return fvsolve.build(fvsolve.load(scene({"pool": pool}, {}, end, numerics, (), end / 10, fluid=FLUID)))
+    return model_of(scene({"pool": pool}, {}, end, numerics, (), end / 10, fluid=FLUID))
 
 
-def ended(model, end: float) -> np.ndarray:
+def at_end(model, end: float) -> np.ndarray:
     """Density and mass flow density along x at the end : float64[2, n]."""
     pool = model.basins[0]
     found = pool.deviations(fvsolve.advance(model, fvsolve.initial_state(model), end).y)
@@ -60,12 +59,12 @@ def test_exact_riemann_problems_of_the_isentrope(name, scheme):
     start = {"pressure": f"where(x < 50, {left[0] - REST}, {right[0] - REST})",
              "u": f"where(x < 50, {left[1]}, {right[1]})"}  # fmt: skip
     for n in (100, 200, 400):
-        model = model_of(basin(size=[100.0, 1.0], cells=[n, 1], start=start), end, scheme=scheme)
+        model = single(basin(size=[100.0, 1.0], cells=[n, 1], start=start), end, scheme=scheme)
         pool = model.basins[0]
         inner = abs(pool.x - 50.0) < 27.0
         rays = (pool.x[inner, None] - 50.0 + 100.0 / n * ((np.arange(8) + 0.5) / 8 - 0.5)) / end
         means = exact.at(rays.ravel()).reshape(2, -1, 8).mean(axis=2)
-        errors.append(np.abs(ended(model, end)[:, inner] - means).mean(axis=1) / pool.density / [1.0, pool.speed])
+        errors.append(np.abs(at_end(model, end)[:, inner] - means).mean(axis=1) / pool.density / [1.0, pool.speed])
     assert (errors[0] / errors[2] > 4**0.6).all() and (errors[2] < 4e-4).all()
 
 
@@ -76,7 +75,7 @@ def pipe_of(n: int, start: np.ndarray, end: float) -> np.ndarray:
     """Density minus that at rest, and mass flow density, at `end` in a pipe of 100 m : float64[2, n]."""
     nodes, numerics = {"left": reservoir(REST), "right": junction()}, {"scheme": "muscl", "method": "ssp-rk3"}
     links = {"main": stiff_pipe("left", "right", 100.0, 0.5, n, friction=NO_FRICTION)}
-    model = fvsolve.build(fvsolve.load(scene(nodes, links, end, numerics | {"courant": 0.5}, (), end, fluid=FLUID)))
+    model = model_of(scene(nodes, links, end, numerics | {"courant": 0.5}, (), end, fluid=FLUID))
     state, row = fvsolve.initial_state(model), model.tables.pipes[0]
     c, area = row["speed"], row["area"]
     state.y[: 2 * n] = 0.5 * area * np.concatenate([c * start[0] + start[1], c * start[0] - start[1]])
@@ -89,9 +88,9 @@ def test_a_wave_in_a_row_of_cells_is_that_of_a_pipe_under_the_same_law():
     apart, end = [], 0.04
     for n in (200, 400):
         pool = basin(size=[100.0, 1.0], cells=[n, 1], start={"pressure": f"4e6*{PULSE}", "u": f"3*{PULSE}"})
-        model = model_of(pool, end, limiter="monotonized-central")
+        model = single(pool, end, limiter="monotonized-central")
         start = model.basins[0].deviations(model.start)[:2]
-        found = ended(model, end) - [[model.basins[0].density], [0.0]]
+        found = at_end(model, end) - [[model.basins[0].density], [0.0]]
         other = pipe_of(n, start, end)
         assert np.abs(found - start).max(axis=1) == approx([16.0, 6400.0], rel=0.5)  # the pulse has moved
         apart.append(np.abs(found - other).mean(axis=1) / np.abs(found).mean(axis=1))
@@ -101,7 +100,7 @@ def test_a_wave_in_a_row_of_cells_is_that_of_a_pipe_under_the_same_law():
 @pytest.mark.parametrize("wave_speed", [None, 400.0])
 def test_pressures_are_those_of_the_fluids_own_table(wave_speed):
     """Pressures equal those of pipes, also with elastic walls, and those of CoolProp with rigid walls."""
-    model = model_of(basin(wave_speed=wave_speed) if wave_speed else basin())
+    model = single(basin(wave_speed=wave_speed) if wave_speed else basin())
     st, floats, pool = model.tables.settings[0], model.tables.floats, model.basins[0]
     compliance = 1 / (pool.density * pool.speed**2) - law.log_density(st, floats, REST)[1]
     pressures = np.array([-3e7, 1e6, 4.6e6, 5.9e6, 6e6, 6.1e6, 2e7, 5.9e7, 9e7, 1.5e8])
@@ -161,8 +160,8 @@ def test_a_basin_is_relieved_into_the_network_and_all_of_it_is_booked(path, tmp_
     pool = basin(patches={"out": {"side": "east", "span": [1.0, 2.0]}})
     if path == "triangles":
         points, cells = triangles((4.0, 2.0), 0.25)
-        edges = boundary(cells)
-        write(tmp_path / "t.msh", points, cells.tolist(), {"out": edges[(points[edges, 0] > 4.0 - 1e-9).all(axis=1)]})
+        east = on_sides(points, boundary(cells), (4.0, 2.0))["east"]
+        write(tmp_path / "t.msh", points, cells.tolist(), {"out": east})
         pool = {key: pool[key] for key in ("type", "physics", "pressure", "thickness")}
         pool["mesh"] = {"file": str(tmp_path / "t.msh")}
     pool |= {"holes": HOLE} if path == "faces" else {}
@@ -183,7 +182,7 @@ def test_the_pressure_of_a_patch_is_that_of_the_cells_behind(over):
     nodes, links = {"pool": pool, "end": reservoir(REST)}, {"tap": valve("pool.out", "end", 1e-4)}
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5, "initial": "rest"}
     probes = ["pool.out.pressure", "pool.pressure@2,1"]
-    model = fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, numerics, probes, 0.1, fluid=FLUID)))
+    model = model_of(scene(nodes, links, 1.0, numerics, probes, 0.1, fluid=FLUID))
     assert model.observe(0.0, model.start) == approx([REST + over] * 2, rel=1e-9)
     own, node = model.basins[0], model.tables.nodes[model.node_names.index("pool.out")]
     stiffness = model.evaluate(0.0, model.start)[1][model.layout["stiffness"] + node["row"]]
@@ -198,12 +197,10 @@ def test_probes_and_frames_have_the_isentropes_pressures(holes):
     probes = [f"pool.{field}@{place}" for place in places for field in ("pressure", "u")]
     pool = basin(start={"pressure": "1e6*cos(pi*x/4)", "u": "x"}, **more)
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5}
-    model = fvsolve.build(fvsolve.load(scene({"pool": pool}, {}, 1.0, numerics, probes, 0.1, fluid=FLUID)))
-    frame, found, own = (
-        model.fields(model.start, model.new_out())["pool"],
-        model.observe(0.0, model.start),
-        model.basins[0],
-    )
+    model = model_of(scene({"pool": pool}, {}, 1.0, numerics, probes, 0.1, fluid=FLUID))
+    frame = model.fields(model.start, model.new_out())["pool"]
+    found = model.observe(0.0, model.start)
+    own = model.basins[0]
     for place, (p, u) in zip(places, found.reshape(-1, 2), strict=True):
         x, y = map(float, place.split(","))
         k = int(np.argmin(np.hypot(own.x - x, own.y - y)))
@@ -218,7 +215,7 @@ def test_implicit_steps_agree_with_explicit_ones(holes):
     found = []
     for method, rtol in (("radau-iia-5", 1e-7), ("dormand-prince", 1e-9)):
         numerics = {"scheme": "upwind", "method": method, "rtol": rtol}
-        model = fvsolve.build(fvsolve.load(scene({"pool": pool}, {}, 0.004, numerics, (), 1e-3, fluid=FLUID)))
+        model = model_of(scene({"pool": pool}, {}, 0.004, numerics, (), 1e-3, fluid=FLUID))
         found.append(fvsolve.advance(model, fvsolve.initial_state(model), 0.004).y)
     assert np.abs(found[0] - found[1]).max() < 2e-6 * np.abs(found[1]).max()
 
@@ -231,7 +228,7 @@ def test_walls_that_give_much_leave_pressure_what_it_is(wave_speed):
         "wave_speed": wave_speed, "start": {"pressure": "1000 * (x - 0.5)"},
     }  # fmt: skip
     fluid = {"name": "Water", "temperature": 293.15, "law": "table"}
-    model = fvsolve.build(fvsolve.load(scene({"b": pool}, {}, 1.0, {"scheme": "muscl"}, fluid=fluid)))
+    model = model_of(scene({"b": pool}, {}, 1.0, {"scheme": "muscl"}, fluid=fluid))
     basin = model.basins[0]
     rates = basin.states_of(model.evaluate(0.0, model.start.copy())[0])
     assert rates[1].reshape(2, 10)[:, 2:-2] == approx(-1000.0, rel=1e-5)
@@ -240,7 +237,7 @@ def test_walls_that_give_much_leave_pressure_what_it_is(wave_speed):
 
 def test_walls_make_no_wave_quicker_than_the_fluids_own():
     with pytest.raises(CaseError, match="nodes.pool.wave_speed: 600 m/s is faster than sound in the fluid, 519"):
-        model_of(basin(wave_speed=600.0))
+        single(basin(wave_speed=600.0))
 
 
 def test_a_mixture_is_refused():

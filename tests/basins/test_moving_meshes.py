@@ -1,31 +1,24 @@
 """Moving walls on meshes: geometry of moved corners, conservation, closed forms, and equivalent cases."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
+from reference.basins import SIDES, ended, model_of, on_sides, straight
 from reference.meshes import write
 from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, ramp, scene, smooth_ramp, smooth_step
 from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 
-from fvsolve import advance, build, load, run
-from fvsolve.basins.lower_mesh import lower_mesh
+from fvsolve import load, run
+from fvsolve.basins.lower_motion import lower_mesh
 from fvsolve.errors import CaseError
 from fvsolve.mesh import rectangle
 from fvsolve.mesh.mesh import assemble, edges_of
-from fvsolve.model.model import State
 from fvsolve.studies.energy_balance import energy
 
-SIDES = {"west": (0, 0.0), "east": (0, 1.0), "south": (1, 0.0), "north": (1, 1.0)}
 STEPPED = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2"}
 EXACT = ["euler", "ssp-rk2", "rk4", "implicit-midpoint", "gauss-4"]
-
-
-def straight(speed, end=10.0):
-    return {"time": [0.0, end], "value": [0.0, speed * end]}
 
 
 def tub(tmp_path, kind="mixed", many=(12, 4), size=(2.0, 1.0), turned=False, seed=5, reach=0.25):
@@ -37,11 +30,7 @@ def tub(tmp_path, kind="mixed", many=(12, 4), size=(2.0, 1.0), turned=False, see
     points[inside] += np.random.default_rng(seed).uniform(-1.0, 1.0, (inside.sum(), 2)) * step
     cut = {"triangles": lambda k: True, "quads": lambda k: False, "mixed": lambda k: k % 3 == 0}[kind]
     cells = [[c[:3], [c[0], *c[2:]]] if cut(k) else [c] for k, c in enumerate(mesh.cells.tolist())]
-    outer = mesh.ends[mesh.inner :]
-    middle = mesh.points[outer].mean(axis=1)
-    groups = {
-        side: outer[np.abs(middle[:, axis] - at * size[axis]) < 1e-9].tolist() for side, (axis, at) in SIDES.items()
-    }
+    groups = on_sides(mesh.points, mesh.ends[mesh.inner :], size)
     if turned:  # by 90 degrees: x, y -> -y, x
         points = np.column_stack([size[1] - points[:, 1], points[:, 0]])
         groups = {{"west": "south", "south": "east", "east": "north", "north": "west"}[k]: v for k, v in groups.items()}
@@ -51,12 +40,6 @@ def tub(tmp_path, kind="mixed", many=(12, 4), size=(2.0, 1.0), turned=False, see
 def pool(file, patches, physics="free-surface", **more):
     rest = {"level": 1.0} if physics == "free-surface" else {"pressure": 2e5, "thickness": 0.1}
     return {"type": "basin", "physics": physics, "mesh": {"file": file}, "patches": patches, **rest, **more}
-
-
-def moved(case, until):
-    """Return (model, state) at a time."""
-    model = build(load(case))
-    return model, advance(model, State(case["numerics"].get("start", 0.0), model.start.copy()), until)
 
 
 def as_it_is(mesh, points):
@@ -77,7 +60,7 @@ def test_what_is_known_of_sides_is_that_of_the_mesh_with_corners_where_they_are(
     patches = {"west": {"travel": straight(0.2), "zone": 0.7}, "east": {"travel": straight(-0.3)}}
     case = scene({"b": pool(tub(tmp_path, kind, many), patches)}, {}, 1.0, {**STEPPED, "step": 0.01},
                  scalars={"dye": {"initial": 1.0, "diffusivity": 1e-3}})  # fmt: skip
-    model = build(load(case))
+    model = model_of(case)
     basin, y = model.basins[0], model.start.copy()
     y[[int(row["y"]) for row in model.tables.walls]] = 0.2, -0.3
     with model.run_data() as slate:
@@ -102,7 +85,7 @@ def test_homologous_expansion_is_exact_to_round_off_under_every_method(tmp_path,
         start = {"uv"[axis]: f"{rate} * {'xy'[axis]}"}
         case = scene({"b": pool(tub(tmp_path, kind), patches, start=start)}, {}, 0.5,
                      {**STEPPED, "method": method, "step": 5e-3})  # fmt: skip
-        model, state = moved(case, 0.5)
+        model, state = ended(case, 0.5)
         basin = model.basins[0]
         found, grown = basin.deviations(state.y), 1.0 + 0.5 * rate
         # Jacobians by differences limit Rosenbrock methods, iterations limit methods of two stages
@@ -124,7 +107,7 @@ def test_between_walls_that_swing_a_lake_of_uniform_content_is_wherever_lines_ar
     case = scene({"b": pool(tub(tmp_path, many=(10, 3)), patches, **more)}, {}, 0.4,
                  {**STEPPED, "scheme": scheme, "method": method, "step": 4e-3},
                  scalars={"even": {"initial": 3.0}, "patchy": {"initial": 1.0}})  # fmt: skip
-    model, state = moved(case, 0.4)
+    model, state = ended(case, 0.4)
     basin = model.basins[0]
     values = basin.values(state.y)
     assert values["even"] == pytest.approx(3.0, abs=1e-9 if method in EXACT[3:] else 1e-12)
@@ -138,7 +121,7 @@ def test_where_no_wave_has_come_yet_lines_that_swing_leave_a_lake_as_it_is(tmp_p
     patches = {"west": {"travel": swings}, "east": {"travel": straight(-0.3)}}
     case = scene({"b": pool(tub(tmp_path, many=(30, 2)), patches)}, {}, 1.0,
                  {"scheme": "upwind", "method": method, "step": 2e-3})  # fmt: skip
-    model, state = moved(case, 6e-3)  # at most three steps of four stages, each one cell further
+    model, state = ended(case, 6e-3)  # at most three steps of four stages, each one cell further
     basin = model.basins[0]
     far = np.abs(basin.mesh.centre[:, 0] - 1.0) < 0.1
     assert np.abs(basin.area_ratios(state.y)[far] - 1.0).min() > 1e-5
@@ -214,7 +197,7 @@ def test_a_mesh_that_is_turned_by_a_right_angle_has_the_same_waves(tmp_path, sch
         file = tub(tmp_path, many=(10, 4), turned=turned)
         start = {"u": "0.3 * sin(x)"} if not turned else {"v": "0.3 * sin(y)"}
         nodes = {"b": pool(file, {"north" if turned else "east": {"travel": travel, "zone": 1.5}}, start=start)}
-        model, state = moved(scene(nodes, {}, 0.5, {**STEPPED, "scheme": scheme, "step": 5e-3}), 0.5)
+        model, state = ended(scene(nodes, {}, 0.5, {**STEPPED, "scheme": scheme, "step": 5e-3}), 0.5)
         basin = model.basins[0]
         depth, x, y = basin.deviations(state.y)[0], *basin.mesh.centre.T
         x, y = (y, 1.0 - x) if turned else (x, y)
@@ -261,7 +244,7 @@ def test_a_liquid_that_is_compressed_evenly_follows_its_law_as_a_chamber_of_the_
         step = {"courant": 0.8} if method == "ssp-rk3" else {"rtol": 1e-6}
         case = scene(nodes, {}, 0.2, {"scheme": "muscl", "method": method, **step}, [f"b.{side}.force"], every=0.05,
                      fluid=fluid(law))  # fmt: skip
-        model, state = moved(case, 0.2)
+        model, state = ended(case, 0.2)
         basin, ratio = model.basins[0], 2.0 / 1.996
         wanted = law_of(basin, law, ratio)
         assert basin.pressure(basin.deviations(state.y)[0]) == pytest.approx(wanted, rel=2e-3)
@@ -285,7 +268,7 @@ def test_a_piston_that_starts_at_once_makes_a_water_hammer(tmp_path, law, side, 
         nodes = {"b": column(law, {side: {"travel": straight(inward)}}, 60, side=side, file=file)}
         case = scene(nodes, {}, 1e-3, {"scheme": "upwind", "method": "ssp-rk2", "courant": 0.8},
                      [f"b.{side}.force", f"b.{side}.power"], every=1e-4, fluid=fluid(law))  # fmt: skip
-        result, basin = run(case), build(load(case)).basins[0]
+        result, basin = run(case), model_of(case).basins[0]
         rho, c = basin.density, basin.speed
         wanted = rho * c * speed / (1.0 - speed / c)  # m = c r = speed (rho + r)
         if law == "log":  # a simple wave: c falls by half the speed
@@ -302,7 +285,7 @@ def test_where_no_wave_has_come_yet_lines_that_swing_leave_a_liquid_as_it_is(tmp
     patches = {"west": {"travel": {"mean": 0.0, "amplitude": 0.01, "period": 1e-2}}, "east": {"travel": straight(-1.0)}}
     nodes = {"b": pool(tub(tmp_path, many=(30, 2)), patches, "liquid") | ({"pressure": 6e6} if law == "table" else {})}
     case = scene(nodes, {}, 1.0, {"scheme": "upwind", "method": method, "step": 1e-5}, fluid=fluid(law))
-    model, state = moved(case, 3e-5)
+    model, state = ended(case, 3e-5)
     basin = model.basins[0]
     far = np.abs(basin.mesh.centre[:, 0] - 1.0) < 0.1
     found = basin.deviations(state.y)
@@ -373,7 +356,7 @@ def test_momentum_changes_by_the_forces_of_both_walls_alone(tmp_path, law, schem
     nodes = {"b": pool(tub(tmp_path), patches, "free-surface" if water else "liquid", **more)}
     case = scene(nodes, {}, 0.9, {"scheme": scheme, "step": 1e-3, "method": "euler"},
                  fluid=fluid("linear" if water else law))  # fmt: skip
-    model = build(load(case))
+    model = model_of(case)
     basin, y = model.basins[0], model.start
     dydt, out = model.evaluate(0.0, y)
     west, east = out[int(model.layout["wall"]) :][:2]
@@ -396,9 +379,8 @@ def test_a_liquid_that_is_turned_or_seen_from_behind_says_the_same(law, method):
     for side, sign in (("west", 1.0), ("east", -1.0), ("south", 1.0), ("north", -1.0)):
         travel = {"mean": 0.0, "amplitude": sign * 1e-3, "period": 5e-3}
         nodes = {"b": column(law, {side: {"travel": travel, "zone": 0.7}}, 24, side=side)}
-        scheme = (
-            "upwind" if method == "rodas-4" else "muscl"
-        )  # a Jacobian by differences is one-sided at kinks of limiters
+        # a Jacobian by differences is one-sided at kinks of limiters
+        scheme = "upwind" if method == "rodas-4" else "muscl"
         case = scene(nodes, {}, 3e-3, {"scheme": scheme, "method": method, "step": 2.5e-5},
                      [f"b.{side}.force", f"b.{side}.power"], every=3e-4, fluid=fluid(law))  # fmt: skip
         result = run(case)
@@ -420,8 +402,8 @@ def test_a_grid_and_a_mesh_of_the_same_rectangles_find_the_same_rates(tmp_path, 
         patches = {side: {"side": side, **one} if file is None else one for side, one in walls.items()}
         nodes = {"b": {"type": "basin", "physics": "liquid", "thickness": 0.1, "patches": patches,
                        "pressure": 6e6 if law == "table" else 2e5, **shape}}  # fmt: skip
-        model = build(
-            load(scene(nodes, {}, 0.09, {"scheme": "upwind", "method": "euler", "step": 1e-6}, fluid=fluid(law)))
+        model = model_of(
+            scene(nodes, {}, 0.09, {"scheme": "upwind", "method": "euler", "step": 1e-6}, fluid=fluid(law))
         )
         basin, y = model.basins[0], model.start.copy()
         y[[int(row["y"]) for row in model.tables.walls]] = 0.1, -0.05
@@ -448,10 +430,8 @@ def test_a_grid_and_a_mesh_of_the_same_rectangles_find_the_same_rates(tmp_path, 
 def test_the_ledger_of_energy_has_the_work_of_the_wall_and_its_step_part_falls_with_the_step(tmp_path, physics, body):
     parts, water = [], physics == "free-surface"
     slow, more = (1.0, {}) if water else (1e-3, {"elevation": 7.0, "start": {"pressure": "1e6 * sin(3 * x)"}})
-    file, rest = (
-        tub(tmp_path, "triangles", (20, 2), (2.0, 0.2)),
-        0.1 * RHO * GRAVITY if water else (2e5 - AMBIENT) * 0.02,
-    )
+    file = tub(tmp_path, "triangles", (20, 2), (2.0, 0.2))
+    rest = 0.1 * RHO * GRAVITY if water else (2e5 - AMBIENT) * 0.02
     for step in (4e-3 * slow, 2e-3 * slow):
         wall = {"travel": {"mean": 0.0, "amplitude": 0.1 * slow, "period": 2.0 * slow}, "zone": 1.0}
         nodes, links = {"b": pool(file, {"east": {"body": "lid"} if body else wall}, physics, **more)}, {}

@@ -1,45 +1,27 @@
-"""Moving walls of basins: closed forms, geometric conservation, force and power, bodies, limits, equivalent cases."""
-
-from __future__ import annotations
+"""Moving walls of basins: closed forms, conservation, forces, bodies, limits, equivalent cases, transport theorem."""
 
 import math
 
 import numpy as np
 import pytest
+from reference.basins import SIDES, ended, model_of, straight
 from reference.scenes import GRAVITY, RHO, scene
+from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from fvsolve import advance, build, load, run
+from fvsolve import advance, run
 from fvsolve.model.model import State
 from fvsolve.studies.energy_balance import energy
 
-SIDES = ("west", "east", "south", "north")
 STEPPED = {"scheme": "muscl", "limiter": "minmod", "method": "ssp-rk2"}
 
 
 def flume(patches, cells=50, wide=2, length=2.0, side="east", level=1.0, physics="free-surface", **more):
     """Return a basin 2 m long in the direction of the wall on a side, and 1 m wide."""
-    along = side in SIDES[:2]
+    along = side in ("west", "east")
     size, many = ([length, 1.0], [cells, wide]) if along else ([1.0, length], [wide, cells])
-    return {
-        "type": "basin",
-        "physics": physics,
-        "size": size,
-        "cells": many,
-        "level": level,
-        "patches": patches,
-        **more,
-    }
-
-
-def moved(case, until):
-    """Return (model, state) at a time."""
-    model = build(load(case))
-    return model, advance(model, State(case["numerics"].get("start", 0.0), model.start.copy()), until)
-
-
-def straight(speed, end=10.0):
-    return {"time": [0.0, end], "value": [0.0, speed * end]}
+    shape = {"type": "basin", "physics": physics, "size": size, "cells": many}
+    return {**shape, "level": level, "patches": patches, **more}
 
 
 # closed forms ----------
@@ -52,7 +34,7 @@ def test_homologous_expansion_is_exact_to_round_off_under_every_method(method, s
     velocity = "u" if side == "east" else "v"
     start = {velocity: f"{rate} * {'x' if side == 'east' else 'y'}"}
     nodes = {"b": flume({"lid": {"side": side, "travel": straight(2.0 * rate)}}, n, side=side, start=start)}
-    model, state = moved(scene(nodes, {}, 1.0, {**STEPPED, "method": method, "step": 5e-3}), 1.0)
+    model, state = ended(scene(nodes, {}, 1.0, {**STEPPED, "method": method, "step": 5e-3}), 1.0)
     basin = model.basins[0]
     found, x = basin.deviations(state.y), (basin.mesh.centre[:, 0 if side == "east" else 1]) * (1.0 + rate)
     close = 1e-10 if method == "rodas-4" else 1e-13  # Rosenbrock methods have a Jacobian by differences
@@ -82,7 +64,7 @@ def test_a_wall_drawn_out_makes_a_simple_wave_and_faster_than_twice_the_waves_a_
     c = math.sqrt(GRAVITY)
     for speed in (0.5, 2.5 * c):
         nodes = {"b": flume({"lid": {"side": "east", "travel": straight(speed), "zone": 1.0}}, 200, 1)}
-        model, state = moved(scene(nodes, {}, 0.15, {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.5}), 0.15)
+        model, state = ended(scene(nodes, {}, 0.15, {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.5}), 0.15)
         depth = 1.0 + model.basins[0].deviations(state.y)[0][-1]
         wanted = max(1.0 - 0.5 * speed / c, 0.0) ** 2
         assert depth == pytest.approx(wanted, abs=4e-3)
@@ -133,7 +115,7 @@ def test_what_is_even_stays_even_and_amounts_and_mass_are_kept_between_walls_tha
     scalars = {"even": {"initial": 3.0}, "patchy": {"initial": 1.0}}
     step = {"courant": 0.5} if method == "ssp-rk3" else {"step": 0.01}
     case = scene(nodes, {}, 0.8, {"scheme": scheme, "method": method, **step}, scalars=scalars)
-    model, state = moved(case, 0.8)
+    model, state = ended(case, 0.8)
     basin = model.basins[0]
     values = basin.values(state.y)
     close = 1e-12 if method == "ssp-rk3" else 1e-8
@@ -154,7 +136,7 @@ def test_no_water_flows_through_the_walls_of_a_basin_of_one_or_two_cells_across(
     start = {"level": "1 + 0.1 * cos(3 * x) * cos(2 * y)", "u": "0.2 * x", "v": "0.1 * y"}
     nodes = {"b": flume({}, *cells, start=start, scalars={"even": 3.0})}
     case = scene(nodes, {}, 0.1, {"scheme": scheme, "method": method, "step": 0.01}, scalars={"even": {"initial": 3.0}})
-    model, state = moved(case, 0.1)
+    model, state = ended(case, 0.1)
     assert model.basins[0].values(state.y)["even"] == pytest.approx(3.0, abs=1e-9)
     mass, change = model.contents(state.y)
     assert abs(change) < 1e-12 * mass and np.abs(state.y).max() > 0.01
@@ -172,7 +154,7 @@ def mass_and_spring(patches, mass, stiff, rest, n=40, start=None, numerics=None,
 def test_water_at_rest_before_a_wall_that_a_spring_holds_does_not_move_by_a_bit():
     rest = 0.5 * RHO * GRAVITY
     case = mass_and_spring({"lid": {"side": "east", "body": "lid"}}, {"type": "mass", "mass": 10.0}, 9e3, rest, end=2.0)
-    model, state = moved(case, 2.0)
+    model, state = ended(case, 2.0)
     assert not state.y.any()
 
 
@@ -295,7 +277,7 @@ def test_waves_of_a_small_swing_come_out_to_the_order_of_the_scheme(scheme, orde
         nodes = {"b": flume({"lid": {"side": "east", "travel": travel}}, n, 1, start=start)}
         limiter = {"limiter": "van-leer"} if scheme == "muscl" else {}
         case = scene(nodes, {}, 1.0, {"scheme": scheme, "method": "rk4", "step": 0.25 / n, **limiter})
-        model, state = moved(case, 1.0)
+        model, state = ended(case, 1.0)
         basin = model.basins[0]
         x = basin.mesh.centre[:, 0]
         wanted = a * w * math.cos(w) * np.sin(k * x) / math.sin(k * length)
@@ -364,3 +346,53 @@ def test_a_driven_body_takes_a_wall_along_as_its_travel_would():
     w = 2.0 * math.pi / 1.5
     asked = 5.0 * -0.1 * w * w * np.sin(w * found.t) + found["b.lid.force"]  # m a, and the force of the water
     assert np.abs(found["board.joint_fx"]) == pytest.approx(np.abs(asked), rel=1e-6, abs=1.0)
+
+
+LENGTH, RATE, T, D = 2.0, 0.3, 0.4, 2e-3
+
+
+def run_up(cells: int):
+    """Return (model, states just before, at and after T) of a wave in a flume with an oscillating east wall."""
+    travel = {"mean": 0.0, "amplitude": RATE, "period": 2.0}
+    basin = {
+        "type": "basin", "size": [LENGTH, 1.0], "cells": [cells, 1], "level": 1.0,
+        "start": {"level": f"1 + 0.02 * cos({math.pi / LENGTH} * x)", "u": f"{RATE * math.pi / LENGTH} * x"},
+        "patches": {"lid": {"side": "east", "travel": travel}},
+    }  # fmt: skip
+    model = model_of(scene({"b": basin}, {}, 1.0, {"scheme": "upwind5", "method": "rk4", "step": 2e-4}))
+    states = [State(0.0, model.start.copy())]
+    for until in (T - D, T, T + D):
+        states.append(advance(model, states[-1], until))
+    return model, states[1:]
+
+
+def held(model, state) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return (grid lines, volume of water west of each line, depth and velocity at inner lines)."""
+    depth, flow, _ = model.basins[0].deviations(state.y)[:3]
+    depth, n = 1.0 + depth, len(depth)
+    lines = np.linspace(0.0, LENGTH + RATE * math.sin(math.pi * state.t), n + 1)
+    contents = np.concatenate([[0.0], np.cumsum(depth * np.diff(lines))])
+
+    def at_lines(mean):
+        return (7 * (mean[1:-2] + mean[2:-1]) - mean[:-3] - mean[3:]) / 12  # fourth order, lines 2 to n - 2
+
+    return lines, contents, at_lines(depth), at_lines(flow) / at_lines(depth)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7])
+def test_the_terms_of_a_volume_up_to_a_line_that_moves(share):
+    errors = []
+    for cells in (20, 40):
+        model, states = run_up(cells)
+        before, now, after = (held(model, state) for state in states)
+        m = round(share * cells)
+        lines, _, depth, velocity = now
+        speed = RATE * math.pi * math.cos(math.pi * T) * m / cells
+        whole = (after[1][m] - before[1][m]) / (2 * D)
+        inside = sum(sign * CubicSpline(*one[:2])(lines[m]) for sign, one in ((1, after), (-1, before))) / (2 * D)
+        swept = depth[m - 2] * speed
+        flux = depth[m - 2] * velocity[m - 2]
+        assert abs(swept) > 0.05 and abs(inside) > 0.05  # not negligible
+        errors.append([abs(whole - inside - swept), abs(inside + flux), abs(whole + flux - swept)])  # (71), (76), (77)
+    assert max(errors[1]) < 1e-5
+    assert errors[1][2] < 0.2 * errors[0][2]

@@ -1,19 +1,18 @@
 """Balances of basins: flow through open sides and by given velocities is booked at the patch that it passes."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 from model.test_sparsity import stray
 from pytest import approx
+from reference.basins import SIDES, model_of, on_sides
 from reference.meshes import boundary, triangles, write
 from reference.scenes import RHO, WATER, scene
 
 import fvsolve
 
-SIZE, SIDES = (4.0, 2.0), ("west", "east", "south", "north")
+SIZE = (4.0, 2.0)
 MIDDLES = {"west": (0.0, 1.0), "east": (4.0, 1.0), "south": (2.0, 0.0), "north": (2.0, 2.0)}
 PATHS = ["grid", "graded", "holes", "triangles"]
 OPEN = {side: {"side": side, "boundary": "open"} for side in SIDES}
@@ -28,10 +27,7 @@ def pool(path: str, folder, patches: dict, **more) -> dict:
         shape = {"graded": {"grading": [2.0, 1.5]}, "holes": {"holes": [[1.0, 0.5, 1.5, 1.0]]}}.get(path, {})
         return {"type": "basin", "size": list(SIZE), "cells": [32, 16], "patches": patches, **shape, **more}
     points, cells = triangles(SIZE, 0.125)
-    ends = boundary(cells)
-    middle, at = points[ends].mean(axis=1), {"west": (0, 0.0), "east": (0, 4.0), "south": (1, 0.0), "north": (1, 2.0)}
-    groups = {name: ends[np.abs(middle[:, at[name][0]] - at[name][1]) < 1e-9] for name in patches}
-    write(folder / "t.msh", points, cells.tolist(), groups)
+    write(folder / "t.msh", points, cells.tolist(), on_sides(points, boundary(cells), SIZE, patches))
     stated = {name: {key: value for key, value in patch.items() if key != "side"} for name, patch in patches.items()}
     return {"type": "basin", "mesh": {"file": str(folder / "t.msh")}, "patches": stated, **more}
 
@@ -61,7 +57,7 @@ def test_what_cells_beside_an_open_side_gain_is_booked_to_it(path, scheme, law, 
     """Noise near the middle of a side is booked at this side alone; noise everywhere, at all sides."""
     patches = OPEN if law == "water" else IMPEDANCE
     basin = pool(path, tmp_path, patches, **physics(law))
-    model = fvsolve.build(fvsolve.load(case(basin, 1.0, scheme, fluid=fluid(law))))
+    model = model_of(case(basin, 1.0, scheme, fluid=fluid(law)))
     field, rng = model.basins[0], np.random.default_rng(0)
     _, per = field.mass()
     noise = 0.1 * model.scale * rng.normal(size=model.y_size)
@@ -106,7 +102,7 @@ def test_a_wave_that_meets_nothing_beyond_leaves_half_its_flow_at_either_end(pat
     basin = pool(path, tmp_path, patches, **physics(law), start={"u": 0.01})
     if path == "holes":
         basin["holes"] = [[0.0, 0.0, 4.0, 0.5]]
-    model = fvsolve.build(fvsolve.load(case(basin, 0.01, "muscl", fluid=fluid(law))))
+    model = model_of(case(basin, 0.01, "muscl", fluid=fluid(law)))
     _, out = model.evaluate(0.0, model.start)
     booked, density = out[model.layout["supply"] :], model.basins[0].row["density"]
     half = 0.5 * density * 0.01 * 0.1 * (1.5 if path == "holes" else 2.0)
@@ -156,6 +152,6 @@ def test_what_passes_open_sides_keeps_to_its_pattern(path, scheme, law, tmp_path
     basin = pool(path, tmp_path, patches, **physics(law))
     if path == "grid":
         basin["cells"] = [14, 12]
-    model = fvsolve.build(fvsolve.load(case(basin, 1.0, scheme, fluid=fluid(law))))
+    model = model_of(case(basin, 1.0, scheme, fluid=fluid(law)))
     y = model.scale * np.random.default_rng(0).normal(scale=0.02, size=model.y_size)
     assert stray(model, 0.0, y) < 1e-7

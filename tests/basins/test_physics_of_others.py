@@ -1,7 +1,5 @@
 """Physics of basins from outside: a folder that is declared, checked, lowered, compiled, run and read."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -46,7 +44,7 @@ class Belt(Physics, name="belt"):
 ''',
     "rates.py": '''
 """Rates of the cells of a belt, and what probes read there."""
-from fvsolve.basins.physics_codes import physics_code
+from fvsolve.basins.basin_patches import physics_code
 from fvsolve.jit import njit
 from fvsolve.kernels.table_handle import open_tables
 from fvsolve.kernels.dtypes import CELL_FIELD, RATE

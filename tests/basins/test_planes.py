@@ -1,18 +1,18 @@
 """Basins in case files: kernels on grids and on meshes, boundaries, links, scalars, and patches that fall dry."""
 
-from __future__ import annotations
-
 import copy
 import math
 
 import numpy as np
 import pytest
 from pytest import approx
+from reference.basins import ended, model_of
 from reference.meshes import boundary, triangles, write
 from reference.scenes import AMBIENT, RHO, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.errors import CaseError
+from fvsolve.mesh import rectangle
 
 STEPS = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.8}
 HOLE = [[3.0, 0.0, 4.0, 1.0]]
@@ -35,12 +35,6 @@ def liquid(**more) -> dict:
 def case(pool: dict, end: float, numerics: dict | None = None, **top) -> dict:
     made = scene({"pool": pool}, {}, end, STEPS | (numerics or {}), (), end / 10, **top)
     return {key: value for key, value in made.items() if key != "links"}
-
-
-def ended(given: dict):
-    """Return (model, state) at the end of a case."""
-    model = fvsolve.build(fvsolve.load(given))
-    return model, fvsolve.advance(model, fvsolve.initial_state(model), given["numerics"]["end"])
 
 
 def triangulated(tmp_path, spacing: float = 0.25) -> dict:
@@ -67,23 +61,17 @@ def test_a_uniform_scalar_stays_uniform_in_sloshing_water(scheme, path, tmp_path
 @pytest.mark.parametrize("law", ["linear", "log", "table"])
 def test_first_order_on_a_rectangle_is_the_same_by_both_paths(law, tmp_path):
     """Loops over faces give the rates of loops over rows, for the same cells from a file."""
-    x, y = np.meshgrid(np.linspace(0, 4, 33), np.linspace(0, 2, 17))
-    points = np.column_stack([x.ravel(), y.ravel()])
-    corner = (np.arange(16)[:, None] * 33 + np.arange(32)).ravel()
-    write(tmp_path / "q.msh", points, np.column_stack([corner, corner + 1, corner + 34, corner + 33]).tolist())
+    mesh = rectangle((4.0, 2.0), (32, 16))
+    write(tmp_path / "q.msh", mesh.points, mesh.cells.tolist())
     outline = {"type": "basin", "mesh": {"file": str(tmp_path / "q.msh")}}
     start = {"pressure": "1e5*exp(-((x - 1.5)^2 + (y - 1.2)^2))", "u": "0.1*x", "v": "-0.2*y"}
     physics = {"physics": "liquid", "pressure": 2e6, "thickness": 0.1, "start": start}
+    pairs = [(liquid(start=start), physics)]
     if law == "linear":
-        pairs = [(liquid(start=start), physics), (water(start=WAVY), {"level": 1.0, "start": WAVY})]
-    else:
-        pairs = [(liquid(start=start), physics)]
+        pairs.append((water(start=WAVY), {"level": 1.0, "start": WAVY}))
     for plain, other in pairs:
         fluid = {"name": "Water", "law": "table"} if law == "table" else case(plain, 1.0)["fluid"] | {"law": law}
-        one, two = (
-            fvsolve.build(fvsolve.load(case(pool, 1.0, {"scheme": "upwind"}, fluid=fluid)))
-            for pool in (plain, outline | other)
-        )
+        one, two = (model_of(case(pool, 1.0, {"scheme": "upwind"}, fluid=fluid)) for pool in (plain, outline | other))
         a, b = (model.basins[0] for model in (one, two))
         order = np.lexsort((b.x, b.y))
         same = two.start.copy()  # averages of cells, not values at centres
@@ -192,10 +180,7 @@ def test_a_plug_is_carried_through_a_channel_and_all_of_it_is_booked():
 def test_dye_that_a_pipe_brings_leaves_by_another_and_none_is_lost():
     pool = basin(level=0.5, patches={"in": {"side": "west"}, "out": {"side": "east"}}, cells=[16, 8])
     nodes = {"works": {"type": "inflow", "flow": 0.1, "scalars": {"dye": 2.0}}, "pool": pool, "river": lake(0.45)}
-    links = {
-        "feed": pipe("works", "pool.in", 5.0, 0.3, 100.0, 5),
-        "tap": valve("pool.out", "river", 0.1),
-    }
+    links = {"feed": pipe("works", "pool.in", 5.0, 0.3, 100.0, 5), "tap": valve("pool.out", "river", 0.1)}
     given = scene(nodes, links, 400.0, STEPS | {"method": "ssp-rk3"}, ["pool.out.dye", "feed.dye@1"], 10.0)
     result = fvsolve.run(given | {"scalars": {"dye": {}}})
     assert result.ok and result["feed.dye@1"][-1] == approx(2.0, rel=1e-9)
@@ -267,31 +252,23 @@ def test_normal_flow_down_a_slope_has_the_velocity_of_manning():
 
 
 FAULTS = {
-    "join": (
-        {"physics": "transport", "velocity": {"u": 1.0}},
-        {"tap": valve("pool.out", "end", 0.1)},
-        "the key `velocity` gives the flow",
-    ),
-    "expression": ({"physics": "transport", "velocity": {"expression": "swril"}}, {}, 'did you mean "swirl"'),
-    "ways": ({"physics": "transport", "velocity": {"u": 1.0, "stream": "x"}}, {}, "expected"),
-    "impedance": (
-        {"level": 1.0, "patches": {"out": {"side": "east", "impedance": 1.0}}},
-        {},
-        "does not apply to physics",
-    ),
-    "scalar": ({"level": 1.0, "scalars": {"dye": 1.0}}, {}, "no scalar named"),
-    "start": ({"level": 1.0, "start": {"pressure": 1.0}}, {}, "does not apply to physics"),
+    "join": ({"physics": "transport", "velocity": {"u": 1.0}}, "the key `velocity` gives the flow"),
+    "expression": ({"physics": "transport", "velocity": {"expression": "swril"}}, 'did you mean "swirl"'),
+    "ways": ({"physics": "transport", "velocity": {"u": 1.0, "stream": "x"}}, "expected"),
+    "impedance": ({"level": 1.0, "patches": {"out": {"side": "east", "impedance": 1.0}}}, "does not apply to physics"),
+    "scalar": ({"level": 1.0, "scalars": {"dye": 1.0}}, "no scalar named"),
+    "start": ({"level": 1.0, "start": {"pressure": 1.0}}, "does not apply to physics"),
 }
 
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_faults(name):
-    more, links, words = FAULTS[name]
-    nodes = {"pool": basin(**({"patches": {"out": {"side": "east"}}} | more))}
-    if links:
-        nodes["end"] = reservoir(AMBIENT)
+    more, words = FAULTS[name]
+    nodes, links = {"pool": basin(**({"patches": {"out": {"side": "east"}}} | more))}, {}
+    if name == "join":
+        nodes["end"], links["tap"] = reservoir(AMBIENT), valve("pool.out", "end", 0.1)
     with pytest.raises(CaseError, match=words):
-        fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, STEPS, (), 0.1)))
+        model_of(scene(nodes, links, 1.0, STEPS, (), 0.1))
 
 
 def test_a_patch_that_runs_dry_does_not_shorten_steps():

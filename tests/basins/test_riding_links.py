@@ -1,12 +1,11 @@
 """Links at patches of basins on bodies: rest in accelerated frames, and oscillations like those of a column."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 from model.test_sparsity import stray
+from reference.basins import model_of, on_sides, slowing, straight
 from reference.meshes import boundary, triangles, write
 from reference.scenes import AMBIENT, GRAVITY, RHO, scene
 from scipy.integrate import solve_ivp
@@ -38,12 +37,9 @@ def basin(at, side, folder=None, **more):
         shape = {"size": SIZE, "cells": CELLS, "patches": {"gap": {"side": side, **span}}}
     else:
         points, cells = triangles(SIZE, 0.25)
-        ends = boundary(cells)
-        middle = points[ends].mean(axis=1)
-        behind = np.abs(middle[:, 0] - {"west": 0.0, "east": SIZE[0]}[side]) < 1e-9
-        behind &= np.abs(middle[:, 1] - 0.5) < 0.25
-        file = folder / f"{side}.msh"
-        write(file, points, cells.tolist(), {"gap": ends[behind]})
+        ends = on_sides(points, boundary(cells), SIZE)[side]
+        middle = np.abs(points[ends].mean(axis=1)[:, 1] - 0.5) < 0.25
+        file = write(folder / f"{side}.msh", points, cells.tolist(), {"gap": ends[middle]})
         shape = {"mesh": {"file": str(file)}}
     return {"type": "basin", "on": "hull", "at": list(at), **shape, **more}
 
@@ -70,7 +66,7 @@ def twins(joint, link, swap=False, turned=False, folder=None, start=None, end=1.
 
 
 def spin(rate):
-    return {"kind": "revolute", "axis": [0, 0, 1], "angle": {"time": [0.0, 100.0], "value": [0.0, 100.0 * rate]}}
+    return {"kind": "revolute", "axis": [0, 0, 1], "angle": straight(rate, 100.0)}
 
 
 SLOWS = 0.3  # [m/s2], along -x
@@ -79,8 +75,7 @@ RATE = 1.0  # [rad/s], about an axis outside of both basins
 
 FRAMES = {  # (joint, surface at rest in its frame)
     "slows down": (
-        {"kind": "prismatic", "axis": [1, 0, 0],
-         "travel": {"start": 0.0, "duration": 10.0, "value": [0.0, 50.0 * SLOWS], "exponent": 2}},
+        {"kind": "prismatic", "axis": [1, 0, 0], "travel": slowing(SLOWS)},
         lambda x, y: f"{LEVEL} + {SLOWS / GRAVITY} * ({x} - 2.5)",
     ),
     "turns": (spin(RATE), lambda x, y: f"0.2 + {RATE**2 / (2 * GRAVITY)} * ({x}**2 + {y}**2)"),
@@ -94,7 +89,7 @@ WAYS = {
 
 def rests(case, loose=1e-13):
     """Return the model of a case, after a check that its state stays within `loose` of the start."""
-    model = fv.build(fv.load(case))
+    model = model_of(case)
     last = fv.advance(model, fv.initial_state(model), case["numerics"]["end"]).y
     assert np.abs(last - model.start).max() < loose
     return model
@@ -218,7 +213,7 @@ def test_a_basin_and_a_tank_swing_as_one_column_of_water_does(joint, drawn):
 
 @pytest.mark.parametrize("link", [{}, QUICK["a pipe"]], ids=["column", "pipe"])
 def test_rates_hang_on_the_states_that_the_pattern_of_implicit_methods_has(link):
-    model = fv.build(fv.load(half_u(JOINTS["rolls"][0], grid=(4, 4), **link)))
+    model = model_of(half_u(JOINTS["rolls"][0], grid=(4, 4), **link))
     y = model.start + 0.01 * model.scale * np.random.default_rng(0).normal(size=model.y_size)
     assert stray(model, 1.0, y) < 1e-7
 
@@ -289,7 +284,7 @@ def test_what_a_joint_holds_and_energy_are_refused_where_a_link_joins_a_basin_th
     with pytest.raises(
         CaseError, match="a probe reads forces of joints, but the reaction of the flow through a.gap is not modelled"
     ):
-        fv.build(fv.load(case))
+        model_of(case)
 
 
 def test_a_patch_tells_the_pressure_on_the_bed_amid_its_faces():

@@ -1,36 +1,26 @@
 """Liquids in boxes on bodies: rest in any axes, spin-up, rotating axes, acceleration, joint loads, springs."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
+from reference.basins import HEAVY, cart, model_of, sliding, slowing, straight, turning
 from reference.meshes import shaken, write
 from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, scene
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import j0
 
-from fvsolve import advance, build, load, run
+from fvsolve import advance, load, run
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.model.model import State
 from fvsolve.studies.energy_balance import energy
 
-HEAVY = {"type": "body", "mass": 10.0, "inertia": [1.0, 1.0, 1.0]}
 TILT = {"roll": "30 deg", "pitch": "-70 deg", "yaw": "25 deg"}
 TABLE = {"name": "Water", "temperature": "20 degC", "pressure": "3 bar", "law": "table"}
 FLUIDS = {"linear": WATER, "log": {**WATER, "law": "log"}, "table": TABLE}
 STIFF = WATER["bulk_modulus"]
 REST = 3e5
-
-
-def turning(angle, axis=(0, 0, 1), **more):
-    return {**HEAVY, "joint": {"kind": "revolute", "axis": list(axis), "angle": angle, **more}}
-
-
-def sliding(travel, axis=(1, 0, 0), **more):
-    return {**HEAVY, "joint": {"kind": "prismatic", "axis": list(axis), "travel": travel, **more}}
 
 
 def full(cells=(12, 10), size=(2.0, 1.5), **more):
@@ -48,15 +38,11 @@ def case_of(body, basin, end, law="linear", probes=(), **numerics):
 
 def after(case, until, start=None):
     """Return (basin, its deviations) at a time, from the states `start` gives if it is not None."""
-    model = build(load(case))
+    model = model_of(case)
     y = model.start.copy()
     if start is not None:
         model.basins[0].states_of(y)[:] = start(model.basins[0])
     return model.basins[0], model.basins[0].deviations(advance(model, State(0.0, y), until).y)
-
-
-def steady(rate, span=100.0):
-    return {"time": [0.0, span], "value": [0.0, rate * span]}
 
 
 def resting(law, phi):
@@ -99,9 +85,9 @@ def test_a_box_that_turns_or_slows_steadily_holds_its_liquid_at_rest(how, law, c
     if cells == "mesh":
         more["mesh"] = {"file": str(write(tmp_path / "m.msh", *shaken()))}
     if how == "slows":
-        body = sliding({"start": 0.0, "duration": 10.0, "value": [0.0, 0.5 * slows * 100.0], "exponent": 2})
+        body = sliding(slowing(slows))
     else:
-        body = turning(steady(rate))
+        body = turning(straight(rate, 100.0))
     if how == "leans and turns":  # vertical axis, tilted box: W has three components in its axes
         more["attitude"] = TILT
 
@@ -171,7 +157,7 @@ def test_a_ring_of_pressure_seen_from_axes_that_turn_is_the_ring_that_stands_sti
     errors = []
     for n in (48, 96):
         basin = full((n, n), (2.0, 2.0), at=[-1, -1, 0], start=start, wave_speed=c)
-        basin, found = after(case_of(turning(steady(rate)), basin, end, "log", courant=0.8), end)
+        basin, found = after(case_of(turning(straight(rate, 100.0)), basin, end, "log", courant=0.8), end)
         x, y = basin.x - 1.0, basin.y - 1.0
         near = np.hypot(x, y) < 0.5  # waves of the walls do not arrive here
         turned = rate * end
@@ -250,13 +236,6 @@ def test_what_drives_a_full_box_is_what_its_liquid_gains_and_loses(way):
 # free ----------
 
 
-def cart(mass=100.0, axis=(1, 0, 0), **more):
-    return {
-        "type": "body", "mass": mass, "inertia": [50.0, 50.0, 50.0],
-        "joint": {"kind": "prismatic", "axis": list(axis), **more},
-    }  # fmt: skip
-
-
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_a_full_box_on_a_spring_swings_at_the_root_of_the_tangent_law(law):
     """stiff - M w^2 - m w^2 tan(s) / s = 0, with s = w L / (2 c)."""
@@ -290,7 +269,7 @@ def test_a_full_box_on_a_spring_swings_at_the_root_of_the_tangent_law(law):
 def test_a_free_box_on_rails_keeps_its_momentum(law):
     start = {"pressure": "2e5 * exp(-20 * (x - 0.5)**2)", "u": "0.2 * sin(1.5707963 * x)"}
     case = case_of(cart(50.0, rate=0.3), full((30, 4), (2.0, 0.5), start=start), 4e-3, law)
-    model = build(load(case))
+    model = model_of(case)
     basin, at = model.basins[0], model.state_names.index("body.travel_rate")
 
     def momentum(y):
@@ -362,9 +341,9 @@ def test_energy_and_joints_are_refused_by_name_where_a_side_is_open():
     for more in ({}, water):
         basin = {key: one for key, one in {**full(patches=gap), **more}.items() if one is not None}
         with pytest.raises(FvsolveError, match="a basin on a body with an open side is not supported"):
-            energy(case_of(turning(steady(1.0)), basin, 0.01))
+            energy(case_of(turning(straight(1.0, 100.0)), basin, 0.01))
         with pytest.raises(CaseError, match=r"joint load omits the flow through b\.gap\."):
-            build(load(case_of(turning(steady(1.0)), basin, 0.01, probes=["body.joint_fz"])))
+            model_of(case_of(turning(straight(1.0, 100.0)), basin, 0.01, probes=["body.joint_fz"]))
 
 
 # faults ----------
@@ -385,4 +364,4 @@ FAULTS = {
 def test_what_does_not_go_with_a_liquid_that_rides_is_refused_by_name(text):
     body, keys = FAULTS[text]
     with pytest.raises(CaseError, match=text):
-        load(case_of({**turning(steady(1.0)), **body}, full(**keys), 1.0))
+        load(case_of({**turning(straight(1.0, 100.0)), **body}, full(**keys), 1.0))

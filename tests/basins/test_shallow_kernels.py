@@ -1,7 +1,5 @@
 """Kernels of shallow water on grids: rest, orders over a bed, steady flows, Thacker's bowls, symmetry, friction."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,17 +1,16 @@
 """Water as linear modes: potential theory by finite elements, frequencies of hulls, rest, momentum, energy, faults."""
 
-from __future__ import annotations
-
 import math
 
 import meshio
 import numpy as np
 import pytest
+from reference.basins import model_of
 from reference.potential import added
 from reference.scenes import GRAVITY, RHO, scene, smooth_ramp
 from scipy.optimize import brentq
 
-from fvsolve import advance, build, load, run
+from fvsolve import advance, load, run
 from fvsolve.case import sloshing
 from fvsolve.errors import CaseError
 from fvsolve.model.model import State
@@ -152,7 +151,7 @@ def test_water_that_is_level_in_a_tank_that_leans_rests(method):
     basin = tank(at=[0.2, 0.1, 0.5], attitude={"yaw": 0.3})
     probes = ["b.depth@0.1,0.2", "b.depth@1.9,0.9", "hull.joint_tx"]
     result = run(case_of(hull({"kind": "fixed", "attitude": lean}), basin, 1.0, {"method": method}, probes))
-    model = build(load(case_of(hull({"kind": "fixed", "attitude": lean}), basin, 1.0, {"method": method}, probes)))
+    model = model_of(case_of(hull({"kind": "fixed", "attitude": lean}), basin, 1.0, {"method": method}, probes))
     turn = model.case.poses["hull"].attitude @ model.case.nodes["b"].rotation
     slope = -turn[2, :2]  # gravity along the bed over g: a level surface to first order
     for place, name in (((0.1, 0.2), probes[0]), ((1.9, 0.9), probes[1])):
@@ -167,7 +166,7 @@ def test_a_free_tank_on_rails_keeps_its_momentum():
             "force": {"time": [0.0, 0.2, 0.2 + 1e-9], "value": [60.0, 60.0, 0.0]}}  # fmt: skip
     case = case_of(body, tank(), 3.0, {"step": 0.01}, links={"push": push})
     case["nodes"]["world"] = {"type": "frame", "points": {"o": [-5, 0, 0]}}
-    model = build(load(case))
+    model = model_of(case)
     bodies, names = model.tables.bodies, model.body_names
 
     def momentum(state):
@@ -211,8 +210,8 @@ def test_modes_lie_on_cells_where_water_is_shallow_and_waves_small():
 
 
 def test_check_says_when_shallow_water_is_not_the_rung_and_a_run_when_modes_are_not():
-    deep, shallow = (build(load(case_of(hull({"kind": "fixed"}), tank(level=level, sloshing="cells"),
-                                        numerics={"method": "ssp-rk3", "courant": 0.5} )))
+    deep, shallow = (model_of(case_of(hull({"kind": "fixed"}), tank(level=level, sloshing="cells"),
+                                        numerics={"method": "ssp-rk3", "courant": 0.5} ))
                      for level in (DEPTH, 0.05))  # fmt: skip
     (said,) = [one for one in deep.warnings if one.kind == "dispersion"]
     kh = math.pi * DEPTH / SIDE

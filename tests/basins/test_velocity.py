@@ -1,12 +1,11 @@
 """Face flows of expressions, stream functions and files, against integrals of velocities over faces."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 from pytest import approx
+from reference.basins import model_of
 from reference.meshes import shaken, triangles, write, write_msh
 from reference.scenes import scene
 
@@ -21,16 +20,10 @@ MUSCL = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk3", "courant
 # Name: (parameters, velocities u, v (x, y) as in its source).
 VELOCITIES = {
     "constant": ({"u": 2.0, "v": -3.0}, lambda x, y: (2.0 + 0 * x, -3.0 + 0 * x)),
-    "rotation": (
-        {"centre": (0.3, 0.6), "angular_velocity": 2.0},
-        lambda x, y: (-2.0 * (y - 0.6), 2.0 * (x - 0.3)),
-    ),
+    "rotation": ({"centre": (0.3, 0.6), "angular_velocity": 2.0}, lambda x, y: (-2.0 * (y - 0.6), 2.0 * (x - 0.3))),
     "swirl": ({}, lambda x, y: (np.sin(PI * x) ** 2 * np.sin(2 * PI * y), -(np.sin(PI * y) ** 2) * np.sin(2 * PI * x))),
     "shear": ({"rate": 3.0, "y0": 0.5, "u": 1.0}, lambda x, y: (1.0 + 3.0 * (y - 0.5), 0 * x)),
-    "parabolic": (
-        {"speed": 2.0, "south": 0.5, "north": 2.5},
-        lambda x, y: (2.0 * 1.5 * (1.0 - (y - 1.5) ** 2), 0 * x),
-    ),
+    "parabolic": ({"speed": 2.0, "south": 0.5, "north": 2.5}, lambda x, y: (2.0 * 1.5 * (1.0 - (y - 1.5) ** 2), 0 * x)),
     "cellular": (
         {"speed": 2.0, "width": 0.5, "height": 1.0},
         lambda x, y: (2.0 * np.sin(2 * PI * x) * np.cos(PI * y), -4.0 * np.cos(2 * PI * x) * np.sin(PI * y)),
@@ -175,7 +168,7 @@ def test_steps_follow_a_velocity_that_stands_for_a_moment(path, tmp_path):
         velocity = {"expression": "swirl", "period": 1.0}
         sheet = {"type": "basin", "physics": "transport", "velocity": velocity, "scalars": {"dye": BUMP}, **shape}
         case = scene({"sheet": sheet}, {}, 1.0, MUSCL, [], 0.5, scalars={"dye": {}})
-        model = fvsolve.build(fvsolve.load(case))
+        model = model_of(case)
         start = fvsolve.initial_state(model)
         errors.append(np.abs(fvsolve.advance(model, start, 1.0).y - start.y).sum() / start.y.sum())
     assert errors == sorted(errors, reverse=True) and errors[-1] < 0.03
@@ -203,7 +196,7 @@ def test_what_is_carried_starts_from_no_flow_of_its_own(key):
 ])  # fmt: skip
 def test_a_field_that_is_closed_but_for_rounding_passes_no_outline(velocity, length):
     case = carrying(velocity, size=[length, length], cells=[32, 32])
-    pool = fvsolve.build(fvsolve.load(case)).basins[0]
+    pool = model_of(case).basins[0]
     assert pool.passing == []
 
 
@@ -223,7 +216,7 @@ def test_a_slanted_channel_passes_its_ends_alone(velocity, tmp_path):
 
     write_msh(tmp_path / "channel.msh", points @ turn + away, cells, ends)
     case = carrying(velocity, tmp_path / "channel.msh")
-    pool = fvsolve.build(fvsolve.load(case)).basins[0]
+    pool = model_of(case).basins[0]
     assert sorted(pool.passing) == ["in", "out"]
     if "stream" in velocity or "expression" in velocity:
         flows = pool.flows(None)
@@ -233,18 +226,18 @@ def test_a_slanted_channel_passes_its_ends_alone(velocity, tmp_path):
 def test_a_stream_that_passes_the_outline_by_little_is_still_refused():
     case = carrying({"stream": "0.1*sin(pi*x)*sin(pi*y) + 1e-9*x*y"}, size=[1.0, 1.0], cells=[8, 8])
     with pytest.raises(CaseError, match="crosses the outline at"):
-        fvsolve.build(fvsolve.load(case))
+        model_of(case)
 
 
 @pytest.mark.parametrize(("stream", "leak"), [("x*y*(2 - x)", "y = 1 m"), ("y", "x = [02] m"), ("0.1*x", "y = [01] m")])
 def test_a_wall_that_leaks_is_named_and_not_the_hole_behind_it(stream, leak):
     case = carrying({"stream": stream}, size=[2.0, 1.0], cells=[20, 10], holes=[[0.8, 0.4, 1.2, 0.6]])
     with pytest.raises(CaseError, match=f"nodes.pool.velocity: .*outline at .*{leak}"):
-        fvsolve.build(fvsolve.load(case))
+        model_of(case)
 
 
 def test_a_hole_that_leaks_alone_is_named():
     case = carrying({"stream": "where((x - 1)**2 + (y - 0.5)**2 < 0.09, x, 0)"}, size=[2.0, 1.0], cells=[20, 10],
                     holes=[[0.8, 0.4, 1.2, 0.6]])  # fmt: skip
     with pytest.raises(CaseError, match=r"outline at x = (0\.[89]|1)[\d.]* m, y = 0\.[456]"):
-        fvsolve.build(fvsolve.load(case))
+        model_of(case)

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from reference.refusals import refused
 from reference.scenes import branched, still
 
 import fvsolve

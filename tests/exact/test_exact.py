@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from pytest import approx
 from reference import folders, frictionless, pulses, scenes, vessels
+from reference.refusals import refused
 from scipy.integrate import quad, solve_ivp
 
 from fvsolve import exact

@@ -1,7 +1,5 @@
 """Functions of the right-hand side give equal bits for a band of rows, by a handle whose tables are slices."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np

@@ -44,9 +44,8 @@ def rubbed(flows, leans, loss=0.0, rough=1.0):
     forward, backward = np.array(flows, dtype=float), np.zeros(len(flows))
     dr, dl = np.array(leans, dtype=float), np.zeros(len(flows))
     before = dr.copy()
-    subtract_friction_hazen(
-        0.5, 0.0, loss, rough, 0.0, forward, backward, dr, dl
-    )  # lean = 2 GAUSS (dr + dl): leans are half differences
+    # lean = 2 GAUSS (dr + dl): leans are half differences
+    subtract_friction_hazen(0.5, 0.0, loss, rough, 0.0, forward, backward, dr, dl)
     assert before - dr == pytest.approx(dl, rel=1e-9)
     return 2.0 * dl
 

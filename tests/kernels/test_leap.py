@@ -1,7 +1,5 @@
 """Fused steps of upwind and Euler give the bits that rates, sum and record give one after the other."""
 
-from __future__ import annotations
-
 from importlib import import_module
 
 import numpy as np

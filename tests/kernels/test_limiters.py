@@ -1,7 +1,5 @@
 """Limiters differ from each other in every kernel that uses one; an unknown code gives nan."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

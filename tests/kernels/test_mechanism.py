@@ -1,7 +1,5 @@
 """Trees of bodies compared with pinocchio: accelerations, mass matrix and energies, from fvsolve's own rates."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference.bodies import pinocchio_of, random_tree

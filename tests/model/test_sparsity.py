@@ -15,7 +15,7 @@ from fvsolve.model import RunData
 from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.steppers import METHODS
 from fvsolve.steppers.integrator import Integrator
-from fvsolve.steppers.run_handle import RATES, addresses, evaluate, open_run
+from fvsolve.steppers.run_handle import RHS_CALL, addresses, evaluate, open_run
 from fvsolve.steppers.structure import KINDS, Structure, differences, multiply
 
 CASES = sorted(folders.CASES.glob("*.toml"))
@@ -131,7 +131,7 @@ def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:
     f, out = slate.evaluate(t, y, np.inf)
     supply = out[at : at + m].copy()
     stepper = Integrator(METHODS["implicit-euler"], n, structure.m, lambda: structure, model.scale.copy())
-    stepper.calls, stepper.out = addresses((model.functions.rhs,) * (RATES + 1)), model.new_out()
+    stepper.calls, stepper.out = addresses((model.functions.rhs,) * (RHS_CALL + 1)), model.new_out()
     stepper.control["ledger_offset"], stepper.jacobian[:] = at, np.nan
     calls = compiled_differences()(slate.handle, stepper.handle(False), t, y, f, supply, np.zeros(n))
     jacobian = stepper.jacobian

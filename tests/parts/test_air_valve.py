@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from reference.air import HEAT, SMALL, bores
+from reference.refusals import refused
 from reference.scenes import AMBIENT, RHO, WATER, area, junction, lake, pipe, reservoir, scene, valve
 from scipy.integrate import solve_ivp
 

@@ -3,6 +3,7 @@
 import pytest
 from parts.test_bodies import parallelogram
 from reference.bodies import Crane, bodies, body, pendulum
+from reference.refusals import refused
 
 import fvsolve
 from fvsolve.case import load

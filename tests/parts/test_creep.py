@@ -5,6 +5,7 @@ import pytest
 from model.test_sparsity import random_state, stray
 from pytest import approx
 from reference import stopped_lines
+from reference.refusals import refused
 from reference.scenes import WATER, area, junction, reservoir, scene
 
 import fvsolve

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from model.test_sparsity import random_state, stray
 from pytest import approx
-from reference import stopped_lines
-from reference.characteristics import Line, Network
+from reference import scenes, stopped_lines
+from reference.characteristics import Line, Network, ValvePipe, darcy, hazen_williams
 from reference.folders import CASES
 from reference.orders import observed_order
 from reference.refusals import refused

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from reference import lifted_valves
+from reference.refusals import refused
 from reference.scenes import RHO, SMOOTH, WATER, chamber, junction, lake, pipe, reservoir, scene, valve
 from scipy.optimize import brentq
 

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from reference import scenes
+from reference import frictionless, scenes
 from reference.frictionless import relative_drop
 from reference.scenes import AMBIENT, RHO, SHARP, WATER, junction, pipe, ramp, reservoir, scene, step, valve
 
@@ -16,7 +16,6 @@ from fvsolve import run
 from fvsolve.assembly.schedule_tables import Schedules
 from fvsolve.case.load import load
 from fvsolve.errors import CaseError
-from fvsolve.exact import rays
 from fvsolve.exact.solution import value
 from fvsolve.kernels.schedule_pieces import piece_slopes, piece_value
 from fvsolve.parts.schedule import Schedule
@@ -189,13 +188,13 @@ def test_valve_pressure_and_flow_are_exact_at_every_step(name):
     schedule, velocity = SCHEDULES[name], 1.0
     result = fvsolve.run(closure(velocity, schedule, LINE_STEP))
     area = flow_area(velocity, schedule)
-    main = rays.Pipe(
+    main = frictionless.Pipe(
         "lake", "gate", LINE_LENGTH, LINE_DIAMETER, LINE_SPEED, velocity * scenes.area(LINE_DIAMETER), AMBIENT + DROP
     )
-    exact = rays.Rays(
+    exact = frictionless.Rays(
         RHO,
         {"main": main},
-        {"lake": rays.held(AMBIENT + DROP)},
+        {"lake": frictionless.held(AMBIENT + DROP)},
         outlets={"gate": (lambda t: area * opening(schedule, t), AMBIENT)},
     )
     pressure = np.array([exact.pressure("gate", float(t)) for t in result.t])

@@ -16,15 +16,15 @@ from fvsolve.kernels.rhs_assembly import PHASES
 from fvsolve.model import RunData
 from fvsolve.solve.run_loop import RunLoop
 
-PIPES = {"pipes", "ghost_cells", "reconstruction", "fused_step"}
+PIPES = {"pipes", "ghost_cells", "reconstruction", "compiled_functions"}
 MASSES = {"mass_dynamics"}
-BODIES = {"body_kinematics", "mass_matrix", "body_layout", "loop_constraints", "force_elements"}
+BODIES = {"body_kinematics", "mass_matrix", "body_layout", "bushings_and_pins"}
 DEVICES = {"check_valve", "regulator", "pump", "accumulator"}
 MEMORY = {"relaxation"}  # of unsteady friction
 IMPLICIT = {"newton", "dirk", "irk", "ros", "structure", "linear_dense", "linear_banded", "linear_sparse"}
 CAVITIES = {"cavitating_pipes", "cavitating_nodes", "riemann"}
 JOBS = (*PHASES, "observe", "record", "events")
-SCALARS = {"scalar_transport", "node_mixing"}
+SCALARS = {"scalar_transport"}
 ALL = SCALARS | PIPES | MASSES | BODIES | DEVICES | MEMORY | CAVITIES | IMPLICIT
 
 
@@ -87,20 +87,20 @@ def test_other_laws_compile_no_more_for_two_tanks(law, compiling):
 
 
 def test_each_room_is_compiled_where_it_is_used(compiling):
-    assert files(fvsolve.build(fvsolve.load(line()))) & ALL == PIPES - {"fused_step"}
+    assert files(fvsolve.build(fvsolve.load(line()))) & ALL == PIPES - {"compiled_functions"}
     found = files(fvsolve.build(fvsolve.load(tanks(method="implicit-euler", step=0.1))))
     assert found & ALL == {"newton", "dirk", "structure", "linear_dense"}
     dyed = line() | {"scalars": {"dye": {}}}
-    assert files(fvsolve.build(fvsolve.load(dyed))) & ALL == PIPES - {"fused_step"} | SCALARS
+    assert files(fvsolve.build(fvsolve.load(dyed))) & ALL == PIPES - {"compiled_functions"} | SCALARS
     log = line() | {"fluid": {"name": "Water", "law": "log"}}
-    assert files(fvsolve.build(fvsolve.load(log))) & ALL == PIPES - {"fused_step"}
+    assert files(fvsolve.build(fvsolve.load(log))) & ALL == PIPES - {"compiled_functions"}
     wet = {**WATER, "law": "mixture", "air_fraction": 1e-6, "cavitation": True}
     found = files(fvsolve.build(fvsolve.load(line(scheme="muscl") | {"fluid": wet})))
     assert found & ALL == CAVITIES | {"reconstruction"}
     cylinder = fvsolve.build(fvsolve.load(CASES / "closed-cylinder.toml"))  # law: log
     assert files(cylinder) & (PIPES | MASSES | BODIES) == MASSES
     arm = fvsolve.build(fvsolve.load(bodies({"arm": pendulum()}, 1.0)))
-    assert files(arm) & BODIES == BODIES - {"loop_constraints", "force_elements"} and not files(arm) & PIPES
+    assert files(arm) & BODIES == BODIES - {"bushings_and_pins"} and not files(arm) & PIPES
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])

@@ -1,7 +1,5 @@
 """Factor on the step for ends of short pipes, with which no pipe and no network grows."""
 
-from __future__ import annotations
-
 from math import factorial
 
 import numpy as np
@@ -87,10 +85,8 @@ def test_a_limiter_bears_a_little_more_than_what_it_is_where_all_is_smooth(limit
         limit = pipe_limit("fromm", "ssp-rk3", cells)
         for factor, grows in ((0.99, False), (1.5, True)):
             h = factor * limit * LENGTH / cells / SPEED
-            nodes, links = (
-                {"lake": lake(50.0), "end": junction()},
-                {"p": pipe("lake", "end", LENGTH, 0.3, SPEED, cells)},
-            )
+            nodes = {"lake": lake(50.0), "end": junction()}
+            links = {"p": pipe("lake", "end", LENGTH, 0.3, SPEED, cells)}
             numerics = {"scheme": "muscl", "limiter": limiter, "method": "ssp-rk3", "step": h}
             model = fvsolve.build(fvsolve.load(scene(nodes, links, 150 * h, numerics, ["lake.pressure"], 0.1)))
             state = fvsolve.initial_state(model)

@@ -1,7 +1,5 @@
 """Courant limits of linear advection on a uniform grid: closed forms, exact steps of exact waves, random schemes."""
 
-from __future__ import annotations
-
 import json
 import math
 import sys
@@ -16,8 +14,14 @@ from reference import folders
 
 from fvsolve.cli import main
 from fvsolve.errors import FvsolveError
-from fvsolve.step_limits.advection_limit import advection_limit, advection_limits, growth_of, limit_of
-from fvsolve.step_limits.polynomial_sign import negative_point, polynomial_value
+from fvsolve.step_limits.advection_limit import (
+    advection_limit,
+    advection_limits,
+    growth_of,
+    limit_of,
+    negative_point,
+    polynomial_value,
+)
 from fvsolve.step_limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
 from fvsolve.steppers import METHODS, analyse, method_named
 from fvsolve.steppers.tableau import tableau
@@ -183,10 +187,8 @@ def test_an_implicit_method_that_is_not_a_stable_has_a_limit(less_implicit):
 
 def brute(weights, method, courant: float) -> float:
     """Greatest |R|^2 - 1 on sampled waves in extended precision."""
-    r, theta = (
-        analyse(method).stability_function,
-        np.concatenate([np.geomspace(1e-4, 0.05, 60), np.linspace(0.05, np.pi, 3000)]),
-    )
+    r = analyse(method).stability_function
+    theta = np.concatenate([np.geomspace(1e-4, 0.05, 60), np.linspace(0.05, np.pi, 3000)])
     wave = np.exp(1j * theta.astype(np.longdouble))
     z = -(1 - 1 / wave) * sum(
         np.longdouble(w.numerator) / w.denominator * wave ** (k - 2) for k, w in enumerate(weights)

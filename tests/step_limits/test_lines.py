@@ -1,7 +1,5 @@
 """Growth of waves between a delay line and a storing node: predictions against reflection factors and runs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from model.test_delay_lines import vessel

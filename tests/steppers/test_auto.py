@@ -1,7 +1,5 @@
 """The method `auto` selects explicit or implicit steps by their cost, and reports each choice."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

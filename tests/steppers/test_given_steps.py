@@ -1,7 +1,5 @@
 """Implicit given steps are solved at their full length, independent of rounding and of the order of the parts."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Factors, solutions and difference quotients of Jacobians for every kind of linear algebra."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Newton's method: counts of its work, solved stages, and errors with time and state of a failure."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One step against equations (14), (23) and (8) of the course, by formulas, SciPy's solver and exact Taylor series."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np
@@ -9,7 +7,7 @@ import pytest
 from scipy.optimize import root
 
 from fvsolve.steppers import METHODS, analyse, integrate, method_named
-from fvsolve.steppers.rosenbrock import Rosenbrock
+from fvsolve.steppers.implicit import Rosenbrock
 
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 EXPLICIT = [name for name in NAMES if METHODS[name].explicit]

@@ -1,7 +1,5 @@
 """Accuracy of rows between steps against that of ends of steps, for every method."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

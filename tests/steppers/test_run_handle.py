@@ -1,7 +1,5 @@
 """Handle of a run: checked arrays, arrays that are replaced between calls, and restart arrays by name."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Compiled steps of stiff problems against theory: damping, ringing, order reduction and dense output."""
 
-from __future__ import annotations
-
 import math
 import re
 

@@ -1,7 +1,5 @@
 """Tableaux: each has the order of its source and not the next, and invalid tableaux are refused."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from math import cos, pi, sqrt
 

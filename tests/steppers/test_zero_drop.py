@@ -1,7 +1,5 @@
 """Implicit steps to a drop of zero: requested number of steps, the parabola of Torricelli, and rest afterwards."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numba import njit

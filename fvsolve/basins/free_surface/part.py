@@ -1,7 +1,5 @@
 """Keys of the case file for water with a free surface, and its output fields."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, ClassVar
 
 import numpy as np

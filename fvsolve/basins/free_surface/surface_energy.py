@@ -1,17 +1,16 @@
 """Power and stored energy of water with a free surface, also between moving walls.
 
 The stored energy per area is rho (g h^2 / 2 + g h z + |q|^2 / (2 h)): depth h [m], elevation z of the bed [m], flow per
-width q [m2/s]. For the rows of the array `power` see `basin_energy`.
+width q [m2/s]. For the rows of the array `power` see `basin_output`.
 """
 
 from math import sqrt
 
-from fvsolve.basins.basin_energy import basin_first_row, rest_potential
-from fvsolve.basins.boundary_cells import flow_weight, patch_area, patch_length, weighted_volume
+from fvsolve.basins.basin_output import basin_first_row, rest_potential
+from fvsolve.basins.basin_patches import flow_weight, patch_area, patch_length, physics_code, weighted_volume
 from fvsolve.basins.free_surface.bed_friction import drag_per_flow
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.moving_walls import area_growth_rate
-from fvsolve.basins.physics_codes import physics_code
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import NO_DRAG
 from fvsolve.kernels.table_handle import open_tables
@@ -46,7 +45,7 @@ def add_power(t, y, dydt, out, handle, power):
 def water_power(st, basin, plane, y, dydt, rows):
     """Write the power of friction to rows[2] and the rate of storage to rows[3] of a basin [W].
 
-    rows : entries of the basin in `power`, see `basin_energy`. Friction is capped as in the rates of the cells.
+    rows : entries of the basin in `power`, see `basin_output`. Friction is capped as in the rates of the cells.
     """
     n, o = basin["n"], basin["y"]
     depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fvsolve.basins.basin_patches import put_inward
-from fvsolve.basins.cell_stretching import fill
+from fvsolve.basins.cell_sides import fill
 from fvsolve.basins.free_surface import surface_rows as rows_of
 from fvsolve.basins.free_surface.surface_rows import EAST, GHOSTS, HIGH, MAX_COLUMNS, NORTH, STRIDE
 from fvsolve.jit import inline, njit
@@ -216,7 +216,7 @@ def grid_rates(grid, begin, stop, states, flows, work, rates, moves):
     Rows are counted over the whole grid; neighbours within the stencil of the scheme are read too.
     grid, flows : `WaterGrid`, `FaceFlows`
     states : deviation of depth from rest [m] and both unit flows [m2/s], three arrays; with moving walls, the changes
-    of their amounts over undeformed areas, see `basins.cell_stretching`; rates : arrays for their rates
+    of their amounts over undeformed areas, see `basins.cell_sides`; rates : arrays for their rates
     work : float64[WORK], fastest if aligned to a cache line; float64[MOVING] if lines move
     moves : None, or the `GridMotion` of moving walls
     """

@@ -2,13 +2,12 @@
 
 from math import inf, sqrt
 
-from fvsolve.basins import boundary_cells as near
+from fvsolve.basins import basin_patches as near
 from fvsolve.basins.basin_frames import potential_coefficients
-from fvsolve.basins.basin_patches import add_link_momentum, normal_gravity
-from fvsolve.basins.basin_probes import FIRST_OWN, velocity_value
-from fvsolve.basins.cell_stretching import deviations_of, stretch_of_cell
+from fvsolve.basins.basin_output import FIRST_OWN, velocity_value
+from fvsolve.basins.basin_patches import add_link_momentum, normal_gravity, physics_code
+from fvsolve.basins.cell_sides import deviations_of, stretch_of_cell
 from fvsolve.basins.free_surface.surface_rows import THIN
-from fvsolve.basins.physics_codes import physics_code
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import CELL_FIELD, GN, PATCH, RATE
 from fvsolve.kernels.restrictions import head_drop

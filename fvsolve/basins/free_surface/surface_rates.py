@@ -3,15 +3,13 @@
 from math import inf
 
 from fvsolve.basins import mesh_blocks
-from fvsolve.basins.basin_patches import needs_rates, normal_gravity, put_open_flows
-from fvsolve.basins.boundary_cells import band_cells
-from fvsolve.basins.cell_stretching import deviations_of
+from fvsolve.basins.basin_patches import band_cells, needs_rates, normal_gravity, physics_code, put_open_flows
+from fvsolve.basins.cell_sides import deviations_of
 from fvsolve.basins.free_surface import surface_grid, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import add_capped_friction, add_friction, damp_flows
 from fvsolve.basins.free_surface.surface_rows import GHOSTS, MAX_COLUMNS
 from fvsolve.basins.moving_meshes import mesh_motion
 from fvsolve.basins.moving_walls import grid_motion
-from fvsolve.basins.physics_codes import physics_code
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels import stage_sums as sums_of
 from fvsolve.kernels.dtypes import NO_DRAG, RATE
@@ -158,7 +156,7 @@ def grid_rates(tables, b, y, rates, out, moves):
     """Write the rates of basin b, whose mesh is a grid; return the greatest rate of its cells [1/s].
 
     rates : as for `add_bed_friction`; moves : None, or the `GridMotion` of moving walls
-    If walls move, the states are those of `basins.cell_stretching`. Flows through faces (for scalars) and boundary
+    If walls move, the states are those of `basins.cell_sides`. Flows through faces (for scalars) and boundary
     faces are written too.
     """
     basin, work, bands = tables.basins[b], tables.work, tables.bands

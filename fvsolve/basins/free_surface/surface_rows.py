@@ -38,7 +38,7 @@ def put_cells(g, depth0, surface0, dh, qx, qy, kx, ky, factors, cells, top):
     g : gravity [m/s2]; depth0, surface0 : depth and surface at rest [m]
     dh, qx, qy : deviation of depth from rest [m], unit flows [m2/s]
     kx, ky : 1 / widths of the columns, 1 / height of the row [1/m]
-    factors : None, or (wide, narrow) of stretching cells, see `basins.cell_stretching`; dh, qx and qy then refer to
+    factors : None, or (wide, narrow) of stretching cells, see `basins.cell_sides`; dh, qx and qy then refer to
     undeformed areas
     top : float64[n]  greatest rate (|u| + c) kx + (|v| + c) ky of each column so far [1/s]
     """

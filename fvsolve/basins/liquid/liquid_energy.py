@@ -2,12 +2,12 @@
 
 The stored energy per volume is P r / rho + a^2 r^2 / (2 rho) + |m|^2 / (2 rho): piezometric pressure P at rest [Pa],
 density rho, its deviation r [kg/m3], wave speed a [m/s], mass-flow density m [kg/(m2 s)]. For the entries of the array
-`power` see `basin_energy`.
+`power` see `basin_output`.
 """
 
-from fvsolve.basins.basin_energy import basin_first_row, rest_potential
+from fvsolve.basins.basin_output import basin_first_row, rest_potential
+from fvsolve.basins.basin_patches import physics_code
 from fvsolve.basins.moving_walls import area_growth_rate, speed_of
-from fvsolve.basins.physics_codes import physics_code
 from fvsolve.jit import njit
 from fvsolve.kernels.table_handle import open_tables
 
@@ -28,7 +28,7 @@ def add_power(t, y, dydt, out, handle, power):
 def liquid_power(st, basin, plane, y, dydt, rows):
     """Write the rate of change of the stored energy of a liquid [W] to rows[3].
 
-    rows : entries of the basin in `power`, see `basin_energy`
+    rows : entries of the basin in `power`, see `basin_output`
     """
     n, o, rest, area = basin["n"], basin["y"], rest_potential(st, basin), plane[basin["drawn"] :]
     rate, square = 0.0, basin["speed"] * basin["speed"]

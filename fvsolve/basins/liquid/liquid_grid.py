@@ -15,7 +15,7 @@ moves : None, or the `GridMotion` of moving walls
 phi : None, or the `Potentials` of the frame of a basin on a body (full momentum flux)
 """
 
-from fvsolve.basins.cell_stretching import fill, stretch_row_rates
+from fvsolve.basins.cell_sides import fill, stretch_row_rates
 from fvsolve.basins.liquid import grid_linear, grid_nonlinear
 from fvsolve.basins.liquid import liquid_sides as sides
 from fvsolve.basins.liquid.liquid_sides import CLOSURE_CELLS, GHOSTS, ring_offset

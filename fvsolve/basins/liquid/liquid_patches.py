@@ -2,12 +2,10 @@
 
 from math import log1p
 
-from fvsolve.basins.basin_patches import add_link_momentum
-from fvsolve.basins.basin_probes import FIRST_OWN, velocity_value
-from fvsolve.basins.boundary_cells import patch_area, patch_length
-from fvsolve.basins.cell_stretching import deviations_of, stretch_of_cell
+from fvsolve.basins.basin_output import FIRST_OWN, velocity_value
+from fvsolve.basins.basin_patches import add_link_momentum, patch_area, patch_length, physics_code
+from fvsolve.basins.cell_sides import deviations_of, stretch_of_cell
 from fvsolve.basins.liquid.riemann_invariants import pressure
-from fvsolve.basins.physics_codes import physics_code
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels.dtypes import CELL_FIELD, LAW_LINEAR, LAW_LOG
 from fvsolve.kernels.table_handle import open_tables

@@ -9,14 +9,12 @@ side the liquid rests in the same axes, with its pressure at rest at their origi
 
 from fvsolve.basins import basin_frames as frames
 from fvsolve.basins import mesh_blocks
-from fvsolve.basins.basin_patches import needs_rates, put_open_flows
-from fvsolve.basins.cell_sides import BLOCK, blocks
-from fvsolve.basins.cell_stretching import deviations_of
+from fvsolve.basins.basin_patches import needs_rates, physics_code, put_open_flows
+from fvsolve.basins.cell_sides import BLOCK, blocks, deviations_of
 from fvsolve.basins.liquid import liquid_grid, liquid_mesh
 from fvsolve.basins.liquid.liquid_sides import LiquidGrid, LiquidScheme, Potentials, side_kinds
 from fvsolve.basins.moving_meshes import mesh_motion
 from fvsolve.basins.moving_walls import grid_motion
-from fvsolve.basins.physics_codes import physics_code
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels import stage_sums as sums_of
 from fvsolve.kernels.dtypes import RATE
@@ -46,7 +44,7 @@ def rates_of(tables, basin, dydt):
     """Arrays to which the rates of the three states of cells are written.
 
     If `dydt` is empty, they are work arrays, which only `frame_forces.add_frame_forces` reads. If walls move, the rates
-    are those of the states of `basins.cell_stretching`.
+    are those of the states of `basins.cell_sides`.
     """
     n, (to, first) = basin["n"], (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["boundary_rates"])
     return to[first : first + n], to[first + n : first + 2 * n], to[first + 2 * n : first + 3 * n]

@@ -1,7 +1,5 @@
 """Keys of the case file for a liquid between two plates, and its output fields."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.basin import VELOCITY_FIELDS, Physics, VelocityStart

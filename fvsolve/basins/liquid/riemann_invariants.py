@@ -5,7 +5,7 @@ rest. A table contains
     1/dr, first interval, number of further intervals, offset, 1/dw, first interval, number of further intervals, offset
 for grids of steps dr and dw, and four coefficients of s in [0, 1] per interval: of w over r, then of r and of p over w.
 Intervals are counted from rest, where all values are exactly 0. The first and the last interval are straight and have
-no end. `lower_invariants` builds the table.
+no end. `lower` builds the table.
 """
 
 from math import sqrt

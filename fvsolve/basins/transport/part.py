@@ -1,7 +1,5 @@
 """Keys of the case file for scalars in a given velocity."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar

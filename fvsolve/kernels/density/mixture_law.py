@@ -14,7 +14,7 @@ root of a quadratic.
 from math import exp, log, sqrt
 
 from fvsolve.jit import inline
-from fvsolve.kernels.density.no_inline import law_njit, prevent_inlining
+from fvsolve.kernels.calls import law_njit, prevent_inlining
 
 
 @law_njit

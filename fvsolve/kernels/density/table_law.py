@@ -6,7 +6,7 @@ Beyond both ends of the table ln(rho / rho_ref) is linear in pressure, and the e
 from math import exp, expm1
 
 from fvsolve.jit import njit
-from fvsolve.kernels.density.no_inline import law_njit, prevent_inlining
+from fvsolve.kernels.calls import law_njit, prevent_inlining
 
 
 @njit(forceinline=True)

@@ -147,10 +147,8 @@ def pipe_energy_rate(y, dydt, out, tables, k, here):
     """Rate of the energy of pipe k that is due to the motion of its body [W]."""
     r, t, length = fluid.pipe_segment(tables, k)
     z, rise = end_heights(tables, tables.pipes[k], length)
-    (m, flow), (d, rate) = (
-        fluid.pipe_moments(tables, y, k, length, 1.0),
-        fluid.pipe_moments(tables, dydt, k, length, 0.0),
-    )
+    (m, flow) = fluid.pipe_moments(tables, y, k, length, 1.0)
+    (d, rate) = fluid.pipe_moments(tables, dydt, k, length, 0.0)
     total = segment_energy_rate(tables, out, here, (r, t, m), d, z, rise)
     total += path_energy_rate(tables, out, here, fluid.straight_path(r, t), fluid.ZERO_FLOW_PATH, flow, rate)
     for right in range(2):

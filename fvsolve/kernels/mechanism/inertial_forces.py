@@ -10,7 +10,7 @@ equation ((70) of docs/course.md) for fluid that slides along a given path. Cori
 path. The initial steady state already balances the part of gravity at the start.
 
 First the rates of flow are computed for q'' = 0; q'' are the accelerations of the degrees of freedom of bodies. Then
-q'' is solved with the fluid loads (`fluid_loads`) and with the inertia of the fluid (`fluid_inertia`). Last, the rates
+q'' is solved with the fluid loads (`fluid_loads`) and with the inertia of the fluid (`fluid_loads`). Last, the rates
 of flow are corrected for q''.
 """
 

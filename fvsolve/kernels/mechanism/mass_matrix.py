@@ -19,7 +19,7 @@ from fvsolve.kernels.mass_dynamics import push_stiffness
 from fvsolve.kernels.mechanism import body_kinematics as kinematics
 from fvsolve.kernels.mechanism import body_layout as layout
 from fvsolve.kernels.mechanism.body_layout import body_row, freedom_path, nearest_free_body
-from fvsolve.kernels.mechanism.fluid_inertia import add_basin_inertia, add_fluid_inertia
+from fvsolve.kernels.mechanism.fluid_loads import add_basin_inertia, add_fluid_inertia
 from fvsolve.kernels.mechanism.vectors import (
     cross,
     dot,

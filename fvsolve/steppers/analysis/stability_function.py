@@ -1,7 +1,5 @@
 """Stability function R(s) of a method in exact arithmetic: a step h of y' = lambda y gives R(s) y with s = h lambda."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass

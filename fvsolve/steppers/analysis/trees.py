@@ -1,7 +1,5 @@
 """Order conditions of Runge-Kutta and Rosenbrock methods by rooted trees (Butcher 1963)."""
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Sequence

@@ -27,7 +27,7 @@ from fvsolve.schemes import LIMITED, LIMITERS, branches
 from fvsolve.step_limits.advection_limit import AdvectionLimit, limit_of
 from fvsolve.step_limits.symbol import WEIGHTS, symbol, weights_of
 from fvsolve.steppers import loop_records
-from fvsolve.steppers.analysis.method_facts import analyse
+from fvsolve.steppers.analysis.stability_properties import analyse
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.ode import observers
 from fvsolve.steppers.structure import Structure
