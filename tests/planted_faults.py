@@ -149,7 +149,7 @@ FAULTS = [
         "rho * (n * p * compressibility * (total - volume) - volume)",
     ),
     Fault("parts/tank.py", "0.5 * s * (area[k + 1] - area[k])", "0.505 * s * (area[k + 1] - area[k])"),
-    Fault("parts/pump/law_curve.py", "residual = drop + weight * head", "residual = drop + 1.01 * weight * head"),
+    Fault("parts/pump/law.py", "residual = drop + weight * head", "residual = drop + 1.01 * weight * head"),
     Fault("run/verdicts.py", "compare.t + compare.shift", "compare.t - compare.shift"),
     Fault("epanet/part_tables.py", "2.0 * GRAVITY * drop / velocity**2", "2.02 * GRAVITY * drop / velocity**2"),
     Fault("solve/run_summary.py", 'row["inflow"] - row["outflow"] for name', 'row["inflow"] + row["outflow"] for name'),
