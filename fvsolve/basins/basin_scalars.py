@@ -10,7 +10,7 @@ from math import cos, pi
 from fvsolve.basins import advection, fifth_order
 from fvsolve.basins.advection import THIN, AdvectionGrid, GridFlows
 from fvsolve.basins.advection_faces import MeshFlows, advection_rates
-from fvsolve.basins.basin_patches import flow_weight, has_given_flows, patch_inflow, stencil_cells, weighted_volume
+from fvsolve.basins.boundary_cells import flow_weight, has_given_flows, patch_inflow, stencil_cells, weighted_volume
 from fvsolve.basins.cell_sides import deviations_of
 from fvsolve.jit import njit
 from fvsolve.kernels import stage_sums

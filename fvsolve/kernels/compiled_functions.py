@@ -173,10 +173,7 @@ def compile_readers(cast: ModelFeatures) -> tuple:
 @compile_once
 def fused_step_function(needed: bool):
     """Compiled combined step of upwind scheme and Euler method if `needed`, else a placeholder with equal arguments."""
-    step_function = unused_step
-    if needed:
-        from fvsolve.kernels.compiled_functions import fused_step_linear as step_function
-    return calls.compile_as(step_function, "ttVVVHV")
+    return calls.compile_as(fused_step_linear if needed else unused_step, "ttVVVHV")
 
 
 @njit

@@ -442,7 +442,7 @@ def test_a_folder_that_cannot_be_written_is_named(monkeypatch, fvs, tmp_path):
         ("linearise", "chamber-chain"),
         ("stability", "--scheme", "upwind"),
     ):
-        code, _, err = fvs(*command.split(), "--out", "taken")
+        code, _, err = fvs(*command, "--out", "taken")
         assert code == 2 and "taken: cannot be written" in err
 
 

@@ -7,7 +7,8 @@ width q [m2/s]. For the rows of the array `power` see `basin_output`.
 from math import sqrt
 
 from fvsolve.basins.basin_output import basin_first_row, rest_potential
-from fvsolve.basins.basin_patches import flow_weight, patch_area, patch_length, physics_code, weighted_volume
+from fvsolve.basins.basin_patches import physics_code
+from fvsolve.basins.boundary_cells import flow_weight, patch_area, patch_length, weighted_volume
 from fvsolve.basins.free_surface.bed_friction import drag_per_flow
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.moving_walls import area_growth_rate

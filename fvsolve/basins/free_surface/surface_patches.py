@@ -2,7 +2,7 @@
 
 from math import inf, sqrt
 
-from fvsolve.basins import basin_patches as near
+from fvsolve.basins import boundary_cells as near
 from fvsolve.basins.basin_frames import potential_coefficients
 from fvsolve.basins.basin_output import FIRST_OWN, velocity_value
 from fvsolve.basins.basin_patches import add_link_momentum, normal_gravity, physics_code

@@ -3,7 +3,8 @@
 from math import inf
 
 from fvsolve.basins import mesh_blocks
-from fvsolve.basins.basin_patches import band_cells, needs_rates, normal_gravity, physics_code, put_open_flows
+from fvsolve.basins.basin_patches import needs_rates, normal_gravity, physics_code, put_open_flows
+from fvsolve.basins.boundary_cells import band_cells
 from fvsolve.basins.cell_sides import deviations_of
 from fvsolve.basins.free_surface import surface_grid, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import add_capped_friction, add_friction, damp_flows

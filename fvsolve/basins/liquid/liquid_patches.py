@@ -3,7 +3,8 @@
 from math import log1p
 
 from fvsolve.basins.basin_output import FIRST_OWN, velocity_value
-from fvsolve.basins.basin_patches import add_link_momentum, patch_area, patch_length, physics_code
+from fvsolve.basins.basin_patches import add_link_momentum, physics_code
+from fvsolve.basins.boundary_cells import patch_area, patch_length
 from fvsolve.basins.cell_sides import deviations_of, stretch_of_cell
 from fvsolve.basins.liquid.riemann_invariants import pressure
 from fvsolve.jit import njit, specialise
