@@ -14,7 +14,7 @@ from pathlib import Path
 import hypothesis
 import pytest
 from hypothesis_profiles import NEW, fix_constants
-from tally import Tally
+from tally import Tally, unknown_names
 
 from fvsolve.steppers.tableau import METHODS
 
@@ -60,7 +60,7 @@ def pytest_collection_modifyitems(config, items):
         hypothesis.seed(zlib.crc32(item.originalname.encode()))(item.function)
     quick = {item for item in items if item.nodeid not in SLOW}
     if config.stash[TIER] != "full":
-        config.stash[TALLY].names["unknown"] = {*SLOW} - {item.nodeid for item in items}
+        config.stash[TALLY].names["unknown"] = unknown_names(SLOW, [item.nodeid for item in items])
     chosen = {"quick": quick, "rest": {*items} - quick | drawing, "full": {*items}}[config.stash[TIER]]
     config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
     items[:] = [item for item in items if item in chosen]

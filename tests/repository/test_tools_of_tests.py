@@ -20,7 +20,7 @@ from hypothesis.internal.conjecture import providers
 from hypothesis_profiles import examples
 from reference import folders
 from reference.scenes import lake, pipe, reservoir, scene
-from tally import Tally, expected
+from tally import Tally, expected, unknown_names
 
 import fvsolve
 
@@ -46,6 +46,14 @@ def test_a_listed_test_that_is_not_there_is_named():
     tally = Tally()
     tally.add({kind: sorted(names) for kind, names in expected().items()} | {"unknown": ["tests/a.py::test_gone"]})
     assert tally.missing() == ["tests/durations.json: tests/a.py::test_gone is not a test"]
+
+
+def test_only_tests_that_cannot_be_missing_for_want_of_a_library_are_unknown():
+    """A file without collected tests needs an optional library; a file that is gone or collected has no such reason."""
+    here = "tests/repository/test_tools_of_tests.py"
+    listed = {f"{here}::test_a": 1.0, f"{here}::test_gone": 1.0, "tests/gone.py::test_b": 1.0}
+    listed |= {"tests/solve/test_ranks.py::test_ranks": 1.0}
+    assert unknown_names(listed, [f"{here}::test_a"]) == {f"{here}::test_gone", "tests/gone.py::test_b"}
 
 
 def test_a_run_counts_its_parts_scheme_method_and_law(request):
