@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.compile.cache_folders import code_folder, warn_not_cached
-from fvsolve.compile.store import Code
+from fvsolve.compile.store import IN_USE, Code
 
 DIGEST = hashlib.sha256().digest_size
-LOADED_CODE: dict[str, bytes] = {}  # machine code that numba has loaded from its cache, by the symbol of the function
+LOADED_CODE: dict[str, bytes] = {}  # machine code that numba has loaded and the store lacks, by its symbol
 CACHE_DIR_LOCK = threading.Lock()  # locked while numba's cache folder is set
 
 
@@ -89,7 +89,8 @@ def cache_file_class() -> type:
             if hashlib.sha256(data).digest() != digest:
                 raise OSError(f"{name} is damaged")  # numba then compiles it again
             content = pickle.loads(data)
-            (_, _, (LOADED_CODE[content[1].llvm_func_name], _)), *_ = content  # LLVM does not return it later
+            if IN_USE:  # LLVM does not return it later
+                (_, _, (LOADED_CODE[content[1].llvm_func_name], _)), *_ = content
             return content
 
         def _save_data(self, name: str, data: Any) -> None:
