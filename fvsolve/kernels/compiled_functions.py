@@ -1,89 +1,10 @@
-"""Compiled functions of a model for the stepper, compiled at first use, and the fused step of upwind scheme and Euler.
-
-The fused step is that of the upwind scheme and the Euler method under the linear density law. The loop of
-`steppers.time_loop` passes over all cells separately for rates, sums, envelope and the search for NaN. Here a block of
-cells is advanced and compared with the envelope while it lies in the cache. The operations and their order are equal,
-so the results agree to the bit.
-"""
+"""Compiled functions of a model for the stepper, compiled at first use."""
 
 import functools
 
 from fvsolve.jit import compile_in_parallel, compile_once, njit
 from fvsolve.kernels import calls
-from fvsolve.kernels.calls import RHS, run_job
-from fvsolve.kernels.dtypes import NOT_FINITE, STATUS
-from fvsolve.kernels.observation import observe_linear, record_nodes, update_envelope
 from fvsolve.kernels.rhs_assembly import CLOSING, PHASES, ModelFeatures
-from fvsolve.kernels.table_handle import open_tables
-
-BLOCK = 512
-
-
-@njit
-def fused_cells(h, k, flow, half, base, r, l, r_new, l_new, least, greatest):
-    """Advance a block of n pipe cells by the step h [s]; return the numbers of cells below and above their envelope.
-
-    k : wave speed over cell length [1/s]
-    flow : initial steady mass flow [kg/s]
-    half : half of the friction coefficient of |M| M [1/kg]; base : half of the initial steady drag [kg/s2]
-    r, l : float64[n + 1]  waves [kg/s]; r starts with the cell before the block, l ends with the cell behind it
-    r_new, l_new : float64[n]  receive the new waves [kg/s]
-    least, greatest : float64[n]  envelope of r + l [kg/s]
-    NaN counts as below and above, so the search for it costs nothing.
-    """
-    here, beyond, low, high = r[1:], l[1:], 0, 0
-    for i in range(r_new.size):
-        m = flow + (here[i] - l[i])
-        s = half * (abs(m) * m) - base
-        a = here[i] + h * (-k * (here[i] - r[i]) - s)
-        b = l[i] + h * (k * (beyond[i] - l[i]) + s)
-        r_new[i], l_new[i] = a, b
-        low += not a + b >= least[i]
-        high += not a + b <= greatest[i]
-    return low, high
-
-
-@njit
-def fused_block(t, h, pipe, index, at, r, l, r_new, l_new, tables):
-    """Advance cells of pipe number `index` from cell `at` on and update their envelope; return 0 if all are finite.
-
-    t : time after the step [s]; h : step [s]
-    r, l, r_new, l_new : waves before and after the step, see `fused_cells`
-    """
-    e, a, b = tables.envelope, pipe["cell"] + at, pipe["cell"] + at + r_new.size
-    k, half, base = pipe["speed"] / pipe["dx"], 0.5 * pipe["loss"], 0.5 * pipe["drag"]
-    low, high = fused_cells(h, k, pipe["flow"], half, base, r, l, r_new, l_new, e[0, a:b], e[2, a:b])
-    return update_envelope(t, r_new, l_new, a, low, high, index, tables) if low + high > 0 else 0
-
-
-@njit
-def fused_step_linear(t, h, y, y_new, out, handle, values):
-    """Advance y by the step h to y_new at time t, by the upwind scheme and Euler; update `out`, probes and records.
-
-    On entry `out` holds the solved nodes of y. The function is valid for models whose states are only those of pipes,
-    without friction or with a given friction factor. `values` receives the values of probes. STATUS is set to
-    NOT_FINITE if a value is not finite.
-    """
-    tables = open_tables(handle)
-    pipes, pad, bad = tables.pipes, tables.scratch[:4], 0
-    for index in range(pipes.size):
-        pipe = pipes[index]
-        n, o, ends = pipe["cells"], pipe["y"], tables.layout[0]["ends"] + 4 * index
-        r, l, r_new, l_new = y[o : o + n], y[o + n : o + 2 * n], y_new[o : o + n], y_new[o + n : o + 2 * n]
-        for side in range(2):  # the cells at the ends, whose neighbours are nodes
-            i = side * (n - 1)
-            pad[0], pad[1] = out[ends] if i == 0 else r[i - 1], r[i]
-            pad[2], pad[3] = l[i], out[ends + 3] if i == n - 1 else l[i + 1]
-            bad += fused_block(t, h, pipe, index, i, pad[:2], pad[2:], r_new[i : i + 1], l_new[i : i + 1], tables)
-        for i in range(1, n - 1, BLOCK):
-            j = min(i + BLOCK, n - 1)
-            bad += fused_block(t, h, pipe, index, i, r[i - 1 : j], l[i : j + 1], r_new[i:j], l_new[i:j], tables)
-    run_job(RHS, t, y_new, y_new[:0], out, handle)
-    observe_linear(t, y_new, out, handle, values)
-    record_nodes(t, y_new, out, handle, values)
-    if bad > 0:
-        out[STATUS] = NOT_FINITE
-
 
 READER_IMPORTS = (
     "from fvsolve.kernels.rhs_assembly import ModelFeatures, RhsTerms; "
@@ -173,7 +94,10 @@ def compile_readers(cast: ModelFeatures) -> tuple:
 @compile_once
 def fused_step_function(needed: bool):
     """Compiled combined step of upwind scheme and Euler method if `needed`, else a placeholder with equal arguments."""
-    return calls.compile_as(fused_step_linear if needed else unused_step, "ttVVVHV")
+    step_function = unused_step
+    if needed:
+        from fvsolve.kernels.fused_step import fused_step_linear as step_function
+    return calls.compile_as(step_function, "ttVVVHV")
 
 
 @njit

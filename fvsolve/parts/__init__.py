@@ -6,7 +6,7 @@ from pathlib import Path
 from fvsolve.parts.basin import Basin
 from fvsolve.parts.body_links import Torque
 from fvsolve.parts.carried_scalar import Scalar
-from fvsolve.parts.conduit import Friction, RigidColumn
+from fvsolve.parts.conduit import Friction
 from fvsolve.parts.cylinder import Cylinder
 from fvsolve.parts.hydraulic_nodes import Chamber, Inflow, Junction, Reservoir
 from fvsolve.parts.nodes_and_links import Link, Node
@@ -14,6 +14,7 @@ from fvsolve.parts.outlet.part import Leak
 from fvsolve.parts.pipe.part import Pipe
 from fvsolve.parts.pipe.pipe_wall import Wall
 from fvsolve.parts.plugins import declare_installed
+from fvsolve.parts.rigid_column import RigidColumn
 from fvsolve.parts.schedule import Schedule
 from fvsolve.parts.tank import AreaTable, Tank
 from fvsolve.parts.translational import Damper, EndStop, Force, Frame, Mass, Spring

@@ -16,7 +16,7 @@ from fvsolve.kernels.rhs_assembly import PHASES
 from fvsolve.model import RunData
 from fvsolve.solve.run_loop import RunLoop
 
-PIPES = {"pipes", "ghost_cells", "reconstruction", "compiled_functions"}
+PIPES = {"pipes", "ghost_cells", "reconstruction", "fused_step"}
 MASSES = {"mass_dynamics"}
 BODIES = {"body_kinematics", "mass_matrix", "body_layout", "bushings_and_pins"}
 DEVICES = {"check_valve", "regulator", "pump", "accumulator"}
@@ -87,13 +87,13 @@ def test_other_laws_compile_no_more_for_two_tanks(law, compiling):
 
 
 def test_each_room_is_compiled_where_it_is_used(compiling):
-    assert files(fvsolve.build(fvsolve.load(line()))) & ALL == PIPES - {"compiled_functions"}
+    assert files(fvsolve.build(fvsolve.load(line()))) & ALL == PIPES - {"fused_step"}
     found = files(fvsolve.build(fvsolve.load(tanks(method="implicit-euler", step=0.1))))
     assert found & ALL == {"newton", "dirk", "structure", "linear_dense"}
     dyed = line() | {"scalars": {"dye": {}}}
-    assert files(fvsolve.build(fvsolve.load(dyed))) & ALL == PIPES - {"compiled_functions"} | SCALARS
+    assert files(fvsolve.build(fvsolve.load(dyed))) & ALL == PIPES - {"fused_step"} | SCALARS
     log = line() | {"fluid": {"name": "Water", "law": "log"}}
-    assert files(fvsolve.build(fvsolve.load(log))) & ALL == PIPES - {"compiled_functions"}
+    assert files(fvsolve.build(fvsolve.load(log))) & ALL == PIPES - {"fused_step"}
     wet = {**WATER, "law": "mixture", "air_fraction": 1e-6, "cavitation": True}
     found = files(fvsolve.build(fvsolve.load(line(scheme="muscl") | {"fluid": wet})))
     assert found & ALL == CAVITIES | {"reconstruction"}

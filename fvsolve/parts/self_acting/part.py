@@ -161,7 +161,10 @@ class ReliefValve(Disc, Sized, TwoPort, kind="relief-valve"):
 
 
 STROKES = UsualRange(1e-4, 1e5, "servo valves to motor drives")
-BANDS = UsualRange(20.0, 1e8, "millimetres of water to servo valves")
+BAND = Quantity(
+    "pressure_drop", positive, "pressure error that moves the valve over its stroke in one time constant [Pa]",
+    UsualRange(20.0, 1e8, "millimetres of water to servo valves"),
+)  # fmt: skip
 
 
 class Regulating(Sized, TwoPort):
@@ -183,10 +186,7 @@ class PressureReducing(Regulating, kind="pressure-reducing"):
     """
 
     set_pressure: Annotated[Schedule, Scheduled("pressure", about="set pressure at `to` [Pa]")]
-    band: Annotated[float, Quantity(
-        "pressure_drop", positive, "pressure error that moves the valve over its stroke in one time constant [Pa]",
-        BANDS,
-    )] = 1e5  # fmt: skip
+    band: Annotated[float, BAND] = 1e5
 
 
 class PressureSustaining(Regulating, kind="pressure-sustaining"):
@@ -197,10 +197,7 @@ class PressureSustaining(Regulating, kind="pressure-sustaining"):
     """
 
     set_pressure: Annotated[Schedule, Scheduled("pressure", about="set pressure at `from` [Pa]")]
-    band: Annotated[float, Quantity(
-        "pressure_drop", positive, "pressure error that moves the valve over its stroke in one time constant [Pa]",
-        BANDS,
-    )] = 1e5  # fmt: skip
+    band: Annotated[float, BAND] = 1e5
 
 
 class FlowControl(Regulating, kind="flow-control"):
