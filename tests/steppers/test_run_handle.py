@@ -70,7 +70,9 @@ def test_restart_arrays_by_name_continue_to_the_same_bits(method):
 VALVES = ("air-valve", "check-valve-slam", "pressure-reducing", "relief-on-closed-main", "surge-tank", "two-tanks")
 
 
-@pytest.mark.parametrize("name", [*VALVES, "cylinder-servo", "four-bar", "hydropower", "pump-trip", "tumbling-body"])
+@pytest.mark.parametrize(
+    "name", [*VALVES, "cylinder-servo", "anti-roll-tank", "four-bar", "hydropower", "pump-trip", "tumbling-body"]
+)
 def test_a_stage_without_the_rate_limit_has_the_same_rates(name):
     """The limit of the step is left out at all stages of a step but the first; nothing else depends on it."""
     model = fvsolve.build(fvsolve.load(CASES / f"{name}.toml"))

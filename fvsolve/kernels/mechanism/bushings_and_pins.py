@@ -158,6 +158,8 @@ def bushing_rate_limit(t, y, dydt, out, handle):
 
     The factored mass matrix must be in `scratch`.
     """
+    if out[RATE] == RATE_UNWANTED:
+        return
     tables = open_tables(handle)
     bushings, at = tables.bushings, 7 * tables.freedoms.size
     stiffness, damping, none = 0.0, 0.0, (0.0, 0.0, 0.0)

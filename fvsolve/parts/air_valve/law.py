@@ -16,7 +16,7 @@ from math import expm1, log1p, sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
-from fvsolve.kernels.dtypes import LAW_LINEAR, RATE
+from fvsolve.kernels.dtypes import LAW_LINEAR, RATE, RATE_UNWANTED
 from fvsolve.kernels.network_energy import vessel_power
 from fvsolve.kernels.restrictions import flow_at_drop, restriction_slope
 from fvsolve.kernels.self_acting_valves import event_pair
@@ -133,7 +133,8 @@ def air_rate(y, tables, device):
 def move(t, y, dydt, out, tables, device):
     """Write the rate of the air mass in the chamber to `dydt`, and raise out[RATE] to the rate limit of the valve."""
     flow, rate, _ = air_rate(y, tables, device)
-    out[RATE] = max(out[RATE], rate, fluid_rate_limit(out, tables, device))
+    if out[RATE] != RATE_UNWANTED:
+        out[RATE] = max(out[RATE], rate, fluid_rate_limit(out, tables, device))
     if dydt.size > 0:
         dydt[device["y"]] = flow
 
