@@ -162,6 +162,54 @@ def parse(given: Any, dimension: str) -> Any:
     return value
 
 
+def parse_ratio(given: Any, over: str, under: str) -> float:
+    """SI value of a bare number, or of text with a number and a unit of the dimension `over` per dimension `under`.
+
+    Raises ValueError with the unit expected.
+    """
+    if not isinstance(given, str):
+        value = _parse_number(given, "number")
+    else:
+        import pint
+
+        si, match = f"{DIMENSIONS[over].si} / ({DIMENSIONS[under].si})", _NUMBER.fullmatch(given)
+        wanted = f"expected a number in {_readable(over, under)}"
+        if match is None:
+            raise ValueError(f"{show(given)} is not a number with a unit; {wanted}")
+        number, spelling = match[1], _canonical(match[2])
+        bare = spelling.removeprefix("1/")
+        if spelling and not _SAFE_SPELLING.fullmatch(bare):
+            raise ValueError(f"{show(given)}: unknown unit {show(spelling)}; {wanted}")
+        registry = pint.get_application_registry()
+        try:
+            unit = registry.Quantity(1.0, registry.parse_units(_for_pint(bare))) if bare else registry.Quantity(1.0)
+        except Exception:  # pint raises errors of many families
+            raise ValueError(f"{show(given)}: unknown unit {show(spelling)}; {wanted}") from None
+        unit = 1.0 / unit if bare != spelling else unit
+        expected_unit = registry.Quantity(1.0, registry.parse_units(_for_pint(si)))
+        if unit.dimensionality != expected_unit.dimensionality:
+            raise ValueError(f"{show(given)} has the unit {spelling or '1'}; {wanted}")
+        value = float(number) * float(unit.to_base_units().magnitude)
+    if not math.isfinite(value) or abs(value) > MAX_NUMBER:
+        raise ValueError(f"{show(given)} is not a usable number; expected a finite number")
+    return value
+
+
+def _readable(over: str, under: str) -> str:
+    """Unit of the dimension `over` per dimension `under`, such as "1/m" or "m3/s per Pa"."""
+    top, bottom = DIMENSIONS[over].si, DIMENSIONS[under].si
+    if bottom == "-":
+        return top if top != "-" else "1, without a unit"
+    return f"1/{bottom}" if top == "-" and " " not in bottom and "/" not in bottom else f"{top} per {bottom}"
+
+
+def _for_pint(spelling: str) -> str:
+    """Spelling of a unit for pint: `m3/s / (N m)` is `m**3/s/(N*m)`."""
+    text = re.sub(r"\s*/\s*", "/", spelling.replace("-", "1") if spelling.startswith("-") else spelling)
+    text = re.sub(r"([A-Za-z])(-?\d)", r"\1**\2", text.replace("(-)", "1"))
+    return re.sub(r"(?<=[\w)]) +(?=[\w(])", "*", text)
+
+
 class Kinematic(float):
     """A kinematic viscosity [m2/s], not yet multiplied by a density."""
 

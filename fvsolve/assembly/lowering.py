@@ -63,6 +63,7 @@ class Input(NamedTuple):
     node: int = -1  # node, for a pressure or head
     other: int = -1  # for a value with a sign, the schedule of its negative part
     scalar: int = -1  # scalar whose value flows in
+    control: int = -1  # block whose output it is, in place of a schedule
 
 
 def opening_input(model, name: str) -> dict[str, Input]:

@@ -235,6 +235,10 @@ class ModelDraft:
     wall_table: np.ndarray = no_rows(rec.WALL)
     delay_table: np.ndarray = no_rows(rec.DELAY)
     probe_table: np.ndarray = no_rows(rec.PROBE)
+    control_table: np.ndarray = no_rows(rec.CONTROL)
+    sensor_table: np.ndarray = no_rows(rec.PROBE)
+    driven_table: np.ndarray = no_rows(rec.DRIVEN)
+    sensors: list[Any] = field(default_factory=list)  # probes that blocks of `controls` read
 
     # results of the start
     # piston -> sides whose closed chambers may support a load
@@ -251,6 +255,7 @@ class ModelDraft:
         self.fluid, self.hydraulics = case.properties, Hydraulics(case)
         self.warnings += case.notices
         self.links = links_by_table(case)
+        self.schedules.events = self.events
         self.schedules.span = case.numerics.start, case.numerics.end
         self.node_index = {name: i for i, name in enumerate(case.places)}
         self.owned = {f"{name}.{place}" for name, link in case.links.items() for place in link.owns}

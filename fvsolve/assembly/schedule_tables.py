@@ -1,11 +1,22 @@
 """Schedules as pieces (polynomial, power, wave) for kernels, and the times at which steps must end."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from fvsolve.kernels.dtypes import PIECE_COLUMNS, SCHEDULE
-from fvsolve.kernels.schedule_pieces import CREST, POWER, WAVE
+from fvsolve.kernels.formula_programs import FLAG, STEPS, program_slopes, run_program
+from fvsolve.kernels.schedule_pieces import (
+    BLOCK,
+    BLOCK_PART,
+    CREST,
+    FORMULA,
+    POWER,
+    WAVE,
+    piece_at,
+    piece_slopes,
+    value_with_limit,
+)
 
 STEPS_PER_PERIOD = 8  # least number of steps in a period
 SAMPLED = 32  # schedules with more entries are samples of a smooth function
@@ -16,11 +27,14 @@ SAMPLE_KINK = 0.2  # for samples, change of slope, relative to the greatest slop
 class Schedules:
     """Table of all schedules of a model, filled one by one.
 
-    span : time span in which kinks of periodic schedules are listed [s]
+    span : time span in which kinks of periodic schedules are listed [s]; blocks : name of a block -> its number
     """
 
     span: tuple[float, float] = (0.0, 0.0)
 
+    blocks: dict[str, int] = field(default_factory=dict)
+    events: list[tuple[str, str]] = field(default_factory=list)  # those of the model, as for `ModelDraft`
+    stack: int = 1  # size of the work array of formulas
     records: list[tuple[int, int]] = field(default_factory=list)
     rows: list[list[float]] = field(default_factory=list)
     breaks: dict[float, bool] = field(default_factory=dict)  # time -> True if a value jumps
@@ -39,6 +53,10 @@ class Schedules:
         """Add a schedule with the value scale * value + offset; return its index."""
         if schedule.kind == "constant":
             return self.add_constant(schedule.first * scale + offset)
+        if schedule.kind == "control":
+            return self.add_block(schedule, BLOCK, scale, offset)
+        if schedule.kind == "formula":
+            return self.add_formula(schedule, scale, offset)
         table = schedule_pieces(schedule)
         table[:, 3:] = scaled(table, scale, offset)
         pieces = table.tolist()
@@ -57,6 +75,10 @@ class Schedules:
 
         It has kinks where the value is zero; steps must end there.
         """
+        if schedule.kind == "control":
+            return self.add_block(schedule, BLOCK_PART, side, 0.0)
+        if schedule.kind == "formula":
+            return self.add_formula(replace(schedule, program=schedule.program.positive_part(side)), 1.0, 0.0)
         index = self.add(schedule, side)
         first, count = self.records[index]
         if schedule.kind == "harmonic":
@@ -69,10 +91,66 @@ class Schedules:
             self.breaks.setdefault(time, False)
         return index
 
-    def tables(self) -> tuple[np.ndarray, np.ndarray]:
-        """Arrays that kernels read : (first piece and number of pieces of each schedule, float64[pieces, 7])."""
+    def add_block(self, schedule, kind: float, scale: float, offset: float) -> int:
+        """Add a schedule that follows a block, kind BLOCK or BLOCK_PART; return its index."""
+        self.records.append((len(self.rows), 0))
+        number = float(self.blocks[schedule.origin["control"]])
+        self.rows.append([-np.inf, kind, number, scale, offset, 0.0, 0.0])
+        return len(self.records) - 1
+
+    def add_formula(self, schedule, scale: float, offset: float) -> int:
+        """Add a formula of time with the value scale * value + offset; return its index."""
+        first = self.add_program(schedule.program, scale, offset)
+        self.records.append((first, -1))
+        for time, jump in schedule.program.breaks():
+            self.breaks[time] = self.breaks.get(time, False) or jump
+        times, values = schedule.program.samples(*self.span)
+        turns = times[1:-1][np.diff(np.sign(np.diff(values))) != 0.0]
+        gaps = np.diff(turns)
+        if gaps[gaps > 0.0].size:  # two turns in a period
+            self.spacing = min(self.spacing, 2.0 * float(np.median(gaps[gaps > 0.0])) / STEPS_PER_PERIOD)
+        return len(self.records) - 1
+
+    def add_program(self, program, scale: float = 1.0, offset: float = 0.0) -> int:
+        """Add the steps of a formula, with its event functions; return its header row."""
+        first, flag = len(self.rows), len(self.events)
+        self.rows += program.rows(scale, offset, flag, FORMULA)
+        self.events += [(program.text, "")] * 2 * program.kinks
+        self.stack = max(self.stack, program.stack_size)
+        return first
+
+    def tables(self, flags: int) -> tuple[np.ndarray, np.ndarray]:
+        """Arrays that kernels read : (first piece and number of pieces of each schedule, float64[pieces, 7]).
+
+        flags : number of event flags before those of `events`
+        """
         rows = np.array(self.rows, dtype=np.float64).reshape(-1, PIECE_COLUMNS)
+        rows[rows[:, 1] == FORMULA, FLAG] += flags
         return np.array(self.records, dtype=[("first", "i8"), ("pieces", "i8")]).astype(SCHEDULE), rows
+
+
+def value_at(tables, index: int, t: float, limit: float) -> float:
+    """Value of schedule `index` at time t [s], continuous from the right; from `limit` [s] on, its left limit there.
+
+    A schedule that follows a block has its value at the start. tables : tables of a model, or its draft
+    """
+    record = tables.schedules[index]
+    if record["pieces"] >= 0:
+        return float(value_with_limit(tables.schedules, tables.pieces, index, t, limit))
+    first, none = int(record["first"]), np.zeros(0)
+    stack = np.zeros(int(tables.pieces[first, STEPS]) + 1)
+    return float(run_program(tables.pieces, first, t, limit, 0, stack, none, none))
+
+
+def slope_at(tables, index: int, t: float, limit: float) -> float:
+    """Rate of change of schedule `index` at time t [1/s]; from `limit` [s] on, its left limit there."""
+    record = tables.schedules[index]
+    if record["pieces"] >= 0:
+        piece = piece_at(tables.pieces, record["first"], record["pieces"], t, limit)
+        return float(piece_slopes(tables.pieces, piece, t)[0])
+    first = int(record["first"])
+    stack = np.zeros(3 * int(tables.pieces[first, STEPS]) + 3)
+    return float(program_slopes(tables.pieces, first, t, limit, stack)[0])
 
 
 def schedule_pieces(schedule) -> np.ndarray:
@@ -123,6 +201,8 @@ def break_times(schedule) -> list[tuple[float, bool]]:
     t, v = schedule.time, schedule.value
     if schedule.kind in ("constant", "harmonic"):
         return []
+    if schedule.kind == "formula":
+        return schedule.program.breaks()
     if schedule.kind == "ramp":
         return [(float(t[0]), False), (float(t[1]), False)]
     if schedule.kind == "step":

@@ -11,6 +11,7 @@ from typing import Any
 from fvsolve import units
 from fvsolve.case import basins, bodies, case_notices, sloshing, text
 from fvsolve.case.claims import Compare, DesignLimit, Expect
+from fvsolve.case.controls import Block
 from fvsolve.case.pipe_routes import Route
 from fvsolve.case.probe import Probe, of_profiles
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
@@ -54,6 +55,7 @@ class Case(Displayable):
     compare: dict[str, Compare]
     routes: dict[str, Route]
     limits: dict[str, DesignLimit]
+    controls: dict[str, Block]
     exact: ExactSpec | None
     copies: dict[str, Path]
     raw: dict[str, Any] = field(repr=False)  # tables of the file, with overrides
@@ -276,6 +278,9 @@ class Case(Displayable):
             "nodes": {name: {"type": node.kind, **node.table()} for name, node in self.nodes.items()},
             "links": {name: {"type": link.kind, **link.table()} for name, link in self.links.items()},
             "signals": {name: plain_value(signal) for name, signal in self.signals.items()},
+            "controls": {
+                name: {"type": block.control.kind, **block.control.table()} for name, block in self.controls.items()
+            },
             "scalars": {name: item.table() for name, item in self.scalars.items()},
             "numerics": self.numerics.table(),
             "output": self.output.table(),

@@ -109,7 +109,7 @@ def _beyond(declared: Any, value: Any, given: Any) -> tuple[float, float, str] |
     """
     usual = getattr(declared, "usual", None)
     for x in _numbers(value) if usual else ():
-        if x == 0.0 or usual.least <= x <= usual.greatest:
+        if x == 0.0 or not math.isfinite(x) or usual.least <= x <= usual.greatest:
             continue
         unit = "" if declared.dimension == "number" else f" {DIMENSIONS[declared.dimension].si}"
         given = f"{x:g}{unit}" if not isinstance(given, str) else given
@@ -162,7 +162,7 @@ def starts_after_end(part: Any, end: float) -> Iterator[tuple[str, float]]:
         if isinstance(value, Schedule) and value.wave:
             if (period := value.wave[2]) > end:
                 yield info.alias or name, float(period)
-        elif isinstance(value, Schedule):
+        elif isinstance(value, Schedule) and value.kind not in ("control", "formula"):
             changes = len(value.time) and len(value.time) <= MAX_ENTRIES and value.time[-1] > end
             if changes and np.ptp(value.value[max(np.searchsorted(value.time, end, "right") - 1, 0) :]) > 0.0:
                 yield info.alias or name, float(value.time[-1])

@@ -1,6 +1,5 @@
 """Effect of a changed key on the model: other numbers, another initial state, or a new model."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,10 +8,11 @@ from fvsolve.case.chainage import original_keys, pieces_of, placed
 from fvsolve.case.claims import COMPARE_KEYS, expect_keys, limit_keys
 from fvsolve.case.load import TOP
 from fvsolve.case.pipe_routes import Route
-from fvsolve.case.reading import WITH_DEFAULTS, default_values, raw_link, split_key
+from fvsolve.case.reading import WITH_DEFAULTS, default_values, driven_keys, raw_link, split_key
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import KINDS, Scalar
+from fvsolve.parts.control import Control
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table_model import Nested
 from fvsolve.parts.value import BY_CELLS, PROFILE, SHAPE, VALUE, Quantity, Text, Value
@@ -35,9 +35,8 @@ def changes(case: Case, key: str) -> str:
     own = class_of_key(case, keys)
     if keys[0] != "signals" or not keys[1:]:
         return own
-    return max(
-        (class_of_key(case, other) for other in driven_keys(case.raw, keys[1])), key=CLASSES.index, default=VALUE
-    )
+    others = driven_keys(case.raw, "signal", keys[1])
+    return max((class_of_key(case, other) for other in others), key=CLASSES.index, default=VALUE)
 
 
 def class_of_key(case: Case, keys: tuple[Any, ...]) -> str:
@@ -94,6 +93,10 @@ def declarations(raw: dict[str, Any]) -> dict[str, Value]:
     for group, kinds in KINDS.items():
         parts = raw.get(group, {}).items()
         result[group] = Keys({name: Keys({"type": Value(), **kinds[entry["type"]].values()}) for name, entry in parts})
+    blocks = raw.get("controls", {}).items()
+    result["controls"] = Keys(
+        {name: Keys({"type": Value(), **Control.kinds[item["type"]].values()}) for name, item in blocks}
+    )
     result["defaults"] = Keys({kind: Keys(default_values(kind)) for kind in WITH_DEFAULTS})
     for group, name, _ in placed(raw):
         where = {"on": Text(), "at": Quantity("length", changes=SHAPE)}
@@ -105,15 +108,3 @@ def declarations(raw: dict[str, Any]) -> dict[str, Value]:
 
 def values_of(keys: dict[str, tuple[Value, Any]]) -> dict[str, Value]:
     return {key: value for key, (value, _) in keys.items()}
-
-
-def driven_keys(table: Any, signal: str, keys: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Key paths of all values of a case that refer to the signal `signal`, outside `[signals]`.
-
-    table : nested dicts of the case as in the file, or a part of them; keys : key path of `table`
-    """
-    if isinstance(table, dict):
-        if table.get("signal") == signal and keys[:1] != ("signals",):
-            yield keys
-        for key, inner in table.items():
-            yield from driven_keys(inner, signal, (*keys, key))

@@ -10,6 +10,7 @@ from typing import Any
 from fvsolve import exact, units
 from fvsolve.case import basins, chainage, checks, claims, connections, part_reading, resource_checks, shipped
 from fvsolve.case.case import Case, wave_speed
+from fvsolve.case.controls import read_controls
 from fvsolve.case.part_reading import Parts
 from fvsolve.case.pipe_routes import legs, read_routes
 from fvsolve.case.probe import default_probes, read_probe
@@ -19,6 +20,7 @@ from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Friction, Pipe, Scalar
 from fvsolve.parts import value as val
+from fvsolve.parts.control import Control
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import read_keys
 from fvsolve.units import Kinematic, show
@@ -27,11 +29,12 @@ from fvsolve.validation import TABLE, validated
 SCHEMA = 1
 PRESENCE_KEYS = ("required_pressure",)  # keys of parts whose presence alone changes the case
 # Tables with names that other tables refer to.
-NAME_TABLES = ("nodes", "links", "signals", "scalars", "routes", "defaults")
+NAME_TABLES = ("nodes", "links", "signals", "controls", "scalars", "routes", "defaults")
 STUDY_KEYS = {"events", "protections"}
 KEYS = (
     "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
-    "signals", "scalars", "defaults", "numerics", "output", "expect", "compare", "routes", "limits", "exact",
+    "signals", "controls", "scalars", "defaults", "numerics", "output", "expect", "compare", "routes", "limits",
+    "exact",
 )  # fmt: skip
 TOP = {
     "schema": (val.Whole(val.between(SCHEMA, SCHEMA)), SCHEMA),
@@ -86,7 +89,7 @@ def read_case(raw: Raw, settings: Mapping[str, Any], previous: Case | None = Non
 
     settings : overrides, see `load`. Raises CaseError with all faults.
     """
-    models = (Numerics, Friction, *KINDS["nodes"].values(), *KINDS["links"].values())
+    models = (Numerics, Friction, *Control.kinds.values(), *KINDS["nodes"].values(), *KINDS["links"].values())
     refused = override(raw, chainage.settings(raw.table, settings), alternatives_of(models))
     if previous is not None and not refused:
         case = update_values(Reading(raw), previous)
@@ -101,6 +104,8 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     reading.known = reusable_values(reading, previous)
     fluid, state = reading.reuse(("fluid",), reading.raw.table.get("fluid"), functools.partial(read_fluid, reading))
     numerics = reading.table("numerics", Numerics)
+    if (times := numerics or valid_times(reading)) is not None:
+        reading.setting.span = times.start, times.end
     check_names(reading)
     network = part_reading.cut_pipes(reading, state, numerics)
     scalars = read_scalars(reading)
@@ -109,6 +114,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     kinds = part_reading.place_kinds(network, parts, scalars, bool(reading.faults))
     routes = read_routes(reading, network, parts.links)
     kinds["routes"] = {name: route and (legs(route, parts.links), parts.links) for name, route in routes.items()}
+    blocks = read_controls(reading, kinds)
     output = read_output(reading, numerics, kinds)
     expect, compare = claims.read_expectations(reading, kinds, routes), claims.read_comparisons(reading, kinds)
     limits = claims.read_limits(reading, kinds, routes, parts.links, state, general["gravity"])
@@ -127,7 +133,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
         name=raw.name, path=raw.path, folder=raw.folder, raw=raw.table, **general, ambient_pressure=setting.ambient,
         fluid=fluid, properties=state, nodes=parts.nodes, links=links, meshes=parts.meshes, lumped=parts.lumped,
         signals=dict(setting.used), scalars=scalars, numerics=numerics, output=output, expect=expect, compare=compare,
-        routes=routes, limits=limits, exact=named, copies=dict(setting.files), read=reading.read,
+        routes=routes, limits=limits, controls=blocks, exact=named, copies=dict(setting.files), read=reading.read,
     )  # fmt: skip
     return case if named is None else with_exact(reading, case)
 
@@ -204,7 +210,7 @@ def _in_celsius(reading: Reading, stated: dict[str, Any], key: str) -> str:
 def check_names(reading: Reading) -> None:
     """Read the signals and check the defaults. Raises CaseError if a table of named parts is not a table."""
     table = reading.raw.table
-    reading.setting.signals = reading.group("signals")
+    reading.setting.signals, reading.setting.controls = reading.group("signals"), reading.group("controls")
     reading.add(default_faults(table, reading.setting))
     tables = [table.get(name, {}) for name in NAME_TABLES]
     tables += tables[-1].values() if isinstance(tables[-1], dict) else []  # of defaults
@@ -402,11 +408,11 @@ def read_before(given: dict[str, Any], before: dict[str, Any], part: Any) -> dic
 
 
 def is_self_contained(case: Case) -> bool:
-    """True if a case has no files, measurements, signals, scalars, basins, placed parts or computed equilibrium.
+    """True if a case has no files, measurements, signals, controls, scalars, basins, placed parts, equilibrium.
 
     An exact solution, if the case has one, must also be stated in its file.
     """
-    outer = case.signals or case.scalars or case.compare or case.copies or case.equilibrium_nodes
+    outer = case.signals or case.controls or case.scalars or case.compare or case.copies or case.equilibrium_nodes
     no_outer_input = not (chainage.placed(chainage.add_bends(case.raw)) or outer)
     exact_in_file = case.exact is None or "exact" in case.raw
     return no_outer_input and exact_in_file and not any(isinstance(node, Basin) for node in case.nodes.values())

@@ -79,7 +79,8 @@ def _read_group(reading: Reading, network: chainage.CutTable, group: str) -> dic
     """Nodes or links without faults; group : "nodes" or "links"."""
     table = network.table
     alone = any(connections.kind_name(node) in (*LINKLESS, None) for node in table.get("nodes", {}).values())
-    if group not in table and not (group == "links" and alone):
+    alone = alone or ("controls" in table and not {"nodes", "links"} & table.keys())  # blocks without fluid
+    if group not in table and not (group == "links" and alone or "controls" in table and not table.get("links")):
         reading.fault((), f"[{group}] is missing: {GROUPS[group]}")
     result = {}
     for name, part in table.get(group, {}).items():

@@ -29,14 +29,15 @@ class Probe:
     """Recorded quantity of a part.
 
     text : text of the probe in the case, such as "main.pressure@0.5"
-    part, name : "nodes" or "links", and name of the part; quantity, dimension : such as "level" and "length"
+    part, name : "nodes", "links" or "controls", and name of the part or block
+    quantity, dimension : such as "level" and "length"
     fraction : distance from the `from` end of a pipe over its length [-], else None
     point : x, y in a basin [m], else None
     straight : True to interpolate linearly between cells, not by the polynomial of the scheme
     """
 
     text: str
-    part: str  # "nodes" | "links"
+    part: str  # "nodes" | "links" | "controls"
     name: str
     quantity: str
     fraction: float | None
@@ -60,8 +61,8 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     if match is None:
         raise ValueError(f'{show(given)} is not a probe; expected NAME.QUANTITY, for example "gate.pressure"')
     part, name, quantity, place = match.groups()
-    parts = [part] if part else [part for part in ("nodes", "links") if name in kinds[part]]
-    parts = [part for part in parts if name in kinds[part]]
+    parts = [part] if part else ["nodes", "links", "controls"]
+    parts = [part for part in parts if name in kinds.get(part, ())]
     if not parts and part != "nodes" and name in kinds.get("routes", {}):
         return route_probe(given.strip(), name, quantity, place, kinds)
     if not parts and kinds["nodes"].get(name.partition(".")[0], name) is None:
@@ -69,7 +70,7 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     if not parts and may_be_piece(name, kinds):
         return None
     if not parts:
-        names = [*kinds["nodes"], *kinds["links"]] if part is None else list(kinds[part])
+        names = [*kinds["nodes"], *kinds["links"], *kinds.get("controls", ())] if part is None else list(kinds[part])
         noun = {"nodes": "node", "links": "link"}.get(part or "", "part")
         raise ValueError(f"no {noun} named {show(name)}; {noun}s are {listing(names)}{did_you_mean(name, names)}")
     if any(kinds[part][name] is None for part in parts):
@@ -158,6 +159,9 @@ def default_probes(kinds: Kinds) -> list[Probe]:
             for quantity in [*own, *_scalars_of(kind, kinds, "quantities")] if own else []:
                 text = f"{part}.{name}.{quantity}" if name in other else f"{name}.{quantity}"
                 probes.append(_probe(text, part, name, quantity, None, kinds))
+    for name, kind in kinds.get("controls", {}).items():
+        if kind is not None:
+            probes.append(_probe(f"{name}.output", "controls", name, "output", None, kinds))
     return probes
 
 

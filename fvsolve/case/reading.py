@@ -466,3 +466,16 @@ class Reading:
             with suppress(KeyError, TypeError, ValueError):
                 values[key] = value.read(self.raw.table[name][key], self.setting)
         return model.model_construct(**values)
+
+
+def driven_keys(table: Any, word: str, name: str = "", keys: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Key paths of all values of a case that follow a signal or a control, outside `[signals]`.
+
+    table : nested dicts of the case as in the file, or a part of them; word : "signal" or "control"
+    name : name of the signal or control, "" for any; keys : key path of `table`
+    """
+    if isinstance(table, dict):
+        if isinstance(table.get(word), str) and name in ("", table[word]) and keys[:1] != ("signals",):
+            yield keys
+        for key, inner in table.items():
+            yield from driven_keys(inner, word, name, (*keys, key))

@@ -12,6 +12,7 @@ from fvsolve.case.pipe_routes import Route
 from fvsolve.case.reading import GROUPS, NOT_DEFAULT, WITH_DEFAULTS
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.parts import KINDS, Scalar
+from fvsolve.parts.control import Control
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table_model import keys_json
 from fvsolve.parts.value import Quantity
@@ -43,6 +44,8 @@ def full_schema() -> dict[str, Any]:
     for group, kinds in KINDS.items():
         any_kind = [_typed(kind, part, definitions) for kind, part in sorted(kinds.items())]
         properties[group] = {"type": "object", "additionalProperties": {"anyOf": any_kind}}
+    any_block = [_typed(kind, block, definitions) for kind, block in sorted(Control.kinds.items())]
+    properties["controls"] = {"type": "object", "additionalProperties": {"anyOf": any_block}}
     properties["defaults"] = _defaults(definitions)
     scalar = _with_shared_definitions(Scalar, definitions)
     properties["scalars"] = {"type": "object", "additionalProperties": scalar}

@@ -46,6 +46,11 @@ HOOKS = {  # functions of the law of a part: types of arguments and of the resul
     # t, y, tables, device, p' upstream, p' downstream (changes since the start [Pa]), drop, ahead: dx/dt of the lift x
     # and its slope over the drop [1/s/Pa], for a change of the upstream (`ahead`) or of the downstream pressure
     "lead": ("tVTDtttb", "tt"),
+    # block of `controls`: t, y, tables, control: its output before its limits
+    "decide": ("tVTC", "t"),
+    # t, y, dydt, tables, control, v, u: rates of its states; v, u : output before and after its limits
+    "adapt": ("tVVTCtt", ""),
+    "switch": ("tVTCV", ""),  # t, y, tables, control, g: its event functions
 }
 
 
@@ -53,7 +58,7 @@ def argument_types(letters: str) -> tuple:
     """Numba types of arguments, a letter for each.
 
     t : number; v : vector; h : handle; V, H : vector and handle in calls by address
-    T : tables; D : record of a device; i : integer; b : boolean
+    T : tables; D : record of a device; C : record of a block; i : integer; b : boolean
     """
     kinds = _kinds()
     return tuple(kinds[letter] for letter in letters)
@@ -67,6 +72,7 @@ def _kinds() -> dict:
 
     vectors = {"V": Vector(types.float64), "H": Vector(types.int64)}
     own = vectors | {"T": Tables("Tables", table_types), "D": table_types().devices.dtype}
+    own["C"] = table_types().controls.dtype
     return plain_kinds() | own
 
 
@@ -143,6 +149,9 @@ call_step = call_at_address("call_step", *HOOKS["step"])
 call_slope = call_at_address("call_slope", *HOOKS["slope"])
 call_lift = call_at_address("call_lift", *HOOKS["lift"])
 call_bends = call_at_address("call_bends", *HOOKS["bends"])
+call_decide = call_at_address("call_decide", *HOOKS["decide"])
+call_adapt = call_at_address("call_adapt", *HOOKS["adapt"])
+call_switch = call_at_address("call_switch", *HOOKS["switch"])
 
 
 @njit(forceinline=True)

@@ -7,7 +7,9 @@ from fvsolve.kernels.energy_rows import DEVICE_ROWS, device_power_row, device_st
 from fvsolve.kernels.table_handle import open_tables
 
 # columns of `hooks`
-SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, STORED, STEP, SLOPE, LIFT, BENDS, LEAD = range(len(calls.HOOKS))
+(
+    SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, STORED, STEP, SLOPE, LIFT, BENDS, LEAD, DECIDE, ADAPT, SWITCH,
+) = range(len(calls.HOOKS))  # fmt: skip
 TEMPORARY = 2  # result of a hook `outside`: to be reported, but it ends by itself when a check valve closes
 
 

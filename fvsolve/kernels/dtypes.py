@@ -337,10 +337,40 @@ DEVICE = record(
     controls_column=i8,  # offset in `armed` of the flag that it controls its rigid column; -1 if it never does
 )
 
-SCHEDULE = record(first=i8, pieces=i8)
+SCHEDULE = record(
+    first=i8,
+    pieces=i8,  # number of its pieces; 0 for a schedule that follows a block of `controls`, -1 for a formula
+)
 # Piece: start, kind (0 polynomial in t - origin, 1 power, 2 wave, 3 wave cut off below zero), origin, then
-# a, b, c, d or v0, v1, duration, exponent or mean, amplitude, frequency [1/s], phase
+# a, b, c, d or v0, v1, duration, exponent or mean, amplitude, frequency [1/s], phase.
+# Of a schedule that follows a block: start, kind (4 scale u + offset, 5 its positive part), number of the block, then
+# scale, offset, output u of the block at the start
 PIECE_COLUMNS = 7
+
+CONTROL = record(  # block of `controls`, in an order in which each block comes after those that it reads at once
+    hooks=i8,  # row of `hooks`, the functions of its law
+    y=i8,  # offset in y of its states: filtered inputs first; -1 for none
+    filters=i8,  # number of filtered inputs
+    filter_rate=f8,  # 1 / time constant of the filters [1/s]
+    data=i8,  # offset of the numbers of its law in `floats`
+    inputs=i8,  # offset in `integers` of its inputs: number of a sensor, or -1 - number of another block
+    input_count=i8,
+    starts=i8,  # offset in `floats` of the values of its inputs at the start
+    setpoint=i8,  # schedule of its setpoint; -1 for none
+    setpoint_start=f8,
+    at_once=i8,  # 1 if its output depends on the present values of its inputs
+    late=i8,  # 1 if its output is computed after the nodes are solved, 0 if before
+    least=f8,  # limits of its output
+    greatest=f8,
+    start=f8,  # output at the start
+    held=f8,  # output at which a study holds it; nan if it follows its law
+)
+
+DRIVEN = record(  # row of a table that a block drives before the nodes are solved
+    kind=i8,  # DRIVEN_VALVE, DRIVEN_DEVICE or DRIVEN_NODE
+    index=i8,  # its row
+)
+DRIVEN_VALVE, DRIVEN_DEVICE, DRIVEN_NODE = 0, 1, 2
 
 CLUSTER_RECORD = record(first_node=i8, nodes=i8, first_valve=i8, valves=i8, first_couple=i8, couples=i8, inverse=i8)
 
@@ -374,6 +404,7 @@ LAYOUT = record(
     along=i8,  # unit vectors of lines, between their points
     pin=i8,  # forces of pins, three for each [N]
     body=i8,  # data of bodies, see `kernels.mechanism.body_layout`
+    control=i8,  # of each block of `controls`: output, and first input after its filter
     size=i8,
 )
 BODY_OUT = 45  # numbers of each body in `out`
@@ -410,6 +441,7 @@ WALL_VALUE = 19  # of a moving wall
 BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = 20, 21, 22, 23  # quantity in `side`, see `mechanism.body_values`
 SURFACE_VALUE = 24  # of a surface described by modes
 PIPE_FORCE = 25  # on a whole pipe
+CONTROL_VALUE = 26  # of a block of `controls`: 0 output, 1 input, 2 error in `side`
 
 BASIN = record(
     kind=i8,  # code of its physics, see `basins.basin_patches`
@@ -547,6 +579,9 @@ RECORDS = {
     "scalars": SCALAR,
     "walls": WALL,
     "delays": DELAY,
+    "controls": CONTROL,
+    "sensors": PROBE,
+    "driven": DRIVEN,
 }
 # `Tables`: of a model, read-only; `RunArrays`: written by a run; `HandleTables`: behind a handle, also addresses of
 # functions: `calls`, a row for each job, and `hooks`, a row for each law of devices.
@@ -554,12 +589,12 @@ Tables = namedtuple("Tables", (*RECORDS, "integers", "floats", "profile", "plane
 RunArrays = namedtuple("RunArrays",
     (
         "clock", "work", "armed", "marks", "scratch", "spare", "seen", "bands", "joint", "sums", "envelope", "extremes",
-        "past", "sharp",
+        "past", "sharp", "applied", "readings", "sensing", "stack",
     ),
 )  # fmt: skip
 HandleTables = namedtuple("HandleTables", (*Tables._fields, *RunArrays._fields, "calls", "hooks"))
 MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]; all others that are not records are float64[:]
-INTEGERS = ("integers", "bands", "joint", "sums", "sharp", "calls", "hooks")  # these are int64
+INTEGERS = ("integers", "bands", "joint", "sums", "sharp", "sensing", "calls", "hooks")  # these are int64
 
 
 @functools.cache

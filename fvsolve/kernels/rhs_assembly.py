@@ -26,6 +26,7 @@ class RhsTerms:
     prepare: str = ""  # from (t, y) alone: conductances, speeds, pressures of vessels
     outgoing_waves: str = ""  # outgoing waves at pipe ends
     known_pressures: str = ""  # pressures of nodes with storage or given pressure, flows from outside
+    decide: str = ""  # outputs of blocks that drive the network, from states alone
     inflow: str = ""  # flows of rigid columns into nodes
     solve_nodes: str = ""  # pressures of other nodes, flows of restrictions
     column_nodes: str = ""  # pressures of nodes that only columns determine
@@ -41,6 +42,7 @@ class RhsTerms:
     outlet_values: str = ""  # values of scalars in the water that leaves pipes and cells
     mix: str = ""  # values of scalars at nodes
     scalar_rates: str = ""  # rates of scalars in cells
+    control_rates: str = ""  # rates of states of blocks, from all values of the state
     stretching: str = ""  # conversion of rates of scalars in stretching cells to rates of their content
     reduce_rate: str = ""  # greatest rate of all bands
     # jobs other than the right-hand side
@@ -113,7 +115,18 @@ FLUID_LOADS = {
     "stored": "mechanism.fluid_energy: add_stored",
 }
 COLUMNS = {"inflow": "rigid_columns: column_inflows", "rate_limits": "rigid_columns: column_rate_limit"}
+CONTROLS = {
+    "prepare": "controls: begin_controls",
+    "move": "controls: decide_late",
+    "control_rates": "controls: control_rates",
+    "observe": "controls: restore_outputs",
+}
 COMPONENTS = {
+    "controls, linear": RhsTerms(**CONTROLS, decide="controls: decide_linear"),
+    "controls, barotropic": RhsTerms(**CONTROLS, decide="controls: decide_barotropic"),
+    "switches": RhsTerms(events="controls: control_events"),
+    "formulas": RhsTerms(events="schedule_pieces: formula_events"),
+    "probes of controls": RhsTerms(observe="controls: observe_controls"),
     "pipes": RhsTerms(record="observation: record_pipes"),
     "valves": RhsTerms(rate_limits="network_balance: valve_rate_limit"),
     "bends": RhsTerms(events="restrictions: restriction_events"),
@@ -242,6 +255,8 @@ class ModelFeatures:
     bands: bool = False
     boundary_exchange: bool = False
     forces: bool = False
+    controls: bool = False
+    formulas: bool = False
 
     def components(self) -> Iterator[RhsTerms]:
         """Yield the terms (`RhsTerms`) of all components of the model, in the order in which the functions run."""
@@ -251,6 +266,8 @@ class ModelFeatures:
             yield BOUNDARY_EXCHANGE
         linear = self.family == "linear"
         family = self.family if linear or self.pipes else "barotropic"
+        if self.controls:
+            yield COMPONENTS["controls, linear" if linear else "controls, barotropic"]
         lumped = linear and not self.pipes and not self.delays
         yield from (ALONE,) if self.alone else (LUMPED,) if lumped else (NETWORK, NODES[family])
         yield READ["linear" if linear else "barotropic"]
@@ -261,10 +278,15 @@ class ModelFeatures:
         if self.valves:
             yield COMPONENTS["valves"]
         bends = any(hook_of(law, "bends") is not None for law in self.modules())
-        if self.devices or bends:  # their event functions need solved nodes
+        switches = any(hook_of(law, "switch") is not None for law in self.modules())
+        if self.devices or bends or switches:  # their event functions need solved nodes
             yield COMPONENTS["closed"]
         if bends:
             yield COMPONENTS["bends"]
+        if switches:
+            yield COMPONENTS["switches"]
+        if self.formulas:
+            yield COMPONENTS["formulas"]
         if self.clusters and linear:
             yield COMPONENTS["clusters"]
             if self.delays:
@@ -298,6 +320,8 @@ class ModelFeatures:
             if self.pipes:
                 yield COMPONENTS["carried"]
         yield from self.carried
+        if self.controls:
+            yield COMPONENTS["probes of controls"]
         if self.forces:
             yield COMPONENTS[f"forces, {family}"]
         if self.pipes:

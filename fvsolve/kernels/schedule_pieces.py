@@ -1,10 +1,14 @@
-"""Values and derivatives of schedules at a time: pieces of polynomials, powers and waves."""
+"""Values and derivatives of schedules at a time: pieces of polynomials, powers and waves, and outputs of blocks."""
 
 from math import cos, sin
 
 from fvsolve.jit import njit
+from fvsolve.kernels.formula_programs import program_slopes, run_program
+from fvsolve.kernels.table_handle import open_tables
 
 POLYNOMIAL, POWER, WAVE, CREST = 0.0, 1.0, 2.0, 3.0  # kinds of pieces; CREST: wave cut off below zero
+BLOCK, BLOCK_PART = 4.0, 5.0  # scale times output of a block plus offset, and the positive part of this value
+FORMULA = 6.0  # header of the steps of a formula, see `formula_programs`
 
 
 @njit(forceinline=True)
@@ -69,6 +73,8 @@ def schedule_slopes(tables, index, t):
     end; a single piece continues.
     """
     record, limit = tables.schedules[index], tables.clock[0]["limit"]
+    if record["pieces"] < 0:
+        return program_slopes(tables.pieces, record["first"], t, limit, tables.stack)
     if record["pieces"] == 1:
         return piece_slopes(tables.pieces, record["first"], t)
     row = piece_at(tables.pieces, record["first"], record["pieces"], t, limit)
@@ -81,13 +87,47 @@ def schedule_value(tables, index, t):
 
     From the end of the schedule segment on, a schedule of several pieces keeps its left limit at this end.
     """
+    record = tables.schedules[index]
+    if record["pieces"] <= 0:
+        return followed_value(tables, record["first"], record["pieces"], t)
     return value_with_limit(tables.schedules, tables.pieces, index, t, tables.clock[0]["limit"])
+
+
+@njit
+def followed_value(tables, row, pieces, t):
+    """Value at time t [s] of a schedule that follows a block (pieces 0) or a formula; row : its row in `pieces`."""
+    if pieces == 0:
+        return block_value(tables.pieces, row, tables.applied[int(tables.pieces[row, 2])])
+    limit, flags = tables.clock[0]["limit"], tables.armed
+    return run_program(tables.pieces, row, t, limit, 0, tables.stack, flags, flags[:0])
+
+
+@njit
+def formula_events(t, y, out, handle, g):
+    """Write to g the two event functions of each kink of the formulas of time."""
+    tables = open_tables(handle)
+    limit, schedules = tables.clock[0]["limit"], tables.schedules
+    for k in range(schedules.size):
+        if schedules[k]["pieces"] < 0:
+            run_program(tables.pieces, schedules[k]["first"], t, limit, 0, tables.stack, tables.armed, g)
+
+
+@njit(forceinline=True)
+def block_value(pieces, row, output):
+    """Value of a schedule that follows a block; row : its row in `pieces`, output : output of the block."""
+    value = pieces[row, 3] * output + pieces[row, 4]
+    return max(value, 0.0) if pieces[row, 1] == BLOCK_PART else value
 
 
 @njit(forceinline=True)
 def value_with_limit(schedules, pieces, index, t, limit):
-    """Value of schedule `index` at time t [s], continuous from the right; from `limit` [s] on, its left limit there."""
+    """Value of schedule `index` at time t [s], continuous from the right; from `limit` [s] on, its left limit there.
+
+    A schedule that follows a block has its value at the start.
+    """
     record = schedules[index]
+    if record["pieces"] == 0:
+        return block_value(pieces, record["first"], pieces[record["first"], 5])
     if record["pieces"] == 1:
         return piece_value(pieces, record["first"], t)
     row = piece_at(pieces, record["first"], record["pieces"], t, limit)

@@ -68,19 +68,19 @@ def make_handle(tables: tuple):
     return handle_of(addresses_of(tables))
 
 
-def linked_handles(shared: tuple, sharp: tuple, written: tuple, called: tuple):
+def linked_handles(shared: tuple, replaced: dict[str, tuple], written: tuple, called: tuple):
     """Handle of the tables of a model, the arrays of a run and the addresses of functions.
 
-    The array `sharp` of the run receives a second handle, in which some tables of the model are replaced. It is used at
-    the time at which a jump of a delay line arrives.
-    shared, sharp : addresses of the tables of the model, without and with these replacements
+    The arrays `sharp` and `sensing` of the run each receive another handle, in which some tables of the model are
+    replaced: for the time at which a jump of a delay line arrives, and to read sensors in place of probes.
+    shared : addresses of the tables of the model; replaced : "sharp" or "sensing" -> addresses with these replacements
     written, called : arrays that the run writes, and tables of function addresses
     """
     own = addresses_of((*written, *called))
-    if written.sharp.size > 0:
-        within = handle_of((*sharp, *own))
+    for name, tables in replaced.items():
+        within, array = handle_of((*tables, *own)), getattr(written, name)
         if COMPILING:
-            written.sharp[:] = within
+            array[:] = within
         else:
-            written.sharp[0] = within
+            array[0] = within
     return handle_of((*shared, *own))

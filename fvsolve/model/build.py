@@ -18,6 +18,7 @@ from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tanks
 from fvsolve.model.cluster_tables import classify_nodes
+from fvsolve.model.control_tables import Balance, control_rate, lower_controls, number_blocks, set_starts
 from fvsolve.model.delay_lines import (
     divide_lines,
     end_admittance_ratio,
@@ -148,6 +149,8 @@ def tables_with_start(case: Case, draft: ModelDraft | None = None, unfit: Collec
     """
     draft = draft or tables_before_start(case, unfit)
     draft.check()
+    if len(draft.control_table):
+        draft = with_balanced_blocks(draft)
     draft.steady = start_profile(draft)
     scale_scalars(draft)
     worse = divide_lines(draft)
@@ -158,15 +161,34 @@ def tables_with_start(case: Case, draft: ModelDraft | None = None, unfit: Collec
 def tables_before_start(case: Case, unfit: Collection[str] = ()) -> ModelDraft:
     """Tables of a case before its initial steady state is known; unfit : names of pipes that cannot be delay lines."""
     draft = ModelDraft(case)
+    number_blocks(draft)
     draft.followed = line_methods(case, unfit)
     fill_nodes(draft)
     fill_links(draft)
     classify_nodes(draft)
     lower_basins(draft)
     lower_scalars(draft)
+    lower_controls(draft)
     draft.check()
     pack(draft, np.zeros(profile_size(draft)))
     fill_rises(draft)
+    return draft
+
+
+def with_balanced_blocks(packed: ModelDraft) -> ModelDraft:
+    """Copy of packed tables in which the outputs of blocks are balanced, and values of blocks at the start are set."""
+
+    def start(draft: ModelDraft) -> Model:
+        draft.steady = start_profile(draft)
+        scale_scalars(draft)
+        divide_lines(draft)
+        return model_of(draft)
+
+    balance = Balance(packed.case, packed, start)
+    outputs, starts = balance.find()
+    packed.check()
+    draft = balance.draft_with(outputs)
+    set_starts(draft, outputs, starts)
     return draft
 
 
@@ -235,7 +257,7 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     """
     settings = settings_of(draft)
     draft.probe_table = lower_probes(draft)
-    schedules, pieces = draft.schedules.tables()
+    schedules, pieces = draft.schedules.tables(tanks.EVENTS * draft.tanks)
     schedules.flags.writeable = pieces.flags.writeable = False  # from here on constant, as in the model
     layout = layout_of(draft)
     draft.tables = rec.Tables(
@@ -244,7 +266,7 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         np.array(draft.points, rec.POINT), draft.line_table, draft.pin_table, draft.bushing_table,
         draft.moving_segment_table, draft.mass_table, draft.brace_table, draft.stop_table, draft.piston_table,
         draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table, draft.wall_table,
-        draft.delay_table,
+        draft.delay_table, draft.control_table, draft.sensor_table, draft.driven_table,
         np.array(draft.integers, dtype=np.int64), np.array(draft.floats, dtype=float), profile, draft.plane(), pieces,
     )  # fmt: skip
     pipes, nodes, out = len(draft.pipe_table), len(draft.node_table), int(layout["size"][0])
@@ -260,6 +282,8 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         scratch=scratch_size(draft), spare=spare, seen=draft.size if len(draft.wall_table) else 0,
         bands=2 * len(draft.basin_table), joint=0, sums=0, sharp=int(len(draft.delay_table) > 0),
         envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)), past=history_size(draft.delay_table),
+        applied=2 * len(draft.control_table), readings=len(draft.sensor_table),
+        sensing=int(len(draft.sensor_table) > 0), stack=draft.schedules.stack,
     )  # fmt: skip
 
 
@@ -278,7 +302,8 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
         method = method_named(automatic.first_method(case.numerics.method))
         s["weights"], s["stages"] = len(draft.floats), method.stages
         draft.floats += [*map(float, method.b), *method.times]
-    s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"] * pipes["rate_factor"]), *column_rates(draft)])
+    rates = [*(pipes["speed"] / pipes["dx"] * pipes["rate_factor"]), *column_rates(draft)]
+    s["rate"] = max([0.0, *rates, control_rate(draft)])
     return table
 
 
@@ -310,6 +335,7 @@ def layout_of(draft: ModelDraft) -> np.ndarray:
         ("tank", rec.TANK_OUT * len(draft.basin_table) if len(draft.body_table) else 0),
         ("travel", 2 * len(draft.push_names)), ("along", 3 * len(draft.line_table)),
         ("pin", 3 * len(draft.pin_table)), ("body", rec.BODY_OUT * len(draft.body_table)),
+        ("control", 2 * len(draft.control_table)),
     ):  # fmt: skip
         layout[name], at = at, at + size
     layout["size"] = at

@@ -185,6 +185,8 @@ def line_methods(case, unfit: Collection[str] = ()) -> dict[str, LineMethod]:
     for name, link in pipes.items():
         line = link.pipe_model or case.numerics.pipe_model
         need = "" if line == "finite-volume" else reason_for_cells(case, name, link)
+        if line == "auto" and case.controls:
+            need = need or "a control may change values at any rate"
         if line == "finite-volume" or need:
             methods[name] = LineMethod("finite-volume", need or f'pipe_model = "{line}"')
         elif name in unfit:

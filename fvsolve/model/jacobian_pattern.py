@@ -15,6 +15,7 @@ from scipy.sparse import coo_array, csc_array
 from fvsolve.basins import lower_pattern as pattern
 from fvsolve.basins.lower_pattern import all_states
 from fvsolve.kernels import dtypes as rec
+from fvsolve.model.control_pattern import BlockCouplings, pairs_of, unique_states
 from fvsolve.model.scalar_tables import STORES
 from fvsolve.schemes import SCHEMES, Reach
 from fvsolve.steady import union
@@ -58,13 +59,14 @@ class Couplings:
         self.devices = tables.devices
         self.basins, self.integers, self.walls = model.basins, tables.integers, tables.walls
         self.patches = {int(row["node"]): row for row in tables.patches}
+        self.blocks = BlockCouplings(self, tables)
         self.sets = self.pressures()  # for each node, the states that set its pressure
 
     def pairs(self) -> Iterator[Pairs]:
         """Yield all couplings of the model, except some of a state with itself."""
         for pipe in self.pipes:
             if pipe["delay"] >= 0:
-                yield all_pairs(unique_states(pipe["y"]), unique_states(*(self.sets[i] for i in ends_of(pipe))))
+                yield pairs_of(unique_states(pipe["y"]), unique_states(*(self.sets[i] for i in ends_of(pipe))))
                 continue
             yield from self.inside(pipe)
             yield from self.beyond(pipe)
@@ -75,11 +77,13 @@ class Couplings:
         yield from self.boundary_pairs()
         yield from self.stored()
         for column in self.columns:
-            yield all_pairs(unique_states(column["y"]), unique_states(*(self.sets[i] for i in ends_of(column))))
+            yield pairs_of(unique_states(column["y"]), unique_states(*(self.sets[i] for i in ends_of(column))))
         yield from self.moving()
         yield from self.device_pairs()
-        yield from self.wall_pairs()
+        yield from self.wpairs_of()
         yield from self.moving_fluid_pairs()
+        if self.blocks.follows or len(self.blocks.controls):
+            yield from self.blocks.pairs()
 
     def boundary_pairs(self) -> Iterator[Pairs]:
         """Yield couplings of the flow through open patches of basins with the cells there."""
@@ -87,7 +91,7 @@ class Couplings:
             basin, behind = self.basins[row["basin"]], row["ring"] + row["faces"]
             if row["open"]:
                 cells = pattern.cells_read(pattern.neighbours(basin), self.integers[behind : behind + row["faces"]])
-                yield all_pairs(unique_states(self.size + i), pattern.cell_states(basin, cells))
+                yield pairs_of(unique_states(self.size + i), pattern.cell_states(basin, cells))
 
     # nodes ------------------------------------------------------------------------------------------------------
 
@@ -123,19 +127,23 @@ class Couplings:
         """
         if i in self.patches:
             return unique_states(self.behind(i, 1), *(self.walls["y"][self.walls["basin"] == self.patches[i]["basin"]]))
+        given = self.blocks.schedule(self.nodes["schedule"][i])
         of_devices = (self.device_states(row) for row in self.devices if row["row"] >= 0 and row["node"] == i)
         of_pistons = (self.places(row, 0) for row in self.pistons if i in (row["a"], row["b"]))
-        return unique_states(self.own(i), *of_pistons, *of_devices)
+        return unique_states(self.own(i), given, *of_pistons, *of_devices)
 
     def device_states(self, device) -> np.ndarray:
         """Indices of the states of a device."""
         return device["y"] + np.arange(device["states"] if device["y"] >= 0 else 0)
 
     def opening_states(self, link) -> np.ndarray:
-        """Indices of the states of the device that opens and closes a link; empty if it has none."""
-        if "device" not in link.dtype.names or link["device"] < 0:
+        """Indices of the states of the device and of the blocks that open and close a link; empty if it has none."""
+        if "device" not in link.dtype.names:
             return unique_states()
-        return self.device_states(self.devices[link["device"]])
+        if link["device"] < 0:
+            return self.blocks.schedule(link["schedule"])
+        device = self.devices[link["device"]]
+        return unique_states(self.device_states(device), self.blocks.schedule(link["schedule"], device["schedule"]))
 
     def places(self, row, order: int) -> np.ndarray:
         """States of the positions (`order` 0) or velocities (1) of the masses or bodies that a row joins."""
@@ -205,6 +213,8 @@ class Couplings:
             i, j = ends_of(link)
             enter[group[i]] += [self.pressure_states(j), self.opening_states(link)]
             enter[group[j]] += [self.pressure_states(i), self.opening_states(link)]
+        for i in np.flatnonzero(self.inner):
+            enter[group[i]].append(self.blocks.schedule(self.nodes["schedule"][i]))
         joined = [unique_states(*parts) for parts in enter]
         return [joined[group[i]] if self.inner[i] else self.pressure_states(i) for i in range(len(group))]
 
@@ -229,7 +239,7 @@ class Couplings:
             for i, other in ((row["a"], row["b"]), (row["b"], row["a"])):
                 into[i] += [swept, *([self.pressure_states(other)] if row["leakage"] > 0.0 else [])]
         for i in np.flatnonzero(~self.inner):
-            yield all_pairs(unique_states(self.own(i), self.behind(i), self.size + i), unique_states(*into[i]))
+            yield pairs_of(unique_states(self.own(i), self.behind(i), self.size + i), unique_states(*into[i]))
 
     def moving(self) -> Iterator[Pairs]:
         """Yield couplings of positions of masses with their velocities, and of these with adjacent masses and chambers.
@@ -240,17 +250,18 @@ class Couplings:
         yield at, at + 1
         for root in np.unique([self.tree_root(root) for root in self.bodies["root"]]):
             own = unique_states(*(self.tree_states(root, order) for order in (0, 1)))
-            yield all_pairs(own, own)
+            yield pairs_of(own, own)
         for row in self.bushings:
             points = row["from_point"], row["to_point"]
             read = [self.chain_states(i, order) for i in self.bodies_at(points) for order in (0, 1)]
-            yield all_pairs(self.tree_velocities(points), unique_states(*read))
+            yield pairs_of(self.tree_velocities(points), unique_states(*read))
         for row in [*self.braces, *self.pistons]:
             read = [self.places(row, 0), self.places(row, 1)]
+            read += [self.blocks.schedule(row["schedule"])] if "schedule" in row.dtype.names else []
             if "rod" in row.dtype.names:
                 read += [self.own(row["a"]), self.own(row["b"])]
             pushed = self.places(row, 1) if row["line"] < 0 else self.tree_velocities(self.ends_of_line(row))
-            yield all_pairs(pushed, unique_states(*read))
+            yield pairs_of(pushed, unique_states(*read))
 
     def device_pairs(self) -> Iterator[Pairs]:
         """Yield couplings of the states of each device with each other, and with pressures.
@@ -260,9 +271,10 @@ class Couplings:
         for row in self.devices:
             ends = ends_of(self.valves[row["valve"]]) if row["valve"] >= 0 else ()
             read = [self.sets[i] for i in (*ends, row["node"]) if i >= 0]
-            yield all_pairs(self.device_states(row), unique_states(self.device_states(row), *read))
+            read.append(self.blocks.schedule(row["schedule"]))
+            yield pairs_of(self.device_states(row), unique_states(self.device_states(row), *read))
 
-    def wall_pairs(self) -> Iterator[Pairs]:
+    def wpairs_of(self) -> Iterator[Pairs]:
         """Yield couplings of basin cells with the travel of moving walls, and of this travel with masses and bodies.
 
         The masses and bodies are those that move the walls; their couplings with the cells at the walls are included.
@@ -272,11 +284,11 @@ class Couplings:
             speed = unique_states(mass + 1) if mass >= 0 else unique_states()
             if wall["body"] >= 0:
                 speed = self.joint_states(self.bodies[wall["body"]], 1)
-            yield all_pairs(pattern.all_states(basin), unique_states(wall["y"], speed))
-            yield all_pairs(unique_states(wall["y"]), speed)
+            yield pairs_of(pattern.all_states(basin), unique_states(wall["y"], speed))
+            yield pairs_of(unique_states(wall["y"]), speed)
             behind = self.integers[wall["faces"] + wall["count"] :][: wall["count"]]
             cells = pattern.cells_read(pattern.neighbours(basin), behind)
-            yield all_pairs(speed, unique_states(wall["y"], pattern.cell_states(basin, cells)))
+            yield pairs_of(speed, unique_states(wall["y"], pattern.cell_states(basin, cells)))
 
     def moving_fluid_pairs(self) -> Iterator[Pairs]:
         """Yield couplings of fluid on bodies and of the bodies that it moves.
@@ -297,7 +309,7 @@ class Couplings:
                 continue
             both = unique_states(*cells, own[1])
             pushing = [self.own(row[side]) for row in self.pistons if row["line"] >= 0 for side in ("a", "b")]
-            yield all_pairs(both, unique_states(*cells, *own, *pushing))
+            yield pairs_of(both, unique_states(*cells, *own, *pushing))
 
     def moving_fluid_states(self) -> Iterator[tuple[int, np.ndarray]]:
         """Yield (row of `moving_segments`, its states and those that set its pressures) for the fluid on bodies."""
@@ -392,26 +404,16 @@ class Couplings:
             enters, leaves = self.sides(pipe, right)
             near, last = slice(self.reach.behind), slice(max(self.reach.ahead, 1))
             read = unique_states(self.sets[i], self.edge_cells(pipe, right), enters[: self.reach.entering])
-            yield all_pairs(enters[near], read)
-            yield all_pairs(leaves[last], leaves[: self.reach.leaving])
+            yield pairs_of(enters[near], read)
+            yield pairs_of(leaves[last], leaves[: self.reach.leaving])
             if self.coupled(pipe):
-                yield all_pairs(leaves[near], read)
-                yield all_pairs(enters[last], leaves[: self.reach.leaving])
+                yield pairs_of(leaves[near], read)
+                yield pairs_of(enters[last], leaves[: self.reach.leaving])
 
 
 def ends_of(link) -> tuple[int, int]:
     """Indices of the nodes at both ends of a link."""
     return int(link["from_node"]), int(link["to_node"])
-
-
-def unique_states(*parts) -> np.ndarray:
-    """Sorted indices of states, each once, from arrays or numbers."""
-    return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(np.atleast_1d(part) for part in parts)]))
-
-
-def all_pairs(rows: np.ndarray, states: np.ndarray) -> Pairs:
-    """Couplings of all given rows with all given states : (row, state) of each pair."""
-    return np.repeat(rows, states.size), np.tile(states, rows.size)
 
 
 LIMITER_CELLS = 2  # cells that a limited value at a face reads on each side; at an end of a pipe, 1 more
@@ -489,7 +491,7 @@ class ScalarCouplings:
             sources[j].append(self.values[i])
         for i, read in enumerate(sources):
             affected = [self.places[i]] if self.stores[i] else [self.behind(i)] if i in self.of.patches else []
-            yield all_pairs(unique_states(*affected, self.ledger + i), unique_states(*read))
+            yield pairs_of(unique_states(*affected, self.ledger + i), unique_states(*read))
         if self.q == 0:
             yield from map(pattern.scalar_pattern, self.of.basins)
         for basin in self.of.basins:
@@ -499,8 +501,8 @@ class ScalarCouplings:
         for pipe in self.of.pipes:
             yield from self.inside(pipe)
             for right, i in enumerate(ends_of(pipe)):
-                yield all_pairs(self.edge(pipe, right)[0], unique_states(self.values[i]))
-                yield all_pairs(self.close(pipe, right), self.read(pipe, right, i))
+                yield pairs_of(self.edge(pipe, right)[0], unique_states(self.values[i]))
+                yield pairs_of(self.close(pipe, right), self.read(pipe, right, i))
 
     def boundary_pairs(self, basin) -> Iterator[Pairs]:
         """Yield couplings of the flow through open boundaries of a basin with the cells there.
@@ -512,7 +514,7 @@ class ScalarCouplings:
             behind = [self.of.integers[row["first"] :][: row["count"]] for row in map(self.of.patches.get, nodes)]
             cells = pattern.cells_read(pattern.scalar_neighbours(basin), np.concatenate(behind))
             read = unique_states(pattern.amount_states(basin, self.q, cells), pattern.cell_states(basin, cells))
-            yield all_pairs(self.ledger + np.array(nodes), read)
+            yield pairs_of(self.ledger + np.array(nodes), read)
 
     def decay_pairs(self) -> Iterator[Pairs]:
         """Yield couplings of the decay in the ledger with the amounts and masses that decay.
@@ -527,7 +529,7 @@ class ScalarCouplings:
                 yield pick(pipe["cell"] + cells), first + cells
         for i in np.flatnonzero(self.stores):
             read = unique_states(*self.own(i))
-            yield all_pairs(np.atleast_1d(pick(self.places[i] - self.row["y"])), read)
+            yield pairs_of(np.atleast_1d(pick(self.places[i] - self.row["y"])), read)
         for basin in self.of.basins:
             cells = np.arange(basin.n)
             for first in (pattern.amount_states(basin, self.q, 0), *([basin.row["y"]] if basin.quantities else [])):

@@ -277,6 +277,9 @@ def drive_joint(draft, name: str, schedule, row) -> None:
     row["schedule"] = draft.schedules.add(schedule)
     key = "travel" if row["joint"] == rec.PRISMATIC else "angle"
     start, end = draft.case.numerics.start, draft.case.numerics.end  # kinks before the start have no effect
+    if schedule.kind == "formula" and schedule.program.kinks:
+        text = "drives the joint, and has kinks, which need an infinite force; expected a formula without them"
+        draft.fault(f"nodes.{name}.joint.{key}", text)
     kinks = [time for time, _ in sorted(rate_jumps(schedule)) if start < time <= end]
     if kinks:
         kind = "it jumps" if schedule.kind == "step" else "its rate jumps"

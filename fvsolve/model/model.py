@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,14 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fvsolve.assembly.lowering import Input, lowering_of
+from fvsolve.assembly.control_rows import small_change
+from fvsolve.assembly.lowering import Input, InputKind, lowering_of
 from fvsolve.assembly.pipe_terms import mass_in_creep
+from fvsolve.case.controls import decision_order
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.run_data import RunData
 from fvsolve.model.scalar_tables import node_values, pipe_values
-from fvsolve.units import show
+from fvsolve.units import DIMENSIONS, show
 
 if TYPE_CHECKING:
     from fvsolve.assembly.model_draft import PipeMesh
@@ -157,6 +160,11 @@ class Model(Displayable):
         return {"state": self.state_names, "start": self.start, "scale": self.scale}
 
     @property
+    def block_names(self) -> list[str]:
+        """Names of blocks of `controls`, in the order of their table."""
+        return decision_order(self.case.controls)
+
+    @property
     def y_size(self) -> int:
         """Number of states."""
         return len(self.state_names)
@@ -228,7 +236,8 @@ class Model(Displayable):
         cells = bool((self.tables.pipes["cells"] > 0).any())
         cast = ModelFeatures(self.case.law.family, cells, *mechanics, self.unsteady, self.creeps, has.devices,
                     tuple(self.laws), basins, carried, has.scalars, valves, has.delays, alone,
-                    forces=bool(self.layout["forces"] >= 0))  # fmt: skip
+                    forces=bool(self.layout["forces"] >= 0), controls=has.controls,
+                    formulas=bool((self.tables.schedules["pieces"] < 0).any()))  # fmt: skip
         return functions(cast)
 
     @property
@@ -458,4 +467,20 @@ def inputs_of(model: Model) -> dict[str, Input]:
     for name, part in parts.items():
         own = lowering_of(type(part)).of(part).inputs(model, name, part)
         inputs |= {f"{name}.{key}": value for key, value in own.items()}
+    return inputs | block_inputs(model)
+
+
+def block_inputs(model: Model) -> dict[str, Input]:
+    """Outputs of all blocks, at which they can be cut, and setpoints : name `controls.NAME.KEY` -> input."""
+    inputs: dict[str, Input] = {}
+    for row, name in zip(model.tables.controls, model.block_names, strict=True):
+        first, output = model.case.controls[name].dimensions
+        least, greatest = float(row["least"]), float(row["greatest"])
+        unit, small = DIMENSIONS[output].si, small_change(output)
+        span = f", {least:g} to {greatest:g}" if math.isfinite(least) and math.isfinite(greatest) else ""
+        sort = InputKind(unit, f"a number [{unit}]{span}", least, greatest, small)
+        inputs[f"controls.{name}.output"] = Input(sort, -1, control=model.block_names.index(name))
+        if row["setpoint"] >= 0:
+            sort = InputKind(DIMENSIONS[first].si, f"a number [{DIMENSIONS[first].si}]", small=small_change(first))
+            inputs[f"controls.{name}.setpoint"] = Input(sort, int(row["setpoint"]))
     return inputs

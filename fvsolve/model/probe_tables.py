@@ -8,14 +8,24 @@ from fvsolve.assembly.scheme_codes import lower_position
 from fvsolve.case import sloshing
 from fvsolve.kernels import dtypes as rec
 
+BLOCK_QUANTITIES = ("output", "input", "error")  # in the order of `kernels.controls`
+
 
 def lower_probes(draft) -> np.ndarray:
     """Table of all probes (`all_probes`). Data of the initial steady state are filled in later, by `probe_offsets`."""
-    case, table = draft.case, np.zeros(len(all_probes(draft.case)), rec.PROBE)
+    return fill_probes(draft, all_probes(draft.case))
+
+
+def fill_probes(draft, probes: list) -> np.ndarray:
+    """Table with a row for each of these probes."""
+    case, table = draft.case, np.zeros(len(probes), rec.PROBE)
     parts = {"nodes": {**case.places, **case.nodes}, "links": {**case.links, **case.conduits}}
-    for row, probe in zip(table, all_probes(case), strict=True):
+    for row, probe in zip(table, probes, strict=True):
         row["mark"] = -1
-        if probe.point is not None:
+        if probe.part == "controls":
+            row["kind"], row["index"] = rec.CONTROL_VALUE, draft.schedules.blocks[probe.name.removeprefix("controls.")]
+            row["side"] = BLOCK_QUANTITIES.index(probe.quantity)
+        elif probe.point is not None:
             lower_basin_point(draft, row, probe)
         elif probe.quantity in draft.case.scalars:
             scalar_probe(draft, row, probe)
@@ -93,7 +103,8 @@ def probe_offsets(draft, start) -> None:
     for k, (row, probe) in enumerate(zip(draft.probe_table[count:], draft.case.extreme_probes, strict=True)):
         if probe.straight and row["kind"] == rec.PIPE_PRESSURE:
             draft.watched_start[k] = start.profile_at(int(row["index"]), probe.fraction)[0]
-    for row, probe in zip(draft.probe_table, all_probes(draft.case), strict=True):
+    rows = [*draft.probe_table, *draft.sensor_table]
+    for row, probe in zip(rows, [*all_probes(draft.case), *draft.sensors], strict=True):
         if row["kind"] >= rec.CELL_FIELD:  # basins hold the profile of theirs, the others need none
             continue
         if draft.case.law.linear:

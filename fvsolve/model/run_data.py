@@ -21,10 +21,11 @@ def zeros_for_run(shapes: rec.RunArrays) -> rec.RunArrays:
     arrays = {name: np.zeros(shape) for name, shape in shapes._asdict().items() if name not in rec.INTEGERS}
     arrays |= {name: np.zeros(getattr(shapes, name), dtype=np.int64) for name in shapes._fields if name in rec.INTEGERS}
     arrays |= {"clock": np.zeros(1, rec.CLOCK), "work": aligned_zeros(shapes.work)}
-    if shapes.sharp:
-        from fvsolve.kernels.table_handle import empty_handle
+    for name in ("sharp", "sensing"):
+        if getattr(shapes, name):
+            from fvsolve.kernels.table_handle import empty_handle
 
-        arrays["sharp"] = empty_handle()
+            arrays[name] = empty_handle()
     return rec.RunArrays(**arrays)
 
 
@@ -73,8 +74,11 @@ class RunData:
 
         model = self.model
         shared = model.places if self.tables is model.tables else addresses_of(self.tables)
-        sharp = addresses_of(self.tables._replace(**model.sharp)) if model.sharp else shared
-        return linked_handles(shared, sharp, written, callables)
+        replacements = {"sharp": model.sharp} if model.sharp else {}
+        if len(model.tables.sensors):
+            replacements["sensing"] = {"probes": model.tables.sensors, "controls": model.tables.controls[:0]}
+        replaced = {name: addresses_of(self.tables._replace(**own)) for name, own in replacements.items()}
+        return linked_handles(shared, replaced, written, callables)
 
     def reset(self, armed: np.ndarray | float = 0.0) -> None:
         """Reset for another state: event flags as given, and no waves in delay lines."""

@@ -52,8 +52,17 @@ def events(case: Any) -> Iterator[tuple[str, float]]:
 def duration(schedule: Schedule, start: float, end: float) -> float:
     """Time that a schedule needs to cross its whole range at its steepest slope between `start` and `end` [s].
 
-    It is inf if the schedule does not change between `start` and `end`.
+    It is inf if the schedule does not change between `start` and `end`, and if it follows a control.
     """
+    if schedule.kind == "control":
+        return math.inf
+    if schedule.kind == "formula":
+        times, values = schedule.program.samples(start, end)
+        spans = np.diff(times)
+        if np.any(np.diff(values)[spans == 0.0]):
+            return 0.0
+        steep = float(np.max(np.abs(np.diff(values)[spans > 0.0]) / spans[spans > 0.0], initial=0.0))
+        return float(np.ptp(values)) / steep if steep > 0.0 else math.inf
     if schedule.kind == "harmonic":
         return schedule.wave[2] / math.pi
     t, changes = schedule.time, np.abs(np.diff(schedule.value))

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from fvsolve.assembly.lowering import lowering_of
+from fvsolve.assembly.schedule_tables import value_at
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.restrictions import conductance_of, flow_at_drop, flow_slope, transition_of
-from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.kernels.steady_friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.table_handle import make_handle
 from fvsolve.model.mechanics_tables import driven_at_start, start_masses
@@ -84,8 +84,7 @@ class SteadyStart:
         """Value of a schedule at the start, its left limit."""
         values, key = self.draft.schedules.known_values, (int(schedule), self.t)
         if key not in values:
-            schedules, pieces = self.draft.tables.schedules, self.draft.tables.pieces
-            values[key] = float(value_with_limit(schedules, pieces, key[0], self.t, self.t))
+            values[key] = value_at(self.draft.tables, key[0], self.t, self.t)
         return values[key]
 
     def solve(self) -> None:

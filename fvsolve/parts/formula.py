@@ -20,6 +20,7 @@ from fvsolve.parts.value import PROFILE, Quantity, Range, ReadContext, Value, Va
 from fvsolve.units import show
 
 NAMES = ("x", "y", "pi")
+TIME_NAMES = ("t", "pi")
 CALL_FORMS = (  # allowed calls; "..." stands for any number of arguments
     "sin(a)", "cos(a)", "tan(a)", "arctan2(a, b)", "exp(a)", "log(a)", "sqrt(a)", "tanh(a)", "abs(a)",
     "min(a, b, ...)", "max(a, b, ...)", "hypot(a, b)", "where(condition, a, b)",
@@ -56,15 +57,17 @@ class Step(NamedTuple):
 
 
 class Arithmetic:
-    """Formula of x and y, called with arrays. Raises ValueError for an invalid text or a value that is not finite.
+    """Formula of x and y, called with arrays, or of other names, whose steps become a program (`formula_program`).
+
+    Raises ValueError for an invalid text or a value that is not finite.
 
     All values are floats; comparisons give 1 or 0. Values that the function `where` does not select may be invalid.
     """
 
-    def __init__(self, text: str, otherwise: str = "") -> None:
-        """Parse a formula; otherwise : error message for a text that is not a formula at all."""
-        self.text, self.source = text, text.replace("^", "**").strip()
-        about = f"{show(text)} is not a formula of x and y"
+    def __init__(self, text: str, otherwise: str = "", names: tuple[str, ...] = NAMES) -> None:
+        """Parse a formula; otherwise : error message for a text that is not a formula at all; names : its variables."""
+        self.text, self.source, self.names = text, text.replace("^", "**").strip(), names
+        about = f"{show(text)} is not a formula of {listing([name for name in names if name != 'pi']) or 'numbers'}"
         if len(text) > MAX_LENGTH:
             text = f'{about}: it has {len(text)} characters; expected at most {MAX_LENGTH}, or {{ file = "NAME.csv" }}'
             raise ValueError(text)
@@ -89,10 +92,11 @@ class Arithmetic:
         if isinstance(node, ast.Constant):
             yield Step(decimal_number(part), 0, part)
         elif isinstance(node, ast.Name):
-            if node.id not in NAMES:
+            if node.id not in self.names:
                 hint = f"; did you mean {FUNCTIONS[node.id]}?" if node.id in FUNCTIONS else ""
-                hint = hint or did_you_mean(node.id, [*NAMES, *FUNCTIONS])
-                raise ValueError(f"{node.id} is unknown{hint}; known are {listing([*NAMES, *FUNCTIONS], 20)}")
+                known = [*self.names, *FUNCTIONS]
+                raise ValueError(f"{node.id} is unknown{hint or did_you_mean(node.id, known)}; known are "
+                                 f"{listing(known, 20)}")  # fmt: skip
             yield Step(node.id, 0, part)
         elif isinstance(node, ast.UnaryOp):
             yield from self.read(node.operand)
@@ -113,7 +117,7 @@ class Arithmetic:
                 yield from self.read(other)
                 yield Step(operator_function(sign), 2, part)
             if len(node.ops) > 1:
-                yield Step(np.minimum, len(node.ops), part)
+                yield Step(np.multiply, len(node.ops), part)
         elif isinstance(node, ast.Call):
             yield from self.call(node, part)
         else:

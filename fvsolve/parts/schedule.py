@@ -1,6 +1,6 @@
 """Schedules: values that may change with time, and the keys that declare them."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -9,27 +9,31 @@ import numpy as np
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
 from fvsolve.parts.csv_rows import copy_name, find_file, read_columns
+from fvsolve.parts.formula_program import Program, is_formula, program_in
 from fvsolve.parts.table_model import keys_json, read_keys
 from fvsolve.parts.value import NEEDED, Choice, Number, Quantity, Range, ReadContext, Rows, Text, Value, ValueFault
-from fvsolve.units import show
+from fvsolve.units import DIMENSIONS, show
 
 KINDS = ("linear", "step", "smooth")
 AMPLITUDE_DIMENSIONS = {
     "pressure": "pressure_drop"
 }  # dimension of an amplitude, if the zero point of the dimension matters
 
+BOUNDED = ("pressure", "head", "angular_velocity")  # dimensions that a control may drive only within `limits`
+
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
     """Value over time: constant before the first and after the last entry; at a jump, the value after the jump holds.
 
-    kind : constant | linear | step | smooth (monotone cubic) | ramp | harmonic
+    kind : constant | linear | step | smooth (monotone cubic) | ramp | harmonic | formula | control
     time, value : float64[n]  breakpoints [s] and values there [SI, pressures absolute]; a constant has one entry; a
-    harmonic schedule has its minimum and maximum, at infinite times
+    harmonic schedule or a formula has its minimum and maximum, at infinite times, the output of a control its limits
     exponent : for a ramp, value = v1 + (v0 - v1) (1 - s)^exponent, with v0 and v1 its first and last value, and s from
     0 to 1 between its two times
     wave : (mean, amplitude, period [s], phase [rad]) of a harmonic schedule,
     value = mean + amplitude sin(2 pi t / period + phase)
+    program : formula of the time, as steps
     origin : table as in a case file, in SI; None for a constant that is stated as a number
     """
 
@@ -39,6 +43,7 @@ class Schedule:
     exponent: float = 1.0
     origin: Any = field(default=None, repr=False)
     wave: tuple[float, ...] = ()
+    program: Program | None = None
 
     def __post_init__(self) -> None:
         for name in ("time", "value"):
@@ -49,6 +54,8 @@ class Schedule:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Schedule):
             return NotImplemented
+        if self.kind in ("formula", "control"):
+            return self.kind == other.kind and self.origin == other.origin
         mine, theirs = (self.kind, self.exponent, self.wave), (other.kind, other.exponent, other.wave)
         return mine == theirs and np.array_equal(self.time, other.time) and np.array_equal(self.value, other.value)
 
@@ -88,10 +95,16 @@ class Scheduled(Value):
     def read(self, given: Any, setting: ReadContext) -> Schedule:
         if isinstance(given, Schedule):
             return given
+        if is_formula(given):
+            return self._read_formula({"formula": given}, setting, given)
         if not isinstance(given, dict):
             return constant(Quantity(self.dimension, self.range).read(given, setting))
         if "signal" in given:
             return self._read_signal(given, setting)
+        if "formula" in given:
+            return self._read_formula(given, setting, given)
+        if "control" in given:
+            return self._read_control(given, setting)
         if "file" in given:
             return self._read_file(given, setting)
         if any(key in given for key in ("start", "duration", "exponent")):
@@ -118,6 +131,8 @@ class Scheduled(Value):
             },
             "file": {"file": (Text(), NEEDED), "time": (Text(), None), "value": (Text(), None), "kind": kind},
             "signal": {"signal": (Text(), NEEDED)},
+            "control": {"control": (Text(), NEEDED)},
+            "formula": {"formula": (Text(), NEEDED), "unit": (Text(), "")},
         }  # fmt: skip
 
     @property
@@ -191,6 +206,46 @@ class Scheduled(Value):
         except ValueError as error:
             raise ValueFault(val.faults_of(error, val.ROOT, "signals", name)) from None
         setting.used[name] = schedule.table()
-        return Schedule(
-            schedule.kind, schedule.time, schedule.value, schedule.exponent, {"signal": name}, schedule.wave
-        )
+        return replace(schedule, origin={"signal": name})
+
+    def _read_formula(self, given: dict[str, Any], setting: ReadContext, origin: Any) -> Schedule:
+        setting.lookups += 1  # its range depends on the times of the run
+        values = read_keys(given, self.forms["formula"], setting)
+        place = ("formula",) if isinstance(origin, dict) else ()
+        try:
+            program = program_in(values["unit"], self.dimension, values["formula"], (), setting.ambient)
+        except ValueError as error:
+            if not place and not any(sign in origin for sign in "*/+()<>="):  # a quantity with a wrong unit
+                Quantity(self.dimension, self.range).read(origin, setting)
+            raise ValueFault([(place, str(error))]) from None
+        if setting.span is None:
+            return Schedule("formula", (-np.inf, np.inf), (-np.inf, np.inf), origin=origin, program=program)
+        times, found = program.samples(*setting.span)
+        bad = ~np.isfinite(found)
+        bad |= (found < self.range.least) | (found > self.range.greatest)
+        bad |= self.range.open & (found == self.range.least)
+        if bad.any():
+            k = int(np.argmax(bad))
+            state = f"is {found[k]:.6g}, out of range; expected a value {self.range}"
+            state = "is not a finite number" if not np.isfinite(found[k]) else state
+            raise ValueFault([(place, f"{show(values['formula'])} at t = {times[k]:.6g} s {state}")])
+        reach = float(found.min()), float(found.max())
+        return Schedule("formula", (-np.inf, np.inf), reach, origin=origin, program=program)
+
+    def _read_control(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
+        setting.lookups += 1
+        name = read_keys(given, self.forms["control"], setting)["control"]
+        if name not in setting.controls:
+            near, names = did_you_mean(name, setting.controls), listing(setting.controls) or "none"
+            raise ValueFault([(("control",), f"no control named {show(name)}{near}; [controls] has {names}")])
+        setting.driven.setdefault(name, []).append((self.dimension, self.range))
+        block = setting.controls[name]
+        limits = block.get("limits") if isinstance(block, dict) else None
+        try:
+            reach = Rows(self.dimension, length=2).read(limits, setting)
+        except ValueError:  # none, or a fault of the block
+            reach = self.range.least, self.range.greatest
+            if self.dimension in BOUNDED and not np.isfinite(reach).all():
+                text = f"{DIMENSIONS[self.dimension].words} needs bounds; give `limits` in [controls.{name}]"
+                raise ValueFault([(("control",), text)]) from None
+        return Schedule("control", (-np.inf, np.inf), reach, origin={"control": name})

@@ -85,14 +85,22 @@ def read_each(entries: Iterable[tuple[Any, Any]], read: Callable[[Any], Any]) ->
 
 @dataclass
 class ReadContext:
-    """Context in which a value is read: ambient pressure [Pa], folder, signals and files of the case."""
+    """Context in which a value is read: ambient pressure [Pa], folder, signals, controls and files of the case.
+
+    driven : control -> (dimension, range) of each key that it drives; block_units : dimensions of the first input and
+    of the output of the block that is read
+    """
 
     ambient: float = 101325.0
     folder: Path | None = None
     signals: dict[str, Any] = field(default_factory=dict)
     files: dict[str, Path] = field(default_factory=dict)
     used: dict[str, Any] = field(default_factory=dict)  # signals that parts refer to, in SI
-    lookups: int = 0  # number of uses of files and signals
+    lookups: int = 0  # number of uses of files, signals and controls
+    controls: dict[str, Any] = field(default_factory=dict)
+    driven: dict[str, list[tuple[str, Range]]] = field(default_factory=dict)
+    block_units: tuple[str, str] = ("number", "number")
+    span: tuple[float, float] | None = None  # start and end of the run [s]; None if unknown
 
 
 def context_of(info: Any) -> ReadContext:

@@ -73,6 +73,7 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
     tables = model.tables
     schedules, pieces, nodes = tables.schedules.copy(), tables.pieces, tables.nodes.copy()
     scalars, known, linear, rows = tables.scalars.copy(), inputs_of(model), model.case.law.linear, []
+    controls = tables.controls.copy()
     for name, value in inputs.items():
         if name not in known:
             near = nearest(str(name), known)
@@ -80,6 +81,9 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
             raise FvsolveError(f"no input named {show(name)}{hint}")
         target = known[name]
         converted = checked(name, value, target)
+        if target.control >= 0:
+            controls["held"][target.control] = converted
+            continue
         if target.node >= 0 and not linear:  # under the linear law a head becomes a pressure, else it stays a head
             nodes["head_given"][target.node] = target.sort is HEAD
         else:
@@ -93,8 +97,9 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
         if target.scalar >= 0:  # values of a scalar are limited to its bounds
             bounds = scalars[target.scalar]
             bounds["least"], bounds["greatest"] = min(bounds["least"], converted), max(bounds["greatest"], converted)
-    pieces = np.vstack([pieces, rows])
-    return replace(model, tables=tables._replace(schedules=schedules, nodes=nodes, scalars=scalars, pieces=pieces))
+    pieces = np.vstack([pieces, *([rows] if rows else [])])
+    changed = {"schedules": schedules, "nodes": nodes, "scalars": scalars, "pieces": pieces, "controls": controls}
+    return replace(model, tables=tables._replace(**changed))
 
 
 def checked(name: str, value: float, target: Input) -> float:

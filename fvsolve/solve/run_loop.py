@@ -310,7 +310,8 @@ def fused_step_allowed(model: Model, method: Method) -> bool:
     """True if a single function can compute both rates and step (a fused step).
 
     It requires the linear density law, the upwind scheme, a one-stage explicit method without error control, no state
-    except cells of pipes, no events, no pipe on a moving body, and no friction or a constant friction factor.
+    except cells of pipes, no events, no pipe on a moving body, no control, and no friction or a constant friction
+    factor.
     """
     settings, numerics = model.tables.settings[0], model.case.numerics
     laws = model.tables.pipes["friction"]
@@ -318,6 +319,7 @@ def fused_step_allowed(model: Model, method: Method) -> bool:
         model.case.law.linear and settings["scheme"] == rec.UPWIND
         and method.explicit and method.stages == 1 and numerics.rtol is None
         and model.y_size == 2 * model.cells and model.shapes.armed == 0 and not len(model.tables.moving_segments)
+        and not len(model.tables.controls)
         and {*laws.tolist()} <= {rec.FRICTION_NONE, rec.FRICTION_FACTOR}
     )  # fmt: skip
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from fvsolve.assembly.lowering import PRESSURE, Input
+from fvsolve.assembly.schedule_tables import value_at
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.model.energy_norm import EnergyForm
 from fvsolve.model.model import inputs_of
 from fvsolve.schemes import SCHEMES
@@ -81,6 +81,7 @@ class Linear:
         names, basins = set(self.states), {basin.name: basin.part.physics_type.states for basin in self.at.model.basins}
         return [
             basins[part].get(quantity.split("[")[0], "-") if part in basins
+            else block_unit(self.at.model.case, part, quantity) if part.startswith("controls.")
             else state_unit(name, f"{part}.opening" in names)
             for name in self.states for part, quantity in [name.rsplit(".", 1)]
         ]  # fmt: skip
@@ -105,6 +106,12 @@ class Linear:
             "A": a, "B": self.b, "C": self.c, "D": self.d, "error": self.error,
             "state": self.at.y, "rate": self.at.rate,
         }  # fmt: skip
+
+
+def block_unit(case, block: str, state: str) -> str:
+    """SI unit of a state of a block: that of its output for an integral, else that of its input."""
+    first, output = case.controls[block.removeprefix("controls.")].dimensions
+    return DIMENSIONS[output if state == "integral" else first].si
 
 
 def state_unit(name: str, opens: bool) -> str:
@@ -138,6 +145,7 @@ def linearise(
 def linearise_at(at: OperatingPoint, inputs=(), outputs: int = 0) -> Linear:
     """Linearise about an operating point, with named inputs; outputs are the first `outputs` of its probes.
 
+    A loop is cut at the output of a control that is an input: its probe is then the output as the control computes it.
     Raises FvsolveError for an unknown input, and for a state, input or output without a derivative.
     """
     model, inputs = at.model, tuple(dict.fromkeys(inputs))
@@ -147,6 +155,8 @@ def linearise_at(at: OperatingPoint, inputs=(), outputs: int = 0) -> Linear:
             hint = did_you_mean(name, available) or f"; inputs are {listing(available)}"
             raise FvsolveError(f'no input named "{name}"{hint}')
     refuse_limiter(model)
+    cut = {name: input_value(at, name, available[name]) for name in inputs if available[name].control >= 0}
+    at = replace(at, model=hold(model, cut))
     a, size, error_a, steps = state_matrix(at)
     c, error_c = output_matrix(at, outputs, steps)
     values = [input_value(at, name, available[name]) for name in inputs]
@@ -186,9 +196,11 @@ def input_value(at: OperatingPoint, name: str, input_: Input) -> float:
                          + model.evaluate(at.t, at.y)[1][model.layout["pressure"] + input_.node])  # fmt: skip
         place = model.node_names[input_.node]
         return pressure if input_.sort is PRESSURE else float(model.head(pressure, model.elevation[place]))
-    value = value_with_limit(model.tables.schedules, model.tables.pieces, input_.schedule, at.t, np.inf)
+    if input_.control >= 0:
+        return float(model.evaluate(at.t, at.y)[1][model.layout["control"] + 2 * input_.control])
+    value = value_at(model.tables, input_.schedule, at.t, np.inf)
     if input_.other >= 0:
-        value -= value_with_limit(model.tables.schedules, model.tables.pieces, input_.other, at.t, np.inf)
+        value -= value_at(model.tables, input_.other, at.t, np.inf)
     return float(value / input_.scale)
 
 

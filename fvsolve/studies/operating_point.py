@@ -16,10 +16,11 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.assembly.schedule_tables import slope_at, value_at
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.ghost_cells import difference_rows
-from fvsolve.kernels.schedule_pieces import POLYNOMIAL, piece_at, piece_slopes, value_with_limit
+from fvsolve.kernels.schedule_pieces import POLYNOMIAL
 from fvsolve.schemes import LIMITED, SCHEMES
 from fvsolve.step_limits.symbol import symbol
 from fvsolve.studies.outcome import outcome, study_model
@@ -113,7 +114,7 @@ def _state_at(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray | 
 
 
 def with_held_schedules(model, t: float, before: bool = False):
-    """Model with all schedules and all periodic velocities of basins held at their values at t [s].
+    """Model with all schedules of time and all periodic velocities of basins held at their values at t [s].
 
     before : True for the values just before a kink or jump at t, otherwise just after it
     Schedules that drive joints and walls continue with their rate of change at this time. Kinks and jumps are removed.
@@ -121,14 +122,14 @@ def with_held_schedules(model, t: float, before: bool = False):
     """
     tables = model.tables
     schedules, limit = tables.schedules.copy(), t if before else np.inf
-    values = [value_with_limit(tables.schedules, tables.pieces, k, t, limit) for k in range(len(schedules))]
-    for k in range(len(schedules)):
-        schedules[k] = (k, 1)
+    values = [value_at(tables, k, t, limit) for k in range(len(schedules))]
     rows = [[-np.inf, POLYNOMIAL, t, value, 0.0, 0.0, 0.0] for value in values]
+    for k, record in enumerate(tables.schedules):
+        schedules[k] = (k, int(record["pieces"] != 0))
+        if record["pieces"] == 0:  # it follows a block
+            rows[k] = tables.pieces[record["first"]].tolist()
     for k in {int(row["schedule"]) for table in (tables.bodies, tables.walls) for row in table} - {-1}:
-        record = tables.schedules[k]
-        piece = piece_at(tables.pieces, record["first"], record["pieces"], t, limit)
-        rows[k][4] = piece_slopes(tables.pieces, piece, t)[0]
+        rows[k][4] = slope_at(tables, k, t, limit)
     tables = tables._replace(schedules=schedules, pieces=np.array(rows).reshape(-1, 7))
     tables = with_held_velocities(model, tables, t)
     if not has_limiter(model):

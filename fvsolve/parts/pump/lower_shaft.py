@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fvsolve.kernels.schedule_pieces import value_with_limit
+from fvsolve.assembly.schedule_tables import value_at
 from fvsolve.parts.pump import law
 from fvsolve.parts.pump.head_curve import CurvePoints, Quadrants, quadrants, zero_head_flow
 from fvsolve.parts.pump.part import EFFICIENCY
@@ -328,8 +328,7 @@ class ShaftLowering:
         name = draft.valve_names[row["valve"]]
         if floats[at + law.MODE] == law.TRIPPING:
             trip = float(part.trip)
-            tables = draft.tables.schedules, draft.tables.pieces
-            floats[at + law.START_SPEED] = value_with_limit(*tables, int(row["schedule"]), trip, trip)
+            floats[at + law.START_SPEED] = value_at(draft.tables, int(row["schedule"]), trip, trip)
         if floats[at + law.MODE] != law.TORQUE_DRIVEN:
             return []
         braking = self.fluid_torque(start, row, valve)

@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.assembly.schedule_tables import value_at
 from fvsolve.case.chainage import add_bends, placed
 from fvsolve.case.reading import raw_link
 from fvsolve.case.sloshing import slowest
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.fluid import LAWS
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.kernels.steady_friction import drag
 from fvsolve.model.delay_lines import reason_for_cells
 from fvsolve.model.model_facts import velocities
@@ -509,7 +509,7 @@ def change_time(model) -> float:
 
 def schedule_values(model, index: int, times) -> np.ndarray:
     """Values [SI] of the schedule with this index at the given times [s]."""
-    return np.array([value_with_limit(model.tables.schedules, model.tables.pieces, index, t, np.inf) for t in times])
+    return np.array([value_at(model.tables, index, t, np.inf) for t in times])
 
 
 def run_down_time(model, name: str, t: float) -> float:

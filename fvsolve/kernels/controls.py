@@ -1,0 +1,173 @@
+"""Blocks of `controls`: sensors, outputs before and after the nodes are solved, rates of their states, probes.
+
+A sensor is a probe that a block reads. The functions of the job OBSERVE read all sensors through the handle `sensing`,
+in which the sensors replace the probes. A block works on changes since the start, so that a loop at rest does not move.
+Blocks whose output drives the network (openings, speeds, pressures, demands) decide before the nodes are solved, from
+states alone. Other blocks decide afterwards. Schedules read the outputs from `applied`; after the outputs, this array
+has the outputs before their limits.
+"""
+
+from fvsolve.jit import njit, specialise
+from fvsolve.kernels import calls
+from fvsolve.kernels.barotropic_nodes import head_pressure
+from fvsolve.kernels.devices import ADAPT, DECIDE, SET, SWITCH
+from fvsolve.kernels.dtypes import CONTROL_VALUE, DRIVEN_DEVICE, DRIVEN_VALVE, FIXED
+from fvsolve.kernels.restrictions import valve_conductance
+from fvsolve.kernels.schedule_pieces import schedule_value
+from fvsolve.kernels.table_handle import open_tables
+
+OUTPUT, INPUT, ERROR = 0, 1, 2  # quantities of a block
+LINEAR = None  # of the template: True for the density law `linear`
+
+
+@njit(forceinline=True)
+def measured_change(tables, control, j):
+    """Change of input j of a block since the start, before its filter."""
+    code = tables.integers[control["inputs"] + j]
+    value = tables.readings[code] if code >= 0 else tables.applied[-1 - code]
+    return value - tables.floats[control["starts"] + j]
+
+
+@njit(forceinline=True)
+def input_change(y, tables, control, j):
+    """Change of input j of a block since the start, after its filter if it has one."""
+    return y[control["y"] + j] if j < control["filters"] else measured_change(tables, control, j)
+
+
+@njit(forceinline=True)
+def setpoint_change(t, tables, control):
+    """Change of the setpoint of a block since the start; 0 without a setpoint."""
+    if control["setpoint"] < 0:
+        return 0.0
+    return schedule_value(tables, control["setpoint"], t) - control["setpoint_start"]
+
+
+@njit
+def begin_controls(t, y, dydt, out, handle):
+    """Set the outputs of all blocks to those at the start, which schedules have until the blocks decide."""
+    tables = open_tables(handle)
+    for k in range(tables.controls.size):
+        tables.applied[k] = applied_output(tables.controls[k], tables.controls[k]["start"])
+
+
+@njit(forceinline=True)
+def applied_output(control, output):
+    """Output of a block as schedules read it: the value at which a study holds it, else `output`."""
+    return control["held"] if control["held"] == control["held"] else output
+
+
+@njit(forceinline=True)
+def read_sensors(t, y, out, tables):
+    """Write the values of all sensors to `readings`."""
+    if tables.readings.size > 0:
+        calls.observe_in_turn(t, y, out, tables.sensing, tables.readings)
+
+
+@njit
+def write_outputs(t, y, out, tables, late):
+    """Write the outputs of the blocks that decide before (late 0) or after (late 1) the nodes are solved."""
+    controls, applied, at = tables.controls, tables.applied, tables.layout[0]["control"]
+    for k in range(controls.size):
+        control = controls[k]
+        if control["late"] == late:
+            v = calls.call_decide(tables.hooks[control["hooks"], DECIDE], t, y, tables, control)
+            out[at + 2 * k] = min(max(v, control["least"]), control["greatest"])
+            applied[k], applied[controls.size + k] = applied_output(control, out[at + 2 * k]), v
+
+
+@njit(forceinline=True)
+def drive_node(t, out, tables, i):
+    """Write the pressure change of a node of given pressure, or replace the demand of a junction (law `linear`)."""
+    node, layout = tables.nodes[i], tables.layout[0]
+    value = schedule_value(tables, node["schedule"], t)
+    if node["kind"] != FIXED:
+        out[layout["net"] + i] -= value + out[layout["supply"] + i]
+        out[layout["supply"] + i] = -value
+        return
+    if not LINEAR and node["head_given"] == 1:
+        value = head_pressure(tables.settings[0], tables.floats, value - node["elevation"])
+    out[layout["pressure"] + i] = value - node["pressure"]
+
+
+def _decide_early(t, y, dydt, out, handle):
+    """Write the outputs of blocks that drive the network, from states alone, and apply them to valves and nodes."""
+    tables = open_tables(handle)
+    read_sensors(t, y, out, tables)
+    write_outputs(t, y, out, tables, 0)
+    for m in range(tables.driven.size):
+        kind, i = tables.driven[m]["kind"], tables.driven[m]["index"]
+        if kind == DRIVEN_VALVE:
+            out[tables.layout[0]["conductance"] + i] = valve_conductance(tables, i, t)
+        elif kind == DRIVEN_DEVICE:
+            device = tables.devices[i]
+            calls.call_set(tables.hooks[device["hooks"], SET], t, y, out, tables, device)
+        else:
+            drive_node(t, out, tables, i)
+
+
+decide_linear = specialise(_decide_early, "decide_linear", LINEAR=True)
+decide_barotropic = specialise(_decide_early, "decide_barotropic", LINEAR=False)
+
+
+@njit
+def decide_late(t, y, dydt, out, handle):
+    """Write the outputs of blocks that only rates read, such as forces, after the nodes are solved."""
+    tables = open_tables(handle)
+    read_sensors(t, y, out, tables)
+    write_outputs(t, y, out, tables, 1)
+
+
+@njit
+def control_rates(t, y, dydt, out, handle):
+    """Write the rates of filters and other states of blocks to `dydt`, and the first input of each block to `out`."""
+    tables = open_tables(handle)
+    controls, applied, at = tables.controls, tables.applied, tables.layout[0]["control"]
+    read_sensors(t, y, out, tables)
+    for k in range(controls.size):
+        control = controls[k]
+        if control["input_count"] > 0:
+            out[at + 2 * k + 1] = tables.floats[control["starts"]] + input_change(y, tables, control, 0)
+        if dydt.size == 0:
+            continue
+        for j in range(control["filters"]):
+            i = control["y"] + j
+            dydt[i] = (measured_change(tables, control, j) - y[i]) * control["filter_rate"]
+        hook = tables.hooks[control["hooks"], ADAPT]
+        if hook != 0 and control["y"] >= 0:
+            calls.call_adapt(hook, t, y, dydt, tables, control, applied[controls.size + k], out[at + 2 * k])
+
+
+@njit
+def control_events(t, y, out, handle, g):
+    """Write the event functions of all blocks to g, from solved nodes."""
+    tables = open_tables(handle)
+    read_sensors(t, y, out, tables)
+    for k in range(tables.controls.size):
+        hook = tables.hooks[tables.controls[k]["hooks"], SWITCH]
+        if hook != 0:
+            calls.call_switch(hook, t, y, tables, tables.controls[k], g)
+
+
+@njit
+def restore_outputs(t, y, out, handle, values):
+    """Write the outputs of blocks at this state to `applied`, before other functions read schedules."""
+    tables = open_tables(handle)
+    for k in range(tables.controls.size):  # there is none behind the handle of the sensors
+        tables.applied[k] = applied_output(tables.controls[k], out[tables.layout[0]["control"] + 2 * k])
+
+
+@njit
+def observe_controls(t, y, out, handle, values):
+    """Write output, input or error of blocks to `values`."""
+    tables = open_tables(handle)
+    controls, at = tables.controls, tables.layout[0]["control"]
+    for k in range(tables.probes.size):
+        probe = tables.probes[k]
+        if probe["kind"] == CONTROL_VALUE:
+            i = probe["index"]
+            if probe["side"] == OUTPUT:
+                values[k] = out[at + 2 * i]
+            elif probe["side"] == INPUT:
+                values[k] = out[at + 2 * i + 1]
+            else:
+                values[k] = schedule_value(tables, controls[i]["setpoint"], t) - out[at + 2 * i + 1]

@@ -1,0 +1,177 @@
+"""Formulas of time, and of inputs of blocks: text, steps for the stack machine, breaks, range of values in a run."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fvsolve import units
+from fvsolve.kernels import formula_programs as code
+from fvsolve.parts.formula import FUNCTIONS, TIME_NAMES, Arithmetic
+from fvsolve.units import show
+
+CODES = {
+    np.add: code.ADD, np.subtract: code.SUBTRACT, np.multiply: code.MULTIPLY, np.divide: code.DIVIDE,
+    np.power: code.POWER_OF, np.negative: code.NEGATE, np.sin: code.SINE, np.cos: code.COSINE, np.tan: code.TANGENT,
+    np.arctan2: code.ARCTANGENT, np.exp: code.EXPONENTIAL, np.log: code.LOGARITHM, np.sqrt: code.ROOT,
+    np.tanh: code.TANH, np.hypot: code.HYPOTENUSE, np.where: code.WHERE, np.abs: code.ABSOLUTE,
+    np.minimum: code.LEAST, np.maximum: code.GREATEST, np.less: code.LESS, np.less_equal: code.LESS,
+    np.greater: code.MORE, np.greater_equal: code.MORE,
+}  # fmt: skip
+SAMPLES = 4001  # values of a formula at equal distances in a run, from which its range and its periods are found
+NO_FLAGS = np.zeros(0)
+TIME_FORMULA = re.compile(r"(?<![\w.])t(?![\w.])|" + "|".join(rf"\b{name}\(" for name in FUNCTIONS))
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """Formula as steps of the stack machine.
+
+    text : formula; names : its inputs; scale, offset : SI value = scale * value of the formula + offset
+    """
+
+    text: str
+    names: tuple[str, ...] = ()
+    scale: float = 1.0
+    offset: float = 0.0
+
+    @cached_property
+    def steps(self) -> list[tuple[int, float]]:
+        """(code, number) of each step. Raises ValueError for a text that is not a formula."""
+        result: list[tuple[int, float]] = []
+        widths: list[list[int]] = []  # steps that compute each value on the stack
+        for step in Arithmetic(self.text, names=(*TIME_NAMES, *self.names)).steps:
+            if step.count == 0:
+                self.push(result, widths, step.rule)
+            elif step.rule is not np.positive:
+                self.apply(result, widths, step)
+        return result
+
+    def push(self, result: list, widths: list, rule: Any) -> None:
+        """Add the step for a number or a name."""
+        widths.append([len(result)])
+        if rule == "t":
+            result.append((code.TIME, 0.0))
+        elif isinstance(rule, str) and rule != "pi":
+            result.append((code.INPUT, float(self.names.index(rule))))
+        else:
+            result.append((code.CONSTANT, math.pi if rule == "pi" else rule))
+
+    def apply(self, result: list, widths: list, step: Any) -> None:
+        """Add the steps for a function of the last `step.count` values; functions of numbers are computed here."""
+        if step.rule not in CODES:
+            raise ValueError(f"{show(self.text)}: {step.part} compares for equality; expected < or >")
+        operands = widths[len(widths) - step.count :]
+        del widths[len(widths) - step.count :]
+        first = operands[0][0]
+        own = [result[operand[0]] for operand in operands]
+        if all(len(operand) == 1 and item[0] == code.CONSTANT for operand, item in zip(operands, own, strict=True)):
+            values = [item[1] for item in own]
+            del result[first:]
+            with np.errstate(all="ignore"):
+                value = float(step.rule(*values) if len(values) < 3 or step.rule is np.where else
+                              step.rule.reduce(values))  # fmt: skip
+            if not math.isfinite(value):
+                raise ValueError(f"{show(self.text)}: {step.part} is not a number")
+            result.append((code.CONSTANT, value))
+        elif (past := self.compared_time(operands, own, CODES[step.rule])) is not None:
+            del result[first:]
+            result.append(past)
+        else:
+            result += [(CODES[step.rule], 0.0)] * (1 if step.rule is np.where else max(1, step.count - 1))
+        widths.append(list(range(first, len(result))))
+
+    def compared_time(self, operands: list, own: list, kind: int) -> tuple[int, float] | None:
+        """Step for a comparison of the time with a number; None for other steps."""
+        if kind not in (code.LESS, code.MORE) or any(len(operand) > 1 for operand in operands):
+            return None
+        (left, a), (right, b) = own
+        if (left, right) == (code.TIME, code.CONSTANT):
+            return (code.BEFORE if kind == code.LESS else code.AFTER, b)
+        if (left, right) == (code.CONSTANT, code.TIME):
+            return (code.AFTER if kind == code.LESS else code.BEFORE, a)
+        return None
+
+    @property
+    def kinks(self) -> int:
+        """Number of steps whose result has a kink or a jump where two values are equal."""
+        return sum(kind >= code.FIRST_KINK for kind, _ in self.steps)
+
+    def rows(self, scale: float = 1.0, offset: float = 0.0, flag: int = 0, kind: float = 0.0) -> list[list[float]]:
+        """Rows of `pieces`: header and steps, for the value scale * SI value + offset; flag : first event flag."""
+        header = [-np.inf, kind, len(self.steps), scale * self.scale, scale * self.offset + offset, flag, 0.0]
+        result, number = [header], 0
+        for step, value in self.steps:
+            if step >= code.FIRST_KINK:
+                value, number = 2.0 * number, number + 1
+            result.append([0.0, float(step), value, 0.0, 0.0, 0.0, 0.0])
+        return result
+
+    @cached_property
+    def table(self) -> np.ndarray:
+        """Rows of `pieces` of the program alone : float64[1 + steps, 7]."""
+        return np.array(self.rows())
+
+    @property
+    def stack_size(self) -> int:
+        """Size of the work array that the program needs."""
+        return 3 * (len(self.steps) + len(self.names)) + 1
+
+    def value(self, t: float, limit: float = np.inf, inputs: tuple[float, ...] = ()) -> float:
+        """SI value at time t [s] with these inputs; from time `limit` on, its left limit there."""
+        stack = np.zeros(self.stack_size)
+        stack[: len(inputs)] = inputs
+        return float(code.run_program(self.table, 0, t, limit, len(inputs), stack, NO_FLAGS, NO_FLAGS))
+
+    def breaks(self) -> list[tuple[float, bool]]:
+        """Times at which a comparison with the time changes: (time [s], True if the value jumps), increasing."""
+        return [(time, self.jumps(time)) for time in self.break_times]
+
+    @property
+    def break_times(self) -> list[float]:
+        """Times at which a comparison with the time changes [s], increasing."""
+        return sorted({value for step, value in self.steps if step in (code.BEFORE, code.AFTER)})
+
+    def jumps(self, time: float) -> bool:
+        """True if the value of a formula of time jumps at a break."""
+        before, after = self.value(time, time), self.value(time)
+        return not abs(after - before) <= 1e-12 * (abs(before) + abs(after))
+
+    def samples(self, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
+        """(times, values) of a formula of time in a run, with both sides of each break : float64[n] each."""
+        times = np.linspace(start, end, SAMPLES)
+        pairs = [(t, self.value(t)) for t in times.tolist()]
+        for t, _ in self.breaks():
+            pairs += [(t, self.value(t, t)), (t, self.value(t))] if start <= t <= end else []
+        pairs.sort(key=lambda pair: pair[0])
+        return tuple(np.array(pairs).T)
+
+    def positive_part(self, side: int) -> Program:
+        """Formula of the positive part of side * value, side 1 or -1."""
+        return Program(f"max(0, {side}*({self.scale!r}*({self.text}) + {self.offset!r}))", self.names)
+
+
+def is_formula(text: Any) -> bool:
+    """True if a text may be a formula of time: it has the name t or calls a function."""
+    return isinstance(text, str) and TIME_FORMULA.search(text) is not None
+
+
+def program_in(unit: str, dimension: str, text: str, names: tuple[str, ...], ambient: float) -> Program:
+    """Formula whose value has a unit; "" for SI. Raises ValueError. ambient : ambient pressure [Pa]"""
+    if not unit:
+        return checked(Program(text, names))
+    entry = units.find(unit, dimension)
+    shift = ambient if entry.gauge and dimension == "pressure" else 0.0
+    zero = entry.si(0.0)
+    return checked(Program(text, names, entry.si(1.0) - zero, zero + shift))
+
+
+def checked(program: Program) -> Program:
+    """The same program; raises ValueError if its text is not a formula."""
+    program.steps  # noqa: B018
+    return program

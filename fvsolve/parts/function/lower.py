@@ -1,0 +1,31 @@
+"""Blocks with a formula in the tables of a model, and their value at the start."""
+
+from fvsolve.assembly.control_rows import ControlRows
+from fvsolve.parts.function import law
+
+
+class FunctionRows(ControlRows, kind="function"):
+    """Conversion of blocks with a formula to table rows."""
+
+    law = law
+
+    def numbers(self, draft, name, block):
+        program = program_of(draft.case, block)
+        for time in program.break_times:
+            draft.schedules.breaks[time] = True
+        return [0.0, 0.0, float(draft.schedules.add_program(program))]
+
+    def residual(self, control, start):
+        return self.value(control, start) - start.output
+
+    def value(self, control, start) -> float:
+        """Value of the formula at the start."""
+        return program_of(start.case, start.block).value(start.time, start.time, start.inputs)
+
+    def begin(self, control, start, numbers):
+        numbers[law.START], numbers[law.VALUE] = start.output, self.value(control, start)
+
+
+def program_of(case, block):
+    """Steps of the formula of a block."""
+    return block.control.program(block.dimensions[1], case.ambient_pressure)

@@ -1,0 +1,71 @@
+"""Blocks with a formula of their inputs and of the time: keys and faults."""
+
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+from fvsolve.errors import listing
+from fvsolve.parts.control import Control
+from fvsolve.parts.formula import FUNCTIONS, TIME_NAMES
+from fvsolve.parts.formula_program import Program, program_in
+from fvsolve.parts.value import ReadContext, Text, Value, ValueFault, read_each
+from fvsolve.units import DIMENSIONS, UNITS, show
+
+
+@dataclass(frozen=True)
+class InputNames(Value):
+    """Table of inputs: name in the formula -> probe or block."""
+
+    about: str = "name in the formula, and its probe or controls.NAME"
+    takes: ClassVar[str] = "`{ NAME = PROBE }`"
+    schema: ClassVar[dict[str, Any]] = {"type": "object", "additionalProperties": {"type": "string"}}
+
+    def read(self, given: Any, setting: ReadContext) -> dict[str, str]:
+        if not isinstance(given, dict):
+            raise ValueError(f"{show(given)} is not a table of inputs; expected {{ NAME = PROBE }}")
+        faults = [((name,), f"{show(name)} is no name of an input; expected another name than {listing(RESERVED, 20)}")
+                  for name in given if name in RESERVED or not name.isidentifier()]  # fmt: skip
+        if faults:
+            raise ValueFault(faults)
+        return read_each(given.items(), lambda item: Text().read(item, setting))
+
+
+RESERVED = (*TIME_NAMES, *FUNCTIONS)
+
+
+class Function(Control, kind="function"):
+    """Block with the value of a formula of its inputs and of the time t, in SI.
+
+    Gain, sum, saturation, dead band and logic by 0 and 1 are such blocks.
+    """
+
+    inputs: Annotated[dict[str, str], InputNames()] = {}
+    formula: Annotated[str, Text("formula of the names of the inputs and of t, in SI")]
+    unit: Annotated[str, Text("unit of the value of the formula; SI if left out")] = ""
+
+    @classmethod
+    def inputs_of(cls, given: dict[str, Any]) -> dict[tuple[str, ...], Any]:
+        inputs = given.get("inputs")
+        return {("inputs", name): text for name, text in inputs.items()} if isinstance(inputs, dict) else {}
+
+    @classmethod
+    def own_dimension(cls, given: dict[str, Any], first: str, output: str) -> str | None:
+        unit = UNITS.get(given.get("unit", ""))
+        if unit is None or (DIMENSIONS[output].base or output) == unit.dimension:
+            return None
+        return unit.dimension if unit.dimension in DIMENSIONS else None
+
+    @classmethod
+    def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
+        names, formula, unit = given.get("inputs", {}), given.get("formula"), given.get("unit", "")
+        if isinstance(names, dict) and isinstance(formula, str) and isinstance(unit, str):
+            try:
+                program_in(unit, setting.block_units[1], formula, tuple(names), setting.ambient)
+            except ValueError as error:
+                of_unit = unit and "formula" not in str(error) and show(formula) not in str(error)
+                place = "unit" if of_unit else "formula"
+                raise ValueFault([((place,), str(error))], given) from None
+        return given
+
+    def program(self, dimension: str, ambient: float) -> Program:
+        """Steps of the formula; dimension : that of the output; ambient : ambient pressure [Pa]"""
+        return program_in(self.unit, dimension, self.formula, tuple(self.inputs), ambient)

@@ -1,0 +1,49 @@
+"""Blocks with a table of values in the tables of a model, and their value at the start."""
+
+import numpy as np
+
+from fvsolve.assembly.control_rows import ControlRows
+from fvsolve.parts.lookup_table import law
+
+EVENTS = ("",) * 4  # both ends of the table, in both directions; not reported
+
+
+class LookupTableRows(ControlRows, kind="table"):
+    """Conversion of blocks with a table to table rows."""
+
+    law = law
+
+    def numbers(self, draft, name, block):
+        points = block.control.points
+        flag = draft.flags(f"controls.{name}", EVENTS)
+        pieces = cubic(points).c[::-1].T
+        return [0.0, 0.0, float(flag), float(len(points.input)), *points.input, *pieces.ravel()]
+
+    def residual(self, control, start):
+        return self.value(control, start) - start.output
+
+    def value(self, control, start) -> float:
+        """Value of the table at the start."""
+        points = control.points
+        return float(cubic(points)(np.clip(start.inputs[0], points.input[0], points.input[-1])))
+
+    def begin(self, control, start, numbers):
+        numbers[law.START], numbers[law.VALUE] = start.output, table_value_at(numbers, start.inputs[0])
+
+
+def cubic(points):
+    """Monotone cubic through the points of a table."""
+    from scipy.interpolate import PchipInterpolator
+
+    return PchipInterpolator(points.input, points.output)
+
+
+def table_value_at(numbers: np.ndarray, x: float) -> float:
+    """Value of a table at the input x, by the operations of its law; numbers : those of the block"""
+    n = int(numbers[law.COUNT])
+    inputs = numbers[law.OWN :][:n]
+    x = min(max(x, inputs[0]), inputs[-1])
+    k = min(int(np.searchsorted(inputs, x, "right")) - 1, n - 2)
+    a, b, c, d = numbers[law.OWN + n + 4 * k :][:4]
+    s = x - inputs[k]
+    return float(a + s * (b + s * (c + s * d)))
