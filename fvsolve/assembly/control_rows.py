@@ -13,6 +13,9 @@ import numpy as np
 SMALL = {"pressure": 1e5, "gauge_pressure": 1e5, "pressure_drop": 1e5, "flow": 1e-3, "number": 0.1, "force": 1e3}
 
 
+DIFFERENCE = 1e-6  # change of an input for differences, relative to a small change
+
+
 def small_change(dimension: str) -> float:
     """Size of a small change of a quantity of this dimension [SI]."""
     return SMALL.get(dimension, 1.0)
@@ -62,8 +65,31 @@ class ControlRows:
         """Quantity that is zero if the block is at rest with these values."""
         raise NotImplementedError
 
+    def output_rate(self, control: Any, start: BlockStart, rates: list[float]) -> float:
+        """Rate of its output at the start, with its states at rest; rates : those of its inputs."""
+        return 0.0
+
     def begin(self, control: Any, start: BlockStart, numbers: np.ndarray) -> None:
         """Set the numbers that depend on the start; numbers : view of those of the block."""
+
+
+class StaticRows(ControlRows):
+    """Conversion of blocks without states, whose output is a function of their inputs."""
+
+    def value(self, control: Any, start: BlockStart) -> float:
+        """Output for the inputs at the start, before its limits."""
+        raise NotImplementedError
+
+    def residual(self, control, start):
+        return self.value(control, start) - start.output
+
+    def output_rate(self, control, start, rates):
+        result, here = 0.0, self.value(control, start)
+        for j, rate in enumerate(rates):
+            step = DIFFERENCE * small_change(start.block.dimensions[0])
+            moved = (*start.inputs[:j], start.inputs[j] + step, *start.inputs[j + 1 :])
+            result += (self.value(control, start._replace(inputs=moved)) - here) / step * rate
+        return result
 
 
 @functools.cache

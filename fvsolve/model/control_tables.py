@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -18,12 +17,16 @@ from fvsolve.assembly.schedule_tables import value_at
 from fvsolve.case.controls import Block, decision_order
 from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
+from fvsolve.model.jacobian_pattern import Couplings
 from fvsolve.model.probe_tables import fill_probes
 
 STATE_KINDS = (rec.LEVEL, rec.POSITION, rec.VELOCITY, rec.PISTON_POSITION, rec.PISTON_VELOCITY)
 STORED = (rec.FIXED, rec.TANK, rec.CHAMBER, rec.MOVING, rec.VESSEL)
 TURNS = 30  # Newton iterations of the balance
 DIFFERENCE = 1e-6  # change of an output for differences, relative to its range
+MOST_STATES = 32  # a sensor of more states has no rate
+RANK = 1e-9  # singular values below this share of the greatest are zero
+ROUNDING = 1e-8  # change of an output below which it is rounding if it no longer falls, relative to its range
 BALANCED = 1e-12  # change of an output in the last iteration, relative to its range
 
 
@@ -177,63 +180,69 @@ class Balance:
         draft.tables.controls["start"] = draft.tables.controls["held"] = outputs
         return draft
 
-    def starts(self, outputs: np.ndarray) -> tuple[Any, list[BlockStart], np.ndarray]:
-        """(model, values of each block, rates of its first input) at the start with these outputs."""
+    def starts(self, outputs: np.ndarray) -> tuple[list[BlockStart], np.ndarray]:
+        """(values of each block, rates of change of its first input) at the start with these outputs."""
         model = self.make(self.draft_with(outputs))
-        t = self.case.numerics.start
-        values, rates = sensor_values(model, t)
-        starts, slopes = [], []
+        t, codes = self.case.numerics.start, []
+        values, slopes = sensor_values(model, t)
+        starts = []
         for block, row, output in zip(self.blocks.values(), model.tables.controls, outputs, strict=True):
-            codes = model.tables.integers[row["inputs"] :][: row["input_count"]]
-            inputs = tuple(float(values[code] if code >= 0 else outputs[-1 - code]) for code in codes)
+            codes.append(model.tables.integers[row["inputs"] :][: row["input_count"]].tolist())
+            inputs = tuple(float(values[code] if code >= 0 else outputs[-1 - code]) for code in codes[-1])
             setpoint = value_at(model.tables, row["setpoint"], t, np.inf) if row["setpoint"] >= 0 else 0.0
             starts.append(BlockStart(self.case, block, t, inputs, float(setpoint), float(output)))
-            slopes.append(float(rates[codes[0]]) if len(codes) and codes[0] >= 0 else 0.0)
-        return model, starts, np.array(slopes)
+        rates: list[float] = []  # of outputs: blocks come in the order in which they decide
+        first = np.zeros(len(starts))
+        for k, start in enumerate(starts):
+            own = [slopes[code] if code >= 0 else rates[-1 - code] if -1 - code < k else 0.0 for code in codes[k]]
+            rates.append(control_rows_of(type(start.block.control)).output_rate(start.block.control, start, own))
+            first[k] = own[0] if own else 0.0
+        return starts, first
 
-    def residuals(self, starts: list[BlockStart], slopes: np.ndarray) -> np.ndarray:
-        """Residual of each block without `initial`.
+    def residuals(self, outputs: np.ndarray, by_rates: bool) -> np.ndarray:
+        """Residuals of all blocks without `initial`, each zero for a block at rest : float64[n].
 
-        An integrating block whose input is stated at the start, and agrees with its setpoint, has the rate of its
-        input as residual.
+        by_rates : True to append the rate of the first input of each block that integrates. It decides where the input
+        is stated, such as the level of a tank, and agrees with the setpoint.
         """
-        result = []
-        for k in self.free:
-            block = list(self.blocks.values())[k]
-            own = control_rows_of(type(block.control)).residual(block.control, starts[k])
-            result.append(slopes[k] if own == 0.0 and block.control.integrates else own)
-        return np.array(result)
+        starts, slopes = self.starts(outputs)
+        controls = [block.control for block in self.blocks.values()]
+        own = [control_rows_of(type(controls[k])).residual(controls[k], starts[k]) for k in self.free]
+        return np.array(own + ([slopes[k] for k in self.free if controls[k].integrates] if by_rates else []))
 
     def find(self) -> tuple[np.ndarray, list[BlockStart]]:
         """Balanced outputs, and the values of all blocks. Adds a fault if there is no balance."""
-        outputs = self.guess()
+        outputs, by_rates, size_before = self.guess(), False, math.inf
         for _ in range(TURNS if self.free else 0):
-            _, starts, slopes = self.starts(outputs)
-            residual = self.residuals(starts, slopes)
-            matrix = np.array([self.slope(outputs, k, residual) for k in self.free]).T
-            if not residual.any():
+            residual = self.residuals(outputs, by_rates)
+            matrix = np.array([self.slope(outputs, k, residual, by_rates) for k in self.free]).T
+            size = np.max(np.abs(matrix), axis=1)
+            acts = size > 0.0
+            if residual[~acts].any():
                 break
-            lost = [k for k, column in zip(self.free, matrix.T, strict=True) if not column.any()]
-            if lost or np.linalg.matrix_rank(matrix) < len(self.free):
-                self.refuse(lost or self.free)
-                return outputs, starts
-            step = -np.linalg.solve(matrix, residual)
+            step, _, rank, _ = np.linalg.lstsq(matrix[acts] / size[acts, None], -residual[acts] / size[acts], RANK)
             before = outputs.copy()
-            outputs[self.free] = np.clip(outputs[self.free] + step, self.low[self.free], self.high[self.free])
-            if np.all(np.abs(outputs - before) <= BALANCED * self.range):
-                break
-        else:
-            if self.free:
-                self.refuse(self.free)
-        return outputs, self.starts(outputs)[1]
+            change = step * self.range[self.free]
+            outputs[self.free] = np.clip(outputs[self.free] + change, self.low[self.free], self.high[self.free])
+            moved = float(np.max(np.abs(outputs - before) / self.range))
+            rounding, size_before = 0.5 * size_before < moved < ROUNDING, moved
+            if moved <= BALANCED or rounding:
+                size_before = math.inf
+                if rank == len(self.free):
+                    return outputs, self.starts(outputs)[0]
+                if by_rates:
+                    break
+                by_rates = True
+        if self.free:
+            self.refuse(self.free)
+        return outputs, self.starts(outputs)[0]
 
-    def slope(self, outputs: np.ndarray, k: int, residual: np.ndarray) -> np.ndarray:
-        """Derivative of all residuals by the output of block k."""
-        change = DIFFERENCE * self.range[k]
-        change = -change if outputs[k] + change > self.high[k] else change
+    def slope(self, outputs: np.ndarray, k: int, residual: np.ndarray, by_rates: bool) -> np.ndarray:
+        """Derivative of all residuals by the output of block k, times its range."""
+        change = -DIFFERENCE if outputs[k] + DIFFERENCE * self.range[k] > self.high[k] else DIFFERENCE
         moved = outputs.copy()
-        moved[k] += change
-        return (self.residuals(*self.starts(moved)[1:]) - residual) / change
+        moved[k] += change * self.range[k]
+        return (self.residuals(moved, by_rates) - residual) / change
 
     def refuse(self, numbers: list[int]) -> None:
         """Add a fault for blocks that no output balances."""
@@ -243,15 +252,25 @@ class Balance:
 
 
 def sensor_values(model, t: float) -> tuple[np.ndarray, np.ndarray]:
-    """Values of all sensors at the start, and their rates : float64[sensors] each [SI, SI/s]."""
+    """Values of all sensors at the start, and their rates : float64[sensors] each [SI, SI/s].
+
+    The rate is the sum over the states that a sensor reads of slope times rate, so that it is exactly zero at rest. It
+    is left at zero for a sensor of many states, which the steady start determines.
+    """
     with model.run_data() as data:
         y = model.start.copy()
         rates, out = data.evaluate(t, y, np.inf)
-        value = read_sensors(model, data, t, y, out)
-        step = 1e-6 / max(1e-300, float(np.max(np.abs(rates) / model.scale, initial=0.0)))
-        moved = y + step * rates
-        change = read_sensors(model, data, t, moved, data.evaluate(t, moved, np.inf)[1]) - value
-        return value, change / step if np.any(rates) else np.zeros_like(value)
+        value, slopes = read_sensors(model, data, t, y, out), np.zeros(len(model.tables.sensors))
+        couplings = Couplings(model)
+        for k, row in enumerate(model.tables.sensors):
+            for j in states if (states := couplings.blocks.sensor(row)).size <= MOST_STATES else ():
+                high, low = y.copy(), y.copy()
+                high[j] += DIFFERENCE * model.scale[j]
+                low[j] -= DIFFERENCE * model.scale[j]
+                ends = [read_sensors(model, data, t, moved, data.evaluate(t, moved, np.inf)[1])[k]
+                        for moved in (high, low) if rates[j] != 0.0]  # fmt: skip
+                slopes[k] += (ends[0] - ends[1]) / (high[j] - low[j]) * rates[j] if ends else 0.0
+        return value, slopes
 
 
 def read_sensors(model, data, t: float, y: np.ndarray, out: np.ndarray) -> np.ndarray:

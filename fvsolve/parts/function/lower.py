@@ -1,10 +1,10 @@
 """Blocks with a formula in the tables of a model, and their value at the start."""
 
-from fvsolve.assembly.control_rows import ControlRows
+from fvsolve.assembly.control_rows import StaticRows
 from fvsolve.parts.function import law
 
 
-class FunctionRows(ControlRows, kind="function"):
+class FunctionRows(StaticRows, kind="function"):
     """Conversion of blocks with a formula to table rows."""
 
     law = law
@@ -15,11 +15,7 @@ class FunctionRows(ControlRows, kind="function"):
             draft.schedules.breaks[time] = True
         return [0.0, 0.0, float(draft.schedules.add_program(program))]
 
-    def residual(self, control, start):
-        return self.value(control, start) - start.output
-
-    def value(self, control, start) -> float:
-        """Value of the formula at the start."""
+    def value(self, control, start):
         return program_of(start.case, start.block).value(start.time, start.time, start.inputs)
 
     def begin(self, control, start, numbers):

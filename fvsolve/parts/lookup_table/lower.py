@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from fvsolve.assembly.control_rows import ControlRows
+from fvsolve.assembly.control_rows import StaticRows
 from fvsolve.parts.lookup_table import law
 
 EVENTS = ("",) * 4  # both ends of the table, in both directions; not reported
 
 
-class LookupTableRows(ControlRows, kind="table"):
+class LookupTableRows(StaticRows, kind="table"):
     """Conversion of blocks with a table to table rows."""
 
     law = law
@@ -19,11 +19,7 @@ class LookupTableRows(ControlRows, kind="table"):
         pieces = cubic(points).c[::-1].T
         return [0.0, 0.0, float(flag), float(len(points.input)), *points.input, *pieces.ravel()]
 
-    def residual(self, control, start):
-        return self.value(control, start) - start.output
-
-    def value(self, control, start) -> float:
-        """Value of the table at the start."""
+    def value(self, control, start):
         points = control.points
         return float(cubic(points)(np.clip(start.inputs[0], points.input[0], points.input[-1])))
 

@@ -37,6 +37,9 @@ class PiRows(ControlRows, kind="pi"):
             return start_error(start)
         return control.gain * (control.setpoint_weight * start.setpoint - start.inputs[0]) - start.output
 
+    def output_rate(self, control, start, rates):
+        return -control.gain * rates[0]
+
     def begin(self, control, start, numbers):
         numbers[law.START], numbers[law.ERROR] = start.output, start_error(start)
 

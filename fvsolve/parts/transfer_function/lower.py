@@ -32,6 +32,9 @@ class TransferFunctionRows(ControlRows, kind="transfer-function"):
             return start.inputs[0]
         return control.numerator[-1] / control.denominator[-1] * start.inputs[0] - start.output
 
+    def output_rate(self, control, start, rates):
+        return control.direct * rates[0]
+
     def begin(self, control, start, numbers):
         numbers[law.START], x = start.output, start.inputs[0]
         (own, weights), first = coefficients(control), 0.0
