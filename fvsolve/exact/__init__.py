@@ -31,6 +31,8 @@ def find_faults(case) -> Iterator[tuple[tuple, str]]:
     are checked only if there are no such parts.
     """
     exact = _exact(case.exact.name)
+    if case.controls:
+        yield ("controls",), "exact solutions have no controls; remove [controls], or [exact]"
     yield from law_faults(case)
     yield from list(type_faults(case, exact.nodes, exact.links)) or exact.find_faults(case)
 

@@ -152,6 +152,9 @@ def value(schedule, t: np.ndarray, left: bool = False) -> np.ndarray:
     if schedule.kind == "harmonic":
         mean, amplitude, period, phase = schedule.wave
         return mean + amplitude * np.sin(2.0 * np.pi * t / period + phase)
+    if schedule.kind == "formula":
+        found = [schedule.program.value(time, time if left else np.inf) for time in t.ravel().tolist()]
+        return np.array(found).reshape(t.shape)
     inside = np.clip(t, times[0], times[-1])
     if schedule.kind == "ramp":
         s = (inside - times[0]) / (times[1] - times[0])
@@ -167,6 +170,8 @@ def kinks(schedule) -> list[float]:
     """Times at which a schedule or its slope jumps; for a smooth schedule only its two ends."""
     if schedule.kind in ("constant", "harmonic"):
         return []
+    if schedule.kind == "formula":
+        return schedule.program.break_times
     return [float(t) for t in (schedule.time[[0, -1]] if schedule.kind == "smooth" else schedule.time)]
 
 

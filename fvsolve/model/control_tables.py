@@ -189,14 +189,21 @@ class Balance:
         for block, row, output in zip(self.blocks.values(), model.tables.controls, outputs, strict=True):
             codes.append(model.tables.integers[row["inputs"] :][: row["input_count"]].tolist())
             inputs = tuple(float(values[code] if code >= 0 else outputs[-1 - code]) for code in codes[-1])
-            setpoint = value_at(model.tables, row["setpoint"], t, np.inf) if row["setpoint"] >= 0 else 0.0
+            setpoint = value_at(model.tables, row["setpoint"], t, t) if row["setpoint"] >= 0 else 0.0
             starts.append(BlockStart(self.case, block, t, inputs, float(setpoint), float(output)))
-        rates: list[float] = []  # of outputs: blocks come in the order in which they decide
-        first = np.zeros(len(starts))
-        for k, start in enumerate(starts):
-            own = [slopes[code] if code >= 0 else rates[-1 - code] if -1 - code < k else 0.0 for code in codes[k]]
-            rates.append(control_rows_of(type(start.block.control)).output_rate(start.block.control, start, own))
-            first[k] = own[0] if own else 0.0
+        rates: dict[int, float] = {}
+
+        def input_rates(k: int) -> list[float]:
+            return [float(slopes[code]) if code >= 0 else output_rate(-1 - code) for code in codes[k]]
+
+        def output_rate(k: int) -> float:
+            if k not in rates:
+                start, at_once = starts[k], starts[k].block.control.passes_at_once
+                own = control_rows_of(type(start.block.control))
+                rates[k] = own.output_rate(start.block.control, start, input_rates(k)) if at_once else 0.0
+            return rates[k]
+
+        first = np.array([input_rates(k)[0] if codes[k] else 0.0 for k in range(len(starts))])
         return starts, first
 
     def residuals(self, outputs: np.ndarray, by_rates: bool) -> np.ndarray:
@@ -259,7 +266,7 @@ def sensor_values(model, t: float) -> tuple[np.ndarray, np.ndarray]:
     """
     with model.run_data() as data:
         y = model.start.copy()
-        rates, out = data.evaluate(t, y, np.inf)
+        rates, out = data.evaluate(t, y, t)
         value, slopes = read_sensors(model, data, t, y, out), np.zeros(len(model.tables.sensors))
         couplings = Couplings(model)
         for k, row in enumerate(model.tables.sensors):
@@ -267,7 +274,7 @@ def sensor_values(model, t: float) -> tuple[np.ndarray, np.ndarray]:
                 high, low = y.copy(), y.copy()
                 high[j] += DIFFERENCE * model.scale[j]
                 low[j] -= DIFFERENCE * model.scale[j]
-                ends = [read_sensors(model, data, t, moved, data.evaluate(t, moved, np.inf)[1])[k]
+                ends = [read_sensors(model, data, t, moved, data.evaluate(t, moved, t)[1])[k]
                         for moved in (high, low) if rates[j] != 0.0]  # fmt: skip
                 slopes[k] += (ends[0] - ends[1]) / (high[j] - low[j]) * rates[j] if ends else 0.0
         return value, slopes

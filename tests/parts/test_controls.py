@@ -1,0 +1,364 @@
+"""Blocks of `controls`, and formulas of time, against hand-written equations in SciPy, closed forms and restatements."""
+
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from reference import governor
+from reference.scenes import GRAVITY, WATER, lake, pipe, reservoir, scene, tank, valve
+from scipy.integrate import solve_ivp
+from scipy.interpolate import PchipInterpolator
+from solve.test_implicit_runs import DYING
+from solve.test_resume import same_files
+
+import fvsolve
+from fvsolve.model.jacobian_pattern import jacobian_pattern
+from fvsolve.studies.linearise import linearise
+
+METHODS = ("dormand-prince", "radau-iia-5", "rodas-5p", "auto")
+CLOSE = 1e-9
+SECTION, ORIFICE, SUPPLY = 2.0, 20e-4, 20.0
+REAL = {"name": "Water", "temperature": 293.15, "law": "table"}
+LAWS = [WATER, {**WATER, "law": "log"}, REAL]
+
+
+def orifice_flow(opening, head):
+    """Flow through a valve of `tower` [m3/s]."""
+    return opening * ORIFICE * np.sign(head) * np.sqrt(2.0 * GRAVITY * abs(head))
+
+
+def tower(inlet, outlet, level=4.0, end=300.0, numerics=None, **top):
+    """Case of a tank between a lake and the air, with the openings of both valves."""
+    nodes = {"source": lake(SUPPLY, elevation=0.0), "tower": tank(SECTION, level, elevation=0.0),
+             "town": lake(0.0, elevation=0.0)}  # fmt: skip
+    links = {"inlet": valve("source", "tower", ORIFICE, inlet), "outlet": valve("tower", "town", ORIFICE, outlet)}
+    probes = ["tower.level", *(f"controls.{name}.output" for name in top.get("controls", {}))]
+    return scene(nodes, links, end, numerics or {"rtol": 1e-10}, probes, end / 100, **top)
+
+
+def pi(setpoint, gain=0.8, integral=120.0, **more):
+    more |= {} if integral is None else {"integral_time": integral}
+    return {"type": "pi", "input": "tower.level", "setpoint": setpoint, "gain": gain, **more}
+
+
+def final(case, method, **numerics):
+    """Values of the probes at the end of a case, by a method with a tolerance of 1e-10."""
+    model = fvsolve.build(fvsolve.load(case, {"numerics.method": method, "numerics.rtol": 1e-10, **numerics}))
+    state = fvsolve.advance(model, fvsolve.initial_state(model), model.case.numerics.end)
+    return model.observe(state)
+
+
+def solved(rates, y, times):
+    """Solution of dy/dt = rates(t, y, k) over intervals number k between given times, by SciPy."""
+    for k, (start, end) in enumerate(zip(times, times[1:], strict=False)):
+        found = solve_ivp(lambda t, y, k=k: rates(t, y, k), (start, end), y, "DOP853", rtol=1e-12, atol=1e-13)
+        y = found.y[:, -1]
+    return y
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_level_held_by_pi_is_that_of_hand_written_equations(method):
+    outlet = {"time": [10.0, 11.0], "value": [0.5, 0.7]}
+
+    def rates(t, y, k):
+        level, integral = y
+        u = min(max(0.8 * (4.0 - level) + integral, 0.0), 1.0)
+        leaving = orifice_flow(np.interp(t, outlet["time"], outlet["value"]), level)
+        return [(orifice_flow(u, SUPPLY - level) - leaving) / SECTION, 0.8 * (4.0 - level) / 120.0]
+
+    level, integral = solved(rates, [4.0, 0.25], [0.0, 10.0, 11.0, 300.0])
+    found = final(tower({"control": "hold"}, outlet, controls={"hold": pi(4.0)}), method)
+    assert found == pytest.approx([level, 0.8 * (4.0 - level) + integral], abs=CLOSE)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_pid_with_limits_and_tracking_is_that_of_hand_written_equations(method):
+    gain, ti, td, n, b, c, tt = 1.5, 60.0, 8.0, 6.0, 0.7, 0.3, 25.0
+    steps = {"time": [0.0, 20.0, 120.0], "value": [4.0, 4.6, 4.2], "kind": "step"}
+    control = pi(steps, gain, ti, derivative_time=td, derivative_filter=n, setpoint_weight=b, derivative_weight=c,
+                 tracking_time=tt, limits=[0.1, 0.6]) | {"type": "pid"}  # fmt: skip
+
+    def rates(t, y, k):
+        level, integral, lagged = y
+        setpoint = (4.0, 4.6, 4.2)[k]
+        z = c * setpoint - level
+        v = gain * (b * setpoint - level) + integral + gain * n * (z - lagged)
+        u = min(max(v, 0.1), 0.6)
+        flow = orifice_flow(u, SUPPLY - level) - orifice_flow(0.5, level)
+        return [flow / SECTION, gain * (setpoint - level) / ti + (u - v) / tt, (z - lagged) * n / td]
+
+    start = [4.0, 0.25 - gain * (b * 4.0 - 4.0), (c - 1.0) * 4.0]
+    level = solved(rates, start, [0.0, 20.0, 120.0, 300.0])[0]
+    found = final(tower({"control": "hold"}, 0.5, controls={"hold": control}), method)
+    assert found[0] == pytest.approx(level, abs=10 * CLOSE)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_pi_on_two_lags_without_any_fluid_is_the_step_response_of_its_equations(method):
+    step = {"time": [0.0, 1.0], "value": [0.0, 1.0], "kind": "step"}
+    controls = {
+        "plant": {"type": "transfer-function", "input": "controls.loop", "numerator": [1.0],
+                  "denominator": [0.05, 0.6, 1.0]},
+        "loop": {"type": "pi", "input": "controls.plant", "setpoint": step, "gain": 5.0, "integral_time": 0.4},
+    }  # fmt: skip
+    case = {"schema": 1, "fluid": WATER, "controls": controls, "numerics": {"end": 5.0},
+            "output": {"probes": ["controls.plant.output", "controls.loop.error"]}}  # fmt: skip
+
+    def rates(t, y, k):
+        x, speed, integral = y
+        return [speed, (5.0 * (k - x) + integral - x - 0.6 * speed) / 0.05, 5.0 * (k - x) / 0.4]
+
+    x = solved(rates, [0.0, 0.0, 0.0], [0.0, 1.0, 5.0])[0]
+    assert final(case, method) == pytest.approx([x, 1.0 - x], abs=CLOSE)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_formula_of_level_and_lagged_level_is_that_of_hand_written_equations(method):
+    formula = "min(0.6, max(0.1, 0.25 + 1.5*(4 - h) + 0.2*e)) + 0.02*sin(t/7)*where(t < 50, 1, 0)"
+    controls = {
+        "act": {"type": "function", "inputs": {"h": "tower.level", "e": "controls.lag"}, "formula": formula},
+        "lag": {"type": "transfer-function", "input": "tower.level", "numerator": [2.0, 1.0],
+                "denominator": [20.0, 1.0]},
+    }  # fmt: skip
+
+    def rates(t, y, k):
+        level, lag = y  # G = (2 s + 1) / (20 s + 1) = 0.1 + 0.9 / (20 s + 1)
+        e = 0.1 * level + lag
+        u = min(0.6, max(0.1, 0.25 + 1.5 * (4.0 - level) + 0.2 * e)) + (0.02 * np.sin(t / 7.0) if k == 0 else 0.0)
+        return [(orifice_flow(u, SUPPLY - level) - orifice_flow(0.5, level)) / SECTION, (0.9 * level - lag) / 20.0]
+
+    fine = {"rtol": 1e-11, "atol": 1e-13, "max_step": 0.05}
+    y = [3.5, 0.9 * 3.5]
+    for k, span in enumerate([(0.0, 50.0), (50.0, 200.0)]):
+        y = solve_ivp(lambda t, y, k=k: rates(t, y, k), span, y, "Radau", **fine).y[:, -1]
+    found = final(tower({"control": "act"}, 0.5, 3.5, 200.0, controls=controls), method)
+    assert found[0] == pytest.approx(y[0], abs=CLOSE) and found[2] == pytest.approx(0.1 * y[0] + y[1], abs=CLOSE)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_table_is_a_monotone_cubic_held_beyond_its_ends(method):
+    inputs, outputs = [3.6, 3.8, 4.0, 4.05], [0.6, 0.5, 0.2, 0.1]
+    curve = PchipInterpolator(inputs, outputs)
+
+    def rates(t, y):
+        u = float(curve(np.clip(y[0], 3.6, 4.05)))
+        return [(orifice_flow(u, SUPPLY - y[0]) - orifice_flow(0.5, y[0])) / SECTION]
+
+    level = solve_ivp(rates, (0.0, 100.0), [3.5], "Radau", rtol=1e-11, atol=1e-13, max_step=0.05).y[0, -1]
+    control = {"type": "table", "input": "tower.level", "table": {"input": inputs, "output": outputs}}
+    found = final(tower({"control": "act"}, 0.5, 3.5, 100.0, controls={"act": control}), method)
+    assert found == pytest.approx([level, float(curve(level))], abs=CLOSE)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_force_that_holds_a_mass_is_decided_after_the_nodes(method):
+    """PD control of a mass on a damper: x'' = (K (r - x) - K Td x' filtered - b x') / m, here with a filtered D."""
+    nodes = {
+        "wall": {"type": "frame", "initial_position": 0.0},
+        "body": {"type": "mass", "mass": 3.0, "initial_position": 0.5},
+    }
+    links = {
+        "drive": {"type": "force", "from": "wall", "to": "body", "force": {"control": "hold"}},
+        "drag": {"type": "damper", "from": "wall", "to": "body", "damping": 2.0},
+    }
+    setpoint = {"time": [0.0, 1.0], "value": [0.5, 0.8], "kind": "step"}
+    control = {"type": "pid", "input": "body.position", "setpoint": setpoint, "gain": "40 N/m", "derivative_time": 0.5}
+    case = scene(nodes, links, 4.0, {}, ["body.position"], 0.1, controls={"hold": control})
+
+    def rates(t, y, k):
+        x, speed, lagged = y
+        force = 40.0 * ((0.5, 0.8)[k] - x) + 400.0 * (-x - lagged)
+        return [speed, (force - 2.0 * speed) / 3.0, (-x - lagged) * 20.0]
+
+    x = solved(rates, [0.5, 0.0, -0.5], [0.0, 1.0, 4.0])[0]
+    assert final(case, method)[0] == pytest.approx(x, abs=CLOSE)
+
+
+def moving_case(law):
+    """Case of a pump whose speed holds the filtered pressure behind a pipe, and a demand that follows a formula."""
+    nodes = {"lake": lake(5.0, elevation=0.0), "a": {"type": "junction", "elevation": 0.0},
+             "b": {"type": "chamber", "volume": 0.2, "elevation": 0.0},
+             "out": reservoir({"control": "back"}, elevation=0.0)}  # fmt: skip
+    links = {
+        "pump": {"type": "pump", "from": "lake", "to": "a", "speed": {"control": "hold"},
+                 "curve": {"flow": [0.0, 0.02, 0.04], "head": [40.0, 34.0, 16.0]}},
+        "main": pipe("a", "b", 60.0, 0.1, 1000.0, 6), "gate": valve("b", "out", 8e-4),
+    }  # fmt: skip
+    hold = {"type": "pi", "input": "b.pressure", "setpoint": "2.2 bar", "gain": "0.02 1/bar", "integral_time": 0.5,
+            "filter": 0.05, "limits": [0.2, 1.5]}  # fmt: skip
+    back = {"type": "function", "formula": "1.2 + 0.3*where(t > 1, sin(t - 1), 0)", "unit": "bar", "limits": [1e5, 2e5]}
+    controls = {"hold": hold, "back": back}
+    return scene(nodes, links, 3.0, {}, ["b.pressure", "controls.hold.output"], 0.01,
+                 fluid=law, controls=controls)  # fmt: skip
+
+
+@pytest.mark.parametrize("law", LAWS, ids=["linear", "log", "table"])
+@pytest.mark.parametrize("method", ["ssp-rk3", *METHODS])
+def test_a_loop_at_rest_does_not_move_by_one_bit(method, law):
+    case = fvsolve.load(moving_case(law), {"numerics.method": method})
+    case = fvsolve.load(case, {"controls.back.formula": "1.2 + 0*t", "output.every": 0.1})
+    assert fvsolve.build(case).steady["moving"] == []
+    run = fvsolve.run(case)
+    assert run.ok, run.warnings
+    # without controls this scene moves by as much by `radau-iia-5` under these laws
+    rounding = 1e-11 if method == "radau-iia-5" and law is not WATER else 0.0
+    for probe in run.probes:
+        assert np.ptp(run[probe]) <= rounding * run[probe][0]
+
+
+def test_a_balanced_start_finds_the_opening_that_the_flow_needs():
+    model = fvsolve.build(fvsolve.load(tower({"control": "hold"}, 0.5, controls={"hold": pi(4.0)})))
+    assert model.tables.controls[0]["start"] == pytest.approx(0.25, rel=1e-14)  # sqrt(4 / 16) / 2
+    assert model.steady["moving"] == []
+
+
+def test_a_stated_initial_output_is_that_at_the_start():
+    case = tower({"control": "hold"}, 0.5, controls={"hold": pi(4.3, initial=0.4)})
+    model = fvsolve.build(fvsolve.load(case))
+    assert model.observe(fvsolve.initial_state(model)).tolist() == [4.0, 0.4]
+
+
+def test_explicit_and_implicit_methods_agree_on_a_pump_a_pipe_and_a_filter_under_all_laws():
+    for law in LAWS:
+        found = [
+            final(moving_case(law), method, **{"numerics.rtol": 1e-8})[0]
+            for method in ("dormand-prince", "radau-iia-5")
+        ]
+        assert found[0] == pytest.approx(found[1], rel=1e-7)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=["linear", "log", "table"])
+def test_the_pattern_of_the_jacobian_contains_what_blocks_read_and_drive(law):
+    for case in (moving_case(law), tower({"control": "hold"}, 0.5, controls={"hold": pi(4.0, filter=3.0)})):
+        model = fvsolve.build(fvsolve.load(case))
+        pattern = jacobian_pattern(model).toarray()[: model.y_size].astype(bool)
+        y = model.start + 1e-3 * model.scale * np.random.default_rng(1).standard_normal(model.y_size)
+        jacobian = model.jacobian(0.1, y)
+        small = 1e-9 * np.abs(jacobian).max(axis=1, keepdims=True)
+        assert not (np.abs(jacobian) > small)[~pattern].any()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_restated_loops_have_the_same_result(method):
+    """The order of blocks and parts; PI as a transfer function, and as a gain beside an integrator; a moved gain."""
+    steps = {"time": [0.0, 20.0], "value": [4.0, 4.1], "kind": "step"}
+    plain = tower({"control": "hold"}, 0.5, controls={"hold": pi(steps)})
+    found = final(plain, method)[0]
+    turned = {**plain, "nodes": dict(reversed(plain["nodes"].items())), "links": dict(reversed(plain["links"].items()))}
+    assert final(turned, method)[0] == pytest.approx(found, abs=1e-12)
+    error = {"type": "function", "inputs": {"h": "tower.level"}, "formula": "where(t < 20, 4.0, 4.1) - h"}
+    as_transfer = {"error": error, "hold": {"type": "transfer-function", "input": "controls.error",
+                                            "numerator": [0.8, 0.8 / 120.0], "denominator": [1.0, 0.0]}}  # fmt: skip
+    assert final(tower({"control": "hold"}, 0.5, controls=as_transfer), method)[0] == pytest.approx(found, abs=CLOSE)
+    summed = {"hold": {"type": "function", "inputs": {"e": "controls.error", "i": "controls.integral"},
+                       "formula": "0.8*e + i"},
+              "integral": {"type": "transfer-function", "input": "controls.error", "numerator": [0.8 / 120.0],
+                           "denominator": [1.0, 0.0]}, "error": error}  # fmt: skip
+    assert final(tower({"control": "hold"}, 0.5, controls=summed), method)[0] == pytest.approx(found, abs=CLOSE)
+    centimetres = pi({"time": [0.0, 20.0], "value": ["400 cm", "410 cm"], "kind": "step"}, "0.008 1/cm", "2 min")
+    assert final(tower({"control": "hold"}, 0.5, controls={"hold": centimetres}), method)[0] == found
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    "formula, schedule",
+    [
+        ("0.5 + 0.2*sin(2*pi*t/11 + 0.3)", {"mean": 0.5, "amplitude": 0.2, "period": 11.0, "phase": 0.3}),
+        ("min(0.7, max(0.3, 0.3 + 0.4*(t - 5)/20))", {"start": 5.0, "duration": 20.0, "value": [0.3, 0.7]}),
+        ("where(t < 15, 0.5, 0.2)", {"time": [0.0, 15.0], "value": [0.5, 0.2], "kind": "step"}),
+        ("0.5 + 0.02*abs(t - 20)*(t < 30)", {"time": [0.0, 20.0, 29.999999999999996, 30.0],
+                                             "value": [0.9, 0.5, 0.7, 0.5]}),
+    ],
+    ids=["wave", "ramp", "jump", "kink"],
+)  # fmt: skip
+def test_a_formula_is_the_schedule_that_it_states(method, formula, schedule):
+    by_formula, by_schedule = (final(tower(0.25, outlet, end=60.0), method)[0] for outlet in (formula, schedule))
+    assert by_formula == pytest.approx(by_schedule, abs=CLOSE)
+
+
+def test_a_formula_with_a_unit_is_that_of_its_si_value():
+    case = tower(0.25, 0.3)
+    case["nodes"]["town"] = {"type": "inflow", "flow": {"formula": "-2 - sin(t/30)", "unit": "l/s"}, "elevation": 0.0}
+    si = {**case, "nodes": {**case["nodes"], "town": {"type": "inflow", "flow": "-2e-3 - 1e-3*sin(t/30)",
+                                                      "elevation": 0.0}}}  # fmt: skip
+    assert final(case, "dormand-prince")[0] == pytest.approx(final(si, "dormand-prince")[0], abs=1e-12)
+
+
+def test_a_formula_drives_a_joint_with_its_slopes():
+    """Angle a t^2 / 2 of an arm with a mass at 2 m: the torque of the joint is (m r^2 + J) a + m g r cos(angle)."""
+    joint = {"kind": "revolute", "axis": [0, 1, 0], "angle": "0.1*t^2"}
+    nodes = {
+        "arm": {
+            "type": "body",
+            "mass": 3.0,
+            "inertia": [1.0, 2.0, 2.0],
+            "centre_of_mass": [2.0, 0.0, 0.0],
+            "joint": joint,
+        }
+    }
+    wave = {**nodes["arm"], "joint": {**joint, "angle": "0.4*sin(t)"}}
+    for body, angle, rate in ((nodes["arm"], lambda t: 0.1 * t * t, 0.2), (wave, lambda t: 0.4 * math.sin(t), None)):
+        case = scene({"arm": body}, {}, 1.3, {"rtol": 1e-10}, ["arm.angle", "arm.joint_ty"], 0.1)
+        run = fvsolve.run(case)
+        change = rate if rate is not None else -0.4 * math.sin(1.3)
+        torque = (3.0 * 4.0 + 2.0) * change - 3.0 * GRAVITY * 2.0 * math.cos(angle(1.3))
+        assert run["arm.angle"][-1] == pytest.approx(angle(1.3), abs=1e-12)
+        assert run["arm.joint_ty"][-1] == pytest.approx(torque, rel=1e-9)
+
+
+def test_linearise_cuts_a_loop_at_its_output():
+    """Return ratio of a PI on a tank: its output over its output, L = -K (1 + 1 / (Ti s)) B / (s - a)."""
+    case = tower({"control": "hold"}, 0.5, controls={"hold": pi(4.0)})
+    system = linearise(
+        case, ["controls.hold.output", "controls.hold.setpoint"], ["tower.level", "controls.hold.output"]
+    )
+    slope = orifice_flow(1.0, 16.0)  # d flow / d opening
+    loss = -(orifice_flow(0.25, 16.0) / 32.0 + orifice_flow(0.5, 4.0) / 8.0) / SECTION
+    s = 0.3j
+    transfer = system.c @ np.linalg.solve(s * np.eye(2) - system.a, system.b) + system.d
+    plant = slope / SECTION / (s - loss)
+    assert transfer[0, 0] == pytest.approx(plant, rel=1e-6)
+    assert transfer[1, 0] == pytest.approx(-0.8 * (1.0 + 1.0 / (120.0 * s)) * plant, rel=1e-6)
+    assert transfer[:, 1] == pytest.approx([0.0, 0.8 * (1.0 + 1.0 / (120.0 * s))], rel=1e-6)
+    assert system.input_values == pytest.approx((0.25, 4.0)) and system.input_units == ("-", "m")
+
+
+def test_advance_knows_outputs_and_setpoints_as_inputs():
+    case = tower({"control": "hold"}, 0.5, controls={"hold": pi(4.0)})
+    model = fvsolve.build(fvsolve.load(case))
+    start = fvsolve.initial_state(model)
+    held = fvsolve.advance(model, start, 50.0, {"controls.hold.output": 0.4})
+    open_loop = fvsolve.build(fvsolve.load(tower(0.4, 0.5)))
+    free = fvsolve.advance(open_loop, fvsolve.initial_state(open_loop), 50.0)
+    assert held.y[0] == pytest.approx(free.y[0], rel=1e-9)
+    moved = fvsolve.advance(model, start, 50.0, {"controls.hold.setpoint": 4.2})
+    step = {"time": [-1.0, 0.0], "value": [4.0, 4.2], "kind": "step"}
+    stepped = fvsolve.build(fvsolve.load(tower({"control": "hold"}, 0.5, controls={"hold": pi(step)})))
+    bumped = fvsolve.advance(stepped, fvsolve.initial_state(stepped), 50.0)
+    assert moved.y == pytest.approx(bumped.y, rel=1e-9)
+
+
+@pytest.mark.parametrize("method", ["ssp-rk3", "rodas-5p", "auto"])
+def test_a_killed_and_resumed_loop_is_the_unbroken_run(tmp_path, method):
+    case = fvsolve.load(moving_case(WATER), {"numerics.method": method, "numerics.end": 60.0, "output.every": 1.0})
+    whole = fvsolve.run(case, out=tmp_path / "whole", pictures=False)
+    (tmp_path / "dying.py").write_text(DYING.replace("out=sys.argv[2]", "out=sys.argv[2], pictures=False"))
+    file, broken = tmp_path / "whole" / "case.toml", tmp_path / "broken"
+    died = subprocess.run([sys.executable, str(tmp_path / "dying.py"), str(file), str(broken), "20"])
+    assert whole.ok and died.returncode == 9
+    assert fvsolve.run(file, out=broken, resume=True, pictures=False).reason == "finished"
+    same_files(tmp_path / "whole", broken)
+
+
+def test_the_governor_follows_its_plant_by_characteristics():
+    t, head, turns, opening, level = governor.plant(60, 40.0)
+    run = fvsolve.run("governor", {"numerics.end": 40.0, "output.every": 1.0})
+    assert run.ok and max(run["unit.speed"]) < 360.0
+    for at in (7.0, 10.0, 20.0, 40.0):
+        k, row = round(at / (t[1] - t[0])), round(at)
+        assert run["unit.speed"][row] == pytest.approx(turns[k], abs=0.01)
+        assert run["spiral.head"][row] == pytest.approx(head[k], abs=0.02)
+        assert run["controls.servomotor.output"][row] == pytest.approx(opening[k], abs=2e-4)
+        assert run["shaft.level"][row] == pytest.approx(level[k], abs=3e-3)
