@@ -1,4 +1,4 @@
-"""Blocks of `controls`, and formulas of time, against hand-written equations in SciPy, closed forms and restatements."""
+"""Blocks of `controls`, and formulas of time, against hand-written equations in SciPy and against restatements."""
 
 import math
 import subprocess
