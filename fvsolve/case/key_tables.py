@@ -20,6 +20,7 @@ from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.basin import BasinStart, Patch
 from fvsolve.parts.body import Joint
 from fvsolve.parts.connection import Connection
+from fvsolve.parts.control import Control
 from fvsolve.parts.nodes_and_links import PlaceOnBody, TwoPort
 from fvsolve.parts.pipe.pipe_wall import SI, Lining, Wall, materials
 from fvsolve.parts.self_acting.part import Disc
@@ -73,7 +74,7 @@ def materials_table() -> str:
 
 def model_of(name: str) -> type[Table]:
     """Declaration (class) of a type of part, or of another table of the case."""
-    known = {**TABLES, **KINDS["nodes"], **KINDS["links"]}
+    known = {**TABLES, **Control.kinds, **KINDS["nodes"], **KINDS["links"]}
     if name not in known:
         raise FvsolveError(f"unknown table of keys {show(name)}{did_you_mean(name, known)}; expected a type of part, "
                            f"or one of {', '.join(TABLES)}, case")  # fmt: skip

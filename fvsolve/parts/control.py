@@ -9,7 +9,7 @@ from fvsolve import units
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import Table
-from fvsolve.parts.value import PROFILE, VALUE, Quantity, ReadContext, Rows, Text, Value, positive
+from fvsolve.parts.value import PROFILE, Quantity, ReadContext, Rows, Text, Value, positive
 from fvsolve.units import show
 
 PREFIX = "controls."  # of a block in the key `input` of another block
@@ -55,7 +55,7 @@ class Gain(Value):
     """Number with the unit of the output over that of the input; a bare number is in SI."""
 
     about: str = ""
-    changes: str = VALUE
+    changes: str = PROFILE
     takes: ClassVar[str] = "unit of the output over unit of the input"
     schema: ClassVar[dict[str, Any]] = {"type": ["number", "string"]}
 

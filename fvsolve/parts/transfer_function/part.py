@@ -3,7 +3,7 @@
 from typing import Annotated, Any
 
 from fvsolve.parts.control import SingleInput
-from fvsolve.parts.value import VALUE, Rows
+from fvsolve.parts.value import Rows
 from fvsolve.units import show
 
 
@@ -14,10 +14,10 @@ class TransferFunction(SingleInput, kind="transfer-function"):
     """
 
     numerator: Annotated[
-        tuple[float, ...], Rows("number", about="b0 to bm, highest power of s first, in SI", changes=VALUE)
+        tuple[float, ...], Rows("number", about="b0 to bm, highest power of s first, in SI")
     ]
     denominator: Annotated[
-        tuple[float, ...], Rows("number", about="a0 to an, highest power of s first, in SI", changes=VALUE)
+        tuple[float, ...], Rows("number", about="a0 to an, highest power of s first, in SI")
     ]
 
     @classmethod
