@@ -72,6 +72,18 @@ class ControlRows:
     def begin(self, control: Any, start: BlockStart, numbers: np.ndarray) -> None:
         """Set the numbers that depend on the start; numbers : view of those of the block."""
 
+    def flags_at_start(self, control: Any, start: BlockStart, numbers: np.ndarray) -> dict[int, bool]:
+        """Event flags at the start that do not follow from the state: index -> True if it is set."""
+        return {}
+
+    def fault(self, control: Any, start: BlockStart) -> str:
+        """Text of the fault of a start that does not tell the state of a block; "" for none."""
+        return ""
+
+    def timed_flag(self, numbers: np.ndarray) -> int:
+        """Flag at whose changes the time is stored in `discrete`; -1 for none."""
+        return -1
+
 
 class StaticRows(ControlRows):
     """Conversion of blocks without states, whose output is a function of their inputs."""

@@ -239,6 +239,9 @@ class ModelDraft:
     sensor_table: np.ndarray = no_rows(rec.PROBE)
     driven_table: np.ndarray = no_rows(rec.DRIVEN)
     sensors: list[Any] = field(default_factory=list)  # probes that blocks of `controls` read
+    discrete: list[float] = field(default_factory=list)  # `discrete` at the start
+    start_flags: dict[int, bool] = field(default_factory=dict)  # event flags at the start, of blocks
+    timed: list[tuple[int, int]] = field(default_factory=list)  # (flag, place in `discrete` of its last change)
 
     # results of the start
     # piston -> sides whose closed chambers may support a load

@@ -12,6 +12,7 @@ from fvsolve.kernels import calls
 from fvsolve.kernels.barotropic_nodes import head_pressure
 from fvsolve.kernels.devices import ADAPT, DECIDE, SET, SWITCH
 from fvsolve.kernels.dtypes import CONTROL_VALUE, DRIVEN_DEVICE, DRIVEN_VALVE, FIXED
+from fvsolve.kernels.formula_programs import is_low
 from fvsolve.kernels.restrictions import valve_conductance
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
@@ -63,6 +64,17 @@ def read_sensors(t, y, out, tables):
         calls.observe_in_turn(t, y, out, tables.sensing, tables.readings)
 
 
+@njit(forceinline=True)
+def limited(v, armed, control):
+    """Output within its limits; flags select the limits, so that no step has a kink."""
+    flag = control["flag"]
+    if flag >= 0 and armed[flag] > 0.0:
+        return control["least"]
+    if flag >= 0 and armed[flag + 2] > 0.0:
+        return control["greatest"]
+    return min(max(v, control["least"]), control["greatest"])
+
+
 @njit
 def write_outputs(t, y, out, tables, late):
     """Write the outputs of the blocks that decide before (late 0) or after (late 1) the nodes are solved."""
@@ -71,7 +83,7 @@ def write_outputs(t, y, out, tables, late):
         control = controls[k]
         if control["late"] == late:
             v = calls.call_decide(tables.hooks[control["hooks"], DECIDE], t, y, tables, control)
-            out[at + 2 * k] = min(max(v, control["least"]), control["greatest"])
+            out[at + 2 * k] = limited(v, tables.armed, control)
             applied[k], applied[controls.size + k] = applied_output(control, out[at + 2 * k]), v
 
 
@@ -141,11 +153,18 @@ def control_rates(t, y, dydt, out, handle):
 def control_events(t, y, out, handle, g):
     """Write the event functions of all blocks to g, from solved nodes."""
     tables = open_tables(handle)
+    controls, applied, none = tables.controls, tables.applied, tables.armed[:0]
     read_sensors(t, y, out, tables)
-    for k in range(tables.controls.size):
-        hook = tables.hooks[tables.controls[k]["hooks"], SWITCH]
+    write_outputs(t, y, out, tables, 1)
+    for k in range(controls.size):
+        control = controls[k]
+        hook, flag = tables.hooks[control["hooks"], SWITCH], control["flag"]
         if hook != 0:
-            calls.call_switch(hook, t, y, tables, tables.controls[k], g)
+            calls.call_switch(hook, t, y, tables, control, g)
+        if flag >= 0:
+            v = applied[controls.size + k]
+            is_low(v - control["least"], 0.0, flag, none, g)
+            is_low(control["greatest"] - v, 2.0, flag, none, g)
 
 
 @njit

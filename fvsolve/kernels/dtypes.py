@@ -362,6 +362,8 @@ CONTROL = record(  # block of `controls`, in an order in which each block comes 
     late=i8,  # 1 if its output is computed after the nodes are solved, 0 if before
     least=f8,  # limits of its output
     greatest=f8,
+    flag=i8,  # first of four event flags of its limits; -1 for none
+    memory=i8,  # offset in `discrete` of numbers that change at events and samples only; -1 for none
     start=f8,  # output at the start
     held=f8,  # output at which a study holds it; nan if it follows its law
 )
@@ -589,7 +591,7 @@ Tables = namedtuple("Tables", (*RECORDS, "integers", "floats", "profile", "plane
 RunArrays = namedtuple("RunArrays",
     (
         "clock", "work", "armed", "marks", "scratch", "spare", "seen", "bands", "joint", "sums", "envelope", "extremes",
-        "past", "sharp", "applied", "readings", "sensing", "stack",
+        "past", "sharp", "applied", "readings", "sensing", "stack", "discrete",
     ),
 )  # fmt: skip
 HandleTables = namedtuple("HandleTables", (*Tables._fields, *RunArrays._fields, "calls", "hooks"))

@@ -278,12 +278,11 @@ class ModelFeatures:
         if self.valves:
             yield COMPONENTS["valves"]
         bends = any(hook_of(law, "bends") is not None for law in self.modules())
-        switches = any(hook_of(law, "switch") is not None for law in self.modules())
-        if self.devices or bends or switches:  # their event functions need solved nodes
+        if self.devices or bends or self.controls:  # their event functions need solved nodes
             yield COMPONENTS["closed"]
         if bends:
             yield COMPONENTS["bends"]
-        if switches:
+        if self.controls:
             yield COMPONENTS["switches"]
         if self.formulas:
             yield COMPONENTS["formulas"]

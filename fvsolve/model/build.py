@@ -189,6 +189,7 @@ def with_balanced_blocks(packed: ModelDraft) -> ModelDraft:
     packed.check()
     draft = balance.draft_with(outputs)
     set_starts(draft, outputs, starts)
+    draft.check()
     return draft
 
 
@@ -283,7 +284,7 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         bands=2 * len(draft.basin_table), joint=0, sums=0, sharp=int(len(draft.delay_table) > 0),
         envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)), past=history_size(draft.delay_table),
         applied=2 * len(draft.control_table), readings=len(draft.sensor_table),
-        sensing=int(len(draft.sensor_table) > 0), stack=draft.schedules.stack,
+        sensing=int(len(draft.sensor_table) > 0), stack=draft.schedules.stack, discrete=len(draft.discrete),
     )  # fmt: skip
 
 
@@ -383,7 +384,16 @@ def model_of(draft: ModelDraft) -> Model:
         dict(case.elevations), case.probes, draft.warnings,
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
         draft.basins, case.extreme_probes, draft.watched_start, jump_tables(draft),
+        flags_at_start(draft), np.array(draft.discrete, dtype=float), draft.timed,
     )  # fmt: skip
+
+
+def flags_at_start(draft: ModelDraft) -> np.ndarray:
+    """Event flags before a run : float64[flags]; those of blocks do not always follow from the state."""
+    flags = np.zeros(draft.shapes.armed)
+    for flag, is_set in draft.start_flags.items():
+        flags[flag], flags[flag + 1] = is_set, not is_set
+    return flags
 
 
 @validated(model=instance_of(Model), set=TABLE)

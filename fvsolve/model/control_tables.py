@@ -22,6 +22,9 @@ from fvsolve.model.probe_tables import fill_probes
 
 STATE_KINDS = (rec.LEVEL, rec.POSITION, rec.VELOCITY, rec.PISTON_POSITION, rec.PISTON_VELOCITY)
 STORED = (rec.FIXED, rec.TANK, rec.CHAMBER, rec.MOVING, rec.VESSEL)
+LIMIT_EVENTS = (
+    "reaches its lower limit", "leaves its lower limit", "reaches its upper limit", "leaves its upper limit",
+)  # fmt: skip
 TURNS = 30  # Newton iterations of the balance
 DIFFERENCE = 1e-6  # change of an output for differences, relative to its range
 MOST_STATES = 32  # a sensor of more states has no rate
@@ -78,6 +81,13 @@ def fill_block(draft, name: str, block: Block, sensors: list[str], row) -> None:
     setpoint = control.setpoint_schedule
     row["setpoint"] = -1 if setpoint is None else draft.schedules.add(setpoint)
     row["least"], row["greatest"], row["held"] = *block.limits, np.nan
+    limited = not control.switches and any(map(math.isfinite, block.limits))
+    row["flag"] = draft.flags(f"controls.{name}", LIMIT_EVENTS) if limited else -1
+    flag = rows.timed_flag(np.array(draft.floats[row["data"] :]))
+    row["memory"] = len(draft.discrete) if flag >= 0 else -1
+    if flag >= 0:
+        draft.timed.append((flag, len(draft.discrete)))
+        draft.discrete.append(-np.inf)
 
 
 def control_rate(draft) -> float:
@@ -153,7 +163,7 @@ class Balance:
     def __init__(self, case, packed, make) -> None:
         self.case, self.packed, self.make = case, packed, make
         self.blocks = {name: case.controls[name] for name in packed.schedules.blocks}
-        self.free = [k for k, block in enumerate(self.blocks.values()) if block.control.initial is None]
+        self.free = [k for k, block in enumerate(self.blocks.values()) if block.control.initial_output is None]
         low, high = packed.control_table["least"], packed.control_table["greatest"]
         small = [small_change(block.dimensions[1]) for block in self.blocks.values()]
         finite = np.isfinite(low) & np.isfinite(high)
@@ -164,7 +174,7 @@ class Balance:
         """First outputs: as stated, or in the middle of the limits, or zero."""
         middle = [0.5 * (a + b) if math.isfinite(a) and math.isfinite(b) else min(max(0.0, a), b)
                   for a, b in zip(self.low, self.high, strict=True)]  # fmt: skip
-        stated = [block.control.initial for block in self.blocks.values()]
+        stated = [block.control.initial_output for block in self.blocks.values()]
         return np.array([m if s is None else s for m, s in zip(middle, stated, strict=True)])
 
     def draft_with(self, outputs: np.ndarray):
@@ -295,4 +305,8 @@ def set_starts(draft, outputs: np.ndarray, starts: list[BlockStart]) -> None:
         control, row = draft.case.controls[name].control, tables.controls[k]
         row["start"], row["setpoint_start"], row["held"] = outputs[k], start.setpoint, np.nan
         tables.floats[row["starts"] :][: len(start.inputs)] = start.inputs
-        control_rows_of(type(control)).begin(control, start, tables.floats[row["data"] :])
+        own, numbers = control_rows_of(type(control)), tables.floats[row["data"] :]
+        own.begin(control, start, numbers)
+        draft.start_flags |= own.flags_at_start(control, start, numbers)
+        if text := own.fault(control, start):
+            draft.fault(f"controls.{name}", text)

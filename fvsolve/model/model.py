@@ -59,10 +59,10 @@ class State(Displayable):
         return {"y": self.y}
 
 
-def flags_of(state: State, model: Model) -> np.ndarray | float:
-    """Event flags (as `RunData.armed`) of a state that `advance` returned; 0 for any other state."""
+def flags_of(state: State, model: Model) -> np.ndarray:
+    """Event flags (as `RunData.armed`) of a state that `advance` returned; those of a start for any other state."""
     flags = state.memory["armed"] if "step" in state.memory else None
-    return flags if flags is not None and flags.size == model.shapes.armed else 0.0
+    return flags if flags is not None and flags.size == model.shapes.armed else model.flags
 
 
 def as_numbers(name: str, values: Any) -> np.ndarray:
@@ -142,6 +142,9 @@ class Model(Displayable):
     watched: list[Probe]  # read in addition to the probes, for their extremes only
     watched_start: np.ndarray  # pressures of `watched` along pipes in the profile [Pa], nan for others
     sharp: dict[str, np.ndarray]  # tables that replace these while a jump is solved, see `model.delay_lines`
+    flags: np.ndarray  # event flags before a run
+    discrete: np.ndarray  # numbers of blocks that change at events and samples only, at the start
+    timed: list[tuple[int, int]]  # (event flag, place in `discrete` of the time of its last change)
     # idle run data for evaluating single states; tables before the start is solved, reused by `vary`
     idle_run_data: deque[RunData] = field(default_factory=deque, init=False)
     tables_before_start: list = field(default_factory=list, init=False)
@@ -314,10 +317,10 @@ class Model(Displayable):
             return run_data.evaluate(t, y, limit)
 
     @contextmanager
-    def run_data(self, armed: np.ndarray | float = 0.0) -> Iterator[RunData]:
+    def run_data(self, armed: np.ndarray | None = None) -> Iterator[RunData]:
         """Context with run data for evaluating single states, which later calls use again.
 
-        armed : event flags, 0 as at a start. First occurrences and extremes in these data have no meaning.
+        armed : event flags; None for those of a start. First occurrences and extremes in these data have no meaning.
         """
         try:
             run_data = self.idle_run_data.pop()  # atomic: no other thread gets the same object
@@ -354,7 +357,7 @@ class Model(Displayable):
         contain the waves in the memory of the `State`; at (t, y) they are empty. From time `limit` [s] on, schedules
         keep their left limit at `limit`.
         """
-        armed, limit, past = 0.0, as_limit(limit), None
+        armed, limit, past = None, as_limit(limit), None
         if isinstance(t, State) and y is None:
             t, y, armed, past = t.t, t.y, flags_of(t, self), t
         t, y = self.checked(t, y)

@@ -54,6 +54,7 @@ class RunData:
         self.envelope, self.extremes = self.written.envelope, self.written.extremes
         reset_history(self.written.past, model.tables.delays)
         self.clock["limit"], self.marks[:] = np.inf, np.nan
+        self.armed[:], self.discrete[:] = model.flags, model.discrete
         basins = model.tables.basins
         self.written.bands[1::2] = np.where(basins["nx"] > 0, basins["ny"], basins["n"])  # all
         for array in (self.envelope, self.extremes):
@@ -80,10 +81,16 @@ class RunData:
         replaced = {name: addresses_of(self.tables._replace(**own)) for name, own in replacements.items()}
         return linked_handles(shared, replaced, written, callables)
 
-    def reset(self, armed: np.ndarray | float = 0.0) -> None:
-        """Reset for another state: event flags as given, and no waves in delay lines."""
-        self.armed[:], self.clock["limit"] = armed, np.inf
+    def reset(self, armed: np.ndarray | None = None) -> None:
+        """Reset for another state: event flags as given or as at the start, and no waves in delay lines."""
+        self.armed[:], self.clock["limit"] = self.model.flags if armed is None else armed, np.inf
+        self.discrete[:] = self.model.discrete
         reset_history(self.past, self.model.tables.delays)
+
+    @property
+    def discrete(self) -> np.ndarray:
+        """Numbers of blocks of `controls` that change at events and samples only."""
+        return self.written.discrete
 
     @property
     def past(self) -> np.ndarray:
@@ -157,10 +164,17 @@ class RunData:
         g = np.zeros(self.armed.size)
         for _ in range(3 + 2 * len(self.model.events)):
             self.model.functions.events(t, y, self.handle, g)
-            changed = np.any((g <= 0.0) != (self.armed > 0.0))
+            before = self.armed.copy()
             self.armed[:] = g <= 0.0
-            if not changed:
+            if np.array_equal(before, self.armed):
                 return
+            self.store_times(t, before)
+
+    def store_times(self, t: float, before: np.ndarray) -> None:
+        """Store the time t [s] for timers whose input has changed; before : event flags before the change."""
+        for flag, place in self.model.timed:
+            if self.armed[flag] != before[flag]:
+                self.discrete[place] = t
 
     def fields(self, t: float, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
         """Values as in `Model.fields`, with the least and greatest pressures in pipes up to now, and a key "out".

@@ -9,7 +9,7 @@ from fvsolve import units
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import Table
-from fvsolve.parts.value import PROFILE, Quantity, ReadContext, Rows, Text, Value, positive
+from fvsolve.parts.value import PROFILE, VALUE, Quantity, ReadContext, Rows, Text, Value, positive
 from fvsolve.units import show
 
 PREFIX = "controls."  # of a block in the key `input` of another block
@@ -48,6 +48,34 @@ class OfOutput(Value):
     def json(self) -> dict[str, Any]:
         item = {"type": ["number", "string"]}
         return item if self.length is None else {"type": "array", "items": item, "minItems": self.length}
+
+
+@dataclass(frozen=True)
+class OfInputNumber(Value):
+    """Number in the unit of the first input of the block."""
+
+    about: str = ""
+    changes: str = PROFILE
+    takes: ClassVar[str] = "unit of the input"
+    schema: ClassVar[dict[str, Any]] = {"type": ["number", "string"]}
+
+    def read(self, given: Any, setting: ReadContext) -> float:
+        return Quantity(setting.block_units[0]).read(given, setting)
+
+
+@dataclass(frozen=True)
+class OfRate(Value):
+    """Number above 0 with the unit of the output over that of a time."""
+
+    about: str = ""
+    changes: str = VALUE
+    takes: ClassVar[str] = "unit of the output per s, above 0"
+    schema: ClassVar[dict[str, Any]] = {"type": ["number", "string"]}
+
+    def read(self, given: Any, setting: ReadContext) -> float:
+        value = units.parse_ratio(given, setting.block_units[1], "time")
+        positive.check(value, given)
+        return value
 
 
 @dataclass(frozen=True)
@@ -109,6 +137,16 @@ class Control(Table):
     def setpoint_schedule(self) -> Schedule | None:
         """Schedule of the setpoint; None for a block without a setpoint."""
         return getattr(self, "setpoint", None)
+
+    @property
+    def initial_output(self) -> float | None:
+        """Output at the start if it is stated, else None."""
+        return self.initial
+
+    @property
+    def switches(self) -> bool:
+        """True if its output only changes at events, so that its limits have none."""
+        return False
 
     @property
     def integrates(self) -> bool:

@@ -40,6 +40,7 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     loop.now[:] = state.y
     loop.state["t"] = state.t
     loop.armed[:] = flags_of(state, model)
+    loop.run_data.discrete[:] = state.memory.get("discrete", model.discrete)
     loop.run_data.restore_history(state)
     loop.on_switch = lambda: loop.stop_columns(loop.control["end"])
     adaptive = loop.control["mode"] == loop_records.TOLERANCE
@@ -58,6 +59,8 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         if code != loop_records.DONE:
             raise FvsolveError(f"advance stopped: {loop.failure_text(code)}")
     memory = {"step": np.array([loop.state["step"], loop.state["error_old"]]), "armed": loop.armed.copy()}
+    if len(model.discrete):
+        memory["discrete"] = loop.run_data.discrete.copy()
     if len(model.tables.delays):
         memory["past"] = loop.run_data.past.copy()
     return State(loop.t, loop.now.copy(), memory)

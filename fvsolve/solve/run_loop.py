@@ -185,6 +185,7 @@ class RunLoop:
         first, count = tanks.EVENTS * self.tanks.size, len(self.model.events)
         now = self.armed[first : first + count] > before[first : first + count]
         self.switched += [(self.t, int(k)) for k in np.flatnonzero(now) if self.model.events[k][1]]
+        self.run_data.store_times(self.t, before)
         self.apply_events()
 
     def apply_events(self) -> None:

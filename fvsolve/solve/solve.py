@@ -21,7 +21,7 @@ CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
 # steps between two checks by `RunChecks.check` where it is needed often
 FREQUENT_CHECK_STEPS = loop_records.GROWTH_CHECK_STEPS
-PERSISTENT = ("extremes", "envelope", "marks", "armed")
+PERSISTENT = ("extremes", "envelope", "marks", "armed", "discrete")
 
 
 class MemoryMismatch(RunError):

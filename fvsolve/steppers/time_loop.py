@@ -40,6 +40,7 @@ from fvsolve.steppers.step_operations import (
 )
 
 EVENT_TOLERANCE = 1e-13
+SECANT_TURNS = 40  # turns of the Illinois rule, which is slow where an event function is nearly zero at the start
 JUMP = 1e-6  # fraction of an event function, and of a given step; smaller changes do not count as a jump
 
 
@@ -101,7 +102,7 @@ def locate(handle, run, r, h, now, new, e):
             break
         guess = high - at_high * (high - low) / (at_high - at_low)
         guess += 1e-3 * EVENT_TOLERANCE * h
-        if not low < guess < high:
+        if not low < guess < high or turn > SECANT_TURNS:
             guess = 0.5 * (low + high)
         if done:
             guess = high

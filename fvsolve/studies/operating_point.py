@@ -35,14 +35,14 @@ class OperatingPoint:
 
     t : time at which schedules are held [s]; y : float64[n]  state, as deviations from the initial steady state
     when : description of this time, with the side of a kink or jump of a schedule
-    armed : flags of events at this time, see `model.run_data.RunData`; 0 at the start
+    armed : flags of events at this time, see `model.run_data.RunData`
     """
 
     model: object
     t: float
     y: np.ndarray
     when: str
-    armed: np.ndarray | float = 0.0
+    armed: np.ndarray | None = None
 
     @property
     def rate(self) -> np.ndarray:
@@ -99,11 +99,11 @@ def frequency_limit_note(model, lines: list[str]) -> str:
     return f", delay lines as cells (error of waves at most {DELAY_ERROR:g} up to {min(rates):.3g} Hz)"
 
 
-def _state_at(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray | float]:
+def _state_at(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray]:
     """Time [s], state and event flags of a run at the time `at` [s]; at the start if `at` is None."""
     start = model.case.numerics.start
     if at is None or at == start:
-        return start, model.start.copy(), 0.0
+        return start, model.start.copy(), model.flags.copy()
     if not start < at < np.inf:
         raise FvsolveError(f"at = {at:g} s is not a finite time after the start of the case, {start:g} s")
     numerics = model.case.numerics.model_copy(update={"end": float(at)})

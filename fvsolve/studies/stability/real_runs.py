@@ -77,7 +77,7 @@ class RealRuns:
     def loop(self, y: np.ndarray, h: float) -> RunLoop:
         """Run loop that starts from the state y with fixed steps of h [s]."""
         loop = fixed_step_loop(self.at.model, lambda: self.structure, self.method, h, self.at.t)
-        loop.now[:], loop.armed[:] = y, self.at.armed
+        loop.now[:], loop.armed[:] = y, self.at.model.flags if self.at.armed is None else self.at.armed
         loop.begin(self.at.t + 2.0 * self.steps * h, NO_LIMIT)
         return loop
 
