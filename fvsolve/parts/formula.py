@@ -67,7 +67,8 @@ class Arithmetic:
     def __init__(self, text: str, otherwise: str = "", names: tuple[str, ...] = NAMES) -> None:
         """Parse a formula; otherwise : error message for a text that is not a formula at all; names : its variables."""
         self.text, self.source, self.names = text, text.replace("^", "**").strip(), names
-        about = f"{show(text)} is not a formula of {listing([name for name in names if name != 'pi']) or 'numbers'}"
+        of = " and ".join(name for name in names if name != "pi") if len(names) < 4 else listing(names, 20)
+        about = f"{show(text)} is not a formula of {of}"
         if len(text) > MAX_LENGTH:
             text = f'{about}: it has {len(text)} characters; expected at most {MAX_LENGTH}, or {{ file = "NAME.csv" }}'
             raise ValueError(text)

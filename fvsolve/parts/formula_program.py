@@ -172,6 +172,6 @@ def program_in(unit: str, dimension: str, text: str, names: tuple[str, ...], amb
 
 
 def checked(program: Program) -> Program:
-    """The same program; raises ValueError if its text is not a formula."""
+    """Return the program; raises ValueError if its text is not a formula."""
     program.steps  # noqa: B018
     return program

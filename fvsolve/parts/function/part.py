@@ -22,7 +22,7 @@ class InputNames(Value):
     def read(self, given: Any, setting: ReadContext) -> dict[str, str]:
         if not isinstance(given, dict):
             raise ValueError(f"{show(given)} is not a table of inputs; expected {{ NAME = PROBE }}")
-        faults = [((name,), f"{show(name)} is no name of an input; expected another name than {listing(RESERVED, 20)}")
+        faults = [((name,), f"{show(name)} cannot name an input; expected another name than {listing(RESERVED, 20)}")
                   for name in given if name in RESERVED or not name.isidentifier()]  # fmt: skip
         if faults:
             raise ValueFault(faults)
@@ -32,7 +32,7 @@ class InputNames(Value):
 RESERVED = (*TIME_NAMES, *FUNCTIONS)
 
 
-class Function(Control, kind="function"):
+class FormulaBlock(Control, kind="function"):
     """Block with the value of a formula of its inputs and of the time t, in SI.
 
     Gain, sum, saturation, dead band and logic by 0 and 1 are such blocks.

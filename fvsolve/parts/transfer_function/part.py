@@ -13,12 +13,8 @@ class TransferFunction(SingleInput, kind="transfer-function"):
     Lag, lead-lag, integrator and oscillator are such blocks. `initial` is its output at the start.
     """
 
-    numerator: Annotated[
-        tuple[float, ...], Rows("number", about="b0 to bm, highest power of s first, in SI")
-    ]
-    denominator: Annotated[
-        tuple[float, ...], Rows("number", about="a0 to an, highest power of s first, in SI")
-    ]
+    numerator: Annotated[tuple[float, ...], Rows("number", about="b0 to bm, highest power of s first, in SI")]
+    denominator: Annotated[tuple[float, ...], Rows("number", about="a0 to an, highest power of s first, in SI")]
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
