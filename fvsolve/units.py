@@ -127,7 +127,8 @@ def superscript(power: float) -> str:
 
 
 __all__ = [
-    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "convert", "find", "likely", "parse", "show", "span",
+    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "begins_as_quantity", "convert", "find",
+    "is_number_with_unit", "likely", "parse", "show", "span",
     "vacuum", "expected",
 ]  # fmt: skip
 
@@ -193,6 +194,17 @@ def parse_ratio(given: Any, over: str, under: str) -> float:
     if not math.isfinite(value) or abs(value) > MAX_NUMBER:
         raise ValueError(f"{show(given)} is not a usable number; expected a finite number")
     return value
+
+
+def is_number_with_unit(text: str) -> bool:
+    """True if a text is a number and a spelling that may be that of a unit, such as "12 m3/h", and not a formula."""
+    return begins_as_quantity(text) and not any(sign in text for sign in (" + ", " - ", "<", ">", "=", "(", "*", ","))
+
+
+def begins_as_quantity(text: str) -> bool:
+    """True if a text begins with a number and the letter of a unit."""
+    match = _NUMBER.fullmatch(text)
+    return match is not None and bool(match[2]) and match[2][0] not in "*/+-^<>=!("
 
 
 def _readable(over: str, under: str) -> str:

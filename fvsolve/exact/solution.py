@@ -152,6 +152,11 @@ def value(schedule, t: np.ndarray, left: bool = False) -> np.ndarray:
     if schedule.kind == "harmonic":
         mean, amplitude, period, phase = schedule.wave
         return mean + amplitude * np.sin(2.0 * np.pi * t / period + phase)
+    if schedule.kind == "formula":
+        program = schedule.program
+        return np.array([program.value(s, s if left else np.inf) for s in t.ravel().tolist()]).reshape(t.shape)
+    if schedule.kind == "control":
+        return np.full(t.shape, np.nan)  # known only in a run
     inside = np.clip(t, times[0], times[-1])
     if schedule.kind == "ramp":
         s = (inside - times[0]) / (times[1] - times[0])
@@ -167,6 +172,8 @@ def kinks(schedule) -> list[float]:
     """Times at which a schedule or its slope jumps; for a smooth schedule only its two ends."""
     if schedule.kind in ("constant", "harmonic"):
         return []
+    if schedule.kind == "formula":
+        return schedule.program.break_times
     return [float(t) for t in (schedule.time[[0, -1]] if schedule.kind == "smooth" else schedule.time)]
 
 

@@ -131,11 +131,12 @@ def check_order(draft, early: set[str]) -> None:
     rows = dict(zip([probe.text for probe in draft.sensors], draft.sensor_table, strict=True))
     for name in early:
         block = draft.case.controls[name]
-        for probe in block.inputs if block.control.passes_at_once else ():
+        names = list(getattr(block.control, "inputs", ()))
+        for k, probe in enumerate(block.inputs if block.control.passes_at_once else ()):
             if not isinstance(probe, str) and not is_known_early(draft, rows[probe.text], probe):
-                text = (f"{probe.text} follows at once from what this control drives, a loop without a state; give it "
-                        "a `filter`")  # fmt: skip
-                draft.fault(f"controls.{name}.input", text)
+                text = f"{probe.text} may follow at once from what the control drives, a loop without a state"
+                place = f"inputs.{names[k]}" if names else "input"
+                draft.fault(f"controls.{name}.{place}", f"{text}; give [controls.{name}] a `filter`")
 
 
 # start --------------------------------------------------------------------------------------------------------------
@@ -209,23 +210,31 @@ class Balance:
         outputs = self.guess()
         for _ in range(TURNS if self.free else 0):
             _, starts, slopes = self.starts(outputs)
+            if self.refuse_infinite(starts):
+                return outputs, starts
             residual = self.residuals(starts, slopes)
             matrix = np.array([self.slope(outputs, k, residual) for k in self.free]).T
             if not residual.any():
                 break
             lost = [k for k, column in zip(self.free, matrix.T, strict=True) if not column.any()]
-            if lost or np.linalg.matrix_rank(matrix) < len(self.free):
-                self.refuse(lost or self.free)
+            if lost or not np.isfinite(matrix).all() or np.linalg.matrix_rank(matrix) < len(self.free):
+                self.refuse(lost or self.free, starts)
                 return outputs, starts
             step = -np.linalg.solve(matrix, residual)
             before = outputs.copy()
             outputs[self.free] = np.clip(outputs[self.free] + step, self.low[self.free], self.high[self.free])
             if np.all(np.abs(outputs - before) <= BALANCED * self.range):
+                beyond = [k for k, change in zip(self.free, step, strict=True) if abs(change) > 1e-9 * self.range[k]]
+                beyond = [k for k in beyond if list(self.blocks.values())[k].control.integrates]
+                if beyond:  # an integral that its limits stop is not at rest
+                    self.refuse(beyond, starts)
                 break
         else:
             if self.free:
-                self.refuse(self.free)
-        return outputs, self.starts(outputs)[1]
+                self.refuse(self.free, starts)
+        starts = self.starts(outputs)[1]
+        self.refuse_infinite(starts)
+        return outputs, starts
 
     def slope(self, outputs: np.ndarray, k: int, residual: np.ndarray) -> np.ndarray:
         """Derivative of all residuals by the output of block k."""
@@ -235,11 +244,29 @@ class Balance:
         moved[k] += change
         return (self.residuals(*self.starts(moved)[1:]) - residual) / change
 
-    def refuse(self, numbers: list[int]) -> None:
+    def refuse(self, numbers: list[int], starts: list[BlockStart]) -> None:
         """Add a fault for blocks that no output balances."""
-        names = [list(self.blocks)[k] for k in numbers]
-        text = f"no output of {listing(names)} balances the start; give the key `initial`, the output at the start"
-        self.packed.fault(f"controls.{names[0]}", text)
+        names, amount = [list(self.blocks)[k] for k in numbers], self.case.amount
+        block, start = list(self.blocks.values())[numbers[0]], starts[numbers[0]]
+        state, unit = "", block.dimensions[0]
+        if block.control.setpoint_schedule is not None:
+            state = f", with the input {amount(start.inputs[0], unit)} and the setpoint {amount(start.setpoint, unit)}"
+        text = f"no output of {listing(names)} balances the start{state}"
+        self.packed.fault(f"controls.{names[0]}", f"{text}; give the key `initial`, the output at the start")
+
+    def refuse_infinite(self, starts: list[BlockStart]) -> bool:
+        """Add a fault for each block whose output at the start is not finite; True if there are such blocks."""
+        bad = {}
+        for name, start in zip(self.blocks, starts, strict=True):
+            control = start.block.control
+            if not math.isfinite(control_rows_of(type(control)).residual(control, start)):
+                bad[name] = zip(getattr(control, "inputs", ("input",)), start.inputs, strict=True)
+        for name, inputs in bad.items():
+            values = ", ".join(f"{key} = {value:.6g}" for key, value in inputs)
+            place = f"controls.{name}.formula" if hasattr(self.blocks[name].control, "formula") else f"controls.{name}"
+            text = f"is not a finite number at the start{f', with {values}' * bool(values)}"
+            self.packed.fault(place, f"{text}; expected a formula with finite values")
+        return bool(bad)
 
 
 def sensor_values(model, t: float) -> tuple[np.ndarray, np.ndarray]:

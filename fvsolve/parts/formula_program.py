@@ -13,6 +13,7 @@ import numpy as np
 from fvsolve import units
 from fvsolve.kernels import formula_programs as code
 from fvsolve.parts.formula import FUNCTIONS, TIME_NAMES, Arithmetic
+from fvsolve.parts.value import ValueFault
 from fvsolve.units import show
 
 CODES = {
@@ -157,21 +158,28 @@ class Program:
 
 
 def is_formula(text: Any) -> bool:
-    """True if a text may be a formula of time: it has the name t or calls a function."""
-    return isinstance(text, str) and TIME_FORMULA.search(text) is not None
+    """True if a text may be a formula of time: it has the name t or calls a function, and is not a quantity."""
+    return isinstance(text, str) and TIME_FORMULA.search(text) is not None and not units.is_number_with_unit(text)
 
 
 def program_in(unit: str, dimension: str, text: str, names: tuple[str, ...], ambient: float) -> Program:
-    """Formula whose value has a unit; "" for SI. Raises ValueError. ambient : ambient pressure [Pa]"""
-    if not unit:
-        return checked(Program(text, names))
-    entry = units.find(unit, dimension)
-    shift = ambient if entry.gauge and dimension == "pressure" else 0.0
-    zero = entry.si(0.0)
-    return checked(Program(text, names, entry.si(1.0) - zero, zero + shift))
+    """Formula whose value has a unit; "" for SI. ambient : ambient pressure [Pa]
 
-
-def checked(program: Program) -> Program:
-    """The same program; raises ValueError if its text is not a formula."""
-    program.steps  # noqa: B018
+    Raises ValueFault with the faults of the keys `formula` and `unit`.
+    """
+    program, faults = Program(text, names), []
+    try:
+        if unit:
+            entry = units.find(unit, dimension)
+            shift, zero = ambient if entry.gauge and dimension == "pressure" else 0.0, entry.si(0.0)
+            program = Program(text, names, entry.si(1.0) - zero, zero + shift)
+    except ValueError as error:
+        faults.append((("unit",), str(error)))
+    try:
+        program.steps  # noqa: B018
+    except ValueError as error:
+        hint = "; numbers in a formula are in SI, without units" if str(error).endswith("invalid syntax") else ""
+        faults.append((("formula",), f"{error}{hint}"))
+    if faults:
+        raise ValueFault(faults)
     return program

@@ -18,6 +18,8 @@ from fvsolve.units import show
 ROOT = object()  # in the key path of a fault: the following keys start at the top of the case
 NEEDED = object()  # instead of a default: the key is required
 
+CHANGING = ("control", "formula", "signal", "time")  # keys of schedules
+
 # Effect of a changed value on an existing model
 VALUE = "value"  # only numbers in its tables change; the initial state stays
 PROFILE = "profile"  # the initial state changes too; sizes, names and whole numbers of the tables stay
@@ -208,6 +210,9 @@ class Quantity(Value):
     changes: str = PROFILE
 
     def read(self, given: Any, setting: ReadContext) -> float:
+        if isinstance(given, dict) and (form := next((key for key in CHANGING if key in given), "")):
+            text = f"{show(given)} changes with time, and this value does not; {units.expected(self.dimension)}"
+            raise ValueError(text.replace("changes with time", "follows a control") if form == "control" else text)
         value = units.parse(given, self.dimension)
         if isinstance(value, tuple):
             value = value[0] + (setting.ambient if value[1] and self.dimension == "pressure" else 0.0)
