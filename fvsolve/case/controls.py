@@ -180,12 +180,12 @@ class Blocks:
         stated, initial = self.valid_key(name, "limits"), self.valid_key(name, "initial")
         low, high = self.driven_range(name)
         least_open = any(r.open and r.least == low for _, r in self.setting.driven.get(name, ()))
-        limits = stated or (low, high)
+        limits, given = stated or (low, high), show(self.given[name].get("limits"))
         if not limits[0] < limits[1]:
             if stated:
-                yield ("limits",), f"{show(list(limits))} has no values between; expected the least, then the greatest"
+                yield ("limits",), f"{given} has no values between; expected the least, then the greatest"
         elif stated and (limits[0] < low or limits[1] > high or (least_open and limits[0] == low)):
-            text = f"{show(list(limits))} goes beyond what the driven keys may be"
+            text = f"{given} goes beyond what the driven keys may be"
             yield ("limits",), f"{text}; expected values {str(Range(low, high, least_open)).removeprefix('of ')}"
         elif initial is not None and not limits[0] <= initial <= limits[1]:
             text = f"{show(self.given[name]['initial'])} is outside the limits {show(list(limits))}"
