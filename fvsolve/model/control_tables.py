@@ -19,11 +19,14 @@ from fvsolve.case.controls import Block, decision_order
 from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.probe_tables import fill_probes
+from fvsolve.units import show
 
 STATE_KINDS = (rec.LEVEL, rec.POSITION, rec.VELOCITY, rec.PISTON_POSITION, rec.PISTON_VELOCITY)
 STORED = (rec.FIXED, rec.TANK, rec.CHAMBER, rec.MOVING, rec.VESSEL)
 TURNS = 30  # Newton iterations of the balance
 DIFFERENCE = 1e-6  # change of an output for differences, relative to its range
+ROUNDING = 1e-11  # relative change of an input by rounding
+SETTLED = 1e-9  # greatest last change of an output that is balanced, relative to its range
 BALANCED = 1e-12  # change of an output in the last iteration, relative to its range
 
 
@@ -157,6 +160,7 @@ class Balance:
         finite = np.isfinite(low) & np.isfinite(high)
         self.range = np.where(finite, high - low, small)
         self.low, self.high = low, high
+        self.stated: set[int] = set()  # as `stated_inputs`
 
     def guess(self) -> np.ndarray:
         """First outputs: as stated, or in the middle of the limits, or zero."""
@@ -192,81 +196,118 @@ class Balance:
             slopes.append(float(rates[codes[0]]) if len(codes) and codes[0] >= 0 else 0.0)
         return model, starts, np.array(slopes)
 
-    def residuals(self, starts: list[BlockStart], slopes: np.ndarray) -> np.ndarray:
-        """Residual of each block without `initial`.
+    def residual(self, start: BlockStart) -> float:
+        """Residual of a block by its own law."""
+        control = start.block.control
+        return control_rows_of(type(control)).residual(control, start)
 
-        An integrating block whose input is stated at the start, and agrees with its setpoint, has the rate of its
-        input as residual.
-        """
-        result = []
-        for k in self.free:
-            block = list(self.blocks.values())[k]
-            own = control_rows_of(type(block.control)).residual(block.control, starts[k])
-            result.append(slopes[k] if own == 0.0 and block.control.integrates else own)
-        return np.array(result)
+    def residuals(self, starts: list[BlockStart], slopes: np.ndarray) -> np.ndarray:
+        """Residual of each block without `initial`; of a block in `stated` it is the rate of its input."""
+        return np.array([slopes[k] if k in self.stated else self.residual(starts[k]) for k in self.free])
+
+    def stated_inputs(self, outputs: np.ndarray, starts: list[BlockStart]) -> set[int]:
+        """Numbers of integrating blocks without `initial` whose first input at the start depends on no output."""
+        found = {k for k in self.free if starts[k].block.control.integrates}
+        for other in self.free if found else ():
+            moved = self.starts(self.moved(outputs, other))[1]
+            for k in list(found):
+                before, after = starts[k].inputs[0], moved[k].inputs[0]
+                if abs(after - before) > ROUNDING * abs(before):
+                    found.discard(k)
+        return found
 
     def find(self) -> tuple[np.ndarray, list[BlockStart]]:
         """Balanced outputs, and the values of all blocks. Adds a fault if there is no balance."""
         outputs = self.guess()
-        for _ in range(TURNS if self.free else 0):
-            _, starts, slopes = self.starts(outputs)
-            if self.refuse_infinite(starts):
-                return outputs, starts
-            residual = self.residuals(starts, slopes)
-            matrix = np.array([self.slope(outputs, k, residual) for k in self.free]).T
-            if not residual.any():
-                break
-            lost = [k for k, column in zip(self.free, matrix.T, strict=True) if not column.any()]
-            if lost or not np.isfinite(matrix).all() or np.linalg.matrix_rank(matrix) < len(self.free):
-                self.refuse(lost or self.free, starts)
-                return outputs, starts
-            step = -np.linalg.solve(matrix, residual)
-            before = outputs.copy()
-            outputs[self.free] = np.clip(outputs[self.free] + step, self.low[self.free], self.high[self.free])
-            if np.all(np.abs(outputs - before) <= BALANCED * self.range):
-                beyond = [k for k, change in zip(self.free, step, strict=True) if abs(change) > 1e-9 * self.range[k]]
-                beyond = [k for k in beyond if list(self.blocks.values())[k].control.integrates]
-                if beyond:  # an integral that its limits stop is not at rest
-                    self.refuse(beyond, starts)
-                break
-        else:
-            if self.free:
-                self.refuse(self.free, starts)
         starts = self.starts(outputs)[1]
+        if self.infinite(starts):
+            outputs = self.passed_on(starts)
+            starts = self.starts(outputs)[1]
+        if not self.infinite(starts):
+            self.stated = self.stated_inputs(outputs, starts)
+            lost = self.iterate(outputs)
+            starts = self.starts(outputs)[1]
+            lost += [k for k in self.stated if k not in lost and self.residual(starts[k]) != 0.0]
+            if lost and not self.infinite(starts):
+                self.refuse(sorted(lost), starts)
         self.refuse_infinite(starts)
         return outputs, starts
 
+    def iterate(self, outputs: np.ndarray) -> list[int]:
+        """Iterate the outputs to their balance; returns the numbers of blocks that no output balances."""
+        step = np.zeros(len(self.free))
+        for _ in range(TURNS if self.free else 0):
+            _, starts, slopes = self.starts(outputs)
+            residual = self.residuals(starts, slopes)
+            matrix = np.array([self.slope(outputs, k, residual) for k in self.free]).T
+            if not residual.any():
+                return []
+            lost = [k for k, column in zip(self.free, matrix.T, strict=True) if not column.any()]
+            if lost or not np.isfinite(matrix).all() or np.linalg.matrix_rank(matrix) < len(self.free):
+                return lost or self.free
+            step, before = -np.linalg.solve(matrix, residual), outputs.copy()
+            outputs[self.free] = np.clip(outputs[self.free] + step, self.low[self.free], self.high[self.free])
+            if np.all(np.abs(outputs - before) <= BALANCED * self.range):
+                break
+        far = [k for k, change in zip(self.free, step, strict=True) if abs(change) > SETTLED * self.range[k]]
+        at_limits = np.isin(outputs, (self.low, self.high))  # an integral that its limits stop is not at rest
+        return [k for k in far if not at_limits[k] or list(self.blocks.values())[k].control.integrates]
+
+    def passed_on(self, starts: list[BlockStart]) -> np.ndarray:
+        """Outputs in which each block that does not integrate has the value that its inputs give."""
+        outputs, numbers = np.array([start.output for start in starts]), {name: k for k, name in enumerate(self.blocks)}
+        for k in self.free:
+            start, block = starts[k], starts[k].block
+            if not block.control.integrates:
+                inputs = (outputs[numbers[item]] if isinstance(item, str) else known
+                          for item, known in zip(block.inputs, start.inputs, strict=True))  # fmt: skip
+                value = self.residual(start._replace(inputs=tuple(map(float, inputs)))) + start.output
+                outputs[k] = min(max(value, self.low[k]), self.high[k]) if math.isfinite(value) else outputs[k]
+        return outputs
+
+    def moved(self, outputs: np.ndarray, k: int) -> np.ndarray:
+        """Copy of the outputs with a small change of that of block k."""
+        change, moved = DIFFERENCE * self.range[k], outputs.copy()
+        moved[k] += -change if outputs[k] + change > self.high[k] else change
+        return moved
+
     def slope(self, outputs: np.ndarray, k: int, residual: np.ndarray) -> np.ndarray:
         """Derivative of all residuals by the output of block k."""
-        change = DIFFERENCE * self.range[k]
-        change = -change if outputs[k] + change > self.high[k] else change
-        moved = outputs.copy()
-        moved[k] += change
-        return (self.residuals(*self.starts(moved)[1:]) - residual) / change
+        moved = self.moved(outputs, k)
+        return (self.residuals(*self.starts(moved)[1:]) - residual) / (moved[k] - outputs[k])
 
     def refuse(self, numbers: list[int], starts: list[BlockStart]) -> None:
         """Add a fault for blocks that no output balances."""
-        names, amount = [list(self.blocks)[k] for k in numbers], self.case.amount
-        block, start = list(self.blocks.values())[numbers[0]], starts[numbers[0]]
-        state, unit = "", block.dimensions[0]
-        if block.control.setpoint_schedule is not None:
-            state = f", with the input {amount(start.inputs[0], unit)} and the setpoint {amount(start.setpoint, unit)}"
+        names = [list(self.blocks)[k] for k in numbers]
+        block, start, state = starts[numbers[0]].block, starts[numbers[0]], ""
+        if block.control.integrates and self.residual(start) != 0.0:
+            amounts = [
+                self.case.amount(x, block.dimensions[0]).removesuffix(" -") for x in (*start.inputs, start.setpoint)
+            ]
+            state = f": the input is {amounts[0]}, but the setpoint {amounts[1]}"
+            state = state if block.control.setpoint_schedule is not None else f": the input is {amounts[0]}, but not 0"
         text = f"no output of {listing(names)} balances the start{state}"
         self.packed.fault(f"controls.{names[0]}", f"{text}; give the key `initial`, the output at the start")
 
-    def refuse_infinite(self, starts: list[BlockStart]) -> bool:
-        """Add a fault for each block whose output at the start is not finite; True if there are such blocks."""
-        bad = {}
-        for name, start in zip(self.blocks, starts, strict=True):
+    def infinite(self, starts: list[BlockStart]) -> list[int]:
+        """Numbers of the blocks whose output at the start is not finite."""
+        return [k for k, start in enumerate(starts) if not math.isfinite(self.residual(start))]
+
+    def refuse_infinite(self, starts: list[BlockStart]) -> None:
+        """Add a fault for each block whose output at the start is not finite."""
+        for k in self.infinite(starts):
+            name, start = list(self.blocks)[k], starts[k]
             control = start.block.control
-            if not math.isfinite(control_rows_of(type(control)).residual(control, start)):
-                bad[name] = zip(getattr(control, "inputs", ("input",)), start.inputs, strict=True)
-        for name, inputs in bad.items():
-            values = ", ".join(f"{key} = {value:.6g}" for key, value in inputs)
-            place = f"controls.{name}.formula" if hasattr(self.blocks[name].control, "formula") else f"controls.{name}"
-            text = f"is not a finite number at the start{f', with {values}' * bool(values)}"
-            self.packed.fault(place, f"{text}; expected a formula with finite values")
-        return bool(bad)
+            known = {"t": start.time, **dict(zip(getattr(control, "inputs", ("input",)), start.inputs, strict=True))}
+            formula = getattr(control, "formula", None)
+            text = "the output" if formula is None else show(formula)
+            text = f"{text} is not a finite number at the start, with {listing_of(known)}; expected finite values"
+            self.packed.fault(f"controls.{name}{'.formula' * (formula is not None)}", text)
+
+
+def listing_of(values: dict[str, float]) -> str:
+    """Text of names and their values, such as "t = 0, h = 4"."""
+    return ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
 
 
 def sensor_values(model, t: float) -> tuple[np.ndarray, np.ndarray]:

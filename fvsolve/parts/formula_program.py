@@ -152,6 +152,19 @@ class Program:
         pairs.sort(key=lambda pair: pair[0])
         return tuple(np.array(pairs).T)
 
+    def has_jump(self, start: float, end: float) -> bool:
+        """True if the value of a formula of time jumps in a run, at a break or at the steepest place of its samples."""
+        if any(jump for time, jump in self.breaks() if start < time <= end):
+            return True
+        times, values = self.samples(start, end)
+        k = int(np.argmax(np.abs(np.diff(values))))
+        a, b, change = times[k], times[k + 1], abs(values[k + 1] - values[k])
+        for _ in range(30 if self.kinks else 0):
+            middle = 0.5 * (a + b)
+            ahead = abs(self.value(middle) - self.value(a)) > 0.5 * abs(self.value(b) - self.value(a))
+            a, b = (a, middle) if ahead else (middle, b)
+        return bool(self.kinks and change > 0.0 and abs(self.value(b) - self.value(a)) > 0.1 * change)
+
     def positive_part(self, side: int) -> Program:
         """Formula of the positive part of side * value, side 1 or -1."""
         return Program(f"max(0, {side}*({self.scale!r}*({self.text}) + {self.offset!r}))", self.names)

@@ -88,7 +88,7 @@ def signal_fault(given: Any) -> str:
     if not (isinstance(given, dict) and "control" in given):
         return ""
     name = given["control"] if isinstance(given["control"], str) else "NAME"
-    return f'is not a signal with values; write {{ control = "{name}" }} at the keys that use it'
+    return f'{show(given)} is not a signal with values; write {{ control = "{name}" }} at the keys that use it'
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,7 @@ class Scheduled(Value):
         except ValueError:
             if not isinstance(given, str) or begins_as_quantity(given) or not any(sign in given for sign in SIGNS):
                 raise
-            program_in("", self.dimension, given, (), setting.ambient)  # raises for a text that is not a formula
+            self._read_formula({"formula": given}, setting, given)  # raises for a text that is not a formula
             text = f"{show(given)} is neither a number with a unit nor a formula of t"
             raise ValueError(f"{text}; {expected(self.dimension)}") from None
 
