@@ -209,7 +209,7 @@ class Balance:
         """Numbers of integrating blocks without `initial` whose first input at the start depends on no output."""
         found = {k for k in self.free if starts[k].block.control.integrates}
         for other in self.free if found else ():
-            moved = self.starts(self.moved(outputs, other))[1]
+            moved = self.starts(self.moved(outputs, other)[0])[1]
             for k in list(found):
                 before, after = starts[k].inputs[0], moved[k].inputs[0]
                 if abs(after - before) > ROUNDING * abs(before):
@@ -265,27 +265,26 @@ class Balance:
                 outputs[k] = min(max(value, self.low[k]), self.high[k]) if math.isfinite(value) else outputs[k]
         return outputs
 
-    def moved(self, outputs: np.ndarray, k: int) -> np.ndarray:
-        """Copy of the outputs with a small change of that of block k."""
+    def moved(self, outputs: np.ndarray, k: int) -> tuple[np.ndarray, float]:
+        """Copy of the outputs with a small change of that of block k, and this change."""
         change, moved = DIFFERENCE * self.range[k], outputs.copy()
-        moved[k] += -change if outputs[k] + change > self.high[k] else change
-        return moved
+        change = -change if outputs[k] + change > self.high[k] else change
+        moved[k] += change
+        return moved, change
 
     def slope(self, outputs: np.ndarray, k: int, residual: np.ndarray) -> np.ndarray:
         """Derivative of all residuals by the output of block k."""
-        moved = self.moved(outputs, k)
-        return (self.residuals(*self.starts(moved)[1:]) - residual) / (moved[k] - outputs[k])
+        moved, change = self.moved(outputs, k)
+        return (self.residuals(*self.starts(moved)[1:]) - residual) / change
 
     def refuse(self, numbers: list[int], starts: list[BlockStart]) -> None:
         """Add a fault for blocks that no output balances."""
         names = [list(self.blocks)[k] for k in numbers]
         block, start, state = starts[numbers[0]].block, starts[numbers[0]], ""
         if block.control.integrates and self.residual(start) != 0.0:
-            amounts = [
-                self.case.amount(x, block.dimensions[0]).removesuffix(" -") for x in (*start.inputs, start.setpoint)
-            ]
-            state = f": the input is {amounts[0]}, but the setpoint {amounts[1]}"
-            state = state if block.control.setpoint_schedule is not None else f": the input is {amounts[0]}, but not 0"
+            unit, setpoint = block.dimensions[0], block.control.setpoint_schedule
+            found, wanted = (self.case.amount(x, unit).removesuffix(" -") for x in (start.inputs[0], start.setpoint))
+            state = f": the input is {found}, but {'not 0' if setpoint is None else f'the setpoint {wanted}'}"
         text = f"no output of {listing(names)} balances the start{state}"
         self.packed.fault(f"controls.{names[0]}", f"{text}; give the key `initial`, the output at the start")
 

@@ -64,12 +64,8 @@ class Function(Control, kind="function"):
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
         names, formula, unit = given.get("inputs", {}), given.get("formula"), given.get("unit", "")
-        if (
-            isinstance(names, dict)
-            and not any(map(name_fault, names))
-            and isinstance(formula, str)
-            and isinstance(unit, str)
-        ):
+        sound = isinstance(names, dict) and not any(map(name_fault, names))
+        if sound and isinstance(formula, str) and isinstance(unit, str):
             output = setting.block_units[1]
             try:
                 program_in(unit if output else "", output, formula, tuple(names), setting.ambient)
