@@ -178,7 +178,7 @@ def parse_ratio(given: Any, over: str, under: str) -> float:
         if match is None:
             raise ValueError(f"{show(given)} is not a number with a unit; {wanted}")
         number, spelling = match[1], _canonical(match[2])
-        bare = spelling.removeprefix("1/")
+        bare = spelling.removeprefix("1/").replace("%", "percent")
         if spelling and not _SAFE_SPELLING.fullmatch(bare):
             raise ValueError(f"{show(given)}: unknown unit {show(spelling)}; {wanted}")
         registry = pint.get_application_registry()
@@ -186,7 +186,7 @@ def parse_ratio(given: Any, over: str, under: str) -> float:
             unit = registry.Quantity(1.0, registry.parse_units(_for_pint(bare))) if bare else registry.Quantity(1.0)
         except Exception:  # pint raises errors of many families
             raise ValueError(f"{show(given)}: unknown unit {show(spelling)}; {wanted}") from None
-        unit = 1.0 / unit if bare != spelling else unit
+        unit = 1.0 / unit if spelling.startswith("1/") else unit
         expected_unit = registry.Quantity(1.0, registry.parse_units(_for_pint(si)))
         if unit.dimensionality != expected_unit.dimensionality:
             raise ValueError(f"{show(given)} has the unit {spelling or '1'}; {wanted}")
