@@ -127,7 +127,8 @@ def superscript(power: float) -> str:
 
 
 __all__ = [
-    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "convert", "find", "likely", "parse", "show", "span",
+    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "begins_as_quantity", "convert", "find",
+    "is_number_with_unit", "likely", "parse", "show", "span",
     "vacuum", "expected",
 ]  # fmt: skip
 
@@ -177,7 +178,7 @@ def parse_ratio(given: Any, over: str, under: str) -> float:
         if match is None:
             raise ValueError(f"{show(given)} is not a number with a unit; {remedy}")
         number, spelling = match[1], _canonical(match[2])
-        bare = spelling.removeprefix("1/")
+        bare = spelling.removeprefix("1/").replace("%", "percent")
         if spelling and not _SAFE_SPELLING.fullmatch(bare):
             raise ValueError(f"{show(given)}: unknown unit {show(spelling)}; {remedy}")
         registry = pint.get_application_registry()
@@ -185,7 +186,7 @@ def parse_ratio(given: Any, over: str, under: str) -> float:
             unit = registry.Quantity(1.0, registry.parse_units(_for_pint(bare))) if bare else registry.Quantity(1.0)
         except Exception:  # pint raises errors of many families
             raise ValueError(f"{show(given)}: unknown unit {show(spelling)}; {remedy}") from None
-        unit = 1.0 / unit if bare != spelling else unit
+        unit = 1.0 / unit if spelling.startswith("1/") else unit
         expected_unit = registry.Quantity(1.0, registry.parse_units(_for_pint(si)))
         if unit.dimensionality != expected_unit.dimensionality:
             raise ValueError(f"{show(given)} has the unit {spelling or '1'}; {remedy}")
@@ -193,6 +194,17 @@ def parse_ratio(given: Any, over: str, under: str) -> float:
     if not math.isfinite(value) or abs(value) > MAX_NUMBER:
         raise ValueError(f"{show(given)} is not a usable number; expected a finite number")
     return value
+
+
+def is_number_with_unit(text: str) -> bool:
+    """True if a text is a number and a spelling that may be that of a unit, such as "12 m3/h", and not a formula."""
+    return begins_as_quantity(text) and not any(sign in text for sign in (" + ", " - ", "<", ">", "=", "(", "*", ","))
+
+
+def begins_as_quantity(text: str) -> bool:
+    """True if a text begins with a number and the letter of a unit."""
+    match = _NUMBER.fullmatch(text)
+    return match is not None and bool(match[2]) and match[2][0] not in "*/+-^<>=!("
 
 
 def _readable(over: str, under: str) -> str:

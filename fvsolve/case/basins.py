@@ -180,7 +180,7 @@ def travel_faults(travel: Any, side: float, zone: float, times: tuple, mesh: Any
     travel : schedule [m]; side : sign of the outward normal; zone : width of the deformed zone [m]
     times : start and end of the run [s]; per : float64[n]  relative growth of cell areas per travel [1/m]
     """
-    if travel.kind == "step":
+    if travel.kind == "step" or (travel.kind == "formula" and travel.program.has_jump(*times)):
         yield "jumps, and a wall has a finite speed; expected a schedule without jumps, for example a ramp"
     inside = travel.time[(travel.time > times[0]) & (travel.time < times[1])]
     places = value(travel, np.concatenate([np.linspace(*times, SAMPLES), inside]))

@@ -16,6 +16,7 @@ from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.fluid.laws import LAWS, law_names
 from fvsolve.parts import KINDS, Basin
 from fvsolve.parts.basin import VELOCITY_FIELDS, Physics
+from fvsolve.parts.formula_program import is_formula
 from fvsolve.parts.table_model import CaseContext
 from fvsolve.parts.value import ROOT
 from fvsolve.steppers.loop_records import LEAST_STEP, LEAST_TOLERANCE
@@ -163,6 +164,11 @@ def _vacuum(keys: tuple, values: list[float], fluid: Any, raw: Raw) -> Faults:
     if lowest > fluid.vapor_pressure:
         return
     given, keys = _raw_value(keys, values.index(lowest), raw)
+    formula = given.get("formula") if isinstance(given, dict) else given
+    if isinstance(formula, str) and (isinstance(given, dict) or is_formula(formula)):
+        text = f"{show(formula)} falls to {lowest:.4g} Pa absolute; expected values above the vapour pressure"
+        yield keys, f"{text} of {fluid.vapor_pressure:.4g} Pa"
+        return
     if isinstance(given, (dict, list)) or given is None:
         given = lowest
     yield keys, units.vacuum(given, lowest, fluid.vapor_pressure)
@@ -177,6 +183,9 @@ def _raw_value(keys: tuple, index: int, raw: Raw) -> tuple[Any, tuple]:
     if isinstance(given, dict) and "signal" in given:
         keys = ("signals", given["signal"])
         given = raw.get(keys)
+    if isinstance(given, dict) and "control" in given:
+        keys = ("controls", given["control"], "limits", index)
+        return raw.get(keys), keys
     if isinstance(given, dict) and isinstance(given.get("value"), list):
         return given["value"][index], (*keys, "value", index)
     return given, keys

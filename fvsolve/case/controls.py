@@ -5,6 +5,7 @@ keys that it drives. A block without `limits` has the range of these keys.
 """
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,12 +13,11 @@ from fvsolve.case.probe import Probe, read_probe
 from fvsolve.case.reading import Reading, driven_keys
 from fvsolve.case.resource_checks import name_faults
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts.control import PREFIX, Control
+from fvsolve.parts.control import PREFIX, UNKNOWN, Control, SingleInput
 from fvsolve.parts.value import Range
 from fvsolve.units import DIMENSIONS, show
 
 DIFFERENCES = {"pressure": "pressure_drop", "gauge_pressure": "pressure_drop"}  # dimension of an error
-WANT_SLOPES = ("joint", "travel")  # keys that move bodies and walls
 
 
 @dataclass(frozen=True)
@@ -35,14 +35,18 @@ class Block:
     @property
     def blocks_read(self) -> list[str]:
         """Names of the blocks whose outputs it reads, in its inputs or as its setpoint."""
+        return [*(item for item in self.inputs if isinstance(item, str)), *self.followed]
+
+    @property
+    def followed(self) -> list[str]:
+        """Name of the block that its setpoint follows, in a list; empty if there is none."""
         setpoint = self.control.setpoint_schedule
-        by_setpoint = [setpoint.origin["control"]] if setpoint is not None and setpoint.kind == "control" else []
-        return [*(item for item in self.inputs if isinstance(item, str)), *by_setpoint]
+        return [setpoint.origin["control"]] if setpoint is not None and setpoint.kind == "control" else []
 
     @property
     def blocks_passed(self) -> list[str]:
         """Names of the blocks on whose present outputs its own output depends."""
-        return [name for name in self.blocks_read if self.control.passes_at_once or name not in self.inputs]
+        return self.blocks_read if self.control.passes_at_once else self.followed
 
 
 @dataclass(frozen=True)
@@ -73,10 +77,11 @@ class Blocks:
             return reading.fault(("controls", name), f"{show(given)} is not a table; expected a table with a type")
         if "type" not in given:
             return reading.fault(("controls", name), f"type is missing; expected one of {listing(sorted(known))}")
-        if given["type"] in known:
-            return known[given["type"]]
-        near = did_you_mean(str(given["type"]), known) or f"; types are {listing(sorted(known))}"
-        return reading.fault(("controls", name, "type"), f"unknown type {show(given['type'])}{near}")
+        word = given["type"]
+        if isinstance(word, str) and word in known:
+            return known[word]
+        near = did_you_mean(str(word), known) or f"; types are {listing(sorted(known))}"
+        return reading.fault(("controls", name, "type"), f"unknown type {show(word)}{near}")
 
     def kind(self, name: str) -> type[Control]:
         return Control.kinds[self.given[name]["type"]]
@@ -84,68 +89,75 @@ class Blocks:
     def read_inputs(self, name: str, given: dict[str, Any]) -> Iterator[tuple[tuple[str, ...], Probe | str | None]]:
         """Yield the inputs of a block: (key path in the block, probe or name of a block, None if it is faulty)."""
         for keys, text in self.kind(name).inputs_of(given).items():
-            value, known = None, self.reading.raw.table["controls"]
-            with self.reading.catch("controls", name, *keys):
-                if isinstance(text, str) and text.startswith(PREFIX) and "." not in text.removeprefix(PREFIX):
-                    value = text.removeprefix(PREFIX)
-                    if value not in known:
-                        near = did_you_mean(value, known)
-                        raise ValueError(f"no control named {show(value)}{near}; [controls] has {listing(known)}")
-                else:
-                    value = self.probe(text)
+            value = None
+            if isinstance(text, str):  # else a fault of the key
+                with self.reading.catch("controls", name, *keys):
+                    value = self.read_input(text)
             yield keys, value
 
-    def probe(self, text: Any) -> Probe | None:
-        """Probe of a part. Raises ValueError, also for a name that is neither a probe nor a block."""
+    def read_input(self, text: str) -> Probe | str | None:
+        """Probe or name of a block; None for a probe of a faulty part. Raises ValueError."""
+        known = self.reading.raw.table["controls"]
+        name = text.removeprefix(PREFIX)
+        if name != text and "." not in name:
+            if name not in known:
+                near = did_you_mean(name, known)
+                raise ValueError(f"no control named {show(name)}{near}; [controls] has {listing(known)}")
+            return name
         try:
             return read_probe(text, self.kinds)
         except ValueError as error:
-            names = self.reading.raw.table["controls"]
-            near = did_you_mean(str(text), [f"{PREFIX}{name}" for name in names])
-            hint = near or f"; a block is named {PREFIX}NAME"
+            block = name.partition(".")[0]
+            if block in known and (name != text or block == text):
+                raise ValueError(f'{show(text)} is not a block; did you mean "{PREFIX}{block}"?') from None
+            hint = "" if "did you mean" in str(error) else f"; a block is named {PREFIX}NAME"
             raise ValueError(f"{error}{hint}") from None
 
-    def dimension_of(self, item: Probe | str | None) -> str:
-        """Dimension of an input."""
-        return "number" if item is None else self.outputs[item] if isinstance(item, str) else item.dimension
+    def first_dimension(self, name: str) -> str:
+        """Dimension of the first input of a block; UNKNOWN if this input is missing or faulty."""
+        inputs = self.inputs[name]
+        if not inputs:
+            return UNKNOWN if issubclass(self.kind(name), SingleInput) else "number"
+        first = next(iter(inputs.values()))
+        return first.dimension if isinstance(first, Probe) else self.outputs.get(first, UNKNOWN)
 
-    def dimensions(self, name: str) -> tuple[str, str]:
-        """Dimensions of the first input and of the output of a block."""
-        first = next(iter(self.inputs[name].values()), None)
-        if isinstance(first, str) and first not in self.outputs:
-            first = None
-        return self.dimension_of(first), self.outputs[name]
+    def wanted(self, name: str) -> list[str]:
+        """Known dimensions of the keys that a block drives and of the setpoints that follow it."""
+        found = [dimension for dimension, _ in self.setting.driven.get(name, ())]
+        for other, item in self.given.items():
+            setpoint = item.get("setpoint")
+            if isinstance(setpoint, dict) and setpoint.get("control") == name:
+                found.append(self.first_dimension(other))
+        return list(dict.fromkeys(dimension for dimension in found if dimension != UNKNOWN))
+
+    def output_dimension(self, name: str) -> str:
+        """Dimension of the output of a block; UNKNOWN if it drives only faulty keys."""
+        if wanted := self.wanted(name):
+            return UNKNOWN if unlike(wanted) else wanted[0]
+        follows = (keys[0] != "controls" for keys in driven_keys(self.reading.raw.table, "control", name))
+        if own := self.kind(name).own_dimension(self.given[name]):
+            return own
+        return UNKNOWN if any(follows) else "number"
 
     def find_dimensions(self) -> None:
         """Find the dimensions of all outputs from the keys that they drive."""
         for _ in range(len(self.given) + 1):
-            for name in self.given:
-                known = [dimension for dimension, _ in self.setting.driven.get(name, ())]
-                own = self.kind(name).own_dimension(self.given[name], *self.dimensions(name))
-                self.outputs[name] = own or (known[0] if known else self.outputs[name])
-            for name, item in self.given.items():  # setpoints that follow other blocks
-                setpoint = item.get("setpoint")
-                if isinstance(setpoint, dict) and setpoint.get("control") in self.given:
-                    other = setpoint["control"]
-                    if other not in self.setting.driven and self.dimensions(name)[0] != "number":
-                        self.setting.driven.setdefault(other, []).append((self.dimensions(name)[0], Range()))
+            self.outputs = {name: self.output_dimension(name) for name in self.given}
 
     def read(self) -> dict[str, Block | None]:
         """Blocks by name, in the order of the file; None for a faulty block."""
         self.find_dimensions()
-        blocks: dict[str, Block | None] = {}
+        blocks: dict[str, Block | None] = dict.fromkeys(self.given)
         for name, item in self.given.items():
-            blocks[name], before = None, len(self.reading.faults)
-            self.setting.block_units = self.dimensions(name)
+            before = len(self.reading.faults)
+            self.setting.block_units = self.first_dimension(name), self.outputs[name]
+            self.reading.add((("controls", name, *keys), text) for keys, text in self.faults(name))
             with self.reading.catch("controls", name):
                 rest = {key: value for key, value in item.items() if key != "type"}
                 control = self.kind(name).model_validate(rest, context=self.setting)
-                limits = control.limits or self.driven_range(name)
-                self.reading.add((("controls", name, *keys), text) for keys, text in self.faults(name, control, limits))
                 if before == len(self.reading.faults) and None not in self.inputs[name].values():
-                    inputs = tuple(self.inputs[name].values())
+                    limits, inputs = control.limits or self.driven_range(name), tuple(self.inputs[name].values())
                     blocks[name] = Block(control, inputs, limits, self.setting.block_units)
-        self.reading.add(slope_faults(self.reading.raw.table))
         self.reading.add(cycle_faults(blocks))
         return blocks
 
@@ -154,21 +166,38 @@ class Blocks:
         ranges = [limits for _, limits in self.setting.driven.get(name, ())]
         return max([-float("inf"), *(r.least for r in ranges)]), min([float("inf"), *(r.greatest for r in ranges)])
 
-    def faults(self, name: str, control: Control, limits: tuple[float, float]) -> Iterator[tuple[tuple, str]]:
-        """Yield faults (keys in the block, text) of limits, of the initial output and of unlike driven keys."""
-        dimensions = [DIMENSIONS[item].base or item for item, _ in self.setting.driven.get(name, ())]
-        unlike = [item for item in dimensions if item != dimensions[0]]
-        if unlike:
-            words = [DIMENSIONS[item].words for item in (dimensions[0], unlike[0])]
-            yield (), f"drives {words[0]} and {words[1]}; expected keys of one unit, or a block for each"
+    def valid_key(self, name: str, key: str) -> Any:
+        """Value of a key of a block; None if it is left out or faulty."""
+        with suppress(KeyError, ValueError):
+            return self.kind(name).values()[key].read(self.given[name][key], self.setting)
+        return None
+
+    def faults(self, name: str) -> Iterator[tuple[tuple, str]]:
+        """Yield faults (keys in the block, text) of unlike driven keys, of limits and of the initial output."""
+        if pair := unlike(self.wanted(name)):
+            first, other = (DIMENSIONS[item].words for item in pair)
+            yield (), f"drives {first} and {other}; expected keys of one unit, or a block for each"
+        stated, initial = self.valid_key(name, "limits"), self.valid_key(name, "initial")
         low, high = self.driven_range(name)
-        if control.limits is not None and not limits[0] < limits[1]:
-            yield ("limits",), f"{list(limits)} has no values between; expected the least value, then the greatest"
-        elif control.limits is not None and (limits[0] < low or limits[1] > high):
-            yield ("limits",), f"{list(limits)} goes beyond what the driven key may be, {Range(low, high)}"
-        if control.initial is not None and not limits[0] <= control.initial <= limits[1]:
-            text = f"{control.initial:g} is outside the limits {list(limits)}; expected a value within them"
-            yield ("initial",), text
+        least_open = any(r.open and r.least == low for _, r in self.setting.driven.get(name, ()))
+        limits, given = stated or (low, high), show(self.given[name].get("limits"))
+        if not limits[0] < limits[1]:
+            if stated:
+                yield ("limits",), f"{given} has no values between; expected the least, then the greatest"
+        elif stated and (limits[0] < low or limits[1] > high or (least_open and limits[0] == low)):
+            text = f"{given} goes beyond what the driven keys may be"
+            yield ("limits",), f"{text}; expected values {str(Range(low, high, least_open)).removeprefix('of ')}"
+        elif initial is not None and not limits[0] <= initial <= limits[1]:
+            text = f"{show(self.given[name]['initial'])} is outside the limits {show(list(limits))}"
+            yield ("initial",), f"{text}; expected a value within them"
+
+
+def unlike(dimensions: list[str]) -> tuple[str, str] | None:
+    """First two dimensions with different units; None if all have the same unit."""
+    for item in dimensions[1:]:
+        if (DIMENSIONS[item].base or item) != (DIMENSIONS[dimensions[0]].base or dimensions[0]):
+            return dimensions[0], item
+    return None
 
 
 def read_controls(reading: Reading, kinds: dict[str, Any]) -> dict[str, Block | None]:
@@ -191,21 +220,33 @@ def read_controls(reading: Reading, kinds: dict[str, Any]) -> dict[str, Block | 
     return result
 
 
-def slope_faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
-    """Yield faults of keys that follow a block although their slopes are needed: driven joints and walls."""
-    for keys in driven_keys(table, "control"):
-        if keys[0] == "nodes" and any(word in keys for word in WANT_SLOPES):
-            yield keys, "cannot follow a control, because the motion needs its slopes; drive a torque or a force"
-
-
 def cycle_faults(blocks: dict[str, Block | None]) -> Iterator[tuple[tuple, str]]:
-    """Yield a fault for a cycle of blocks each of which passes its input on at once."""
+    """Yield a fault for each cycle of blocks that pass their inputs or setpoints on at once."""
     sound = {name: block for name, block in blocks.items() if block is not None}
-    order = decision_order(sound)
-    left = [name for name in sound if name not in order]
-    if left:
-        text = f"{listing(left)} read each other at once, so none can decide first; give one of them a `filter`"
-        yield ("controls", left[0]), text
+    needs = {name: needed_at_once(sound, name) for name in sound}
+    done: set[str] = set()
+    for name in sound:
+        cycle = [other for other in sound if other in needs[name] and name in needs[other]]
+        if not cycle or name in done:
+            continue
+        done.update(cycle)
+        text = f"{listing(cycle)} read each other at once, so none can decide first"
+        text = f"{name} reads its own output at once" if len(cycle) == 1 else text
+        curable = (item for item in cycle if not {*cycle} & {*sound[item].followed})
+        remedy = next((f"give [controls.{item}] a `filter`" for item in curable), "")
+        remedy = remedy or "a `filter` does not act on setpoints; expected a setpoint from outside of the cycle"
+        yield ("controls", name), f"{text}; {remedy}"
+
+
+def needed_at_once(blocks: dict[str, Block], name: str) -> set[str]:
+    """Names of the blocks on whose present outputs the output of a block depends, also through other blocks."""
+    found: set[str] = set()
+    ahead = [name]
+    while ahead:
+        more = [other for other in blocks[ahead.pop()].blocks_passed if other in blocks and other not in found]
+        found.update(more)
+        ahead += more
+    return found
 
 
 def decision_order(blocks: dict[str, Block]) -> list[str]:

@@ -21,7 +21,7 @@ from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Friction, Pipe, Scalar
 from fvsolve.parts import value as val
 from fvsolve.parts.control import Control
-from fvsolve.parts.schedule import Schedule, Scheduled
+from fvsolve.parts.schedule import Schedule, Scheduled, signal_fault
 from fvsolve.parts.table_model import read_keys
 from fvsolve.units import Kinematic, show
 from fvsolve.validation import TABLE, validated
@@ -104,7 +104,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     reading.known = reusable_values(reading, previous)
     fluid, state = reading.reuse(("fluid",), reading.raw.table.get("fluid"), functools.partial(read_fluid, reading))
     numerics = reading.table("numerics", Numerics)
-    if (times := numerics or valid_times(reading)) is not None:
+    if (times := numerics or valid_times(reading)) is not None and times.start < times.end:
         reading.setting.span = times.start, times.end
     check_names(reading)
     network = part_reading.cut_pipes(reading, state, numerics)
@@ -234,6 +234,9 @@ def check_unused_signals(reading: Reading) -> None:
     """Add a fault for each signal that no part uses and that is not a schedule of any usual dimension."""
     for name, given in reading.setting.signals.items():
         if name in reading.setting.used or (isinstance(given, dict) and "signal" in given):
+            continue
+        if text := signal_fault(given):
+            reading.fault(("signals", name), text)
             continue
         problems, dimensions = [], ("number", "flow", "pressure", "head", "force")
         for dimension in dimensions:

@@ -155,6 +155,8 @@ def value(schedule, t: np.ndarray, left: bool = False) -> np.ndarray:
     if schedule.kind == "formula":
         found = [schedule.program.value(time, time if left else np.inf) for time in t.ravel().tolist()]
         return np.array(found).reshape(t.shape)
+    if schedule.kind == "control":
+        return np.full(t.shape, np.nan)  # known only in a run
     inside = np.clip(t, times[0], times[-1])
     if schedule.kind == "ramp":
         s = (inside - times[0]) / (times[1] - times[0])

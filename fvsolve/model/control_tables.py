@@ -19,6 +19,7 @@ from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.jacobian_pattern import Couplings
 from fvsolve.model.probe_tables import fill_probes
+from fvsolve.units import show
 
 STATE_KINDS = (rec.LEVEL, rec.POSITION, rec.VELOCITY, rec.PISTON_POSITION, rec.PISTON_VELOCITY)
 STORED = (rec.FIXED, rec.TANK, rec.CHAMBER, rec.MOVING, rec.VESSEL)
@@ -30,6 +31,7 @@ DIFFERENCE = 1e-6  # change of an output for differences, relative to its range
 MOST_STATES = 32  # a sensor of more states has no rate
 RANK = 1e-9  # singular values below this share of the greatest are zero
 ROUNDING = 1e-8  # change of an output below which it is rounding if it no longer falls, relative to its range
+STOPPED = 1e-6  # residual of an integrating block at its limit that stops it, over its change with the outputs
 BALANCED = 1e-12  # change of an output in the last iteration, relative to its range
 
 
@@ -144,11 +146,12 @@ def check_order(draft, early: set[str]) -> None:
     rows = dict(zip([probe.text for probe in draft.sensors], draft.sensor_table, strict=True))
     for name in early:
         block = draft.case.controls[name]
-        for probe in block.inputs if block.control.passes_at_once else ():
+        names = list(getattr(block.control, "inputs", ()))
+        for k, probe in enumerate(block.inputs if block.control.passes_at_once else ()):
             if not isinstance(probe, str) and not is_known_early(draft, rows[probe.text], probe):
-                text = (f"{probe.text} follows at once from what this control drives, a loop without a state; give it "
-                        "a `filter`")  # fmt: skip
-                draft.fault(f"controls.{name}.input", text)
+                text = f"{probe.text} may follow at once from what the control drives, a loop without a state"
+                place = f"inputs.{names[k]}" if names else "input"
+                draft.fault(f"controls.{name}.{place}", f"{text}; give [controls.{name}] a `filter`")
 
 
 # start --------------------------------------------------------------------------------------------------------------
@@ -169,6 +172,7 @@ class Balance:
         finite = np.isfinite(low) & np.isfinite(high)
         self.range = np.where(finite, high - low, small)
         self.low, self.high = low, high
+        self.stated: set[int] = set()  # as `stated_inputs`
 
     def guess(self) -> np.ndarray:
         """First outputs: as stated, or in the middle of the limits, or zero."""
@@ -227,16 +231,43 @@ class Balance:
         own = [control_rows_of(type(controls[k])).residual(controls[k], starts[k]) for k in self.free]
         return np.array(own + ([slopes[k] for k in self.free if controls[k].integrates] if by_rates else []))
 
+    def residual(self, start: BlockStart) -> float:
+        """Residual of a block by its own law."""
+        control = start.block.control
+        return control_rows_of(type(control)).residual(control, start)
+
     def find(self) -> tuple[np.ndarray, list[BlockStart]]:
         """Balanced outputs, and the values of all blocks. Adds a fault if there is no balance."""
-        outputs, by_rates, size_before = self.guess(), False, math.inf
+        outputs = self.guess()
+        starts = self.starts(outputs)[0]
+        if self.infinite(starts):
+            outputs = self.passed_on(starts)
+            starts = self.starts(outputs)[0]
+        if not self.infinite(starts):
+            lost = self.iterate(outputs)
+            starts = self.starts(outputs)[0]
+            if lost and not self.infinite(starts):
+                self.refuse(lost, starts)
+        self.refuse_infinite(starts)
+        return outputs, starts
+
+    def stopped(self, outputs: np.ndarray, residual: np.ndarray) -> list[int]:
+        """Numbers of the blocks whose integral a limit stops; residual : relative to its change with the outputs."""
+        integrating = [k for k in self.free if list(self.blocks.values())[k].control.integrates]
+        rows = [*zip(self.free, residual, strict=False), *zip(integrating, residual[len(self.free) :], strict=False)]
+        found = {k for k, rest in rows if abs(rest) > STOPPED and outputs[k] in (self.low[k], self.high[k])}
+        return sorted(found.intersection(integrating))
+
+    def iterate(self, outputs: np.ndarray) -> list[int]:
+        """Iterate the outputs to their balance; returns the numbers of blocks that no output balances."""
+        by_rates, size_before = False, math.inf
         for _ in range(TURNS if self.free else 0):
             residual = self.residuals(outputs, by_rates)
             matrix = np.array([self.slope(outputs, k, residual, by_rates) for k in self.free]).T
             size = np.max(np.abs(matrix), axis=1)
             acts = size > 0.0
-            if residual[~acts].any():
-                break
+            if residual[~acts].any() or not np.isfinite(matrix).all():
+                return self.free
             step, _, rank, _ = np.linalg.lstsq(matrix[acts] / size[acts, None], -residual[acts] / size[acts], RANK)
             before = outputs.copy()
             change = step * self.range[self.free]
@@ -246,13 +277,23 @@ class Balance:
             if moved <= BALANCED or rounding:
                 size_before = math.inf
                 if rank == len(self.free):
-                    return outputs, self.starts(outputs)[0]
+                    return self.stopped(outputs, np.divide(residual, size, where=acts, out=np.zeros(size.size)))
                 if by_rates:
-                    break
+                    return self.free
                 by_rates = True
-        if self.free:
-            self.refuse(self.free)
-        return outputs, self.starts(outputs)[0]
+        return self.free
+
+    def passed_on(self, starts: list[BlockStart]) -> np.ndarray:
+        """Outputs in which each block that does not integrate has the value that its inputs give."""
+        outputs, numbers = np.array([start.output for start in starts]), {name: k for k, name in enumerate(self.blocks)}
+        for k in self.free:
+            start, block = starts[k], starts[k].block
+            if not block.control.integrates:
+                inputs = (outputs[numbers[item]] if isinstance(item, str) else known
+                          for item, known in zip(block.inputs, start.inputs, strict=True))  # fmt: skip
+                value = self.residual(start._replace(inputs=tuple(map(float, inputs)))) + start.output
+                outputs[k] = min(max(value, self.low[k]), self.high[k]) if math.isfinite(value) else outputs[k]
+        return outputs
 
     def slope(self, outputs: np.ndarray, k: int, residual: np.ndarray, by_rates: bool) -> np.ndarray:
         """Derivative of all residuals by the output of block k, times its range."""
@@ -261,11 +302,36 @@ class Balance:
         moved[k] += change * self.range[k]
         return (self.residuals(moved, by_rates) - residual) / change
 
-    def refuse(self, numbers: list[int]) -> None:
+    def refuse(self, numbers: list[int], starts: list[BlockStart]) -> None:
         """Add a fault for blocks that no output balances."""
         names = [list(self.blocks)[k] for k in numbers]
-        text = f"no output of {listing(names)} balances the start; give the key `initial`, the output at the start"
-        self.packed.fault(f"controls.{names[0]}", text)
+        block, start, state = starts[numbers[0]].block, starts[numbers[0]], ""
+        if block.control.integrates and self.residual(start) != 0.0:
+            unit, setpoint = block.dimensions[0], block.control.setpoint_schedule
+            found, wanted = (self.case.amount(x, unit).removesuffix(" -") for x in (start.inputs[0], start.setpoint))
+            state = f": the input is {found}, but {'not 0' if setpoint is None else f'the setpoint {wanted}'}"
+        text = f"no output of {listing(names)} balances the start{state}"
+        self.packed.fault(f"controls.{names[0]}", f"{text}; give the key `initial`, the output at the start")
+
+    def infinite(self, starts: list[BlockStart]) -> list[int]:
+        """Numbers of the blocks whose output at the start is not finite."""
+        return [k for k, start in enumerate(starts) if not math.isfinite(self.residual(start))]
+
+    def refuse_infinite(self, starts: list[BlockStart]) -> None:
+        """Add a fault for each block whose output at the start is not finite."""
+        for k in self.infinite(starts):
+            name, start = list(self.blocks)[k], starts[k]
+            control = start.block.control
+            known = {"t": start.time, **dict(zip(getattr(control, "inputs", ("input",)), start.inputs, strict=True))}
+            formula = getattr(control, "formula", None)
+            text = "the output" if formula is None else show(formula)
+            text = f"{text} is not a finite number at the start, with {listing_of(known)}; expected finite values"
+            self.packed.fault(f"controls.{name}{'.formula' * (formula is not None)}", text)
+
+
+def listing_of(values: dict[str, float]) -> str:
+    """Text of names and their values, such as "t = 0, h = 4"."""
+    return ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
 
 
 def sensor_values(model, t: float) -> tuple[np.ndarray, np.ndarray]:

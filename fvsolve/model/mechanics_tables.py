@@ -11,6 +11,7 @@ from fvsolve.case.bodies import free_joints
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.static_forces import DRIVES, MOTION, StaticForces, pin_rows, rounding
 from fvsolve.parts.body import Body
+from fvsolve.units import show
 
 SMALL_PRESSURE = 1e5  # a small pressure, which sets the size of a small travel
 # [m] of masses without chambers, [m/s] of masses without stiffness, and of joints; [rad], [rad/s] of joints
@@ -278,12 +279,13 @@ def drive_joint(draft, name: str, schedule, row) -> None:
     key = "travel" if row["joint"] == rec.PRISMATIC else "angle"
     start, end = draft.case.numerics.start, draft.case.numerics.end  # kinks before the start have no effect
     if schedule.kind == "formula" and schedule.program.kinks:
-        text = "drives the joint, and has kinks, which need an infinite force; expected a formula without them"
+        text = f"{show(schedule.program.text)} drives the joint, and has kinks, which need an infinite force"
+        text = f"{text}; expected a formula without abs, min, max, where and comparisons"
         draft.fault(f"nodes.{name}.joint.{key}", text)
-    kinks = [time for time, _ in sorted(rate_jumps(schedule)) if start < time <= end]
+    kinks = [(time, jump) for time, jump in sorted(rate_jumps(schedule)) if start < time <= end]
     if kinks:
-        kind = "it jumps" if schedule.kind == "step" else "its rate jumps"
-        time_text = draft.case.amount(kinks[0], "time", 6)
+        kind = "it jumps" if kinks[0][1] else "its rate jumps"
+        time_text = draft.case.amount(kinks[0][0], "time", 6)
         text = f"drives the joint, and at t = {time_text} {kind}, which needs an infinite force"
         remedy = 'expected kind = "smooth" with zero slope at both ends, or a harmonic'
         draft.fault(f"nodes.{name}.joint.{key}", f"{text}; {remedy}")

@@ -59,7 +59,8 @@ class Patch(Table):
     )] = None  # fmt: skip
     body: Annotated[str | None, Text("mass, or body on a prismatic joint, that moves this wall along x or y")] = None
     travel: Annotated[
-        Schedule | None, Scheduled("position", about="displacement of this wall along x or y, instead of `body` [m]")
+        Schedule | None,
+        Scheduled("position", about="displacement of this wall along x or y, instead of `body` [m]", moves=True),
     ] = None
     zone: Annotated[float | None, Quantity(
         "length", positive, "width of the zone whose grid lines follow the wall [m]; the whole basin if left out",

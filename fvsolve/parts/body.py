@@ -175,11 +175,15 @@ class Joint(Table):
     axis: Annotated[tuple[float, ...] | None, Rows("number", length=3, about="axis of motion in the joint axes")] = None
     angle: Annotated[
         Schedule | None,
-        Scheduled("angle", about="angle at the start, or a schedule that drives the joint [rad]; 0 if left out"),
+        Scheduled(
+            "angle", about="angle at the start, or a schedule that drives the joint [rad]; 0 if left out", moves=True
+        ),
     ] = None
     travel: Annotated[
         Schedule | None,
-        Scheduled("position", about="travel at the start, or a schedule that drives the joint [m]; 0 if left out"),
+        Scheduled(
+            "position", about="travel at the start, or a schedule that drives the joint [m]; 0 if left out", moves=True
+        ),
     ] = None
     rate: Annotated[Any, JointQuantity(
         "angular_velocity",

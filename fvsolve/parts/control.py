@@ -2,17 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from fvsolve import units
 from fvsolve.errors import FvsolveError
-from fvsolve.parts.schedule import Schedule, Scheduled
+from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import PROFILE, VALUE, Quantity, ReadContext, Rows, Text, Value, positive
 from fvsolve.units import show
 
 PREFIX = "controls."  # of a block in the key `input` of another block
+UNKNOWN = ""  # dimension of an input or output that is not known because of a fault elsewhere
+
+
+def read_in(dimensions: tuple[str, ...], read: Callable[[tuple[str, ...]], Any], given: Any, instead: Any) -> Any:
+    """Value of a key in units of the input or of the output; `instead` if it has a unit that cannot be checked.
+
+    dimensions : some may be `UNKNOWN`; read : function of known dimensions. Raises ValueError.
+    """
+    try:
+        return read(tuple(dimension or "number" for dimension in dimensions))
+    except ValueError:
+        if UNKNOWN in dimensions and has_unit(given):
+            return instead
+        raise
+
+
+def has_unit(given: Any) -> bool:
+    """True if a value of the case file, or a value in its lists and tables, may have a unit."""
+    if isinstance(given, dict):
+        return "unit" in given or "signal" in given or any(map(has_unit, given.values()))
+    if isinstance(given, (list, tuple)):
+        return any(map(has_unit, given))
+    return isinstance(given, str) and units.is_number_with_unit(given)
 
 
 @dataclass(frozen=True)
@@ -25,7 +49,8 @@ class OfInput(Value):
     schema: ClassVar[dict[str, Any]] = {"type": ["number", "string", "object"]}
 
     def read(self, given: Any, setting: ReadContext) -> Schedule:
-        return Scheduled(setting.block_units[0]).read(given, setting)
+        first = setting.block_units[:1]
+        return read_in(first, lambda known: Scheduled(*known).read(given, setting), given, constant(0.0))
 
 
 @dataclass(frozen=True)
@@ -37,9 +62,11 @@ class OfOutput(Value):
     changes: str = PROFILE
 
     def read(self, given: Any, setting: ReadContext) -> Any:
-        dimension = setting.block_units[1]
-        item = Quantity(dimension) if self.length is None else Rows(dimension, length=self.length)
-        return item.read(given, setting)
+        def read(known: tuple[str, ...]) -> Any:
+            item = Quantity(*known) if self.length is None else Rows(*known, length=self.length)
+            return item.read(given, setting)
+
+        return read_in(setting.block_units[1:], read, given, None)
 
     @property
     def takes(self) -> str:
@@ -60,7 +87,8 @@ class OfInputNumber(Value):
     schema: ClassVar[dict[str, Any]] = {"type": ["number", "string"]}
 
     def read(self, given: Any, setting: ReadContext) -> float:
-        return Quantity(setting.block_units[0]).read(given, setting)
+        first = setting.block_units[:1]
+        return read_in(first, lambda known: Quantity(*known).read(given, setting), given, 0.0)
 
 
 @dataclass(frozen=True)
@@ -73,7 +101,8 @@ class OfRate(Value):
     schema: ClassVar[dict[str, Any]] = {"type": ["number", "string"]}
 
     def read(self, given: Any, setting: ReadContext) -> float:
-        value = units.parse_ratio(given, setting.block_units[1], "time")
+        output = setting.block_units[1:]
+        value = read_in(output, lambda known: units.parse_ratio(given, *known, "time"), given, 1.0)
         positive.check(value, given)
         return value
 
@@ -88,8 +117,7 @@ class Gain(Value):
     schema: ClassVar[dict[str, Any]] = {"type": ["number", "string"]}
 
     def read(self, given: Any, setting: ReadContext) -> float:
-        under, over = setting.block_units
-        return units.parse_ratio(given, over, under)
+        return read_in(setting.block_units, lambda known: units.parse_ratio(given, known[1], known[0]), given, 0.0)
 
 
 class Control(Table):
@@ -126,10 +154,10 @@ class Control(Table):
         return {("input",): given["input"]} if "input" in given else {}
 
     @classmethod
-    def own_dimension(cls, given: dict[str, Any], first: str, output: str) -> str | None:
-        """Dimension of the output that the keys of a block state; None if the driven keys decide.
+    def own_dimension(cls, given: dict[str, Any]) -> str | None:
+        """Dimension of the output that the keys of a block state, for a block that drives no key; None if they do not.
 
-        first, output : dimensions of its first input, and of its output as far as known
+        given : keys of the block as in the file
         """
         return None
 
@@ -157,16 +185,6 @@ class Control(Table):
     def passes_at_once(self) -> bool:
         """True if its output depends on the present values of its inputs."""
         return self.filter is None
-
-    @classmethod
-    def key_faults(cls, given: dict[str, Any]) -> list:
-        faults = super().key_faults(given)
-        limits = given.get("limits")
-        numbers = isinstance(limits, list) and len(limits) == 2 and all(isinstance(x, (int, float)) for x in limits)
-        if numbers and not limits[0] < limits[1]:
-            text = f"{show(limits)} has no values between; expected the least value, then the greatest"
-            faults.append((("limits",), text))
-        return faults
 
 
 class SingleInput(Control):

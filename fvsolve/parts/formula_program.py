@@ -13,6 +13,7 @@ import numpy as np
 from fvsolve import units
 from fvsolve.kernels import formula_programs as code
 from fvsolve.parts.formula import FUNCTIONS, TIME_NAMES, Arithmetic
+from fvsolve.parts.value import ValueFault
 from fvsolve.units import show
 
 CODES = {
@@ -151,27 +152,47 @@ class Program:
         pairs.sort(key=lambda pair: pair[0])
         return tuple(np.array(pairs).T)
 
+    def has_jump(self, start: float, end: float) -> bool:
+        """True if the value of a formula of time jumps in a run, at a break or at the steepest place of its samples."""
+        if any(jump for time, jump in self.breaks() if start < time <= end):
+            return True
+        times, values = self.samples(start, end)
+        k = int(np.argmax(np.abs(np.diff(values))))
+        a, b, change = times[k], times[k + 1], abs(values[k + 1] - values[k])
+        for _ in range(30 if self.kinks else 0):
+            middle = 0.5 * (a + b)
+            ahead = abs(self.value(middle) - self.value(a)) > 0.5 * abs(self.value(b) - self.value(a))
+            a, b = (a, middle) if ahead else (middle, b)
+        return bool(self.kinks and change > 0.0 and abs(self.value(b) - self.value(a)) > 0.1 * change)
+
     def positive_part(self, side: int) -> Program:
         """Formula of the positive part of side * value, side 1 or -1."""
         return Program(f"max(0, {side}*({self.scale!r}*({self.text}) + {self.offset!r}))", self.names)
 
 
 def is_formula(text: Any) -> bool:
-    """True if a text may be a formula of time: it has the name t or calls a function."""
-    return isinstance(text, str) and TIME_FORMULA.search(text) is not None
+    """True if a text may be a formula of time: it has the name t or calls a function, and is not a quantity."""
+    return isinstance(text, str) and TIME_FORMULA.search(text) is not None and not units.is_number_with_unit(text)
 
 
 def program_in(unit: str, dimension: str, text: str, names: tuple[str, ...], ambient: float) -> Program:
-    """Formula whose value has a unit; "" for SI. Raises ValueError. ambient : ambient pressure [Pa]"""
-    if not unit:
-        return checked(Program(text, names))
-    entry = units.find(unit, dimension)
-    shift = ambient if entry.gauge and dimension == "pressure" else 0.0
-    zero = entry.si(0.0)
-    return checked(Program(text, names, entry.si(1.0) - zero, zero + shift))
+    """Formula whose value has a unit; "" for SI. ambient : ambient pressure [Pa]
 
-
-def checked(program: Program) -> Program:
-    """Return the program; raises ValueError if its text is not a formula."""
-    program.steps  # noqa: B018
+    Raises ValueFault with the faults of the keys `formula` and `unit`.
+    """
+    program, faults = Program(text, names), []
+    try:
+        if unit:
+            entry = units.find(unit, dimension)
+            shift, zero = ambient if entry.gauge and dimension == "pressure" else 0.0, entry.si(0.0)
+            program = Program(text, names, entry.si(1.0) - zero, zero + shift)
+    except ValueError as error:
+        faults.append((("unit",), str(error)))
+    try:
+        program.steps  # noqa: B018
+    except ValueError as error:
+        hint = "; numbers in a formula are in SI, without units" if str(error).endswith("invalid syntax") else ""
+        faults.append((("formula",), f"{error}{hint}"))
+    if faults:
+        raise ValueFault(faults)
     return program

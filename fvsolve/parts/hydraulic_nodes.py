@@ -1,5 +1,6 @@
 """Junctions, given inflows, reservoirs and chambers."""
 
+import math
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
@@ -70,7 +71,11 @@ class Junction(PlaceOnBody, kind="junction"):
                 f"Expected at least {around.ambient:g} Pa"
             )
             yield ("minimum_pressure",), message
-        if not (self.demand.value.min() >= 0.0 and self.demand.value.max() > 0.0):
+        full = float(self.demand.value.max())
+        if math.isinf(full):
+            text = "follows a control without `limits`, which `required_pressure` needs; expected limits of at least 0"
+            yield ("demand",), text
+        elif not (self.demand.value.min() >= 0.0 and full > 0.0):
             text = "is negative at some time, or always 0; `required_pressure` needs values of at least 0, not all 0"
             yield ("demand",), text
 

@@ -12,13 +12,14 @@ from fvsolve.parts.csv_rows import copy_name, find_file, read_columns
 from fvsolve.parts.formula_program import Program, is_formula, program_in
 from fvsolve.parts.table_model import keys_json, read_keys
 from fvsolve.parts.value import NEEDED, Choice, Number, Quantity, Range, ReadContext, Rows, Text, Value, ValueFault
-from fvsolve.units import DIMENSIONS, show
+from fvsolve.units import DIMENSIONS, begins_as_quantity, expected, show
 
 KINDS = ("linear", "step", "smooth")
 AMPLITUDE_DIMENSIONS = {
     "pressure": "pressure_drop"
 }  # dimension of an amplitude, if the zero point of the dimension matters
 
+SIGNS = "*+()^<>="  # of a formula
 BOUNDED = ("pressure", "head", "angular_velocity")  # dimensions that a control may drive only within `limits`
 
 
@@ -82,6 +83,14 @@ def constant(value: float) -> Schedule:
     return Schedule("constant", np.zeros(1), np.array([value]))
 
 
+def signal_fault(given: Any) -> str:
+    """Text of the fault of a signal that follows a control; "" for other signals."""
+    if not (isinstance(given, dict) and "control" in given):
+        return ""
+    name = given["control"] if isinstance(given["control"], str) else "NAME"
+    return f'{show(given)} is not a signal with values; write {{ control = "{name}" }} at the keys that use it'
+
+
 @dataclass(frozen=True)
 class Scheduled(Value):
     """Value of a case file that may change with time: number, text, table, file, ramp, wave or signal."""
@@ -91,6 +100,7 @@ class Scheduled(Value):
     about: str = ""
     usual: val.UsualRange | None = None
     changes: str = val.PROFILE
+    moves: bool = False  # True if it moves a body or a wall, so that its slopes are needed
 
     def read(self, given: Any, setting: ReadContext) -> Schedule:
         if isinstance(given, Schedule):
@@ -98,7 +108,7 @@ class Scheduled(Value):
         if is_formula(given):
             return self._read_formula({"formula": given}, setting, given)
         if not isinstance(given, dict):
-            return constant(Quantity(self.dimension, self.range).read(given, setting))
+            return constant(self._read_number(given, setting))
         if "signal" in given:
             return self._read_signal(given, setting)
         if "formula" in given:
@@ -141,6 +151,16 @@ class Scheduled(Value):
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [Quantity(self.dimension).json(), *map(keys_json, self.forms.values())]}
+
+    def _read_number(self, given: Any, setting: ReadContext) -> float:
+        try:
+            return Quantity(self.dimension, self.range).read(given, setting)
+        except ValueError:
+            if not isinstance(given, str) or begins_as_quantity(given) or not any(sign in given for sign in SIGNS):
+                raise
+            self._read_formula({"formula": given}, setting, given)  # raises for a text that is not a formula
+            text = f"{show(given)} is neither a number with a unit nor a formula of t"
+            raise ValueError(f"{text}; {expected(self.dimension)}") from None
 
     def _read_table(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
         values = read_keys(given, self.forms["table"], setting)
@@ -197,6 +217,8 @@ class Scheduled(Value):
             near, names = did_you_mean(name, setting.signals), listing(setting.signals) or "none"
             raise ValueFault([(("signal",), f"no signal named {show(name)}{near}; [signals] has {names}")])
         shared = setting.signals[name]
+        if text := signal_fault(shared):
+            raise ValueFault([((val.ROOT, "signals", name), text)])
         if isinstance(shared, dict) and "signal" in shared:
             raise ValueFault(
                 [(("signal",), f"signal {show(name)} refers to another signal; expected a signal with values")]
@@ -214,10 +236,8 @@ class Scheduled(Value):
         place = ("formula",) if isinstance(origin, dict) else ()
         try:
             program = program_in(values["unit"], self.dimension, values["formula"], (), setting.ambient)
-        except ValueError as error:
-            if not place and not any(sign in origin for sign in "*/+()<>="):  # a quantity with a wrong unit
-                Quantity(self.dimension, self.range).read(origin, setting)
-            raise ValueFault([(place, str(error))]) from None
+        except ValueFault as error:
+            raise ValueFault([(keys if place else (), text) for keys, text in error.faults]) from None
         if setting.span is None:
             return Schedule("formula", (-np.inf, np.inf), (-np.inf, np.inf), origin=origin, program=program)
         times, found = program.samples(*setting.span)
@@ -234,18 +254,27 @@ class Scheduled(Value):
 
     def _read_control(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
         setting.lookups += 1
-        name = read_keys(given, self.forms["control"], setting)["control"]
+        name = given["control"]
+        if isinstance(name, str) and name in setting.controls:  # known also if the table has further, invalid keys
+            setting.driven.setdefault(name, []).append((self.dimension, self.range))
+        read_keys(given, self.forms["control"], setting)
         if name not in setting.controls:
-            near, names = did_you_mean(name, setting.controls), listing(setting.controls) or "none"
+            bare = name.removeprefix("controls.")
+            near = f"; did you mean {show(bare)}?" if bare in setting.controls else did_you_mean(name, setting.controls)
+            names = listing(setting.controls) or "none"
             raise ValueFault([(("control",), f"no control named {show(name)}{near}; [controls] has {names}")])
-        setting.driven.setdefault(name, []).append((self.dimension, self.range))
+        if self.moves:
+            text = "cannot follow a control, because the motion needs its slopes; expected a schedule or a formula of t"
+            raise ValueFault([((), f"{text}, or a control of the force or torque that moves it")])
         block = setting.controls[name]
         limits = block.get("limits") if isinstance(block, dict) else None
+        reach, wants = (self.range.least, self.range.greatest), self.dimension in BOUNDED or self.range.open
+        if wants and limits is None and isinstance(block, dict) and not np.isfinite(reach).all():
+            text = f"{DIMENSIONS[self.dimension].words} needs bounds; give `limits` in [controls.{name}]"
+            raise ValueFault([(("control",), text)])
         try:
             reach = Rows(self.dimension, length=2).read(limits, setting)
         except ValueError:  # none, or a fault of the block
-            reach = self.range.least, self.range.greatest
-            if self.dimension in BOUNDED and not np.isfinite(reach).all():
-                text = f"{DIMENSIONS[self.dimension].words} needs bounds; give `limits` in [controls.{name}]"
-                raise ValueFault([(("control",), text)]) from None
+            if wants:
+                raise ValueFault([]) from None  # the block has the fault
         return Schedule("control", (-np.inf, np.inf), reach, origin={"control": name})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +18,9 @@ from fvsolve.units import show
 
 ROOT = object()  # in the key path of a fault: the following keys start at the top of the case
 NEEDED = object()  # instead of a default: the key is required
+
+OF_TIME = re.compile(r"[*/+(-] ?t\b(?![\w.])|(?<![\w.])t ?[*/+)<>^-]")  # formula with the name t
+CHANGING = ("control", "formula", "signal", "time")  # keys of schedules
 
 # Effect of a changed value on an existing model
 VALUE = "value"  # only numbers in its tables change; the initial state stays
@@ -208,6 +212,12 @@ class Quantity(Value):
     changes: str = PROFILE
 
     def read(self, given: Any, setting: ReadContext) -> float:
+        if isinstance(given, dict) and (form := next((key for key in CHANGING if key in given), "")):
+            text = f"{show(given)} changes with time, and this value does not; {units.expected(self.dimension)}"
+            raise ValueError(text.replace("changes with time", "follows a control") if form == "control" else text)
+        if isinstance(given, str) and OF_TIME.search(given) and not units.begins_as_quantity(given):
+            text = f"{show(given)} is a formula of t, and this value does not change with time"
+            raise ValueError(f"{text}; {units.expected(self.dimension)}")
         value = units.parse(given, self.dimension)
         if isinstance(value, tuple):
             value = value[0] + (setting.ambient if value[1] and self.dimension == "pressure" else 0.0)

@@ -354,7 +354,7 @@ def test_a_killed_and_resumed_loop_is_the_unbroken_run(tmp_path, method):
 
 def test_the_governor_follows_its_plant_by_characteristics():
     t, head, turns, opening, level = governor.plant(60, 40.0)
-    run = fvsolve.run("governor", {"numerics.end": 40.0, "output.every": 1.0})
+    run = fvsolve.run("governor", {"numerics.end": 40.0, "output.every": 1.0, "expect": {}})
     assert run.ok and max(run["unit.speed"]) < 360.0
     for at in (7.0, 10.0, 20.0, 40.0):
         k, row = round(at / (t[1] - t[0])), round(at)

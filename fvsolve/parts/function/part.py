@@ -1,6 +1,7 @@
 """Blocks with a formula of their inputs and of the time: keys and faults."""
 
 from dataclasses import dataclass
+from keyword import iskeyword
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.errors import listing
@@ -22,14 +23,22 @@ class InputNames(Value):
     def read(self, given: Any, setting: ReadContext) -> dict[str, str]:
         if not isinstance(given, dict):
             raise ValueError(f"{show(given)} is not a table of inputs; expected {{ NAME = PROBE }}")
-        faults = [((name,), f"{show(name)} cannot name an input; expected another name than {listing(RESERVED, 20)}")
-                  for name in given if name in RESERVED or not name.isidentifier()]  # fmt: skip
+        faults = [((name,), text) for name in given if (text := name_fault(name))]
         if faults:
             raise ValueFault(faults)
         return read_each(given.items(), lambda item: Text().read(item, setting))
 
 
 RESERVED = (*TIME_NAMES, *FUNCTIONS)
+
+
+def name_fault(name: str) -> str:
+    """Text of the fault of a name in a formula; "" for a valid name."""
+    if name in RESERVED or iskeyword(name):
+        return f"{show(name)} is reserved; expected another name than {listing(RESERVED, 20)}"
+    if not (name.isidentifier() and name.isascii()):
+        return f"{show(name)} is not a name in a formula; expected letters a to z, digits and _, a letter first"
+    return ""
 
 
 class FormulaBlock(Control, kind="function"):
@@ -48,22 +57,20 @@ class FormulaBlock(Control, kind="function"):
         return {("inputs", name): text for name, text in inputs.items()} if isinstance(inputs, dict) else {}
 
     @classmethod
-    def own_dimension(cls, given: dict[str, Any], first: str, output: str) -> str | None:
-        unit = UNITS.get(given.get("unit", ""))
-        if unit is None or (DIMENSIONS[output].base or output) == unit.dimension:
-            return None
-        return unit.dimension if unit.dimension in DIMENSIONS else None
+    def own_dimension(cls, given: dict[str, Any]) -> str | None:
+        unit = UNITS.get(str(given.get("unit", "")))
+        return unit.dimension if unit is not None and unit.dimension in DIMENSIONS else None
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
         names, formula, unit = given.get("inputs", {}), given.get("formula"), given.get("unit", "")
-        if isinstance(names, dict) and isinstance(formula, str) and isinstance(unit, str):
+        sound = isinstance(names, dict) and not any(map(name_fault, names))
+        if sound and isinstance(formula, str) and isinstance(unit, str):
+            output = setting.block_units[1]
             try:
-                program_in(unit, setting.block_units[1], formula, tuple(names), setting.ambient)
-            except ValueError as error:
-                of_unit = unit and "formula" not in str(error) and show(formula) not in str(error)
-                place = "unit" if of_unit else "formula"
-                raise ValueFault([((place,), str(error))], given) from None
+                program_in(unit if output else "", output, formula, tuple(names), setting.ambient)
+            except ValueFault as error:
+                raise ValueFault(error.faults, given) from None
         return given
 
     def program(self, dimension: str, ambient: float) -> Program:

@@ -5,9 +5,10 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.parts.control import SingleInput
+from fvsolve.parts.control import SingleInput, read_in
 from fvsolve.parts.table_model import ListTable, read_lists
 from fvsolve.parts.value import NEEDED, PROFILE, ReadContext, Rows, Value
+from fvsolve.units import show
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,14 +32,16 @@ class PointsValue(Value):
         if isinstance(given, Points):
             return given
         if not isinstance(given, dict):
-            raise ValueError("expected a table { input = [...], output = [...] }")
-        first, output = setting.block_units
-        keys = {"input": (Rows(first), NEEDED), "output": (Rows(output), NEEDED)}
+            raise ValueError(f"{show(given)} is not a table; expected {{ input = [...], output = [...] }}")
 
         def few(inputs, outputs):
             return [(("input",), "has one value; expected two or more")] if len(inputs) < 2 else []
 
-        return Points(*read_lists(given, keys, setting, "inputs", few))
+        def read(known: tuple[str, ...]) -> Points:
+            keys = {key: (Rows(dimension), NEEDED) for key, dimension in zip(("input", "output"), known, strict=True)}
+            return Points(*read_lists(given, keys, setting, "inputs", few))
+
+        return read_in(setting.block_units, read, given, Points((0.0, 1.0), (0.0, 1.0)))
 
 
 class LookupTable(SingleInput, kind="table"):

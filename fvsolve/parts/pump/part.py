@@ -64,6 +64,9 @@ class Pump(TwoPort, kind="pump"):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
+        if "trip" in given and isinstance(given.get("speed"), dict) and "control" in given["speed"]:
+            text = "cannot follow a control if the machine trips, because the speed at the trip is then unknown"
+            faults.append((("speed",), f"{text}; expected a schedule, or no `trip`"))
         if "trip" in given and "inertia" not in given and "rated_speed" not in given:
             faults.append((("trip",), 'needs rated_speed, for example "1480 rpm", and the inertia of all rotating '
                                       "masses, which is otherwise estimated; to stop the pump at once, set speed to 0 "

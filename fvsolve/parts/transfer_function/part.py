@@ -3,8 +3,16 @@
 from typing import Annotated, Any
 
 from fvsolve.parts.control import SingleInput
-from fvsolve.parts.value import Rows
+from fvsolve.parts.value import ReadContext, Rows
 from fvsolve.units import show
+
+
+def numbers_in(given: Any) -> tuple[float, ...]:
+    """Numbers of a list in the case file; empty if it is not a list of numbers."""
+    try:
+        return Rows("number").read(given, ReadContext())
+    except ValueError:
+        return ()
 
 
 class TransferFunction(SingleInput, kind="transfer-function"):
@@ -19,21 +27,20 @@ class TransferFunction(SingleInput, kind="transfer-function"):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
-        lists = {key: given.get(key) for key in ("numerator", "denominator")}
+        lists = {key: numbers_in(given.get(key)) for key in ("numerator", "denominator")}
         for key, values in lists.items():
-            numbers = isinstance(values, (list, tuple)) and all(isinstance(x, (int, float)) for x in values) and values
-            if not numbers:
-                continue
-            if values[0] == 0:
-                faults.append(((key,), f"{show(values)} begins with a zero; expected the highest power of s first"))
-            elif key == "denominator" and len(values) == 1 and len(lists["numerator"] or ()) <= 1:
-                text = "has no power of s, so it holds no state; expected a function block for a gain"
+            if values and not any(values):
+                faults.append(((key,), f"{show(given[key])} has only zeros; expected a number that is not 0"))
+            elif values and values[0] == 0.0:
+                text = f"{show(given[key])} begins with a zero; expected the highest power of s first, and not 0"
                 faults.append(((key,), text))
-        if all(isinstance(values, (list, tuple)) for values in lists.values()):
-            more, fewer = (len(values) for values in lists.values())
-            if more > fewer:
-                text = f"has the power {more - 1} of s, above that of the denominator; expected at most {fewer - 1}"
-                faults.append((("numerator",), text))
+        above, below = lists.values()
+        if len(below) == 1:
+            text = f"{show(given['denominator'])} has no power of s; expected two or more numbers, or a function block"
+            faults.append((("denominator",), f"{text} for a gain"))
+        elif below and len(above) > len(below):
+            text = f"{show(given['numerator'])} has the power {len(above) - 1} of s, above that of the denominator"
+            faults.append((("numerator",), f"{text}; expected at most {len(below)} numbers"))
         return faults
 
     @property

@@ -51,6 +51,9 @@ class Turbine(TwoPort, kind="turbine"):
     @classmethod
     def key_faults(cls, given) -> list:
         faults = super().key_faults(given)
+        if "trip" in given and isinstance(given.get("speed"), dict) and "control" in given["speed"]:
+            text = "cannot follow a control if the machine trips, because the speed at the trip is then unknown"
+            faults.append((("speed",), f"{text}; expected a schedule, or no `trip`"))
         if "trip" in given and "inertia" not in given:
             faults.append((("trip",), "needs the key `inertia`, the inertia of all rotating masses"))
         return faults
