@@ -312,6 +312,10 @@ class ModelFeatures:
         if self.viscoelastic_walls:
             yield COMPONENTS["creep" if linear else "creep, barotropic"]
         yield from self.basins
+        yield from self.carried_and_observed(family)
+
+    def carried_and_observed(self, family: str) -> Iterator[RhsTerms]:
+        """Yield the last terms: scalars, and probes that need all others; family : kernels of the density law."""
         if self.scalars:  # carried by the flow from the rates of waves, which come before
             yield COMPONENTS["scalars"]
             if not self.alone:
