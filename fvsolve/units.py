@@ -174,22 +174,22 @@ def parse_ratio(given: Any, over: str, under: str) -> float:
         import pint
 
         si, match = f"{DIMENSIONS[over].si} / ({DIMENSIONS[under].si})", _NUMBER.fullmatch(given)
-        wanted = f"expected a number in {_readable(over, under)}"
+        remedy = f"expected a number in {_readable(over, under)}"
         if match is None:
-            raise ValueError(f"{show(given)} is not a number with a unit; {wanted}")
+            raise ValueError(f"{show(given)} is not a number with a unit; {remedy}")
         number, spelling = match[1], _canonical(match[2])
         bare = spelling.removeprefix("1/").replace("%", "percent")
         if spelling and not _SAFE_SPELLING.fullmatch(bare):
-            raise ValueError(f"{show(given)}: unknown unit {show(spelling)}; {wanted}")
+            raise ValueError(f"{show(given)}: unknown unit {show(spelling)}; {remedy}")
         registry = pint.get_application_registry()
         try:
             unit = registry.Quantity(1.0, registry.parse_units(_for_pint(bare))) if bare else registry.Quantity(1.0)
         except Exception:  # pint raises errors of many families
-            raise ValueError(f"{show(given)}: unknown unit {show(spelling)}; {wanted}") from None
+            raise ValueError(f"{show(given)}: unknown unit {show(spelling)}; {remedy}") from None
         unit = 1.0 / unit if spelling.startswith("1/") else unit
         expected_unit = registry.Quantity(1.0, registry.parse_units(_for_pint(si)))
         if unit.dimensionality != expected_unit.dimensionality:
-            raise ValueError(f"{show(given)} has the unit {spelling or '1'}; {wanted}")
+            raise ValueError(f"{show(given)} has the unit {spelling or '1'}; {remedy}")
         value = float(number) * float(unit.to_base_units().magnitude)
     if not math.isfinite(value) or abs(value) > MAX_NUMBER:
         raise ValueError(f"{show(given)} is not a usable number; expected a finite number")
