@@ -121,7 +121,7 @@ class Blocks:
         first = next(iter(inputs.values()))
         return first.dimension if isinstance(first, Probe) else self.outputs.get(first, UNKNOWN)
 
-    def wanted(self, name: str) -> list[str]:
+    def known_dimensions(self, name: str) -> list[str]:
         """Known dimensions of the keys that a block drives and of the setpoints that follow it."""
         found = [dimension for dimension, _ in self.setting.driven.get(name, ())]
         for other, item in self.given.items():
@@ -132,8 +132,8 @@ class Blocks:
 
     def output_dimension(self, name: str) -> str:
         """Dimension of the output of a block; UNKNOWN if it drives only faulty keys."""
-        if wanted := self.wanted(name):
-            return UNKNOWN if unlike(wanted) else wanted[0]
+        if known := self.known_dimensions(name):
+            return UNKNOWN if unlike(known) else known[0]
         follows = (keys[0] != "controls" for keys in driven_keys(self.reading.raw.table, "control", name))
         if own := self.kind(name).own_dimension(self.given[name]):
             return own
@@ -174,7 +174,7 @@ class Blocks:
 
     def faults(self, name: str) -> Iterator[tuple[tuple, str]]:
         """Yield faults (keys in the block, text) of unlike driven keys, of limits and of the initial output."""
-        if pair := unlike(self.wanted(name)):
+        if pair := unlike(self.known_dimensions(name)):
             first, other = (DIMENSIONS[item].words for item in pair)
             yield (), f"drives {first} and {other}; expected keys of one unit, or a block for each"
         stated, initial = self.valid_key(name, "limits"), self.valid_key(name, "initial")

@@ -308,8 +308,8 @@ class Balance:
         block, start, state = starts[numbers[0]].block, starts[numbers[0]], ""
         if block.control.integrates and self.residual(start) != 0.0:
             unit, setpoint = block.dimensions[0], block.control.setpoint_schedule
-            found, wanted = (self.case.amount(x, unit).removesuffix(" -") for x in (start.inputs[0], start.setpoint))
-            state = f": the input is {found}, but {'not 0' if setpoint is None else f'the setpoint {wanted}'}"
+            found, set_value = (self.case.amount(x, unit).removesuffix(" -") for x in (start.inputs[0], start.setpoint))
+            state = f": the input is {found}, but {'not 0' if setpoint is None else f'the setpoint {set_value}'}"
         text = f"no output of {listing(names)} balances the start{state}"
         self.packed.fault(f"controls.{names[0]}", f"{text}; give the key `initial`, the output at the start")
 

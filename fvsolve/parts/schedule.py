@@ -268,13 +268,13 @@ class Scheduled(Value):
             raise ValueFault([((), f"{text}, or a control of the force or torque that moves it")])
         block = setting.controls[name]
         limits = block.get("limits") if isinstance(block, dict) else None
-        reach, wants = (self.range.least, self.range.greatest), self.dimension in BOUNDED or self.range.open
-        if wants and limits is None and isinstance(block, dict) and not np.isfinite(reach).all():
+        reach, needed = (self.range.least, self.range.greatest), self.dimension in BOUNDED or self.range.open
+        if needed and limits is None and isinstance(block, dict) and not np.isfinite(reach).all():
             text = f"{DIMENSIONS[self.dimension].words} needs bounds; give `limits` in [controls.{name}]"
             raise ValueFault([(("control",), text)])
         try:
             reach = Rows(self.dimension, length=2).read(limits, setting)
         except ValueError:  # none, or a fault of the block
-            if wants:
+            if needed:
                 raise ValueFault([]) from None  # the block has the fault
         return Schedule("control", (-np.inf, np.inf), reach, origin={"control": name})
