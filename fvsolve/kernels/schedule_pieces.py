@@ -3,6 +3,7 @@
 from math import cos, sin
 
 from fvsolve.jit import njit
+from fvsolve.kernels.calls import law_njit, prevent_inlining
 from fvsolve.kernels.formula_programs import program_slopes, run_program
 from fvsolve.kernels.table_handle import open_tables
 
@@ -88,18 +89,22 @@ def schedule_value(tables, index, t):
     From the end of the schedule segment on, a schedule of several pieces keeps its left limit at this end.
     """
     record = tables.schedules[index]
-    if record["pieces"] <= 0:
-        return followed_value(tables, record["first"], record["pieces"], t)
-    return value_with_limit(tables.schedules, tables.pieces, index, t, tables.clock[0]["limit"])
+    if record["pieces"] == 1:
+        return piece_value(tables.pieces, record["first"], t)
+    return value_of_many(tables, index, t)
 
 
-@njit
-def followed_value(tables, row, pieces, t):
-    """Value at time t [s] of a schedule that follows a block (pieces 0) or a formula; row : its row in `pieces`."""
-    if pieces == 0:
-        return block_value(tables.pieces, row, tables.applied[int(tables.pieces[row, 2])])
-    limit, flags = tables.clock[0]["limit"], tables.armed
-    return run_program(tables.pieces, row, t, limit, 0, tables.stack, flags, flags[:0])
+@law_njit
+def value_of_many(tables, index, t):
+    """Value of a schedule that has several pieces, or follows a block or a formula, as `schedule_value`."""
+    prevent_inlining()
+    record, limit = tables.schedules[index], tables.clock[0]["limit"]
+    first, count = record["first"], record["pieces"]
+    if count == 0:
+        return block_value(tables.pieces, first, tables.applied[int(tables.pieces[first, 2])])
+    if count < 0:
+        return run_program(tables.pieces, first, t, limit, 0, tables.stack, tables.armed, tables.armed[:0])
+    return piece_value(tables.pieces, piece_at(tables.pieces, first, count, t, limit), min(t, limit))
 
 
 @njit
