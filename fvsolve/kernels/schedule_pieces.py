@@ -91,22 +91,20 @@ def schedule_value(tables, index, t):
     record = tables.schedules[index]
     if record["pieces"] == 1:
         return piece_value(tables.pieces, record["first"], t)
-    if record["pieces"] <= 0:
-        return followed_value(tables, index, t)
-    limit = tables.clock[0]["limit"]
-    row = piece_at(tables.pieces, record["first"], record["pieces"], t, limit)
-    return piece_value(tables.pieces, row, min(t, limit))
+    return value_of_many(tables, index, t)
 
 
 @law_njit
-def followed_value(tables, index, t):
-    """Value of a schedule that follows a block or a formula, as `schedule_value`."""
+def value_of_many(tables, index, t):
+    """Value of a schedule that has several pieces, or follows a block or a formula, as `schedule_value`."""
     prevent_inlining()
     record, limit = tables.schedules[index], tables.clock[0]["limit"]
-    first = record["first"]
-    if record["pieces"] == 0:
+    first, count = record["first"], record["pieces"]
+    if count == 0:
         return block_value(tables.pieces, first, tables.applied[int(tables.pieces[first, 2])])
-    return run_program(tables.pieces, first, t, limit, 0, tables.stack, tables.armed, tables.armed[:0])
+    if count < 0:
+        return run_program(tables.pieces, first, t, limit, 0, tables.stack, tables.armed, tables.armed[:0])
+    return piece_value(tables.pieces, piece_at(tables.pieces, first, count, t, limit), min(t, limit))
 
 
 @njit
