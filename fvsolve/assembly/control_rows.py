@@ -57,6 +57,10 @@ class ControlRows:
         """Numbers of a block, in the order in which its law reads them; those of the start are set by `begin`."""
         return []
 
+    def sampled_numbers(self, control: Any) -> int:
+        """Count of the numbers in `discrete` that a block needs if it acts at samples."""
+        return 0
+
     def rate(self, control: Any) -> float:
         """Greatest constant rate of its states [1/s]."""
         return 0.0

@@ -111,11 +111,11 @@ class Schedules:
             self.spacing = min(self.spacing, 2.0 * float(np.median(gaps[gaps > 0.0])) / STEPS_PER_PERIOD)
         return len(self.records) - 1
 
-    def add_program(self, program, scale: float = 1.0, offset: float = 0.0) -> int:
-        """Add the steps of a formula, with its event functions; return its header row."""
+    def add_program(self, program, scale: float = 1.0, offset: float = 0.0, located: bool = True) -> int:
+        """Add the steps of a formula, and its event functions if its kinks are `located`; return its header row."""
         first, flag = len(self.rows), len(self.events)
         self.rows += program.rows(scale, offset, flag, FORMULA)
-        self.events += [(program.text, "")] * 2 * program.kinks
+        self.events += [(program.text, "")] * 2 * program.kinks * located
         self.stack = max(self.stack, program.stack_size)
         return first
 

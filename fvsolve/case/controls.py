@@ -17,6 +17,7 @@ from fvsolve.parts.control import PREFIX, UNKNOWN, Control, SingleInput
 from fvsolve.parts.value import Range
 from fvsolve.units import DIMENSIONS, show
 
+MOST_SAMPLES = 1e9  # of a block in a run
 DIFFERENCES = {"pressure": "pressure_drop", "gauge_pressure": "pressure_drop"}  # dimension of an error
 
 
@@ -47,6 +48,11 @@ class Block:
     def blocks_passed(self) -> list[str]:
         """Names of the blocks on whose present outputs its own output depends."""
         return self.blocks_read if self.control.passes_at_once else self.followed
+
+    @property
+    def blocks_needed(self) -> list[str]:
+        """Names of the blocks that must decide before this block; none for a block that holds its output."""
+        return self.blocks_passed if self.control.period is None else []
 
 
 @dataclass(frozen=True)
@@ -173,7 +179,8 @@ class Blocks:
         return None
 
     def faults(self, name: str) -> Iterator[tuple[tuple, str]]:
-        """Yield faults (keys in the block, text) of unlike driven keys, of limits and of the initial output."""
+        """Yield faults (keys in the block, text) of unlike driven keys, limits, the initial output and samples."""
+        yield from self.sample_faults(name)
         if pair := unlike(self.known_dimensions(name)):
             first, other = (DIMENSIONS[item].words for item in pair)
             yield (), f"drives {first} and {other}; expected keys of one unit, or a block for each"
@@ -187,9 +194,27 @@ class Blocks:
         elif stated and (limits[0] < low or limits[1] > high or (least_open and limits[0] == low)):
             text = f"{given} goes beyond what the driven keys may be"
             yield ("limits",), f"{text}; expected values {str(Range(low, high, least_open)).removeprefix('of ')}"
+        elif outputs := self.valid_key(name, "output"):
+            for k, output in enumerate(outputs):
+                if not low <= output <= high:
+                    text = f"{show(self.given[name]['output'][k])} is not a value that the driven keys may have"
+                    yield ("output", k), f"{text}; expected values {str(Range(low, high)).removeprefix('of ')}"
         elif initial is not None and not limits[0] <= initial <= limits[1]:
             text = f"{show(self.given[name]['initial'])} is outside the limits {show(list(limits))}"
             yield ("initial",), f"{text}; expected a value within them"
+
+    def sample_faults(self, name: str) -> Iterator[tuple[tuple, str]]:
+        """Yield faults (keys in the block, text) of `period` and `offset`."""
+        given, period, offset = self.given[name], self.valid_key(name, "period"), self.valid_key(name, "offset")
+        if offset and "period" not in given:
+            yield ("offset",), "has no effect without `period`; give both keys, or remove this key"
+        if offset is not None and period is not None and offset >= period:
+            yield ("offset",), f"{show(given['offset'])} is not below the period; expected less than {period:g} s"
+        if period is not None and self.setting.span is not None:
+            start, end = self.setting.span
+            if (end - start) / period > MOST_SAMPLES:
+                text = f"{show(given['period'])} gives {(end - start) / period:.3g} samples"
+                yield ("period",), f"{text}; expected at most {MOST_SAMPLES:.0e} in the run"
 
 
 def unlike(dimensions: list[str]) -> tuple[str, str] | None:

@@ -51,6 +51,8 @@ HOOKS = {  # functions of the law of a part: types of arguments and of the resul
     # t, y, dydt, tables, control, v, u: rates of its states; v, u : output before and after its limits
     "adapt": ("tVVTCtt", ""),
     "switch": ("tVTCV", ""),  # t, y, tables, control, g: its event functions
+    # t, y, tables, control: output before its limits at a sample; changes the numbers of the block in `discrete`
+    "sample": ("tVTC", "t"),
 }
 
 
@@ -152,6 +154,7 @@ call_bends = call_at_address("call_bends", *HOOKS["bends"])
 call_decide = call_at_address("call_decide", *HOOKS["decide"])
 call_adapt = call_at_address("call_adapt", *HOOKS["adapt"])
 call_switch = call_at_address("call_switch", *HOOKS["switch"])
+call_sample = call_at_address("call_sample", *HOOKS["sample"])
 
 
 @njit(forceinline=True)

@@ -12,7 +12,7 @@ READER_IMPORTS = (
 )
 HOOK = {hook: k for k, hook in enumerate(calls.HOOKS)}
 RHS_HOOKS = ("set", "move", "step", "slope", "lift", "decide", "adapt")
-READER_HOOKS = ("value", "outside", "events", "bends", "switch")
+READER_HOOKS = ("value", "outside", "events", "bends", "switch", "sample")
 ENERGY_HOOKS = ("power", "stored")
 COMPILE_TIME_LOOP = "from fvsolve.steppers.time_loop import compiled; compiled()"
 

@@ -10,14 +10,15 @@ has the outputs before their limits.
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels import calls
 from fvsolve.kernels.barotropic_nodes import head_pressure
-from fvsolve.kernels.devices import ADAPT, DECIDE, SET, SWITCH
-from fvsolve.kernels.dtypes import CONTROL_VALUE, DRIVEN_DEVICE, DRIVEN_VALVE, FIXED
+from fvsolve.kernels.devices import ADAPT, DECIDE, SAMPLE, SET, SWITCH
+from fvsolve.kernels.dtypes import ARRIVED, ARRIVES, CONTROL_VALUE, DRIVEN_DEVICE, DRIVEN_VALVE, FIXED, NEVER, STATUS
 from fvsolve.kernels.formula_programs import is_low
 from fvsolve.kernels.restrictions import valve_conductance
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
 
 OUTPUT, INPUT, ERROR = 0, 1, 2  # quantities of a block
+SAMPLE_ROUNDING = 1e-12  # of times, relative to the time and the period
 LINEAR = None  # of the template: True for the density law `linear`
 
 
@@ -33,6 +34,12 @@ def measured_change(tables, control, j):
 def input_change(y, tables, control, j):
     """Change of input j of a block since the start, after its filter if it has one."""
     return y[control["y"] + j] if j < control["filters"] else measured_change(tables, control, j)
+
+
+@njit(forceinline=True)
+def flag_count(tables, control):
+    """Count of event flags that select the side of kinks of a block; 0 for a block that acts at samples."""
+    return 0 if control["period"] > 0.0 else tables.armed.size
 
 
 @njit(forceinline=True)
@@ -82,8 +89,11 @@ def write_outputs(t, y, out, tables, late):
     for k in range(controls.size):
         control = controls[k]
         if control["late"] == late:
-            v = calls.call_decide(tables.hooks[control["hooks"], DECIDE], t, y, tables, control)
-            out[at + 2 * k] = limited(v, tables.armed, control)
+            if control["period"] > 0.0:
+                v = out[at + 2 * k] = tables.discrete[control["memory"]]
+            else:
+                v = calls.call_decide(tables.hooks[control["hooks"], DECIDE], t, y, tables, control)
+                out[at + 2 * k] = limited(v, tables.armed, control)
             applied[k], applied[controls.size + k] = applied_output(control, out[at + 2 * k]), v
 
 
@@ -113,7 +123,7 @@ def _decide_early(t, y, dydt, out, handle):
         elif kind == DRIVEN_DEVICE:
             device = tables.devices[i]
             calls.call_set(tables.hooks[device["hooks"], SET], t, y, out, tables, device)
-        else:
+        elif i >= 0:
             drive_node(t, out, tables, i)
 
 
@@ -145,7 +155,7 @@ def control_rates(t, y, dydt, out, handle):
             i = control["y"] + j
             dydt[i] = (measured_change(tables, control, j) - y[i]) * control["filter_rate"]
         hook = tables.hooks[control["hooks"], ADAPT]
-        if hook != 0 and control["y"] >= 0:
+        if hook != 0 and control["y"] >= 0 and control["period"] == 0.0:
             calls.call_adapt(hook, t, y, dydt, tables, control, applied[controls.size + k], out[at + 2 * k])
 
 
@@ -159,12 +169,63 @@ def control_events(t, y, out, handle, g):
     for k in range(controls.size):
         control = controls[k]
         hook, flag = tables.hooks[control["hooks"], SWITCH], control["flag"]
-        if hook != 0:
+        if hook != 0 and control["period"] == 0.0:
             calls.call_switch(hook, t, y, tables, control, g)
         if flag >= 0:
             v = applied[controls.size + k]
             is_low(v - control["least"], 0.0, flag, none, g)
             is_low(control["greatest"] - v, 2.0, flag, none, g)
+
+
+@njit(forceinline=True)
+def next_sample(tables, control):
+    """Time of the next sample of a block [s], counted from the start, so that no rounding adds up."""
+    count = tables.discrete[control["memory"] + 1]
+    return tables.settings[0]["start"] + control["offset"] + count * control["period"]
+
+
+@njit(forceinline=True)
+def is_due(t, tables, control):
+    """True if a block acts at a sample at the time t, but for rounding."""
+    rounding = SAMPLE_ROUNDING * (abs(t) + control["period"])
+    return control["period"] > 0.0 and next_sample(tables, control) - t <= rounding
+
+
+@njit
+def take_samples(t, y, out, handle, values):
+    """At a time at which a sample is due (STATUS is ARRIVED), let the blocks act, in the order of their table."""
+    tables = open_tables(handle)
+    controls, discrete = tables.controls, tables.discrete
+    if out[STATUS] != ARRIVED:
+        return
+    read_sensors(t, y, out, tables)
+    for k in range(controls.size):
+        control = controls[k]
+        if is_due(t, tables, control):
+            sample = tables.hooks[control["hooks"], SAMPLE]
+            if sample != 0:
+                v = calls.call_sample(sample, t, y, tables, control)
+            else:
+                v = calls.call_decide(tables.hooks[control["hooks"], DECIDE], t, y, tables, control)
+            discrete[control["memory"]] = min(max(v, control["least"]), control["greatest"])
+            discrete[control["memory"] + 1] += 1.0
+            tables.applied[k] = applied_output(control, discrete[control["memory"]])
+
+
+@njit
+def announce_samples(t, y, out, handle, values):
+    """Write the time of the next sample to out[ARRIVES], t if it is now, unless a jump of a delay line comes first.
+
+    A sample at the end of a segment of the run is taken at the start of the next one, after a jump of a schedule there.
+    """
+    tables = open_tables(handle)
+    arrives, ends = out[ARRIVES] if tables.delays.size > 0 else NEVER, t >= tables.clock[0]["limit"]
+    for k in range(tables.controls.size):
+        control = tables.controls[k]
+        if control["period"] > 0.0 and not (ends and is_due(t, tables, control)):
+            time = t if is_due(t, tables, control) else next_sample(tables, control)
+            arrives = time if arrives == NEVER else min(arrives, time)
+    out[ARRIVES] = arrives
 
 
 @njit

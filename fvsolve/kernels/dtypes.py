@@ -50,6 +50,7 @@ SETTINGS = record(
     rho=f8,  # reference density [kg/m3]
     viscosity=f8,  # dynamic [Pa s]
     ambient=f8,  # ambient pressure [Pa]
+    start=f8,  # start of the run [s]
     gravity=f8,
     datum=f8,  # elevation of zero height in energy studies [m]
     vapor=f8,  # vapour pressure [Pa]
@@ -363,7 +364,11 @@ CONTROL = record(  # block of `controls`, in an order in which each block comes 
     least=f8,  # limits of its output
     greatest=f8,
     flag=i8,  # first of four event flags of its limits; -1 for none
-    memory=i8,  # offset in `discrete` of numbers that change at events and samples only; -1 for none
+    # Offset in `discrete` of numbers that change at events and samples only, -1 for none. Of a block that acts at
+    # samples: its output, the number of its next sample, then numbers of its law.
+    memory=i8,
+    period=f8,  # time between samples [s]; 0 for a block that acts at all times
+    offset=f8,  # time of the first sample after the start of the run [s]
     start=f8,  # output at the start
     held=f8,  # output at which a study holds it; nan if it follows its law
 )

@@ -120,13 +120,14 @@ CONTROLS = {
     "move": "controls: decide_late",
     "control_rates": "controls: control_rates",
     "observe": "controls: restore_outputs",
+    "record": "controls: take_samples",
 }
 COMPONENTS = {
     "controls, linear": RhsTerms(**CONTROLS, decide="controls: decide_linear"),
     "controls, barotropic": RhsTerms(**CONTROLS, decide="controls: decide_barotropic"),
     "switches": RhsTerms(events="controls: control_events"),
     "formulas": RhsTerms(events="schedule_pieces: formula_events"),
-    "probes of controls": RhsTerms(observe="controls: observe_controls"),
+    "probes of controls": RhsTerms(observe="controls: observe_controls", record="controls: announce_samples"),
     "pipes": RhsTerms(record="observation: record_pipes"),
     "valves": RhsTerms(rate_limits="network_balance: valve_rate_limit"),
     "bends": RhsTerms(events="restrictions: restriction_events"),

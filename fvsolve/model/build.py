@@ -294,6 +294,7 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     s = table[0]
     scheme_settings(s, case.numerics.scheme, case.numerics.limiter)
     s["viscosity"] = draft.fluid.viscosity or 0.0
+    s["start"] = case.numerics.start
     s["ambient"], s["gravity"] = case.ambient_pressure, case.gravity
     s["vapor"] = case.law.cavity_pressure
     s["stop_below"] = case.numerics.below_vapor == "stop"

@@ -42,7 +42,7 @@ class BlockCouplings:
         """States on which the output of block k depends: its own, and those of inputs that it passes on at once."""
         if k not in self.at_once:
             row = self.controls[k]
-            parts = [self.own(k), self.schedule(row["setpoint"])]
+            parts = [self.own(k), self.schedule(row["setpoint"])] if row["period"] == 0.0 else []
             parts += [self.read(code) for code in self.inputs(k)] if row["at_once"] else []
             self.at_once[k] = unique_states(*parts)
         return self.at_once[k]

@@ -31,8 +31,9 @@ DIFFERENCE = 1e-6  # change of an output for differences, relative to its range
 MOST_STATES = 32  # a sensor of more states has no rate
 RANK = 1e-9  # singular values below this share of the greatest are zero
 ROUNDING = 1e-8  # change of an output below which it is rounding if it no longer falls, relative to its range
+BESIDE = 1e-7  # distance of the residuals of the last step, relative to the range
 STOPPED = 1e-6  # residual of an integrating block at its limit that stops it, over its change with the outputs
-BALANCED = 1e-12  # change of an output in the last iteration, relative to its range
+BALANCED = 4e-16  # change of an output in the last iteration, relative to its range: rounding
 
 
 def number_blocks(draft) -> None:
@@ -68,13 +69,14 @@ def fill_block(draft, name: str, block: Block, sensors: list[str], row) -> None:
     if all(map(math.isfinite, block.limits)):
         small[1] = min(small[1], 0.1 * (block.limits[1] - block.limits[0]))
     names = [f"controls.{name}.filtered{k or ''}" for k in range(filters)]
-    names += [f"controls.{name}.{state}" for state in rows.states(control)]
-    scales = [small[0]] * filters + rows.scales(control, tuple(small))
+    if control.period is None:
+        names += [f"controls.{name}.{state}" for state in rows.states(control)]
+    scales = [small[0]] * filters + (rows.scales(control, tuple(small)) if control.period is None else [])
     row["y"] = draft.states(names, scales) if names else -1
     row["filters"], row["filter_rate"] = filters, 1.0 / control.filter if filters else 0.0
     row["hooks"], row["data"] = draft.hooks(rows), len(draft.floats)
     draft.floats += rows.numbers(draft, name, block)
-    row["at_once"] = control.passes_at_once
+    row["at_once"] = control.feeds_through
     row["inputs"], row["input_count"] = len(draft.integers), len(block.inputs)
     draft.integers += [-1 - draft.schedules.blocks[item] if isinstance(item, str) else sensors.index(item.text)
                        for item in block.inputs]  # fmt: skip
@@ -83,10 +85,13 @@ def fill_block(draft, name: str, block: Block, sensors: list[str], row) -> None:
     setpoint = control.setpoint_schedule
     row["setpoint"] = -1 if setpoint is None else draft.schedules.add(setpoint)
     row["least"], row["greatest"], row["held"] = *block.limits, np.nan
-    limited = not control.switches and any(map(math.isfinite, block.limits))
+    row["period"], row["offset"] = control.period or 0.0, control.offset
+    limited = not control.switches and control.period is None and any(map(math.isfinite, block.limits))
     row["flag"] = draft.flags(f"controls.{name}", LIMIT_EVENTS) if limited else -1
     flag = rows.timed_flag(np.array(draft.floats[row["data"] :]))
-    row["memory"] = len(draft.discrete) if flag >= 0 else -1
+    row["memory"] = len(draft.discrete) if flag >= 0 or control.period else -1
+    if control.period:
+        draft.discrete += [0.0] * (2 + rows.sampled_numbers(control))
     if flag >= 0:
         draft.timed.append((flag, len(draft.discrete)))
         draft.discrete.append(-np.inf)
@@ -95,7 +100,7 @@ def fill_block(draft, name: str, block: Block, sensors: list[str], row) -> None:
 def control_rate(draft) -> float:
     """Greatest constant rate of filters and states of blocks [1/s]."""
     blocks = draft.case.controls.values()
-    own = [control_rows_of(type(block.control)).rate(block.control) for block in blocks]
+    own = [control_rows_of(type(block.control)).rate(block.control) for block in blocks if not block.control.period]
     return max([0.0, *own, *draft.control_table["filter_rate"]])
 
 
@@ -123,7 +128,7 @@ def early_blocks(draft, driven: list[tuple[int, int, int]]) -> set[str]:
     """Names of the blocks that decide before the nodes are solved, because they drive the network or such a block."""
     names = list(draft.schedules.blocks)
     early = {names[block] for _, _, block in driven}
-    while more := {other for name in early for other in draft.case.controls[name].blocks_passed} - early:
+    while more := {other for name in early for other in draft.case.controls[name].blocks_needed} - early:
         early |= more
     return early
 
@@ -147,7 +152,7 @@ def check_order(draft, early: set[str]) -> None:
     for name in early:
         block = draft.case.controls[name]
         names = list(getattr(block.control, "inputs", ()))
-        for k, probe in enumerate(block.inputs if block.control.passes_at_once else ()):
+        for k, probe in enumerate(block.inputs if block.control.feeds_through else ()):
             if not isinstance(probe, str) and not is_known_early(draft, rows[probe.text], probe):
                 text = f"{probe.text} may follow at once from what the control drives, a loop without a state"
                 place = f"inputs.{names[k]}" if names else "input"
@@ -251,6 +256,22 @@ class Balance:
         self.refuse_infinite(starts)
         return outputs, starts
 
+    def polish(self, outputs: np.ndarray, matrix: np.ndarray, acts: np.ndarray, by_rates: bool) -> None:
+        """Take a last step from residuals on both sides: beside its root a rate of a tank is set to zero as rounding.
+
+        matrix : rows of the slopes of the residuals that outputs change, times the ranges; acts : True for these
+        """
+        around = np.zeros(acts.sum())
+        for side in (1.0, -1.0):
+            moved = outputs.copy()
+            moved[self.free] += side * BESIDE * self.range[self.free]
+            if np.any(moved < self.low) or np.any(moved > self.high):
+                return
+            around += 0.5 * self.residuals(moved, by_rates)[acts]
+        step = np.linalg.lstsq(matrix, -around, RANK)[0] if np.isfinite(around).all() else np.zeros(len(self.free))
+        if np.all(np.abs(step) < ROUNDING):
+            outputs[self.free] += step * self.range[self.free]
+
     def stopped(self, outputs: np.ndarray, residual: np.ndarray) -> list[int]:
         """Numbers of the blocks whose integral a limit stops; residual : relative to its change with the outputs."""
         integrating = [k for k in self.free if list(self.blocks.values())[k].control.integrates]
@@ -277,6 +298,7 @@ class Balance:
             if moved <= BALANCED or rounding:
                 size_before = math.inf
                 if rank == len(self.free):
+                    self.polish(outputs, matrix[acts], acts, by_rates)
                     return self.stopped(outputs, np.divide(residual, size, where=acts, out=np.zeros(size.size)))
                 if by_rates:
                     return self.free
@@ -373,6 +395,8 @@ def set_starts(draft, outputs: np.ndarray, starts: list[BlockStart]) -> None:
         tables.floats[row["starts"] :][: len(start.inputs)] = start.inputs
         own, numbers = control_rows_of(type(control)), tables.floats[row["data"] :]
         own.begin(control, start, numbers)
+        if row["period"] > 0.0:
+            draft.discrete[row["memory"]] = outputs[k]
         draft.start_flags |= own.flags_at_start(control, start, numbers)
         if text := own.fault(control, start):
             draft.fault(f"controls.{name}", text)

@@ -10,7 +10,7 @@ from fvsolve import units
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table_model import Table
-from fvsolve.parts.value import PROFILE, VALUE, Quantity, ReadContext, Rows, Text, Value, positive
+from fvsolve.parts.value import PROFILE, VALUE, Quantity, ReadContext, Rows, Text, Value, nonnegative, positive
 from fvsolve.units import show
 
 PREFIX = "controls."  # of a block in the key `input` of another block
@@ -138,6 +138,11 @@ class Control(Table):
         tuple[float, float] | None,
         OfOutput("least and greatest output; the range of the driven key if left out", 2),
     ] = None
+    period: Annotated[
+        float | None,
+        Quantity("time", positive, "time between samples; it acts then, and holds [s]; continuous if left out"),
+    ] = None
+    offset: Annotated[float, Quantity("time", nonnegative, "time of the first sample after the start [s]")] = 0.0
     initial: Annotated[float | None, OfOutput("output at the start; balanced if left out")] = None
 
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
@@ -167,6 +172,11 @@ class Control(Table):
         return getattr(self, "setpoint", None)
 
     @property
+    def feeds_through(self) -> bool:
+        """True if its output at any time depends on its inputs at this time; a sampled block holds its output."""
+        return self.passes_at_once and self.period is None
+
+    @property
     def initial_output(self) -> float | None:
         """Output at the start if it is stated, else None."""
         return self.initial
@@ -191,3 +201,9 @@ class SingleInput(Control):
     """Block with a single input."""
 
     input: Annotated[str, Text("probe, such as tower.level, or controls.NAME")]
+
+
+def continuous_faults(given: dict[str, Any]) -> list:
+    """Fault of `period` in a block that acts at events or at all times, as a list."""
+    text = "does not apply to this type, which acts at all times; remove the key, or read it by a sampled `function`"
+    return [(("period",), text)] if "period" in given else []

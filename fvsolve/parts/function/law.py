@@ -1,7 +1,7 @@
 """Block with the value of a formula of its inputs and of the time."""
 
 from fvsolve.jit import njit
-from fvsolve.kernels.controls import input_change
+from fvsolve.kernels.controls import flag_count, input_change
 from fvsolve.kernels.formula_programs import run_program
 
 START, VALUE, PROGRAM = range(3)
@@ -14,7 +14,7 @@ def formula_value(t, y, tables, control, g):
     floats, count = tables.floats, control["input_count"]
     for j in range(count):
         tables.stack[j] = floats[control["starts"] + j] + input_change(y, tables, control, j)
-    limit, flags = tables.clock[0]["limit"], tables.armed
+    limit, flags = tables.clock[0]["limit"], tables.armed[: flag_count(tables, control)]
     first = int(floats[control["data"] + PROGRAM])
     return run_program(tables.pieces, first, t, limit, count, tables.stack, flags, g)
 

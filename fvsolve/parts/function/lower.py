@@ -11,6 +11,8 @@ class FunctionRows(StaticRows, kind="function"):
 
     def numbers(self, draft, name, block):
         program = program_of(draft.case, block)
+        if block.control.period is not None:
+            return [0.0, 0.0, float(draft.schedules.add_program(program, located=False))]
         for time in program.break_times:
             draft.schedules.breaks[time] = True
         return [0.0, 0.0, float(draft.schedules.add_program(program))]

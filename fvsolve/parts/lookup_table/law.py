@@ -4,7 +4,7 @@ Two pairs of event functions locate the kinks at both ends; their flags select t
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.controls import input_change
+from fvsolve.kernels.controls import flag_count, input_change
 from fvsolve.kernels.formula_programs import is_low
 
 START, VALUE, FLAG, COUNT, OWN = range(5)
@@ -32,7 +32,9 @@ def table_value(y, tables, control, armed, g):
 def decide(t, y, tables, control):
     """Output before its limits."""
     floats, at = tables.floats, control["data"]
-    return floats[at + START] + (table_value(y, tables, control, tables.armed, tables.armed[:0]) - floats[at + VALUE])
+    flags = tables.armed[: flag_count(tables, control)]
+    value = table_value(y, tables, control, flags, tables.armed[:0])
+    return floats[at + START] + (value - floats[at + VALUE])
 
 
 @njit

@@ -15,7 +15,7 @@ class LookupTableRows(StaticRows, kind="table"):
 
     def numbers(self, draft, name, block):
         points = block.control.points
-        flag = draft.flags(f"controls.{name}", EVENTS)
+        flag = draft.flags(f"controls.{name}", EVENTS) if block.control.period is None else 0
         pieces = cubic(points).c[::-1].T
         return [0.0, 0.0, float(flag), float(len(points.input)), *points.input, *pieces.ravel()]
 

@@ -28,6 +28,21 @@ def decide(t, y, tables, control):
 
 
 @njit
+def sample(t, y, tables, control):
+    """Output v of a sample; the integral and the filter of the derivative take a step of backward Euler."""
+    floats, at, own, h = tables.floats, control["data"], control["memory"] + 2, control["period"]
+    r, x = setpoint_change(t, tables, control), input_change(y, tables, control, 0)
+    memory, z, rate = tables.discrete, floats[at + LEAD_WEIGHT] * r - x, h * floats[at + LEAD_RATE]
+    memory[own] += floats[at + GAIN] * h * (floats[at + ERROR] + (r - x)) * floats[at + INTEGRAL]
+    memory[own + 1] = (memory[own + 1] + rate * z) / (1.0 + rate)
+    v = floats[at + START] + floats[at + GAIN] * (floats[at + WEIGHT] * r - x) + memory[own]
+    v += floats[at + LEAD] * (z - memory[own + 1])
+    u = min(max(v, control["least"]), control["greatest"])
+    memory[own] += h * (u - v) * floats[at + TRACKING]
+    return v
+
+
+@njit
 def adapt(t, y, dydt, tables, control, v, u):
     """Write the rates of the integral, and of the filtered input of the derivative, to `dydt`."""
     floats, at, i = tables.floats, control["data"], control["y"] + control["filters"]

@@ -29,6 +29,9 @@ class PiRows(ControlRows, kind="pi"):
         tracking = 1.0 / control.tracking_time if control.tracking_time else integral
         return [0.0, 0.0, control.gain, control.setpoint_weight, integral, tracking, *derivative(control)]
 
+    def sampled_numbers(self, control):
+        return 2
+
     def rate(self, control):
         return derivative(control)[2]
 

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from fvsolve.parts.control import Control, OfInputNumber, OfOutput, SingleInput
+from fvsolve.parts.control import Control, OfInputNumber, OfOutput, SingleInput, continuous_faults
 from fvsolve.parts.value import Quantity, Text, Whole, between, nonnegative
 from fvsolve.units import show
 
@@ -19,6 +19,10 @@ class Switching(Control):
     @property
     def initial_output(self) -> float | None:
         return None if self.initial is None else self.output[self.initial]
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list:
+        return super().key_faults(given) + continuous_faults(given)
 
     @property
     def passes_at_once(self) -> bool:

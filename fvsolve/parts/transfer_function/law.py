@@ -8,7 +8,8 @@ from fvsolve.jit import njit
 from fvsolve.kernels.controls import input_change
 
 START, DIRECT, EXCESS, COUNT, OWN = range(5)
-"""Numbers of a block: v at the start; D; constant part of dz_n/dt; n; then a_n to a_1 and c_1 to c_n."""
+"""Numbers of a block: v at the start; D; constant part of dz_n/dt; n; then a_n to a_1 and c_1 to c_n. With samples: the
+rows of M and the entries of g in z = M z_before + g (x + x_before), Tustin's method."""
 
 
 @njit
@@ -21,6 +22,25 @@ def decide(t, y, tables, control):
         v += floats[at + DIRECT] * input_change(y, tables, control, 0)
     for k in range(n):
         v += floats[at + OWN + n + k] * y[i + k]
+    return v
+
+
+@njit
+def sample(t, y, tables, control):
+    """Output v of a sample; the states take a step of the trapezoidal rule (Tustin)."""
+    floats, at, own, memory = tables.floats, control["data"], control["memory"] + 2, tables.discrete
+    n, x = int(floats[at + COUNT]), input_change(y, tables, control, 0)
+    matrix, gain = at + OWN + 2 * n, at + OWN + 2 * n + n * n
+    drive = x + memory[own + 2 * n] + 2.0 * floats[at + EXCESS]
+    v = floats[at + START] + floats[at + DIRECT] * x
+    for k in range(n):
+        memory[own + n + k] = floats[gain + k] * drive
+        for j in range(n):
+            memory[own + n + k] += floats[matrix + n * k + j] * memory[own + j]
+    for k in range(n):
+        memory[own + k] = memory[own + n + k]
+        v += floats[at + OWN + n + k] * memory[own + k]
+    memory[own + 2 * n] = x
     return v
 
 

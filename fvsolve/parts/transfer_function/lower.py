@@ -22,7 +22,10 @@ class TransferFunctionRows(ControlRows, kind="transfer-function"):
     def numbers(self, draft, name, block):
         control = block.control
         own, weights = coefficients(control)
-        return [0.0, control.direct, 0.0, float(len(own)), *own, *weights]
+        return [0.0, control.direct, 0.0, float(len(own)), *own, *weights, *tustin(own, control.period)]
+
+    def sampled_numbers(self, control):
+        return 2 * (len(control.denominator) - 1) + 1
 
     def rate(self, control):
         return float(np.max(np.abs(np.roots(control.denominator)), initial=0.0))
@@ -51,3 +54,14 @@ def coefficients(control) -> tuple[list[float], list[float]]:
     b[a.size - len(control.numerator) :] = np.array(control.numerator) / control.denominator[0]
     weights = b[1:] - b[0] * a[1:]
     return a[:0:-1].tolist(), weights[::-1].tolist()
+
+
+def tustin(own: list[float], period: float | None) -> list[float]:
+    """Rows of M, then g, of the states of a sampled block; own : coefficients a_n to a_1; empty without samples."""
+    if period is None:
+        return []
+    n = len(own)
+    a, one = np.eye(n, k=1), np.eye(n)
+    a[-1] = -np.array(own)
+    inverse = np.linalg.inv(one - 0.5 * period * a)
+    return [*(inverse @ (one + 0.5 * period * a)).ravel(), *(0.5 * period * inverse[:, -1])]
