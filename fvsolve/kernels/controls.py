@@ -135,8 +135,9 @@ decide_barotropic = specialise(_decide_early, "decide_barotropic", LINEAR=False)
 def decide_late(t, y, dydt, out, handle):
     """Write the outputs of blocks that only rates read, such as forces, after the nodes are solved."""
     tables = open_tables(handle)
-    read_sensors(t, y, out, tables)
-    write_outputs(t, y, out, tables, 1)
+    if tables.settings[0]["late_blocks"] == 1:
+        read_sensors(t, y, out, tables)
+        write_outputs(t, y, out, tables, 1)
 
 
 @njit
@@ -144,7 +145,8 @@ def control_rates(t, y, dydt, out, handle):
     """Write the rates of filters and other states of blocks to `dydt`, and the first input of each block to `out`."""
     tables = open_tables(handle)
     controls, applied, at = tables.controls, tables.applied, tables.layout[0]["control"]
-    read_sensors(t, y, out, tables)
+    if tables.settings[0]["late_sensors"] == 1:  # others have been read before the nodes were solved
+        read_sensors(t, y, out, tables)
     for k in range(controls.size):
         control = controls[k]
         if control["input_count"] > 0:

@@ -18,7 +18,14 @@ from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tanks
 from fvsolve.model.cluster_tables import classify_nodes
-from fvsolve.model.control_tables import Balance, control_rate, lower_controls, number_blocks, set_starts
+from fvsolve.model.control_tables import (
+    Balance,
+    control_rate,
+    has_late_sensors,
+    lower_controls,
+    number_blocks,
+    set_starts,
+)
 from fvsolve.model.delay_lines import (
     divide_lines,
     end_admittance_ratio,
@@ -294,7 +301,8 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     s = table[0]
     scheme_settings(s, case.numerics.scheme, case.numerics.limiter)
     s["viscosity"] = draft.fluid.viscosity or 0.0
-    s["start"] = case.numerics.start
+    s["start"], s["late_blocks"] = case.numerics.start, bool(draft.control_table["late"].any())
+    s["late_sensors"] = has_late_sensors(draft)
     s["ambient"], s["gravity"] = case.ambient_pressure, case.gravity
     s["vapor"] = case.law.cavity_pressure
     s["stop_below"] = case.numerics.below_vapor == "stop"

@@ -6,6 +6,7 @@ follow from states alone.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -144,6 +145,11 @@ def is_known_early(draft, row, probe) -> bool:
         name, part, device = draft.devices[row["index"]]
         return probe.quantity in device.states_of(draft, name, part)
     return kind in STATE_KINDS or kind == rec.CELL_FIELD
+
+
+def has_late_sensors(draft) -> bool:
+    """True if a sensor reads what only the solved nodes determine."""
+    return not all(map(functools.partial(is_known_early, draft), draft.sensor_table, draft.sensors))
 
 
 def check_order(draft, early: set[str]) -> None:

@@ -1,0 +1,78 @@
+"""Cost of controls: a PI with filter and limits per stage, an operation of a formula, a sample.
+
+    python benchmarks/loops.py [--quick]
+
+Each number is the difference of two runs of the same scene in this process, with and without the block, by `rk4` with a
+given step, divided by the number of stages, operations or samples. Least of several turns, everything compiled before.
+"""
+
+from __future__ import annotations
+
+import time
+
+from measure import parser
+
+from fvsolve import build, load
+from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
+
+STEP, STAGES = 1e-2, 4  # [s], of rk4
+GOALS = {"PI with filter and limits, a stage": 60.0, "formula, an operation": 6.0, "sample": 2000.0}  # [ns]
+FLUID = {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2300.0}
+OPERATIONS = 18  # of the longer formula, in addition to that of the shorter one
+SHORT, LONG = "0.25 + 0*t", "0.25 + 0*t + 0*t + 0*t - 0*t - 0*t + 0"
+
+
+def tower(opening, controls=None) -> dict:
+    """Case of a tank between a lake and the air."""
+    nodes = {"source": {"type": "reservoir", "head": 20.0, "elevation": 0.0},
+             "tower": {"type": "tank", "area": 2.0, "level": 4.0, "elevation": 0.0},
+             "town": {"type": "reservoir", "head": 0.0, "elevation": 0.0}}  # fmt: skip
+    valve = {"type": "valve", "area": 2e-3, "discharge_coefficient": 0.61}
+    links = {"inlet": {**valve, "from": "source", "to": "tower", "opening": opening},
+             "outlet": {**valve, "from": "tower", "to": "town", "opening": 0.5}}  # fmt: skip
+    case = {"fluid": FLUID, "nodes": nodes, "links": links, "output": {"probes": ["tower.level"]},
+            "numerics": {"end": 1.0, "method": "rk4", "step": STEP}}  # fmt: skip
+    return case | ({"controls": controls} if controls else {})
+
+
+def pi(**more) -> dict:
+    block = {"type": "pi", "input": "tower.level", "setpoint": 4.0, "gain": 0.8, "integral_time": 120.0}
+    return {"hold": block | more}
+
+
+def seconds_per_step(case: dict, steps: int, turns: int) -> float:
+    """Least CPU time of a step [s]."""
+    model, found = build(load(case, {"numerics.end": (steps + 10) * STEP, "output.every": steps * STEP})), []
+    for _ in range(turns):
+        loop = RunLoop(model)
+        loop.begin(model.case.numerics.end, NO_LIMIT)
+        loop.run(10.0)
+        begun = time.process_time()
+        loop.run(float(steps))
+        found.append((time.process_time() - begun) / steps)
+    return min(found)
+
+
+def main() -> None:
+    """Print the table."""
+    quick = parser(__doc__).parse_args().quick
+    steps, turns = (2_000, 2) if quick else (50_000, 9)
+    plain, held = tower(0.25), tower({"control": "hold"}, pi(filter=0.5, limits=[0.0, 1.0]))
+    sampled = tower({"control": "hold"}, pi(limits=[0.0, 1.0], period=STEP))
+    rare = tower({"control": "hold"}, pi(limits=[0.0, 1.0], period=1e6))
+    cases = {"plain": plain, "held": held, "short": tower(SHORT), "long": tower(LONG), "sampled": sampled, "rare": rare}
+    cost = {name: 1e9 * seconds_per_step(case, steps, turns) for name, case in cases.items()}
+    found = {
+        "PI with filter and limits, a stage": (cost["held"] - cost["plain"]) / STAGES,
+        "formula, an operation": (cost["long"] - cost["short"]) / STAGES / OPERATIONS,
+        "sample": cost["sampled"] - cost["rare"],
+    }
+    print("| | ns | goal |\n|---|---|---|")
+    for name, value in found.items():
+        factor = GOALS[name] / value
+        print(f"| {name} | {value:.1f} | at most {GOALS[name]:g}: {'met' if factor >= 1.0 else 'missed'} |")
+    print("ns a step: " + ", ".join(f"{name} {value:.0f}" for name, value in cost.items()))
+
+
+if __name__ == "__main__":
+    main()
