@@ -79,7 +79,7 @@ def _read_group(reading: Reading, network: chainage.CutTable, group: str) -> dic
     """Nodes or links without faults; group : "nodes" or "links"."""
     table = network.table
     alone = any(connections.kind_name(node) in (*LINKLESS, None) for node in table.get("nodes", {}).values())
-    alone = alone or ("controls" in table and not {"nodes", "links"} & table.keys())  # blocks without fluid
+    alone = alone or reading.blocks_alone
     if group not in table and not (group == "links" and alone or "controls" in table and not table.get("links")):
         reading.fault((), f"[{group}] is missing: {GROUPS[group]}")
     result = {}

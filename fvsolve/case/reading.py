@@ -450,11 +450,18 @@ class Reading:
     def table(self, name: str, model: Any) -> Any:
         """Table `name`, read by the class `model`; None if it is faulty."""
         given = self.raw.table.get(name)
-        if name not in self.raw.table and name in GROUPS:
+        if name == "fluid" and given is None and self.blocks_alone:
+            given = {"name": "water"}  # no part reads it
+        elif name not in self.raw.table and name in GROUPS:
             return self.fault((), f"[{name}] is missing: {GROUPS[name]}")
         with self.catch(name):
-            table = {} if name not in self.raw.table else given
+            table = {} if given is None and name not in self.raw.table else given
             return self.reuse((name, "table"), given, lambda: model.model_validate(table, context=self.setting))
+
+    @property
+    def blocks_alone(self) -> bool:
+        """Whether the case has controls and neither nodes nor links: then it needs no fluid."""
+        return "controls" in self.raw.table and not {"nodes", "links"} & self.raw.table.keys()
 
     def valid_keys(self, name: str, model: Any) -> Any:
         """Instance of `model` with the valid keys of the table `name`, without checks of the table.

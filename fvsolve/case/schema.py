@@ -9,7 +9,7 @@ from fvsolve.case.claims import limit_keys
 from fvsolve.case.load import KEYS, TOP
 from fvsolve.case.part_reading import LINKLESS
 from fvsolve.case.pipe_routes import Route
-from fvsolve.case.reading import GROUPS, NOT_DEFAULT, WITH_DEFAULTS
+from fvsolve.case.reading import NOT_DEFAULT, WITH_DEFAULTS
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.control import Control
@@ -59,13 +59,19 @@ def full_schema() -> dict[str, Any]:
         "title": "fvsolve case",
         "type": "object",
         "properties": properties,
-        "required": [group for group in GROUPS if group != "links"],
+        "required": ["numerics"],
+        "anyOf": [
+            {"required": ["fluid", "nodes"]},
+            {"required": ["controls"], "not": {"anyOf": [{"required": ["nodes"]}, {"required": ["links"]}]}},
+        ],
         "if": {
+            "required": ["nodes"],
+            "not": {"required": ["controls"]},
             "properties": {
                 "nodes": {"additionalProperties": {"properties": {"type": {"not": {"enum": list(LINKLESS)}}}}}
-            }
+            },
         },
-        "then": {"required": ["links"]},  # without a basin or a body
+        "then": {"required": ["links"]},  # without a basin, a body or a control
         "additionalProperties": False,
         "$defs": definitions,
     }

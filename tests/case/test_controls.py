@@ -63,11 +63,6 @@ LOOP = """\
 schema = 1
 title = "PI controller of two lags"
 
-[fluid]
-name = "water"
-density = 1000.0
-bulk_modulus = "2.2 GPa"
-
 [controls.plant]
 type = "transfer-function"
 input = "controls.pi"
@@ -339,6 +334,18 @@ def test_a_filter_is_no_remedy_for_setpoints_that_follow_each_other():
     blocks = {"controls.a": pi | {"setpoint": {"control": "b"}}, "controls.b": pi | {"setpoint": {"control": "a"}}}
     text = only_fault(blocks, LOOP)
     assert text.endswith("a `filter` does not act on setpoints; expected a setpoint from outside of the cycle")
+
+
+def test_blocks_without_parts_need_no_fluid_and_parts_do():
+    alone = fvsolve.load(tomllib.loads(LOOP))
+    tank = {"type": "tank", "area": 2.0, "level": 4.0}
+    text = "[fluid] is missing: the fluid"
+    assert text in faults({"nodes.tower": tank}, LOOP)
+    with pytest.raises(CaseError, match=re.escape(text)):  # an earlier case lends it no fluid
+        fvsolve.load(alone, {f"nodes.tower.{key}": value for key, value in tank.items()})
+    with pytest.raises(CaseError, match=re.escape(text)):
+        fvsolve.load({key: value for key, value in tomllib.loads(LOOP).items() if key != "controls"})
+    assert faults({"nodes.tower": tank, "fluid.name": "water"}, LOOP) == ["nodes.tower: no link touches it"]
 
 
 def test_a_loop_through_the_network_without_a_state_needs_a_filter():

@@ -103,15 +103,17 @@ def test_pi_on_two_lags_without_any_fluid_is_the_step_response_of_its_equations(
                   "denominator": [0.05, 0.6, 1.0]},
         "loop": {"type": "pi", "input": "controls.plant", "setpoint": step, "gain": 5.0, "integral_time": 0.4},
     }  # fmt: skip
-    case = {"schema": 1, "fluid": WATER, "controls": controls, "numerics": {"end": 5.0},
+    case = {"schema": 1, "controls": controls, "numerics": {"end": 5.0},
             "output": {"probes": ["controls.plant.output", "controls.loop.error"]}}  # fmt: skip
+    found = final(case, method)
+    assert list(final({**case, "fluid": {"name": "ISO VG 46"}}, method)) == list(found)
 
     def rates(t, y, k):
         x, speed, integral = y
         return [speed, (5.0 * (k - x) + integral - x - 0.6 * speed) / 0.05, 5.0 * (k - x) / 0.4]
 
     x = solved(rates, [0.0, 0.0, 0.0], [0.0, 1.0, 5.0])[0]
-    assert final(case, method) == pytest.approx([x, 1.0 - x], abs=CLOSE)
+    assert found == pytest.approx([x, 1.0 - x], abs=CLOSE)
 
 
 @pytest.mark.parametrize("method", METHODS)
