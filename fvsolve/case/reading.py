@@ -460,7 +460,7 @@ class Reading:
 
     @property
     def blocks_alone(self) -> bool:
-        """Whether the case has controls and neither nodes nor links: then it needs no fluid."""
+        """True for a case with controls and neither nodes nor links, which needs no fluid."""
         return "controls" in self.raw.table and not {"nodes", "links"} & self.raw.table.keys()
 
     def valid_keys(self, name: str, model: Any) -> Any:

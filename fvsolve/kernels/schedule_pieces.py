@@ -91,11 +91,11 @@ def schedule_value(tables, index, t):
     record = tables.schedules[index]
     if record["pieces"] == 1:
         return piece_value(tables.pieces, record["first"], t)
-    return value_of_many(tables, index, t)
+    return piecewise_value(tables, index, t)
 
 
 @law_njit
-def value_of_many(tables, index, t):
+def piecewise_value(tables, index, t):
     """Value of a schedule that has several pieces, or follows a block or a formula, as `schedule_value`."""
     prevent_inlining()
     record, limit = tables.schedules[index], tables.clock[0]["limit"]

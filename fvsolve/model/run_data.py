@@ -75,7 +75,7 @@ class RunData:
 
         model = self.model
         shared = model.places if self.tables is model.tables else addresses_of(self.tables)
-        replacements = {"sharp": model.sharp} if model.sharp else {}
+        replacements = {"sharp": model.sharp} if written.sharp.size else {}
         if len(model.tables.sensors):
             replacements["sensing"] = {"probes": model.tables.sensors, "controls": model.tables.controls[:0]}
         replaced = {name: addresses_of(self.tables._replace(**own)) for name, own in replacements.items()}

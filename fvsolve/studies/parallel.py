@@ -3,6 +3,7 @@
 The result of a task must not depend on the process, the order or the other tasks of its chunk.
 """
 
+import gc
 import pickle
 import threading
 import uuid
@@ -294,12 +295,15 @@ def connect(address: str) -> Any:
         from distributed import Client
     except ImportError:
         raise FvsolveError("--dask needs the package distributed: pip install fvsolve[dask]") from None
+    client, text = None, ""
     try:
         client = Client(address, timeout=TIMEOUT, set_as_default=False)
     except Exception as error:  # Dask raises many types of exceptions
         text = str(error).split("\n")[0] or type(error).__name__
+    if client is None:
+        gc.collect()  # closes the failed client now: while another client starts, Dask would wait for ever
         raise FvsolveError(f'no Dask scheduler answers at "{address}": {text}. Expected an address such as '
-                           "tcp://10.0.0.1:8786; the command `dask scheduler` prints it") from None  # fmt: skip
+                           "tcp://10.0.0.1:8786; the command `dask scheduler` prints it")  # fmt: skip
     return client
 
 
