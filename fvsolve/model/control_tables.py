@@ -18,7 +18,6 @@ from fvsolve.assembly.schedule_tables import value_at
 from fvsolve.case.controls import Block, decision_order
 from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.jacobian_pattern import Couplings
 from fvsolve.model.probe_tables import fill_probes
 from fvsolve.units import show
 
@@ -368,6 +367,8 @@ def sensor_values(model, t: float) -> tuple[np.ndarray, np.ndarray]:
     The rate is the sum over the states that a sensor reads of slope times rate, so that it is exactly zero at rest. It
     is left at zero for a sensor of many states, which the steady start determines.
     """
+    from fvsolve.model.jacobian_pattern import Couplings  # it imports SciPy, which a run without controls does not need
+
     with model.run_data() as data:
         y = model.start.copy()
         rates, out = data.evaluate(t, y, t)

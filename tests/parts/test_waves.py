@@ -260,7 +260,7 @@ def test_slopes_of_schedules_are_those_of_their_values(kind):
     }.get(kind, Schedule(kind, times, values))
     table = Schedules()
     table.add(one, 2.0, 0.5)
-    _, pieces = table.tables()
+    _, pieces = table.tables(0)
     for t in (0.2, 0.6, 0.9, 1.3):
         row = np.flatnonzero(pieces[:, 0] <= t)[-1]
         at = lambda s, row=row: piece_value(pieces, row, s)  # noqa: E731
