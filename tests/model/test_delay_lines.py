@@ -167,6 +167,12 @@ def test_lines_shorter_than_a_step_know_each_other():
     assert errors[0] < 0.02 * JUMP and errors[1] < 0.4 * errors[0]
 
 
+@pytest.mark.parametrize("case", [main(), short("delay-line", method="euler", step=0.02)], ids=["long", "short"])
+def test_tables_of_jumps_have_a_handle_whether_they_replace_tables_or_none(case):
+    with fvsolve.build(fvsolve.load(case)).run_data() as data:
+        assert np.any(data.written.sharp)
+
+
 @pytest.mark.parametrize("method", ["euler", "rk4", "gauss-4", "rodas-5p"])
 def test_stores_beside_lines_are_as_beside_cells(method):
     """A chamber and a tank at the ends of lines follow the solution with cells, under all kinds of methods."""
