@@ -7,7 +7,7 @@ from pydantic import Field
 from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.pump.head_curve import CurvePoints, Efficiency, HeadCurve, ShaftPower, Suter, SuterTable
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
-from fvsolve.parts.value import PROFILE, VALUE, Choice, Flag, Quantity, UsualRange, nonnegative, positive
+from fvsolve.parts.value import PROFILE, Choice, Flag, Quantity, UsualRange, nonnegative, positive
 
 EFFICIENCY = 0.75
 SPEEDS = UsualRange(2.0, 1400.0, "20 rpm of great tidal pumps to 13 000 rpm of small ones")
@@ -52,7 +52,7 @@ class Pump(TwoPort, kind="pump"):
     inertia: Annotated[float | None, Quantity(
         "inertia", positive,
         "inertia of all rotating masses and water in the pump, with `rated_speed` [kg m2]; estimated if left out",
-        changes=VALUE,
+        changes=PROFILE,
     )] = None  # fmt: skip
     trip: Annotated[
         float | None, Quantity("time", about="time at which the motor is switched off, requires `rated_speed` [s]")

@@ -3,10 +3,10 @@
 from typing import Annotated, Any
 
 from fvsolve.parts.control import Control, OfInputNumber, OfOutput, SingleInput, continuous_faults
-from fvsolve.parts.value import Quantity, Text, Whole, between, nonnegative
+from fvsolve.parts.value import PROFILE, Quantity, Text, Whole, between, nonnegative
 from fvsolve.units import show
 
-STATE = Whole(between(0, 1), "state at the start: 0 off, 1 on; that of its input if left out")
+STATE = Whole(between(0, 1), "state at the start: 0 off, 1 on; that of its input if left out", PROFILE)
 OUTPUTS = OfOutput("output while it is off, and while it is on", 2)
 
 
@@ -57,7 +57,7 @@ class Latch(Switching, kind="latch"):
 
     set: Annotated[str, Text("probe or controls.NAME that turns it on")]
     reset: Annotated[str, Text("probe or controls.NAME that turns it off")]
-    initial: Annotated[int, Whole(between(0, 1), "state at the start: 0 off, 1 on")]
+    initial: Annotated[int, Whole(between(0, 1), "state at the start: 0 off, 1 on", PROFILE)]
 
     @classmethod
     def inputs_of(cls, given: dict[str, Any]) -> dict[tuple[str, ...], Any]:

@@ -61,7 +61,7 @@ def tustin(own: list[float], period: float | None) -> list[float]:
     if period is None:
         return []
     n = len(own)
-    a, one = np.eye(n, k=1), np.eye(n)
+    a, unit = np.eye(n, k=1), np.eye(n)
     a[-1] = -np.array(own)
-    inverse = np.linalg.inv(one - 0.5 * period * a)
-    return [*(inverse @ (one + 0.5 * period * a)).ravel(), *(0.5 * period * inverse[:, -1])]
+    inverse = np.linalg.inv(unit - 0.5 * period * a)
+    return [*(inverse @ (unit + 0.5 * period * a)).ravel(), *(0.5 * period * inverse[:, -1])]

@@ -10,7 +10,7 @@ from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.turbine.hill_chart import HillChart, HillChartValue, OpeningCurve
-from fvsolve.parts.value import VALUE, Quantity, UsualRange, anything, between, positive
+from fvsolve.parts.value import PROFILE, Quantity, UsualRange, anything, between, positive
 
 RUNNER_DIAMETERS = UsualRange(0.05, 12.0, "pico turbines to large Kaplan runners")
 ROUNDING = 1e-9  # tolerance, over the power of the water
@@ -42,7 +42,7 @@ class Turbine(TwoPort, kind="turbine"):
     )
     inertia: Annotated[float | None, Quantity(
         "inertia", positive, "inertia of runner, water in it and generator, required with `trip` [kg m2]",
-        changes=VALUE,
+        changes=PROFILE,
     )] = None  # fmt: skip
     trip: Annotated[
         float | None, Quantity("time", about="time of load rejection, when the generator is disconnected [s]")
