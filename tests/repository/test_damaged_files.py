@@ -92,7 +92,7 @@ def test_a_disk_that_fills_up_is_named_with_the_place_and_the_run_goes_on_later(
 def stopped(tmp_path_factory):
     """Case and output folder of a run that was interrupted half way."""
     case, out = branched(fields=4), tmp_path_factory.mktemp("run") / "out"
-    case["numerics"] |= {"step": "0.1 ms"}
+    case["numerics"] |= {"step": "0.02 ms"}
     del case["numerics"]["courant"]
 
     def half(t, seconds, steps):
