@@ -124,11 +124,12 @@ class Control(Table):
     """Block of `controls`: its output is a schedule for keys of parts and for other blocks.
 
     kinds : type in the case file -> class; passes_at_once : True if its output depends on the present values of its
-    inputs; integrates : see `integrating`
+    inputs; integrates : see its docstring; may_sample : True if it can act at samples, with `period`
     """
 
     kind: ClassVar[str] = ""
     kinds: ClassVar[dict[str, type[Control]]] = {}
+    may_sample: ClassVar[bool] = True
 
     filter: Annotated[
         float | None,
@@ -152,6 +153,13 @@ class Control(Table):
                 raise FvsolveError(f"a control of type {show(kind)} exists already; expected another name")
             cls.kind = kind
             cls.kinds[kind] = cls
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list:
+        text = (
+            "does not apply to this type, which acts at all times; remove the key, or read it by a sampled `function`"
+        )
+        return super().key_faults(given) + [(("period",), text)] * ("period" in given and not cls.may_sample)
 
     @classmethod
     def inputs_of(cls, given: dict[str, Any]) -> dict[tuple[str, ...], Any]:
@@ -201,9 +209,3 @@ class SingleInput(Control):
     """Block with a single input."""
 
     input: Annotated[str, Text("probe, such as tower.level, or controls.NAME")]
-
-
-def continuous_faults(given: dict[str, Any]) -> list:
-    """Fault of `period` in a block that acts at events or at all times, as a list."""
-    text = "does not apply to this type, which acts at all times; remove the key, or read it by a sampled `function`"
-    return [(("period",), text)] if "period" in given else []

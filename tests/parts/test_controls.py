@@ -1,8 +1,6 @@
 """Blocks of `controls`, and formulas of time, against hand-written equations in SciPy and against restatements."""
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -10,7 +8,7 @@ from reference import governor
 from reference.scenes import GRAVITY, WATER, lake, pipe, reservoir, scene, tank, valve
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
-from solve.test_implicit_runs import DYING
+from solve.test_implicit_runs import killed_and_resumed
 from solve.test_resume import same_files
 
 import fvsolve
@@ -346,12 +344,8 @@ def test_advance_knows_outputs_and_setpoints_as_inputs():
 def test_a_killed_and_resumed_loop_is_the_unbroken_run(tmp_path, method):
     case = fvsolve.load(moving_case(WATER), {"numerics.method": method, "numerics.end": 60.0, "output.every": 1.0})
     whole = fvsolve.run(case, out=tmp_path / "whole", pictures=False)
-    (tmp_path / "dying.py").write_text(DYING.replace("out=sys.argv[2]", "out=sys.argv[2], pictures=False"))
-    file, broken = tmp_path / "whole" / "case.toml", tmp_path / "broken"
-    died = subprocess.run([sys.executable, str(tmp_path / "dying.py"), str(file), str(broken), "20"])
-    assert whole.ok and died.returncode == 9
-    assert fvsolve.run(file, out=broken, resume=True, pictures=False).reason == "finished"
-    same_files(tmp_path / "whole", broken)
+    assert whole.ok
+    same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 20.0))
 
 
 def test_the_governor_follows_its_plant_by_characteristics():

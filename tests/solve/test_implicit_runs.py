@@ -4,6 +4,7 @@ import math
 import random
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -159,8 +160,18 @@ def save_and_die(run):
     if run.loop.t >= float(sys.argv[3]):
         os._exit(9)
 rooms.Run.save = save_and_die
-fvsolve.run(sys.argv[1], out=sys.argv[2])
+fvsolve.run(sys.argv[1], out=sys.argv[2], pictures=sys.argv[4] == "True")
 """
+
+
+def killed_and_resumed(whole: Path, moment: float, pictures: bool = False) -> Path:
+    """Folder of a run of the case of `whole` that is killed after `moment` [s], then resumed in this process."""
+    script, broken = whole.parent / "dying.py", whole.parent / "broken"
+    script.write_text(DYING)
+    died = subprocess.run([sys.executable, *map(str, (script, whole / "case.toml", broken, moment, pictures))])
+    assert died.returncode == 9 and moment <= reached(broken) < fvsolve.open_run(whole).t[-1]
+    assert fvsolve.run(whole / "case.toml", out=broken, resume=True, pictures=pictures).reason == "finished"
+    return broken
 
 
 @pytest.mark.parametrize(
@@ -171,13 +182,8 @@ def test_dead_at_a_random_moment_and_resumed_is_the_unbroken_run(tmp_path, numer
     print("seed", seed)
     whole = fvsolve.run(busy(numerics), out=tmp_path / "whole")
     assert whole.ok, whole.reason
-    (tmp_path / "dying.py").write_text(DYING)
-    file, broken = tmp_path / "whole" / "case.toml", tmp_path / "broken"
     moment = random.Random(seed).uniform(0.1, 0.7) * whole.t[-1]
-    died = subprocess.run([sys.executable, str(tmp_path / "dying.py"), str(file), str(broken), str(moment)])
-    assert died.returncode == 9 and moment <= reached(broken) < whole.t[-1]
-    assert fvsolve.run(file, out=broken, resume=True).reason == "finished"  # in this process, unlike in test_resume
-    same_files(tmp_path / "whole", broken)
+    same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", moment, pictures=True))
 
 
 def reached(folder) -> float:

@@ -1,8 +1,8 @@
 """Relays, latches and timers: keys and faults."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.control import Control, OfInputNumber, OfOutput, SingleInput, continuous_faults
+from fvsolve.parts.control import Control, OfInputNumber, OfOutput, SingleInput
 from fvsolve.parts.value import PROFILE, Quantity, Text, Whole, between, nonnegative
 from fvsolve.units import show
 
@@ -13,16 +13,14 @@ OUTPUTS = OfOutput("output while it is off, and while it is on", 2)
 class Switching(Control):
     """Block with two outputs, one for each of its states off and on; events change the state."""
 
+    may_sample: ClassVar[bool] = False
+
     output: Annotated[tuple[float, float], OUTPUTS] = (0.0, 1.0)
     initial: Annotated[int | None, STATE] = None
 
     @property
     def initial_output(self) -> float | None:
         return None if self.initial is None else self.output[self.initial]
-
-    @classmethod
-    def key_faults(cls, given: dict[str, Any]) -> list:
-        return super().key_faults(given) + continuous_faults(given)
 
     @property
     def passes_at_once(self) -> bool:
