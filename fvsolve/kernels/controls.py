@@ -4,8 +4,10 @@ A sensor is a probe that a block reads. The functions of the job OBSERVE read al
 in which the sensors replace the probes. A block works on changes since the start, so that a loop at rest does not move.
 Blocks whose output drives the network (openings, speeds, pressures, demands) decide before the nodes are solved, from
 states alone. Other blocks decide afterwards. Schedules read the outputs from `applied`; after the outputs, this array
-has the outputs before their limits.
+has the outputs before their limits, then number + 1 of the last block whose output was not finite, and its time.
 """
+
+from math import inf
 
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels import calls
@@ -72,14 +74,31 @@ def read_sensors(t, y, out, tables):
 
 
 @njit(forceinline=True)
+def clipped(v, control):
+    """Output within its limits; NaN stays NaN."""
+    return v if v != v else min(max(v, control["least"]), control["greatest"])
+
+
+@njit(forceinline=True)
 def limited(v, armed, control):
-    """Output within its limits; flags select the limits, so that no step has a kink."""
+    """Output within its limits, as `clipped`; flags select the limits, so that no step has a kink."""
     flag = control["flag"]
+    if v != v:
+        return v
     if flag >= 0 and armed[flag] > 0.0:
         return control["least"]
     if flag >= 0 and armed[flag + 2] > 0.0:
         return control["greatest"]
-    return min(max(v, control["least"]), control["greatest"])
+    return clipped(v, control)
+
+
+@njit(forceinline=True)
+def apply_output(t, tables, k, output):
+    """Write the output of block k to `applied`; if it is not finite, also its number and the time."""
+    tables.applied[k] = applied_output(tables.controls[k], output)
+    if not abs(output) < inf:
+        at = 2 * tables.controls.size
+        tables.applied[at], tables.applied[at + 1] = k + 1.0, t
 
 
 @njit
@@ -94,7 +113,8 @@ def write_outputs(t, y, out, tables, late):
             else:
                 v = calls.call_decide(tables.hooks[control["hooks"], DECIDE], t, y, tables, control)
                 out[at + 2 * k] = limited(v, tables.armed, control)
-            applied[k], applied[controls.size + k] = applied_output(control, out[at + 2 * k]), v
+            applied[controls.size + k] = v
+            apply_output(t, tables, k, out[at + 2 * k])
 
 
 @njit(forceinline=True)
@@ -209,9 +229,9 @@ def take_samples(t, y, out, handle, values):
                 v = calls.call_sample(sample, t, y, tables, control)
             else:
                 v = calls.call_decide(tables.hooks[control["hooks"], DECIDE], t, y, tables, control)
-            discrete[control["memory"]] = min(max(v, control["least"]), control["greatest"])
+            discrete[control["memory"]] = clipped(v, control)
             discrete[control["memory"] + 1] += 1.0
-            tables.applied[k] = applied_output(control, discrete[control["memory"]])
+            apply_output(t, tables, k, discrete[control["memory"]])
 
 
 @njit

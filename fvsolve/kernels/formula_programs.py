@@ -75,7 +75,8 @@ def run_program(pieces, first, t, limit, base, stack, armed, g):
             k += 1
         elif code == WHERE:
             k -= 2
-            stack[k - 1] = stack[k] if stack[k - 1] != 0.0 else stack[k + 1]
+            if stack[k - 1] == stack[k - 1]:  # else NaN, which stays
+                stack[k - 1] = stack[k] if stack[k - 1] != 0.0 else stack[k + 1]
         elif code >= FIRST_KINK:
             k = kink(code, number, k, flag, stack, armed, g)
         else:
@@ -85,13 +86,19 @@ def run_program(pieces, first, t, limit, base, stack, armed, g):
 
 @njit
 def kink(code, number, k, flag, stack, armed, g):
-    """Replace the last values on the stack of k values by `abs`, `min`, `max` or a comparison; returns the new k."""
+    """Replace the last values on the stack of k values by `abs`, `min`, `max` or a comparison; returns the new k.
+
+    The result is NaN if a value is.
+    """
     if code == ABSOLUTE:
         stack[k - 1] = -stack[k - 1] if is_low(stack[k - 1], number, flag, armed, g) else stack[k - 1]
         return k
     k -= 1
-    low = is_low(stack[k - 1] - stack[k], number, flag, armed, g)
-    if code == LEAST:
+    e = stack[k - 1] - stack[k]
+    low = is_low(e, number, flag, armed, g)
+    if e != e:
+        stack[k - 1] = e
+    elif code == LEAST:
         stack[k - 1] = stack[k - 1] if low else stack[k]
     elif code == GREATEST:
         stack[k - 1] = stack[k] if low else stack[k - 1]

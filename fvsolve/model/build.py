@@ -290,7 +290,7 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         scratch=scratch_size(draft), spare=spare, seen=draft.size if len(draft.wall_table) else 0,
         bands=2 * len(draft.basin_table), joint=0, sums=0, sharp=int(len(draft.delay_table) > 0),
         envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)), past=history_size(draft.delay_table),
-        applied=2 * len(draft.control_table), readings=len(draft.sensor_table),
+        applied=2 * len(draft.control_table) + 2 * (len(draft.control_table) > 0), readings=len(draft.sensor_table),
         sensing=int(len(draft.sensor_table) > 0), stack=draft.schedules.stack, discrete=len(draft.discrete),
     )  # fmt: skip
 

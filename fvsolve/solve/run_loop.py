@@ -12,6 +12,7 @@ from fvsolve.kernels.column_junctions import gate_inflow
 from fvsolve.kernels.compiled_functions import fused_step_function
 from fvsolve.model import Model, RunData
 from fvsolve.model.scalar_tables import amount_indices, state_bounds
+from fvsolve.parts.control import PREFIX
 from fvsolve.solve.partition import blocked_sums, make_partition
 from fvsolve.steppers import automatic, loop_records
 from fvsolve.steppers.integrator import Integrator
@@ -287,7 +288,16 @@ class RunLoop:
             else:
                 names["place"] = f" at {model.node_names[index]}" if index >= 0 else ""
             self.step_back()
+        if block := self.block_without_output():
+            return f"the output of {block} is not a finite number at {names['when']}; check its formula and its inputs"
         return text.format(**names)
+
+    def block_without_output(self) -> str:
+        """Name of a control whose output was not finite in a step from the present time on; "" for none."""
+        if not len(self.model.tables.controls):
+            return ""
+        number, time = self.run_data.written.applied[-2:]
+        return f"{PREFIX}{self.model.block_names[int(number) - 1]}" if number > 0.0 and time >= self.t else ""
 
     def chattering_text(self, when: str) -> str:
         """Text with the devices that change their states without end, and a remedy; when : time of the failure."""
@@ -295,6 +305,8 @@ class RunLoop:
         first = self.t if self.at_once > 1 else self.recent_events[0]  # at the same time, or within a short span
         names = sorted({model.events[k][0] for t, k in self.switched if t >= first})
         remedies = {device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names}
+        if any(name.startswith(PREFIX) for name in names):
+            remedies["set the thresholds of the block farther apart, or give it a `filter`"] = None
         parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
         verbs = "change their states" if len(names) > 1 else "changes its state"
         remedy = ", or ".join(remedies) or "put a chamber at the node of this part"

@@ -208,6 +208,19 @@ def test_a_loop_at_rest_does_not_move_by_one_bit(method, law):
         assert np.ptp(run[probe]) <= rounding * run[probe][0]
 
 
+NO_NUMBERS = ["0.1 + 0.1*log(h - 3.5)", "min(0.6, max(0.05, log(h - 3.5)))", "where(log(h - 3.5) < 5, 0.05, 0.6)"]
+
+
+@pytest.mark.parametrize("numerics", [{"method": method, "rtol": 1e-8} for method in METHODS]
+                         + [{"method": "rk4", "step": 0.5}], ids=lambda numerics: numerics["method"])  # fmt: skip
+@pytest.mark.parametrize("formula", NO_NUMBERS)
+def test_an_output_that_is_no_number_ends_the_run_there_within_limits_too(formula, numerics):
+    act = {"type": "function", "inputs": {"h": "tower.level"}, "formula": formula}
+    run = fvsolve.run(tower({"control": "act"}, 0.9, numerics=numerics, controls={"act": act}))
+    assert not run.ok and "the output of controls.act is not a finite number at t = " in run.reason
+    assert run["tower.level"][-1] > 3.5 - 1e-9 and run.t[-1] > 50.0
+
+
 def test_a_balanced_start_finds_the_opening_that_the_flow_needs():
     model = fvsolve.build(fvsolve.load(tower({"control": "hold"}, 0.5, controls={"hold": pi(4.0)})))
     assert model.tables.controls[0]["start"] == pytest.approx(0.25, rel=1e-14)  # sqrt(4 / 16) / 2

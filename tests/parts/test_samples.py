@@ -108,6 +108,13 @@ def test_a_sampled_block_tends_to_its_continuous_twin_with_first_order():
     assert orders[-1] == pytest.approx(1.0, abs=0.1)
 
 
+def test_a_sample_that_is_no_number_ends_the_run():
+    act = {"type": "function", "inputs": {"h": "tower.level"}, "formula": "0.1 + sqrt(h - 3.99)", "period": 1.0,
+           "initial": 0.2}  # fmt: skip
+    run = fvsolve.run(tower({"control": "act"}, 0.9, controls={"act": act}))
+    assert not run.ok and "the output of controls.act is not a finite number at t = 3 s" in run.reason
+
+
 def test_a_loop_in_python_by_advance_is_the_sampled_block():
     period, gain, ti = 2.0, 1.2, 40.0
     control = pi({"time": [0.0, 10.0], "value": [4.0, 4.3], "kind": "step"}, gain, ti, period=period)

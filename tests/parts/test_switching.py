@@ -161,3 +161,10 @@ def test_events_name_their_blocks_and_states_survive_advance():
     assert model.observe(state) == pytest.approx(model.observe(whole), abs=1e-7)
     run = fvsolve.run(case)
     assert [event["what"] for event in run.summary["events"]][:2] == ["turns on", "turns off"]
+
+
+def test_a_relay_without_hysteresis_is_refused_with_its_remedy():
+    act = {"type": "relay", "input": "tower.level", "on": 4.0 - 1e-13, "off": 4.0, "output": [0.1, 0.9], "initial": 0}
+    run = fvsolve.run(tower({"control": "act"}, 0.5, controls={"act": act}))
+    assert not run.ok and "controls.act changes its state without end" in run.reason
+    assert run.reason.endswith("set the thresholds of the block farther apart, or give it a `filter`")
