@@ -7,7 +7,7 @@ states alone. Other blocks decide afterwards. Schedules read the outputs from `a
 has the outputs before their limits, then number + 1 of the last block whose output was not finite, and its time.
 """
 
-from math import inf
+from math import inf, nan
 
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels import calls
@@ -179,6 +179,8 @@ def control_rates(t, y, dydt, out, handle):
         hook = tables.hooks[control["hooks"], ADAPT]
         if hook != 0 and control["y"] >= 0 and control["period"] == 0.0:
             calls.call_adapt(hook, t, y, dydt, tables, control, applied[controls.size + k], out[at + 2 * k])
+        if not abs(applied[k]) < inf:
+            dydt[0] = nan  # the run must not go on, whatever a driven part makes of this output
 
 
 @njit

@@ -293,11 +293,15 @@ class RunLoop:
         return text.format(**names)
 
     def block_without_output(self) -> str:
-        """Name of a control whose output was not finite in a step from the present time on; "" for none."""
+        """Name of a control whose output was not finite in a step from the present time on; "" for none.
+
+        In a model without states no step is rejected, so an output that was not finite at any time counts.
+        """
         if not len(self.model.tables.controls):
             return ""
         number, time = self.run_data.written.applied[-2:]
-        return f"{PREFIX}{self.model.block_names[int(number) - 1]}" if number > 0.0 and time >= self.t else ""
+        earliest = self.t if self.model.y_size else -np.inf
+        return f"{PREFIX}{self.model.block_names[int(number) - 1]}" if number > 0.0 and time >= earliest else ""
 
     def chattering_text(self, when: str) -> str:
         """Text with the devices that change their states without end, and a remedy; when : time of the failure."""

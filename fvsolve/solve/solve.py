@@ -314,7 +314,8 @@ class Run:
                 self.pause()
                 self.left, self.paused = self.budget, time.perf_counter()
             elif code == loop_records.DONE:
-                return ""
+                lost = self.model.y_size == 0 and self.loop.block_without_output()  # no rate can tell
+                return self.failure(code) if lost else ""
             elif code not in (loop_records.BUDGET_SPENT, loop_records.ROWS_FULL):
                 return self.failure(code)
 

@@ -1,10 +1,13 @@
 """Blocks of `controls`, and formulas of time, against hand-written equations in SciPy and against restatements."""
 
 import math
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 from reference import governor
+from reference.folders import CASES
 from reference.scenes import GRAVITY, WATER, lake, pipe, reservoir, scene, tank, valve
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
@@ -219,6 +222,27 @@ def test_an_output_that_is_no_number_ends_the_run_there_within_limits_too(formul
     run = fvsolve.run(tower({"control": "act"}, 0.9, numerics=numerics, controls={"act": act}))
     assert not run.ok and "the output of controls.act is not a finite number at t = " in run.reason
     assert run["tower.level"][-1] > 3.5 - 1e-9 and run.t[-1] > 50.0
+
+
+@pytest.mark.parametrize("driven", ["pump", "spool", "push", "nothing"])
+def test_an_output_that_is_no_number_ends_the_run_whatever_it_drives(driven, monkeypatch):
+    monkeypatch.chdir(CASES)
+    act = {"type": "function", "inputs": {}, "formula": "0.3 + 0*sqrt(2.5 - t)"}
+    case, control = {"schema": 1, "controls": {"act": act}}, {"control": "act"}
+    if driven == "pump":
+        case |= tomllib.loads(Path("tank-relay.toml").read_text()) | {"controls": {"act": act}}
+        case["links"]["pump"]["speed"] = control
+    elif driven != "nothing":
+        case |= tomllib.loads(Path("cylinder-servo.toml").read_text())
+        act["formula"] = "0*sqrt(0.025 - t)"
+        case["links"]["push"] = {"type": "force", "from": "ground", "to": "load", "force": 0.0}
+        case["links"][driven][{"spool": "position", "push": "force"}[driven]] = control
+    case = {key: case[key] for key in case if key not in ("expect", "compare", "limits", "output")}
+    end = 0.05 if "push" in case.get("links", ()) else 5.0
+    case |= {"numerics": {"end": end, "method": "dormand-prince", "rtol": 1e-7}}
+    run = fvsolve.run(case)
+    assert not run.ok and "the output of controls.act is not a finite number at t = " in run.reason
+    assert run.t[-1] <= end / 2 or driven == "nothing"
 
 
 def test_a_balanced_start_finds_the_opening_that_the_flow_needs():
