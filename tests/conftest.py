@@ -99,7 +99,9 @@ def pytest_terminal_summary(terminalreporter, config):
 @pytest.fixture
 def fvs(monkeypatch, capsys):
     """The command line in this process: fvs("run", "two-tanks") -> (exit code, standard output, standard error)."""
-    from fvsolve.cli import main
+    from fvsolve.cli import app, main
+
+    monkeypatch.setattr(app, "_announce_compilation", lambda: None)  # only the first test of a cold cache would see it
 
     def call(*arguments):
         monkeypatch.setattr(sys, "argv", ["fvsolve", *map(str, arguments)])

@@ -18,7 +18,7 @@ MAX_LINES = 60
 # folder -> (lines, files), with its subfolders
 FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve": (1616, 11),
-    "tests": (913, 7),
+    "tests": (915, 7),
     "benchmarks": (6234, 48),
     "fvsolve/assembly": (1709, 9),
     "fvsolve/basins": (9051, 44),
