@@ -99,9 +99,10 @@ def pytest_terminal_summary(terminalreporter, config):
 @pytest.fixture
 def fvs(monkeypatch, capsys):
     """The command line in this process: fvs("run", "two-tanks") -> (exit code, standard output, standard error)."""
-    from fvsolve.cli import app, main
+    from fvsolve import jit
+    from fvsolve.cli import main
 
-    monkeypatch.setattr(app, "_announce_compilation", lambda: None)  # only the first test of a cold cache would see it
+    monkeypatch.setattr(jit, "is_cold", lambda: False)  # else the first test of a cold cache would see a notice
 
     def call(*arguments):
         monkeypatch.setattr(sys, "argv", ["fvsolve", *map(str, arguments)])
