@@ -61,6 +61,10 @@ class ControlRows:
         """Count of the numbers in `discrete` that a block needs if it acts at samples."""
         return 0
 
+    def delay(self, control: Any) -> float:
+        """Time by which its output follows its input [s]; 0 if it does not need the history of the input."""
+        return 0.0
+
     def rate(self, control: Any) -> float:
         """Greatest constant rate of its states [1/s]."""
         return 0.0
@@ -70,7 +74,7 @@ class ControlRows:
         raise NotImplementedError
 
     def output_rate(self, control: Any, start: BlockStart, rates: list[float]) -> float:
-        """Rate of its output at the start, with its states at rest; rates : those of its inputs."""
+        """Rate of its output if its states follow rates of its inputs that last; rates : those of its inputs."""
         return 0.0
 
     def begin(self, control: Any, start: BlockStart, numbers: np.ndarray) -> None:

@@ -127,19 +127,26 @@ class Blocks:
         first = next(iter(inputs.values()))
         return first.dimension if isinstance(first, Probe) else self.outputs.get(first, UNKNOWN)
 
-    def known_dimensions(self, name: str) -> list[str]:
-        """Known dimensions of the keys that a block drives and of the setpoints that follow it."""
+    def known_dimensions(self, name: str, passed: tuple[str, ...] = ()) -> list[str]:
+        """Known dimensions of the keys that a block drives and of the setpoints that follow it.
+
+        Those that it drives through blocks of the same unit count too. passed : blocks between these and the block
+        """
         found = [dimension for dimension, _ in self.setting.driven.get(name, ())]
         for other, item in self.given.items():
             setpoint = item.get("setpoint")
             if isinstance(setpoint, dict) and setpoint.get("control") == name:
                 found.append(self.first_dimension(other))
+            if self.kind(other).same_unit and name in self.inputs[other].values() and other not in passed:
+                found += self.known_dimensions(other, (*passed, name))
         return list(dict.fromkeys(dimension for dimension in found if dimension != UNKNOWN))
 
     def output_dimension(self, name: str) -> str:
         """Dimension of the output of a block; UNKNOWN if it drives only faulty keys."""
         if known := self.known_dimensions(name):
             return UNKNOWN if unlike(known) else known[0]
+        if self.kind(name).same_unit:
+            return self.first_dimension(name)
         follows = (keys[0] != "controls" for keys in driven_keys(self.reading.raw.table, "control", name))
         if own := self.kind(name).own_dimension(self.given[name]):
             return own
@@ -181,9 +188,14 @@ class Blocks:
     def faults(self, name: str) -> Iterator[tuple[tuple, str]]:
         """Yield faults (keys in the block, text) of unlike driven keys, limits, the initial output and samples."""
         yield from self.sample_faults(name)
+        yield from self.delay_faults(name)
         if pair := unlike(self.known_dimensions(name)):
             first, other = (DIMENSIONS[item].words for item in pair)
             yield (), f"drives {first} and {other}; expected keys of one unit, or a block for each"
+        ends = [item for item in (self.first_dimension(name), self.outputs[name]) if item != UNKNOWN]
+        if self.kind(name).same_unit and (pair := unlike(ends)):
+            first, other = (DIMENSIONS[item].words for item in pair)
+            yield (), f"passes on {first}, but drives {other}; expected keys of the unit of its input"
         stated, initial = self.valid_key(name, "limits"), self.valid_key(name, "initial")
         low, high = self.driven_range(name)
         least_open = any(r.open and r.least == low for _, r in self.setting.driven.get(name, ()))
@@ -202,6 +214,18 @@ class Blocks:
         elif initial is not None and not limits[0] <= initial <= limits[1]:
             text = f"{show(self.given[name]['initial'])} is outside the limits {show(list(limits))}"
             yield ("initial",), f"{text}; expected a value within them"
+
+    def delay_faults(self, name: str) -> Iterator[tuple[tuple, str]]:
+        """Yield a fault (keys in the block, text) of a `delay` that is too short for the steps of the run."""
+        given, delay, step = self.given[name].get("delay"), self.valid_key(name, "delay"), self.setting.step
+        if delay is not None and step is not None and delay < step:
+            text = f"{show(given)} is shorter than numerics.step, so a step would read an input that is not known yet"
+            yield ("delay",), f"{text}; expected at least {step:g} s, or a shorter step"
+        elif delay is not None and self.setting.span is not None:
+            start, end = self.setting.span
+            if (end - start) / delay > MOST_SAMPLES:
+                text = f"{show(given)} gives {(end - start) / delay:.3g} steps, since no step may exceed the delay"
+                yield ("delay",), f"{text}; expected at most {MOST_SAMPLES:.0e} in the run"
 
     def sample_faults(self, name: str) -> Iterator[tuple[tuple, str]]:
         """Yield faults (keys in the block, text) of `period` and `offset`."""

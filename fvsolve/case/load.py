@@ -107,6 +107,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     numerics = reading.table("numerics", Numerics)
     if (times := numerics or valid_times(reading)) is not None and times.start < times.end:
         reading.setting.span = times.start, times.end
+    reading.setting.step = numerics.step if numerics is not None else None
     check_names(reading)
     network = part_reading.cut_pipes(reading, state, numerics)
     scalars = read_scalars(reading)

@@ -15,6 +15,15 @@ from fvsolve.kernels.barotropic_nodes import head_pressure
 from fvsolve.kernels.devices import ADAPT, DECIDE, SAMPLE, SET, SWITCH
 from fvsolve.kernels.dtypes import ARRIVED, ARRIVES, CONTROL_VALUE, DRIVEN_DEVICE, DRIVEN_VALVE, FIXED, NEVER, STATUS
 from fvsolve.kernels.formula_programs import is_low
+from fvsolve.kernels.input_histories import (
+    JUMP,
+    admit_breaks,
+    awaits_break,
+    break_arrives,
+    next_break,
+    record_inputs,
+    set_breaks,
+)
 from fvsolve.kernels.restrictions import valve_conductance
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
@@ -216,16 +225,35 @@ def is_due(t, tables, control):
 
 
 @njit
+def let_breaks_arrive(t, tables):
+    """Let the breaks that are due at the time t arrive at blocks with a delay that act at all times; True if any do.
+
+    Samples are then taken after these outputs have changed.
+    """
+    found = False
+    for k in range(tables.controls.size):
+        control = tables.controls[k]
+        if control["delay"] > 0.0 and control["period"] == 0.0 and break_arrives(tables.histories, control, t):
+            admit_breaks(tables, k, t)
+            found = True
+    return found
+
+
+@njit
 def take_samples(t, y, out, handle, values):
     """At a time at which a sample is due (STATUS is ARRIVED), let the blocks act, in the order of their table."""
     tables = open_tables(handle)
     controls, discrete = tables.controls, tables.discrete
-    if out[STATUS] != ARRIVED:
+    if out[STATUS] != ARRIVED or let_breaks_arrive(t, tables):
         return
     read_sensors(t, y, out, tables)
     for k in range(controls.size):
         control = controls[k]
         if is_due(t, tables, control):
+            if control["delay"] > 0.0:
+                admit_breaks(tables, k, t)
+            if tables.histories.size > 0:
+                set_breaks(tables, k, t, JUMP)
             sample = tables.hooks[control["hooks"], SAMPLE]
             if sample != 0:
                 v = calls.call_sample(sample, t, y, tables, control)
@@ -237,18 +265,26 @@ def take_samples(t, y, out, handle, values):
 
 
 @njit
-def announce_samples(t, y, out, handle, values):
-    """Write the time of the next sample to out[ARRIVES], t if it is now, unless a jump of a delay line comes first.
+def record_controls(t, y, out, handle, values):
+    """Store the inputs of blocks with a delay, and write the time of the next sample or break to out[ARRIVES].
 
-    A sample at the end of a segment of the run is taken at the start of the next one, after a jump of a schedule there.
+    A break is that of the input of a block with a delay. The time is t if it is now, and that of a jump of a delay line
+    if this comes first. A sample or break at the end of a segment of the run acts at the start of the next one, after a
+    jump of a schedule there.
     """
     tables = open_tables(handle)
+    record_inputs(t, out, tables)
     arrives, ends = out[ARRIVES] if tables.delays.size > 0 else NEVER, t >= tables.clock[0]["limit"]
     for k in range(tables.controls.size):
         control = tables.controls[k]
         if control["period"] > 0.0 and not (ends and is_due(t, tables, control)):
             time = t if is_due(t, tables, control) else next_sample(tables, control)
             arrives = time if arrives == NEVER else min(arrives, time)
+        elif control["delay"] > 0.0 and awaits_break(tables.histories, control):
+            is_now = break_arrives(tables.histories, control, t)
+            if not (ends and is_now):
+                time = t if is_now else next_break(tables.histories, control)
+                arrives = time if arrives == NEVER else min(arrives, time)
     out[ARRIVES] = arrives
 
 

@@ -71,6 +71,7 @@ SETTINGS = record(
     weights=i8,  # offset in `floats` of the weights b of the method, followed by its c; number of stages
     stages=i8,
     jumps=f8,  # least jump in a delay line that is stored as a jump, as fraction of the greatest wave
+    tolerance=f8,  # rtol of error control; 0 without it
     saturation=f8,  # gas pressure at which all gas is dissolved; infinite for no dissolution [Pa]
 )
 
@@ -373,6 +374,13 @@ CONTROL = record(  # block of `controls`, in an order in which each block comes 
     offset=f8,  # time of the first sample after the start of the run [s]
     start=f8,  # output at the start
     held=f8,  # output at which a study holds it; nan if it follows its law
+    delay=f8,  # time by which it follows its input [s]; 0 for other blocks
+    history=i8,  # number of the history of its input, see `kernels.input_histories`; -1 for none
+    # Offset in `integers` of the blocks on which the input of a delay depends, not through other delays: first those on
+    # whose present outputs it depends, `source_count`, then `later_count` that it follows through states.
+    sources=i8,
+    source_count=i8,
+    later_count=i8,
 )
 
 DRIVEN = record(  # row of a table that a block drives before the nodes are solved
@@ -419,8 +427,8 @@ LAYOUT = record(
 BODY_OUT = 45  # numbers of each body in `out`
 GN = 14  # index of g_n among the numbers of a frame, see `basins.basin_frames`
 TANK_OUT = 24  # numbers in `out` of each basin on a body, see `mechanism.body_layout`
-RATE, STATUS, WHERE, CLOSING, ARRIVES = 0, 1, 2, 3, 4  # first entries of `out`
-OUT_HEAD = 5
+RATE, STATUS, WHERE, CLOSING, ARRIVES, LONGEST = 0, 1, 2, 3, 4, 5  # first entries of `out`
+OUT_HEAD = 6
 # RATE before a call if the rate that limits the step is not needed, which holds at all stages of a step but the first.
 # Functions that spend time on this rate leave the value; others raise it as always.
 RATE_UNWANTED = -1.0
@@ -598,7 +606,7 @@ Tables = namedtuple("Tables", (*RECORDS, "integers", "floats", "profile", "plane
 RunArrays = namedtuple("RunArrays",
     (
         "clock", "work", "armed", "marks", "scratch", "spare", "seen", "bands", "joint", "sums", "envelope", "extremes",
-        "past", "sharp", "applied", "readings", "sensing", "stack", "discrete",
+        "past", "sharp", "applied", "readings", "sensing", "stack", "discrete", "histories",
     ),
 )  # fmt: skip
 HandleTables = namedtuple("HandleTables", (*Tables._fields, *RunArrays._fields, "calls", "hooks"))

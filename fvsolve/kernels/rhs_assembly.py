@@ -127,7 +127,7 @@ COMPONENTS = {
     "controls, barotropic": RhsTerms(**CONTROLS, decide="controls: decide_barotropic"),
     "switches": RhsTerms(events="controls: control_events"),
     "formulas": RhsTerms(events="schedule_pieces: formula_events"),
-    "probes of controls": RhsTerms(observe="controls: observe_controls", record="controls: announce_samples"),
+    "probes of controls": RhsTerms(observe="controls: observe_controls", record="controls: record_controls"),
     "pipes": RhsTerms(record="observation: record_pipes"),
     "valves": RhsTerms(rate_limits="network_balance: valve_rate_limit"),
     "bends": RhsTerms(events="restrictions: restriction_events"),

@@ -35,6 +35,7 @@ from fvsolve.model.delay_lines import (
     lower_delays,
 )
 from fvsolve.model.equilibrium_search import with_equilibrium
+from fvsolve.model.input_histories import histories_size
 from fvsolve.model.mechanics_tables import (
     find_closed_chambers,
     lower_bodies,
@@ -292,6 +293,7 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)), past=history_size(draft.delay_table),
         applied=2 * len(draft.control_table) + 2 * (len(draft.control_table) > 0), readings=len(draft.sensor_table),
         sensing=int(len(draft.sensor_table) > 0), stack=draft.schedules.stack, discrete=len(draft.discrete),
+        histories=histories_size(draft.control_table),
     )  # fmt: skip
 
 
@@ -307,6 +309,7 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     s["vapor"] = case.law.cavity_pressure
     s["stop_below"] = case.numerics.below_vapor == "stop"
     case.law.lower(draft.fluid, s, draft.floats)
+    s["tolerance"] = case.numerics.rtol or 0.0
     s["jumps"] = 0.25 * case.numerics.delay_tolerance
     if len(draft.delay_table):
         method = method_named(automatic.first_method(case.numerics.method))

@@ -58,6 +58,7 @@ def lower_controls(draft) -> None:
         block = draft.case.controls[name]
         fill_block(draft, name, block, list(probes), row)
         row["late"] = name not in early
+    lower_delays(draft)
     check_order(draft, early)
 
 
@@ -85,7 +86,7 @@ def fill_block(draft, name: str, block: Block, sensors: list[str], row) -> None:
     setpoint = control.setpoint_schedule
     row["setpoint"] = -1 if setpoint is None else draft.schedules.add(setpoint)
     row["least"], row["greatest"], row["held"] = *block.limits, np.nan
-    row["period"], row["offset"] = control.period or 0.0, control.offset
+    row["period"], row["offset"], row["delay"] = control.period or 0.0, control.offset, rows.delay(control)
     limited = not control.switches and control.period is None and any(map(math.isfinite, block.limits))
     row["flag"] = draft.flags(f"controls.{name}", LIMIT_EVENTS) if limited else -1
     flag = rows.timed_flag(np.array(draft.floats[row["data"] :]))
@@ -95,6 +96,29 @@ def fill_block(draft, name: str, block: Block, sensors: list[str], row) -> None:
     if flag >= 0:
         draft.timed.append((flag, len(draft.discrete)))
         draft.discrete.append(-np.inf)
+
+
+def lower_delays(draft) -> None:
+    """Number the histories of blocks with a delay, and list the blocks on which their inputs depend."""
+    table, blocks, numbers = draft.control_table, draft.case.controls, draft.schedules.blocks
+    table["history"] = np.where(table["delay"] > 0.0, np.cumsum(table["delay"] > 0.0) - 1, -1)
+    names, rows = list(numbers), draft.schedules.rows
+    drives_scene = {names[int(rows[first][2])] for first, pieces in draft.schedules.records if pieces == 0}
+    for name, row in zip(names, table, strict=True):
+        if row["delay"] > 0.0:
+            now = {item for item in blocks[name].inputs if isinstance(item, str)}
+            while more := {other for item in now for other in blocks[item].blocks_needed} - now:
+                now |= more
+            found, ahead = set(now), [name, *now]
+            while ahead:
+                block = blocks[item := ahead.pop()]
+                if item == name or control_rows_of(type(block.control)).delay(block.control) == 0.0:
+                    reads_scene = any(not isinstance(given, str) for given in block.inputs)
+                    more = {*block.blocks_read, *(drives_scene if reads_scene else ())} - found
+                    found, ahead = found | more, [*ahead, *more]
+            row["sources"], row["source_count"] = len(draft.integers), len(now)
+            row["later_count"] = len(found) - len(now)
+            draft.integers += [numbers[item] for group in (now, found - now) for item in sorted(group)]
 
 
 def control_rate(draft) -> float:
@@ -222,9 +246,8 @@ class Balance:
 
         def output_rate(k: int) -> float:
             if k not in rates:
-                start, at_once = starts[k], starts[k].block.control.passes_at_once
-                own = control_rows_of(type(start.block.control))
-                rates[k] = own.output_rate(start.block.control, start, input_rates(k)) if at_once else 0.0
+                control, rates[k] = starts[k].block.control, 0.0  # of a cycle of blocks
+                rates[k] = control_rows_of(type(control)).output_rate(control, starts[k], input_rates(k))
             return rates[k]
 
         first = np.array([input_rates(k)[0] if codes[k] else 0.0 for k in range(len(starts))])

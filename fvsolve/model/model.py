@@ -301,7 +301,10 @@ class Model(Displayable):
         return self.evaluate(t, y)[0]
 
     def refuse_delay_lines(self, function: str) -> None:
-        """Raise FvsolveError if the model has delay lines: their history is not part of y."""
+        """Raise FvsolveError if the model has delay lines or blocks with a delay: their history is not part of y."""
+        if self.shapes.histories:
+            text = f"{function}(t, y) is not defined for a case with a control of type delay: y has no earlier inputs"
+            raise FvsolveError(f"{text}. Expected a case without it, or rhs(State) instead of rhs(t, y)")
         if len(self.tables.delays):
             text = f"{function}(t, y) is not defined for a model with delay lines: y does not contain their waves"
             raise FvsolveError(f'{text}. Expected pipe_model = "finite-volume" (or rhs(State) instead of rhs(t, y))')

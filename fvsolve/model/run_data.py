@@ -10,6 +10,7 @@ import numpy as np
 from fvsolve.assembly.model_draft import aligned_zeros
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.delay_lines.wave_history import COUNT
+from fvsolve.model import input_histories
 from fvsolve.model.delay_lines import LEAST_STEPS, reset_history, steps_left, stored_history, with_doubled_rings
 
 if TYPE_CHECKING:
@@ -53,6 +54,7 @@ class RunData:
         self.armed, self.marks = self.written.armed, self.written.marks
         self.envelope, self.extremes = self.written.envelope, self.written.extremes
         reset_history(self.written.past, model.tables.delays)
+        input_histories.reset_histories(self.written.histories, model.tables.controls)
         self.clock["limit"], self.marks[:] = np.inf, np.nan
         self.armed[:], self.discrete[:] = model.flags, model.discrete
         basins = model.tables.basins
@@ -82,10 +84,11 @@ class RunData:
         return linked_handles(shared, replaced, written, callables)
 
     def reset(self, armed: np.ndarray | None = None) -> None:
-        """Reset for another state: event flags as given or as at the start, and no waves in delay lines."""
+        """Reset for another state: event flags as given or as at the start, and empty histories."""
         self.armed[:], self.clock["limit"] = self.model.flags if armed is None else armed, np.inf
         self.discrete[:] = self.model.discrete
         reset_history(self.past, self.model.tables.delays)
+        input_histories.reset_histories(self.written.histories, self.model.tables.controls)
 
     @property
     def discrete(self) -> np.ndarray:
@@ -102,20 +105,44 @@ class RunData:
         self.written, self.full_at = self.written._replace(past=past), -np.inf
         self.__dict__.pop("handle", None)
 
-    def restore_history(self, state) -> None:
-        """Set the history of delay lines from the memory of a state; it is unchanged if state or memory are missing.
+    @property
+    def histories(self) -> np.ndarray:
+        """Histories of the inputs of blocks with a delay."""
+        return self.written.histories
 
-        Raises ValueError if the memory contains no history.
+    @histories.setter
+    def histories(self, histories: np.ndarray) -> None:
+        self.written = self.written._replace(histories=histories)
+        self.__dict__.pop("handle", None)
+
+    def restore_history(self, state) -> None:
+        """Set histories of delay lines and of inputs of blocks from the memory of a state.
+
+        They are unchanged if state or memory are missing. Raises ValueError if the memory contains no history.
         """
-        if len(self.model.tables.delays) and state is not None and state.memory:
+        if state is None or not state.memory:
+            return
+        if len(self.model.tables.delays):
             self.past = stored_history(state.memory)
+        if self.histories.size:
+            self.histories = input_histories.stored_histories(state.memory)
 
     def history_capacity(self) -> float:
-        """Number of steps that fit before a ring of delay-line history would lose an entry that is still needed.
+        """Number of steps that fit before a history would lose an entry that is still needed.
 
-        Infinite without delay lines. Where rings are nearly full they are doubled; then `past` and `handle` are new
-        arrays.
+        Infinite without delay lines and blocks with a delay. Where there is little space left it is doubled; then the
+        arrays of the histories and `handle` are new.
         """
+        if self.histories.size:
+            histories = input_histories.with_space(self.histories, self.model.tables.controls)
+            if histories is not self.histories:
+                self.histories = histories
+            delays = input_histories.delays_of(self.model.tables.controls)
+            return min(self.wave_history_capacity(), float(input_histories.steps_left(histories, delays)))
+        return self.wave_history_capacity()
+
+    def wave_history_capacity(self) -> float:
+        """Number of steps as `history_capacity`, for delay lines."""
         delays = self.model.tables.delays
         if not len(delays):
             return np.inf

@@ -124,12 +124,14 @@ class Control(Table):
     """Block of `controls`: its output is a schedule for keys of parts and for other blocks.
 
     kinds : type in the case file -> class; passes_at_once : True if its output depends on the present values of its
-    inputs; integrates : see its docstring; may_sample : True if it can act at samples, with `period`
+    inputs; integrates : see its docstring; may_sample : True if it can act at samples, with `period`;
+    same_unit : True if its output has the unit of its input
     """
 
     kind: ClassVar[str] = ""
     kinds: ClassVar[dict[str, type[Control]]] = {}
     may_sample: ClassVar[bool] = True
+    same_unit: ClassVar[bool] = False
 
     filter: Annotated[
         float | None,

@@ -105,6 +105,7 @@ class ReadContext:
     driven: dict[str, list[tuple[str, Range]]] = field(default_factory=dict)
     block_units: tuple[str, str] = ("number", "number")
     span: tuple[float, float] | None = None  # start and end of the run [s]; None if unknown
+    step: float | None = None  # given step of the run [s]; None without one
 
 
 def context_of(info: Any) -> ReadContext:

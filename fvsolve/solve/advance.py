@@ -63,6 +63,8 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         memory["discrete"] = loop.run_data.discrete.copy()
     if len(model.tables.delays):
         memory["past"] = loop.run_data.past.copy()
+    if loop.run_data.histories.size:
+        memory["histories"] = loop.run_data.histories.copy()
     return State(loop.t, loop.now.copy(), memory)
 
 

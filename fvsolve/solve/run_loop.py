@@ -10,7 +10,9 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tanks
 from fvsolve.kernels.column_junctions import gate_inflow
 from fvsolve.kernels.compiled_functions import fused_step_function
+from fvsolve.kernels.input_histories import BEGINS, MOST_POINTS
 from fvsolve.model import Model, RunData
+from fvsolve.model.input_histories import delays_of
 from fvsolve.model.scalar_tables import amount_indices, state_bounds
 from fvsolve.parts.control import PREFIX
 from fvsolve.solve.partition import blocked_sums, make_partition
@@ -22,6 +24,9 @@ from fvsolve.steppers.tableau import Method, method_named
 
 ROW_CAPACITY = 512
 NO_LIMIT = 1e308
+# Least steps in the time of a `delay` under error control, which does not see the error of its input between entries:
+# as many as a polynomial needs.
+STEPS_IN_DELAY = MOST_POINTS
 MOST_EVENTS_AT_ONCE = 20  # events at the same time; more is chattering
 # events within this fraction of the run, or within a given step; more is chattering
 MOST_EVENTS_IN_SPAN, SPAN = 2000, 1e-6
@@ -88,6 +93,10 @@ class RunLoop:
         # of waves only: implicit steps are stable for the rest
         if numerics.courant is not None and not method.explicit:
             control["mode"], control["size"] = loop_records.FIXED_STEP, numerics.courant / model.wave_rate
+        longest = step_within_delays(model)
+        control["step_max"] = min(control["step_max"], longest / (STEPS_IN_DELAY if numerics.rtol is not None else 1))
+        if control["mode"] == loop_records.FIXED_STEP:
+            control["size"] = min(control["size"], longest)
         self.run_data.clock["step"] = self.given_step
         self.team, single_band = None, make_partition(model, 1)
         if method.explicit and numerics.method != automatic.AUTO:
@@ -132,6 +141,8 @@ class RunLoop:
         stop_at : time [s] from which on the loop writes no output rows
         """
         self.stepper.discard_history()
+        if self.run_data.histories.size and any(t == self.t for t, _ in self.model.breaks):
+            self.run_data.histories[BEGINS] = 1.0
         self.resume(end, stop_at)
 
     def resume(self, end: float, stop_at: float) -> None:
@@ -321,6 +332,14 @@ def longest_step(model: Model) -> float:
     """Longest step that suits the delay lines [s]: the inverse of their greatest wave rate; infinity without them."""
     delay_lines = model.tables.pipes["delay"] >= 0
     return float(1.0 / model.wave_rates[delay_lines].max()) if delay_lines.any() else np.inf
+
+
+def step_within_delays(model: Model) -> float:
+    """Longest step for which no stage reads the input of a `delay` before it is known [s]; infinity without delays."""
+    method = model.case.numerics.method
+    methods = (automatic.EXPLICIT, automatic.IMPLICIT) if method == automatic.AUTO else (method,)
+    latest = max(1.0, *(time for name in methods for time in method_named(name).times))
+    return float(delays_of(model.tables.controls).min(initial=np.inf)) / latest
 
 
 def fused_step_allowed(model: Model, method: Method) -> bool:

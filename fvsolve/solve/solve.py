@@ -22,6 +22,7 @@ CHUNK_SECONDS = 0.1
 # steps between two checks by `RunChecks.check` where it is needed often
 FREQUENT_CHECK_STEPS = loop_records.GROWTH_CHECK_STEPS
 PERSISTENT = ("extremes", "envelope", "marks", "armed", "discrete")
+HISTORIES = ("past", "histories")  # arrays that may grow during a run
 
 
 class MemoryMismatch(RunError):
@@ -139,14 +140,16 @@ class Run:
             "rates": [rates.get(basin.name, 0.0) for basin in self.checks.moving],
         }  # fmt: skip
         memory = {name: np.array(values, dtype=np.float64) for name, values in own.items()}
-        return memory | {"past": self.run_data.past.copy()} | {name: view.copy() for name, view in self.views().items()}
+        memory |= {name: getattr(self.run_data, name).copy() for name in HISTORIES}
+        return memory | {name: view.copy() for name, view in self.views().items()}
 
     def restore(self, memory: dict[str, np.ndarray]) -> None:
         """Restore the result of `memory`; raises ValueError or KeyError if it does not match this run."""
-        loop, past = self.loop, memory["past"]
-        if (past.size == 0) != (self.run_data.past.size == 0):
-            raise ValueError("history of delay lines does not match")
-        self.run_data.past = past.copy()
+        loop = self.loop
+        for name in HISTORIES:
+            if (memory[name].size == 0) != (getattr(self.run_data, name).size == 0):
+                raise ValueError(f"array {name} does not match")
+            setattr(self.run_data, name, memory[name].copy())
         segment, self.seconds, self.processor, loop.last_switch, at_once = memory["run"].tolist()
         self.segment, loop.at_once = int(segment), int(at_once)
         if not 0 <= self.segment < len(self.bounds):

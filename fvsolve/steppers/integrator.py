@@ -46,7 +46,7 @@ class Integrator:
         self.no_floats, self.no_integers = np.zeros(0), np.zeros(0, dtype=np.int64)
         self.stored, self.carry, self.times = self.no_integers, np.zeros(0), self.no_floats
         self.largest = self.no_floats  # largest allowed states, where growth is checked
-        self.out, self.out_row, self.values = np.zeros(5), np.zeros(5), np.zeros(0)
+        self.out, self.out_row, self.values = np.zeros(6), np.zeros(6), np.zeros(0)
         self.out[rec.JUMP_TIME] = rec.NO_JUMP
         self.g = self.g_new = self.armed = self.no_floats
         self.y_out, self.rows = np.zeros(n), np.zeros((1, 1))

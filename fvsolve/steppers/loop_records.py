@@ -68,7 +68,8 @@ FRESH, FUSED, EMIT, READY = range(4)  # values of `phase`
 LEAST_TOLERANCE = 1e-13  # least relative tolerance: below it rounding errors dominate
 LEAST_STEP = 4e-16  # least step, relative to the time
 
-RATE, STATUS, PLACE, CLOSING_RATE, JUMP_TIME = 0, 1, 2, 3, 4  # entries of `out` that the loop reads
+# Entries of `out` that the loop reads; LONGEST_STEP limits the next step under error control [s], 0 for no limit.
+RATE, STATUS, PLACE, CLOSING_RATE, JUMP_TIME, LONGEST_STEP = 0, 1, 2, 3, 4, 5
 NO_JUMP = -1e300  # in JUMP_TIME: no jump will arrive
 CORRECTED, ARRIVED = 7, 8  # in STATUS: the record has corrected the accepted state; the record lets a jump arrive now
 NOT_FINITE = 3  # a value of out[STATUS]

@@ -16,6 +16,7 @@ LIMITED_BY_STABILITY = 2.5
 COUNT_DECREASE = 0.4  # decrease of the count by a step that stability does not limit
 # Fraction of an opening that may close in one given step; for x ~ (time left)^(1/3) this is half of the time left.
 CLOSING_FRACTION = 0.15
+LIMITED = 0.8  # fraction of a limit of the step, so that the limit does not act at every step
 APPROACH = 0.95  # fraction of the rest of a segment that the second-last step takes
 NEVER = 1e308  # a time that is never reached [s]
 DEAD_BAND = 1.2  # a step solved by Newton that may grow by a smaller factor keeps its length, and so its factorisation
@@ -48,15 +49,18 @@ def first_step(k, scale, control, state):
 
 
 @njit(forceinline=True)
-def next_step(control, state, out_rate, k, scale):
-    """Length of the step to try [s], without regard to the end of the segment; out_rate : greatest wave rate [1/s].
+def next_step(control, state, out_rate, longest, k, scale):
+    """Length of the step to try [s], without regard to the end of the segment.
 
+    out_rate : greatest wave rate [1/s]; longest : limit of the step under error control [s], 0 for none
     k, scale : rates and sizes of the states, for `first_step`
     control, state : see `loop_records`; a first step, and a new given step with its start, are stored there
     """
     if control["mode"] == rec.TOLERANCE:
         if too_short(control, state, state["step"]):  # no step is stored, or it does not change the time
             state["step"] = first_step(k, scale, control, state)
+        if 0.0 < longest < state["step"]:
+            state["step"] = LIMITED * longest
         stable = control["step_max"]  # error control alone oscillates at the stability limit
         if out_rate > 0.0 and control["kind"] == rec.EXPLICIT:
             stable = 2.0 / out_rate

@@ -280,7 +280,7 @@ def take_step(handle, run, r):
     now, new = progress["now"], 3 - progress["now"] - progress["old"]
     full = state["split_remainder"]
     if not full > 0.0:
-        full = step_control.next_step(control, state, r.out[rec.RATE], r.k, r.scale)
+        full = step_control.next_step(control, state, r.out[rec.RATE], r.out[rec.LONGEST_STEP], r.k, r.scale)
     if control["mode"] != rec.TOLERANCE:
         full = step_control.closing_step(state, r.out[rec.CLOSING_RATE], full, step_control.shortest(control, state))
     h = step_control.arriving_step(control, state, r.out[rec.JUMP_TIME], full)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.assembly.schedule_tables import slope_at, value_at
-from fvsolve.errors import FvsolveError
+from fvsolve.errors import FvsolveError, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.ghost_cells import difference_rows
 from fvsolve.kernels.schedule_pieces import POLYNOMIAL
@@ -125,12 +125,12 @@ def with_held_schedules(model, t: float, before: bool = False):
     values = [value_at(tables, k, t, limit) for k in range(len(schedules))]
     rows = [[-np.inf, POLYNOMIAL, t, value, 0.0, 0.0, 0.0] for value in values]
     for k, record in enumerate(tables.schedules):
-        schedules[k] = (k, int(record["pieces"] != 0))
-        if record["pieces"] == 0:  # it follows a block
-            rows[k] = tables.pieces[record["first"]].tolist()
+        if record["pieces"] != 0:  # it does not follow a block
+            schedules[k] = (len(tables.pieces) + k, 1)
     for k in {int(row["schedule"]) for table in (tables.bodies, tables.walls) for row in table} - {-1}:
         rows[k][4] = slope_at(tables, k, t, limit)
-    tables = tables._replace(schedules=schedules, pieces=np.array(rows).reshape(-1, 7))
+    pieces = np.vstack([tables.pieces, np.array(rows).reshape(-1, 7)])  # the first ones contain formulas of blocks
+    tables = tables._replace(schedules=schedules, pieces=pieces)
     tables = with_held_velocities(model, tables, t)
     if not has_limiter(model):
         tables = without_slope_limits(tables)
@@ -337,10 +337,16 @@ def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray
 
     The size of row i is the sum over j of |A_ij| times the small deviation of state j; the error is relative to it.
     A is a full array, or a sparse scipy array for more than 1000 states. States whose columns have no row in common
-    (equal colours) are changed together. Raises FvsolveError for a state without a derivative.
+    (equal colours) are changed together. Raises FvsolveError for a state without a derivative, and for a delay.
     """
     from scipy.sparse import csc_array
 
+    controls = at.model.tables.controls
+    if uncut := [f"controls.{at.model.block_names[k]}" for k in np.flatnonzero(
+        (controls["delay"] > 0.0) & np.isnan(controls["held"])
+    )]:  # fmt: skip
+        text = f"{listing(uncut)} of type delay needs earlier inputs, so no matrix A describes it"
+        raise FvsolveError(f'{text}; cut the loop there, with the input "{uncut[0]}.output"')
     model, n, width = at.model, at.model.y_size, np.maximum(at.model.scale, np.abs(at.y))
     pattern = model.structure.pattern[:n].tocsc()
     pattern.sort_indices()

@@ -345,6 +345,18 @@ def test_a_formula_drives_a_joint_with_its_slopes():
         assert run["arm.joint_ty"][-1] == pytest.approx(torque, rel=1e-9)
 
 
+def test_linearise_knows_the_slopes_of_formulas():
+    act = {
+        "type": "function",
+        "inputs": {"h": "tower.level"},
+        "formula": "0.02*h^2 + where(t < 1, 0, 0.3)",
+        "filter": 9.0,
+    }
+    system = linearise(tower({"control": "act"}, 0.9, controls={"act": act}), inputs=["outlet.opening"], at=0.0)
+    mass_flow = WATER["density"] * orifice_flow(1.0, SUPPLY - 4.0)
+    assert system.a[0, 1] == pytest.approx(0.16 * mass_flow, rel=1e-7)
+
+
 def test_linearise_cuts_a_loop_at_its_output():
     """Return ratio of a PI on a tank: its output over its output, L = -K (1 + 1 / (Ti s)) B / (s - a)."""
     case = tower({"control": "hold"}, 0.5, controls={"hold": pi(4.0)})

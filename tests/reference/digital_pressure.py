@@ -10,6 +10,7 @@ import numpy as np
 GRAVITY, LAKE = 9.80665, 10.0
 LENGTH, BORE, WAVE_SPEED, FACTOR = 1500.0, 0.3, 1000.0, 0.02
 SETPOINT, GAIN, INTEGRAL_TIME, PERIOD, LIMITS = 50.0, 0.002, 2.0, 2.0, (0.3, 1.3)
+RADIO = 0.9  # time that a reading of the far end takes [s], a whole number of steps
 DEMAND = ([20.0, 22.0], [0.03, 0.05])
 AREA = pi / 4 * BORE**2
 # head of the pump at speed n: n^2 (60 m) - c q^2 through the points of the case, which lie on this parabola
@@ -35,7 +36,8 @@ def main(reaches: int, end: float):
         t = k * step
         if t >= samples * PERIOD - 1e-9:
             samples += 1
-            error = SETPOINT - head[-1]
+            late = k - round(RADIO / step)
+            error = SETPOINT - (rows[late][1] if late >= 0 else head[-1])
             integral += GAIN * PERIOD * error / INTEGRAL_TIME
             speed = min(max(start + GAIN * error + integral, LIMITS[0]), LIMITS[1])
         rows.append((t, head[-1], head[0], speed))

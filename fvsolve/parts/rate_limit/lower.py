@@ -28,5 +28,8 @@ class RateLimitRows(ControlRows, kind="rate-limit"):
     def residual(self, control, start):
         return start.inputs[0] - start.output
 
+    def output_rate(self, control, start, rates):
+        return rates[0]
+
     def begin(self, control, start, numbers):
         numbers[law.START] = start.output

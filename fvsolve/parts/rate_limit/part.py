@@ -10,6 +10,7 @@ class RateLimit(SingleInput, kind="rate-limit"):
     """Block whose output follows its input no quicker than its limits: dv/dt = (x - v) / T, within them."""
 
     may_sample: ClassVar[bool] = False
+    same_unit: ClassVar[bool] = True
 
     rising: Annotated[float, OfRate("greatest rate of rise of the output")]
     falling: Annotated[float, OfRate("greatest rate of fall of the output, above 0")]

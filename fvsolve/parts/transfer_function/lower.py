@@ -36,7 +36,7 @@ class TransferFunctionRows(ControlRows, kind="transfer-function"):
         return control.numerator[-1] / control.denominator[-1] * start.inputs[0] - start.output
 
     def output_rate(self, control, start, rates):
-        return control.direct * rates[0]
+        return 0.0 if control.integrates else control.numerator[-1] / control.denominator[-1] * rates[0]
 
     def begin(self, control, start, numbers):
         numbers[law.START], x = start.output, start.inputs[0]

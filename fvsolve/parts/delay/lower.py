@@ -1,0 +1,25 @@
+"""Delays in the tables of a model, and their state at the start."""
+
+from fvsolve.assembly.control_rows import StaticRows
+from fvsolve.kernels.input_histories import BEFORE, START
+from fvsolve.parts.delay import law
+
+
+class DelayRows(StaticRows, kind="delay"):
+    """Conversion of delays to table rows."""
+
+    law = law
+
+    def numbers(self, draft, name, block):
+        return [0.0, 0.0]
+
+    def delay(self, control):
+        return control.delay
+
+    def value(self, control, start):
+        return start.inputs[0]
+
+    def begin(self, control, start, numbers):
+        balanced = control.initial is None
+        numbers[START] = start.output if balanced else start.inputs[0]
+        numbers[BEFORE] = 0.0 if balanced else start.output - start.inputs[0]
