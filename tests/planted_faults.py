@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 TOP = Path(__file__).parents[1]
-QUICK_NEEDED, ALL_NEEDED = 38, 42
+QUICK_NEEDED, ALL_NEEDED = 40, 44
 WITHOUT_OWN_TEST = (
     "--deselect",
     "tests/repository/test_tools_of_tests.py",
@@ -114,6 +114,12 @@ FAULTS = [
         "studies/linearise.py",
         "float(value / input_.scale)",
         "float(value * input_.scale)",
+    ),
+    Fault("studies/loops/sampled.py", "self.drive * (1.0 + z[place])", "self.drive * (1.0 - z[place])"),
+    Fault(
+        "kernels/input_histories.py",
+        "weight *= (time - other) / (histories[here] - other)",
+        "weight *= 1.01 * (time - other) / (histories[here] - other)",
     ),
     Fault("studies/ports/positive_real.py", "order = n.degree - d.degree", "order = d.degree - n.degree"),
     Fault(

@@ -15,6 +15,7 @@ COMMANDS = dict.fromkeys(("run", "check", "list", "new", "schema", "methods", "c
     "failure-map": "failure_map",
     "import": "file_commands",
     "linearise": "linear_commands",
+    "loop": "loop_commands",
     "optimise": "design_commands",
     "order": "accuracy_commands",
     "precompile": "file_commands",

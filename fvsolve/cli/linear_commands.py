@@ -9,8 +9,9 @@ from typer import Option
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.terminal import present
+from fvsolve.errors import FvsolveError
 from fvsolve.output.unit_columns import column
-from fvsolve.studies.result_table import ResultTable, write_csv
+from fvsolve.studies.result_table import Column, ResultTable, write_csv
 
 POLES_SHOWN = 24  # greatest number of poles on the terminal; poles.csv has all
 SYMBOLS = {"admittance": "Y", "impedance": "Z"}
@@ -109,16 +110,22 @@ def system_text(system, values, poles: list[dict], folder: Path) -> Iterator:
 @cli.app.command()
 def response(
     case: cli.SingleCase,
-    port: Annotated[str, Option(metavar="NODE", help="node at which flow and pressure are taken: a reservoir, "
-        "junction, inflow, chamber or tank")],
+    port: Annotated[str | None, Option(metavar="NODE", help="node at which flow and pressure are taken: a reservoir, "
+        "junction, inflow, chamber or tank")] = None,
+    input: Annotated[str | None, Option(metavar="NAME", help="input in place of a port, such as valve.opening or "
+        "controls.NAME.setpoint")] = None,
+    output: Annotated[str | None, Option(metavar="PROBE", help="probe that responds to the input")] = None,
     at: cli.AtTime = None, before: cli.BeforeJump = False, scheme: cli.LinearScheme = None, out: cli.Out = None,
     set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
 ) -> None:  # fmt: skip
-    """Compute the transfer function of pressure and flow at a node: matrices, frequency response, positive realness."""
+    """Compute a transfer function: of pressure and flow at a node, or of an input and a probe."""
     from fvsolve.studies.ports.response import response as ask
 
     loaded = cli.load_case(case, set)
+    if port is None or input is not None or output is not None:
+        respond(loaded, port, input, output, cli.quantity_of(at, "time", f"--at {at}"), before, scheme, out, as_json)
+        return
     result = ask(loaded, port, cli.quantity_of(at, "time", f"--at {at}"), before, scheme)
     folder = cli.folder_of(loaded, "response", out)
     name = f"{port}.response"
@@ -132,6 +139,48 @@ def response(
     unit = output_unit(loaded, result)
     draw(result, folder / name, *unit)
     present(as_json, result.plain() | {"directory": str(folder)}, response_text(result, folder, name, unit[1]))
+
+
+def respond(case, port, input, output, at, before, scheme, out, as_json: bool) -> None:
+    """Compute and write the transfer function from an input to a probe; arguments as for `response`."""
+    from fvsolve.draw.stability_pictures import response_figure
+    from fvsolve.studies.loops.input_response import input_response
+
+    if port is not None or input is None or output is None:
+        given = "--port" if port is not None else "--input" if input is not None else "no option"
+        raise FvsolveError(f"{given} alone names no transfer function. Expected --port NODE, or --input NAME with "
+                           "--output PROBE")  # fmt: skip
+    result = input_response(case, input, output, at, before, scheme)
+    folder, stem, h = cli.folder_of(case, "response", out), f"{input}-{output}.response".replace("/", "-"), result.h
+    header = ["frequency [Hz]", "w [rad/s]", "real", "imaginary", "magnitude", "phase [deg]"]
+    table = [result.w / (2.0 * np.pi), result.w, h.real, h.imag, np.abs(h), np.degrees(np.angle(h))]
+    cli.warn_replaced(folder, f"{stem}.csv")
+    cli.clear_files(folder, f"{stem}.png", f"{stem}.svg")
+    write_csv(folder / f"{stem}.csv", header, np.column_stack(table).tolist())
+    title = f"{result.case} at {result.when}: {output} over {input}"
+    unit = f"{result.units[1]} / {result.units[0]}"
+    figure = response_figure(result.w, h, ("H", unit), title=title, note="real part")
+    for ending in ("png", "svg"):
+        figure.savefig(folder / f"{stem}.{ending}")
+    present(as_json, result.plain() | {"directory": str(folder)}, input_response_text(result, folder, stem))
+
+
+def input_response_text(result, folder: Path, stem: str) -> Iterator:
+    """Definition of a transfer function from an input to a probe, its size, its poles, and the files."""
+    yield (f"{result.case} at {result.when}: {result.output} [{result.units[1]}] over {result.input} "
+           f"[{result.units[0]}]; {len(result.states)} states")  # fmt: skip
+    if result.moving > 1e-9:
+        yield "  not a steady state; schedules are held at their values of that time"
+    if result.system.delays.size:
+        yield f"  delays: {', '.join(f'{delay:.4g} s' for delay in result.system.delays)}, exact"
+    first, last = result.h[0], result.h[-1]
+    yield f"  H = {first.real:.6g} {first.imag:+.6g}j at {result.w[0]:.4g} rad/s"
+    yield f"  H = {last.real:.6g} {last.imag:+.6g}j at {result.w[-1]:.4g} rad/s"
+    rows = [
+        {"pole": f"{s.real:.6g} {s.imag:+.6g}j" if s.imag else f"{s.real:.6g}"} for s in result.poles if s.imag >= 0
+    ]
+    yield ResultTable([Column("pole", "pole [1/s]")], rows[:POLES_SHOWN])
+    yield f"{folder}: {stem}.csv, {stem}.png, {stem}.svg"
 
 
 def si_unit(result) -> str:

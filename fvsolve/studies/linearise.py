@@ -155,6 +155,11 @@ def linearise_at(at: OperatingPoint, inputs=(), outputs: int = 0) -> Linear:
             hint = did_you_mean(name, available) or f"; inputs are {listing(available)}"
             raise FvsolveError(f'no input named "{name}"{hint}')
     refuse_limiter(model)
+    controls = model.tables.controls
+    delays = [f"controls.{model.block_names[k]}" for k in np.flatnonzero(controls["delay"] > 0.0)]
+    if uncut := [name for name in delays if f"{name}.output" not in inputs]:
+        text = f"{listing(uncut)} of type delay needs earlier inputs, so no matrix A describes it"
+        raise FvsolveError(f'{text}; cut the loop there, with the input "{uncut[0]}.output"')
     cut = {name: input_value(at, name, available[name]) for name in inputs if available[name].control >= 0}
     at = replace(at, model=hold(model, cut))
     a, size, error_a, steps = state_matrix(at)
@@ -197,7 +202,7 @@ def input_value(at: OperatingPoint, name: str, input_: Input) -> float:
         place = model.node_names[input_.node]
         return pressure if input_.sort is PRESSURE else float(model.head(pressure, model.elevation[place]))
     if input_.control >= 0:
-        return float(model.evaluate(at.t, at.y)[1][model.layout["control"] + 2 * input_.control])
+        return float(at.outputs[input_.control])
     value = value_at(model.tables, input_.schedule, at.t, np.inf)
     if input_.other >= 0:
         value -= value_at(model.tables, input_.other, at.t, np.inf)

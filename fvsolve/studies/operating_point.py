@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.assembly.schedule_tables import slope_at, value_at
-from fvsolve.errors import FvsolveError, listing
+from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.ghost_cells import difference_rows
 from fvsolve.kernels.schedule_pieces import POLYNOMIAL
@@ -36,6 +36,8 @@ class OperatingPoint:
     t : time at which schedules are held [s]; y : float64[n]  state, as deviations from the initial steady state
     when : description of this time, with the side of a kink or jump of a schedule
     armed : flags of events at this time, see `model.run_data.RunData`
+    outputs : float64[blocks]  outputs of all controls at this time; those of delays and of sampled controls are held
+    discrete : numbers of controls that change at events and samples only, at this time
     """
 
     model: object
@@ -43,28 +45,32 @@ class OperatingPoint:
     y: np.ndarray
     when: str
     armed: np.ndarray | None = None
+    outputs: np.ndarray | None = None
+    discrete: np.ndarray | None = None
 
     @property
     def rate(self) -> np.ndarray:
         """Rate of change dy/dt of the state : float64[n]; zero at a steady state."""
-        return self.model.rhs(self.t, self.y)
+        return self.model.evaluate(self.t, self.y)[0]
 
 
-def operating_point(case, set=None, at: float | None = None, before: bool = False, probes=()) -> OperatingPoint:
+def operating_point(
+    case, set=None, at: float | None = None, before: bool = False, probes=(), lines: bool = False
+) -> OperatingPoint:
     """Operating point of a case at its start, or at the time `at` [s], to which the case is run.
 
     set : changed keys of the case; before : True to hold schedules at the values just before a kink or jump at this
     time, otherwise just after it
     probes : names of probes that are added before the probes of the case
-    Delay lines are replaced by cells. If the case gives no scheme and the default scheme is limited, it is replaced by
-    the linear scheme that it equals in smooth solutions, or by `upwind` in a case with basins. Raises CaseError for a
-    case or probe that cannot be read, and FvsolveError for a case without states, for a time `at` before the start, and
-    for a run that does not reach `at`.
+    Delay lines are replaced by cells, unless `lines` is True and the point is the start. If the case gives no scheme
+    and the default scheme is limited, it is replaced by the linear scheme that it equals in smooth solutions, or by
+    `upwind` in a case with basins. Raises CaseError for a case or probe that cannot be read, and FvsolveError for a
+    case without states, for a time `at` before the start, and for a run that does not reach `at`.
     """
     from fvsolve.case import load
 
     case = load(case, dict(set or {}))
-    delayed = delay_lines(case)
+    delayed = [] if lines and at is None else delay_lines(case)
     if delayed:
         case = load(case, as_cells(delayed))
     if "scheme" not in case.raw["numerics"] and case.numerics.scheme in LIMITED:
@@ -75,13 +81,19 @@ def operating_point(case, set=None, at: float | None = None, before: bool = Fals
     model = study_model(case, {"output.probes": names, "numerics.end": end})
     if model.y_size == 0:
         raise FvsolveError(f"{case.name} has no state: every pressure in it is given; add a pipe, tank or chamber")
-    t, y, armed = _state_at(model, at)
+    t, y, armed, outputs, discrete = _state_at(model, at)
     sides = {time: jump for time, jump in model.breaks if time == t}
     side = "before" if before else "after"
     when = "the start" if at is None else f"t = {case.amount(t, 'time', 6)}"
     when += f", just {side} a {'jump' if sides[t] else 'kink'} of a schedule" if t in sides else ""
     when += frequency_limit_note(model, delayed) if delayed else ""
-    return OperatingPoint(with_held_schedules(model, t, before), t, y, when, armed)
+    model = with_held_schedules(model, t, before)
+    if len(controls := model.tables.controls):
+        controls = controls.copy()
+        waits = (controls["delay"] > 0.0) | (controls["period"] > 0.0)
+        controls["held"][waits] = outputs[waits]
+        model = replace(model, tables=model.tables._replace(controls=controls))
+    return OperatingPoint(model, t, y, when, armed, outputs, discrete)
 
 
 def frequency_limit_note(model, lines: list[str]) -> str:
@@ -99,18 +111,25 @@ def frequency_limit_note(model, lines: list[str]) -> str:
     return f", delay lines as cells (error of waves at most {DELAY_ERROR:g} up to {min(rates):.3g} Hz)"
 
 
-def _state_at(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray]:
-    """Time [s], state and event flags of a run at the time `at` [s]; at the start if `at` is None."""
-    start = model.case.numerics.start
+def _state_at(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Time [s], state, event flags, outputs and discrete numbers of controls of a run at the time `at` [s].
+
+    They are those of the start if `at` is None.
+    """
+    start, blocks = model.case.numerics.start, len(model.tables.controls)
     if at is None or at == start:
-        return start, model.start.copy(), model.flags.copy()
+        with model.run_data() as data:
+            data.evaluate(start, model.start, np.inf)
+            applied = data.written.applied[:blocks].copy()
+        return start, model.start.copy(), model.flags.copy(), applied, model.discrete.copy()
     if not start < at < np.inf:
         raise FvsolveError(f"at = {at:g} s is not a finite time after the start of the case, {start:g} s")
     numerics = model.case.numerics.model_copy(update={"end": float(at)})
     run = outcome(replace(model, case=replace(model.case, numerics=numerics)))
     if not run.ok:
         raise FvsolveError(f"the run to t = {at:g} s, where the case is to be linearised, failed: {run.reason}")
-    return float(at), run.y, run.run_data.armed
+    data = run.run_data
+    return float(at), run.y, data.armed, data.written.applied[:blocks].copy(), data.discrete.copy()
 
 
 def with_held_schedules(model, t: float, before: bool = False):
@@ -337,16 +356,10 @@ def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray
 
     The size of row i is the sum over j of |A_ij| times the small deviation of state j; the error is relative to it.
     A is a full array, or a sparse scipy array for more than 1000 states. States whose columns have no row in common
-    (equal colours) are changed together. Raises FvsolveError for a state without a derivative, and for a delay.
+    (equal colours) are changed together. Raises FvsolveError for a state without a derivative.
     """
     from scipy.sparse import csc_array
 
-    controls = at.model.tables.controls
-    if uncut := [f"controls.{at.model.block_names[k]}" for k in np.flatnonzero(
-        (controls["delay"] > 0.0) & np.isnan(controls["held"])
-    )]:  # fmt: skip
-        text = f"{listing(uncut)} of type delay needs earlier inputs, so no matrix A describes it"
-        raise FvsolveError(f'{text}; cut the loop there, with the input "{uncut[0]}.output"')
     model, n, width = at.model, at.model.y_size, np.maximum(at.model.scale, np.abs(at.y))
     pattern = model.structure.pattern[:n].tocsc()
     pattern.sort_indices()

@@ -9,7 +9,7 @@ import numpy as np
 
 GRAVITY, LAKE = 9.80665, 10.0
 LENGTH, BORE, WAVE_SPEED, FACTOR = 1500.0, 0.3, 1000.0, 0.02
-SETPOINT, GAIN, INTEGRAL_TIME, PERIOD, LIMITS = 50.0, 0.002, 2.0, 2.0, (0.3, 1.3)
+SETPOINT, GAIN, INTEGRAL_TIME, PERIOD, LIMITS = 50.0, 0.001, 2.0, 2.0, (0.3, 1.3)
 RADIO = 0.9  # time that a reading of the far end takes [s], a whole number of steps
 DEMAND = ([20.0, 22.0], [0.03, 0.05])
 AREA = pi / 4 * BORE**2

@@ -18,15 +18,15 @@ MAX_LINES = 60
 # folder -> (lines, files), with its subfolders
 FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve": (1616, 11),
-    "tests": (916, 7),
+    "tests": (922, 7),
     "benchmarks": (6234, 48),
     "fvsolve/assembly": (1713, 9),
     "fvsolve/basins": (9051, 44),
     "fvsolve/case": (6379, 23),
-    "fvsolve/cli": (3120, 13),
+    "fvsolve/cli": (3272, 14),
     "fvsolve/compile": (1050, 6),
     "fvsolve/data": (12, 1),
-    "fvsolve/draw": (2679, 12),
+    "fvsolve/draw": (2810, 13),
     "fvsolve/epanet": (767, 5),
     "fvsolve/exact": (1156, 5),
     "fvsolve/fluid": (981, 4),
@@ -40,7 +40,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/solve": (2247, 8),
     "fvsolve/step_limits": (1595, 7),
     "fvsolve/steppers": (6567, 31),
-    "fvsolve/studies": (13188, 42),
+    "fvsolve/studies": (14459, 49),
     "tests/attitude": (447, 2),
     "tests/basins": (6580, 21),
     "tests/case": (4248, 14),
@@ -62,7 +62,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/solve": (1799, 7),
     "tests/step_limits": (1022, 4),
     "tests/steppers": (2114, 12),
-    "tests/studies": (7511, 21),
+    "tests/studies": (7874, 22),
     "tests/units": (242, 1),
 }
 # functions that exceed a limit: "path: function" -> (arguments, lines). Commands and studies are excepted by rule.

@@ -1,0 +1,1 @@
+"""Studies of control loops: return ratio, margins, stability and poles, with exact delays and with samples."""

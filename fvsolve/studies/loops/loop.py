@@ -1,0 +1,230 @@
+"""Loop of a control: return ratio, margins, stability, poles, and range of the gain in which it is stable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from fvsolve.studies.loops.delay_system import DelaySystem, sorted_poles
+from fvsolve.studies.loops.margins import Margins, find_margins
+from fvsolve.studies.loops.open_loop import block_of, open_loop
+from fvsolve.studies.loops.sampled import STABLE, SampledLoop
+from fvsolve.studies.result_table import PlainData, plain
+from fvsolve.validation import NUMBER, TABLE, TEXT, validated
+
+PER_DECADE = 200  # frequencies of the table
+DECADES = 3.0  # below the slowest and above the fastest rate
+PER_TURN = 40  # frequencies in each turn of the phase by the longest delay
+MOST_TURNS = 500  # of a delay
+SMALL = 1e-4  # of |L|: turns of a delay end where |L| stays below
+MOST_POLES = 24  # of a loop with delays
+
+
+@dataclass(frozen=True, eq=False)
+class Loop(PlainData):
+    """Result of `loop`; arrays in SI.
+
+    case, control, when : case, control at whose output the loop is cut, state about which it is linearised
+    stable : True if the closed loop is stable; margins : see `Margins`
+    gain_range : least and greatest factor on L between which the closed loop is stable, None for an open end
+    delays : delays of controls and of delay lines [s]; period : time between samples [s], None for a continuous loop
+    poles : poles of the closed loop, of a sampled loop the eigenvalues z over a period
+    frequency : float64[k] [rad/s]; ratio : complex128[k]  return ratio L; 1 + L = 0 is the closed loop
+    system : open loop, a `DelaySystem` or a `SampledLoop`; moving : greatest rate of a state over its scale [1/s]
+    """
+
+    case: str
+    control: str
+    when: str
+    stable: bool | None
+    margins: Margins
+    gain_range: tuple[float | None, float | None]
+    delays: tuple[float, ...]
+    period: float | None
+    poles: np.ndarray
+    frequency: np.ndarray
+    ratio: np.ndarray
+    system: DelaySystem | SampledLoop
+    moving: float
+
+    def plain(self) -> dict:
+        """Values for JSON; poles as [re, im]."""
+        own = {name: plain(getattr(self, name)) for name in ("case", "control", "when", "stable")}
+        own |= {field.name: plain(getattr(self.margins, field.name)) for field in fields(Margins)}
+        return own | {
+            "gain_range": list(self.gain_range), "delays": list(self.delays), "period": self.period,
+            "poles": [[float(s.real), float(s.imag)] for s in self.poles], "frequency": plain(self.frequency),
+            "real": plain(self.ratio.real), "imaginary": plain(self.ratio.imag), "moving": self.moving,
+        }  # fmt: skip
+
+
+@validated(name=TEXT, at=NUMBER, set=TABLE)
+def loop(case, name: str, at: float | None = None, set: Mapping | None = None) -> Loop:
+    """Study the loop of a control of a case, linearised at its start or at the time `at` [s].
+
+    The loop is cut at the output of the control; L(s) is its return ratio, and 1 + L(s) = 0 the closed loop.
+    set : changed keys of the case. Raises CaseError, and FvsolveError for an unknown control, a control without slope
+    or at a limit, a state that cannot be linearised, and more than 800 states.
+    """
+    from fvsolve.case import load
+
+    case = load(case, dict(set or {}))
+    name = block_of(case, name)
+    if any(block.control.period is not None for block in case.controls.values()):
+        return sampled_loop(case, name, at)
+    system, point = open_loop(case, name, at)
+    ratio = ReturnRatio(system)
+    w = frequencies(system, ratio)
+    margins, gains = find_margins(ratio, w)
+    gain_range, stable = stable_gains(system, gains)
+    closed = system.closed()
+    return Loop(
+        case.name, name, point.when, stable, margins, gain_range, tuple(system.delays.tolist()), None,
+        closed.poles(MOST_POLES), w, ratio(w), system, float(np.max(np.abs(point.rate) / point.model.scale)),
+    )  # fmt: skip
+
+
+def sampled_loop(case, name: str, at: float | None) -> Loop:
+    """Study as `loop` for a case with sampled controls, by the map over their common period.
+
+    There are margins if the control is sampled once in this period; the range of the gain is found in every case.
+    """
+    sampled = SampledLoop(case, name, at)
+    w, values = np.zeros(0), np.zeros(0, complex)
+    margins = Margins(*[None] * len(fields(Margins)))
+    if sampled.acts_once:
+        fastest = np.pi / sampled.period
+        w = np.unique(
+            np.concatenate([np.geomspace(1e-4 * fastest, fastest, 4 * PER_DECADE), np.linspace(0, fastest, 800)])
+        )
+        w = w[w > 0.0]
+        margins, _ = find_margins(sampled.ratio, w)
+        values = sampled.ratio(w)
+    poles = sorted_poles(np.linalg.eigvals(sampled.closed_matrix(1.0)).astype(complex))
+    poles = poles[np.argsort(-np.abs(poles), kind="stable")]
+    point = sampled.point
+    return Loop(
+        case.name, name, point.when, sampled.radius(1.0) < 1.0 - STABLE, margins, sampled.gain_range(),
+        tuple(sampled.delays.values()), sampled.period, poles, w, values, sampled,
+        float(np.max(np.abs(point.rate) / point.model.scale)),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ReturnRatio:
+    """Return ratio L(j w) = -v / u of an open loop from the held output u to the computed output v."""
+
+    system: DelaySystem
+
+    def __call__(self, w: np.ndarray) -> np.ndarray:
+        return -self.system.response(1j * np.asarray(w, float))[:, 0, 0]
+
+
+def frequencies(system: DelaySystem, ratio: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Frequencies of the table [rad/s]: logarithmic, at resonances, and dense where a delay turns the phase."""
+    low, high = system.slowest * 10.0**-DECADES, system.fastest * 10.0**DECADES
+    grid = np.geomspace(low, high, int(PER_DECADE * np.log10(high / low)) + 1)
+    resonances = np.abs(system.rates.imag)
+    parts = [grid, resonances[(low < resonances) & (resonances < high)]]
+    if system.delays.size:
+        longest = float(system.delays.sum())
+        large = grid[np.abs(ratio(grid)) > SMALL]
+        last = min(float(large.max(initial=low)), MOST_TURNS * 2.0 * np.pi / longest)
+        parts.append(
+            np.arange(1, int(PER_TURN * last * longest / (2.0 * np.pi)) + 2) * 2.0 * np.pi / longest / PER_TURN
+        )
+    return np.unique(np.concatenate(parts))
+
+
+def stable_gains(system: DelaySystem, gains: np.ndarray) -> tuple[tuple[float | None, float | None], bool | None]:
+    """((least, greatest factor on L of a stable closed loop), True if it is stable with the factor 1).
+
+    The number of unstable poles changes only at the gains 1 / |L| where L is real and negative, at any frequency. If
+    the loop is not stable, the range is the nearest one that is; both ends are None without one.
+    gains : these factors at frequencies above 0
+    """
+    limits = [0.0, *sorted({*map(float, gains), *ends(system)}), np.inf]
+    stable = [is_stable(system, low, high) for low, high in zip(limits, limits[1:], strict=False)]
+    here = next(k for k in range(len(stable)) if limits[k] <= 1.0 < limits[k + 1])
+    own = is_stable_at(system, 1.0)
+    if 1.0 in limits:
+        own = False
+    order = sorted(range(len(stable)), key=lambda k: 0.0 if k == here else distance(limits[k], limits[k + 1]))
+    nearest = next((k for k in order if stable[k]), None)
+    if nearest is None:
+        return (None, None), own
+    first = last = nearest
+    while first > 0 and stable[first - 1]:
+        first -= 1
+    while last + 1 < len(stable) and stable[last + 1]:
+        last += 1
+    low, high = limits[first], limits[last + 1]
+    return (low if low > 0.0 else None, high if np.isfinite(high) else None), own
+
+
+def distance(low: float, high: float) -> float:
+    """Distance of an interval of gains from 1, as a factor, in logarithms."""
+    return min(abs(np.log(max(low, 1e-300))), abs(np.log(max(min(high, 1e300), 1e-300))))
+
+
+def ends(system: DelaySystem) -> list[float]:
+    """Gains 1 / |L| at the frequency 0 and at infinity, where L is real and negative and finite."""
+    slow = 1e-6 * system.slowest
+    near, nearer, zero = -system.response(np.array([slow + 0j, 0.5 * slow + 0j, 0j]))[:, 0, 0].real
+    values = [] if abs(nearer) > 1.5 * abs(near) else [zero]  # without a pole at 0
+    if not system.delays.size:
+        values.append(-system.d[0, 0])
+    return [float(-1.0 / value) for value in values if value < 0.0]
+
+
+def is_stable(system: DelaySystem, low: float, high: float) -> bool | None:
+    """True if the closed loop is stable with gains between two limits."""
+    middle = np.sqrt(low * high) if low > 0.0 and np.isfinite(high) else 0.5 * high if np.isfinite(high) else 2.0 * low
+    return is_stable_at(system, float(middle) if middle > 0.0 else 1.0)
+
+
+def is_stable_at(system: DelaySystem, gain: float) -> bool | None:
+    """True if the closed loop is stable with a factor `gain` on L; None if it is undecided."""
+    count = system.closed(gain).unstable_count()
+    return None if count is None else count == 0
+
+
+LOCUS_GAINS, FEW_GAINS, LARGE = 161, 21, 200  # gains of the root locus, and of one with more states than the last
+LOCUS_RANGE = 30.0  # least and greatest gain of the root locus, as factors on 1
+STEP_POINTS, STEP_PERIODS = 1500, 60  # of a step response, continuous and sampled
+
+
+def locus(result: Loop) -> tuple[np.ndarray, list[np.ndarray]]:
+    """(factors on L, poles of the closed loop for each) for a root locus."""
+    count = FEW_GAINS if len(result.system.a) > LARGE else LOCUS_GAINS
+    gains = np.geomspace(1.0 / LOCUS_RANGE, LOCUS_RANGE, count)
+    if result.period is not None:
+        return gains, [np.linalg.eigvals(result.system.closed_matrix(float(gain))) for gain in gains]
+    closed = (result.system.closed(float(gain)) for gain in gains)
+    return gains, [(item.collocated() if item.delays.size else item).rates for item in closed]
+
+
+def step_response(result: Loop) -> tuple[np.ndarray, np.ndarray]:
+    """(times [s], response of L / (1 + L) to a step of 1 at the time 0) of a loop with a return ratio."""
+    system = result.system
+    if result.period is not None:
+        return system.step_response(STEP_PERIODS)
+    slow = np.abs(result.poles.real)
+    rates = slow[slow > 1e-9 * system.fastest]
+    span = 6.0 / float(rates.min(initial=np.inf)) if rates.size else 100.0 / system.slowest
+    if result.margins.gain_crossover is not None:
+        span = min(span, 60.0 / result.margins.gain_crossover)
+    # u = e = r - y, y = L e = -v, so u = (r + v of the states and delays) / (1 - D)
+    m, n = system.inputs, system.a.shape[0]
+    share = 1.0 / (1.0 - float(system.d[0, 0]))
+    back = share * np.hstack([system.c[:1], system.d[:1, m:]])
+    a, b = system.a + system.b[:, :1] @ back[:, :n], system.b.copy()
+    b[:, m:] += system.b[:, :1] @ back[:, n:]
+    b[:, :1] *= share
+    c, d = system.c + system.d[:, :1] @ back[:, :n], system.d.copy()
+    d[:, m:] += system.d[:, :1] @ back[:, n:]
+    d[:, :1] *= share
+    times = np.linspace(0.0, span, STEP_POINTS)
+    return times, -replace(system, a=a, b=b, c=c, d=d).step_response(times)[:, 0]

@@ -1,0 +1,202 @@
+"""Open loop of a control: the linear system of a case whose loop is cut at the output of the control.
+
+Delays are cut too: what arrives from them is an input, what enters them an output.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError, did_you_mean, listing
+from fvsolve.kernels.delay_lines import wave_history as history
+from fvsolve.parts.control import PREFIX
+from fvsolve.solve.advance import hold
+from fvsolve.studies.linearise import linearise_at
+from fvsolve.studies.loops.delay_system import DelaySystem
+from fvsolve.studies.operating_point import OperatingPoint, operating_point
+from fvsolve.studies.stability.delay_line_limits import reflected_share
+from fvsolve.units import show
+
+MAX_STATES = 800  # greatest number of states
+
+
+def block_of(case, name: str) -> str:
+    """Name of a control of a case without the prefix "controls."; raises FvsolveError if it has no loop to study."""
+    name = name.removeprefix(PREFIX)
+    if name not in case.controls:
+        hint = did_you_mean(name, case.controls) or (
+            f"; controls are {listing(case.controls)}" if case.controls else "; the case has no [controls]"
+        )
+        raise FvsolveError(f"no control named {show(name)}{hint}")
+    if case.controls[name].control.switches:
+        kind = case.controls[name].control.kind
+        raise FvsolveError(f"controls.{name} is a {kind}, whose output has no slope. Expected another type of control")
+    return name
+
+
+def delay_blocks(model) -> dict[str, float]:
+    """Delay of each control of type delay [s] that acts at all times : name -> delay."""
+    controls = model.tables.controls
+    acts = (controls["delay"] > 0.0) & (controls["period"] == 0.0)
+    return {model.block_names[k]: float(controls["delay"][k]) for k in np.flatnonzero(acts)}
+
+
+def open_loop(case, name: str, at: float | None) -> tuple[DelaySystem, OperatingPoint]:
+    """(system from the held output of a control to its computed output, operating point).
+
+    Raises FvsolveError for a control at a limit.
+    """
+    own = f"{PREFIX}{name}.output"
+    linear, system = delayed_system(case, None, own, own, at)
+    refuse_limit(linear.at, name)
+    return system, linear.at
+
+
+def delayed_system(case, set, input: str, output: str, at: float | None, before: bool = False):
+    """(`Linear` system with all delays cut, `DelaySystem` from an input to a probe); arguments as for `linearise`.
+
+    Delay lines are exact at the start; at another time they are replaced by cells.
+    """
+    delays = [key for key, block in case.controls.items() if block.control.kind == "delay"]
+    probes = list(dict.fromkeys([output, *(f"{PREFIX}{key}.input" for key in delays)]))
+    point = operating_point(case, set, at, before, probes, lines=True)
+    inputs = list(dict.fromkeys([input, *(f"{PREFIX}{key}.output" for key in delays)]))
+    linear = linearise_at(point, inputs, len(probes))
+    system = with_delays(linear, input, output, delay_blocks(point.model))
+    if len(point.model.tables.delays):
+        waves = [f"{PREFIX}{key}" for key in delay_blocks(point.model)]
+        rows = [output, *(f"{wave}.input" for wave in waves)]
+        system = with_lines(linear, system, [input, *(f"{wave}.output" for wave in waves)], rows)
+    return linear, system
+
+
+def refuse_limit(point: OperatingPoint, name: str) -> None:
+    """Raise FvsolveError if the output of a control is at one of its limits, where its loop is open."""
+    model = point.model
+    flag = int(model.tables.controls["flag"][model.block_names.index(name)])
+    if flag >= 0 and point.armed is not None and (point.armed[flag] > 0.0 or point.armed[flag + 2] > 0.0):
+        raise FvsolveError(f"the output of controls.{name} is at a limit at {point.when}, so its loop is open. "
+                           "Expected another time (--at)")  # fmt: skip
+
+
+def state_limit_error(count: int) -> FvsolveError:
+    """Error for a case with too many states."""
+    text = f"the case has {count} states. Expected {MAX_STATES} or fewer"
+    return FvsolveError(f"{text}; give pipes fewer cells: --set links.NAME.cells=...")
+
+
+def with_delays(system, cut: str, output: str, delays: dict[str, float]) -> DelaySystem:
+    """`DelaySystem` with the input `cut`, of a linear system whose delays are cut; delays : as `delay_blocks`.
+
+    The output of a delay is what arrives from it.
+    """
+    if len(system.states) > MAX_STATES:
+        raise state_limit_error(len(system.states))
+    a = system.a if isinstance(system.a, np.ndarray) else system.a.toarray()
+    waves = [f"{PREFIX}{key}" for key in delays]
+    columns = [system.inputs.index(cut), *(system.inputs.index(f"{wave}.output") for wave in waves)]
+    rows = [system.outputs.index(output), *(system.outputs.index(f"{wave}.input") for wave in waves)]
+    b, c, d = system.b[:, columns].copy(), system.c[rows], system.d[np.ix_(rows, columns)].copy()
+    if cut.removesuffix(".output") in waves:  # the held output acts in place of what arrives
+        k = 1 + waves.index(cut.removesuffix(".output"))
+        b[:, k], d[:, k] = 0.0, 0.0
+    if output.removesuffix(".output") in waves:
+        c[0], d[0] = 0.0, 0.0
+        d[0, 1 + waves.index(output.removesuffix(".output"))] = 1.0
+    return DelaySystem(a, b, c, d, 1, 1, np.array(list(delays.values())))
+
+
+# delay lines --------------------------------------------------------------------------------------------------
+
+WIDTHS = (2e-3, 1e-3)  # deviations of Richardson's differences, relative to the size of a variable
+BAR_PRESSURE = 1e5  # pressure of a wave of unit size [Pa]
+
+
+def slope(f: Callable[[float], np.ndarray], size: float) -> np.ndarray:
+    """Derivative of f at 0 by Richardson's differences; size : of a small deviation of its argument."""
+    coarse, fine = ((f(width * size) - f(-width * size)) / (2.0 * width * size) for width in WIDTHS)
+    return (4.0 * fine - coarse) / 3.0
+
+
+def with_lines(linear, system: DelaySystem, inputs: list[str], probes: list[str]) -> DelaySystem:
+    """Add the delay lines of a model at its start to a system, as two delays for each stretch of a line.
+
+    A wave travels through a stretch in its time tau; friction in the middle reflects a part of it. The states of lines,
+    their masses, are left out. inputs, probes : names of the columns of B and of the rows of C in `system`
+    """
+    at, rows = linear.at, linear.at.model.tables.delays
+    model = replace(at.model, tables=at.model.tables._replace(**at.model.sharp))  # short lines need their travel time
+    keep = np.setdiff1d(np.arange(len(system.a)), model.tables.pipes["y"][rows["pipe"]])
+    evaluate = line_function(replace(at, model=model), keep, [linear.outputs.index(probe) for probe in probes])
+    y, none, n, p = at.y, np.zeros(2 * len(rows)), keep.size, len(probes)
+    sizes = np.repeat(model.tables.pipes["admittance"][rows["pipe"]], 2) * BAR_PRESSURE
+    states, waves = np.eye(y.size)[keep], np.eye(none.size)
+    by_state = [slope(lambda h, e=e: evaluate(y + h * e, none, {}), model.scale @ e) for e in states]
+    by_wave = np.array([slope(lambda h, e=e: evaluate(y, h * e, {}), sizes @ e) for e in waves]).T
+    values = zip(inputs, (linear.input_values[linear.inputs.index(name)] for name in inputs), strict=True)
+    by_input = [slope(lambda h, name=name, value=value: evaluate(y, none, {name: value + h}), max(0.01, abs(value)))
+                for name, value in values]  # fmt: skip
+    sent_by_state = np.array(by_state).reshape(n, -1).T[n + p :]
+    sent_by_input = np.array(by_input).T[n + p :]
+    read = by_wave[n : n + p]
+    for k, probe in enumerate(probes):  # the output of a delay does not depend on present waves
+        read[k] *= not (probe.endswith(".output") and f"{probe.removesuffix('.output')}.input" in probes)
+    arriving, sent, chain = stretches(
+        rows, [reflected_share(model.tables.pipes[row["pipe"]], row["tau"]) for row in rows]
+    )
+    return DelaySystem(
+        system.a[np.ix_(keep, keep)], np.hstack([system.b[keep], by_wave[:n] @ arriving]),
+        np.vstack([system.c[:, keep], sent @ sent_by_state]),
+        np.block([[system.d, read @ arriving], [sent @ sent_by_input, sent @ by_wave[n + p :] @ arriving + chain]]),
+        1, 1, np.concatenate([system.delays, np.repeat(rows["tau"], 2 * rows["stretches"])]),
+    )  # fmt: skip
+
+
+def line_function(at: OperatingPoint, keep: np.ndarray, probes: list[int]):
+    """Function of states, waves that arrive at both ends of each line, and held inputs, at an operating point.
+
+    Its values are the rates of the states `keep`, the probes with these numbers, and the waves that nodes send.
+    """
+    model, t, rows = at.model, float(at.t), at.model.tables.delays
+    ends = int(model.layout["ends"]) + 4 * rows["pipe"][:, None] + np.array([0, 3])
+    first = np.cumsum(rows["stretches"]) - rows["stretches"]
+    both = np.stack([first, first + rows["stretches"] - 1], axis=1)
+
+    def evaluate(y: np.ndarray, waves: np.ndarray, held: dict[str, float]) -> np.ndarray:
+        own = hold(model, held)
+        with own.run_data(at.armed) as data:
+            past = data.past
+            places = history.offsets_of(past)[0] + history.ARRIVALS_SIZE * both + np.array([0, 1])
+            past[places.ravel()] = waves
+            past[history.COUNT] = past[history.ARRIVALS_COUNT] = history.PROFILE_ENTRIES + 1.0
+            past[history.ARRIVALS_TIME] = t
+            dydt, out = data.evaluate(t, y, np.inf)
+            return np.concatenate([dydt[keep], data.observe(t, y, out)[probes], out[ends.ravel()]])
+
+    return evaluate
+
+
+def stretches(rows: np.ndarray, shares: list[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Matrices of the stretches of delay lines, which have two delays each: forward, then backward wave.
+
+    rows : table of lines; shares : reflected share of a wave in a stretch of each line
+    Results: waves that arrive at both ends of each line over delayed waves; waves that enter delays over waves that
+    nodes send; waves that enter delays over delayed waves, at joints of stretches.
+    """
+    count, channels = len(rows), 2 * int(rows["stretches"].sum())
+    arriving, sent, chain = np.zeros((2 * count, channels)), np.zeros((channels, 2 * count)), np.zeros((channels,) * 2)
+    k = 0
+    for i, (number, share) in enumerate(zip(rows["stretches"].tolist(), shares, strict=True)):
+        forward, backward = k + 2 * np.arange(number), k + 2 * np.arange(number) + 1
+        passed, reflected = 1.0 - share, share
+        arriving[2 * i, [backward[0], forward[0]]] = passed, reflected
+        arriving[2 * i + 1, [forward[-1], backward[-1]]] = passed, reflected
+        sent[forward[0], 2 * i] = sent[backward[-1], 2 * i + 1] = 1.0
+        for q in range(number - 1):
+            chain[forward[q + 1], [forward[q], backward[q]]] = passed, reflected
+            chain[backward[q], [backward[q + 1], forward[q + 1]]] = passed, reflected
+        k += 2 * number
+    return arriving, sent, chain

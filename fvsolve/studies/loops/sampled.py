@@ -1,0 +1,392 @@
+"""Loops with sampled controls: their linear map over the common period of all samples, exact between samples.
+
+The state z of the map contains the states x, the numbers of all sampled controls (outputs that they hold, and memory),
+and numbers of delays: the value w that leaves a delay now, and registers of values on their way. Between samples
+x' = A x + B h, with held outputs and delayed values h, has the solution of the exponential. Two kinds of delays are
+exact: those whose input is held (w changes at known times), and those that only samples read (w is needed at known
+times).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property, partial
+
+import numpy as np
+
+from fvsolve.assembly.control_rows import control_rows_of
+from fvsolve.errors import FvsolveError, listing
+from fvsolve.kernels import dtypes as rec
+from fvsolve.parts.control import PREFIX
+from fvsolve.solve.advance import hold
+from fvsolve.studies.linearise import linearise_at
+from fvsolve.studies.loops.open_loop import MAX_STATES, delay_blocks, refuse_limit, slope, state_limit_error
+from fvsolve.studies.operating_point import OperatingPoint, operating_point
+
+MOST_TICKS = 10_000  # samples in the common period
+RATIONAL = 10**6  # greatest denominator of a ratio of two periods
+SAME = 1e-9  # of the common period: times closer than this are the same
+ARRIVE, TICK, SEND = range(3)  # events, in their order at one time
+STABLE = 1e-13  # a spectral radius below 1 minus this is stable
+
+
+@dataclass(frozen=True)
+class LoopEvent:
+    """LoopEvent in the common period: at a time since its start [s], of a kind, of a control.
+
+    age : for ARRIVE, the register that has the arriving value, counted from the newest
+    """
+
+    time: float
+    kind: int
+    control: str
+    age: int = 0
+
+
+class SampledLoop:
+    """Loop of a control in a case with sampled controls; name : control at whose output the loop is cut.
+
+    Raises FvsolveError for a case that has no common period, and for delays of neither kind in the module docstring.
+    """
+
+    def __init__(self, case, name: str, at: float | None) -> None:
+        self.case, self.name = case, name
+        blocks = case.controls
+        self.sampled = {key: block.control for key, block in blocks.items() if block.control.period is not None}
+        if late := [key for key in self.sampled if blocks[key].control.kind == "delay"]:
+            raise FvsolveError(f"controls.{late[0]} is a delay with `period`. Expected a delay that acts at all times")
+        delays = [key for key, block in blocks.items() if block.control.kind == "delay"]
+        self.period, self.ticks = common_period(self.sampled)
+        own = f"{PREFIX}{name}.output"
+        probes = list(dict.fromkeys([own, *(f"{PREFIX}{key}.input" for key in delays)]))
+        self.point = operating_point(case, None, at, False, probes)
+        refuse_limit(self.point, name)
+        self.delays, self.flows = delay_blocks(self.point.model), {}
+        inputs = list(dict.fromkeys([own, *(f"{PREFIX}{key}.output" for key in (*self.sampled, *self.delays))]))
+        system = linearise_at(self.point, inputs, len(probes))
+        if len(system.states) > MAX_STATES:
+            raise state_limit_error(len(system.states))
+        self.a = system.a if isinstance(system.a, np.ndarray) else system.a.toarray()
+        # input of each delay, and output of the control : (row of C, entries of D by control)
+        controls = [name_of(text) for text in system.inputs]
+        self.signal = {
+            name_of(text): (row, dict(zip(controls, direct.tolist(), strict=True)))
+            for text, row, direct in zip(system.outputs, system.c, system.d, strict=False)
+        }
+        self.column = dict(zip(controls, system.b.T, strict=True))
+        held = [*self.delays, *([name] if name not in self.sampled and name not in self.delays else [])]
+        if held and name in held and name not in self.delays:
+            self.point = replace(self.point, model=hold(self.point.model, {own: float(self.point.outputs[
+                self.point.model.block_names.index(name)])}))  # fmt: skip
+        self.differences = without_idle_numbers(tick_differences(self.point, list(self.sampled), held))
+        self.events, self.registers = self.all_events()
+        n, self.places = len(self.a), {}
+        for key in self.sampled:
+            count = self.differences[key][0].shape[0]
+            self.places[key], n = n + np.arange(count), n + count
+        for key in self.delays:  # w, then registers from the newest
+            self.places[key], n = n + np.arange(1 + self.registers[key]), n + 1 + self.registers[key]
+        self.size = n
+
+    def feeds_states(self, key: str) -> bool:
+        """True if the output of a delay drives states, or another delay, between samples."""
+        others = any(abs(self.signal[other][1].get(key, 0.0)) > 0.0 for other in self.signal)
+        return bool(np.any(self.column[key])) or others
+
+    def is_held(self, key: str) -> bool:
+        """True if the input of a delay only changes at samples."""
+        row, direct = self.signal[key]
+        return not np.any(row) and not any(direct.get(other, 0.0) for other in self.delays)
+
+    def all_events(self) -> tuple[list[LoopEvent], dict[str, int]]:
+        """(events of the common period in their order, number of registers of each delay)."""
+        events, registers = [LoopEvent(time, TICK, key) for key, times in self.ticks.items() for time in times], {}
+        instants = sorted({self.within(time) for times in self.ticks.values() for time in times})
+        for key, tau in self.delays.items():
+            if self.is_held(key):
+                sends, arrivals = instants, [time + tau for time in instants]
+            elif not self.feeds_states(key):
+                sends, arrivals = [time - tau for time in instants], instants
+            else:
+                raise FvsolveError(f"controls.{key} delays what changes between samples, and drives what moves between "
+                                   "samples: such a loop has no finite map. Expected a delay at a sampled control, or "
+                                   "loops without samples")  # fmt: skip
+            ages = [1 + sum(count_within(send, arrival - tau, arrival, self.period) for send in sends)
+                    for arrival in arrivals]  # fmt: skip
+            events += [LoopEvent(time, ARRIVE, key, age) for time, age in zip(arrivals, ages, strict=True)]
+            events += [LoopEvent(time, SEND, key) for time in sends]
+            registers[key] = max(ages)
+        return sorted((replace(event, time=self.place(event)) for event in events), key=self.rank), registers
+
+    def rank(self, event: LoopEvent) -> tuple:
+        """Order of an event: time, kind, then order in which controls decide."""
+        names = self.point.model.block_names
+        return round(event.time / (SAME * self.period)), event.kind, names.index(event.control)
+
+    def within(self, time: float) -> float:
+        """Time in the common period [s]."""
+        time %= self.period
+        return 0.0 if time > self.period * (1.0 - SAME) else time
+
+    def place(self, event: LoopEvent) -> float:
+        """Time of an event since the sample of the control [s]: this sample ends the period, with what comes before it.
+
+        What comes at the same time after it, as it depends on the new output, begins the next period.
+        """
+        if self.name not in self.sampled:
+            return self.within(event.time)
+        time, names = self.within(event.time - self.ticks[self.name][0]), self.point.model.block_names
+        later = event.kind == TICK and names.index(event.control) > names.index(self.name)
+        return time if time > SAME * self.period or event.kind == SEND or later else self.period
+
+    # the map ------------------------------------------------------------------------------------------------
+
+    def factor(self, key: str, gain: float) -> float:
+        """Factor on the output of a control."""
+        return gain if key == self.name else 1.0
+
+    def flow(self, gain: float, length: float) -> np.ndarray:
+        """Map of z over a length of time without events [s], with a factor `gain` on the output of the control."""
+        from scipy.linalg import expm
+
+        if (gain, length) not in self.flows:
+            n, rates = len(self.a), np.zeros((self.size, self.size))
+            rates[:n, :n] = self.a
+            for key in (*self.sampled, *self.delays):
+                rates[:n, self.places[key][0]] += self.factor(key, gain) * self.column[key]
+            if self.name not in self.places:
+                rates[:n] += gain * np.outer(self.column[self.name], self.signal_row(self.name, gain))
+            self.flows[gain, length] = expm(rates * length)
+        return self.flows[gain, length]
+
+    def signal_row(self, key: str, gain: float) -> np.ndarray:
+        """Row of a signal, the input of a delay or the output of the control, as a function of z."""
+        row, (states, direct) = np.zeros(self.size), self.signal[key]
+        row[: len(self.a)] = states
+        for other, value in direct.items():
+            if other in self.places:
+                row[self.places[other][0]] += self.factor(other, gain) * value
+            elif other == self.name and key != self.name:
+                row += gain * value * self.signal_row(self.name, gain)
+        return row
+
+    def jump(self, event: LoopEvent, gain: float) -> np.ndarray:
+        """Map of z at an event, with a factor `gain` on the output of the control."""
+        matrix, places = np.eye(self.size), self.places[event.control]
+        if event.kind == ARRIVE:
+            matrix[places[0]] = 0.0
+            matrix[places[0], places[event.age]] = 1.0
+        elif event.kind == SEND:
+            matrix[places[1:]] = 0.0
+            matrix[places[2:], places[1:-1]] = 1.0
+            matrix[places[1]] = self.signal_row(event.control, gain)
+        else:
+            by_state, by_number = self.differences[event.control]
+            matrix[places] = 0.0
+            matrix[places, : len(self.a)] = by_state
+            for key, columns in by_number.items():
+                if key in self.places:
+                    scaled = columns.copy()
+                    scaled[:, 0] *= self.factor(key, gain)
+                    matrix[np.ix_(places, self.places[key][: columns.shape[1]])] += scaled
+                else:  # the output of the control, which is continuous
+                    matrix[places] += gain * np.outer(columns[:, 0], self.signal_row(self.name, gain))
+        return matrix
+
+    def matrix(self, gain: float = 1.0) -> np.ndarray:
+        """Map of z over the common period, with a factor `gain` on the output of the control."""
+        result, now = np.eye(self.size), 0.0
+        for event in self.events:
+            if event.time - now > SAME * self.period:
+                result, now = self.flow(gain, event.time - now) @ result, event.time
+            result = self.jump(event, gain) @ result
+        if self.period - now > SAME * self.period:
+            result = self.flow(gain, self.period - now) @ result
+        return result
+
+    @property
+    def acts_once(self) -> bool:
+        """True if the control is sampled once in the common period, so that its loop has a return ratio."""
+        return self.name in self.sampled and len(self.ticks[self.name]) == 1
+
+    @cached_property
+    def open_matrix(self) -> np.ndarray:
+        """Map of z with the loop open."""
+        return self.matrix(0.0)
+
+    @cached_property
+    def drive(self) -> np.ndarray:
+        """Change of z in a period by a held output of 1, of a control that is sampled once."""
+        place = self.places[self.name][0]
+        return (self.matrix(1.0) - self.open_matrix)[:, place]
+
+    def closed_matrix(self, gain: float) -> np.ndarray:
+        """Map of z as `matrix`; of a control that is sampled once it is linear in the gain."""
+        if not self.acts_once:
+            return self.matrix(gain)
+        result = self.open_matrix.copy()
+        result[:, self.places[self.name][0]] += gain * self.drive
+        return result
+
+    def ratio(self, w: np.ndarray) -> np.ndarray:
+        """Return ratio L(exp(j w h)) of a control that is sampled once in a period h; w : frequencies [rad/s]."""
+        place, z = self.places[self.name][0], np.exp(1j * np.asarray(w, float) * self.period)
+        matrices = z[:, None, None] * np.eye(self.size) - self.open_matrix
+        return -np.linalg.solve(matrices, np.broadcast_to(self.drive[:, None], (z.size, self.size, 1)))[:, place, 0]
+
+    def radius(self, gain: float) -> float:
+        """Spectral radius of the map."""
+        return float(np.max(np.abs(np.linalg.eigvals(self.closed_matrix(gain)))))
+
+    def gain_range(self) -> tuple[float | None, float | None]:
+        """Least and greatest factor on the loop between which it is stable, by bisection; None for an open end.
+
+        If the loop is not stable, the range is the nearest one that is; both are None without one.
+        """
+        from scipy.optimize import brentq
+
+        gains = np.concatenate([np.geomspace(1e-4, 1.0, 161), np.geomspace(1.0, 1e4, 161)[1:]])
+        stable = np.array([self.radius(gain) < 1.0 - STABLE for gain in gains])
+        if not stable.any():
+            return None, None
+        here = min(np.flatnonzero(stable), key=lambda k: abs(np.log(gains[k])))
+        first = here
+        while first > 0 and stable[first - 1]:
+            first -= 1
+        last = here
+        while last + 1 < stable.size and stable[last + 1]:
+            last += 1
+
+        def limit(inside: float, outside: float) -> float:
+            return float(
+                brentq(lambda gain: self.radius(gain) - 1.0, *sorted((inside, outside)), xtol=1e-15, rtol=1e-14)
+            )
+
+        low = limit(gains[first], gains[first - 1]) if first > 0 else None
+        return low, limit(gains[last], gains[last + 1]) if last + 1 < stable.size else None
+
+    def step_response(self, periods: int) -> tuple[np.ndarray, np.ndarray]:
+        """(times [s], response of L / (1 + L) at samples to a step of 1) of a control that is sampled once."""
+        place, z, values = self.places[self.name][0], np.zeros(self.size), []
+        for _ in range(periods):
+            values.append(-z[place])
+            z = self.open_matrix @ z + self.drive * (1.0 + z[place])
+        return self.period * np.arange(periods), np.array(values)
+
+
+def name_of(text: str) -> str:
+    """Name of a control in the name of one of its quantities, "controls.NAME.output"."""
+    return text.removeprefix(PREFIX).rpartition(".")[0]
+
+
+def common_period(sampled: dict) -> tuple[float, dict[str, list[float]]]:
+    """(common period of all sampled controls [s], times of the samples of each in it).
+
+    Raises FvsolveError for periods without a ratio of whole numbers, and for too many samples.
+    """
+    names = list(sampled)
+    first = sampled[names[0]].period
+    ratios = {name: Fraction(sampled[name].period / first).limit_denominator(RATIONAL) for name in names}
+    if odd := [name for name in names if abs(float(ratios[name]) * first / sampled[name].period - 1.0) > 1e-12]:
+        raise FvsolveError(f"the periods of {listing([names[0], odd[0]])} have no common period. Expected whole ratios")
+    whole = Fraction(1)
+    for ratio in ratios.values():
+        whole = Fraction(np.lcm(whole.numerator * ratio.denominator, ratio.numerator * whole.denominator),
+                         whole.denominator * ratio.denominator)  # fmt: skip
+    counts = {name: int(whole / ratio) for name, ratio in ratios.items()}
+    if sum(counts.values()) > MOST_TICKS:
+        raise FvsolveError(f"the common period of {listing(names)} has {sum(counts.values())} samples. Expected "
+                           f"{MOST_TICKS} or fewer")  # fmt: skip
+    ticks = {name: [sampled[name].offset + k * sampled[name].period for k in range(counts[name])] for name in names}
+    return float(whole) * first, ticks
+
+
+def count_within(time: float, begin: float, end: float, period: float) -> int:
+    """Number of the times `time` + k `period`, k whole, between two times, without these [s]."""
+    slack = SAME * period
+    return int(np.ceil((end - slack - time) / period) - np.floor((begin + slack - time) / period)) - 1
+
+
+def without_idle_numbers(differences: dict[str, tuple]) -> dict[str, tuple]:
+    """Result of `tick_differences` without numbers that affect only themselves, or that nothing else affects.
+
+    Such as the filter of a derivative in a PI, or the integral of a P. The output of a control stays.
+    """
+    used = {}
+    for key, (states, own) in differences.items():
+        others = [by_number[key] for other, (_, by_number) in differences.items() if other != key]
+        inner = own[key] - np.diag(np.diag(own[key]))
+        effect = np.any(np.vstack([inner, *others]) != 0.0, axis=0)
+        cause = np.any(np.hstack([states, inner, *(own[other] for other in own if other != key)]) != 0.0, axis=1)
+        used[key] = [j for j in range(states.shape[0]) if j == 0 or (effect[j] and cause[j])]
+    return {
+        key: (states[used[key]], {other: columns[np.ix_(used[key], used.get(other, range(columns.shape[1])))]
+                                  for other, columns in by_number.items()})
+        for key, (states, by_number) in differences.items()
+    }  # fmt: skip
+
+
+def tick_differences(point: OperatingPoint, sampled: list[str], others: list[str]) -> dict[str, tuple]:
+    """Derivatives of the numbers of each sampled control at one of its samples.
+
+    Result: name -> (matrix by the states, {name of a control: matrix by its numbers, or by its held output}). The
+    compiled functions that take samples are evaluated at deviations of two sizes (Richardson).
+    others : controls whose held outputs count too, such as delays
+    """
+    model = point.model
+    names, controls = model.block_names, model.tables.controls.copy()
+    rows = {name: controls[names.index(name)] for name in (*sampled, *others)}
+    for name in sampled:
+        controls["held"][names.index(name)] = np.nan
+    model = replace(model, tables=model.tables._replace(controls=controls))
+    sizes = {name: control_rows_of(type(model.case.controls[name].control)).sampled_numbers(
+        model.case.controls[name].control) for name in sampled}  # fmt: skip
+    numbers = {name: int(rows[name]["memory"]) + np.r_[0, 2 + np.arange(sizes[name])] for name in sampled}
+
+    def after(due: str, y: np.ndarray, discrete: np.ndarray, held: dict[str, float]) -> np.ndarray:
+        table = controls.copy()
+        for other, value in held.items():
+            table["held"][names.index(other)] += value
+        own = replace(model, tables=model.tables._replace(controls=table))
+        with own.run_data(point.armed) as data:
+            data.discrete[:] = discrete
+            for name in sampled:
+                row = rows[name]
+                count = (point.t - model.case.numerics.start - row["offset"]) / row["period"]
+                data.discrete[int(row["memory"]) + 1] = count if name == due else count + 1e6
+            _, out = data.evaluate(point.t, y, np.inf)
+            out[rec.STATUS] = rec.ARRIVED
+            own.functions.record(point.t, y, out, data.handle, np.zeros(len(model.tables.probes)))
+            return data.discrete[numbers[due]].copy()
+
+    y, base = point.y, point.discrete
+    result = {}
+    for due in sampled:
+        by_state = [slope(partial(after_state, after, due, y, base, j), model.scale[j]) for j in range(model.y_size)]
+        state = np.array(by_state).reshape(-1, len(numbers[due])).T
+        by_number = {}
+        for name in sampled:
+            columns = [slope(partial(after_number, after, due, y, base, place), max(1.0, abs(float(base[place]))))
+                       for place in numbers[name]]  # fmt: skip
+            by_number[name] = np.array(columns).T
+        for name in others:
+            size = max(1.0, abs(float(controls["held"][names.index(name)])))
+            by_number[name] = slope(partial(after_output, after, due, y, base, name), size)[:, None]
+        result[due] = state, by_number
+    return result
+
+
+def after_state(after, due: str, y: np.ndarray, discrete: np.ndarray, j: int, h: float) -> np.ndarray:
+    """Result of `after` with a deviation h of state j."""
+    return after(due, y + h * np.eye(1, y.size, j)[0], discrete, {})
+
+
+def after_number(after, due: str, y: np.ndarray, discrete: np.ndarray, place: int, h: float) -> np.ndarray:
+    """Result of `after` with a deviation h of a number of a control."""
+    return after(due, y, discrete + h * np.eye(1, discrete.size, place)[0], {})
+
+
+def after_output(after, due: str, y: np.ndarray, discrete: np.ndarray, name: str, h: float) -> np.ndarray:
+    """Result of `after` with a deviation h of a held output."""
+    return after(due, y, discrete, {name: h})

@@ -1,0 +1,363 @@
+"""Loops of controls: margins, ranges of gains and poles against closed expressions, hand-made maps and runs."""
+
+import json
+import tomllib
+from math import pi
+
+import numpy as np
+import pytest
+from parts.test_controls import pi as pi_control
+from parts.test_controls import tower
+from parts.test_delays import TAU, blocks, delayed_loop
+from parts.test_samples import LIMIT, sampled_plant
+from reference.folders import CASES
+from reference.scenes import WATER
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+import fvsolve
+from fvsolve.errors import FvsolveError
+from fvsolve.studies.loops.input_response import input_response
+from fvsolve.studies.loops.loop import ReturnRatio, loop, step_response
+
+CLOSE = 1e-9
+
+
+def lag(names, numerator, denominator, **more):
+    return {"type": "transfer-function", "input": f"controls.{names}", "numerator": numerator,
+            "denominator": denominator, **more}  # fmt: skip
+
+
+def two_lags(gain=5.0, delay=None, **more):
+    """Case of a PI with Ti 0.4 s on 1 / ((0.5 s + 1)(0.1 s + 1)), with a delay at its output."""
+    controls = {
+        "plant": lag("late" if delay else "hold", [1.0], [0.05, 0.6, 1.0]),
+        "hold": {"type": "pi", "input": "controls.plant", "setpoint": 0.0, "gain": gain, "integral_time": 0.4, **more},
+    }
+    if delay:
+        controls["late"] = {"type": "delay", "input": "controls.hold", "delay": delay}
+    return blocks(controls, 5.0)
+
+
+def expression(w, gain=5.0, delay=0.0):
+    """Return ratio of `two_lags`, by hand."""
+    s = 1j * w
+    return gain * (1.0 + 1.0 / (0.4 * s)) * np.exp(-s * delay) / ((0.5 * s + 1.0) * (0.1 * s + 1.0))
+
+
+def test_an_integrator_with_a_delay_is_unstable_from_the_gain_of_the_closed_form_on():
+    for cut in ("gain", "plant", "late"):
+        found = loop(delayed_loop(), cut)
+        assert found.stable and found.gain_range == (None, pytest.approx(pi / (2.0 * TAU), rel=CLOSE))
+        assert found.margins.gain_margin == pytest.approx(pi / (2.0 * TAU), rel=CLOSE)
+        assert found.margins.phase_margin == pytest.approx(90.0 - np.degrees(TAU), rel=CLOSE)
+        assert found.delays == (TAU,)
+
+
+def test_margins_of_a_pi_on_two_lags_are_those_of_python_control():
+    margins = loop(two_lags(), "hold").margins
+    assert margins.phase_margin == pytest.approx(48.16261330577572, rel=CLOSE)
+    assert margins.gain_crossover == pytest.approx(7.955433249, rel=CLOSE)
+    assert margins.stability_margin == pytest.approx(0.6568243170, rel=CLOSE)
+    assert margins.gain_margin is None and margins.gain_margin_db is None and margins.phase_crossover is None
+
+
+def test_margins_with_a_delay_are_roots_of_the_closed_expression():
+    margins = loop(two_lags(delay=0.05), "hold").margins
+    assert margins.gain_margin == pytest.approx(2.0202718515, abs=1e-10)
+    assert margins.phase_crossover == pytest.approx(12.6280569120, abs=1e-10)
+    assert margins.phase_margin == pytest.approx(25.3719758372, abs=1e-10)
+    assert margins.delay_margin == pytest.approx(0.0556631553, abs=1e-10)
+    crossing = brentq(lambda w: abs(expression(w, delay=0.05)) - 1.0, 5.0, 12.0, xtol=1e-14)
+    assert margins.gain_crossover == pytest.approx(crossing, rel=CLOSE)
+
+
+@pytest.mark.parametrize("delay", [None, 0.05, 0.3])
+def test_the_return_ratio_is_the_closed_expression_whatever_the_order_of_blocks(delay):
+    case = two_lags(2.0, delay)
+    for controls in (case["controls"], dict(reversed(case["controls"].items()))):
+        found = loop(case | {"controls": controls}, "hold")
+        assert found.ratio == pytest.approx(expression(found.frequency, 2.0, delay or 0.0), rel=1e-8, abs=1e-9)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.05, 0.3])
+def test_poles_solve_the_characteristic_equation(delay):
+    poles = loop(two_lags(2.0, delay or None), "hold").poles
+    for s in poles[:8]:
+        assert abs(1.0 + expression(-1j * s, 2.0, delay)) < 1e-6 * abs(expression(-1j * s, 2.0, delay)) + 1e-8
+    assert len(poles) == 3 if delay == 0.0 else len(poles) > 8
+
+
+@pytest.mark.parametrize(("gain", "stable"), [(5.0, True), (10.0, True), (10.2, False), (50.0, False)])
+def test_stability_with_a_delay_is_that_of_the_margins(gain, stable):
+    """The gain margin of 5 with 0.05 s is 2.0202718515, so the limit is a gain of 10.1013592575."""
+    found = loop(two_lags(gain, 0.05), "hold")
+    assert found.stable == stable
+    assert found.gain_range == (None, pytest.approx(10.1013592575 / gain, rel=CLOSE))
+    assert (found.poles[0].real < 0.0) == stable
+
+
+@pytest.mark.parametrize("delay", [None, 0.1])
+def test_an_unstable_plant_needs_a_least_gain(delay):
+    """1 / (s - 1) with the gain 2: stable from a factor of 1/2 on, and with a delay up to a greatest factor."""
+    controls = {"plant": lag("late" if delay else "hold", [1.0], [1.0, -1.0], initial=0.0),
+                "hold": {"type": "function", "inputs": {"x": "controls.plant"}, "formula": "-2*x"}}  # fmt: skip
+    high = None
+    if delay:
+        controls["late"] = {"type": "delay", "input": "controls.hold", "delay": delay}
+        # j w - 1 + 2 k exp(-j w d) = 0: tan(w d) = w, and 2 k = sqrt(1 + w^2)
+        w = brentq(lambda w: np.tan(w * delay) - w, 1.0, 0.5 * pi / delay - 1e-6, xtol=1e-14)
+        high = pytest.approx(0.5 * np.sqrt(1.0 + w * w), rel=CLOSE)
+    found = loop(blocks(controls, 1.0), "hold")
+    assert found.stable and found.gain_range == (pytest.approx(0.5, rel=CLOSE), high)
+
+
+def test_a_loop_that_no_gain_makes_stable_says_so():
+    controls = {"plant": lag("hold", [1.0], [1.0, 0.0, 0.0]),
+                "hold": {"type": "function", "inputs": {"x": "controls.plant"}, "formula": "2*x"}}  # fmt: skip
+    found = loop(blocks(controls, 1.0), "hold")
+    assert not found.stable and found.gain_range == (None, None)
+
+
+def test_two_delays_in_nested_loops_are_exact():
+    """x' = -x(t - 0.3) - 0.5 z, z = x(t - 0.8): poles solve s + exp(-0.3 s) + 0.5 exp(-0.8 s) = 0."""
+    controls = {
+        "state": lag("sum", [1.0], [1.0, 0.0], initial=0.0),
+        "sum": {"type": "function", "inputs": {"a": "controls.near", "b": "controls.far"}, "formula": "-a - 0.5*b"},
+        "near": {"type": "delay", "input": "controls.state", "delay": 0.3},
+        "far": {"type": "delay", "input": "controls.state", "delay": 0.8},
+    }
+    found = loop(blocks(controls, 1.0), "far")
+    for s in found.poles[:6]:
+        assert abs(s + np.exp(-0.3 * s) + 0.5 * np.exp(-0.8 * s)) < 1e-8 * abs(s)
+    s = 1j * found.frequency
+    assert found.ratio == pytest.approx(0.5 * np.exp(-0.8 * s) / (s + np.exp(-0.3 * s)), rel=1e-8, abs=1e-9)
+    assert found.stable and loop(blocks(controls, 1.0), "sum").stable
+
+
+def test_the_loop_of_a_level_is_that_of_its_tank_and_valves():
+    """k K (1 + 1 / (Ti s)) / (s + c), with k and c the slopes of the flows over the opening and over the level."""
+    case = tower({"control": "hold"}, 0.5, controls={"hold": pi_control(4.0, 0.8, 120.0)})
+    found = loop(case, "hold")
+    area, section, root = 20e-4, 2.0, np.sqrt(2.0 * 9.80665)
+    k = area * root * 4.0 / section  # at a drop of 16 m
+    c = area * root * (0.25 / (2.0 * 4.0) + 0.5 / (2.0 * 2.0)) / section
+    s = 1j * found.frequency
+    assert found.ratio == pytest.approx(k * 0.8 * (1.0 + 1.0 / (120.0 * s)) / (s + c), rel=1e-6)
+
+
+# sampled ------------------------------------------------------------------------------------------------------
+
+
+def test_a_sampled_pi_on_two_lags_is_unstable_from_the_known_gain_on():
+    found = loop(two_lags(1.0, period=0.1), "hold")
+    assert found.stable and found.period == 0.1
+    assert found.gain_range == (None, pytest.approx(LIMIT, rel=CLOSE))
+    assert found.margins.gain_margin == pytest.approx(LIMIT, rel=CLOSE)
+
+
+def hand_made(gain, parts):
+    """Spectral radius of a sampled PI on two lags, over parts of a period: (length [s], True if the new output acts).
+
+    z: states of the plant, integral, new output, last output; the controller reads the plant at the end of a period.
+    """
+    step = np.eye(5)
+    for length, is_new in parts:
+        a, b = sampled_plant(length)
+        part = np.eye(5)
+        part[:2, :2], part[:2, 3 if is_new else 4] = a, b
+        step = part @ step
+    control = np.zeros((5, 5))
+    control[:2, :2] = np.eye(2)
+    control[2] = [-gain * 0.1 / 0.4, 0.0, 1.0, 0.0, 0.0]
+    control[3] = control[2] + [-gain, 0.0, 0.0, 0.0, 0.0]
+    control[4, 3] = 1.0
+    return np.abs(np.linalg.eigvals(control @ step)).max()
+
+
+def test_a_sampled_pi_with_a_computing_time_has_the_limit_of_a_hand_made_map():
+    limit = brentq(lambda gain: hand_made(gain, [(0.04, False), (0.06, True)]) - 1.0, 1.0, 9.0, xtol=1e-13)
+    found = loop(two_lags(1.0, 0.04, period=0.1), "hold")
+    assert found.gain_range == (None, pytest.approx(limit, rel=CLOSE))
+    assert found.margins.gain_margin == pytest.approx(limit, rel=CLOSE)
+
+
+@pytest.mark.parametrize("delay", [0.1, 0.2])
+def test_a_delay_of_whole_periods_is_a_shift(delay):
+    """L(z) of the loop without a delay over z^k; found where the phase of L is -180 degrees."""
+    plain, late = loop(two_lags(1.0, period=0.1), "hold"), loop(two_lags(1.0, delay, period=0.1), "hold")
+    shifted = plain.ratio * np.exp(-1j * plain.frequency * delay)
+    assert late.ratio == pytest.approx(shifted, rel=1e-8, abs=1e-10)
+
+
+def test_a_delay_that_only_samples_read_has_the_map_of_an_earlier_sample():
+    """The controller reads the plant 0.04 s before each sample, so the same map in another order."""
+    case = two_lags(1.0, period=0.1)
+    case["controls"]["radio"] = {"type": "delay", "input": "controls.plant", "delay": 0.04}
+    case["controls"]["hold"]["input"] = "controls.radio"
+    computing = loop(two_lags(1.0, 0.04, period=0.1), "hold")
+    found = loop(case, "hold")
+    assert found.gain_range[1] == pytest.approx(computing.gain_range[1], rel=1e-8)
+    assert found.ratio == pytest.approx(computing.ratio, rel=1e-7, abs=1e-10)
+
+
+def test_two_periods_have_the_map_of_both():
+    """P control at 0.1 s of an integrator, whose setpoint another P control sets at 0.2 s from a second integrator."""
+    controls = {
+        "speed": lag("inner", [1.0], [1.0, 0.0], initial=0.0),
+        "place": lag("speed", [1.0], [1.0, 0.0], initial=0.0),
+        "outer": {"type": "pi", "input": "controls.place", "setpoint": 0.0, "gain": 1.0, "period": 0.2,
+                  "limits": [-9, 9]},
+        "inner": {"type": "pi", "input": "controls.speed", "setpoint": {"control": "outer"}, "gain": 4.0,
+                  "period": 0.1, "limits": [-9, 9]},
+    }  # fmt: skip
+    found = loop(blocks(controls, 2.0), "outer")
+
+    def radius(gain):
+        step = expm(0.1 * np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]))  # place, speed, force
+        inner = lambda z: z - np.array([0.0, 0.0, z[2] - 4.0 * (z[3] - z[1]), 0.0])  # noqa: E731
+        z = np.eye(4)
+        for k in range(2):
+            if k == 0:
+                z[3] = -gain * z[0]
+            z = np.apply_along_axis(inner, 0, z)
+            z[:3] = step @ z[:3]
+        return np.abs(np.linalg.eigvals(z)).max()
+
+    limit = brentq(lambda gain: radius(gain) - 1.0, 1.0, 20.0, xtol=1e-13)
+    assert found.period == 0.2 and found.gain_range == (None, pytest.approx(limit, rel=CLOSE))
+
+
+def test_the_sampled_loop_of_the_long_main_grows_in_runs_from_one_percent_above_its_range_on():
+    case = tomllib.loads((CASES / "digital-pressure.toml").read_text(encoding="utf-8"))
+    found = loop(case, "pressure")
+    assert found.stable and found.margins.gain_margin == pytest.approx(found.gain_range[1], rel=1e-8)
+    case.pop("expect")
+    case["nodes"]["town"]["demand"]["value"] = ["30 l/s", "30.001 l/s"]
+    for factor, grows in ((0.99, False), (1.01, True)):
+        gain = 0.001 * factor * found.gain_range[1]
+        run = fvsolve.run(case, {"controls.pressure.gain": gain, "numerics.end": 1200.0})
+        swing, t = np.abs(np.array(run["town.head"]) - 50.0), np.array(run.t)
+        assert (swing[t > 1000.0].max() > swing[(t > 300.0) & (t < 500.0)].max()) == grows
+
+
+# steps, faults and the command ------------------------------------------------------------------------------------
+
+
+def test_the_step_response_is_that_of_the_closed_loop():
+    times, values = step_response(loop(two_lags(), "hold"))
+    run = fvsolve.run(two_lags() | {"numerics": {"end": 3.0}, "output": {"every": 0.02, "probes": [
+        "controls.plant.output"]}}, {"controls.hold.setpoint": {"time": [0.0], "value": [0.0]}})  # fmt: skip
+    assert run.ok
+    closed = np.array([[0.0, 1.0, 0.0], [-20.0 * 6.0, -12.0, 20.0], [-12.5, 0.0, 0.0]])  # x, x', integral
+    exact = [np.linalg.solve(closed, (expm(closed * t) - np.eye(3)) @ [0.0, 100.0, 12.5])[0] for t in times[:200:20]]
+    assert values[:200:20] == pytest.approx(exact, abs=1e-6)
+
+
+def test_the_step_response_of_a_sampled_loop_is_that_of_its_difference_equation():
+    times, values = step_response(loop(two_lags(2.0, period=0.1), "hold"))
+    (ad, bd), x, integral, expected = sampled_plant(0.1), np.zeros(2), 0.0, [0.0]
+    for _ in range(30):
+        x = ad @ x + bd * (1.0 - expected[-1])
+        integral += 2.0 * 0.1 / 0.4 * x[0]
+        expected.append(2.0 * x[0] + integral)
+    assert times[:31] == pytest.approx(0.1 * np.arange(31)) and values[:31] == pytest.approx(expected, abs=1e-9)
+
+
+def test_faults_of_loops_are_named():
+    relay = {"type": "relay", "input": "tower.level", "on": 3.9, "off": 4.1, "initial": 0}
+    level = pi_control(4.0, 0.8, 120.0)
+    case = tower({"control": "fill"}, {"control": "hold"}, controls={"fill": relay, "hold": level | {"initial": 1.0}})
+    with pytest.raises(FvsolveError, match="is a relay"):
+        loop(case, "fill")
+    with pytest.raises(FvsolveError, match='no control named "hol"; did you mean "hold"'):
+        loop(case, "hol")
+    with pytest.raises(FvsolveError, match="no .controls"):
+        loop("two-tanks", "hold")
+    sampled = delayed_loop()
+    sampled["controls"]["gain"]["period"] = 0.1
+    sampled["controls"]["inner"] = {"type": "delay", "input": "controls.plant", "delay": 0.2}
+    sampled["controls"]["other"] = lag("inner", [1.0], [1.0, 1.0])
+    with pytest.raises(FvsolveError, match="controls.inner delays what changes between samples"):
+        loop(sampled, "gain")
+
+
+def test_the_command_writes_margins_and_pictures(fvs, tmp_path):
+    code, out, _ = fvs("loop", "digital-pressure", "pressure", "--out", tmp_path)
+    assert code == 0 and "closed loop: stable" in out and "below 1.78" in out
+    for kind in ("bode", "nyquist", "step", "locus"):
+        assert (tmp_path / f"pressure.loop.{kind}.png").stat().st_size > 5000
+    code, out, _ = fvs("loop", "tank-level-pi", "level", "--json", "--out", tmp_path / "level")
+    found = json.loads(out)
+    names = ["case", "control", "when", "stable", "gain_margin", "gain_margin_db", "phase_margin", "delay_margin",
+             "stability_margin", "gain_crossover", "phase_crossover", "stability_crossover", "gain_range", "delays",
+             "period", "poles", "frequency", "real", "imaginary"]  # fmt: skip
+    assert code == 0 and names == [name for name in found if name not in ("moving", "directory")]
+    assert found["gain_range"] == [None, None] and found["period"] is None and found["gain_margin"] is None
+
+
+# delay lines and responses ----------------------------------------------------------------------------------------
+
+
+def matched_pipe(gain=0.5, **main):
+    """Integral control of the pressure behind a frictionless pipe by that of its reservoir; the valve matches the pipe.
+
+    2 dp / q = rho a / A, so p(L) = exp(-s tau) p(0).
+    """
+    area, flow = np.pi / 4.0 * 0.3**2, 0.05
+    drop, base = 0.5 * flow * 1000.0 * 1000.0 / area, 2e5
+    nodes = {"lake": {"type": "reservoir", "pressure": {"control": "hold"}, "elevation": 0.0},
+             "end": {"type": "junction", "elevation": 0.0},
+             "outlet": {"type": "reservoir", "pressure": base, "elevation": 0.0}}  # fmt: skip
+    links = {"main": {"type": "pipe", "from": "lake", "to": "end", "length": 1000.0, "diameter": 0.3,
+                      "wave_speed": 1000.0, "friction": {"model": "none"}, "cells": 20,
+                      "pipe_model": "delay-line"} | main,
+             "valve": {"type": "valve", "from": "end", "to": "outlet", "discharge_coefficient": 1.0, "opening": 1.0,
+                       "area": flow / np.sqrt(2.0 * drop / 1000.0)}}  # fmt: skip
+    controls = {"hold": {"type": "transfer-function", "input": "controls.error", "numerator": [gain],
+                         "denominator": [1.0, 0.0], "initial": base + drop, "limits": [5e4, 1e7]},
+                "error": {"type": "function", "inputs": {"p": "nodes.end.pressure"},
+                          "formula": f"where(t < 1, 0, 100) + {base + drop!r} - p"}}  # fmt: skip
+    return {"schema": 1, "fluid": WATER, "nodes": nodes, "links": links, "controls": controls,
+            "numerics": {"end": 60.0, "rtol": 1e-7}, "output": {"every": 0.05,
+            "probes": ["nodes.end.pressure"]}}  # fmt: skip
+
+
+def test_integral_control_through_a_matched_pipe_is_unstable_from_the_gain_of_the_closed_form_on():
+    found = loop(matched_pipe(), "hold")
+    assert found.stable and found.gain_range == (None, pytest.approx(pi, rel=CLOSE))  # times the gain of 1/2
+    assert found.delays == (1.0, 1.0) and found.when == "the start"
+    for factor, grows in ((0.99, False), (1.01, True)):
+        run = fvsolve.run(matched_pipe(factor * pi / 2.0))
+        swing, t = np.abs(np.array(run["nodes.end.pressure"]) - run["nodes.end.pressure"][0] - 100.0), np.array(run.t)
+        assert run.ok and (swing[t > 50.0].max() > swing[(t > 20.0) & (t < 30.0)].max()) == grows
+
+
+def test_a_delay_line_with_friction_is_close_to_many_cells():
+    friction = {"friction": {"model": "steady", "factor": 0.03}}
+    line = loop(matched_pipe(**friction), "hold")
+    cells = loop(matched_pipe(**friction, pipe_model="finite-volume", cells=120), "hold")
+    assert line.gain_range[1] == pytest.approx(cells.gain_range[1], rel=2e-3)
+    assert line.margins.phase_margin == pytest.approx(cells.margins.phase_margin, rel=1e-3)
+
+
+def test_a_response_is_the_transfer_function_from_input_to_probe():
+    """Setpoint to level under PI: T = L / (1 + L); and through a delay: times exp(-s tau)."""
+    case = tower({"control": "hold"}, 0.5, controls={"hold": pi_control(4.0, 0.8, 120.0),
+                 "late": {"type": "delay", "input": "tower.level", "delay": 3.0}})  # fmt: skip
+    found = input_response(case, "controls.hold.setpoint", "tower.level")
+    ratio = ReturnRatio(loop(case, "hold").system)(found.w)
+    assert found.h == pytest.approx(ratio / (1.0 + ratio), rel=1e-6, abs=1e-9)
+    late = input_response(case, "controls.hold.setpoint", "controls.late.output")
+    own = ReturnRatio(loop(case, "hold").system)(late.w)
+    assert late.h == pytest.approx(np.exp(-3j * late.w) * own / (1.0 + own), rel=1e-6, abs=1e-9)
+
+
+def test_the_response_command_names_input_and_output(fvs, tmp_path):
+    code, out, _ = fvs("response", "tank-level-pi", "--input", "controls.level.setpoint", "--output", "tower.level",
+                       "--json", "--out", tmp_path)  # fmt: skip
+    found = json.loads(out)
+    assert code == 0 and found["port"] is None and found["verdict"] is None
+    assert (found["input"], found["output"]) == ("controls.level.setpoint", "tower.level")
+    assert found["real"][0] == pytest.approx(1.0, abs=1e-4) and len(list(tmp_path.glob("*.png"))) == 1
+    assert fvs("response", "tank-level-pi", "--input", "inlet.opening")[0] == 2
