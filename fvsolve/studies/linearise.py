@@ -142,9 +142,10 @@ def linearise(
     return linearise_at(point, inputs, len(outputs) if outputs is not None else len(point.model.probes))
 
 
-def linearise_at(at: OperatingPoint, inputs=(), outputs: int = 0) -> Linear:
+def linearise_at(at: OperatingPoint, inputs=(), outputs: int = 0, hold_delays: bool = False) -> Linear:
     """Linearise about an operating point, with named inputs; outputs are the first `outputs` of its probes.
 
+    hold_delays : True to hold the outputs of delays, for step limits; else a delay that is not an input is refused
     A loop is cut at the output of a control that is an input: its probe is then the output as the control computes it.
     Raises FvsolveError for an unknown input, and for a state, input or output without a derivative.
     """
@@ -157,7 +158,8 @@ def linearise_at(at: OperatingPoint, inputs=(), outputs: int = 0) -> Linear:
     refuse_limiter(model)
     controls = model.tables.controls
     delays = [f"controls.{model.block_names[k]}" for k in np.flatnonzero(controls["delay"] > 0.0)]
-    if uncut := [name for name in delays if f"{name}.output" not in inputs]:
+    uncut = [name for name in delays if f"{name}.output" not in inputs]
+    if uncut and not hold_delays:
         text = f"{listing(uncut)} of type delay needs earlier inputs, so no matrix A describes it"
         raise FvsolveError(f'{text}; cut the loop there, with the input "{uncut[0]}.output"')
     cut = {name: input_value(at, name, available[name]) for name in inputs if available[name].control >= 0}

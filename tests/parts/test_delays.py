@@ -13,6 +13,7 @@ from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.studies import stability
 from fvsolve.studies.linearise import linearise
 
 EXACT = 1e-9
@@ -218,6 +219,15 @@ def test_what_needs_all_inputs_in_the_state_is_refused():
         linearise(delayed_loop(), inputs=["controls.gain.output"])
     cut = linearise(delayed_loop(2.0), inputs=["controls.late.output"], outputs=["controls.plant.output"])
     assert cut.a == pytest.approx(np.zeros((1, 1))) and cut.b * cut.c == pytest.approx(-2.0 * np.ones((1, 1)))
+
+
+def test_step_limits_hold_delays():
+    """A delay acts no quicker than its delay, so the limit of the main is that without it."""
+    late = {"controls.pressure.gain": 1e-9}
+    rows = [stability("digital-pressure", ["upwind5"], ["rk4"], steps=100, set=late | more).rows[0]
+            for more in ({}, {"controls.radio.delay": 5.0})]  # fmt: skip
+    assert rows[0].predicted == pytest.approx(rows[1].predicted, rel=1e-12)
+    assert rows[0].measured == pytest.approx(rows[0].predicted, rel=0.05)
 
 
 @pytest.mark.parametrize(

@@ -66,7 +66,7 @@ class RealRuns:
         reach = STAGE_REACH * self.threshold * np.sqrt(y.size)
 
         def nonlinearity(z: np.ndarray, width: float) -> float:
-            change = self.at.model.rhs(self.at.t, self.at.y + width * z) - base
+            change = self.at.model.evaluate(self.at.t, self.at.y + width * z)[0] - base
             slope = a @ z
             return float(np.max(np.abs(change / width - slope))) / (np.max(np.abs(slope)) or 1.0)
 

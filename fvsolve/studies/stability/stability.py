@@ -86,7 +86,7 @@ class LinearSystem:
 
     def __init__(self, at: OperatingPoint) -> None:
         self.at = at
-        self.linear: Linear = linearise_at(at)
+        self.linear: Linear = linearise_at(at, hold_delays=True)
         self.full_form = energy_form(at.model, at.y)
         self.form: EnergyForm = self.full_form.suited_to(self.linear.a)
         self.e = self.form.seen(self.linear.a)
