@@ -61,7 +61,7 @@ def loop_text(result, folder: Path, stem: str) -> Iterator:
     yield f"{result.case} at {result.when}: loop of controls.{result.control}"
     if result.moving > 1e-9:
         yield "  not a steady state; schedules are held at their values of that time"
-    words = {True: "stable", False: "not stable", None: "undecided: its delays alone grow at high frequencies"}
+    words = {True: "stable", False: "not stable", None: "undecided, poles are too close to the imaginary axis"}
     yield f"closed loop: {words[result.stable]}", "bold"
     if result.delays:
         yield f"  delays: {', '.join(f'{delay:.4g} s' for delay in result.delays)}, exact"

@@ -80,7 +80,10 @@ def operating_point(
     end = case.numerics.end if at is None else max(case.numerics.end, float(at))
     model = study_model(case, {"output.probes": names, "numerics.end": end})
     if model.y_size == 0:
-        raise FvsolveError(f"{case.name} has no state: every pressure in it is given; add a pipe, tank or chamber")
+        remedy = "every pressure in it is given; add a pipe, tank or chamber"
+        if not case.nodes:
+            remedy = "add a control with a state, such as a transfer-function"
+        raise FvsolveError(f"{case.name} has no state: {remedy}")
     t, y, armed, outputs, discrete = _state_at(model, at)
     sides = {time: jump for time, jump in model.breaks if time == t}
     side = "before" if before else "after"

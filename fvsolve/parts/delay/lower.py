@@ -19,6 +19,9 @@ class DelayRows(StaticRows, kind="delay"):
     def value(self, control, start):
         return start.inputs[0]
 
+    def output_rate(self, control, start, rates):
+        return rates[0] if control.initial is None else self.residual(control, start)
+
     def begin(self, control, start, numbers):
         balanced = control.initial is None
         numbers[START] = start.output if balanced else start.inputs[0]

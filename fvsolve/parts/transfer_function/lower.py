@@ -36,7 +36,9 @@ class TransferFunctionRows(ControlRows, kind="transfer-function"):
         return control.numerator[-1] / control.denominator[-1] * start.inputs[0] - start.output
 
     def output_rate(self, control, start, rates):
-        return 0.0 if control.integrates else control.numerator[-1] / control.denominator[-1] * rates[0]
+        if control.integrates or control.initial is not None:
+            return self.residual(control, start)
+        return control.numerator[-1] / control.denominator[-1] * rates[0]
 
     def begin(self, control, start, numbers):
         numbers[law.START], x = start.output, start.inputs[0]

@@ -16,8 +16,9 @@ STEEP = 0.5  # change of the phase between two frequencies above which the grid 
 MOST_ROUNDS = 40  # of refinement
 AXIS = 1e-9  # of the fastest rate: poles closer to the imaginary axis count as stable
 FAR = 1e3  # ratio of the highest frequency to the fastest rate
-CHEBYSHEV_POINTS = 24  # of each delay, for estimates of poles
+CHEBYSHEV_POINTS = 48  # of each delay, for estimates of poles
 NEWTON_TURNS = 30
+ENDLESS = 10**6  # number of unstable poles of delays that grow at all high frequencies
 NEAR = 0.05  # greatest relative distance of a pole from its estimate
 POLE_TOLERANCE = 1e-12  # relative change of a pole at which Newton has converged
 
@@ -100,7 +101,7 @@ class DelaySystem:
         return least if np.isfinite(least) else 1.0
 
     def unstable_count(self) -> int | None:
-        """Number of poles in the right half plane, with all inputs zero; None if they are endless or undecided.
+        """Number of poles in the right half plane, with all inputs zero, at most ENDLESS; None if it is undecided.
 
         Without delays these are eigenvalues. With delays it is the number of zeros of det(1 - P(s) E(s)), where P is
         the transfer matrix from w to s, and E = exp(-s tau). By the argument principle it is the number of unstable
@@ -111,9 +112,9 @@ class DelaySystem:
         if not self.delays.size:
             return own
         winding = self.winding(shift)
-        if winding is None or abs(winding - round(winding)) > 0.1:
-            return None
-        return own - round(winding)
+        if winding is None:
+            return ENDLESS
+        return None if abs(winding - round(winding)) > 0.1 else own - round(winding)
 
     def loop_matrices(self, s: np.ndarray) -> np.ndarray:
         """P(s) E(s) of `unstable_count` : complex128[len(s), delays, delays]."""
@@ -185,15 +186,17 @@ class DelaySystem:
     def poles(self, most: int) -> np.ndarray:
         """Poles with all inputs zero [1/s], by falling real part: all without delays, else at most `most` of them.
 
-        With delays they are estimated by Chebyshev collocation of the delays, then solved by Newton's method.
+        With delays they are estimated by Chebyshev collocation of the delays, then solved by Newton's method, up to the
+        size from which the collocation does not resolve them; poles farther out are farther left.
         """
         if not self.delays.size:
             return sorted_poles(np.linalg.eigvals(self.a).astype(complex))
         found: list[complex] = []
-        for guess in sorted_poles(self.collocated().rates)[: 4 * most]:
+        estimates = self.collocated().rates
+        for guess in estimates[np.argsort(np.abs(estimates))]:
             pole = self.newton(complex(guess))
             if pole is None or abs(pole - guess) > NEAR * abs(guess):  # beyond the resolution of the collocation
-                continue
+                break
             if all(abs(pole - other) > 1e-8 * (abs(pole) + self.slowest) for other in found):
                 found.append(pole)
         return sorted_poles(np.array(found))[:most]

@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.studies.loops.delay_system import DelaySystem, sorted_poles
 from fvsolve.studies.loops.margins import Margins, find_margins
 from fvsolve.studies.loops.open_loop import block_of, open_loop
-from fvsolve.studies.loops.sampled import STABLE, SampledLoop
+from fvsolve.studies.loops.sampled import STABLE, SampledLoop, gain_within
 from fvsolve.studies.result_table import PlainData, plain
 from fvsolve.validation import NUMBER, TABLE, TEXT, validated
 
@@ -20,6 +20,9 @@ PER_TURN = 40  # frequencies in each turn of the phase by the longest delay
 MOST_TURNS = 500  # of a delay
 SMALL = 1e-4  # of |L|: turns of a delay end where |L| stays below
 MOST_POLES = 24  # of a loop with delays
+MOST_DECADES = 9  # added at both ends, where |L| is 1 beyond the rates
+# of the table of a sampled loop: lowest frequency, relative to that of half a period; logarithmic and linear points
+LOWEST, LOW_POINTS, LINEAR_POINTS = 1e-9, 1800, 800
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +80,8 @@ def loop(case, name: str, at: float | None = None, set: Mapping | None = None) -
     system, point = open_loop(case, name, at)
     ratio = ReturnRatio(system)
     w = frequencies(system, ratio)
-    margins, gains = find_margins(ratio, w)
+    at_zero = value_at_zero(system)
+    margins, gains = find_margins(ratio, w, {} if at_zero is None else {0.0: complex(at_zero)})
     gain_range, stable = stable_gains(system, gains)
     closed = system.closed()
     return Loop(
@@ -92,21 +96,20 @@ def sampled_loop(case, name: str, at: float | None) -> Loop:
     There are margins if the control is sampled once in this period; the range of the gain is found in every case.
     """
     sampled = SampledLoop(case, name, at)
-    w, values = np.zeros(0), np.zeros(0, complex)
+    w, values, gains = np.zeros(0), np.zeros(0, complex), np.zeros(0)
     margins = Margins(*[None] * len(fields(Margins)))
     if sampled.acts_once:
         fastest = np.pi / sampled.period
-        w = np.unique(
-            np.concatenate([np.geomspace(1e-4 * fastest, fastest, 4 * PER_DECADE), np.linspace(0, fastest, 800)])
-        )
-        w = w[w > 0.0]
-        margins, _ = find_margins(sampled.ratio, w)
+        parts = [np.geomspace(LOWEST * fastest, fastest, LOW_POINTS), np.linspace(0.0, fastest, LINEAR_POINTS)]
+        w = np.unique(np.concatenate(parts))[1:-1]  # without both ends
+        ends = {at: value for at, value in zip((0.0, fastest), sampled.real_ends(), strict=True) if value is not None}
+        margins, gains = find_margins(sampled.ratio, w, ends)
         values = sampled.ratio(w)
     poles = sorted_poles(np.linalg.eigvals(sampled.closed_matrix(1.0)).astype(complex))
     poles = poles[np.argsort(-np.abs(poles), kind="stable")]
     point = sampled.point
     return Loop(
-        case.name, name, point.when, sampled.radius(1.0) < 1.0 - STABLE, margins, sampled.gain_range(),
+        case.name, name, point.when, sampled.radius(1.0) < 1.0 - STABLE, margins, sampled.gain_range(gains),
         tuple(sampled.delays.values()), sampled.period, poles, w, values, sampled,
         float(np.max(np.abs(point.rate) / point.model.scale)),
     )  # fmt: skip
@@ -125,6 +128,10 @@ class ReturnRatio:
 def frequencies(system: DelaySystem, ratio: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     """Frequencies of the table [rad/s]: logarithmic, at resonances, and dense where a delay turns the phase."""
     low, high = system.slowest * 10.0**-DECADES, system.fastest * 10.0**DECADES
+    size = lambda w: float(np.abs(ratio(np.array([w])))[0])  # noqa: E731
+    for _ in range(MOST_DECADES):  # until |L| is 1 on the way
+        low /= 10.0 if size(low) < 1.0 < size(low * 10.0**-MOST_DECADES) else 1.0
+        high *= 10.0 if size(high) > 1.0 > size(high * 10.0**MOST_DECADES) else 1.0
     grid = np.geomspace(low, high, int(PER_DECADE * np.log10(high / low)) + 1)
     resonances = np.abs(system.rates.imag)
     parts = [grid, resonances[(low < resonances) & (resonances < high)]]
@@ -171,18 +178,22 @@ def distance(low: float, high: float) -> float:
 
 def ends(system: DelaySystem) -> list[float]:
     """Gains 1 / |L| at the frequency 0 and at infinity, where L is real and negative and finite."""
-    slow = 1e-6 * system.slowest
-    near, nearer, zero = -system.response(np.array([slow + 0j, 0.5 * slow + 0j, 0j]))[:, 0, 0].real
-    values = [] if abs(nearer) > 1.5 * abs(near) else [zero]  # without a pole at 0
+    values = [value_at_zero(system) or 0.0]
     if not system.delays.size:
         values.append(-system.d[0, 0])
     return [float(-1.0 / value) for value in values if value < 0.0]
 
 
+def value_at_zero(system: DelaySystem) -> float | None:
+    """L at the frequency 0; None with a pole there."""
+    slow = 1e-6 * system.slowest
+    near, nearer, zero = -system.response(np.array([slow + 0j, 0.5 * slow + 0j, 0j]))[:, 0, 0].real
+    return None if abs(nearer) > 1.5 * abs(near) or not np.isfinite(zero) else float(zero)
+
+
 def is_stable(system: DelaySystem, low: float, high: float) -> bool | None:
     """True if the closed loop is stable with gains between two limits."""
-    middle = np.sqrt(low * high) if low > 0.0 and np.isfinite(high) else 0.5 * high if np.isfinite(high) else 2.0 * low
-    return is_stable_at(system, float(middle) if middle > 0.0 else 1.0)
+    return is_stable_at(system, gain_within(low, high))
 
 
 def is_stable_at(system: DelaySystem, gain: float) -> bool | None:

@@ -28,6 +28,7 @@ MOST_TICKS = 10_000  # samples in the common period
 RATIONAL = 10**6  # greatest denominator of a ratio of two periods
 SAME = 1e-9  # of the common period: times closer than this are the same
 ARRIVE, TICK, SEND = range(3)  # events, in their order at one time
+SINGULAR = 1e12  # condition number of z - M above which L has a pole at z
 STABLE = 1e-13  # a spectral radius below 1 minus this is stable
 
 
@@ -239,32 +240,46 @@ class SampledLoop:
         """Spectral radius of the map."""
         return float(np.max(np.abs(np.linalg.eigvals(self.closed_matrix(gain)))))
 
-    def gain_range(self) -> tuple[float | None, float | None]:
-        """Least and greatest factor on the loop between which it is stable, by bisection; None for an open end.
+    def real_ends(self) -> tuple[complex | None, complex | None]:
+        """L at z = 1 and at z = -1, of a control that is sampled once; None for a pole there."""
+        place, result = self.places[self.name][0], []
+        for z in (1.0, -1.0):
+            matrix = z * np.eye(self.size) - self.open_matrix
+            singular = np.linalg.cond(matrix) > SINGULAR
+            result.append(None if singular else complex(-np.linalg.solve(matrix, self.drive)[place]))
+        return result[0], result[1]
 
-        If the loop is not stable, the range is the nearest one that is; both are None without one.
+    def gain_range(self, limits: np.ndarray) -> tuple[float | None, float | None]:
+        """Least and greatest factor on the loop between which it is stable; None for an open end.
+
+        limits : gains at which a pole may cross the unit circle, of a control that is sampled once. For another control
+        they are found by bisection between 1e-6 and 1e6. If the loop is not stable, the range is the nearest one that
+        is; both are None without one.
         """
-        from scipy.optimize import brentq
-
-        gains = np.concatenate([np.geomspace(1e-4, 1.0, 161), np.geomspace(1.0, 1e4, 161)[1:]])
-        stable = np.array([self.radius(gain) < 1.0 - STABLE for gain in gains])
-        if not stable.any():
+        if not self.acts_once:
+            gains = np.concatenate([np.geomspace(1e-6, 1.0, 241), np.geomspace(1.0, 1e6, 241)[1:]])
+            stable = [self.radius(gain) < 1.0 - STABLE for gain in gains]
+            limits = [self.limit(*gains[k : k + 2]) for k in range(gains.size - 1) if stable[k] != stable[k + 1]]
+        bounds = [0.0, *sorted({float(limit) for limit in limits}), np.inf]
+        inside = [gain_within(low, high) for low, high in zip(bounds, bounds[1:], strict=False)]
+        stable = [self.radius(gain) < 1.0 - STABLE for gain in inside]
+        if not any(stable):
             return None, None
-        here = min(np.flatnonzero(stable), key=lambda k: abs(np.log(gains[k])))
+        here = min((k for k in range(len(stable)) if stable[k]), key=lambda k: (
+            not bounds[k] <= 1.0 < bounds[k + 1], abs(np.log(inside[k]))))  # fmt: skip
         first = here
         while first > 0 and stable[first - 1]:
             first -= 1
-        last = here
-        while last + 1 < stable.size and stable[last + 1]:
-            last += 1
+        while here + 1 < len(stable) and stable[here + 1]:
+            here += 1
+        low, high = bounds[first], bounds[here + 1]
+        return low if low > 0.0 else None, high if high < np.inf else None
 
-        def limit(inside: float, outside: float) -> float:
-            return float(
-                brentq(lambda gain: self.radius(gain) - 1.0, *sorted((inside, outside)), xtol=1e-15, rtol=1e-14)
-            )
+    def limit(self, low: float, high: float) -> float:
+        """Gain between two others at which the spectral radius is 1."""
+        from scipy.optimize import brentq
 
-        low = limit(gains[first], gains[first - 1]) if first > 0 else None
-        return low, limit(gains[last], gains[last + 1]) if last + 1 < stable.size else None
+        return float(brentq(lambda gain: self.radius(gain) - 1.0, low, high, xtol=1e-15, rtol=1e-14))
 
     def step_response(self, periods: int) -> tuple[np.ndarray, np.ndarray]:
         """(times [s], response of L / (1 + L) at samples to a step of 1) of a control that is sampled once."""
@@ -273,6 +288,13 @@ class SampledLoop:
             values.append(-z[place])
             z = self.open_matrix @ z + self.drive * (1.0 + z[place])
         return self.period * np.arange(periods), np.array(values)
+
+
+def gain_within(low: float, high: float) -> float:
+    """Gain between two limits, 0 and infinity included."""
+    if high == np.inf:
+        return 2.0 * low or 1.0
+    return float(np.sqrt(low * high)) if low > 0.0 else 0.5 * high
 
 
 def name_of(text: str) -> str:
