@@ -18,11 +18,13 @@ CAPACITY, FLAGS, BEGINS, BREAK_TIME, POINTS = range(5)
 """Header: entries of a block for which there is space; event flags of the last entry as one number; 1 if the next entry
 is at a break of a schedule; time of the last break of an output, by an arrival or a sample; numbers of the entries in
 use."""
-START, BEFORE = 0, 1
-"""Numbers of a block: output at which the input has its value of the start; change from it before the first input."""
+START, BEFORE, SMALL = 0, 1, 2
+"""Numbers of a block: output at which the input has its value of the start; change from it before the first input; size
+of a small change of the input."""
 COUNT, ARRIVED, NEXT, GREATEST, BREAK_LEVEL, HEAD = range(6)
 """Head: number of entries so far; first entry after the last break that has arrived, and after the next one to arrive,
--1 for none; greatest change so far; level of the break that the last break of an output causes; size of the head."""
+-1 for none; greatest change so far, at least a small change; level of the break that the last break of an output
+causes; size of the head."""
 MOST_POINTS = 6
 HEADER = POINTS + MOST_POINTS  # size of the header
 ENTRY = 3  # numbers of an entry
@@ -193,7 +195,8 @@ def record_inputs(t, out, tables):
             elif caused and histories[at + BREAK_LEVEL] <= LAST_LEVEL:
                 level = max(KINK, histories[at + BREAK_LEVEL])
             change = out[tables.layout[0]["control"] + 2 * k + 1] - tables.floats[control["starts"]]
-            store_input(histories, at, t, change, level, tables.floats[control["data"] + BEFORE])
+            before, small = tables.floats[control["data"] + BEFORE], tables.floats[control["data"] + SMALL]
+            store_input(histories, at, t, change, level, before, small)
             limit = accurate_step(histories, at, tables.settings[0]["tolerance"])
             longest = limit if longest == 0.0 else min(longest, limit)
     histories[FLAGS], histories[BEGINS], out[LONGEST] = flags, 0.0, longest
@@ -204,7 +207,7 @@ def accurate_step(histories, at, tolerance):
     """Longest next step for which the error between two entries is within a tolerance [s]; FAR for no limit.
 
     The error of a polynomial through six entries is D times the product of their distances from the time. D is the
-    divided difference of the last seven. The error is relative to the greatest change so far.
+    divided difference of the last seven. The error is relative to the greatest change so far, or to a small change.
     """
     count = int(histories[at + COUNT])
     first = count - MOST_POINTS - 1
@@ -229,13 +232,13 @@ def accurate_step(histories, at, tolerance):
 
 
 @njit
-def store_input(histories, at, t, change, level, before):
+def store_input(histories, at, t, change, level, before, small):
     """Store the change of an input at the time t; level : that of a break by other reasons than its own jump.
 
-    before : change before the first entry
+    before : change before the first entry; small : size of a small change
     """
     count = int(histories[at + COUNT])
-    histories[at + GREATEST] = max(histories[at + GREATEST], abs(change))
+    histories[at + GREATEST] = max(small, histories[at + GREATEST], abs(change))
     if count == 0:
         add_entry(histories, at, t, change, JUMP if change != before else KINK)
         return

@@ -4,9 +4,9 @@ import numpy as np
 
 from fvsolve.kernels import input_histories as at
 
-FIRST_CAPACITY = 64  # entries of a block
+FIRST_CAPACITY = 1024  # entries of a block
 ENTRIES_OF_STEP = 2  # most entries at the end of a step: one, and one after a break there
-LEAST_STEPS = 16  # steps
+LEAST_STEPS = 256  # steps
 DELAYS_NEEDED = 2.0  # a history spans this many delays: the last step, at most a delay long, may be computed again
 MARGIN = at.MOST_POINTS  # and so many entries before that
 

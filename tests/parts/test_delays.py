@@ -248,3 +248,11 @@ def test_faults_of_delays_are_named(change, numerics, place, text):
     with pytest.raises(CaseError) as caught:
         fvsolve.load(case)
     assert place in str(caught.value) and text in str(caught.value)
+
+
+@pytest.mark.parametrize("start", [0.0, 1e-9])
+def test_a_tiny_motion_takes_no_more_steps_than_rest(start):
+    case = delayed_loop(end=20.0, method="dormand-prince", rtol=1e-6)
+    for block in ("plant", "late"):
+        case["controls"][block]["initial"] = start
+    assert fvsolve.run(case).summary["steps"] < 300

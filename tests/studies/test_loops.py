@@ -347,6 +347,10 @@ def test_faults_of_loops_are_named():
         loop(case, "hol")
     with pytest.raises(FvsolveError, match="no .controls"):
         loop("two-tanks", "hold")
+    for period in ({}, {"period": 1.0}):
+        case["controls"]["hold"] = level | {"initial": 1.0, "setpoint": 4.5, "limits": [0.0, 1.0]} | period
+        with pytest.raises(FvsolveError, match="controls.hold is at a limit"):
+            loop(case, "hold", at=5.0)
     sampled = delayed_loop()
     sampled["controls"]["gain"]["period"] = 0.1
     sampled["controls"]["inner"] = {"type": "delay", "input": "controls.plant", "delay": 0.2}

@@ -1,6 +1,6 @@
 """Delays in the tables of a model, and their state at the start."""
 
-from fvsolve.assembly.control_rows import StaticRows
+from fvsolve.assembly.control_rows import StaticRows, small_change
 from fvsolve.kernels.input_histories import BEFORE, START
 from fvsolve.parts.delay import law
 
@@ -11,7 +11,7 @@ class DelayRows(StaticRows, kind="delay"):
     law = law
 
     def numbers(self, draft, name, block):
-        return [0.0, 0.0]
+        return [0.0, 0.0, small_change(block.dimensions[0])]
 
     def delay(self, control):
         return control.delay

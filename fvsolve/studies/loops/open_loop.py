@@ -75,9 +75,11 @@ def delayed_system(case, set, input: str, output: str, at: float | None, before:
 
 def refuse_limit(point: OperatingPoint, name: str) -> None:
     """Raise FvsolveError if the output of a control is at one of its limits, where its loop is open."""
-    model = point.model
-    flag = int(model.tables.controls["flag"][model.block_names.index(name)])
-    if flag >= 0 and point.armed is not None and (point.armed[flag] > 0.0 or point.armed[flag + 2] > 0.0):
+    number = point.model.block_names.index(name)
+    row = point.model.tables.controls[number]
+    flag, output = int(row["flag"]), float(point.outputs[number])
+    stopped = flag >= 0 and point.armed is not None and (point.armed[flag] > 0.0 or point.armed[flag + 2] > 0.0)
+    if stopped or row["period"] > 0.0 and not row["least"] < output < row["greatest"]:
         raise FvsolveError(f"the output of controls.{name} is at a limit at {point.when}, so its loop is open. "
                            "Expected another time (--at)")  # fmt: skip
 
