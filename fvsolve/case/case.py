@@ -20,6 +20,7 @@ from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
 from fvsolve.fluid import LAWS, Fluid
 from fvsolve.fluid.laws import Law
 from fvsolve.parts import Link, Node, Pipe, Scalar
+from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.parts.pipe.pipe_wall import elastic_compliance
 from fvsolve.parts.table_model import plain_value
 from fvsolve.schemes import SCHEMES
@@ -155,6 +156,13 @@ class Case(Displayable):
         At these positions bushings are not twisted, and springs have their preload.
         """
         return replace(self, equilibrium_nodes={}) if self.equilibrium_nodes else self
+
+    @cached_property
+    def network_places(self) -> frozenset[str]:
+        """Places of a network of rotation, electricity and heat: its nodes, and other places that its links join."""
+        own = [name for name, node in self.nodes.items() if node.domain in NETWORK_DOMAINS]
+        joined = [place for link in self.links.values() if link.in_network for place in link.ports.values()]
+        return frozenset([*own, *joined])
 
     @property
     def needs_equilibrium(self) -> bool:

@@ -17,6 +17,7 @@ from fvsolve.fluid.laws import LAWS, law_names
 from fvsolve.parts import KINDS, Basin
 from fvsolve.parts.basin import VELOCITY_FIELDS, Physics
 from fvsolve.parts.formula_program import is_formula
+from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.parts.table_model import CaseContext
 from fvsolve.parts.value import ROOT
 from fvsolve.steppers.loop_records import LEAST_STEP, LEAST_TOLERANCE
@@ -194,9 +195,11 @@ def _raw_value(keys: tuple, index: int, raw: Raw) -> tuple[Any, tuple]:
 def reserved_names() -> set[str]:
     """Names that scalars cannot have.
 
-    These are columns of output files, quantities of parts, and fields of basins other than velocities.
+    These are columns of output files, quantities of parts that may carry scalars, and fields of basins other than
+    velocities.
     """
-    kinds = [kind for group in KINDS.values() for kind in group.values()]
+    kinds = [kind for group in KINDS.values() for kind in group.values()
+             if getattr(kind, "domain", "") not in NETWORK_DOMAINS]  # fmt: skip
     fields = {name for physics in Physics.kinds.values() for name in physics.fields if name not in VELOCITY_FIELDS}
     return RESERVED | fields | {name for kind in kinds for name in (*kind.quantities, *getattr(kind, "along", {}))}
 

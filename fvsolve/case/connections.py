@@ -9,6 +9,7 @@ from typing import Any
 from fvsolve.case.bodies import WORLD
 from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts import KINDS, Chamber
+from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.units import show
 
 Faults = Iterator[tuple[tuple, str]]
@@ -32,6 +33,7 @@ def network(table: dict[str, Any]) -> Faults:
         yield from ((("links", name, *keys), text) for keys, text in faults)
         joined = [place for _, place, _ in ports if isinstance(place, str)]
         unjoined += len(ports) - len({*joined} & places.keys())
+        joined += [_dict(link).get("heat_to")]
         ends[name] = [place for place in [*joined, *_owned_places(name, link)] if place in places]
     for group in ("nodes", "links"):
         kinds = [_dict(node).get("type") for node in nodes.values()]
@@ -83,6 +85,7 @@ def _island_faults(groups: list[list[str]], nodes: dict[str, Any], places: dict[
 
     places : names that links can join -> domain
     """
+    groups = [island for island in groups if not {places[name] for name in island} <= {*NETWORK_DOMAINS}]
     if len(groups) > 1:
         sizes = " | ".join(listing(island, 6) for island in groups)
         text = f"disconnected network of {len(groups)} parts: {sizes}"
@@ -224,6 +227,18 @@ def _unknown_place(place: str, places: dict[str, Any], nodes: dict[str, Any], li
         text = f"{show(place)} is a link, and links join places, not links; put a junction between the two links"
         return f"{text}; places are {listing(places)}"
     return f"no place named {show(place)}; places are {listing(places)}{did_you_mean(place, places)}"
+
+
+def joined_shafts(links: Any) -> list[str]:
+    """Full names PART.shaft of the shafts of pumps and turbines that links of a network of rotation join."""
+    places = [
+        place
+        for link in links.values()
+        if getattr(kind_of("links", link), "in_network", False)
+        for _, place, domain in _ports(_dict(link))
+        if "rotational" in str(domain) and isinstance(place, str)
+    ]
+    return list(dict.fromkeys(place for place in places if place.endswith(".shaft")))
 
 
 def chambers_of(link: Any) -> list[str]:

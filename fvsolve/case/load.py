@@ -102,7 +102,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     """Read all tables, in the order in which they depend on each other. Raises CaseError with all faults."""
     general = read_general(reading)
     reading.known = reusable_values(reading, previous)
-    given = reading.raw.table.get("fluid", reading.blocks_alone)
+    given = reading.raw.table.get("fluid", reading.needs_no_fluid)
     fluid, state = reading.reuse(("fluid",), given, functools.partial(read_fluid, reading))
     numerics = reading.table("numerics", Numerics)
     if (times := numerics or valid_times(reading)) is not None and times.start < times.end:

@@ -13,6 +13,7 @@ from fvsolve.parts import KINDS, Basin, Chamber, Pipe
 from fvsolve.parts.body import Body, BodyPoint
 from fvsolve.parts.nodes_and_links import Node
 from fvsolve.parts.pipe.part import MOST_CELLS
+from fvsolve.parts.rotation import ShaftPlace
 from fvsolve.units import show
 
 LINKLESS = ("basin", "body")  # nodes that need no link
@@ -79,7 +80,7 @@ def _read_group(reading: Reading, network: chainage.CutTable, group: str) -> dic
     """Nodes or links without faults; group : "nodes" or "links"."""
     table = network.table
     alone = any(connections.kind_name(node) in (*LINKLESS, None) for node in table.get("nodes", {}).values())
-    alone = alone or reading.blocks_alone
+    alone = alone or reading.needs_no_fluid
     if group not in table and not (group == "links" and alone or "controls" in table and not table.get("links")):
         reading.fault((), f"[{group}] is missing: {GROUPS[group]}")
     result = {}
@@ -160,6 +161,7 @@ def place_kinds(network: chainage.CutTable, parts: Parts, scalars: dict[str, Any
     bare = [name for name, kind in nodes.items() if kind is Basin and name not in (*parts.meshes, *parts.lumped)]
     nodes |= {f"{name}.{place}": Chamber for name, kind in links.items() if kind
               for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
+    nodes |= dict.fromkeys(connections.joined_shafts(table.get("links", {})), ShaftPlace)
     nodes |= {name: bodies.BodyQuantities(node) for name, node in parts.nodes.items() if isinstance(node, Body)}
     for name, node in table.get("nodes", {}).items():  # faulty nodes included
         nodes |= dict.fromkeys(connections.points_of(name, node), BodyPoint)

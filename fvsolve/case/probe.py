@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from fvsolve import units
 from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts import KINDS, Link, Node, Pipe, Reservoir, Scalar
+from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.parts.value import ValueFault
 from fvsolve.units import show
 
@@ -156,6 +157,7 @@ def default_probes(kinds: Kinds) -> list[Probe]:
         for name, kind in kinds[part].items():
             known = {} if kind is None else kind.quantities
             own = [key for key in quantities if key in known and key not in getattr(kind, "on_request", ())]
+            own += [key for key in getattr(kind, "main_quantities", ()) if key not in own]
             for quantity in [*own, *_scalars_of(kind, kinds, "quantities")] if own else []:
                 text = f"{part}.{name}.{quantity}" if name in other else f"{name}.{quantity}"
                 probes.append(_probe(text, part, name, quantity, None, kinds))
@@ -174,7 +176,8 @@ def _scalars_of(kind: type[Node] | type[Link], kinds: Kinds, where: str) -> dict
 
 
 def _probe(text: str, part: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe:
-    kind, scalar = kinds[part][name], kinds["scalars"].get(quantity)
+    kind = kinds[part][name]
+    scalar = None if getattr(kind, "domain", "") in NETWORK_DOMAINS else kinds["scalars"].get(quantity)
     unit = scalar.unit if scalar is not None else ""
     if quantity in (fields := getattr(kind, "fields", {})):  # of a basin
         point = kind.point(f"{name}.{quantity}", place)

@@ -17,7 +17,8 @@ from typing import Any
 from fvsolve.case import text
 from fvsolve.case.text import key_lines
 from fvsolve.errors import CaseError, Fault, article, did_you_mean, listing
-from fvsolve.parts import Pipe
+from fvsolve.parts import KINDS, Pipe
+from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.parts.table_model import exclusive_key_faults
 from fvsolve.parts.value import ROOT, ReadContext, Value, faults_of
 from fvsolve.units import show
@@ -450,7 +451,7 @@ class Reading:
     def table(self, name: str, model: Any) -> Any:
         """Table `name`, read by the class `model`; None if it is faulty."""
         given = self.raw.table.get(name)
-        if name == "fluid" and given is None and self.blocks_alone:
+        if name == "fluid" and given is None and self.needs_no_fluid:
             given = {"name": "water"}  # no part reads it
         elif name not in self.raw.table and name in GROUPS:
             return self.fault((), f"[{name}] is missing: {GROUPS[name]}")
@@ -459,9 +460,19 @@ class Reading:
             return self.reuse((name, "table"), given, lambda: model.model_validate(table, context=self.setting))
 
     @property
-    def blocks_alone(self) -> bool:
-        """True for a case with controls and neither nodes nor links, which needs no fluid."""
-        return "controls" in self.raw.table and not {"nodes", "links"} & self.raw.table.keys()
+    def needs_no_fluid(self) -> bool:
+        """True for a case of controls, or of networks of rotation, electricity and heat, without any fluid."""
+        table = self.raw.table
+        if not {"nodes", "links"} & table.keys():
+            return "controls" in table
+        nodes, links = (table.get(group) for group in ("nodes", "links"))
+        if not (isinstance(nodes, dict) and isinstance(links, dict)):
+            return False
+        kinds = [KINDS["nodes"].get(str(part.get("type")) if isinstance(part, dict) else "") for part in nodes.values()]
+        domains = {"" if kind is None else kind.domain for kind in kinds}
+        found = [KINDS["links"].get(str(part.get("type")) if isinstance(part, dict) else "") for part in links.values()]
+        dry = all(kind is not None and "hydraulic" not in {*kind.joins.values(), *kind.owns.values()} for kind in found)
+        return bool(domains & {*NETWORK_DOMAINS}) and domains <= {*NETWORK_DOMAINS, "translational"} and dry
 
     def valid_keys(self, name: str, model: Any) -> Any:
         """Instance of `model` with the valid keys of the table `name`, without checks of the table.

@@ -134,7 +134,8 @@ def check_text(case, facts: dict, every: bool = False) -> Iterator:
     every : True for all rows, otherwise only notable rows of long tables
     """
     yield case.title or case.name, "bold"
-    yield _fluid_text(case, facts["fluid"])
+    if facts["nodes"] or facts["basins"]:
+        yield _fluid_text(case, facts["fluid"])
     odd = {part["place"] for part in facts["warnings"]}
     groups = ("nodes", "node", NODE), ("masses", "mass", MASS), ("bodies", "body", BODY), ("pipes", "pipe", PIPE)
     for group, word, keys in groups:
@@ -154,7 +155,7 @@ def check_text(case, facts: dict, every: bool = False) -> Iterator:
              for name, part in lines.items()]  # fmt: skip
     if lines:
         notes += [f"{name} has cells: {part['line_why']}" for name, part in facts["pipes"].items() if name not in lines]
-    yield from _first(notes, every)
+    yield from _first([*notes, *_network_lines(facts["network"])], every)
     yield from _first([f"moves from the start: {text}" for text in facts["moving"]], every)
     yield from _notices(facts["warnings"], every)
     if facts["basins"]:
@@ -178,6 +179,18 @@ def _parts_table(case, word: str, parts: dict, keys: dict, every: bool = True, o
         yield (f"... {len(parts) - len(names)} more of {len(parts)}; the table has only parts with the least "
                "or greatest value of a column or with a notice, --all prints all")  # fmt: skip
     yield ""
+
+
+def _network_lines(network: dict | None) -> list[str]:
+    """Lines on a network of rotation, electricity and heat: its states, tied stores and passivity."""
+    if network is None:
+        return []
+    states = listing(network["states"], 8) if network["states"] else "none"
+    text = f"network: states {states}; {network['eliminated']} further potentials and flows eliminated"
+    if network["greatest"] is not None:
+        verdict = "passive" if network["passive"] else "not passive"
+        text += f"; {verdict}, greatest eigenvalue of Q A + A' Q {network['greatest']:.6g}"
+    return [text, *(f"tied: {name} = {terms}" for name, terms in network["tied"].items())]
 
 
 def _wall_lines(case, pipes: dict) -> list[str]:

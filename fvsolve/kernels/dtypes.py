@@ -389,6 +389,44 @@ DRIVEN = record(  # row of a table that a block drives before the nodes are solv
 )
 DRIVEN_VALVE, DRIVEN_DEVICE, DRIVEN_NODE = 0, 1, 2
 
+NETWORK_INPUT = record(  # source of a network of potential and flow, see `kernels.potential_networks`
+    kind=i8,
+    index=i8,  # schedule, device, mass, switch or element
+    side=i8,  # of a device: quantity whose value is the torque of the fluid on its shaft
+    sign=f8,
+    start=f8,  # value at the start
+)
+# Sources: a schedule; torque of the fluid on the shaft of a device; force on a mass; torque of dry friction that slips;
+# heat that an element dissipates. Later kinds depend on earlier ones.
+SCHEDULE_INPUT, TORQUE_INPUT, FORCE_INPUT, FRICTION_FLOW, HEAT_INPUT = 0, 1, 2, 3, 4
+
+NETWORK_RATE = record(y=i8)  # state whose rate is the value of the row of the same number
+NETWORK_ELEMENT = record(  # element of a network with power
+    drop=i8,  # row of its difference of potentials
+    flow=i8,  # row of its flow
+    category=i8,  # NOT_BOOKED, STORED, DISSIPATED or SUPPLIED
+    thermal=i8,  # 1 if its flow is a heat flow: then its power is `weight` times the flow
+    weight=f8,
+    capacity=f8,  # of a store of potential, else 0
+    inertance=f8,  # of a store of flow, else 0
+    start=f8,  # potential or flow that it stores at the start
+)
+NOT_BOOKED, STORED, DISSIPATED, SUPPLIED = 0, 1, 2, 3
+NETWORK_SWITCH = record(
+    kind=i8,
+    flag=i8,  # first of two event flags, of friction four
+    schedule=i8,  # of a switch; torque of a clutch; -1 for none
+    drop=i8,  # row of its difference of potentials
+    flow=i8,  # row of its flow, of friction while it sticks
+    forward=f8,  # forward voltage of a diode [V]
+    kinetic=f8,  # friction torque in motion [N m]
+    static=f8,  # greatest friction torque at rest [N m]
+    stribeck=f8,  # speed at which the excess at rest has fallen to 1/e; 0 for none [rad/s]
+    factor=f8,  # greatest torque at rest over a scheduled torque
+    rounding=f8,  # slip of friction that is rounding
+)
+SWITCH, DIODE, FRICTION = 0, 1, 2
+
 CLUSTER_RECORD = record(first_node=i8, nodes=i8, first_valve=i8, valves=i8, first_couple=i8, couples=i8, inverse=i8)
 
 LAYOUT = record(
@@ -422,6 +460,7 @@ LAYOUT = record(
     pin=i8,  # forces of pins, three for each [N]
     body=i8,  # data of bodies, see `kernels.mechanism.body_layout`
     control=i8,  # of each block of `controls`: output, and first input after its filter
+    network=i8,  # sources of networks: change since the start
     size=i8,
 )
 BODY_OUT = 45  # numbers of each body in `out`
@@ -459,6 +498,9 @@ BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = 20, 21, 22, 23  # quantity i
 SURFACE_VALUE = 24  # of a surface described by modes
 PIPE_FORCE = 25  # on a whole pipe
 CONTROL_VALUE = 26  # of a block of `controls`: 0 output, 1 input, 2 error in `side`
+# of a network: row `index` and in `side` 0 or 1 its value; 2 times that of row `cell`; 3 that of row `cell` over its
+# value; 4 of friction with the flag `index` 1 while it sticks
+NETWORK_VALUE = 27
 
 BASIN = record(
     kind=i8,  # code of its physics, see `basins.basin_patches`
@@ -599,6 +641,10 @@ RECORDS = {
     "controls": CONTROL,
     "sensors": PROBE,
     "driven": DRIVEN,
+    "network_inputs": NETWORK_INPUT,
+    "network_rates": NETWORK_RATE,
+    "network_elements": NETWORK_ELEMENT,
+    "network_switches": NETWORK_SWITCH,
 }
 # `Tables`: of a model, read-only; `RunArrays`: written by a run; `HandleTables`: behind a handle, also addresses of
 # functions: `calls`, a row for each job, and `hooks`, a row for each law of devices.
@@ -607,11 +653,22 @@ RunArrays = namedtuple("RunArrays",
     (
         "clock", "work", "armed", "marks", "scratch", "spare", "seen", "bands", "joint", "sums", "envelope", "extremes",
         "past", "sharp", "applied", "readings", "sensing", "stack", "discrete", "histories",
+        "network_places", "network_factors",
     ),
 )  # fmt: skip
 HandleTables = namedtuple("HandleTables", (*Tables._fields, *RunArrays._fields, "calls", "hooks"))
 MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]; all others that are not records are float64[:]
-INTEGERS = ("integers", "bands", "joint", "sums", "sharp", "sensing", "calls", "hooks")  # these are int64
+INTEGERS = (
+    "integers",
+    "bands",
+    "joint",
+    "sums",
+    "sharp",
+    "sensing",
+    "network_places",
+    "calls",
+    "hooks",
+)  # these are int64
 
 
 @functools.cache

@@ -127,6 +127,16 @@ COMPONENTS = {
     "controls, barotropic": RhsTerms(**CONTROLS, decide="controls: decide_barotropic"),
     "switches": RhsTerms(events="controls: control_events"),
     "formulas": RhsTerms(events="schedule_pieces: formula_events"),
+    "networks": RhsTerms(
+        rate_limits="potential_networks: known_sources",
+        move="potential_networks: network_rates",
+        observe="potential_networks: observe_networks",
+        events="potential_networks: switch_events",
+        power="potential_networks: power_networks",
+        stored="potential_networks: stored_networks",
+    ),
+    "sources of networks": RhsTerms(events="potential_networks: sources_for_events"),
+    "sources after blocks": RhsTerms(events="potential_networks: sources_after_blocks"),
     "probes of controls": RhsTerms(observe="controls: observe_controls", record="controls: record_controls"),
     "pipes": RhsTerms(record="observation: record_pipes"),
     "valves": RhsTerms(rate_limits="network_balance: valve_rate_limit"),
@@ -258,6 +268,7 @@ class ModelFeatures:
     forces: bool = False
     controls: bool = False
     formulas: bool = False
+    networks: bool = False
 
     def components(self) -> Iterator[RhsTerms]:
         """Yield the terms (`RhsTerms`) of all components of the model, in the order in which the functions run."""
@@ -279,8 +290,10 @@ class ModelFeatures:
         if self.valves:
             yield COMPONENTS["valves"]
         bends = any(hook_of(law, "bends") is not None for law in self.modules())
-        if self.devices or bends or self.controls:  # their event functions need solved nodes
+        if self.devices or bends or self.controls or self.networks:  # their event functions need solved nodes
             yield COMPONENTS["closed"]
+        if self.networks:
+            yield COMPONENTS["sources after blocks" if self.controls else "sources of networks"]
         if bends:
             yield COMPONENTS["bends"]
         if self.controls:
@@ -308,6 +321,8 @@ class ModelFeatures:
             yield COMPONENTS["lines"]
         if self.devices:
             yield COMPONENTS["devices"]
+        if self.networks:
+            yield COMPONENTS["networks"]
         if self.unsteady_friction:
             yield COMPONENTS["memory" if linear else "memory, barotropic"]
         if self.viscoelastic_walls:

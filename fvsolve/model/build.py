@@ -45,6 +45,7 @@ from fvsolve.model.mechanics_tables import (
     supporting_pressures,
 )
 from fvsolve.model.model import Model
+from fvsolve.model.network_tables import lower_networks, network_rate
 from fvsolve.model.probe_tables import lower_probes, probe_offsets
 from fvsolve.model.scalar_tables import lower_scalars, scale_scalars, start_amounts
 from fvsolve.model.start_notices import coarse_for_cavities, flow_notices, too_few_cells
@@ -176,6 +177,8 @@ def tables_before_start(case: Case, unfit: Collection[str] = ()) -> ModelDraft:
     classify_nodes(draft)
     lower_basins(draft)
     lower_scalars(draft)
+    lower_networks(draft)
+    draft.check()
     lower_controls(draft)
     draft.check()
     pack(draft, np.zeros(profile_size(draft)))
@@ -275,7 +278,8 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         np.array(draft.points, rec.POINT), draft.line_table, draft.pin_table, draft.bushing_table,
         draft.moving_segment_table, draft.mass_table, draft.brace_table, draft.stop_table, draft.piston_table,
         draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table, draft.wall_table,
-        draft.delay_table, draft.control_table, draft.sensor_table, draft.driven_table,
+        draft.delay_table, draft.control_table, draft.sensor_table, draft.driven_table, draft.network_input_table,
+        draft.network_rate_table, draft.network_element_table, draft.network_switch_table,
         np.array(draft.integers, dtype=np.int64), np.array(draft.floats, dtype=float), profile, draft.plane(), pieces,
     )  # fmt: skip
     pipes, nodes, out = len(draft.pipe_table), len(draft.node_table), int(layout["size"][0])
@@ -294,6 +298,8 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         applied=2 * len(draft.control_table) + 2 * (len(draft.control_table) > 0), readings=len(draft.sensor_table),
         sensing=int(len(draft.sensor_table) > 0), stack=draft.schedules.stack, discrete=len(draft.discrete),
         histories=histories_size(draft.control_table),
+        network_places=0 if draft.network is None else 3 * draft.network.first_rows[-1] + draft.network.capacity,
+        network_factors=0 if draft.network is None else draft.network.first_rows[-1] + draft.network.capacity,
     )  # fmt: skip
 
 
@@ -316,7 +322,7 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
         s["weights"], s["stages"] = len(draft.floats), method.stages
         draft.floats += [*map(float, method.b), *method.times]
     rates = [*(pipes["speed"] / pipes["dx"] * pipes["rate_factor"]), *column_rates(draft)]
-    s["rate"] = max([0.0, *rates, control_rate(draft)])
+    s["rate"] = max([0.0, *rates, control_rate(draft), network_rate(draft)])
     return table
 
 
@@ -348,7 +354,7 @@ def layout_of(draft: ModelDraft) -> np.ndarray:
         ("tank", rec.TANK_OUT * len(draft.basin_table) if len(draft.body_table) else 0),
         ("travel", 2 * len(draft.push_names)), ("along", 3 * len(draft.line_table)),
         ("pin", 3 * len(draft.pin_table)), ("body", rec.BODY_OUT * len(draft.body_table)),
-        ("control", 2 * len(draft.control_table)),
+        ("control", 2 * len(draft.control_table)), ("network", len(draft.network_input_table)),
     ):  # fmt: skip
         layout[name], at = at, at + size
     layout["size"] = at
@@ -396,7 +402,7 @@ def model_of(draft: ModelDraft) -> Model:
         dict(case.elevations), case.probes, draft.warnings,
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
         draft.basins, case.extreme_probes, draft.watched_start, jump_tables(draft),
-        flags_at_start(draft), np.array(draft.discrete, dtype=float), draft.timed,
+        flags_at_start(draft), np.array(draft.discrete, dtype=float), draft.timed, draft.network,
     )  # fmt: skip
 
 

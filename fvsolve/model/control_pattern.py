@@ -66,6 +66,8 @@ class BlockCouplings:
             return unique_states(model.masses[i] + (kind == rec.VELOCITY))
         if kind in (rec.PISTON_POSITION, rec.PISTON_VELOCITY):
             return model.places(model.pistons[i], int(kind == rec.PISTON_VELOCITY))
+        if kind == rec.NETWORK_VALUE:
+            return model.probe_states(row)
         if kind == rec.VALVE_FLOW:
             link = model.valves[i]
             ends = (model.sets[link[end]] for end in ("from_node", "to_node"))
@@ -91,6 +93,8 @@ class BlockCouplings:
             read = [self.own(k), self.schedule(row["setpoint"]), *(self.read(code) for code in self.inputs(k))]
             yield pairs_of(self.own(k), unique_states(*read))
         tables, network = self.tables, {*self.tables.valves["schedule"], *self.tables.nodes["schedule"]}
+        inputs = tables.network_inputs
+        network |= {*inputs["index"][inputs["kind"] == rec.SCHEDULE_INPUT], *tables.network_switches["schedule"]}
         network |= {*tables.devices["schedule"], *tables.braces["schedule"], *tables.controls["setpoint"]}
         other = [index for index in self.follows if index not in network]  # shafts, scalars
         if other:

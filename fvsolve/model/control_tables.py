@@ -167,6 +167,8 @@ def is_known_early(draft, row, probe) -> bool:
     if kind == rec.DEVICE_VALUE:
         name, part, device = draft.devices[row["index"]]
         return probe.quantity in device.states_of(draft, name, part)
+    if kind == rec.NETWORK_VALUE:
+        return draft.network.is_known_early(row)
     return kind in STATE_KINDS or kind == rec.CELL_FIELD
 
 
@@ -178,14 +180,27 @@ def has_late_sensors(draft) -> bool:
 def check_order(draft, early: set[str]) -> None:
     """Add a fault for each block that drives the network, and passes on at once what only the solved network tells."""
     rows = dict(zip([probe.text for probe in draft.sensors], draft.sensor_table, strict=True))
-    for name in early:
+    names_of_rows = {name: k for k, name in enumerate(draft.schedules.blocks)}
+    for name in draft.schedules.blocks:
         block = draft.case.controls[name]
+        if name not in early:
+            check_network_order(draft, name, block, rows, names_of_rows)
+            continue
         names = list(getattr(block.control, "inputs", ()))
         for k, probe in enumerate(block.inputs if block.control.feeds_through else ()):
             if not isinstance(probe, str) and not is_known_early(draft, rows[probe.text], probe):
                 text = f"{probe.text} may follow at once from what the control drives, a loop without a state"
                 place = f"inputs.{names[k]}" if names else "input"
                 draft.fault(f"controls.{name}.{place}", f"{text}; give [controls.{name}] a `filter`")
+
+
+def check_network_order(draft, name: str, block: Block, rows: dict, numbers: dict[str, int]) -> None:
+    """Add a fault if a block passes on at once what a block drives in a network of rotation, electricity and heat."""
+    for probe in block.inputs if block.control.feeds_through and draft.network is not None else ():
+        if not isinstance(probe, str) and rows[probe.text]["kind"] == rec.NETWORK_VALUE:
+            if draft.network.follows_blocks(draft, rows[probe.text]):
+                text = f"{probe.text} may follow at once from what a control drives, a loop without a state"
+                draft.fault(f"controls.{name}", f"{text}; give [controls.{name}] a `filter`")
 
 
 # start --------------------------------------------------------------------------------------------------------------

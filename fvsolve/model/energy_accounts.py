@@ -221,6 +221,7 @@ class Accounts:
             self.hold(name, "rigid column", at + 2)
             self.accounts.append(Account("law", name, "rigid column", (at, at + 1, at + 2), (1, -1, -1)))
         self.mechanics()
+        self.networks()
         self.bodies()
         self.devices()
         self.walls()
@@ -287,6 +288,20 @@ class Accounts:
             self.add("dissipated", name, "leak", at)
             self.add("dissipated", name, "friction", at + 1)
             self.add("law", name, "cylinder", at + 2)
+
+    def networks(self) -> None:
+        """Accounts of the parts of a network of rotation, electricity and heat."""
+        network = self.model.network
+        booked = (
+            [] if network is None else [item for item in network.elements if item.ledger or item.heat_to is not None]
+        )
+        for item in booked:
+            at, (group, _, name) = self.take(1), item.part.partition(".")
+            kind = getattr(self.model.case, group)[name].kind.replace("-", " ")
+            stores = item.ledger == "stored"
+            self.hold(name, kind, at if stores else None)
+            if not stores and item.ledger and item.heat_to is None:
+                self.add(item.ledger, name, kind, at)
 
     def bodies(self) -> None:
         for name in self.model.bushing_names:

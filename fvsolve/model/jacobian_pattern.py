@@ -59,6 +59,7 @@ class Couplings:
         self.devices = tables.devices
         self.basins, self.integers, self.walls = model.basins, tables.integers, tables.walls
         self.patches = {int(row["node"]): row for row in tables.patches}
+        self.network, self.inputs, self.switches = model.network, tables.network_inputs, tables.network_switches
         self.blocks = BlockCouplings(self, tables)
         self.sets = self.pressures()  # for each node, the states that set its pressure
 
@@ -82,6 +83,8 @@ class Couplings:
         yield from self.device_pairs()
         yield from self.wpairs_of()
         yield from self.moving_fluid_pairs()
+        if self.network is not None:
+            yield from self.network_pairs()
         if self.blocks.follows or len(self.blocks.controls):
             yield from self.blocks.pairs()
 
@@ -273,6 +276,56 @@ class Couplings:
             read = [self.sets[i] for i in (*ends, row["node"]) if i >= 0]
             read.append(self.blocks.schedule(row["schedule"]))
             yield pairs_of(self.device_states(row), unique_states(self.device_states(row), *read))
+
+    def network_pairs(self) -> Iterator[Pairs]:
+        """Yield couplings of the stores of networks with each other, and with what their sources follow."""
+        network = self.network
+        for r, place in enumerate([*network.states.values(), *network.angles.values()]):
+            yield pairs_of(unique_states(place), self.network_states(network.columns_of_rows[r]))
+
+    def network_states(self, columns: set[int]) -> np.ndarray:
+        """States on which a linear function of stores and sources of a network depends."""
+        network = self.network
+        own = [network.states[column] for column in columns if column in network.states]
+        return unique_states(*own, *(self.source_states(j) for j in network.inputs_of_columns(columns)))
+
+    def probe_states(self, row) -> np.ndarray:
+        """States on which a probe of a network depends."""
+        network, r = self.network, int(row["index"])
+        if row["side"] == 4:
+            return unique_states()
+        if r >= network.first_rows[3]:
+            return unique_states(list(network.angles.values())[r - network.first_rows[3]])
+        rows = [r, *([int(row["cell"])] if row["side"] in (2, 3) else [])]
+        return self.network_states(set().union(*(network.columns_of_rows[r] for r in rows)))
+
+    def source_states(self, j: int) -> np.ndarray:
+        """States on which a source of a network depends."""
+        row, network = self.inputs[j], self.network
+        i = int(row["index"])
+        if row["kind"] == rec.SCHEDULE_INPUT:
+            return self.blocks.schedule(i)
+        if row["kind"] == rec.TORQUE_INPUT:
+            device = self.devices[i]
+            valve = self.valves[device["valve"]]
+            pressures = [self.sets[k] for k in ends_of(valve)]
+            return unique_states(self.device_states(device), self.opening_states(valve), *pressures)
+        if row["kind"] == rec.FORCE_INPUT:
+            return unique_states(*self.pushing_states(i))
+        stores = {column for column in network.columns_followed(j) if column in network.states}
+        switch = int(self.switches[i]["schedule"]) if row["kind"] == rec.FRICTION_FLOW else -1
+        return unique_states(*(network.states[column] for column in stores), self.blocks.schedule(switch))
+
+    def pushing_states(self, mass: int) -> Iterator[np.ndarray]:
+        """Yield states of all force elements that act on a mass."""
+        for row in [*self.braces, *self.pistons]:
+            ends = ("case", "rod") if "rod" in row.dtype.names else ("from_mass", "to_mass")
+            if mass in (row[ends[0]], row[ends[1]]):
+                yield from (self.places(row, 0), self.places(row, 1))
+                if "schedule" in row.dtype.names:
+                    yield self.blocks.schedule(row["schedule"])
+                if "rod" in row.dtype.names:
+                    yield from (self.own(row["a"]), self.own(row["b"]))
 
     def wpairs_of(self) -> Iterator[Pairs]:
         """Yield couplings of basin cells with the travel of moving walls, and of this travel with masses and bodies.

@@ -145,6 +145,7 @@ class Model(Displayable):
     flags: np.ndarray  # event flags before a run
     discrete: np.ndarray  # numbers of blocks that change at events and samples only, at the start
     timed: list[tuple[int, int]]  # (event flag, place in `discrete` of the time of its last change)
+    network: Any  # `network_tables.Network` of rotation, electricity and heat; None without one
     # idle run data for evaluating single states; tables before the start is solved, reused by `vary`
     idle_run_data: deque[RunData] = field(default_factory=deque, init=False)
     tables_before_start: list = field(default_factory=list, init=False)
@@ -240,7 +241,8 @@ class Model(Displayable):
         cast = ModelFeatures(self.case.law.family, cells, *mechanics, self.unsteady, self.creeps, has.devices,
                     tuple(self.laws), basins, carried, has.scalars, valves, has.delays, alone,
                     forces=bool(self.layout["forces"] >= 0), controls=has.controls,
-                    formulas=bool((self.tables.schedules["pieces"] < 0).any()))  # fmt: skip
+                    formulas=bool((self.tables.schedules["pieces"] < 0).any()),
+                    networks=self.network is not None)  # fmt: skip
         return functions(cast)
 
     @property

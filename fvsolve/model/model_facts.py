@@ -72,6 +72,7 @@ def checks(model) -> dict[str, Any]:
         "fluid": model.case.properties.plain(), "nodes": nodes, "masses": masses, "bodies": bodies,
         "pipes": pipes, "basins": {item.name: basin_facts(item) for item in model.basins},
         "states": model.y_size, "cells": model.all_cells, "step": step, "step_set_by": set_by, "steps": steps,
+        "network": None if model.network is None else model.network.facts(),
         "expected_seconds": expected, "moving": model.steady["moving"],
         "warnings": [item.plain() for item in (*model.warnings, *cost_notices(model, steps, set_by))],
     }  # fmt: skip

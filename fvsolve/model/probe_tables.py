@@ -27,8 +27,10 @@ def fill_probes(draft, probes: list) -> np.ndarray:
             row["side"] = BLOCK_QUANTITIES.index(probe.quantity)
         elif probe.point is not None:
             lower_basin_point(draft, row, probe)
-        elif probe.quantity in draft.case.scalars:
+        elif probe.quantity in draft.case.scalars and probe.name not in draft.case.network_places:
             scalar_probe(draft, row, probe)
+        elif probe.name in draft.case.network_places and probe.name not in parts["nodes"]:  # PUMP.shaft
+            draft.network.fill_node_probe(draft, row, probe.name, False)
         elif probe.part == "nodes" and probe.name not in parts["nodes"]:  # a point of a body, or of the world
             lower_body_point(draft, row, probe)
         else:

@@ -57,6 +57,8 @@ class RunData:
         input_histories.reset_histories(self.written.histories, model.tables.controls)
         self.clock["limit"], self.marks[:] = np.inf, np.nan
         self.armed[:], self.discrete[:] = model.flags, model.discrete
+        self.network_mode: tuple[bool, ...] | None = None
+        self.update_network()
         basins = model.tables.basins
         self.written.bands[1::2] = np.where(basins["nx"] > 0, basins["ny"], basins["n"])  # all
         for array in (self.envelope, self.extremes):
@@ -87,6 +89,7 @@ class RunData:
         """Reset for another state: event flags as given or as at the start, and empty histories."""
         self.armed[:], self.clock["limit"] = self.model.flags if armed is None else armed, np.inf
         self.discrete[:] = self.model.discrete
+        self.update_network()
         reset_history(self.past, self.model.tables.delays)
         input_histories.reset_histories(self.written.histories, self.model.tables.controls)
 
@@ -193,9 +196,40 @@ class RunData:
             self.model.functions.events(t, y, self.handle, g)
             before = self.armed.copy()
             self.armed[:] = g <= 0.0
+            self.update_network()
             if np.array_equal(before, self.armed):
                 return
             self.store_times(t, before)
+
+    def update_network(self) -> None:
+        """Write the coefficients of the network that belong to the event flags of its switches."""
+        network = self.model.network
+        if network is None or (mode := network.mode_of(self.armed)) == self.network_mode:
+            return
+        places, factors = network.arrays(mode)
+        self.written.network_places[: places.size], self.written.network_factors[: factors.size] = places, factors
+        self.network_mode = mode
+
+    def apply_network(self, y: np.ndarray) -> str:
+        """Update the coefficients of the network at an event, and the states that the new mode ties to others.
+
+        Returns the text of a fault if the network has no solution, or a switch would cut a flow; "" for none.
+        """
+        network = self.model.network
+        if network is None or not network.switches:
+            return ""
+        mode = network.mode_of(self.armed)
+        if text := network.fault_in(mode, y):
+            at = int(self.model.layout["network"])
+            sources = (
+                self.tables.network_inputs["start"] + self.written.spare[at : at + len(self.tables.network_inputs)]
+            )
+            if (mode := network.commutated(mode, y, sources)) is None:
+                return text
+            network.set_diodes(mode, self.armed)
+        self.update_network()
+        network.settle(self.network_mode, y)
+        return ""
 
     def store_times(self, t: float, before: np.ndarray) -> None:
         """Store the time t [s] for timers whose input has changed; before : event flags before the change."""

@@ -16,6 +16,7 @@ from fvsolve.kernels.restrictions import conductance_of, flow_at_drop, flow_slop
 from fvsolve.kernels.steady_friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.table_handle import make_handle
 from fvsolve.model.mechanics_tables import driven_at_start, start_masses
+from fvsolve.model.network_start import start_network
 from fvsolve.model.run_data import zeros_for_run
 from fvsolve.model.static_forces import start_bodies
 from fvsolve.steady import Edge, solve_steady, union
@@ -447,7 +448,7 @@ class SteadyStart:
 
     def report(self) -> dict[str, Any]:
         moving = start_masses(self.draft, self) + start_bodies(self.draft, self)
-        moving += driven_at_start(self.draft, self) + self.moving
+        moving += driven_at_start(self.draft, self) + self.moving + start_network(self.draft, self)
         fluid, net = self.draft.fluid, self.nodes["inflow"].copy()
         for row in self.pistons:
             net[[row["a"], row["b"]]] -= row["speed"] * np.array([row["sweep_a"], row["sweep_b"]])

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from fvsolve.assembly.lowering import TORQUE, Input, Lowering, lowering_of
 from fvsolve.assembly.mechanics import PushLowering, join_ports, point_row, pose_of
+from fvsolve.assembly.network_elements import FLOW, Element
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
 from fvsolve.parts.nodes_and_links import Link, TwoPort
@@ -136,7 +137,7 @@ class Torque(Link, kind="torque"):
     from_: Annotated[str | None, Text("body that takes the reaction torque; none if left out"), Field(alias="from")] = (
         None
     )
-    to: Annotated[str, Text("shaft (PUMP.shaft or TURBINE.shaft) or body on which the torque acts")]
+    to: Annotated[str, Text("shaft (also PUMP.shaft or TURBINE.shaft) or body on which the torque acts")]
     torque: Annotated[Schedule, Scheduled(
         "torque", about="torque on `to`, positive as the torque of a motor on its pump, or about `axis` [N m]",
     )]  # fmt: skip
@@ -156,11 +157,13 @@ class Torque(Link, kind="torque"):
         turned = around.links.get(self.to.removesuffix(".shaft"))
         if around.spatial(self.to) and self.axis is None:
             yield (), "axis is missing: expected the axis of the torque in the axes of the body, for example [0, 1, 0]"
-        if "shaft" not in getattr(turned, "owns", {}) or around.spatial(self.to):
+        if around.spatial(self.to):
             return
         for key, given in (("from", self.from_), ("axis", self.axis)):
             if given is not None:
                 yield (key,), f"is a key for bodies, but {self.to} is a shaft; remove this key"
+        if "shaft" not in getattr(turned, "owns", {}):
+            return
         if turned.inertia is None:
             text = f"{self.to} has no inertia, so its speed cannot follow from a torque"
             yield ("to",), f"{text}; give the {turned.kind} `inertia`"
@@ -180,7 +183,16 @@ class TorqueRows(Lowering, kind="torque"):
     def of(self, part):
         return self if part.axis is None else BODY_TORQUES
 
+    def network_elements(self, case, name, part):
+        """Element of a torque on a shaft of a network."""
+        if part.to not in case.network_places:
+            return [], []
+        place = f"links.{name}"
+        return [Element(FLOW, place, place, (None, part.to), schedule=part.torque, key="torque", ledger="supplied")], []
+
     def inputs(self, model, name, part):
+        if part.to in model.case.network_places:
+            return {"torque": Input(TORQUE, model.network.schedules[f"links.{name}", "torque"])}
         turned = part.to.removesuffix(".shaft")
         row = lowering_of(type(model.case.links[turned])).row_of(model, turned)
         place = [torque is part for torque in torques_on(model.case, turned)].index(True)

@@ -13,6 +13,7 @@ from fvsolve.parts.table_model import Table, check_table, keys_json, read_keys
 from fvsolve.parts.value import NEEDED, VALUE, Quantity, ReadContext, Rows, Text, UsualRange, Value
 from fvsolve.units import show
 
+NETWORK_DOMAINS = ("rotational", "electrical", "thermal")  # of nodes in networks of potential and flow
 USUAL_ELEVATIONS = UsualRange(-12e3, 9e3, "boreholes to mountains")
 
 
@@ -39,7 +40,10 @@ class Part(Table):
 
 
 class Node(Part):
-    """Place with a single potential: pressure at its elevation (hydraulic), or velocity (translational or spatial).
+    """Place with a single potential.
+
+    It is a pressure at its elevation (hydraulic), a velocity (translational or spatial), an angular velocity
+    (rotational), a voltage (electrical) or a temperature (thermal).
 
     Ports: those of the links that name it. Stored and dissipated energy: none, unless its type states otherwise.
     """
@@ -52,7 +56,8 @@ class Node(Part):
     fixes_pressure: ClassVar[bool] = False
     # key of a prescribed flow, and its sign as flow into links; 0 for a prescribed pressure
     driven: ClassVar[tuple[str, float] | None] = None
-    domain: ClassVar[str] = "hydraulic"  # | "translational" | "spatial"
+    domain: ClassVar[str] = "hydraulic"  # | "translational" | "spatial" | "rotational" | "electrical" | "thermal"
+    main_quantities: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded where a case has no probes
 
     elevation: Annotated[float | None, Quantity(
         "length", about="elevation above datum, at all nodes or none [m]; "
@@ -116,7 +121,8 @@ class Link(Part):
     """Part with ports that join places; flow is positive into the part at each port.
 
     The sum of potential times flow over the ports is the power [W] into the part. Potential and flow are pressure and
-    volume flow (hydraulic domain), velocity and force (translational), or angular velocity and torque (rotational).
+    volume flow (hydraulic domain), velocity and force (translational), angular velocity and torque (rotational), or
+    voltage and current (electrical). The flow of the thermal domain is a heat flow, itself a power.
     """
 
     noun: ClassVar[str] = "link"
@@ -125,6 +131,8 @@ class Link(Part):
     on_request: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded only by explicit probes
     along: ClassVar[dict[str, str]] = {}  # quantities that also exist at a fraction of the length
     joins: ClassVar[dict[str, str]] = {}  # port -> required domain of its place
+    in_network: ClassVar[bool] = False  # True if it is an element of a network of rotation, electricity or heat
+    main_quantities: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded where a case has no probes
     may_lack: ClassVar[tuple[str, ...]] = ()  # ports that may join nothing
     owns: ClassVar[dict[str, str]] = {}  # own place, `LINK.PLACE` for other parts -> domain
 

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from fvsolve.assembly.lowering import FORCE, Input, rows_in
 from fvsolve.assembly.mechanics import AxisLowering, PushLowering, join_ports
+from fvsolve.assembly.network_elements import CAPACITY, FLOW, Element
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
 from fvsolve.parts.body import NamedPoints
@@ -38,6 +39,17 @@ class Mass(Node, kind="mass"):
 
 class MassRows(AxisLowering, kind="mass"):
     """Conversion to table rows of masses: bodies on an axis, moved by forces."""
+
+    def network_elements(self, case, name, part):
+        """Elements of a mass that a part of a network moves: its inertia, and the force of all other parts."""
+        if name not in case.network_places:
+            return [], []
+        place = f"nodes.{name}"
+        mass = case.nodes_with_water[name].mass
+        return [
+            Element(CAPACITY, place, place, (name, None), mass, f"{name}.velocity", state_of=("mass", name)),
+            Element(FLOW, f"{place}.force", place, (None, name), reads=(rec.FORCE_INPUT, name)),
+        ], []  # fmt: skip
 
 
 class Frame(Node, kind="frame"):

@@ -115,15 +115,20 @@ def context_of(info: Any) -> ReadContext:
 
 @dataclass(frozen=True)
 class Range:
-    """Range of valid numbers, from `least` to `greatest`; open : True if the lower bound is excluded"""
+    """Range of valid numbers, from `least` to `greatest`.
+
+    open : True if the lower bound is excluded; nonzero : True if 0 is excluded
+    """
 
     least: float = -math.inf
     greatest: float = math.inf
     open: bool = False
+    nonzero: bool = False
 
     def check(self, value: float, given: Any) -> None:
         """Raise ValueError if `value` is outside the range; given : value as written in the file"""
-        if value < self.least or value > self.greatest or (self.open and value == self.least):
+        excluded = (self.open and value == self.least) or (self.nonzero and value == 0.0)
+        if value < self.least or value > self.greatest or excluded:
             raise ValueError(f"{show(given)} is out of range; expected a value {self}")
 
     @property
@@ -132,6 +137,8 @@ class Range:
         return "" if self == Range() else f", {self}".replace("of at least", "at least")
 
     def __str__(self) -> str:
+        if self.nonzero:
+            return "other than 0"
         if self.greatest == math.inf:
             return f"above {self.least:g}" if self.open else f"of at least {self.least:g}"
         if self.open:
@@ -153,6 +160,7 @@ class UsualRange(NamedTuple):
 anything = Range()
 positive = Range(0, open=True)
 nonnegative = Range(0)
+nonzero = Range(nonzero=True)
 
 
 def between(least: float, greatest: float, open: bool = False) -> Range:

@@ -168,6 +168,8 @@ def single_thread_reason(model: Model) -> str:
         return f"method {method} solves for all states at once; {EXPLICIT_ONLY}"
     if len(model.tables.controls):
         return "controls read the whole state"
+    if model.network is not None:
+        return "parts of rotation, electricity and heat read the whole state"
     if not model.basins:
         return "the case has no basin; only rows of basins are distributed over threads"
     return "" if not all(basin.undivided_reason for basin in model.basins) else undivided_basins(model)

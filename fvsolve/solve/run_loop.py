@@ -62,6 +62,7 @@ class RunLoop:
         method = method_named(automatic.first_method(numerics.method))
         self.switched: list[tuple[float, int]] = []  # time and number of every event of a device
         self.at_once, self.last_switch = 0, np.nan
+        self.network_fault = ""  # reason why a network has no solution after a switch has opened
         # times of the last events
         self.recent_events: deque[float] = deque(maxlen=MOST_EVENTS_IN_SPAN + 4 * self.armed.size)
         self.span = SPAN * (numerics.end - numerics.start)
@@ -164,7 +165,7 @@ class RunLoop:
     def steps(self, budget: float) -> int:
         """Take at most `budget` steps, for which the wave history has space; returns a code, see `run`."""
         self.control["budget"] = budget
-        code = loop_records.SWITCHED
+        code = loop_records.CHATTERING if self.network_fault else loop_records.SWITCHED
         while code == loop_records.SWITCHED:
             before = self.armed.copy()
             functions, where = self.functions
@@ -212,10 +213,13 @@ class RunLoop:
             sums[0 if part > 0.0 else 1, i] += part
         for (_, _, device), row in zip(self.model.devices, self.model.tables.devices, strict=True):
             device.apply_event(self.run_data, row, self.t, self.now, self.stepper.scale)
+        self.network_fault = self.run_data.apply_network(self.now)
 
     def handle_events(self, before: np.ndarray) -> bool:
         """Record the last events; returns False if there are too many at the same time or in a short span of time."""
         self.record_events(before)
+        if self.network_fault:
+            return False
         self.at_once = self.at_once + 1 if self.t == self.last_switch else 1
         self.last_switch = self.t
         self.recent_events.append(self.t)
@@ -280,6 +284,8 @@ class RunLoop:
         """
         model, text, names = self.model, FAILURES.get(code, ""), {}
         names["when"] = f"t = {model.case.amount(self.t, 'time', 6)}"
+        if code == loop_records.CHATTERING and self.network_fault:
+            return f"{self.network_fault} at {names['when']}"
         if code == loop_records.CHATTERING:
             return self.chattering_text(names["when"])
         if code == loop_records.STOPPED:

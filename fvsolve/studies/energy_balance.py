@@ -53,8 +53,10 @@ class EnergyLoop(RunLoop):
             if self.state["steps"] > steps and code in ACCEPTED_CODES:
                 after = armed.copy()
                 armed[:] = rules  # the flags of the right-hand side of this step
+                self.run_data.update_network()
                 self.add(self.released_stops(t, y, self.step_energy(t, y, *first_values)) + self.jump_correction(t, y))
                 armed[:] = after
+                self.run_data.update_network()
                 self.on_step()
         return code
 

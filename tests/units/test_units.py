@@ -76,6 +76,12 @@ g cm2: gram*centimeter**2 | g mm2: gram*millimeter**2 | lb in2: pound*inch**2 | 
 deg/s: degree/second | N m s: newton*meter*second | N m s/rad: newton*meter*second
 Nms: newton*meter*second | kN m s: kilonewton*meter*second | N s: newton*second | kg m/s: kilogram*meter/second
 kN s: kilonewton*second | kg m2/s: kilogram*meter**2/second
+V: volt | mV: millivolt | kV: kilovolt | A: ampere | mA: milliampere | kA: kiloampere | ohm: ohm | mohm: milliohm
+kohm: kiloohm | Mohm: megaohm | H: henry | mH: millihenry | uH: microhenry | Wb: weber | mWb: milliweber
+N m/A: newton*meter/ampere | mN m/A: millinewton*meter/ampere | V s/rad: volt*second | V/(rad/s): volt*second
+V s: volt*second | N m/rad: newton*meter | kN m/rad: kilonewton*meter | N m/deg: newton*meter/degree
+J/K: joule/kelvin | kJ/K: kilojoule/kelvin | MJ/K: megajoule/kelvin | W/K: watt/kelvin | kW/K: kilowatt/kelvin
+W/m2/K: watt/meter**2/kelvin | W/(m2 K): watt/meter**2/kelvin | kW/m2/K: kilowatt/meter**2/kelvin
 lb ft2: pound*foot**2 | C: coulomb | F: farad | K: kelvin | degC: degC | celsius: degC | degF: degF | degR: degR
 """
 PINT = dict(row.strip().split(": ") for line in ROWS.splitlines() for row in line.split("|") if row.strip())
@@ -211,7 +217,7 @@ def test_pint_knows_the_rest():
             '"2 bara" is an absolute pressure; expected a gauge pressure, for example "5 barg"',
         ),
         ("3 m/s", "number", '"3 m/s" is a velocity; expected a number, for example 0.5'),
-        ("3 V", "length", '"3 V" is a quantity of [kg·m²/A/s³]; expected a length, for example "300 mm"'),
+        ("3 V", "length", '"3 V" is a voltage; expected a length, for example "300 mm"'),
         ("3 9**9**9", "length", '"3 9**9**9": unknown unit "9**9**9"; expected a length, for example "300 mm"'),
     ],
 )

@@ -5,7 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fvsolve.assembly.network_elements import CAPACITY, FLOW, Element
 from fvsolve.assembly.schedule_tables import value_at
+from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.pump import law
 from fvsolve.parts.pump.head_curve import CurvePoints, Quadrants, quadrants, zero_head_flow
 from fvsolve.parts.pump.part import EFFICIENCY
@@ -270,9 +272,28 @@ class ShaftLowering:
     """Base of the conversion to table rows of pumps and turbines; small : size of a small deviation of the speed"""
 
     small = 1.0
+    fluid_torque_sign = -1.0  # of the probe `torque`, as a torque that turns the shaft forward
 
     def states_of(self, draft, name, part) -> tuple[str, ...]:
-        return ("speed",) if part.trip is not None or torques_on(draft.case, name) else ()
+        free = part.trip is not None or torques_on(draft.case, name) or f"{name}.shaft" in draft.case.network_places
+        return ("speed",) if free else ()
+
+    def network_elements(self, case, name, part) -> tuple[list[Element], list]:
+        """Elements of a shaft that other parts of a network join: its inertia, and the torque of the fluid."""
+        place, shaft = f"links.{name}", f"{name}.shaft"
+        if shaft not in case.network_places:
+            return [], []
+        rated = part.rated_speed if getattr(part, "rated_speed", None) is not None else 1.0
+        return [
+            Element(CAPACITY, f"{place}.shaft", place, (shaft, None), part.inertia or 1.0, f"{name}.speed",
+                    state_of=("device", name), unit=rated),
+            Element(FLOW, f"{place}.fluid", place, (None, shaft),
+                    reads=(rec.TORQUE_INPUT, (name, self.fluid_torque_sign))),
+        ], []  # fmt: skip
+
+    def torque_at_start(self, start, part, row) -> float:
+        """Value of the probe `torque` at the start [N m]."""
+        return -self.fluid_torque_sign * self.fluid_torque(start, row, start.valves[row["valve"]])
 
     def scales(self, draft, name, part) -> list[float]:
         return [self.small for _ in self.states_of(draft, name, part)]
@@ -283,7 +304,8 @@ class ShaftLowering:
         Also write the speed schedule to the row of the part in the table of devices.
         """
         torques = torques_on(draft.case, name)
-        mode = law.TORQUE_DRIVEN if torques else law.HELD_SPEED if part.trip is None else law.TRIPPING
+        free = torques or f"{name}.shaft" in draft.case.network_places
+        mode = law.TORQUE_DRIVEN if free else law.HELD_SPEED if part.trip is None else law.TRIPPING
         draft.device_table["schedule"][draft.device_names.index(name)] = draft.schedules.add(part.speed)
         return {law.MODE: mode, law.TRIP: self.trip(draft, name, part), law.TORQUE_COUNT: len(torques)}
 
@@ -339,12 +361,16 @@ class ShaftLowering:
         rest = total - braking if abs(total - braking) > ROUNDING_SHARE * (abs(total) + abs(braking)) else 0.0
         speed = float(valve["drive"])
         floats[at + law.START_SPEED], floats[at + law.TORQUE], floats[at + law.OFFSET] = speed, braking, rest
+        if f"{name}.shaft" in draft.case.network_places:
+            return []
         rise = rest / part.inertia
         return [f"{part.kind} {name}: its shaft accelerates by {rise:.4g} rad/s2"] if rest != 0.0 else []
 
 
 def torques_on(case, name: str) -> list:
-    """Torque links of a case on the shaft of a pump or turbine."""
+    """Torque links of a case on the shaft of a pump or turbine that no other part joins."""
+    if f"{name}.shaft" in case.network_places:
+        return []  # they are sources of the network
     return [link for link in case.links.values() if link.kind == "torque" and link.to == f"{name}.shaft"]
 
 

@@ -177,6 +177,7 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
     law = law
     quantities = ("head", "speed", "torque", "power", "opening")
     small = 1.0  # rad/s
+    fluid_torque_sign = 1.0
 
     def inputs(self, model, name, part):
         return opening_input(model, name) | {"speed": Input(ANGULAR_SPEED, int(self.row_of(model, name)["schedule"]))}

@@ -13,6 +13,7 @@ import numpy as np
 
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError
+from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.steppers.tableau import METHODS
 from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
 from fvsolve.studies.accuracy.refine import Level, Plan
@@ -148,12 +149,19 @@ def variable_unit(variable: str, known: Mapping[str, str] = {}) -> str:  # noqa:
     return known[variable] if variable in known else DIMENSIONS[variable_dimension(variable)].si
 
 
-def variable_dimension(variable: str) -> str:
-    """Dimension of a variable of pipes, nodes or links, such as "pressure"; "number" for other variables."""
+def variable_dimension(variable: str, case=None) -> str:
+    """Dimension of a variable of pipes, nodes or links, such as "pressure"; "number" for other variables.
+
+    case : case whose part is named before the quantity; None for the first type of part that has the quantity
+    """
     from fvsolve.parts import KINDS
 
     quantity = variable.split("@")[0].rsplit(".", 1)[-1].rsplit(" ", 1)[-1]
     kinds = [kind for group in KINDS.values() for kind in group.values()]
+    kinds.sort(key=lambda kind: getattr(kind, "domain", "") in NETWORK_DOMAINS)
+    if case is not None:
+        name = variable.split("@")[0].rsplit(".", 1)[0].rsplit(" ", 1)[-1]
+        kinds = [*(parts[name] for parts in (case.nodes, case.links) if name in parts), *kinds]
     return next((quantities[quantity] for kind in kinds
                  for quantities in (kind.quantities, getattr(kind, "along", {}))
                  if quantity in quantities), "number")  # fmt: skip
@@ -163,7 +171,7 @@ def error_scale(case, variable: str) -> tuple[float, str]:
     """(factor from SI, unit) of errors of a variable in the units of `[output]`, or of lengths for "length"."""
     from fvsolve.output.unit_columns import column
 
-    result = column("", variable if variable == "length" else variable_dimension(variable), case)
+    result = column("", variable if variable == "length" else variable_dimension(variable, case), case)
     return result.span_from_si(1.0), result.span_unit
 
 

@@ -1,0 +1,267 @@
+"""Start of a network of potential and flow: stores in equilibrium where no value is stated, state of its switches."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fvsolve.assembly.network_elements import Element
+from fvsolve.errors import listing
+from fvsolve.kernels import dtypes as rec
+from fvsolve.model.network_elimination import NetworkError, Terms, substituted
+from fvsolve.model.network_tables import network_faults
+
+TURNS = 60  # changes of switches, and of nonlinear sources, in the search
+AGREE = 1e-9  # relative difference of two values that are equal
+RESTING = 1e-9  # rate of a store in equilibrium, over the sum of the magnitudes of its terms
+SLIP = 1e-12  # slip that is rounding, over the sum of the magnitudes of its speeds
+
+
+class NetworkStart:
+    """Search for the values of all stores and sources of a network at the start, and for the state of its switches.
+
+    values : of all columns; mode : as for `Network.equations`; directions : of each friction, 0 while it sticks
+    """
+
+    def __init__(self, draft, start) -> None:
+        self.draft, self.start, self.network = draft, start, draft.network
+        self.values = np.zeros(len(self.network.columns))
+        self.free = self.stated_values()
+        self.switches = self.network.switches
+        self.directions = [0.0] * len(self.switches)
+        self.mode = tuple(self.begins_on(k) for k in range(len(self.switches)))
+
+    @property
+    def stores(self) -> dict[int, Element]:
+        """Stores by column."""
+        return self.network.stores
+
+    def stated_values(self) -> list[int]:
+        """Write the stated values of stores and sources; returns the columns of stores whose value is not known."""
+        network, known = self.network, set()
+        for item in network.sources:
+            if item.reads is None:
+                schedule = network.schedules[item.part, item.key]
+                self.values[network.columns[item.name]] = self.start.schedule_value(schedule)
+            elif item.reads[0] in (rec.TORQUE_INPUT, rec.FORCE_INPUT):
+                self.values[network.columns[item.name]] = self.given_by_others(item)
+        for column, item in self.stores.items():
+            value = item.initial if item.state_of is None else self.state_of_other(item)
+            if value is not None:
+                self.values[column] = value
+                known.add(column)
+        for column, terms in network.dependent.items():
+            unknown = [other for other in terms if other not in known]
+            rest = sum(value * self.values[other] for other, value in terms.items() if other in known)
+            if column in known and unknown:
+                self.values[unknown[0]] = (self.values[column] - rest) / terms[unknown[0]]
+                known.add(unknown[0])
+            elif column in known and abs(rest - self.values[column]) > AGREE * (abs(rest) + abs(self.values[column])):
+                tied = [self.stores[other].part.partition(".")[2] for other in terms]
+                text = f"its stated start, {self.values[column]:.6g}, contradicts {listing(tied)}, to which it is tied"
+                self.draft.fault(self.stores[column].part, f"{text}; expected {rest:.6g}, or state only one of them")
+        return [column for column in self.stores if column not in known and column not in network.dependent]
+
+    def given_by_others(self, item: Element) -> float:
+        """Torque of the fluid on a shaft, or force on a mass, at the start."""
+        kind, name = item.reads
+        draft = self.draft
+        if kind == rec.FORCE_INPUT:
+            return float(draft.mass_table[draft.mass_index[name]]["force"])
+        name, sign = name
+        k = draft.device_names.index(name)
+        _, part, device = draft.devices[k]
+        row = draft.device_table[k]
+        return sign * device.torque_at_start(self.start, part, row)
+
+    def state_of_other(self, item: Element) -> float:
+        """Potential at the start of a store whose state is that of another part."""
+        kind, name = item.state_of
+        draft = self.draft
+        if kind == "mass":
+            return float(draft.mass_table[draft.mass_index[name]]["velocity"])
+        row = draft.device_table[draft.device_names.index(name)]
+        return item.unit * float(draft.valve_table[row["valve"]]["drive"])
+
+    def begins_on(self, k: int) -> bool:
+        """First guess of the state of a switch: as scheduled; diodes block; friction sticks."""
+        switch = self.switches[k]
+        if switch.kind != rec.SWITCH:
+            return switch.kind == rec.FRICTION
+        return self.start.schedule_value(self.network.schedules[switch.part, switch.key]) > 0.5
+
+    # search ---------------------------------------------------------------------------------------------------
+
+    def find(self) -> None:
+        """Search for the start, and write it to the tables of the draft and to `draft.network`."""
+        for _ in range(TURNS):
+            try:
+                fault = self.solve()
+            except NetworkError as error:
+                for place, text in network_faults(error, self.draft.case):
+                    self.draft.fault(place, text)
+                return
+            if not self.change_switch():
+                break
+        else:
+            fault = self.switches[0].part, "its state at the start alternates; state the initial values of the stores"
+        if fault is not None:
+            self.draft.fault(*fault)
+        self.write()
+
+    def sum_of(self, terms: Terms) -> float:
+        """Value of a linear function at the present values."""
+        return float(sum(value * self.values[column] for column, value in terms.items()))
+
+    def size_of(self, terms: Terms) -> float:
+        """Sum of the magnitudes of its terms."""
+        return float(sum(abs(value * self.values[column]) for column, value in terms.items()))
+
+    def solve(self) -> tuple[str, str] | None:
+        """Solve for the free stores in the present mode; returns a fault (place, text) if there is no equilibrium."""
+        fault = None
+        for _ in range(TURNS):
+            before = self.values.copy()
+            fault = self.balance()
+            for column, terms in self.network.dependent.items():
+                self.values[column] = self.sum_of(terms)
+            self.set_nonlinear_sources()
+            if np.all(np.abs(self.values - before) <= 1e-14 * (np.abs(before) + np.abs(self.values))):
+                break
+        return fault
+
+    def balance(self) -> tuple[str, str] | None:
+        """Set the free stores so that their rates are zero and ties of the mode hold; returns a fault, or None."""
+        network, found, place = self.network, self.network.equations(self.mode), {c: k for k, c in enumerate(self.free)}
+        if not place:
+            return None
+        ties = network.ties_of(self.mode)
+        laws = [substituted(found.rate(column), network.dependent) for column in self.free if column not in ties]
+        laws += [{column: -1.0} | terms for column, terms in ties.items()]
+        matrix, given = np.zeros((len(laws), len(place))), np.zeros(len(laws))
+        for row, law in enumerate(laws):
+            given[row] = -self.sum_of(law)
+            for column in law.keys() & place.keys():
+                matrix[row, place[column]] = law[column]
+        sizes = np.array([item.small for item in map(self.stores.get, self.free)])
+        scale = 1.0 / np.maximum(np.abs(matrix * sizes).max(axis=1), 1e-300)
+        solution, _, rank, _ = np.linalg.lstsq(matrix * sizes * scale[:, None], given * scale, rcond=1e-11)
+        self.values[self.free] += solution * sizes
+        for law in laws:
+            if abs(self.sum_of(law)) > RESTING * self.size_of(law):
+                moving = [self.stores[c] for c in self.free]
+                names = listing([item.state for item in moving], 4)
+                return moving[0].part, f"there is no equilibrium of {names} at the start; state its initial value"
+        if rank < len(place) and any(self.stores[column].thermal for column in self.free):
+            item = next(self.stores[column] for column in self.free if self.stores[column].thermal)
+            return item.part, "nothing determines its temperature at the start; give the key `initial_temperature`"
+        return None
+
+    def set_nonlinear_sources(self) -> None:
+        """Write torques of friction that slips, and heat that elements dissipate."""
+        network, found = self.network, self.network.equations(self.mode)
+        numbers = {switch.name: k for k, switch in enumerate(self.switches)}
+        on = {switch.name: on for switch, on in zip(self.switches, self.mode, strict=True)}
+        for item in network.sources:
+            if item.reads is None:
+                continue
+            kind, name = item.reads
+            if kind == rec.FRICTION_FLOW:
+                k = numbers[name]
+                slip = self.sum_of(substituted(found.drop(self.element(self.switches[k].drop)), network.dependent))
+                self.values[network.columns[item.name]] = self.directions[k] * self.friction_torque(k, slip)
+            elif kind == rec.HEAT_INPUT:
+                other = self.element(name)
+                active = not other.switch or on[other.switch]
+                drop, flow = (self.sum_of(substituted(terms, network.dependent))
+                              for terms in (found.drop(other), found.flow(other)))  # fmt: skip
+                self.values[network.columns[item.name]] = drop * flow * active
+
+    def element(self, name: str) -> Element:
+        """Element by name."""
+        return self.network.elements[self.network.numbers[name]]
+
+    def friction_torque(self, k: int, slip: float, at_rest: bool = False) -> float:
+        """Torque of dry friction at a slip, or the greatest torque at rest."""
+        switch = self.switches[k]
+        kinetic, static, stribeck, factor = switch.numbers
+        if switch.schedule is not None:
+            torque = self.start.schedule_value(self.network.schedules[switch.part, switch.key])
+            return torque * factor if at_rest else torque
+        if at_rest:
+            return static
+        return kinetic + ((static - kinetic) * float(np.exp(-((slip / stribeck) ** 2))) if stribeck else 0.0)
+
+    def change_switch(self) -> bool:
+        """Change the first switch whose state contradicts the values; False if there is none."""
+        network, found = self.network, self.network.equations(self.mode)
+        for k, switch in enumerate(self.switches):
+            drop_terms = substituted(found.drop(self.element(switch.drop)), network.dependent)
+            drop, on = self.sum_of(drop_terms), self.mode[k]
+            if switch.kind == rec.DIODE:
+                current = self.total(switch.part, found)
+                changes = current < 0.0 if on else drop > switch.numbers[0]
+                direction = 0.0
+            elif switch.kind == rec.SWITCH:
+                continue
+            elif on:
+                torque = self.sum_of(found.flow(self.element(switch.flow)))
+                slips = abs(drop) > SLIP * self.size_of(drop_terms)
+                changes = slips or abs(torque) > self.friction_torque(k, 0.0, True)
+                direction = float(np.sign(drop if slips else torque))
+            else:
+                changes, direction = drop * self.directions[k] < -SLIP * self.size_of(drop_terms), 0.0
+            if changes:
+                self.mode = (*self.mode[:k], not on, *self.mode[k + 1 :])
+                self.directions[k] = direction
+                return True
+        return False
+
+    def total(self, part: str, found) -> float:
+        """Current through a diode."""
+        members = [item for item in self.network.totals[part] if not item.switch or item.switch == part]
+        on = {switch.name: on for switch, on in zip(self.switches, self.mode, strict=True)}
+        first, total = members[0].ends[:2], 0.0
+        for item in members:
+            if not item.switch or on[item.switch]:
+                sign = 1.0 if item.ends[:2] == first else -1.0
+                total += sign * self.sum_of(substituted(found.flow(item), self.network.dependent))
+        return total
+
+    def write(self) -> None:
+        """Write the start to the tables and event flags of the draft."""
+        draft, network = self.draft, self.network
+        draft.network = network = replace(network, values=self.values.copy(), written={})
+        draft.tables.network_inputs["start"] = [self.values[network.columns[item.name]] for item in network.sources]
+        for k, switch in enumerate(self.switches):
+            flag = network.flags[switch.name]
+            if switch.kind == rec.FRICTION:
+                terms = network.terms(network.conducting)[network.rows_of(switch.drop)[0]]
+                small = sum(abs(value) * self.stores[column].small for column, value in terms.items()
+                            if column in self.stores)  # fmt: skip
+                draft.tables.network_switches[k]["rounding"] = SLIP * (small + self.size_of(terms))
+                draft.start_flags |= {flag: self.directions[k] > 0.0, flag + 2: self.directions[k] < 0.0}
+            else:
+                draft.start_flags[flag] = self.mode[k]
+        booked = [item for item in network.elements if item.ledger or item.heat_to is not None]
+        for item, row in zip(booked, draft.tables.network_elements, strict=True):
+            if item.is_store:
+                row["start"] = self.values[network.columns[item.name]]
+
+
+def start_network(draft, start) -> list[str]:
+    """Compute the start of the network of a draft; returns texts of the motions of its states at the start."""
+    if draft.network is None:
+        return []
+    search = NetworkStart(draft, start)
+    search.find()
+    network = draft.network
+    if not network.values.size or draft.faults:
+        return []
+    factors, texts = network.arrays(search.mode)[1], []
+    for rate, (column, _) in zip(factors, network.states.items(), strict=False):
+        item = network.stores[column]
+        if rate != 0.0 and item.state:
+            texts.append(f"{item.state} changes by {rate * item.unit:.4g} per second")
+    return texts
