@@ -13,6 +13,7 @@ from fvsolve.case.reading import NOT_DEFAULT, WITH_DEFAULTS
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.control import Control
+from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table_model import keys_json
 from fvsolve.parts.value import Quantity
@@ -62,8 +63,14 @@ def full_schema() -> dict[str, Any]:
         "required": ["numerics"],
         "anyOf": [
             {"required": ["fluid", "nodes"]},
+            {
+                "required": ["nodes", "links"],
+                "properties": {
+                    "nodes": {"additionalProperties": {"properties": {"type": {"enum": nodes_without_fluid()}}}}
+                },
+            },
             {"required": ["controls"], "not": {"anyOf": [{"required": ["nodes"]}, {"required": ["links"]}]}},
-        ],
+        ],  # fmt: skip
         "if": {
             "required": ["nodes"],
             "not": {"required": ["controls"]},
@@ -75,6 +82,11 @@ def full_schema() -> dict[str, Any]:
         "additionalProperties": False,
         "$defs": definitions,
     }
+
+
+def nodes_without_fluid() -> list[str]:
+    """Types of nodes of cases that need no fluid: of rotation, electricity and heat, and of masses on an axis."""
+    return sorted(name for name, kind in KINDS["nodes"].items() if kind.domain in (*NETWORK_DOMAINS, "translational"))
 
 
 def share_definitions(full: dict[str, Any]) -> dict[str, Any]:

@@ -367,7 +367,10 @@ def test_the_schema_wants_links_but_beside_a_basin_or_a_body():
     for path in folders.CASES.glob("*.toml"):
         table = tomllib.loads(path.read_text(encoding="utf-8"))
         plain = "controls" not in table and all(one["type"] not in excluded for one in table[group].values())
-        fluid = made["anyOf"][0]["required"]
+        first, without = made["anyOf"][:2]
+        kinds = without["properties"][group]["additionalProperties"]["properties"]["type"]["enum"]
+        fluid = first["required"] if "fluid" in table else without["required"]
+        assert "fluid" in table or all(one["type"] in kinds for one in table[group].values())
         assert {*made["required"], *fluid, *(made["then"]["required"] if plain else ())} <= {*table}, path.name
 
 

@@ -22,7 +22,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "benchmarks": (6234, 48),
     "fvsolve/assembly": (1842, 10),
     "fvsolve/basins": (9051, 44),
-    "fvsolve/case": (6422, 23),
+    "fvsolve/case": (6434, 23),
     "fvsolve/cli": (3285, 14),
     "fvsolve/compile": (1050, 6),
     "fvsolve/data": (12, 1),
@@ -43,7 +43,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/studies": (14521, 49),
     "tests/attitude": (447, 2),
     "tests/basins": (6580, 21),
-    "tests/case": (4248, 14),
+    "tests/case": (4254, 14),
     "tests/cli": (996, 7),
     "tests/draw": (217, 2),
     "tests/epanet": (434, 1),
@@ -63,7 +63,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/step_limits": (1022, 4),
     "tests/steppers": (2114, 12),
     "tests/studies": (7951, 22),
-    "tests/units": (248, 1),
+    "tests/units": (250, 1),
 }
 # functions that exceed a limit: "path: function" -> (arguments, lines). Commands and studies are excepted by rule.
 LONG: dict[str, tuple[int, int]] = {}

@@ -97,6 +97,8 @@ PINT_SI = {
     "rad/s": "radian/second", "N m": "newton*meter", "kg m2": "kilogram*meter**2",
     "N m s": "newton*meter*second", "N s": "newton*second",
     "kg m2/s": "kilogram*meter**2/second", "C": "coulomb", "F": "farad",
+    "V": "volt", "A": "ampere", "ohm": "ohm", "H": "henry", "Wb": "weber", "N m/A": "newton*meter/ampere",
+    "N m/rad": "newton*meter/radian", "J/K": "joule/kelvin", "W/K": "watt/kelvin", "W/m2/K": "watt/meter**2/kelvin",
 }  # fmt: skip
 
 
