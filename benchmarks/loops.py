@@ -1,4 +1,4 @@
-"""Cost of controls: a PI with filter and limits per stage, an operation of a formula, a sample.
+"""Cost of controls and networks: a PI with filter and limits, an operation of a formula, a sample, a motor, an entry.
 
     python benchmarks/loops.py [--quick]
 
@@ -16,7 +16,10 @@ from fvsolve import build, load
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 
 STEP, STAGES = 1e-2, 4  # [s], of rk4
-GOALS = {"PI with filter and limits, a stage": 60.0, "formula, an operation": 6.0, "sample": 2000.0}  # [ns]
+GOALS = {  # [ns]; of a network 25 ns and 4 ns an entry, beside 9 ns of rates written by hand
+    "PI with filter and limits, a stage": 60.0, "formula, an operation": 6.0, "sample": 2000.0,
+    "motor and shaft of 6 entries, a stage": 58.0, "entry of a network, a stage": 4.0,
+}  # fmt: skip
 FLUID = {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2300.0}
 OPERATIONS = 18  # of the longer formula, in addition to that of the shorter one
 SHORT, LONG = "0.25 + 0*t", "0.25 + 0*t + 0*t + 0*t - 0*t - 0*t + 0"
@@ -40,6 +43,38 @@ def pi(**more) -> dict:
     return {"hold": block | more}
 
 
+def motor(case: dict) -> dict:
+    """Case with a motor on a shaft with a bearing: two states, six entries."""
+    nodes = {"gnd": {"type": "ground"}, "plus": {"type": "terminal"}, "frame": {"type": "housing"},
+             "axle": {"type": "shaft", "inertia": 3e-3, "initial_speed": 0.0}}  # fmt: skip
+    links = {
+        "supply": {"type": "voltage-source", "from": "gnd", "to": "plus", "voltage": 24.0},
+        "motor": {"type": "dc-motor", "ports": {"p": "plus", "n": "gnd", "shaft": "axle"}, "torque_constant": 0.12,
+                  "resistance": 0.8, "inductance": 0.2},
+        "bearing": {"type": "bearing", "from": "axle", "to": "frame", "damping": 1e-3},
+    }  # fmt: skip
+    return case | {"nodes": case["nodes"] | nodes, "links": case["links"] | links}
+
+
+def ladder(case: dict, sections: int) -> dict:
+    """Case with a chain of inductors, resistors and capacitors; a section has two states and five entries."""
+    nodes = {"gnd": {"type": "ground"}} | {f"n{k}": {"type": "terminal"} for k in range(sections + 1)}
+    nodes |= {f"m{k}": {"type": "terminal"} for k in range(sections)}
+    links = {"end": {"type": "resistor", "from": f"n{sections}", "to": "gnd", "resistance": 1.0},
+             "last": {"type": "capacitor", "from": f"n{sections}", "to": "gnd", "capacitance": 1.0}}  # fmt: skip
+    for k in range(sections):
+        links[f"c{k}"] = {"type": "capacitor", "from": f"n{k}", "to": "gnd", "capacitance": 1.0}
+        links[f"l{k}"] = {"type": "inductor", "from": f"n{k}", "to": f"m{k}", "inductance": 1.0}
+        links[f"r{k}"] = {"type": "resistor", "from": f"m{k}", "to": f"n{k + 1}", "resistance": 1.0}
+    return case | {"nodes": case["nodes"] | nodes, "links": case["links"] | links}
+
+
+def entries(case: dict) -> int:
+    """Number of entries of all rates of a network."""
+    network = build(load(case)).network
+    return sum(len(terms) for terms in network.terms(network.conducting)[: len(network.states)])
+
+
 def seconds_per_step(case: dict, steps: int, turns: int) -> float:
     """Least CPU time of a step [s]."""
     model, found = build(load(case, {"numerics.end": (steps + 10) * STEP, "output.every": steps * STEP})), []
@@ -61,11 +96,15 @@ def main() -> None:
     sampled = tower({"control": "hold"}, pi(limits=[0.0, 1.0], period=STEP))
     rare = tower({"control": "hold"}, pi(limits=[0.0, 1.0], period=1e6))
     cases = {"plain": plain, "held": held, "short": tower(SHORT), "long": tower(LONG), "sampled": sampled, "rare": rare}
+    cases |= {"motor": motor(plain), "few": ladder(plain, 4), "many": ladder(plain, 84)}
     cost = {name: 1e9 * seconds_per_step(case, steps, turns) for name, case in cases.items()}
+    more = entries(cases["many"]) - entries(cases["few"])
     found = {
         "PI with filter and limits, a stage": (cost["held"] - cost["plain"]) / STAGES,
         "formula, an operation": (cost["long"] - cost["short"]) / STAGES / OPERATIONS,
         "sample": cost["sampled"] - cost["rare"],
+        "motor and shaft of 6 entries, a stage": (cost["motor"] - cost["plain"]) / STAGES,
+        "entry of a network, a stage": (cost["many"] - cost["few"]) / STAGES / more,
     }
     print("| | ns | goal |\n|---|---|---|")
     for name, value in found.items():

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 TOP = Path(__file__).parents[1]
-QUICK_NEEDED, ALL_NEEDED = 40, 44
+QUICK_NEEDED, ALL_NEEDED = 42, 46
 WITHOUT_OWN_TEST = (
     "--deselect",
     "tests/repository/test_tools_of_tests.py",
@@ -116,6 +116,12 @@ FAULTS = [
         "float(value * input_.scale)",
     ),
     Fault("studies/loops/sampled.py", "self.drive * (1.0 + z[place])", "self.drive * (1.0 - z[place])"),
+    Fault(
+        "model/network_elimination.py",
+        "scale = (1.0, -1.0, -item.value, item.value)",
+        "scale = (1.0, -1.0, item.value, -item.value)",
+    ),
+    Fault("kernels/potential_networks.py", "forward = most - torque", "forward = 1.01 * most - torque"),
     Fault(
         "kernels/input_histories.py",
         "weight *= (time - other) / (histories[here] - other)",

@@ -7,9 +7,9 @@ from typing import Any, ClassVar, NamedTuple
 from fvsolve.assembly.lowering import Input, InputKind, Lowering
 from fvsolve.kernels import dtypes as rec
 
-CAPACITY, INERTANCE, RESISTANCE, POTENTIAL, FLOW, TRANSFORMER, LOCK = range(7)
+CAPACITY, INERTANCE, RESISTANCE, POTENTIAL, FLOW, TRANSFORMER, LOCK, GAUGE = range(8)
 """Kinds of elements: flow = value d potential / dt; potential = value d flow / dt; potential = value times flow; given
-potential; given flow; potential 1 = value times potential 2; equal potentials."""
+potential; given flow; potential 1 = value times potential 2; equal potentials; a difference that is only read."""
 
 
 class Element(NamedTuple):

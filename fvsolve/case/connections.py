@@ -252,8 +252,8 @@ def _wrong_domain(place: str, domain: str, places: dict[str, Any], nodes: dict[s
     state = f"is {article(nodes[place]['type'] if place in nodes else owned)}"
     alike = [name for name, other in places.items() if _fits(other or "", domain)]
     has = f"; {domain} places are {listing(alike)}" if alike else ""
-    text = f"{show(place)} {state}, a {places[place]} place, and this port of {article(link['type'])} needs"
-    return f"{text} a {domain} place{has}"
+    text = f"{show(place)} {state}, {article(places[place])} place, and this port of {article(link['type'])} needs"
+    return f"{text} {article(domain)} place{has}"
 
 
 def islands(ends: dict[str, list[str]]) -> list[list[str]]:

@@ -423,7 +423,7 @@ NETWORK_SWITCH = record(
     static=f8,  # greatest friction torque at rest [N m]
     stribeck=f8,  # speed at which the excess at rest has fallen to 1/e; 0 for none [rad/s]
     factor=f8,  # greatest torque at rest over a scheduled torque
-    rounding=f8,  # slip of friction that is rounding
+    rounding=f8,  # slip of friction, or reverse current of a diode, that is rounding
 )
 SWITCH, DIODE, FRICTION = 0, 1, 2
 

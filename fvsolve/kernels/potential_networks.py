@@ -203,8 +203,7 @@ def switch_events(t, y, out, handle, g):
         if switch["kind"] == rec.SWITCH:
             left = CLOSED - schedule_value(tables, switch["schedule"], t)
         elif tables.armed[switch["flag"]] > 0.0:
-            left = -row_value(y, out, tables, switch["flow"])
-            left = left if left != 0.0 else -TINY  # two diodes in series conduct together, each waits for the other
+            left = -row_value(y, out, tables, switch["flow"]) - switch["rounding"]
         else:
             left = switch["forward"] - row_value(y, out, tables, switch["drop"])
         write_pair(g, switch["flag"], left if left != 0.0 else TINY)

@@ -95,6 +95,9 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     excess mass e [kg] and travel x in a chamber of a cylinder : dp/dm (e - x A e0 / V)^2 / (2 rho), with piston area A,
     volume V and excess mass e0 at y
 
+    potential or flow d of a store of rotation or electricity with the value C : C d^2 / 2; of a heat capacity 1e-6 of
+    this
+
     Devices add rows (`energy_rows`), basins weights of their cells (`weights`). The form is exact under the density law
     `linear` about a steady state at rest. A scalar stores no energy, and no other state depends on it; a deviation of
     its amount, divided by its greatest possible value, counts as 1e-6 of the energy that the same mass would store.
@@ -110,7 +113,7 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     elongations = Elongations(model, y)
     stored |= {e: (names[e], row) for e, row in chamber_rows(model, y, elongations)}
     parts = [*stored.values(), *spring_rows(model, y, elongations), *device_rows(model, y)]
-    parts += [*kinetic_rows(model, y), *joint_spring_rows(model)]
+    parts += [*kinetic_rows(model, y), *joint_spring_rows(model), *network_rows(model)]
     entries = [(k, i, value) for k, (_, row) in enumerate(parts) for i, value in row.items()]
     row, column, value = (np.array(column_values) for column_values in zip(*entries, strict=True))
     matrix = csr_array((value, (row, column)), shape=(len(parts), model.y_size))
@@ -220,6 +223,17 @@ def weigh_scalars(model, weights: np.ndarray) -> None:
 def greatest_value(model, q: int) -> float:
     """Greatest possible magnitude of the value of scalar q; 1 if all values are 0."""
     return max(map(abs, bounds(model.case, list(model.case.scalars)[q]))) or 1.0
+
+
+def network_rows(model):
+    """Yield (name, state -> factor) of each row of L for stores of networks, except those of pumps and masses."""
+    network = model.network
+    for column, item in network.stores.items() if network is not None else ():
+        if item.state_of is None:
+            size = np.sqrt(0.5 * item.value * (SCALAR_WEIGHT if item.thermal else 1.0))
+            terms = network.dependent.get(column, {column: 1.0})
+            row = {network.states[c]: float(size * value * network.stores[c].unit) for c, value in terms.items()}
+            yield item.part.partition(".")[2], row
 
 
 def spring_rows(model, y: np.ndarray, elongations: Elongations):

@@ -15,6 +15,7 @@ import numpy as np
 
 from fvsolve.assembly.network_elements import (
     CAPACITY,
+    GAUGE,
     LOCK,
     POTENTIAL,
     RESISTANCE,
@@ -84,7 +85,7 @@ class Elimination:
                 if item.kind == kind and item.ends[1] is None and item.ends[0] is not None:
                     self.known.setdefault(item.ends[0], columns[item.name])
         self.unknowns: dict[tuple, int] = {}
-        for item in elements:
+        for item in elements:  # gauges name nodes too
             for node in item.ends:
                 if node is not None and node not in self.known:
                     self.unknowns.setdefault(("potential", node), len(self.unknowns))
@@ -122,7 +123,7 @@ class Elimination:
         for item in self.elements:
             scale = (1.0, -1.0, -item.value, item.value)
             for node, factor in zip(item.ends, scale, strict=False):
-                if node is None:
+                if node is None or item.kind == GAUGE:
                     continue
                 balance = nodes.setdefault(node, Equation(item.part))
                 if item.kind == RESISTANCE:
@@ -205,6 +206,9 @@ class Elimination:
                 laws.append(Equation(""))
                 add(laws[-1].left, {self.unknowns["flow", item.name]: 1.0})
         laws = [law for law in laws if law.left.keys() & set(unknowns)]
+        further = {c for law in laws for c in law.right} - {*block.columns}
+        block.columns += sorted(further)
+        solution = np.hstack([solution, np.zeros((len(solution), len(further)))])
         rows = np.array([[law.left.get(u, 0.0) for u in unknowns] for law in laws]).reshape(-1, len(unknowns))
         given = np.array([[law.right.get(c, 0.0) for c in block.columns] for law in laws])
         choice = rows @ free
@@ -212,7 +216,7 @@ class Elimination:
             loose = np.abs(free).max(axis=1) > 1e-6 * np.abs(free).max()
             parts = [part for u, is_loose in zip(unknowns, loose, strict=True) if is_loose for part in self.parts_of(u)]
             raise NetworkError(parts)
-        rest = rows @ solution - given.reshape(-1, len(block.columns))
+        rest = rows @ solution - given.reshape(len(laws), len(block.columns))
         return solution - free @ (np.linalg.pinv(choice) @ rest)
 
     def tie(self, relation: Terms) -> bool:
@@ -256,6 +260,8 @@ class Elimination:
         """Flow through an element; zero for a lock that is not active."""
         if item.kind == RESISTANCE:
             return {column: value / item.value for column, value in self.drop(item).items()}
+        if item.kind == GAUGE:
+            return {}
         if item.kind in HAS_FLOW:
             return dict(self.solution.get(self.unknowns.get(("flow", item.name)), {}))
         return {self.columns[item.name]: 1.0}
@@ -324,7 +330,9 @@ class EquationBlock:
             solution = solution + inverse((self.given - exact @ solution).astype(float))
         sizes = np.abs(solution / self.by_column)
         solution[sizes < NOTHING * sizes.max(axis=0, initial=0.0)] = 0.0  # such as a flow that has no way
-        return solution, self.by_column * self.right[rank:].T
+        free = self.right[rank:].T.copy()
+        free[np.abs(free) < NOTHING] = 0.0
+        return solution, self.by_column * free
 
 
 def inverse_sizes(matrix: np.ndarray, axis: int) -> np.ndarray:
@@ -347,15 +355,18 @@ def reduced(relation: Terms, others: Sequence[Terms]) -> Terms:
     return {column: float(v / largest) for column, v in zip(columns, own, strict=True) if abs(v) > SMALL * largest}
 
 
-def dependent_stores(relations: Sequence[Terms], stores: dict[int, Element]) -> dict[int, Terms]:
+def dependent_stores(
+    relations: Sequence[Terms], stores: dict[int, Element], fixed: Collection[int] = ()
+) -> dict[int, Terms]:
     """Stores that others determine: column -> linear function of the other stores.
 
     From each relation the store with the least energy is determined by the others. stores : column -> element
+    fixed : stores that are not chosen; a relation of these alone is left out
     """
     found: dict[int, Terms] = {}
     for relation in relations:
         left = substituted(relation, found)
-        own = [column for column, value in left.items() if column in stores and value != 0.0]
+        own = [c for c, value in left.items() if c in stores and value != 0.0 and c not in fixed]
         if not own:
             continue
         chosen = min(own, key=lambda column: (stores[column].value / left[column] ** 2, -column))

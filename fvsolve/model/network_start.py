@@ -29,7 +29,8 @@ class NetworkStart:
         self.values = np.zeros(len(self.network.columns))
         self.free = self.stated_values()
         self.switches = self.network.switches
-        self.directions = [0.0] * len(self.switches)
+        self.known = self.stores.keys() - {*self.free}
+        self.directions = [self.first_direction(k) for k in range(len(self.switches))]
         self.mode = tuple(self.begins_on(k) for k in range(len(self.switches)))
 
     @property
@@ -57,10 +58,8 @@ class NetworkStart:
             if column in known and unknown:
                 self.values[unknown[0]] = (self.values[column] - rest) / terms[unknown[0]]
                 known.add(unknown[0])
-            elif column in known and abs(rest - self.values[column]) > AGREE * (abs(rest) + abs(self.values[column])):
-                tied = [self.stores[other].part.partition(".")[2] for other in terms]
-                text = f"its stated start, {self.values[column]:.6g}, contradicts {listing(tied)}, to which it is tied"
-                self.draft.fault(self.stores[column].part, f"{text}; expected {rest:.6g}, or state only one of them")
+            elif column in known:
+                self.check_tie(column, float(rest), terms)
         return [column for column in self.stores if column not in known and column not in network.dependent]
 
     def given_by_others(self, item: Element) -> float:
@@ -84,11 +83,22 @@ class NetworkStart:
         row = draft.device_table[draft.device_names.index(name)]
         return item.unit * float(draft.valve_table[row["valve"]]["drive"])
 
+    def first_direction(self, k: int) -> float:
+        """Direction of a slip between known speeds; 0 for friction that may stick, and for other switches."""
+        switch = self.switches[k]
+        if switch.kind != rec.FRICTION:
+            return 0.0
+        found = self.network.equations(self.network.conducting)
+        terms = substituted(found.drop(self.element(switch.drop)), self.network.dependent)
+        slip = self.sum_of(terms)
+        known = all(column in self.known for column in terms if column in self.stores)
+        return float(np.sign(slip)) if known and abs(slip) > self.rounding(terms) else 0.0
+
     def begins_on(self, k: int) -> bool:
         """First guess of the state of a switch: as scheduled; diodes block; friction sticks."""
         switch = self.switches[k]
         if switch.kind != rec.SWITCH:
-            return switch.kind == rec.FRICTION
+            return switch.kind == rec.FRICTION and self.directions[k] == 0.0
         return self.start.schedule_value(self.network.schedules[switch.part, switch.key]) > 0.5
 
     # search ---------------------------------------------------------------------------------------------------
@@ -99,6 +109,8 @@ class NetworkStart:
             try:
                 fault = self.solve()
             except NetworkError as error:
+                if self.let_slip():
+                    continue
                 for place, text in network_faults(error, self.draft.case):
                     self.draft.fault(place, text)
                 return
@@ -108,7 +120,28 @@ class NetworkStart:
             fault = self.switches[0].part, "its state at the start alternates; state the initial values of the stores"
         if fault is not None:
             self.draft.fault(*fault)
+        for column, terms in self.network.ties_of(self.mode).items() if fault is None else ():
+            self.check_tie(column, self.sum_of(terms), terms)
         self.write()
+
+    def check_tie(self, column: int, value: float, terms: Terms) -> None:
+        """Add a fault if a store does not have the value that the stores have to which it is tied."""
+        if abs(value - self.values[column]) > AGREE * (abs(value) + abs(self.values[column])):
+            tied = [self.stores[other].part.partition(".")[2] for other in terms if other in self.stores]
+            text = f"its value at the start, {self.values[column]:.6g}, contradicts "
+            text += f"{listing(tied)}, to which it is tied" if tied else "the parts that hold it"
+            self.draft.fault(self.stores[column].part, f"{text}; expected {value:.6g}")
+
+    def let_slip(self) -> bool:
+        """Let the last friction slip that sticks, where the mode has no solution; False if there is none."""
+        sticking = [k for k, on in enumerate(self.mode) if on and self.switches[k].kind == rec.FRICTION]
+        if not sticking:
+            return False
+        k, network = sticking[-1], self.network
+        found = network.equations(network.conducting)
+        slip = self.sum_of(substituted(found.drop(self.element(self.switches[k].drop)), network.dependent))
+        self.directions[k], self.mode = float(np.sign(slip)) or 1.0, (*self.mode[:k], False, *self.mode[k + 1 :])
+        return True
 
     def sum_of(self, terms: Terms) -> float:
         """Value of a linear function at the present values."""
@@ -117,6 +150,11 @@ class NetworkStart:
     def size_of(self, terms: Terms) -> float:
         """Sum of the magnitudes of its terms."""
         return float(sum(abs(value * self.values[column]) for column, value in terms.items()))
+
+    def rounding(self, terms: Terms) -> float:
+        """Value of a linear function below which it is rounding."""
+        small = sum(abs(value) * self.stores[column].small for column, value in terms.items() if column in self.stores)
+        return SLIP * (small + self.size_of(terms))
 
     def solve(self) -> tuple[str, str] | None:
         """Solve for the free stores in the present mode; returns a fault (place, text) if there is no equilibrium."""
@@ -138,14 +176,15 @@ class NetworkStart:
             return None
         ties = network.ties_of(self.mode)
         laws = [substituted(found.rate(column), network.dependent) for column in self.free if column not in ties]
-        laws += [{column: -1.0} | terms for column, terms in ties.items()]
+        laws += [{column: -1.0} | terms for column, terms in ties.items() if place.keys() & {column, *terms}]
         matrix, given = np.zeros((len(laws), len(place))), np.zeros(len(laws))
         for row, law in enumerate(laws):
             given[row] = -self.sum_of(law)
             for column in law.keys() & place.keys():
                 matrix[row, place[column]] = law[column]
         sizes = np.array([item.small for item in map(self.stores.get, self.free)])
-        scale = 1.0 / np.maximum(np.abs(matrix * sizes).max(axis=1), 1e-300)
+        largest = np.abs(matrix * sizes).max(axis=1)
+        scale = 1.0 / np.where(largest > 0.0, largest, 1.0)
         solution, _, rank, _ = np.linalg.lstsq(matrix * sizes * scale[:, None], given * scale, rcond=1e-11)
         self.values[self.free] += solution * sizes
         for law in laws:
@@ -153,8 +192,9 @@ class NetworkStart:
                 moving = [self.stores[c] for c in self.free]
                 names = listing([item.state for item in moving], 4)
                 return moving[0].part, f"there is no equilibrium of {names} at the start; state its initial value"
-        if rank < len(place) and any(self.stores[column].thermal for column in self.free):
-            item = next(self.stores[column] for column in self.free if self.stores[column].thermal)
+        null = np.linalg.svd(matrix * sizes * scale[:, None])[2][rank:]
+        loose = [self.stores[c] for c, k in place.items() if np.any(np.abs(null[:, k]) > SLIP**0.5)]
+        if item := next((item for item in loose if item.thermal), None):
             return item.part, "nothing determines its temperature at the start; give the key `initial_temperature`"
         return None
 
@@ -200,34 +240,24 @@ class NetworkStart:
             drop_terms = substituted(found.drop(self.element(switch.drop)), network.dependent)
             drop, on = self.sum_of(drop_terms), self.mode[k]
             if switch.kind == rec.DIODE:
-                current = self.total(switch.part, found)
-                changes = current < 0.0 if on else drop > switch.numbers[0]
+                flow = found.flow(self.element(switch.flow)) if on else {}
+                least = -self.draft.tables.network_switches[k]["rounding"]
+                changes = self.sum_of(substituted(flow, network.dependent)) < least if on else drop > switch.numbers[0]
                 direction = 0.0
             elif switch.kind == rec.SWITCH:
                 continue
             elif on:
                 torque = self.sum_of(found.flow(self.element(switch.flow)))
-                slips = abs(drop) > SLIP * self.size_of(drop_terms)
+                slips = abs(drop) > self.rounding(drop_terms)
                 changes = slips or abs(torque) > self.friction_torque(k, 0.0, True)
                 direction = float(np.sign(drop if slips else torque))
             else:
-                changes, direction = drop * self.directions[k] < -SLIP * self.size_of(drop_terms), 0.0
+                changes, direction = drop * self.directions[k] < -self.rounding(drop_terms), 0.0
             if changes:
                 self.mode = (*self.mode[:k], not on, *self.mode[k + 1 :])
                 self.directions[k] = direction
                 return True
         return False
-
-    def total(self, part: str, found) -> float:
-        """Current through a diode."""
-        members = [item for item in self.network.totals[part] if not item.switch or item.switch == part]
-        on = {switch.name: on for switch, on in zip(self.switches, self.mode, strict=True)}
-        first, total = members[0].ends[:2], 0.0
-        for item in members:
-            if not item.switch or on[item.switch]:
-                sign = 1.0 if item.ends[:2] == first else -1.0
-                total += sign * self.sum_of(substituted(found.flow(item), self.network.dependent))
-        return total
 
     def write(self) -> None:
         """Write the start to the tables and event flags of the draft."""
@@ -238,9 +268,7 @@ class NetworkStart:
             flag = network.flags[switch.name]
             if switch.kind == rec.FRICTION:
                 terms = network.terms(network.conducting)[network.rows_of(switch.drop)[0]]
-                small = sum(abs(value) * self.stores[column].small for column, value in terms.items()
-                            if column in self.stores)  # fmt: skip
-                draft.tables.network_switches[k]["rounding"] = SLIP * (small + self.size_of(terms))
+                draft.tables.network_switches[k]["rounding"] = self.rounding(terms)
                 draft.start_flags |= {flag: self.directions[k] > 0.0, flag + 2: self.directions[k] < 0.0}
             else:
                 draft.start_flags[flag] = self.mode[k]

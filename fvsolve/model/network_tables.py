@@ -30,6 +30,7 @@ from fvsolve.model.network_elimination import (
 from fvsolve.steady import union
 
 ROUNDING = 1e-12  # value of a row at the start that is rounding, over the sum of the magnitudes of its terms
+CURRENT_ROUNDING = 1e-13  # of diodes, over the sum of all sources divided by their resistance
 CUT = 1e-6  # stored quantity that a switch may cut, over a small deviation
 TURNS = 60  # changes of switches in the search for the start
 SAMPLES = 12  # times at which responses are computed for the sizes of states
@@ -102,6 +103,11 @@ class Network:
             constant = () if mode == self.conducting else self.constant_columns
             self.solved[mode] = Elimination(active, self.columns, leaks, constant)
         return self.solved[mode]
+
+    @cached_property
+    def states_of_others(self) -> set[int]:
+        """Columns of stores whose states are those of other parts, such as shafts of pumps."""
+        return {column for column, item in self.stores.items() if item.state_of is not None}
 
     @cached_property
     def constant_columns(self) -> set[int]:
@@ -325,7 +331,10 @@ class Network:
         try:
             ties = self.ties_of(mode)
         except NetworkError as error:
-            return f"{listing(changed, 3)} leaves {listing(error.parts, 3)} without a solution"
+            names = listing([part.partition(".")[2] for part in error.sources or error.parts], 3)
+            if error.sources:
+                return f"{listing(changed, 3)} would stick to {names}, whose speed changes with time or differs,"
+            return f"{listing(changed, 3)} leaves {names} without a solution"
         for column, terms in ties.items():
             store, total = self.stores[column], self.sum_of(terms, y)
             before = self.value_of(column, y)
@@ -349,7 +358,7 @@ class Network:
 
     def current(self, mode: tuple[bool, ...], k: int, y: np.ndarray, sources: np.ndarray) -> float:
         """Flow of switch k in a mode and state; sources : values of all sources."""
-        row, count = self.total_row(self.switches[k].part), len(self.stores)
+        row, count = self.rows_of(self.switches[k].flow)[1], len(self.stores)
         terms = self.terms(mode)[row]
         stored = self.sum_of({column: value for column, value in terms.items() if column < count}, y)
         return stored + sum(value * sources[column - count] for column, value in terms.items() if column >= count)
@@ -403,7 +412,7 @@ def lower_networks(draft) -> None:
         for place, text in network_faults(error, draft.case):
             draft.fault(place, text)
         return
-    network.dependent = dependent_stores(found.relations, network.stores)
+    network.dependent = dependent_stores(found.relations, network.stores, network.states_of_others)
     for text in unclear_friction(network, found):
         draft.fault(*text)
     draft.network = network
@@ -455,6 +464,8 @@ def network_faults(error: NetworkError, case) -> Iterator[tuple[str, str]]:
     elif error.sources:
         text = f"the sources {listing(names)} contradict each other" if len(names) > 1 else "its flow has no way"
         yield error.sources[0], f"{text}; put a resistance between them, or in parallel"
+    elif names and all(getattr(case.links.get(name), "kind", "") in ("gear", "rack", "dc-motor") for name in names):
+        yield error.parts[0], f"{listing(names, 6)} form a closed loop, whose torques are not determined; leave one out"
     else:
         text = f"nothing determines the potential or flow of {listing(names, 6)}"
         yield error.parts[0] if error.parts else "links", f"{text}; join a ground, housing, ambient or store"
@@ -525,12 +536,14 @@ def fill_tables(draft, network: Network) -> None:
         row["kind"], row["flag"] = switch.kind, network.flags[switch.name]
         row["schedule"] = network.schedules.get((switch.part, switch.key), -1)
         row["drop"] = network.rows_of(switch.drop)[0]
-        total = switch.kind != rec.FRICTION
-        row["flow"] = network.total_row(switch.part) if total else network.rows_of(switch.flow)[1]
+        row["flow"] = network.rows_of(switch.flow)[1]
         if switch.kind == rec.FRICTION:
             row["kinetic"], row["static"], row["stribeck"], row["factor"] = switch.numbers
         else:
             row["forward"] = switch.numbers[0]
+            if switch.kind == rec.DIODE:
+                ohm = network.elements[network.numbers[f"{switch.name}.resistance"]].value
+                row["rounding"] = CURRENT_ROUNDING * sum(map(source_size, network.sources)) / ohm
 
 
 def response_sizes(network: Network, case) -> dict[int, float]:

@@ -12,6 +12,7 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.delay_lines.wave_history import COUNT
 from fvsolve.model import input_histories
 from fvsolve.model.delay_lines import LEAST_STEPS, reset_history, steps_left, stored_history, with_doubled_rings
+from fvsolve.model.network_elimination import NetworkError
 
 if TYPE_CHECKING:
     from fvsolve.model.model import Model
@@ -206,7 +207,10 @@ class RunData:
         network = self.model.network
         if network is None or (mode := network.mode_of(self.armed)) == self.network_mode:
             return
-        places, factors = network.arrays(mode)
+        try:
+            places, factors = network.arrays(mode)
+        except NetworkError:  # the run ends, see `apply_network`
+            return
         self.written.network_places[: places.size], self.written.network_factors[: factors.size] = places, factors
         self.network_mode = mode
 

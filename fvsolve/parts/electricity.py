@@ -10,6 +10,7 @@ from fvsolve.assembly.lowering import InputKind
 from fvsolve.assembly.network_elements import (
     CAPACITY,
     FLOW,
+    GAUGE,
     INERTANCE,
     POTENTIAL,
     RESISTANCE,
@@ -262,21 +263,19 @@ class Diode(ElectricalLink, kind="diode"):
 
 
 class DiodeRows(NetworkRows, kind="diode"):
-    """Conversion of diodes: a resistance and a constant current while they conduct."""
+    """Conversion of diodes: a resistance and its forward voltage in series while they conduct."""
+
+    quantities: ClassVar = {"current": (".forward", "flow", 1.0), "voltage": ("", "drop", 1.0)}
 
     def elements(self, case, name, part):
-        place, (first, second) = f"links.{name}", ends_of(case, part)
-        found = [Element(RESISTANCE, place, place, (first, second), part.resistance, switch=place,
-                         ledger="dissipated")]  # fmt: skip
-        if part.forward_voltage > 0.0:
-            found.append(Element(FLOW, f"{place}.forward", place, (second, first),
-                                 schedule=constant(part.forward_voltage / part.resistance), switch=place,
-                                 ledger="dissipated"))  # fmt: skip
-        return found, [Switch(rec.DIODE, place, place, place, f"{place}.total", (part.forward_voltage,))]
-
-    def probe(self, draft, name, probe, row) -> None:
-        reads = "all flows" if probe.quantity == "current" else "drop"
-        fill_network_probe(draft, row, f"links.{name}", reads)
+        place, (first, second), inner = f"links.{name}", ends_of(case, part), f"{name}.junction"
+        return [
+            Element(GAUGE, place, place, (first, second)),
+            Element(RESISTANCE, f"{place}.resistance", place, (first, inner), part.resistance, switch=place,
+                    ledger="dissipated"),
+            Element(POTENTIAL, f"{place}.forward", place, (inner, second), schedule=constant(part.forward_voltage),
+                    switch=place, ledger="dissipated"),
+        ], [Switch(rec.DIODE, place, place, place, f"{place}.forward", (part.forward_voltage,))]  # fmt: skip
 
 
 class DcMotor(Link, kind="dc-motor"):

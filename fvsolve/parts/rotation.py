@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.assembly.lowering import ANGULAR_SPEED, TORQUE
+from fvsolve.assembly.lowering import ANGULAR_SPEED, InputKind
 from fvsolve.assembly.network_elements import (
     CAPACITY,
     FLOW,
@@ -25,6 +25,7 @@ from fvsolve.parts.nodes_and_links import Link, Node, Ports, TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.value import VALUE, Number, Quantity, Range, Text, UsualRange, nonnegative, nonzero, positive
 
+CLUTCH_TORQUE = InputKind("N m", "a torque of at least 0 [N m]", 0.0)
 SMALL_SPEED, SMALL_TORQUE = 1.0, 1.0  # sizes of small deviations, where the network does not tell [rad/s], [N m]
 
 
@@ -281,7 +282,7 @@ class Clutch(RotationalLink, kind="clutch"):
 class ClutchRows(NetworkRows, kind="clutch"):
     """Conversion of clutches to dry friction with a scheduled torque."""
 
-    input_kinds: ClassVar = {"torque": TORQUE}
+    input_kinds: ClassVar = {"torque": CLUTCH_TORQUE}
 
     def elements(self, case, name, part):
         place = f"links.{name}"

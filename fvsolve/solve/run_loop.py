@@ -199,7 +199,9 @@ class RunLoop:
         now = self.armed[first : first + count] > before[first : first + count]
         self.switched += [(self.t, int(k)) for k in np.flatnonzero(now) if self.model.events[k][1]]
         self.run_data.store_times(self.t, before)
-        self.apply_events()
+        self.apply_events()  # diodes may take over the current of a switch
+        more = (self.armed[first : first + count] > before[first : first + count]) & ~now
+        self.switched += [(self.t, int(k)) for k in np.flatnonzero(more) if self.model.events[k][1]]
 
     def apply_events(self) -> None:
         """Apply the immediate effects of events: limits of tank levels, and sudden changes of states of devices.
@@ -328,6 +330,9 @@ class RunLoop:
         remedies = {device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names}
         if any(name.startswith(PREFIX) for name in names):
             remedies["set the thresholds of the block farther apart, or give it a `filter`"] = None
+        switches = [] if model.network is None else [item.part.partition(".")[2] for item in model.network.switches]
+        if {*names} & {*switches}:
+            remedies["give it more resistance or inertia"] = None
         parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
         verbs = "change their states" if len(names) > 1 else "changes its state"
         remedy = ", or ".join(remedies) or "put a chamber at the node of this part"

@@ -11,8 +11,10 @@ from solve.test_implicit_runs import killed_and_resumed
 from solve.test_resume import same_files
 
 import fvsolve
-from fvsolve.errors import CaseError
+from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.model.energy_norm import energy_form
 from fvsolve.parts.self_acting.law_check_valve import PRESSURE_MARGIN
+from fvsolve.studies import stability
 from fvsolve.studies.energy_balance import energy
 from fvsolve.studies.linearise import linearise
 from fvsolve.studies.loops.loop import loop
@@ -154,6 +156,17 @@ def test_rates_of_a_motor_are_exact():
     assert rates[order[0]][network.columns["links.supply"]] == pytest.approx(500.0, rel=1e-15)
 
 
+def test_the_energy_norm_of_a_network_is_that_of_its_stores():
+    """In these coordinates the rates of a passive network have no eigenvalue of their symmetric part above 0."""
+    for case in (motor(), resonant(), clutched(), warm()):
+        model = fvsolve.build(fvsolve.load(case))
+        form = energy_form(model)
+        seen = form.seen(model.jacobian(0.0, model.start))
+        assert np.linalg.eigvalsh(0.5 * (seen + seen.T)).max() <= 1e-6 * np.abs(seen).max()
+    (row,) = stability(motor(), methods=["dormand-prince"]).rows
+    assert abs(row.difference) < 0.01
+
+
 def test_check_names_states_and_ties_and_decides_passivity():
     facts = fvsolve.build(fvsolve.load(motor())).network.facts()
     assert sorted(facts["states"]) == ["axle.speed", "motor.current"] and not facts["tied"]
@@ -249,6 +262,8 @@ def test_a_diode_takes_over_the_current_of_an_opened_switch(method):
     exact = [12.0 / 1.01 * (1.0 - exp(-1.01 / 0.02 * t)) if t <= 4e-3 else
              at_opening * exp(-1.01 / 0.02 * (t - 4e-3)) for t in run.t]  # fmt: skip
     assert np.array(run["coil.current"]) == pytest.approx(exact, abs=12.0 * EXACT)
+    assert [event["what"] for event in run.summary["events"]] == ["conducts", "opens"] or [
+        event["what"] for event in run.summary["events"]] == ["opens", "conducts"]  # fmt: skip
     assert run["diode.current"][-1] == pytest.approx(exact[-1], rel=1e-8) and run["diode.current"][1] == 0.0
 
 
@@ -256,6 +271,44 @@ def test_a_switch_that_would_cut_a_current_ends_the_run_by_name():
     run = fvsolve.run(chopper(freewheel=False))
     assert not run.ok and "switch" in run.reason and "coil" in run.reason and "diode" in run.reason
     assert run.t[-1] == pytest.approx(4e-3, abs=3e-4)
+
+
+def diode(start, stop, **keys):
+    return two_port("diode", start, stop, forward_voltage=0.7, **keys)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_diodes_in_series_conduct_together(order):
+    source = "10*sin(2*pi*50*t)"
+    links = {"source": two_port("voltage-source", "gnd", "a", voltage=source), "d1": diode("a", "b"),
+             "d2": diode("b", "c"), "d3": diode("c", "d"),
+             "load": two_port("resistor", "d", "gnd", resistance=7.0)}  # fmt: skip
+    run = runs(network("a b c d", dict(list(links.items())[::order]), 0.05, ["load.current"]))
+    voltage = 10.0 * np.sin(2.0 * pi * 50.0 * np.array(run.t))
+    assert np.array(run["load.current"]) == pytest.approx(np.maximum(voltage - 2.1, 0.0) / 7.003, abs=1e-9)
+
+
+@pytest.mark.parametrize("method", ["dormand-prince", "rodas-5p"])
+def test_a_bridge_of_three_phases_passes_the_greatest_line_voltage(method):
+    def phase(k):
+        return f"100*sin(2*pi*50*t - {2.0 * pi * k / 3.0!r})"
+
+    links = {f"v{k}": two_port("voltage-source", "gnd", f"a{k}", voltage=phase(k)) for k in range(3)}
+    links |= {f"u{k}": diode(f"a{k}", "p") for k in range(3)} | {f"w{k}": diode("n", f"a{k}") for k in range(3)}
+    links["load"] = two_port("resistor", "p", "n", resistance=5.0)
+    run = runs(network("a0 a1 a2 p n", links, 0.05, ["load.current"]), method, **{"numerics.rtol": 1e-9})
+    phases = np.array([100.0 * np.sin(2.0 * pi * (50.0 * np.array(run.t) - k / 3.0)) for k in range(3)])
+    exact = (phases.max(axis=0) - phases.min(axis=0) - 1.4) / 5.002
+    apart = np.abs((np.array(run.t) * 300.0 - 0.5) % 1.0 - 0.5) < 0.49  # not while two diodes share the current
+    assert np.array(run["load.current"])[apart] == pytest.approx(exact[apart], rel=1e-6)
+
+
+def test_a_piece_between_open_switches_has_no_current():
+    links = {"source": two_port("voltage-source", "gnd", "a", voltage=10.0),
+             "first": two_port("switch", "a", "b", closed=0.0), "load": two_port("resistor", "b", "c", resistance=1.0),
+             "second": two_port("switch", "c", "gnd", closed=0.0)}  # fmt: skip
+    run = runs(network("a b c", links))
+    assert set(run["load.current"]) == {0.0} and run["b.voltage"][0] == pytest.approx(5.0)
 
 
 # rotation -----------------------------------------------------------------------------------------------------------
@@ -365,6 +418,43 @@ def friction_case(**bearing):
              "drive": {"type": "torque", "to": "a", "torque": {"time": [0.0, 10.0], "value": [0.0, 5.0]}}}  # fmt: skip
     case = shafts(links, ["a.speed", "bearing.torque"], {"inertia": 0.5, "initial_speed": 0.0}, end=8.0)
     return case
+
+
+def test_two_clutches_to_housings_of_unlike_speeds_slip():
+    nodes = {"a": {"type": "shaft", "inertia": 1.0, "initial_speed": 2.0}, "frame": {"type": "housing"},
+             "drum": {"type": "housing", "speed": 5.0}}  # fmt: skip
+    links = {
+        "brake": two_port("clutch", "a", "frame", torque=3.0),
+        "drive": two_port("clutch", "drum", "a", torque=4.0),
+    }
+    run = runs(network(nodes, links, 5.0))
+    assert [(event["name"], event["what"]) for event in run.summary["events"]] == [("drive", "sticks")]
+    assert run.summary["events"][0]["time"] == pytest.approx(3.0, abs=1e-9) and run["a.speed"][-1] == 5.0
+
+
+@pytest.mark.parametrize("voltage", [1.0, 12.0, 30.0])
+def test_the_start_of_a_drive_with_friction_is_an_equilibrium(voltage):
+    """Motor on a shaft with dry friction, a clutch and a spring to a second shaft; its loss heats a body."""
+    nodes = GROUND | {"p": {"type": "terminal"}, "m": {"type": "terminal"}, "rotor": {"type": "shaft", "inertia": 0.5},
+                      "wheel": {"type": "shaft", "inertia": 0.3}, "frame": {"type": "housing"},
+                      "body": {"type": "heat-capacity", "heat_capacity": 10.0},
+                      "room": {"type": "ambient", "temperature": 290.0}}  # fmt: skip
+    links = {
+        "source": two_port("voltage-source", "gnd", "p", voltage=voltage),
+        "wire": two_port("resistor", "p", "m", resistance=0.53, heat_to="body"),
+        "motor": {"type": "dc-motor", "ports": {"p": "m", "n": "gnd", "shaft": "rotor"}, "torque_constant": 0.41,
+                  "resistance": 0.7},
+        "bearing": two_port("bearing", "rotor", "frame", damping=0.023, friction_torque=0.3),
+        "clutch": two_port("clutch", "rotor", "wheel", torque=0.6),
+        "spring": two_port("torsion-spring", "wheel", "rotor", stiffness=3.3),
+        "air": two_port("thermal-conductor", "body", "room", conductance=0.5),
+    }  # fmt: skip
+    run = runs(network(nodes, links, 1.0, ["rotor.speed", "wheel.speed", "body.temperature"]))
+    speed = max(0.0, (0.41 * voltage / 1.23 - 0.3) / (0.023 + 0.41**2 / 1.23))
+    current = (voltage - 0.41 * speed) / 1.23
+    assert set(run["rotor.speed"]) == {run["rotor.speed"][0]} == set(run["wheel.speed"])
+    assert run["rotor.speed"][0] == pytest.approx(speed, rel=1e-9, abs=1e-12)
+    assert run["body.temperature"][0] == pytest.approx(290.0 + 0.53 * current**2 / 0.5, rel=1e-12)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -538,6 +628,24 @@ def test_a_rotor_on_a_gear_is_inertia_of_the_pump():
     assert abs(found.remainder[-1]) < 1e-8 * found.throughput
 
 
+def test_two_pumps_on_a_shaft_have_the_speeds_of_their_gear():
+    """Both speeds are states of the pumps: they stay side by side, and follow from both torques."""
+    raw = fvsolve.load("dc-motor-pump", {"output": {"probes": ["pump.shaft.speed", "motor.current"]}, "expect": {}}).raw
+    twin = {"nodes": raw["nodes"] | {"rise2": raw["nodes"]["rise"]}, "links": dict(raw["links"])}
+    twin["links"]["pump2"] = raw["links"]["pump"] | {"to": "rise2", "rated_speed": "2900 rpm", "inertia": 0.005}
+    twin["links"]["pipework2"] = raw["links"]["pipework"] | {"from": "rise2"}
+    twin["links"]["gear"] = two_port("gear", "pump2.shaft", "pump.shaft", ratio=2.0)
+    probes = ["pump.shaft.speed", "pump2.shaft.speed", "pump.flow", "pump2.flow"]
+    run = fvsolve.run({**raw, **twin, "output": {"probes": probes}})
+    assert run.ok
+    assert np.array(run["pump2.shaft.speed"]) == pytest.approx(2.0 * np.array(run["pump.shaft.speed"]), abs=1e-9)
+    assert np.array(run["pump2.flow"]) == pytest.approx(np.array(run["pump.flow"]), abs=1e-9)
+    assert abs(energy({**raw, **twin}).remainder[-1]) < 1e-8 * energy({**raw, **twin}).throughput
+    raw["links"]["pump"]["speed"] = 0.5
+    with pytest.raises(CaseError, match="contradicts"):
+        fvsolve.build(fvsolve.load({**raw, **twin, "links": twin["links"] | {"pump": raw["links"]["pump"]}}))
+
+
 def test_a_generator_on_its_load_brakes_a_turbine_as_a_bearing():
     case = fvsolve.load("hydropower")
     name = next(name for name, link in case.links.items() if link.kind == "turbine")
@@ -648,6 +756,8 @@ def test_advance_in_parts_keeps_clutch_and_inputs():
     assert speeds["a.speed"] == pytest.approx(4.0, abs=1e-8) and speeds["clutch.locked"] == 1.0
     state = fvsolve.advance(model, state, 5.0, {"clutch.torque": 0.0, "drive.torque": 1.0})
     speeds = dict(zip([probe.text for probe in model.probes], model.observe(state), strict=True))
+    with pytest.raises(FvsolveError, match="at least 0"):
+        fvsolve.advance(model, state, 5.5, {"clutch.torque": -3.0})
     assert speeds["a.speed"] == pytest.approx(4.5, abs=1e-8) and speeds["b.speed"] == pytest.approx(4.0, abs=1e-8)
 
 
