@@ -86,10 +86,6 @@ class NetworkRows(Lowering):
     quantities: ClassVar[dict[str, tuple[str, str, float]]] = {}
     input_kinds: ClassVar[dict[str, InputKind]] = {}
 
-    def elements(self, case, name: str, part: Any) -> tuple[list[Element], list[Switch]]:
-        """Elements and switches of a part."""
-        raise NotImplementedError
-
     def inputs(self, model, name, part):
         place = f"{'links' if name in model.case.links and model.case.links[name] is part else 'nodes'}.{name}"
         schedules = model.network.schedules
@@ -105,7 +101,7 @@ def fill_network_probe(draft, row, element: str, reads: str, sign: float = 1.0) 
     """Fill the row of a probe that reads an element of the network; arguments as in `NetworkRows.quantities`."""
     network = draft.network
     row["kind"], row["scale"] = rec.NETWORK_VALUE, sign
-    row["side"] = {"drop": 0, "flow": 0, "all flows": 0, "power": 2, "entropy": 3, "locked": 4}[reads]
+    row["side"] = {"power": rec.POWER, "entropy": rec.ENTROPY, "locked": rec.LOCKED}.get(reads, rec.ROW)
     if reads == "locked":
         row["index"] = network.flags[element]
     elif reads == "all flows":

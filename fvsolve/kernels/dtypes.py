@@ -498,9 +498,10 @@ BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = 20, 21, 22, 23  # quantity i
 SURFACE_VALUE = 24  # of a surface described by modes
 PIPE_FORCE = 25  # on a whole pipe
 CONTROL_VALUE = 26  # of a block of `controls`: 0 output, 1 input, 2 error in `side`
-# of a network: row `index` and in `side` 0 or 1 its value; 2 times that of row `cell`; 3 that of row `cell` over its
-# value; 4 of friction with the flag `index` 1 while it sticks
+# of a network, by the code in `side`: value of row `index`; times that of row `cell`; row `cell` over its value;
+# 1 while the friction with the flag `index` sticks
 NETWORK_VALUE = 27
+ROW, POWER, ENTROPY, LOCKED = 0, 1, 2, 3
 
 BASIN = record(
     kind=i8,  # code of its physics, see `basins.basin_patches`

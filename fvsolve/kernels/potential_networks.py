@@ -23,7 +23,6 @@ from fvsolve.kernels.table_handle import open_tables
 
 TINY = 1e-300  # in place of a zero of an event function
 CLOSED = 0.5  # value of `closed` above which a switch is closed
-DROP, FLOW, POWER, ENTROPY, LOCKED = 0, 1, 2, 3, 4  # quantities of probes
 
 
 @njit(forceinline=True)
@@ -132,13 +131,13 @@ def observe_networks(t, y, out, handle, values):
     for k in range(probes.size):
         if probes[k]["kind"] == rec.NETWORK_VALUE:
             i, side = probes[k]["index"], probes[k]["side"]
-            if side == LOCKED:
+            if side == rec.LOCKED:
                 value = 0.0 if tables.armed[i] + tables.armed[i + 2] > 0.0 else 1.0
             else:
                 value = row_value(y, out, tables, i)
-            if side == POWER:
+            if side == rec.POWER:
                 value *= row_value(y, out, tables, probes[k]["cell"])
-            elif side == ENTROPY:
+            elif side == rec.ENTROPY:
                 value = row_value(y, out, tables, probes[k]["cell"]) / value
             values[k] = probes[k]["scale"] * value + 0.0  # no negative zero
 

@@ -298,8 +298,8 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         applied=2 * len(draft.control_table) + 2 * (len(draft.control_table) > 0), readings=len(draft.sensor_table),
         sensing=int(len(draft.sensor_table) > 0), stack=draft.schedules.stack, discrete=len(draft.discrete),
         histories=histories_size(draft.control_table),
-        network_places=0 if draft.network is None else 3 * draft.network.first_rows[-1] + draft.network.capacity,
-        network_factors=0 if draft.network is None else draft.network.first_rows[-1] + draft.network.capacity,
+        network_places=0 if draft.network is None else 3 * draft.network.rows.count + draft.network.capacity,
+        network_factors=0 if draft.network is None else draft.network.rows.count + draft.network.capacity,
     )  # fmt: skip
 
 

@@ -292,11 +292,11 @@ class Couplings:
     def probe_states(self, row) -> np.ndarray:
         """States on which a probe of a network depends."""
         network, r = self.network, int(row["index"])
-        if row["side"] == 4:
+        if row["side"] == rec.LOCKED:
             return unique_states()
-        if r >= network.first_rows[3]:
-            return unique_states(list(network.angles.values())[r - network.first_rows[3]])
-        rows = [r, *([int(row["cell"])] if row["side"] in (2, 3) else [])]
+        if r >= network.rows.angles:
+            return unique_states(list(network.angles.values())[r - network.rows.angles])
+        rows = [r, *([int(row["cell"])] if row["side"] in (rec.POWER, rec.ENTROPY) else [])]
         return self.network_states(set().union(*(network.columns_of_rows[r] for r in rows)))
 
     def source_states(self, j: int) -> np.ndarray:

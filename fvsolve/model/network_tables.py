@@ -10,11 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
 from fvsolve.assembly.lowering import lowering_of
-from fvsolve.assembly.network_elements import FLOW, INERTANCE, TRANSFORMER, Element, NetworkRows, Switch
+from fvsolve.assembly.network_elements import FLOW, INERTANCE, TRANSFORMER, Element, Switch, node_or_reference
 from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.network_elimination import (
@@ -32,7 +33,6 @@ from fvsolve.steady import union
 ROUNDING = 1e-12  # value of a row at the start that is rounding, over the sum of the magnitudes of its terms
 CURRENT_ROUNDING = 1e-13  # of diodes, over the sum of all sources divided by their resistance
 CUT = 1e-6  # stored quantity that a switch may cut, over a small deviation
-TURNS = 60  # changes of switches in the search for the start
 SAMPLES = 12  # times at which responses are computed for the sizes of states
 MOST_DIODES = 3  # diodes that begin to conduct at once when a switch opens
 MOST_STATES = 200  # of networks whose responses are computed
@@ -45,6 +45,16 @@ EVENTS = {
 }
 
 
+class FirstRows(NamedTuple):
+    """Numbers of the first row of elements (two for each), of nodes, totals and angles; number of all rows."""
+
+    elements: int
+    nodes: int
+    totals: int
+    angles: int
+    count: int
+
+
 @dataclass(eq=False)
 class Network:
     """Network of a case: elements and switches, numbers of its stores and sources, places of its rows.
@@ -52,8 +62,8 @@ class Network:
     columns : stores and sources by name; sources come after all stores; states : column -> its place in y
     places : nodes of the case; dependent : column of a store that others determine -> linear function of these
     flags : name of a switch -> its first event flag; schedules : (place, key) -> index of the schedule
-    potentials, changes : values of all stores and sources at the start; small : sizes of small deviations of stores
-    angles : nodes whose angle is a state -> its place in y
+    angles : nodes whose angle is a state -> its place in y; values : of all stores and sources at the start
+    solved, written : results of `equations` and `arrays` by mode
     """
 
     elements: list[Element]
@@ -65,7 +75,7 @@ class Network:
     flags: dict[str, int] = field(default_factory=dict)
     schedules: dict[tuple[str, str], int] = field(default_factory=dict)
     angles: dict[str, int] = field(default_factory=dict)
-    values: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of all columns at the start
+    values: np.ndarray = field(default_factory=lambda: np.zeros(0))
     solved: dict[tuple, Elimination] = field(default_factory=dict)
     written: dict[tuple, tuple] = field(default_factory=dict)
 
@@ -139,13 +149,23 @@ class Network:
         return groups
 
     @cached_property
-    def first_rows(self) -> tuple[int, int, int, int, int]:
-        """Numbers of the first row of elements, of nodes, of totals, and of angles, and number of all rows."""
+    def rows(self) -> FirstRows:
+        """Numbers of the first rows; those of rates of states and angles come before."""
         elements = len(self.states) + len(self.angles)
         nodes = elements + 2 * len(self.elements)
         totals = nodes + len(self.nodes)
         angles = totals + len(self.totals)
-        return elements, nodes, totals, angles, angles + len(self.angles)
+        return FirstRows(elements, nodes, totals, angles, angles + len(self.angles))
+
+    @cached_property
+    def node_numbers(self) -> dict[str, int]:
+        """Number of each node."""
+        return {node: k for k, node in enumerate(self.nodes)}
+
+    @cached_property
+    def total_numbers(self) -> dict[str, int]:
+        """Number of each part in `totals`."""
+        return {part: k for k, part in enumerate(self.totals)}
 
     @cached_property
     def numbers(self) -> dict[str, int]:
@@ -154,16 +174,16 @@ class Network:
 
     def rows_of(self, name: str) -> tuple[int, int]:
         """Rows of the difference of potentials and of the flow of an element."""
-        first = self.first_rows[0] + 2 * self.numbers[name]
+        first = self.rows.elements + 2 * self.numbers[name]
         return first, first + 1
 
     def node_row(self, node: str) -> int:
         """Row of the potential of a node."""
-        return self.first_rows[1] + self.nodes.index(node)
+        return self.rows.nodes + self.node_numbers[node]
 
     def total_row(self, part: str) -> int:
         """Row of the sum of the flows of the elements of a part in parallel."""
-        return self.first_rows[2] + list(self.totals).index(part)
+        return self.rows.totals + self.total_numbers[part]
 
     def ends_of(self, name: str) -> tuple[str | None, ...]:
         """Nodes of an element."""
@@ -188,7 +208,7 @@ class Network:
                     if node is not None:
                         islands.setdefault(labels[names[node]], set()).add(self.columns[item.name])
         islands = {label: {column for column in own if column not in self.dependent} for label, own in islands.items()}
-        return [set().union(terms, *(own for own in islands.values() if own & set(terms))) if r < self.first_rows[0]
+        return [set().union(terms, *(own for own in islands.values() if own & set(terms))) if r < self.rows.elements
                 or len(terms) != 1 else set(terms) for r, terms in enumerate(rows)]  # fmt: skip
 
     def facts(self) -> dict:
@@ -216,16 +236,16 @@ class Network:
 
     def is_known_early(self, row) -> bool:
         """True if a probe reads states alone."""
-        if row["side"] == 4 or row["index"] >= self.first_rows[3]:
+        if row["side"] == rec.LOCKED or row["index"] >= self.rows.angles:
             return True
-        rows = [int(row["index"]), *([int(row["cell"])] if row["side"] in (2, 3) else [])]
+        rows = [int(row["index"]), *([int(row["cell"])] if row["side"] in (rec.POWER, rec.ENTROPY) else [])]
         return all(column < len(self.stores) for r in rows for column in self.columns_of_rows[r])
 
     def inputs_of(self, row) -> set[int]:
         """Numbers of the sources that a probe reads, also through torques of friction and heat."""
-        if row["side"] == 4 or row["index"] >= self.first_rows[3]:
+        if row["side"] == rec.LOCKED or row["index"] >= self.rows.angles:
             return set()
-        rows = [int(row["index"]), *([int(row["cell"])] if row["side"] in (2, 3) else [])]
+        rows = [int(row["index"]), *([int(row["cell"])] if row["side"] in (rec.POWER, rec.ENTROPY) else [])]
         return self.inputs_of_columns(set().union(*(self.columns_of_rows[r] for r in rows)))
 
     def inputs_of_columns(self, columns: set[int]) -> set[int]:
@@ -264,8 +284,8 @@ class Network:
 
     def fill_node_probe(self, draft, row, node: str, angle: bool) -> None:
         """Fill the row of a probe of the potential of a node, or of its angle."""
-        row["kind"], row["side"], row["scale"] = rec.NETWORK_VALUE, 0, 1.0
-        row["index"] = self.first_rows[3] + list(self.angles).index(node) if angle else self.node_row(node)
+        row["kind"], row["side"], row["scale"] = rec.NETWORK_VALUE, rec.ROW, 1.0
+        row["index"] = self.rows.angles + list(self.angles).index(node) if angle else self.node_row(node)
 
     def terms(self, mode: tuple[bool, ...]) -> list[Terms]:
         """All rows in a mode, as linear functions of the stores and sources that are not determined by others."""
@@ -393,7 +413,7 @@ class Network:
         """Number of entries of all rows for which the arrays have space in any mode."""
         if not self.switches:
             return sum(len(terms) for terms in self.terms(self.conducting)) + len(self.angles)
-        return self.first_rows[4] * len(self.columns)
+        return self.rows.count * len(self.columns)
 
 
 # tables -------------------------------------------------------------------------------------------------------------
@@ -437,15 +457,11 @@ def parts_of_network(case) -> tuple[list[Element], list[Switch]]:
     elements: list[Element] = []
     switches: list[Switch] = []
     for name, part in (*case.nodes.items(), *case.links.items()):
-        lowering = lowering_of(type(part)).of(part)
-        if isinstance(lowering, NetworkRows) or hasattr(lowering, "network_elements"):
-            give = lowering.elements if isinstance(lowering, NetworkRows) else lowering.network_elements
-            own, more = give(case, name, part)
-            elements += own
-            switches += more
+        own, more = lowering_of(type(part)).of(part).network_elements(case, name, part)
+        elements += own
+        switches += more
     for item in [item for item in elements if item.heat_to is not None]:
-        thermal = lowering_of(type(case.nodes[item.heat_to])).elements(case, item.heat_to, case.nodes[item.heat_to])[0]
-        node = item.heat_to if thermal else None
+        node = node_or_reference(case, item.heat_to)
         elements.append(Element(FLOW, f"{item.name}.heat", item.part, (None, node), reads=(rec.HEAT_INPUT, item.name),
                                 thermal=True))  # fmt: skip
     return elements, switches

@@ -47,7 +47,7 @@ class Terminal(Node, kind="terminal"):
 class TerminalRows(NetworkRows, kind="terminal"):
     """Conversion of terminals, which have no element."""
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         return [], []
 
     def probe(self, draft, name, probe, row) -> None:
@@ -112,7 +112,7 @@ class SourceRows(NetworkRows, kind=""):
     kind_of_source = POTENTIAL
     key = "voltage"
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         first, second = ends_of(case, part)
         ends = (second, first) if self.kind_of_source == POTENTIAL else (first, second)
         return [Element(self.kind_of_source, f"links.{name}", f"links.{name}", ends, schedule=getattr(part, self.key),
@@ -168,7 +168,7 @@ class ElectricalRows(NetworkRows, kind=""):
 class ResistorRows(ElectricalRows, kind="resistor"):
     """Conversion of resistors."""
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         place = f"links.{name}"
         return [Element(RESISTANCE, place, place, ends_of(case, part), part.resistance, ledger="dissipated",
                         heat_to=part.heat_to)], []  # fmt: skip
@@ -189,7 +189,7 @@ class Inductor(ElectricalLink, kind="inductor"):
 class InductorRows(ElectricalRows, kind="inductor"):
     """Conversion of inductors to stores of current."""
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         place = f"links.{name}"
         return [Element(INERTANCE, place, place, ends_of(case, part), part.inductance, f"{name}.current",
                         SMALL_CURRENT, part.initial_current, ledger="stored")], []  # fmt: skip
@@ -210,7 +210,7 @@ class Capacitor(ElectricalLink, kind="capacitor"):
 class CapacitorRows(ElectricalRows, kind="capacitor"):
     """Conversion of capacitors to stores of voltage."""
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         place = f"links.{name}"
         first, second = ends_of(case, part)
         sign = -1.0 if first is None else 1.0
@@ -240,7 +240,7 @@ class SwitchRows(NetworkRows, kind="switch"):
 
     input_kinds: ClassVar = {"closed": ANY_VALUE}
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         place = f"links.{name}"
         found = [Element(RESISTANCE, place, place, ends_of(case, part), part.resistance, switch=place,
                          ledger="dissipated")]  # fmt: skip
@@ -267,7 +267,7 @@ class DiodeRows(NetworkRows, kind="diode"):
 
     quantities: ClassVar = {"current": (".forward", "flow", 1.0), "voltage": ("", "drop", 1.0)}
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         place, (first, second), inner = f"links.{name}", ends_of(case, part), f"{name}.junction"
         return [
             Element(GAUGE, place, place, (first, second)),
@@ -320,7 +320,7 @@ class DcMotorRows(NetworkRows, kind="dc-motor"):
 
     quantities: ClassVar = {"current": (".coupling", "flow", 1.0), "torque": (".coupling", "second flow", -1.0)}
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         place = f"links.{name}"
         p, n, shaft = (node_or_reference(case, part.ports[port]) for port in ("p", "n", "shaft"))
         inner = f"{name}.armature" if part.inductance is not None else f"{name}.brushes"

@@ -45,7 +45,7 @@ class HeatCapacity(Node, kind="heat-capacity"):
 class HeatCapacityRows(NetworkRows, kind="heat-capacity"):
     """Conversion of heat capacities to stores of temperature."""
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         place = f"nodes.{name}"
         return [Element(CAPACITY, place, place, (name, None), part.heat_capacity, f"{name}.temperature",
                         SMALL_TEMPERATURE, part.initial_temperature, ledger="stored", thermal=True)], []  # fmt: skip
@@ -111,7 +111,7 @@ class ThermalConductorRows(NetworkRows, kind="thermal-conductor"):
 
     quantities: ClassVar = {"heat": ("", "flow", 1.0), "entropy_flow": ("", "entropy", 1.0)}
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         place = f"links.{name}"
         return [Element(RESISTANCE, place, place, ends_of(case, part), 1.0 / part.heat_conductance, thermal=True)], []
 
@@ -164,7 +164,7 @@ class HeatSourceRows(NetworkRows, kind="heat-source"):
     quantities: ClassVar = {"heat": ("", "flow", 1.0), "entropy_flow": ("", "entropy", 1.0)}
     input_kinds: ClassVar = {"heat": HEAT}
 
-    def elements(self, case, name: str, part: Any):
+    def network_elements(self, case, name: str, part: Any):
         place, to = f"links.{name}", node_or_reference(case, part.to)
         return [Element(FLOW, place, place, (None, to), schedule=part.heat, key="heat", ledger="supplied",
                         thermal=True)], []  # fmt: skip

@@ -68,7 +68,7 @@ class ShaftPlace(Node):
 class ShaftRows(NetworkRows, kind="shaft"):
     """Conversion of shafts to stores of angular velocity."""
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         if part.inertia is None:
             return [], []
         return [Element(CAPACITY, f"nodes.{name}", f"nodes.{name}", (name, None), part.inertia, f"{name}.speed",
@@ -104,7 +104,7 @@ class GivenPotentialRows(NetworkRows, kind=""):
     key = ""
     thermal = False
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         if node_or_reference(case, name) is None:
             return [], []
         return [Element(POTENTIAL, f"nodes.{name}", f"nodes.{name}", (name, None), schedule=part.reference_potential,
@@ -152,7 +152,7 @@ class GearRows(NetworkRows, kind="gear"):
 
     quantities: ClassVar = {"torque": ("", "flow", 1.0)}
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         first, second = ends_of(case, part)
         ends = (first, None, second, None)
         return [Element(TRANSFORMER, f"links.{name}", f"links.{name}", ends, part.ratio)], []
@@ -178,7 +178,7 @@ class TorsionSpring(RotationalLink, kind="torsion-spring"):
 class TorsionSpringRows(NetworkRows, kind="torsion-spring"):
     """Conversion of torsion springs to stores of torque, with a resistance in parallel."""
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         place, ends = f"links.{name}", ends_of(case, part)
         found = [Element(INERTANCE, place, place, ends, 1.0 / part.stiffness, f"{name}.torque", SMALL_TORQUE,
                          part.initial_torque, ledger="stored")]  # fmt: skip
@@ -248,7 +248,7 @@ def heat_to_faults(part: Any, around: Any) -> Iterator:
 class BearingRows(NetworkRows, kind="bearing"):
     """Conversion of bearings to resistances, and to dry friction."""
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         place, ends = f"links.{name}", ends_of(case, part)
         found = resistances(place, ends, part.damping, part.heat_to)
         static = part.friction_torque if part.static_torque is None else part.static_torque
@@ -284,7 +284,7 @@ class ClutchRows(NetworkRows, kind="clutch"):
 
     input_kinds: ClassVar = {"torque": CLUTCH_TORQUE}
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         place = f"links.{name}"
         switch = Switch(rec.FRICTION, place, place, f"{place}.friction", f"{place}.lock",
                         (0.0, 0.0, 0.0, part.static_factor), part.torque, "torque")  # fmt: skip
@@ -320,7 +320,7 @@ class RackRows(NetworkRows, kind="rack"):
 
     quantities: ClassVar = {"force": ("", "flow", -1.0)}
 
-    def elements(self, case, name, part):
+    def network_elements(self, case, name, part):
         shaft, mass = node_or_reference(case, part.ports["shaft"]), part.ports["mass"]
         mass = None if case.nodes[mass].kind == "frame" else mass
         return [Element(TRANSFORMER, f"links.{name}", f"links.{name}", (mass, None, shaft, None), part.radius)], []

@@ -32,7 +32,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/fluid": (981, 4),
     "fvsolve/kernels": (14789, 61),
     "fvsolve/mesh": (1077, 4),
-    "fvsolve/model": (8035, 24),
+    "fvsolve/model": (8051, 24),
     "fvsolve/output": (1535, 9),
     "fvsolve/parts": (13768, 97),
     "fvsolve/report": (2037, 7),
