@@ -101,6 +101,22 @@ def test_restated_circuits_have_the_same_voltages():
     assert len(fvsolve.build(fvsolve.load(split)).state_names) == 2
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_current_source_charges_a_capacitor(turned):
+    ends, current = (("a", "gnd"), -2.0) if turned else (("gnd", "a"), 2.0)
+    links = {"source": two_port("current-source", *ends, current=current),
+             "load": two_port("resistor", "a", "gnd", resistance=5.0),
+             "store": two_port("capacitor", "a", "gnd", capacitance=0.02, initial_voltage=0.0)}  # fmt: skip
+    case = network("a", links, 0.3, ["a.voltage", "source.current", "source.power"])
+    for method in METHODS:
+        run = runs(case, method)
+        exact = 10.0 * (1.0 - np.exp(-10.0 * np.array(run.t)))
+        assert np.array(run["a.voltage"]) == pytest.approx(exact, abs=10.0 * EXACT)
+        assert set(run["source.current"]) == {current}
+        assert np.array(run["source.power"]) == pytest.approx(2.0 * exact, abs=20.0 * EXACT)
+    assert abs(energy(case).remainder[-1]) < 1e-9 * energy(case).throughput
+
+
 def test_tied_coils_have_the_rates_of_their_sum():
     links = {
         "source": two_port("voltage-source", "gnd", "a", voltage=1.0),
@@ -538,6 +554,26 @@ def test_a_body_cools_as_its_closed_form(method):
     heat = 5.0 * (exact[:, 0] - exact[:, 1])
     assert np.array(run["wall.heat"]) == pytest.approx(heat, abs=1e-6)
     assert np.array(run["wall.entropy_flow"]) == pytest.approx(heat / exact[:, 0], rel=1e-7)
+
+
+def test_a_heat_source_warms_a_body_as_its_closed_form():
+    nodes = {"body": {"type": "heat-capacity", "heat_capacity": 200.0, "initial_temperature": 300.0},
+             "room": {"type": "ambient", "temperature": 300.0}}  # fmt: skip
+    links = {"heater": {"type": "heat-source", "to": "body", "heat": "0.1 kW"},
+             "wall": two_port("thermal-conductor", "body", "room", conductance=4.0)}  # fmt: skip
+    case = network(nodes, links, 100.0, ["body.temperature", "heater.heat", "heater.entropy_flow", "wall.heat"])
+    for method in METHODS:
+        run = runs(case, method)
+        exact = 300.0 + 25.0 * (1.0 - np.exp(-0.02 * np.array(run.t)))
+        assert np.array(run["body.temperature"]) == pytest.approx(exact, abs=25.0 * EXACT)
+        assert set(run["heater.heat"]) == {100.0}
+        assert np.array(run["heater.entropy_flow"]) == pytest.approx(100.0 / exact, rel=1e-9)
+    found = energy(case)
+    assert found.supplied["heater"][-1] == pytest.approx(1e4, rel=1e-9)
+    assert found.supplied["room"][-1] == pytest.approx(-(1e4 - found.stored["body"][-1]), rel=1e-9)
+    model = fvsolve.build(fvsolve.load(case))
+    state = fvsolve.advance(model, fvsolve.initial_state(model), 50.0, {"heater.heat": 0.0})
+    assert model.observe(state)[0] == pytest.approx(300.0, abs=1e-9)
 
 
 def test_an_unstated_temperature_starts_in_equilibrium():

@@ -54,7 +54,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/mesh": (411, 1),
     "tests/model": (2827, 9),
     "tests/output": (518, 2),
-    "tests/parts": (12582, 36),
+    "tests/parts": (12618, 36),
     "tests/reference": (3323, 32),
     "tests/report": (850, 4),
     "tests/repository": (2544, 14),
