@@ -17,7 +17,7 @@ from fvsolve.fluid.laws import LAWS, law_names
 from fvsolve.parts import KINDS, Basin
 from fvsolve.parts.basin import VELOCITY_FIELDS, Physics
 from fvsolve.parts.formula_program import is_formula
-from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
+from fvsolve.parts.nodes_and_links import is_in_network
 from fvsolve.parts.table_model import CaseContext
 from fvsolve.parts.value import ROOT
 from fvsolve.steppers.loop_records import LEAST_STEP, LEAST_TOLERANCE
@@ -199,7 +199,7 @@ def reserved_names() -> set[str]:
     velocities.
     """
     kinds = [kind for group in KINDS.values() for kind in group.values()
-             if getattr(kind, "domain", "") not in NETWORK_DOMAINS]  # fmt: skip
+             if not is_in_network(kind)]  # fmt: skip
     fields = {name for physics in Physics.kinds.values() for name in physics.fields if name not in VELOCITY_FIELDS}
     return RESERVED | fields | {name for kind in kinds for name in (*kind.quantities, *getattr(kind, "along", {}))}
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from fvsolve import units
 from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts import KINDS, Link, Node, Pipe, Reservoir, Scalar
-from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
+from fvsolve.parts.nodes_and_links import is_in_network
 from fvsolve.parts.value import ValueFault
 from fvsolve.units import show
 
@@ -177,7 +177,7 @@ def _scalars_of(kind: type[Node] | type[Link], kinds: Kinds, where: str) -> dict
 
 def _probe(text: str, part: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe:
     kind = kinds[part][name]
-    scalar = None if getattr(kind, "domain", "") in NETWORK_DOMAINS else kinds["scalars"].get(quantity)
+    scalar = None if is_in_network(kind) else kinds["scalars"].get(quantity)
     unit = scalar.unit if scalar is not None else ""
     if quantity in (fields := getattr(kind, "fields", {})):  # of a basin
         point = kind.point(f"{name}.{quantity}", place)

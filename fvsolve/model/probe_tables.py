@@ -7,6 +7,7 @@ from fvsolve.assembly.mechanics import point_row
 from fvsolve.assembly.scheme_codes import lower_position
 from fvsolve.case import sloshing
 from fvsolve.kernels import dtypes as rec
+from fvsolve.parts.nodes_and_links import is_in_network
 
 BLOCK_QUANTITIES = ("output", "input", "error")  # in the order of `kernels.controls`
 
@@ -27,7 +28,7 @@ def fill_probes(draft, probes: list) -> np.ndarray:
             row["side"] = BLOCK_QUANTITIES.index(probe.quantity)
         elif probe.point is not None:
             lower_basin_point(draft, row, probe)
-        elif probe.quantity in draft.case.scalars and probe.name not in draft.case.network_places:
+        elif probe.quantity in draft.case.scalars and not is_in_network(parts[probe.part].get(probe.name)):
             scalar_probe(draft, row, probe)
         elif probe.name in draft.case.network_places and probe.name not in parts["nodes"]:  # PUMP.shaft
             draft.network.fill_node_probe(draft, row, probe.name, False)

@@ -190,3 +190,8 @@ class Ports(Value):
 
     def json(self) -> dict[str, Any]:
         return keys_json(self.keys())
+
+
+def is_in_network(kind: Any) -> bool:
+    """True if a part, or class of parts, is in networks of rotation, electricity and heat, which carry no scalars."""
+    return getattr(kind, "in_network", False) or getattr(kind, "domain", "") in NETWORK_DOMAINS

@@ -576,6 +576,13 @@ def test_a_heat_source_warms_a_body_as_its_closed_form():
     assert model.observe(state)[0] == pytest.approx(300.0, abs=1e-9)
 
 
+def test_a_scalar_may_have_the_name_of_a_quantity_of_a_network():
+    case = fvsolve.load("dc-motor-pump", {"scalars": {"current": {}, "temperature": {}}, "expect": {}, "output": {
+        "probes": ["motor.current", "rise.current"]}, "numerics.end": 0.5})  # fmt: skip
+    run = fvsolve.run(case)
+    assert run.ok and run["motor.current"][-1] > 10.0 and set(run["rise.current"]) == {0.0}
+
+
 def test_an_unstated_temperature_starts_in_equilibrium():
     run = runs(warm())
     assert run["skin.temperature"][0] == pytest.approx(293.15 + 60.0 / 3.0, abs=1e-9)
