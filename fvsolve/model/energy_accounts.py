@@ -292,10 +292,7 @@ class Accounts:
     def networks(self) -> None:
         """Accounts of the parts of a network of rotation, electricity and heat."""
         network = self.model.network
-        booked = (
-            [] if network is None else [item for item in network.elements if item.ledger or item.heat_to is not None]
-        )
-        for item in booked:
+        for item in network.booked if network is not None else ():
             at, (group, _, name) = self.take(1), item.part.partition(".")
             kind = getattr(self.model.case, group)[name].kind.replace("-", " ")
             stores = item.ledger == "stored"

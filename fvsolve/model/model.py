@@ -145,7 +145,7 @@ class Model(Displayable):
     flags: np.ndarray  # event flags before a run
     discrete: np.ndarray  # numbers of blocks that change at events and samples only, at the start
     timed: list[tuple[int, int]]  # (event flag, place in `discrete` of the time of its last change)
-    network: Any  # `network_tables.Network` of rotation, electricity and heat; None without one
+    network: Any  # `network.Network` of rotation, electricity and heat; None without one
     # idle run data for evaluating single states; tables before the start is solved, reused by `vary`
     idle_run_data: deque[RunData] = field(default_factory=deque, init=False)
     tables_before_start: list = field(default_factory=list, init=False)

@@ -34,7 +34,11 @@ Terms = dict[int, float]  # column -> coefficient of a linear function of stores
 
 
 class NetworkError(Exception):
-    """Network without a unique solution. parts : places of the parts concerned; sources : True if sources contradict"""
+    """Network without a unique solution.
+
+    parts : places of the parts concerned; tied : those of stores that are tied to sources; sources : those of sources
+    that contradict each other, or to which stores are tied
+    """
 
     def __init__(self, parts: Iterable[str], tied: Iterable[str] = (), sources: Iterable[str] = ()) -> None:
         super().__init__()
@@ -55,10 +59,10 @@ def cleaned(terms: Terms) -> Terms:
 
 
 class Equation:
-    """Equation between unknowns, `left`, and stores and sources, `right`; part : place of its part in the case."""
+    """Equation: linear function of unknowns, `left` = linear function of stores and sources, `right`."""
 
-    def __init__(self, part: str) -> None:
-        self.part, self.left, self.right = part, {}, {}
+    def __init__(self) -> None:
+        self.left, self.right = {}, {}
 
 
 class Elimination:
@@ -125,7 +129,7 @@ class Elimination:
             for node, factor in zip(item.ends, scale, strict=False):
                 if node is None or item.kind == GAUGE:
                     continue
-                balance = nodes.setdefault(node, Equation(item.part))
+                balance = nodes.setdefault(node, Equation())
                 if item.kind == RESISTANCE:
                     self.put_drop(balance, item.ends, factor / item.value)
                 elif item.kind in HAS_FLOW:
@@ -136,7 +140,7 @@ class Elimination:
         for item in self.elements:
             column = self.columns.get(item.name, -1)
             if item.kind in HAS_FLOW and self.known.get(item.ends[0], -2) != column:
-                law = Equation(item.part)
+                law = Equation()
                 self.put_drop(law, item.ends)
                 if item.kind == TRANSFORMER:
                     self.put_drop(law, item.ends[2:], -item.value)
@@ -146,7 +150,7 @@ class Elimination:
 
     def raw_rate(self, column: int) -> tuple[Terms, Terms]:
         """Rate of a store, as (terms of unknowns, terms of stores and sources)."""
-        item, law = self.stores[column], Equation("")
+        item, law = self.stores[column], Equation()
         if item.kind == CAPACITY:
             add(law.left, {self.unknowns["flow", item.name]: 1.0 / item.value})
         else:
@@ -199,11 +203,11 @@ class Elimination:
         """
         unknowns, laws = block.unknowns, []
         for ends in self.leaks:
-            laws.append(Equation(""))
+            laws.append(Equation())
             self.put_drop(laws[-1], ends)
         for item in self.elements:
             if item.kind == LOCK:
-                laws.append(Equation(""))
+                laws.append(Equation())
                 add(laws[-1].left, {self.unknowns["flow", item.name]: 1.0})
         laws = [law for law in laws if law.left.keys() & set(unknowns)]
         further = {c for law in laws for c in law.right} - {*block.columns}
@@ -230,7 +234,7 @@ class Elimination:
             tied = [self.names[column] for column in relation if column in self.stores]
             raise NetworkError([self.names[c] for c in relation], tied, [self.names[c] for c in sources])
         self.relations.append(relation)
-        equation = Equation(self.names[next(iter(relation))])
+        equation = Equation()
         for column, factor in relation.items():
             if column not in self.stores:
                 continue
@@ -251,9 +255,9 @@ class Elimination:
         number = self.unknowns.get(("potential", node))
         return dict(self.solution.get(number, {})) if number is not None else {}
 
-    def drop(self, item: Element, pair: int = 0) -> Terms:
-        """Difference of the potentials at the ends of an element; pair : 1 for the second pair of a transformer."""
-        first, second = item.ends[2 * pair : 2 * pair + 2]
+    def drop(self, item: Element) -> Terms:
+        """Difference of the potentials at the first two ends of an element."""
+        first, second = item.ends[:2]
         return add(self.potential(first), self.potential(second), -1.0)
 
     def flow(self, item: Element) -> Terms:

@@ -15,6 +15,7 @@ from fvsolve.model.network_tables import network_faults
 TURNS = 60  # changes of switches, and of nonlinear sources, in the search
 AGREE = 1e-9  # relative difference of two values that are equal
 RESTING = 1e-9  # rate of a store in equilibrium, over the sum of the magnitudes of its terms
+LOOSE = 1e-6  # share of a store in a change of values under which no rate changes
 SLIP = 1e-12  # slip that is rounding, over the sum of the magnitudes of its speeds
 
 
@@ -193,7 +194,7 @@ class NetworkStart:
                 names = listing([item.state for item in moving], 4)
                 return moving[0].part, f"there is no equilibrium of {names} at the start; state its initial value"
         null = np.linalg.svd(matrix * sizes * scale[:, None])[2][rank:]
-        loose = [self.stores[c] for c, k in place.items() if np.any(np.abs(null[:, k]) > SLIP**0.5)]
+        loose = [self.stores[c] for c, k in place.items() if np.any(np.abs(null[:, k]) > LOOSE)]
         if item := next((item for item in loose if item.thermal), None):
             return item.part, "nothing determines its temperature at the start; give the key `initial_temperature`"
         return None
@@ -272,8 +273,7 @@ class NetworkStart:
                 draft.start_flags |= {flag: self.directions[k] > 0.0, flag + 2: self.directions[k] < 0.0}
             else:
                 draft.start_flags[flag] = self.mode[k]
-        booked = [item for item in network.elements if item.ledger or item.heat_to is not None]
-        for item, row in zip(booked, draft.tables.network_elements, strict=True):
+        for item, row in zip(network.booked, draft.tables.network_elements, strict=True):
             if item.is_store:
                 row["start"] = self.values[network.columns[item.name]]
 

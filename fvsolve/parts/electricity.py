@@ -22,8 +22,15 @@ from fvsolve.assembly.network_elements import (
     node_or_reference,
 )
 from fvsolve.kernels import dtypes as rec
+from fvsolve.parts.network_parts import (
+    HEAT_TO,
+    GivenPotential,
+    GivenPotentialRows,
+    NetworkNodeRows,
+    ends_of,
+    heat_to_faults,
+)
 from fvsolve.parts.nodes_and_links import Link, Node, Ports, TwoPort
-from fvsolve.parts.rotation import HEAT_TO, GivenPotentialRows, ends_of, heat_to_faults
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.value import Quantity, Text, UsualRange, nonnegative, nonzero, positive
 
@@ -44,17 +51,11 @@ class Terminal(Node, kind="terminal"):
     main_quantities: ClassVar[tuple[str, ...]] = ("voltage",)
 
 
-class TerminalRows(NetworkRows, kind="terminal"):
+class TerminalRows(NetworkNodeRows, kind="terminal"):
     """Conversion of terminals, which have no element."""
 
-    def network_elements(self, case, name, part):
-        return [], []
 
-    def probe(self, draft, name, probe, row) -> None:
-        draft.network.fill_node_probe(draft, row, name, False)
-
-
-class Ground(Node, kind="ground"):
+class Ground(GivenPotential, kind="ground"):
     """Place with a given voltage, 0 V if left out: the reference of a circuit.
 
     Ports: those of the links that name it, voltage and current. Stored and dissipated energy: none; it supplies voltage
@@ -64,21 +65,16 @@ class Ground(Node, kind="ground"):
     domain: ClassVar[str] = "electrical"
     quantities: ClassVar[dict[str, str]] = {"voltage": "voltage"}
     main_quantities: ClassVar[tuple[str, ...]] = ("voltage",)
+    potential_key: ClassVar[str] = "voltage"
 
     voltage: Annotated[Schedule, Scheduled("voltage", about="voltage [V]")] = Field(
         default_factory=lambda: constant(0.0)
     )
 
-    @property
-    def reference_potential(self) -> Schedule:
-        """Its given potential."""
-        return self.voltage
-
 
 class GroundRows(GivenPotentialRows, kind="ground"):
     """Conversion of grounds to sources of voltage."""
 
-    key = "voltage"
     input_kinds: ClassVar = {"voltage": VOLTAGE}
 
 

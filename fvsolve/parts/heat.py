@@ -13,8 +13,8 @@ from fvsolve.assembly.network_elements import (
     NetworkRows,
     node_or_reference,
 )
+from fvsolve.parts.network_parts import GivenPotential, GivenPotentialRows, NetworkNodeRows, ends_of
 from fvsolve.parts.nodes_and_links import Link, Node, TwoPort
-from fvsolve.parts.rotation import GivenPotentialRows, ends_of
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.value import Quantity, Text, UsualRange, positive
 
@@ -42,7 +42,7 @@ class HeatCapacity(Node, kind="heat-capacity"):
     ] = None
 
 
-class HeatCapacityRows(NetworkRows, kind="heat-capacity"):
+class HeatCapacityRows(NetworkNodeRows, kind="heat-capacity"):
     """Conversion of heat capacities to stores of temperature."""
 
     def network_elements(self, case, name, part):
@@ -50,11 +50,8 @@ class HeatCapacityRows(NetworkRows, kind="heat-capacity"):
         return [Element(CAPACITY, place, place, (name, None), part.heat_capacity, f"{name}.temperature",
                         SMALL_TEMPERATURE, part.initial_temperature, ledger="stored", thermal=True)], []  # fmt: skip
 
-    def probe(self, draft, name, probe, row) -> None:
-        draft.network.fill_node_probe(draft, row, name, False)
 
-
-class Ambient(Node, kind="ambient"):
+class Ambient(GivenPotential, kind="ambient"):
     """Surroundings with a given temperature.
 
     Ports: those of the links that name it, temperature and heat flow. Stored and dissipated energy: none; it supplies
@@ -64,19 +61,14 @@ class Ambient(Node, kind="ambient"):
     domain: ClassVar[str] = "thermal"
     quantities: ClassVar[dict[str, str]] = {"temperature": "temperature"}
     main_quantities: ClassVar[tuple[str, ...]] = ("temperature",)
+    potential_key: ClassVar[str] = "temperature"
 
     temperature: Annotated[Schedule, Scheduled("temperature", positive, "temperature [K]")]
-
-    @property
-    def reference_potential(self) -> Schedule:
-        """Its given potential."""
-        return self.temperature
 
 
 class AmbientRows(GivenPotentialRows, kind="ambient"):
     """Conversion of ambients to sources of temperature."""
 
-    key, thermal = "temperature", True
     input_kinds: ClassVar = {"temperature": TEMPERATURE}
 
 

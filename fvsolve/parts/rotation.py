@@ -11,7 +11,6 @@ from fvsolve.assembly.network_elements import (
     FLOW,
     INERTANCE,
     LOCK,
-    POTENTIAL,
     RESISTANCE,
     TRANSFORMER,
     Element,
@@ -21,6 +20,14 @@ from fvsolve.assembly.network_elements import (
     node_or_reference,
 )
 from fvsolve.kernels import dtypes as rec
+from fvsolve.parts.network_parts import (
+    HEAT_TO,
+    GivenPotential,
+    GivenPotentialRows,
+    NetworkNodeRows,
+    ends_of,
+    heat_to_faults,
+)
 from fvsolve.parts.nodes_and_links import Link, Node, Ports, TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.value import VALUE, Number, Quantity, Range, Text, UsualRange, nonnegative, nonzero, positive
@@ -65,7 +72,7 @@ class ShaftPlace(Node):
     quantities: ClassVar[dict[str, str]] = {"speed": "angular_velocity"}
 
 
-class ShaftRows(NetworkRows, kind="shaft"):
+class ShaftRows(NetworkNodeRows, kind="shaft"):
     """Conversion of shafts to stores of angular velocity."""
 
     def network_elements(self, case, name, part):
@@ -74,11 +81,8 @@ class ShaftRows(NetworkRows, kind="shaft"):
         return [Element(CAPACITY, f"nodes.{name}", f"nodes.{name}", (name, None), part.inertia, f"{name}.speed",
                         SMALL_SPEED, part.initial_speed, ledger="stored")], []  # fmt: skip
 
-    def probe(self, draft, name, probe, row) -> None:
-        draft.network.fill_node_probe(draft, row, name, probe.quantity == "angle")
 
-
-class Housing(Node, kind="housing"):
+class Housing(GivenPotential, kind="housing"):
     """Fixed or driven place with a given angular velocity.
 
     Ports: those of the links that name it, angular velocity and torque. Stored and dissipated energy: none; it supplies
@@ -87,37 +91,16 @@ class Housing(Node, kind="housing"):
 
     domain: ClassVar[str] = "rotational"
     quantities: ClassVar[dict[str, str]] = {"speed": "angular_velocity"}
+    potential_key: ClassVar[str] = "speed"
 
     speed: Annotated[Schedule, Scheduled("angular_velocity", about="angular velocity [rad/s]")] = Field(
         default_factory=lambda: constant(0.0)
     )
 
-    @property
-    def reference_potential(self) -> Schedule:
-        """Its given potential."""
-        return self.speed
-
-
-class GivenPotentialRows(NetworkRows, kind=""):
-    """Conversion of nodes whose potential is given."""
-
-    key = ""
-    thermal = False
-
-    def network_elements(self, case, name, part):
-        if node_or_reference(case, name) is None:
-            return [], []
-        return [Element(POTENTIAL, f"nodes.{name}", f"nodes.{name}", (name, None), schedule=part.reference_potential,
-                        key=self.key, ledger="supplied", thermal=self.thermal)], []  # fmt: skip
-
-    def probe(self, draft, name, probe, row) -> None:
-        draft.network.fill_node_probe(draft, row, name, False)
-
 
 class HousingRows(GivenPotentialRows, kind="housing"):
     """Conversion of housings to sources of angular velocity."""
 
-    key = "speed"
     input_kinds: ClassVar = {"speed": ANGULAR_SPEED}
 
 
@@ -131,11 +114,6 @@ class RotationalLink(TwoPort):
 
     from_: Annotated[str, Text("shaft or housing at its start"), Field(alias="from")]
     to: Annotated[str, Text("shaft or housing at its end")]
-
-
-def ends_of(case, part: Any) -> tuple[str | None, str | None]:
-    """Nodes of the network that both ports of a link join; None for the reference."""
-    return node_or_reference(case, part.from_), node_or_reference(case, part.to)
 
 
 class Gear(RotationalLink, kind="gear"):
@@ -204,9 +182,6 @@ def friction_elements(place: str, ends: tuple, heat_to: str | None = None) -> li
     ]  # fmt: skip
 
 
-HEAT_TO = Text("thermal node that its dissipation heats")
-
-
 class Bearing(RotationalLink, kind="bearing"):
     """Bearing with viscous and dry friction: T = damping w + (T_c + (T_s - T_c) exp(-(w / w_s)^2)) sign(w).
 
@@ -235,14 +210,6 @@ class Bearing(RotationalLink, kind="bearing"):
             text = f"is {self.static_torque:g} N m, below `friction_torque`, {self.friction_torque:g} N m"
             yield ("static_torque",), f"{text}; expected at least that torque"
         yield from heat_to_faults(self, around)
-
-
-def heat_to_faults(part: Any, around: Any) -> Iterator:
-    """Fault of a key `heat_to` that names no thermal node."""
-    if part.heat_to is not None and getattr(around.nodes.get(part.heat_to), "domain", "") != "thermal":
-        thermal = [node for node, other in around.nodes.items() if getattr(other, "domain", "") == "thermal"]
-        has = f"thermal nodes are {', '.join(thermal)}" if thermal else "the case has no thermal node"
-        yield ("heat_to",), f"no thermal node named {part.heat_to!r}; {has}"
 
 
 class BearingRows(NetworkRows, kind="bearing"):
