@@ -340,6 +340,14 @@ class Device(Restriction):
         """Size of a small deviation of each state of this part."""
         return []
 
+    def turns_with(self, part: Any) -> str | None:
+        """Place of a network of rotation whose speed its law reads before the nodes are solved; None for none."""
+        return None
+
+    def schedules_of_rates(self, row, valves, floats) -> list[int]:
+        """Indices of further schedules that the rates of its states read; row : of the device"""
+        return []
+
     def revise_state(self, start, part: Any, row) -> bool:
         """Set the state of the device, such as open or shut, that the steady solution implies; True if it changed."""
         return False

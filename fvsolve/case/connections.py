@@ -214,9 +214,12 @@ def _ports(link: dict[str, Any]) -> list[tuple[tuple, Any, str | None]]:
     kind = kind_of("links", link)
     if kind is None:
         return [((key,), link.get(key), None) for key in ("from", "to")]
-    given, below = (_dict(link.get("ports")), ("ports",)) if "ports" in kind.keys() else (link, ())
-    ports = [port for port in kind.joins if port in given or port not in kind.may_lack]
-    return [((*below, port), given.get(port), kind.joins[port]) for port in ports]
+    keys, found = kind.keys(), []
+    for port, domain in kind.joins.items():
+        given, below = (_dict(link.get("ports")), ("ports",)) if "ports" in keys and port not in keys else (link, ())
+        if port in given or port not in kind.may_lack:
+            found.append(((*below, port), given.get(port), domain))
+    return found
 
 
 def _unknown_place(place: str, places: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any]) -> str:
@@ -234,9 +237,8 @@ def joined_shafts(links: Any) -> list[str]:
     places = [
         place
         for link in links.values()
-        if getattr(kind_of("links", link), "in_network", False)
-        for _, place, domain in _ports(_dict(link))
-        if "rotational" in str(domain) and isinstance(place, str)
+        for keys, place, domain in _ports(_dict(link))
+        if "rotational" in str(domain) and isinstance(place, str) and keys[-1] in kind_of("links", link).network_ports
     ]
     return list(dict.fromkeys(place for place in places if place.endswith(".shaft")))
 

@@ -44,6 +44,22 @@ def row_value(y, out, tables, r):
     return tables.network_factors[r] + row_change(y, out, tables, r)
 
 
+@njit
+def known_potential(t, y, tables, r):
+    """Value of row r that depends on stores and schedules alone, before sources are written to `out`."""
+    places, factors = tables.network_places, tables.network_factors
+    first, middle, last, shift = places[3 * r], places[3 * r + 1], places[3 * r + 2], places[0] // 3 - places[0]
+    value = factors[r]
+    for k in range(first, middle):
+        value += factors[k + shift] * y[places[k]]
+    for k in range(middle, last):
+        source = tables.network_inputs[places[k]]
+        if source["kind"] == rec.SCHEDULE_INPUT:
+            given = source["sign"] * schedule_value(tables, source["index"], t)
+            value += factors[k + shift] * (given - source["start"])
+    return value
+
+
 @njit(forceinline=True)
 def slip_direction(tables, switch):
     """1 or -1 while dry friction slips, 0 while it sticks."""

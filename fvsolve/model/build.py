@@ -45,6 +45,7 @@ from fvsolve.model.mechanics_tables import (
     supporting_pressures,
 )
 from fvsolve.model.model import Model
+from fvsolve.model.network_start import unknown_speeds
 from fvsolve.model.network_tables import lower_networks, network_rate
 from fvsolve.model.probe_tables import lower_probes, probe_offsets
 from fvsolve.model.scalar_tables import lower_scalars, scale_scalars, start_amounts
@@ -60,6 +61,52 @@ def start_profile(draft) -> dict[str, Any]:
 
     Raises CaseError if no steady state is found.
     """
+    if draft.network is not None and (columns := unknown_speeds(draft, SteadyStart(draft))):
+        draft.start_speeds = balanced_speeds(draft, columns)
+    return steady_profile(draft)
+
+
+TURNS, DIFFERENCE = 40, 1e-6  # Newton iterations for speeds at the start; change of a speed for differences [rad/s]
+
+
+def balanced_speeds(draft, columns: list[int]) -> dict[int, float]:
+    """Speeds of shafts with displacement machines at which all torques balance : column of the network -> speed.
+
+    Standstill comes first. Adds a fault if no speeds are found.
+    """
+
+    def rates(speeds: np.ndarray) -> np.ndarray:
+        copy = draft.copy_for(draft.case)
+        copy.start_speeds = dict(zip(columns, map(float, speeds), strict=True))
+        steady_profile(copy)
+        network = copy.network
+        starts = network.arrays(network.mode_of(flags_at_start(copy)))[1]
+        return np.array([starts[list(network.states).index(column)] for column in columns])
+
+    speeds = np.zeros(len(columns))
+    found = rates(speeds)
+    for _ in range(TURNS):
+        if not found.any():
+            return dict(zip(columns, map(float, speeds), strict=True))
+        size = np.where(found != 0.0, np.sign(found), 1.0) * DIFFERENCE * (1.0 + np.abs(speeds))
+        slopes = np.array([(rates(speeds + change) - found) / change.sum() for change in np.diag(size)]).T
+        step = np.linalg.lstsq(slopes, -found, rcond=None)[0]
+        for _ in range(30):
+            after = rates(speeds + step)
+            if np.max(np.abs(after)) <= np.max(np.abs(found)):
+                break
+            step *= 0.5
+        if np.all(np.abs(step) <= 1e-15 * np.abs(speeds)):
+            return dict(zip(columns, map(float, speeds), strict=True))
+        speeds, found = speeds + step, after
+    store = draft.network.stores[columns[0]]
+    draft.fault(store.part, "no speed balances the torques on it at the start; give the key `initial_speed`")
+    draft.check()
+    return {}
+
+
+def steady_profile(draft) -> dict[str, Any]:
+    """Initial steady state at known speeds of shafts, as for `start_profile`."""
     if draft.case.law.linear:
         start = SteadyStart(draft)
     else:

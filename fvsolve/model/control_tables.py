@@ -138,7 +138,10 @@ def driven_rows(draft) -> Iterator[tuple[int, int, int]]:
             yield rec.DRIVEN_VALVE, k, followers[row["schedule"]]
     for k, row in enumerate(draft.device_table):
         valve = draft.valve_table[row["valve"]]["schedule"] if row["valve"] >= 0 else -1
-        for block in {followers[index] for index in (row["schedule"], valve) if index in followers}:
+        _, part, device = draft.devices[k]
+        shaft = device.turns_with(part)
+        turned = [] if shaft is None else draft.network.schedules_of_node(shaft)
+        for block in {followers[index] for index in (row["schedule"], valve, *turned) if index in followers}:
             yield rec.DRIVEN_DEVICE, k, block
     for i, row in enumerate(draft.node_table):
         if row["schedule"] in followers:

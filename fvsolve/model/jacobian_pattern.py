@@ -56,7 +56,7 @@ class Couplings:
         joined = [[self.points[pin[end]]["body"] for end in ("from_point", "to_point")] for pin in tables.pins]
         joined = [[int(self.bodies[i]["root"]) for i in pair] for pair in joined if min(pair) >= 0]
         self.ties = union(len(self.bodies), joined)
-        self.devices = tables.devices
+        self.devices, self.parts, self.floats = tables.devices, model.devices, tables.floats
         self.basins, self.integers, self.walls = model.basins, tables.integers, tables.walls
         self.patches = {int(row["node"]): row for row in tables.patches}
         self.network, self.inputs, self.switches = model.network, tables.network_inputs, tables.network_switches
@@ -146,7 +146,11 @@ class Couplings:
         if link["device"] < 0:
             return self.blocks.schedule(link["schedule"])
         device = self.devices[link["device"]]
-        return unique_states(self.device_states(device), self.blocks.schedule(link["schedule"], device["schedule"]))
+        _, part, rows = self.parts[link["device"]]
+        shaft, network = rows.turns_with(part), self.network
+        turned = () if shaft is None else self.network_states(network.columns_of_rows[network.node_row(shaft)])
+        schedules = self.blocks.schedule(link["schedule"], device["schedule"])
+        return unique_states(self.device_states(device), schedules, turned)
 
     def places(self, row, order: int) -> np.ndarray:
         """States of the positions (`order` 0) or velocities (1) of the masses or bodies that a row joins."""
@@ -271,10 +275,10 @@ class Couplings:
 
         The pressures are those at its ends and at the node that it senses.
         """
-        for row in self.devices:
+        for row, (_, _, rows) in zip(self.devices, self.parts, strict=True):
             ends = ends_of(self.valves[row["valve"]]) if row["valve"] >= 0 else ()
             read = [self.sets[i] for i in (*ends, row["node"]) if i >= 0]
-            read.append(self.blocks.schedule(row["schedule"]))
+            read.append(self.blocks.schedule(row["schedule"], *rows.schedules_of_rates(row, self.valves, self.floats)))
             yield pairs_of(self.device_states(row), unique_states(self.device_states(row), *read))
 
     def network_pairs(self) -> Iterator[Pairs]:

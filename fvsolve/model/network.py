@@ -318,9 +318,7 @@ class Network:
             unit = self.stores[rated[r]].unit if r < len(rated) else 1.0
             own = {self.states[c]: value * self.stores[c].unit / unit for c, value in terms.items() if c in self.states}
             given = {c - count: value / unit for c, value in terms.items() if c >= count}
-            parts = [value * self.values[c] / unit for c, value in terms.items()]
-            total = float(np.sum(parts))
-            starts.append(total if abs(total) > ROUNDING * float(np.sum(np.abs(parts))) else 0.0)
+            starts.append(self.start_of(terms, self.values, unit))
             first = 3 * (len(rows) + len(self.angles)) + len(numbers)
             places += [first, first + len(own), first + len(own) + len(given)]
             numbers += [*own, *given]
@@ -332,6 +330,28 @@ class Network:
             factors.append(1.0)
             starts.append(0.0)
         return np.array([*places, *numbers], dtype=np.int64), np.array([*starts, *factors])
+
+    def start_of(self, terms: Terms, values: np.ndarray, unit: float = 1.0) -> float:
+        """Value of a row at given values of stores and sources, in this unit; zero if it is rounding."""
+        parts = [value * values[column] / unit for column, value in terms.items()]
+        total = float(np.sum(parts))
+        return total if abs(total) > ROUNDING * float(np.sum(np.abs(parts))) else 0.0
+
+    def schedules_of_node(self, node: str) -> list[int]:
+        """Indices of the schedules that the potential of a node reads."""
+        sources = [self.sources[column - len(self.stores)] for column in self.columns_of_rows[self.node_row(node)]
+                   if column >= len(self.stores)]  # fmt: skip
+        return [self.schedules[item.part, item.key] for item in sources if item.schedule is not None]
+
+    def lightness(self, node: str) -> float:
+        """Rate of the potential of a node per flow into it through its torque of the fluid [1/kg/m2], at least 0."""
+        rows, found = self.terms(self.conducting), 0.0
+        torques = [item for item in self.sources if item.reads is not None and item.reads[0] == rec.TORQUE_INPUT]
+        sources = [self.columns[item.name] for item in torques if item.ends[0] == node]
+        rates = dict(zip(self.states, rows, strict=False))
+        for column, factor in rows[self.node_row(node)].items():
+            found = max([found, *(abs(factor * rates.get(column, {}).get(source, 0.0)) for source in sources)])
+        return found
 
     def fault_in(self, mode: tuple[bool, ...], y: np.ndarray) -> str:
         """Text of the fault of a mode that has no solution, or whose ties would cut a flow at once; "" for none."""

@@ -23,10 +23,11 @@ class NetworkStart:
     """Search for the values of all stores and sources of a network at the start, and for the state of its switches.
 
     values : of all columns; mode : as for `Network.equations`; directions : of each friction, 0 while it sticks
+    solved : True if the start of all other parts is known
     """
 
-    def __init__(self, draft, start) -> None:
-        self.draft, self.start, self.network = draft, start, draft.network
+    def __init__(self, draft, start, solved: bool = True) -> None:
+        self.draft, self.start, self.network, self.solved = draft, start, draft.network, solved
         self.values = np.zeros(len(self.network.columns))
         self.free = self.stated_values()
         self.switches = self.network.switches
@@ -46,10 +47,11 @@ class NetworkStart:
             if item.reads is None:
                 schedule = network.schedules[item.part, item.key]
                 self.values[network.columns[item.name]] = self.start.schedule_value(schedule)
-            elif item.reads[0] in (rec.TORQUE_INPUT, rec.FORCE_INPUT):
+            elif item.reads[0] in (rec.TORQUE_INPUT, rec.FORCE_INPUT) and self.solved:
                 self.values[network.columns[item.name]] = self.given_by_others(item)
         for column, item in self.stores.items():
             value = item.initial if item.state_of is None else self.state_of_other(item)
+            value = self.draft.start_speeds.get(column) if value is None else value
             if value is not None:
                 self.values[column] = value
                 known.add(column)
@@ -81,8 +83,8 @@ class NetworkStart:
         draft = self.draft
         if kind == "mass":
             return float(draft.mass_table[draft.mass_index[name]]["velocity"])
-        row = draft.device_table[draft.device_names.index(name)]
-        return item.unit * float(draft.valve_table[row["valve"]]["drive"])
+        k = draft.device_names.index(name)
+        return item.unit * float(draft.devices[k][2].speed_at(self.start, int(draft.device_table[k]["valve"])))
 
     def first_direction(self, k: int) -> float:
         """Direction of a slip between known speeds; 0 for friction that may stick, and for other switches."""
@@ -276,6 +278,25 @@ class NetworkStart:
         for item, row in zip(network.booked, draft.tables.network_elements, strict=True):
             if item.is_store:
                 row["start"] = self.values[network.columns[item.name]]
+
+
+def unknown_speeds(draft, start) -> list[int]:
+    """Columns of stores without a stated value whose potential turns a displacement machine."""
+    if draft.network is None or not any(hasattr(part, "displacement") for _, part, _ in draft.devices):
+        return []
+    search, network = NetworkStart(draft, start, solved=False), draft.network
+    rows, shafts = network.terms(network.conducting), {getattr(part, "shaft", None) for _, part, _ in draft.devices}
+    read = {column for node in network.nodes if node in shafts for column in rows[network.node_row(node)]}
+    return [column for column in search.free if column in read]
+
+
+def known_potentials(draft, start) -> dict[str, float]:
+    """Potentials at the start of nodes that stores and schedules determine; stores of unknown value count as 0."""
+    if draft.network is None:
+        return {}
+    search, network = NetworkStart(draft, start, solved=False), draft.network
+    rows = network.terms(network.conducting)
+    return {node: network.start_of(rows[network.node_row(node)], search.values) for node in network.nodes}
 
 
 def start_network(draft, start) -> list[str]:

@@ -14,6 +14,7 @@ from fvsolve.model.network import MOST_STATES, Network
 from fvsolve.model.network_elimination import Elimination, NetworkError, dependent_stores, substituted
 
 CURRENT_ROUNDING = 1e-13  # of diodes, over the sum of all sources divided by their resistance
+NO_SPEED = "has neither an inertia nor a given speed; give this shaft the key `inertia`"
 SAMPLES = 12  # times at which responses are computed for the sizes of states
 CATEGORIES = {"": rec.NOT_BOOKED, "stored": rec.STORED, "dissipated": rec.DISSIPATED, "supplied": rec.SUPPLIED}
 NO_INERTIA = "its speeds depend on its own torque at once; give the shafts at both ends an `inertia`"
@@ -54,6 +55,8 @@ def lower_networks(draft) -> None:
             network.states[column] = state_place(draft, item, sizes[column])
     for name in probed_angles(draft.case):
         network.angles[name] = draft.states([f"{name}.angle"], 1.0)
+    for place, text in speed_faults(draft, network):
+        draft.fault(place, text)
     fill_tables(draft, network)
 
 
@@ -82,6 +85,8 @@ def network_faults(error: NetworkError, case) -> Iterator[tuple[str, str]]:
         sources = listing([part.partition(".")[2] for part in error.sources])
         text = f"lies on the source {sources}, which gives its potential or flow"
         yield error.tied[0], f"{text}; put a resistance between them (a resistor, bearing or thermal-conductor)"
+    elif turning := [name for name in names if hasattr(case.links.get(name), "displacement")]:
+        yield f"links.{turning[0]}.ports.shaft", f"{case.links[turning[0]].shaft} {NO_SPEED}"
     elif error.sources:
         text = f"the sources {listing(names)} contradict each other" if len(names) > 1 else "its flow has no way"
         yield error.sources[0], f"{text}; put a resistance between them, or in parallel"
@@ -102,6 +107,16 @@ def friction_faults(network: Network, found: Elimination) -> Iterator[tuple[str,
             terms = found.drop(network.elements[network.numbers[switch.drop]])
             if torques & terms.keys():
                 yield switch.part, NO_INERTIA
+
+
+def speed_faults(draft, network: Network) -> Iterator[tuple[str, str]]:
+    """Yield a fault (place, text) for each device on a shaft whose speed does not follow from stores and schedules."""
+    rows, first = network.terms(network.conducting), len(network.stores)
+    for name, part, device in draft.devices:
+        shaft = device.turns_with(part)
+        follows = () if shaft is None else rows[network.node_row(shaft)]
+        if any(column >= first and network.sources[column - first].schedule is None for column in follows):
+            yield f"links.{name}.ports.shaft", f"{shaft} {NO_SPEED}"
 
 
 def state_place(draft, item: Element, size: float) -> int:

@@ -16,7 +16,7 @@ from fvsolve.kernels.restrictions import conductance_of, flow_at_drop, flow_slop
 from fvsolve.kernels.steady_friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.table_handle import make_handle
 from fvsolve.model.mechanics_tables import driven_at_start, start_masses
-from fvsolve.model.network_start import start_network
+from fvsolve.model.network_start import known_potentials, start_network
 from fvsolve.model.run_data import zeros_for_run
 from fvsolve.model.static_forces import start_bodies
 from fvsolve.steady import Edge, solve_steady, union
@@ -56,6 +56,7 @@ class SteadyStart:
         self.moving: list[str] = []
         self.shut: set[int] = set()  # valves that a device holds shut
         self.valve_modes: dict[int, str] = {}  # modes of valves that regulate
+        self.compensator_inlets: dict[int, float] = {}  # of regulated pumps: potentials assumed at their inlets [Pa]
         self.loads: dict[int, float] = {}  # of closed chambers: pressures that support bodies, held by `solve` [Pa]
 
     @cached_property
@@ -72,6 +73,11 @@ class SteadyStart:
     def handle(self) -> np.ndarray:
         """Handle of the tables, by which compiled laws read them."""
         return make_handle((*self.draft.tables, *self.run_arrays))
+
+    @cached_property
+    def network_potentials(self) -> dict[str, float]:
+        """Potentials of the nodes of networks at the start, where stores and schedules give them."""
+        return known_potentials(self.draft, self)
 
     def pressure(self, i: int) -> float:
         """Pressure [Pa] at node i in the latest solution."""

@@ -132,9 +132,15 @@ class Link(Part):
     along: ClassVar[dict[str, str]] = {}  # quantities that also exist at a fraction of the length
     joins: ClassVar[dict[str, str]] = {}  # port -> required domain of its place
     in_network: ClassVar[bool] = False  # True if it is an element of a network of rotation, electricity or heat
+    network_ports: ClassVar[tuple[str, ...]] = ()  # ports whose places are in such a network; all if `in_network`
     main_quantities: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded where a case has no probes
     may_lack: ClassVar[tuple[str, ...]] = ()  # ports that may join nothing
     owns: ClassVar[dict[str, str]] = {}  # own place, `LINK.PLACE` for other parts -> domain
+
+    def __init_subclass__(cls, **rest: Any) -> None:
+        super().__init_subclass__(**rest)
+        if cls.in_network:
+            cls.network_ports = tuple(cls.joins)
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
         """(places, links) of the solved network for this link, each by name.

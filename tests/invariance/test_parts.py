@@ -90,6 +90,12 @@ LINKS = {
         {"opening": st.one_of(between(0.1, 1.0), st.builds(ramp, between(0.1, 0.5), between(0.01, 0.4), ONE, NONE))},
         a=st.sampled_from([{}, {"inertia": 0.05, "trip": 0.2}]),
     ),
+    **{f"displacement-{kind}": of(
+        f"displacement-{kind}",
+        {"displacement": between(1e-6, 2e-5), "speed": st.one_of(between(-100.0, 150.0), st.builds(
+            ramp, between(0.1, 0.4), between(0.05, 0.4), st.just(100.0), NONE)), "leakage": between(1e-8, 1e-7)},
+        {"setting": between(-1.0, 1.0), "setting_time": between(0.02, 0.5), "friction_torque": between(0.0, 5.0)},
+    ) for kind in ("pump", "motor")},
     "leak": of("leak", {"coefficient": between(1e-7, 1e-5), "opening": OPENING}, {"exponent": between(0.5, 1.5)}),
 }  # fmt: skip
 NODES = {
@@ -223,7 +229,8 @@ def test_at_rest_it_stays_at_rest(table, kind, data, settings):
     """
     part = data.draw((LINKS if table == "links" else NODES)[kind])
     still = {
-        "pump": {"speed": 0.0}, "turbine": {"speed": 0.0}, "leak": {"opening": 0.0}, "junction": {"demand": 0.0},
+        "pump": {"speed": 0.0}, "turbine": {"speed": 0.0}, "displacement-pump": {"speed": 0.0},
+        "displacement-motor": {"speed": 0.0}, "leak": {"opening": 0.0}, "junction": {"demand": 0.0},
         "inflow": {"flow": 0.0}, "tank": {"level": HEAD}, "reservoir": {"head": HEAD},
     }.get(kind, {})  # fmt: skip
     part |= still
