@@ -148,7 +148,9 @@ class Couplings:
         device = self.devices[link["device"]]
         _, part, rows = self.parts[link["device"]]
         shaft, network = rows.turns_with(part), self.network
-        turned = () if shaft is None else self.network_states(network.columns_of_rows[network.node_row(shaft)])
+        turned = (
+            unique_states() if shaft is None else self.network_states(network.columns_of_rows[network.node_row(shaft)])
+        )
         schedules = self.blocks.schedule(link["schedule"], device["schedule"])
         return unique_states(self.device_states(device), schedules, turned)
 

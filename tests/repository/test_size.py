@@ -32,7 +32,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/fluid": (981, 4),
     "fvsolve/kernels": (14805, 61),
     "fvsolve/mesh": (1077, 4),
-    "fvsolve/model": (8184, 25),
+    "fvsolve/model": (8186, 25),
     "fvsolve/output": (1535, 9),
     "fvsolve/parts": (14475, 102),
     "fvsolve/report": (2037, 7),
