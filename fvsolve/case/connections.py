@@ -103,8 +103,9 @@ def _dict(value: Any) -> dict[str, Any]:
 
 
 def kind_of(group: str, part: Any) -> Any:
-    """Class of a part from its keys in the file; None if its type is unknown."""
-    return KINDS[group].get(str(_dict(part).get("type")))
+    """Class of a part from its keys in the file, with its variant; None if its type is unknown."""
+    kind = KINDS[group].get(str(_dict(part).get("type")))
+    return kind and kind.variant(_dict(part))
 
 
 def _owned_places(name: str, link: Any) -> dict[str, str]:

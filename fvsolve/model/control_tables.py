@@ -138,7 +138,8 @@ def driven_rows(draft) -> Iterator[tuple[int, int, int]]:
             yield rec.DRIVEN_VALVE, k, followers[row["schedule"]]
     for k, row in enumerate(draft.device_table):
         valve = draft.valve_table[row["valve"]]["schedule"] if row["valve"] >= 0 else -1
-        for block in {followers[index] for index in (row["schedule"], valve) if index in followers}:
+        own = row["schedule"] if draft.devices[k][2].follows_at_once else -1
+        for block in {followers[index] for index in (own, valve) if index in followers}:
             yield rec.DRIVEN_DEVICE, k, block
     for i, row in enumerate(draft.node_table):
         if row["schedule"] in followers:

@@ -56,7 +56,7 @@ class Couplings:
         joined = [[self.points[pin[end]]["body"] for end in ("from_point", "to_point")] for pin in tables.pins]
         joined = [[int(self.bodies[i]["root"]) for i in pair] for pair in joined if min(pair) >= 0]
         self.ties = union(len(self.bodies), joined)
-        self.devices = tables.devices
+        self.devices, self.lowerings = tables.devices, [lowering for _, _, lowering in model.devices]
         self.basins, self.integers, self.walls = model.basins, tables.integers, tables.walls
         self.patches = {int(row["node"]): row for row in tables.patches}
         self.network, self.inputs, self.switches = model.network, tables.network_inputs, tables.network_switches
@@ -146,7 +146,8 @@ class Couplings:
         if link["device"] < 0:
             return self.blocks.schedule(link["schedule"])
         device = self.devices[link["device"]]
-        return unique_states(self.device_states(device), self.blocks.schedule(link["schedule"], device["schedule"]))
+        own = device["schedule"] if self.lowerings[link["device"]].follows_at_once else -1
+        return unique_states(self.device_states(device), self.blocks.schedule(link["schedule"], own))
 
     def places(self, row, order: int) -> np.ndarray:
         """States of the positions (`order` 0) or velocities (1) of the masses or bodies that a row joins."""
