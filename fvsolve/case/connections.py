@@ -33,7 +33,10 @@ def network(table: dict[str, Any]) -> Faults:
         yield from ((("links", name, *keys), text) for keys, text in faults)
         joined = [place for _, place, _ in ports if isinstance(place, str)]
         unjoined += len(ports) - len({*joined} & places.keys())
-        joined += [_dict(link).get("heat_to")]
+        wrong = [
+            place for place in _dict(_dict(link).get("ports")).values() if isinstance(place, str)
+        ]  # of other kinds
+        joined += [place for place in [*wrong, _dict(link).get("heat_to")] if place not in joined]
         ends[name] = [place for place in [*joined, *_owned_places(name, link)] if place in places]
     for group in ("nodes", "links"):
         kinds = [_dict(node).get("type") for node in nodes.values()]

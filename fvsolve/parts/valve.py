@@ -128,7 +128,7 @@ class Sized(Table):
         text = f"{alone} needs area or diameter" if alone else f"size is missing; expected {cls.sizes}"
         return faults + [((), text)]
 
-    def flow_area(self, density: float = WATER_15) -> float:
+    def flow_area(self, density: float = 1000.0) -> float:
         """Product Cd A [m2] of discharge coefficient and area at full opening, such that q = Cd A sqrt(2 dp / rho).
 
         density : density of the fluid [kg/m3], which only a rated flow needs

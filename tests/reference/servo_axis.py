@@ -68,7 +68,7 @@ def start() -> np.ndarray:
 
 
 def trajectory(times: np.ndarray, rtol: float = 1e-12) -> np.ndarray:
-    """States at increasing times : float64[7, times], by SciPy's DOP853, with the upper stop of the spool as an event."""
+    """States at increasing times : float64[7, times], by SciPy's DOP853 with the stop of the spool as an event."""
     rates, y, t, at_stop, found = axis(), start(), 0.0, False, []
 
     def follow(t, y):

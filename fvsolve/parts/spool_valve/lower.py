@@ -26,7 +26,7 @@ class SpoolValveRows(Restriction, kind="spool-valve"):
         self.edges, self.ports, self.rows = EDGES[ways], PORTS[ways], len(EDGES[ways])
 
     def of(self, part) -> Restriction:
-        if part.natural_frequency is not None or part.dead_band > 0.0:
+        if part.natural_frequency is not None or part.dead_band:
             return CommandedRows(part)
         return SpoolValveRows(part.ways_of)
 
@@ -97,7 +97,8 @@ class CommandedRows(SpoolValveRows, Device, kind=""):
         fastest = 0.0 if part.stroke_time is None else 1.0 / part.stroke_time
         frequency, damping = 2.0 * math.pi * (part.natural_frequency or 0.0), part.damping_ratio or 0.0
         return [
-            0.0, self.least, frequency, damping, fastest, 0.5 * part.hysteresis, part.dead_band, float(self.rows),
+            0.0, self.least, frequency, damping, fastest, 0.5 * (part.hysteresis or 0.0), part.dead_band or 0.0,
+            float(self.rows),
             float(law.FIRST_EDGE + len(lines)), *lines, float(len(self.positions)), *self.positions,
         ]  # fmt: skip
 

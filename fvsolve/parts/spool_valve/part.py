@@ -37,7 +37,7 @@ DYNAMIC_KEYS = ("damping_ratio", "stroke_time", "hysteresis")  # keys that need 
 
 
 @dataclass(frozen=True)
-class BelowOne(Range):
+class BelowUnity(Range):
     """Range of numbers below 1."""
 
     def check(self, value: float, given: Any) -> None:
@@ -49,7 +49,7 @@ class BelowOne(Range):
         return "below 1" if self.least == -math.inf else f"of at least {self.least:g} and below 1"
 
 
-OVERLAP = Number(BelowOne(), usual=UsualRange(-0.5, 0.5, "critical centre to wide overlap"))
+OVERLAP = Number(BelowUnity(), usual=UsualRange(-0.5, 0.5, "critical centre to wide overlap"))
 
 
 @dataclass(frozen=True)
@@ -141,13 +141,14 @@ class SpoolValve(Sized, Link, kind="spool-valve"):
         "time", positive, "least time of the spool from the centre to an end [s]; no limit of its speed if left out",
         UsualRange(1e-4, 10.0, "servo valves to large proportional valves"),
     )] = None  # fmt: skip
-    dead_band: Annotated[float, Number(
-        BelowOne(0), "command below which the spool stays in the centre", UsualRange(1e-4, 0.5, "proportional valves")
-    )] = 0.0  # fmt: skip
-    hysteresis: Annotated[float, Number(
-        BelowOne(0), "width of the loop of position over command, with `natural_frequency`",
+    dead_band: Annotated[float | None, Number(
+        BelowUnity(0), "command below which the spool stays in the centre; 0 if left out",
+        UsualRange(1e-4, 0.5, "proportional valves"),
+    )] = None  # fmt: skip
+    hysteresis: Annotated[float | None, Number(
+        BelowUnity(0), "width of the loop of position over command, with `natural_frequency`; 0 if left out",
         UsualRange(1e-4, 0.2, "servo valves to valves without position control"),
-    )] = 0.0  # fmt: skip
+    )] = None  # fmt: skip
 
     @classmethod
     def variant(cls, given: dict[str, Any]) -> type[Link]:
@@ -206,7 +207,7 @@ class SpoolValve(Sized, Link, kind="spool-valve"):
 
     def after_dead_band(self, command: float) -> float:
         """Position that a command asks for, sign(u) max(0, |u| - d) / (1 - d)."""
-        d = self.dead_band
+        d = self.dead_band or 0.0
         if d == 0.0:
             return command
         return (command - d) / (1.0 - d) if command > d else (command + d) / (1.0 - d) if command < -d else 0.0
