@@ -61,7 +61,7 @@ class Input(NamedTuple):
     scale: float = 1.0
     offset: float = 0.0
     node: int = -1  # node, for a pressure or head
-    other: int = -1  # for a value with a sign, the schedule of its negative part
+    parts: tuple[tuple[int, float, float], ...] = ()  # schedules with the values max(0, a * value + b), and a, b
     scalar: int = -1  # scalar whose value flows in
     control: int = -1  # block whose output it is, in place of a schedule
 
@@ -298,6 +298,7 @@ class Device(Restriction):
     quantities: ClassVar[tuple[str, ...]] = ()
     remedy: ClassVar[str] = "give the part a time_constant"
     vessel: ClassVar[bool] = False  # True for a node whose pressure it computes
+    follows_at_once: bool = True  # False if only the rates of its states depend on its schedule
 
     def place(self, draft, name: str, node: Any, row) -> None:
         """Fill the NODE row of a vessel."""
@@ -331,6 +332,10 @@ class Device(Restriction):
             Lowering.probe(self, draft, name, probe, row)
         else:
             super().probe(draft, name, probe, row)
+
+    def opening_at_start(self, start, part: Any, row, k: int) -> float:
+        """Opening of its restriction k in the steady start, unless it is shut."""
+        return 1.0
 
     def states_of(self, draft, name: str, part: Any) -> tuple[str, ...]:
         """Names of the states of this part."""
@@ -403,9 +408,9 @@ def lower_devices(draft) -> None:
         row["controls_column"] = row["event"] + device.controlling_event if device.controlling_event >= 0 else -1
         if name in draft.valve_names:
             row["valve"] = draft.valve_names.index(name)
-            valve = draft.valve_table[row["valve"]]
-            valve["device"] = k if calls.hook_of(device.law, "set") is not None else -1  # it sets the opening
-            valve["event"], valve["data"] = row["event"], row["data"] if valve["data"] < 0 else valve["data"]
+            for valve in draft.valve_table[row["valve"] :][: device.rows]:
+                valve["device"] = k if calls.hook_of(device.law, "set") is not None else -1  # it sets the opening
+                valve["event"], valve["data"] = row["event"], row["data"] if valve["data"] < 0 else valve["data"]
         elif name in draft.node_index:
             row["node"] = draft.node_index[name]
             row["row"] = draft.node_table[row["node"]]["row"]

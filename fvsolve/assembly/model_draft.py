@@ -101,7 +101,7 @@ class Hydraulics:
         If the fluid has no viscosity, the kinematic viscosity of water is used; a stated key `laminar_reynolds` is then
         a fault.
         """
-        area = link.flow_area()
+        area = link.flow_area(self.rho)
         if link.diameter is not None:
             area = math.pi / 4.0 * link.diameter**2
         elif link.area is not None:
@@ -358,6 +358,7 @@ class ModelDraft:
         table_rows, at = np.zeros(len(names), record), 0
         if table == "valve":
             table_rows["device"] = table_rows["hooks"] = table_rows["data"] = table_rows["event"] = -1
+            table_rows["command"] = -1
             table_rows["back"] = 1.0
         for key in {"moving_segment", "delay"}.intersection(record.names):
             table_rows[key] = -1
@@ -380,6 +381,6 @@ class ModelDraft:
 
         If `laminar_reynolds` is stated, the flow below which the valve is laminar [kg/s] is set too.
         """
-        row["conductance"] = 2.0 * self.fluid.density * link.flow_area() ** 2
+        row["conductance"] = 2.0 * self.fluid.density * link.flow_area(self.fluid.density) ** 2
         if link.laminar_reynolds is not None:
             row["transition"] = self.hydraulics.transition_flow(name, link, link.laminar_reynolds, self.fault)

@@ -70,16 +70,17 @@ class Schedules:
             self.spacing = min(self.spacing, 4.0 * float(np.median(np.diff(schedule.time))))
         return len(self.records) - 1
 
-    def add_part(self, schedule, side: int) -> int:
-        """Add the positive part of side * value of a schedule, side 1 or -1; return its index.
+    def add_part(self, schedule, scale: float, offset: float = 0.0) -> int:
+        """Add the positive part of scale * value + offset of a schedule; return its index.
 
         It has kinks where the value is zero; steps must end there.
         """
         if schedule.kind == "control":
-            return self.add_block(schedule, BLOCK_PART, side, 0.0)
+            return self.add_block(schedule, BLOCK_PART, scale, offset)
         if schedule.kind == "formula":
-            return self.add_formula(replace(schedule, program=schedule.program.positive_part(side)), 1.0, 0.0)
-        index = self.add(schedule, side)
+            program = schedule.program.positive_part(scale, offset)
+            return self.add_formula(replace(schedule, program=program), 1.0, 0.0)
+        index = self.add(schedule, scale, offset)
         first, count = self.records[index]
         if schedule.kind == "harmonic":
             self.rows[first][1] = CREST

@@ -33,7 +33,10 @@ def network(table: dict[str, Any]) -> Faults:
         yield from ((("links", name, *keys), text) for keys, text in faults)
         joined = [place for _, place, _ in ports if isinstance(place, str)]
         unjoined += len(ports) - len({*joined} & places.keys())
-        joined += [_dict(link).get("heat_to")]
+        wrong = [
+            place for place in _dict(_dict(link).get("ports")).values() if isinstance(place, str)
+        ]  # of other kinds
+        joined += [place for place in [*wrong, _dict(link).get("heat_to")] if place not in joined]
         ends[name] = [place for place in [*joined, *_owned_places(name, link)] if place in places]
     for group in ("nodes", "links"):
         kinds = [_dict(node).get("type") for node in nodes.values()]
@@ -103,8 +106,9 @@ def _dict(value: Any) -> dict[str, Any]:
 
 
 def kind_of(group: str, part: Any) -> Any:
-    """Class of a part from its keys in the file; None if its type is unknown."""
-    return KINDS[group].get(str(_dict(part).get("type")))
+    """Class of a part from its keys in the file, with its variant; None if its type is unknown."""
+    kind = KINDS[group].get(str(_dict(part).get("type")))
+    return kind and kind.variant(_dict(part))
 
 
 def _owned_places(name: str, link: Any) -> dict[str, str]:

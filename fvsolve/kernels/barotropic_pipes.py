@@ -11,6 +11,7 @@ from fvsolve.kernels import density as law
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.density.steady_profile import add_slope_force
 from fvsolve.kernels.pipes import GAUSS, both_faces
+from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.steady_friction import drag
 from fvsolve.kernels.table_handle import open_tables
 from fvsolve.kernels.tanks import tank_level
@@ -154,8 +155,10 @@ def observe_barotropic(t, y, out, handle, values):
         elif kind == rec.VALVE_FLOW:
             value = valve_volume_flow(st, floats, tables, out, i)
         elif kind == rec.SPOOL_FLOW:
-            for e in range(4):
+            for e in range(probe["count"]):
                 value += floats[probe["weights"] + e] * valve_volume_flow(st, floats, tables, out, i + e)
+        elif kind == rec.SCHEDULE_VALUE:
+            value = schedule_value(tables, i, t)
         elif kind == rec.COLUMN_FLOW:
             value = out[layout["column"] + i] / st["rho"]
         values[k] = value

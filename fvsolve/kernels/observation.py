@@ -7,6 +7,7 @@ pressure change; t : present time [s].
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.calls import CLOSE, run_job
+from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
 from fvsolve.kernels.tanks import BOTTOM, EVENTS, RIM, is_near, limit_events, mass_per_metre, tank_level
 
@@ -60,8 +61,10 @@ def observe_linear(t, y, out, handle, values):
         elif kind == rec.COLUMN_FLOW:
             value = out[layout["column"] + i]
         elif kind == rec.SPOOL_FLOW:
-            for e in range(4):
+            for e in range(probe["count"]):
                 value += tables.floats[probe["weights"] + e] * out[layout["valve"] + i + e]
+        elif kind == rec.SCHEDULE_VALUE:
+            value = schedule_value(tables, i, t)
         values[k] = probe["scale"] * value + probe["offset"]
 
 

@@ -73,7 +73,9 @@ class BlockCouplings:
             ends = (model.sets[link[end]] for end in ("from_node", "to_node"))
             return unique_states(*ends, model.opening_states(link))
         if kind == rec.DEVICE_VALUE:
-            device = model.devices[i]
+            device, lowering = model.devices[i], model.lowerings[i]
+            if lowering.quantities[row["side"]] in lowering.states:
+                return model.device_states(device)
             ends = model.valves[device["valve"]] if device["valve"] >= 0 else None
             nodes = [device["node"]] if ends is None else [device["node"], ends["from_node"], ends["to_node"]]
             opening = unique_states() if ends is None else model.opening_states(ends)
@@ -93,6 +95,7 @@ class BlockCouplings:
             read = [self.own(k), self.schedule(row["setpoint"]), *(self.read(code) for code in self.inputs(k))]
             yield pairs_of(self.own(k), unique_states(*read))
         tables, network = self.tables, {*self.tables.valves["schedule"], *self.tables.nodes["schedule"]}
+        network |= {*tables.valves["command"]}
         inputs = tables.network_inputs
         network |= {*inputs["index"][inputs["kind"] == rec.SCHEDULE_INPUT], *tables.network_switches["schedule"]}
         network |= {*tables.devices["schedule"], *tables.braces["schedule"], *tables.controls["setpoint"]}

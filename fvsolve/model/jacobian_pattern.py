@@ -147,12 +147,11 @@ class Couplings:
             return self.blocks.schedule(link["schedule"])
         device = self.devices[link["device"]]
         _, part, rows = self.parts[link["device"]]
-        shaft, network = rows.turns_with(part), self.network
-        turned = (
-            unique_states() if shaft is None else self.network_states(network.columns_of_rows[network.node_row(shaft)])
-        )
-        schedules = self.blocks.schedule(link["schedule"], device["schedule"])
-        return unique_states(self.device_states(device), schedules, turned)
+        shaft, network, turned = rows.turns_with(part), self.network, unique_states()
+        if shaft is not None:
+            turned = self.network_states(network.columns_of_rows[network.node_row(shaft)])
+        own = device["schedule"] if rows.follows_at_once else -1
+        return unique_states(self.device_states(device), self.blocks.schedule(link["schedule"], own), turned)
 
     def places(self, row, order: int) -> np.ndarray:
         """States of the positions (`order` 0) or velocities (1) of the masses or bodies that a row joins."""

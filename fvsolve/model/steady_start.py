@@ -261,7 +261,11 @@ class SteadyStart:
         """Conductance of valve k at the start [kg2/s2/Pa]; if a device controls it, it is fully open or shut."""
         row = self.valves[k]
         if row["device"] >= 0:
-            return 0.0 if k in self.shut else float(row["conductance"])
+            if k in self.shut:
+                return 0.0
+            _, part, device = self.draft.devices[row["device"]]
+            opening = device.opening_at_start(self, part, self.draft.device_table[row["device"]], k)
+            return float(row["conductance"]) * opening * opening
         opening = self.schedule_value(row["schedule"])
         if row["characteristic"] == 0:  # as `conductance_of`, which needs all tables
             return float(row["conductance"]) * opening * opening

@@ -16,9 +16,10 @@ from fvsolve.parts.pipe.pipe_wall import Wall
 from fvsolve.parts.plugins import declare_installed
 from fvsolve.parts.rigid_column import RigidColumn
 from fvsolve.parts.schedule import Schedule
+from fvsolve.parts.spool_valve.part import SpoolValve
 from fvsolve.parts.tank import AreaTable, Tank
 from fvsolve.parts.translational import Damper, EndStop, Force, Frame, Mass, Spring
-from fvsolve.parts.valve import EDGES, Characteristic, Orifice, SpoolValve, Valve
+from fvsolve.parts.valve import Characteristic, Orifice, Valve
 
 package = Path(__file__).parents[1]
 for pattern in ("parts/[a-z]*.py", "parts/*/part.py", "basins/*/part.py"):  # the last declares types of basins
@@ -30,7 +31,7 @@ declare_installed()
 KINDS = {"nodes": Node.kinds, "links": Link.kinds}
 
 __all__ = [
-    "EDGES", "KINDS", "AreaTable", "Basin", "Chamber", "Characteristic", "Cylinder", "Damper", "EndStop", "Force",
+    "KINDS", "AreaTable", "Basin", "Chamber", "Characteristic", "Cylinder", "Damper", "EndStop", "Force",
     "Frame", "Friction", "Inflow", "Junction", "Leak", "Link", "Mass", "Node", "Orifice", "Pipe", "Reservoir",
     "RigidColumn", "Scalar", "Schedule", "SpoolValve", "Spring", "Tank", "Torque", "Valve", "Wall",
 ]  # fmt: skip

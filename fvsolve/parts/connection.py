@@ -64,8 +64,8 @@ class Throat(TwoPort):
     area: float | None
     laminar_reynolds: float | None = None
 
-    def flow_area(self) -> float:
-        """Area of the throat [m2], divided by the square root of the loss coefficient `loss_in`."""
+    def flow_area(self, density: float = 1000.0) -> float:
+        """Area of the throat [m2], divided by the square root of the loss coefficient `loss_in`, at any density."""
         return self.throat_area / math.sqrt(self.size.loss_in)
 
     @property

@@ -165,9 +165,10 @@ class Program:
             a, b = (a, middle) if ahead else (middle, b)
         return bool(self.kinks and change > 0.0 and abs(self.value(b) - self.value(a)) > 0.1 * change)
 
-    def positive_part(self, side: int) -> Program:
-        """Formula of the positive part of side * value, side 1 or -1."""
-        return Program(f"max(0, {side}*({self.scale!r}*({self.text}) + {self.offset!r}))", self.names)
+    def positive_part(self, scale: float, offset: float) -> Program:
+        """Formula of the positive part of scale * value + offset."""
+        value = f"{self.scale!r}*({self.text}) + {self.offset!r}"
+        return Program(f"max(0, {scale!r}*({value}) + {offset!r})", self.names)
 
 
 def is_formula(text: Any) -> bool:

@@ -38,6 +38,11 @@ class Part(Table):
             cls.kind = kind
             cls.kinds[kind] = cls
 
+    @classmethod
+    def variant(cls, given: dict[str, Any]) -> type[Any]:
+        """Class of a part with the given keys: this class, or a subclass with other ports or quantities."""
+        return cls
+
 
 class Node(Part):
     """Place with a single potential.
@@ -69,11 +74,6 @@ class Node(Part):
     scalars: Annotated[
         dict[str, Any], ScalarValues("scalar values of the inflow (reservoir, inflow), or at the start (tank, chamber)")
     ] = {}
-
-    @classmethod
-    def variant(cls, given: dict[str, Any]) -> type[Node]:
-        """Class of a node with the given keys: this class, or a subclass with more quantities."""
-        return cls
 
     @classmethod
     def own_places(cls, given: dict[str, Any]) -> tuple[str, ...] | None:

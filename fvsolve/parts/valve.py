@@ -1,4 +1,4 @@
-"""Valves, orifices and spool valves, and the keys for the size of all restrictions."""
+"""Valves and orifices, and the keys for the size of all restrictions."""
 
 import math
 from dataclasses import dataclass
@@ -7,14 +7,12 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from fvsolve.assembly.lowering import LAMINAR_REYNOLDS, POSITION, Input, Restriction, opening_input
-from fvsolve.kernels import dtypes as rec
-from fvsolve.parts.nodes_and_links import Link, Ports, TwoPort
+from fvsolve.assembly.lowering import LAMINAR_REYNOLDS, Restriction, opening_input
+from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table_model import ListTable, Table, keys_json, read_lists
 from fvsolve.parts.value import (
     NEEDED,
-    SHAPE,
     Choice,
     Number,
     Quantity,
@@ -76,8 +74,12 @@ class CharacteristicValue(Value):
 
 
 class Sized(Table):
-    """Base of restrictions: size by discharge coefficient Cd, loss coefficient K, Kv or Cv."""
+    """Base of restrictions: size by discharge coefficient Cd, loss coefficient K, Kv or Cv.
 
+    sizes : keys that give a size, for messages
+    """
+
+    sizes: ClassVar[str] = "area, diameter, Kv or Cv"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
         ("discharge_coefficient", "loss_coefficient", "Kv", "Cv"),
         ("area", "diameter"),
@@ -123,11 +125,13 @@ class Sized(Table):
         if "area" in given or "diameter" in given:
             return faults
         alone = next((key for key in ("discharge_coefficient", "loss_coefficient") if key in given), None)
-        text = f"{alone} needs area or diameter" if alone else "size is missing; expected area, diameter, Kv or Cv"
+        text = f"{alone} needs area or diameter" if alone else f"size is missing; expected {cls.sizes}"
         return faults + [((), text)]
 
-    def flow_area(self) -> float:
+    def flow_area(self, density: float = 1000.0) -> float:
         """Product Cd A [m2] of discharge coefficient and area at full opening, such that q = Cd A sqrt(2 dp / rho).
+
+        density : density of the fluid [kg/m3], which only a rated flow needs
 
         A loss coefficient K gives A / sqrt(K). Kv gives Kv / 3600 / sqrt(2e5 / 1000); Cv is converted in the same way
         from US gallons per minute and psi, with the density of water at 60 degF.
@@ -199,58 +203,3 @@ class Orifice(Valve, kind="orifice"):
 
 class OrificeRows(ValveRows, kind="orifice"):
     """Conversion to table rows of orifices: the same rows as those of valves."""
-
-
-# From, to, sign of the position at which it opens
-EDGES = ("P", "A", 1), ("P", "B", -1), ("A", "T", -1), ("B", "T", 1)
-
-
-class SpoolValve(Sized, Link, kind="spool-valve"):
-    """Zero-lapped spool valve: edges P-A and B-T open by `position` above 0, edges P-B and A-T by -`position` below 0.
-
-    Each edge is a valve, q = |position| Cd A sqrt(2 |dp| / rho) sign(dp), with flow q and drop dp (docs/course.md, 79).
-    Ports: P, T, A, B; at position 0 there is no flow. Stored energy: none. Dissipated power: dp q [W], summed over the
-    edges.
-    """
-
-    joins: ClassVar[dict[str, str]] = dict.fromkeys(("P", "T", "A", "B"), "hydraulic")
-    quantities: ClassVar[dict[str, str]] = {f"flow_{port}": "flow" for port in ("P", "T", "A", "B")}
-
-    ports: Annotated[dict[str, str], Ports(("P", "T", "A", "B"))]
-    position: Annotated[  # the schedule is divided where it crosses zero
-        Schedule, Scheduled("number", between(-1, 1), "position of the spool, -1 to 1", changes=SHAPE)
-    ]
-
-
-FLOWS = {  # flow into the link at a port: weights of its four edges
-    f"flow_{port}": [float((port == start) - (port == end)) for start, end, _ in EDGES] for port in "PTAB"
-}
-
-
-class SpoolValveRows(Restriction, kind="spool-valve"):
-    """Conversion to table rows of spool valves: four rows for each valve, one for each metering edge.
-
-    The two edges that open on the same side of position zero have one opening schedule.
-    """
-
-    rows, rank = len(EDGES), 1
-
-    def fill(self, draft, name, link, rows) -> None:
-        parts = {side: draft.schedules.add_part(link.position, side) for side in (1, -1)}
-        for (start, end, side), row in zip(EDGES, rows, strict=True):
-            row["from_node"], row["to_node"] = (draft.node_index[link.ports[port]] for port in (start, end))
-            row["schedule"] = parts[side]
-            self.restriction(draft, name, link, row)
-
-    def row_names(self, name) -> list[str]:
-        return [f"{name}.{start}-{end}" for start, end, _ in EDGES]
-
-    def probe(self, draft, name, probe, row) -> None:
-        row["index"], row["kind"] = draft.valve_names.index(name), rec.SPOOL_FLOW
-        row["weights"] = len(draft.floats)
-        draft.floats += FLOWS[probe.quantity]
-
-    def inputs(self, model, name, part):
-        first = model.valve_names.index(name)
-        above, below = (int(model.tables.valves[first + k]["schedule"]) for k in (0, 1))
-        return {"position": Input(POSITION, above, other=below)}

@@ -93,9 +93,7 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
             nodes["head_given"][target.node] = target.sort is HEAD
         else:
             converted = target.scale * converted + target.offset
-        parts = [(target.schedule, converted)]
-        if target.other >= 0:
-            parts = [(target.schedule, max(converted, 0.0)), (target.other, max(-converted, 0.0))]
+        parts = [(target.schedule, converted), *((k, max(0.0, a * converted + b)) for k, a, b in target.parts)]
         for schedule, part in parts:
             schedules[schedule] = (len(pieces) + len(rows), 1)
             rows.append([-np.inf, 0.0, 0.0, part, 0.0, 0.0, 0.0])

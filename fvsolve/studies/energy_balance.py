@@ -24,7 +24,7 @@ from fvsolve.validation import FUNCTION, TABLE, TEXT, validated
 TABLE_ROWS = 1000  # approximate number of rows of the table
 QUADRATURE_TOLERANCE = 1e-3  # allowed quadrature error of the dissipated energy in a step, relative to its total
 LEAST, MOST = 0.1, 8.0  # limits of the factor on the step for that tolerance
-CUT = 1e4  # steps up to this multiple of the spacing of times are rounding
+LEAST_LIMIT = 1e-12  # least limit of the step, relative to the time
 ACCEPTED_CODES = (  # status codes of the loop after an accepted step
     loop_records.BUDGET_SPENT, loop_records.DONE, loop_records.ROWS_FULL, loop_records.FIELD, loop_records.STOPPED,
 )  # fmt: skip
@@ -102,16 +102,16 @@ class EnergyLoop(RunLoop):
         """Limit the next step so that the quadrature error of the dissipated energy stays small.
 
         h : this step [s]; off : quadrature error in this step [J]; lost : dissipated energy so far [J]
-        The error is to stay below a thousandth of `lost`. The limit is 0.1 to 8 times h, also without error control.
+        The error is to stay below a thousandth of `lost`. The limit is 0.1 to 8 times h, also without error control,
+        and at least LEAST_LIMIT times the time: a step between two events may be one rounding error long.
         The error control of states does not cover this error: for states that are parabolas in time, a method of order
-        two is exact, but the integral of the power is not. A step that an event has cut to rounding sets no limit.
+        two is exact, but the integral of the power is not.
         """
-        if h <= CUT * np.spacing(abs(self.t)):
-            return
         grow = MOST
         if off > 0.0:
             grow = min(MOST, 0.9 * (QUADRATURE_TOLERANCE * lost / off) ** (1.0 / self.control["order"]))
-        self.control["step_max"] = min(self.longest, h * max(LEAST, grow))
+        least = LEAST_LIMIT * max(abs(self.t), abs(float(self.control["end"])))
+        self.control["step_max"] = min(self.longest, max(h * max(LEAST, grow), least))
 
     def jump_correction(self, t: float, y: np.ndarray) -> np.ndarray:
         """Correction [J] of the energies of the step from (t, y) for jumps of waves in delay lines within the step.

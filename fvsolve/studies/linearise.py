@@ -205,10 +205,7 @@ def input_value(at: OperatingPoint, name: str, input_: Input) -> float:
         return pressure if input_.sort is PRESSURE else float(model.head(pressure, model.elevation[place]))
     if input_.control >= 0:
         return float(at.outputs[input_.control])
-    value = value_at(model.tables, input_.schedule, at.t, np.inf)
-    if input_.other >= 0:
-        value -= value_at(model.tables, input_.other, at.t, np.inf)
-    return float(value / input_.scale)
+    return float(value_at(model.tables, input_.schedule, at.t, np.inf) / input_.scale)
 
 
 def input_column(at, name, input_, value, size, outputs, steps) -> tuple[np.ndarray, float]:

@@ -459,7 +459,7 @@ def port_flows(case, port: str) -> dict[str, float]:
                 continue
             if link.kind == "pipe":
                 signs[f"links.{name}.flow@{0 if end == 'from' else 1}"] = 1.0 if end == "from" else -1.0
-            elif link.kind == "spool-valve":
+            elif f"flow_{end}" in link.quantities:
                 signs[f"links.{name}.flow_{end}"] = 1.0
             else:
                 signs[f"links.{name}.flow"] = 1.0 if end == "from" else -1.0
