@@ -33,7 +33,10 @@ def network(table: dict[str, Any]) -> Faults:
         yield from ((("links", name, *keys), text) for keys, text in faults)
         joined = [place for _, place, _ in ports if isinstance(place, str)]
         unjoined += len(ports) - len({*joined} & places.keys())
-        joined += [_dict(link).get("heat_to")]
+        sensed = _sensed_places(_dict(link))
+        faults = (fault for one in sensed for fault in _port_faults([one], places, nodes, links, _dict(link)))
+        yield from ((("links", name, *keys), text) for keys, text in faults)
+        joined += [_dict(link).get("heat_to"), *(place for _, place, _ in sensed)]
         ends[name] = [place for place in [*joined, *_owned_places(name, link)] if place in places]
     for group in ("nodes", "links"):
         kinds = [_dict(node).get("type") for node in nodes.values()]
@@ -217,6 +220,17 @@ def _ports(link: dict[str, Any]) -> list[tuple[tuple, Any, str | None]]:
     given, below = (_dict(link.get("ports")), ("ports",)) if "ports" in kind.keys() else (link, ())
     ports = [port for port in kind.joins if port in given or port not in kind.may_lack]
     return [((*below, port), given.get(port), kind.joins[port]) for port in ports]
+
+
+def _sensed_places(link: dict[str, Any]) -> list[tuple[tuple, str, str]]:
+    """List of (key path in the link, name, domain) of the places that a link only senses; entries as of `_ports`."""
+    kind, found = kind_of("links", link), []
+    for key in kind.sensed_keys if kind is not None else ():
+        if isinstance(given := link.get(key), str):
+            found.append(((key,), given, "hydraulic"))
+        elif isinstance(given, (list, tuple)):
+            found += [((key, k), place, "hydraulic") for k, place in enumerate(given) if isinstance(place, str)]
+    return found
 
 
 def _unknown_place(place: str, places: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any]) -> str:

@@ -41,7 +41,7 @@ HOOKS = {  # functions of the law of a part: types of arguments and of the resul
     # Restriction k, conductance g [kg2/s2/Pa], drop [Pa]; denser, wide : see `restrictions.restriction_step`
     "step": ("VTittttb", "tt"),  # out, tables, k, g, m, drop, denser, wide: Newton step, see `kernels.restrictions`
     "slope": ("VTitt", "t"),  # out, tables, k, g, drop: d flow / d drop [kg/s/Pa]
-    "lift": ("VTitttb", "t"),  # out, tables, k, g, drop, denser, wide: d flow / d upstream pressure at constant drop
+    "lift": ("VTitttb", "t"),  # out, tables, k, g, drop, denser, wide: d flow / d lifting pressure at constant drop
     "bends": ("TitV", ""),  # tables, k, drop, g: event functions of a restriction, from the drop alone
     # t, y, tables, device, p' upstream, p' downstream (changes since the start [Pa]), drop, ahead: dx/dt of the lift x
     # and its slope over the drop [1/s/Pa], for a change of the upstream (`ahead`) or of the downstream pressure
