@@ -22,7 +22,9 @@ def classify_nodes(draft) -> None:
     group, sensed = union(len(nodes), pairs), sensed_junctions(draft, inner)
     if sensed:
         refuse_sensed(draft, group, sensed)
-        group = union(len(nodes), pairs + [pair for k, own in sensed.items() for pair in pairs_with(valves[k], own, inner)])
+        group = union(
+            len(nodes), pairs + [pair for k, own in sensed.items() for pair in pairs_with(valves[k], own, inner)]
+        )
     touched: dict[int, list[int]] = {}
     couples = rows_by_group(group, inner, zip(short.tolist(), joins, strict=True), touched)
     touched |= rows_by_group(group, inner, enumerate(valves), touched, sensed)
@@ -57,7 +59,7 @@ def sensed_junctions(draft, inner) -> dict[int, list[int]]:
     """Junctions whose pressures lift a valve at once : row of the valve -> nodes; inner : as for `rows_by_group`."""
     found = {}
     for row in draft.device_table:
-        if row["second"] >= 0 and row["states"] == 0:
+        if row["second"] >= 0 and draft.valve_table["hooks"][row["valve"]] >= 0:
             own = [int(row[column]) for column in ("node", "second") if inner[row[column]]]
             found |= {int(row["valve"]): own} if own else {}
     return found

@@ -153,10 +153,11 @@ class Couplings:
 
     def lifting_nodes(self, link) -> list[int]:
         """Nodes whose pressures open a link at once, besides its ends; empty for links without such a device."""
-        if "device" not in link.dtype.names or link["device"] < 0 or link["hooks"] < 0:
+        if "device" not in link.dtype.names or link["device"] < 0:
             return []
         row = self.devices[link["device"]]
-        return [int(row[column]) for column in ("node", "second") if row["second"] >= 0]
+        at_once = row["second"] >= 0 and row["states"] == 0
+        return [int(row[column]) for column in ("node", "second")] if at_once else []
 
     def places(self, row, order: int) -> np.ndarray:
         """States of the positions (`order` 0) or velocities (1) of the masses or bodies that a row joins."""

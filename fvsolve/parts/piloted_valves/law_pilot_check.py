@@ -30,7 +30,12 @@ def excesses(out, tables, device):
 
     The excess of the pilot is ratio (p_pilot - p_from) - (p_to - p_from + cracking pressure).
     """
-    floats, data, valve, at = tables.floats, device["data"], tables.valves[device["valve"]], tables.layout[0]["pressure"]
+    floats, data, valve, at = (
+        tables.floats,
+        device["data"],
+        tables.valves[device["valve"]],
+        tables.layout[0]["pressure"],
+    )
     before, behind = out[at + valve["from_node"]], out[at + valve["to_node"]]
     drop = floats[data + DROP] + (before - behind)
     pilot = floats[data + PILOT_RATIO] * (out[at + device["node"]] - before) + (before - behind)

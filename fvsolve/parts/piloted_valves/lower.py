@@ -2,6 +2,7 @@
 
 from fvsolve.assembly.lowering import Device, opening_of
 from fvsolve.errors import Notice
+from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.self_acting import law_disc, law_relief_valve
 from fvsolve.parts.self_acting.law_disc import FREE_BACK, SENSED
 from fvsolve.parts.self_acting.lower import (
@@ -191,9 +192,9 @@ class PilotCheckRows(Device, kind="pilot-check"):
 class ShuttleRows(Device, kind="shuttle"):
     """Conversion to table rows of shuttle valves: two rows for each valve, from A to out and from B to out."""
 
-    rows, law, events_only = 2, law_shuttle, True
+    rows, law = 2, law_shuttle
     quantities = ("flow_A", "flow_B", "flow_out", "position")
-    events = ("switches to B", "switches to A")
+    events = ("is at A", "leaves A", "is at B", "leaves B")
     remedy = "give ports A and B chambers, so that its flow does not change their pressures at once"
 
     def fill(self, draft, name, link, rows) -> None:
@@ -208,17 +209,21 @@ class ShuttleRows(Device, kind="shuttle"):
     def numbers(self, draft, name, part) -> list[float]:
         first = draft.valve_names.index(name)
         draft.valve_table["device"][first + 1] = draft.valve_table["device"][first]
-        return [0.0]
+        inner = draft.node_table["kind"][[draft.node_index[part.ports[port]] for port in "AB"]] == rec.JUNCTION
+        return [0.0, float(not inner.any())]
+
+    def sensed(self, part):
+        return (part.ports["A"], -1.0), (part.ports["B"], 1.0)
 
     def difference(self, start, row) -> float:
-        """Pressure at A minus that at B [Pa]."""
+        """Pressure at B minus that at A [Pa]."""
         first = int(row["valve"])
         a, b = (start.pressure(int(start.valves[k]["from_node"])) for k in (first, first + 1))
-        return a - b
+        return b - a
 
     def revise_state(self, start, part, row) -> bool:
         first = int(row["valve"])
-        shut = first if self.difference(start, row) < -law_shuttle.PRESSURE_MARGIN else first + 1
+        shut = first if self.difference(start, row) > law_shuttle.BAND else first + 1
         before, start.shut = start.shut, (start.shut - {first, first + 1}) | {shut}
         return start.shut != before
 

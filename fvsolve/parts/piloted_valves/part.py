@@ -92,7 +92,8 @@ class PressureCompensator(Disc, Sized, TwoPort, kind="pressure-compensator"):
 
     senses: Annotated[tuple[str, str], SensedPair("places before and behind the metering orifice, only sensed")]
     set_drop: Annotated[
-        float, Quantity("pressure_drop", positive, "drop between the sensed places at which it begins to shut [Pa]", DROPS)
+        float,
+        Quantity("pressure_drop", positive, "drop between the sensed places at which it begins to shut [Pa]", DROPS),
     ]
     overpressure: Annotated[float | None, Quantity(
         "pressure_drop", positive, f"drop above `set_drop` that shuts it [Pa]; {SHARE} set_drop if left out", DROPS,

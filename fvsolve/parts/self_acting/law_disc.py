@@ -182,5 +182,7 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Lift of the disc, 0 to 1."""
+    """Lift of the disc, 0 to 1; 1 while a reversed flow passes the full opening."""
+    if device["mode"] == FREE_BACK and tables.armed[device["event"] + 6] > 0.0:
+        return 1.0
     return min(max(disc_lift(y, tables, device), 0.0), 1.0)

@@ -36,7 +36,9 @@ def set(t, y, out, tables, device):
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Lift of the valve, 0 to 1."""
+    """Lift of the valve, 0 to 1; 1 while a reversed flow passes the full opening."""
+    if device["mode"] == FREE_BACK and tables.armed[device["event"] + 2] > 0.0:
+        return 1.0
     return min(max(pressure_lift(tables, out, device["valve"]), 0.0), 1.0)
 
 
