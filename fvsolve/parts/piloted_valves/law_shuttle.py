@@ -2,8 +2,8 @@
 
 Its position x is (p_B - p_A) / BAND between 0, where A alone is open, and 1, where B alone is open. Between them both
 share the opening, 1 - x and x, so that it does not switch without end where its own flow lowers the higher pressure.
-Where a junction is at A or B, the nodes depend on x at once, and A alone is open until x reaches 1. Flags: armed[event],
-A alone; armed[event + 2], B alone. They change on accepted states only.
+Where a junction is at A or B, the nodes depend on x at once, and A alone is open until x reaches 1. Flags:
+armed[event], A alone; armed[event + 2], B alone. They change on accepted states only.
 """
 
 from fvsolve.jit import njit

@@ -3,7 +3,7 @@
 from fvsolve.assembly.lowering import Device, opening_of
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
-from fvsolve.parts.self_acting import law_disc, law_relief_valve
+from fvsolve.parts.self_acting import law_relief_valve
 from fvsolve.parts.self_acting.law_disc import FREE_BACK, SENSED
 from fvsolve.parts.self_acting.lower import (
     LIFTING,
@@ -45,8 +45,8 @@ class PilotedDisc(ReliefDisc, kind=""):
         ends = {int(valve[end]) for end in ("from_node", "to_node")}
         for column, row in zip(draft.column_names, draft.column_table, strict=True):
             if ends & {int(row[end]) for end in ("from_node", "to_node")}:
-                text = (f"{name}: joins the rigid column {column}: its lift and flow are not reliable near its seat; make "
-                        "the column a pipe, or put a chamber between them")  # fmt: skip
+                text = (f"{name}: joins the rigid column {column}: its lift and flow are not reliable near its seat; "
+                        "make the column a pipe, or put a chamber between them")  # fmt: skip
                 draft.warnings.append(Notice("range", f"links.{name}", text))
 
 

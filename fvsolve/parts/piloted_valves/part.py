@@ -18,8 +18,8 @@ class Counterbalance(ReliefValve, kind="counterbalance"):
     """Counterbalance valve, q = x Cd A sqrt(2 dp / rho) with flow q, drop dp and lift x between 0 and 1.
 
     x = (p_from + pilot_ratio p_pilot - set_pressure) / overpressure, in gauge pressures; reverse flow, from `to` to
-    `from`, passes the full size (x = 1). The lift follows the pressures at once, or with the dynamics of a disc that has
-    a time_constant or a natural_frequency. Ports: from, to. Stored energy: none, that of the disc is neglected.
+    `from`, passes the full size (x = 1). The lift follows the pressures at once, or with the dynamics of a disc that
+    has a time_constant or a natural_frequency. Ports: from, to. Stored energy: none, that of the disc is neglected.
     Dissipated power: dp q [W].
     """
 
@@ -84,7 +84,8 @@ class PressureCompensator(Disc, Sized, TwoPort, kind="pressure-compensator"):
 
     x = 1 - (p_before - p_behind - set_drop) / overpressure, between 0 and 1, so that it keeps the drop between the
     sensed places near set_drop. The opening follows at once, or with the dynamics of a disc that has a time_constant or
-    a natural_frequency. Ports: from, to. Stored energy: none, that of the disc is neglected. Dissipated power: dp q [W].
+    a natural_frequency. Ports: from, to. Stored energy: none, that of the spool is neglected. Dissipated power:
+    dp q [W].
     """
 
     sensed_keys: ClassVar[tuple[str, ...]] = ("senses",)
