@@ -34,8 +34,9 @@ def network(table: dict[str, Any]) -> Faults:
         joined = [place for _, place, _ in ports if isinstance(place, str)]
         unjoined += len(ports) - len({*joined} & places.keys())
         sensed = _sensed_places(_dict(link))
-        faults = (fault for one in sensed for fault in _port_faults([one], places, nodes, links, _dict(link)))
+        faults = (fault for entry in sensed for fault in _port_faults([entry], places, nodes, links, _dict(link)))
         yield from ((("links", name, *keys), text) for keys, text in faults)
+        unjoined += sum(place not in places for _, place, _ in sensed)
         joined += [_dict(link).get("heat_to"), *(place for _, place, _ in sensed)]
         ends[name] = [place for place in [*joined, *_owned_places(name, link)] if place in places]
     for group in ("nodes", "links"):

@@ -72,7 +72,7 @@ class SensedPair(Value):
     schema: ClassVar[dict[str, Any]] = {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
 
     def read(self, given: Any, setting: ReadContext) -> tuple[str, str]:
-        if not isinstance(given, (list, tuple)) or len(given) != 2 or not all(isinstance(one, str) for one in given):
+        if not isinstance(given, (list, tuple)) or len(given) != 2 or not all(isinstance(name, str) for name in given):
             raise ValueError(f"{show(given)} is not a list of two places; expected {self.takes}, names in quotes")
         if given[0] == given[1]:
             raise ValueError(f"{show(given[0])} is named twice, so the drop is always 0; expected two places")
