@@ -27,8 +27,8 @@ class Edge:
     flow : fixed mass flow, or first value of the iteration [kg/s]
     shut : True for a link without flow; potentials of nodes behind it may be estimated from its other side
     drop : function of the flow [kg/s] that gives the potential drop [Pa] of an edge with a fixed flow; None if unknown
-    sensed_node : node with potential P on which the flow depends, or -1. With a node, `row` has the third argument P
-        and the fourth result c, and the equation has the further term -c dP on its left side.
+    sensed_nodes : nodes with potentials P on which the flow depends. Each adds an argument P and a result c to `row`,
+        and the equation has the further term -c dP on its left side.
     held_potential : (node, potential [Pa] that the flow maintains there), whose equation replaces `row`; or None
     drives : True if the edge drives flow between equal potentials
     """
@@ -39,7 +39,7 @@ class Edge:
     flow: float = 0.0
     shut: bool = False
     drop: Callable[[float], float] | None = None
-    sensed_node: int = -1
+    sensed_nodes: tuple[int, ...] = ()
     held_potential: tuple[int, float] | None = None
     drives: bool = False
 
@@ -240,8 +240,8 @@ def _columns(column, e, edge) -> tuple[int, ...]:
     if edge.held_potential is not None:
         return (column["node", edge.held_potential[0]],)
     flow = column.get(("flow", e), -1)
-    sensed = -1 if flow < 0 else column.get(("node", edge.sensed_node), -1)
-    return sensed, flow, column.get(("node", edge.i), -1), column.get(("node", edge.j), -1)
+    sensed = (-1 if flow < 0 else column.get(("node", i), -1) for i in edge.sensed_nodes)
+    return *sensed, flow, column.get(("node", edge.i), -1), column.get(("node", edge.j), -1)
 
 
 def _edge_row(values, columns, e, edge, result, scale) -> float:
@@ -253,14 +253,11 @@ def _edge_row(values, columns, e, edge, result, scale) -> float:
         values.append(1.0)
         return (edge.held_potential[1] - result.potential[edge.held_potential[0]]) / scale[0]
     flow, drop = result.flow[e], result.potential[edge.i] - result.potential[edge.j]
-    sensed, own, start, end = columns
+    *sensed, own, start, end = columns
     if own >= 0:
-        if edge.sensed_node < 0:
-            alpha, beta, gamma = edge.row(flow, drop)
-        else:
-            alpha, beta, gamma, lift = edge.row(flow, drop, result.potential[edge.sensed_node])
-            if sensed >= 0:
-                values.append(-lift)
+        potentials = (result.potential[i] for i in edge.sensed_nodes)
+        alpha, beta, gamma, *lifts = edge.row(flow, drop, *potentials)
+        values += [-lift for lift, at in zip(lifts, sensed, strict=True) if at >= 0]
         values.append(alpha * scale[1] / scale[0])
     else:
         beta, gamma = 1.0, drop - edge.drop(flow)

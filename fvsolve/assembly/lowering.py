@@ -299,6 +299,7 @@ class Device(Restriction):
     remedy: ClassVar[str] = "give the part a time_constant"
     vessel: ClassVar[bool] = False  # True for a node whose pressure it computes
     follows_at_once: bool = True  # False if only the rates of its states depend on its schedule
+    regular: ClassVar[bool] = False  # True if a flow law of its own is laminar near zero drop, see `regularise`
 
     def place(self, draft, name: str, node: Any, row) -> None:
         """Fill the NODE row of a vessel."""
@@ -318,6 +319,10 @@ class Device(Restriction):
     def gate(self, name: str) -> str | None:
         """Name of a further link that the device opens and closes; None for none."""
         return None
+
+    def sensed(self, part: Any) -> tuple[tuple[str, float], ...]:
+        """Places that the part only senses, at most two, each with its weight in the pressure that lifts its valve."""
+        return ()
 
     def row_of(self, model, name: str):
         """DEVICE row of the part `name`."""
@@ -399,7 +404,8 @@ def lower_devices(draft) -> None:
     lowered = [(name, part, lowering_of(type(part)).of(part)) for name, part in parts]
     draft.devices = [(name, part, device) for name, part, device in lowered if device.is_device]
     table = draft.device_table = np.zeros(len(draft.devices), rec.DEVICE)
-    table["valve"] = table["node"] = table["schedule"] = table["y"] = table["row"] = -1
+    for column in ("valve", "node", "second", "schedule", "y", "row"):
+        table[column] = -1
     for k, ((name, part, device), row) in enumerate(zip(draft.devices, table, strict=True)):
         states = device.states_of(draft, name, part)
         row["hooks"], row["mode"], row["states"] = draft.hooks(device), device.mode, len(states)
@@ -414,6 +420,8 @@ def lower_devices(draft) -> None:
         elif name in draft.node_index:
             row["node"] = draft.node_index[name]
             row["row"] = draft.node_table[row["node"]]["row"]
+        for column, (place, weight) in zip(("node", "second"), device.sensed(part), strict=False):
+            row[column], row[f"{column}_weight"] = draft.node_index[place], weight
         if (gate := device.gate(name)) is not None:
             row["valve"] = draft.valve_names.index(gate)
             draft.valve_table["device"][row["valve"]] = k

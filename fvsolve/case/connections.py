@@ -33,10 +33,13 @@ def network(table: dict[str, Any]) -> Faults:
         yield from ((("links", name, *keys), text) for keys, text in faults)
         joined = [place for _, place, _ in ports if isinstance(place, str)]
         unjoined += len(ports) - len({*joined} & places.keys())
-        wrong = [
-            place for place in _dict(_dict(link).get("ports")).values() if isinstance(place, str)
-        ]  # of other kinds
-        joined += [place for place in [*wrong, _dict(link).get("heat_to")] if place not in joined]
+        sensed = _sensed_places(_dict(link))
+        faults = (fault for entry in sensed for fault in _port_faults([entry], places, nodes, links, _dict(link)))
+        yield from ((("links", name, *keys), text) for keys, text in faults)
+        unjoined += sum(place not in places for _, place, _ in sensed)
+        # with ports that the link does not have, such as B of a valve with three
+        more = [*_dict(_dict(link).get("ports")).values(), _dict(link).get("heat_to"), *(p for _, p, _ in sensed)]
+        joined += [place for place in more if isinstance(place, str) and place not in joined]
         ends[name] = [place for place in [*joined, *_owned_places(name, link)] if place in places]
     for group in ("nodes", "links"):
         kinds = [_dict(node).get("type") for node in nodes.values()]
@@ -223,6 +226,17 @@ def _ports(link: dict[str, Any]) -> list[tuple[tuple, Any, str | None]]:
         given, below = (_dict(link.get("ports")), ("ports",)) if "ports" in keys and port not in keys else (link, ())
         if port in given or port not in kind.may_lack:
             found.append(((*below, port), given.get(port), domain))
+    return found
+
+
+def _sensed_places(link: dict[str, Any]) -> list[tuple[tuple, str, str]]:
+    """List of (key path in the link, name, domain) of the places that a link only senses; entries as of `_ports`."""
+    kind, found = kind_of("links", link), []
+    for key in kind.sensed_keys if kind is not None else ():
+        if isinstance(given := link.get(key), str):
+            found.append(((key,), given, "hydraulic"))
+        elif isinstance(given, (list, tuple)):
+            found += [((key, k), place, "hydraulic") for k, place in enumerate(given) if isinstance(place, str)]
     return found
 
 

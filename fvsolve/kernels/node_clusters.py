@@ -33,6 +33,7 @@ from fvsolve.kernels.isolated_nodes import check_demand, find_connected, inner_r
 from fvsolve.kernels.restrictions import (
     conductance,
     has_lifted_backflow,
+    is_sensing,
     restriction_lift,
     restriction_step,
     valve_driving_pressure,
@@ -108,6 +109,33 @@ def add_valve(i, j, m, a, s, lift, n, matrix, right):
 
 
 @njit
+def add_sensed(cluster, tables, k, i, j, lift, n, matrix):
+    """Add the change of the flow of valve k by the pressures that its device senses to the linear equations.
+
+    i, j : numbers of its end nodes in the cluster, -1 for a known pressure
+    lift : derivative of the flow with respect to the lifting pressure at constant drop [kg/s/Pa]
+    n, matrix : as for `add_valve`; places outside the cluster have known pressures
+    """
+    device = tables.devices[tables.valves[k]["device"]]
+    for node, weight in ((device["node"], device["node_weight"]), (device["second"], device["second_weight"])):
+        row = row_in_cluster(cluster, tables, node) if node >= 0 else -1
+        if row >= 0 and i >= 0:
+            matrix[n * i + row] += weight * lift
+        if row >= 0 and j >= 0:
+            matrix[n * j + row] -= weight * lift
+
+
+@njit
+def sensed_step(cluster, tables, k, right):
+    """Step of the lifting pressure [Pa] of valve k, by the steps `right` of the pressures in a cluster."""
+    device, step = tables.devices[tables.valves[k]["device"]], 0.0
+    for node, weight in ((device["node"], device["node_weight"]), (device["second"], device["second_weight"])):
+        row = row_in_cluster(cluster, tables, node) if node >= 0 else -1
+        step += weight * right[row] if row >= 0 else 0.0
+    return step
+
+
+@njit
 def add_couplings(cluster, tables, out, n, matrix, right):
     """Add the instantaneous flow between the ends of short delay lines to the equations of a cluster of n nodes.
 
@@ -177,7 +205,11 @@ def _assemble(cluster, tables, out, g, m, c, connected, slope, wide, work):
             drop, denser = DRIVING(tables, out, k)
             a[e], s[e] = restriction_step(tables, out, k, g[e], m[e], drop, denser, wide)
             lift[e] = restriction_lift(tables, out, k, g[e], drop, denser, wide)
-        add_valve(i, j, m[e], a[e], s[e], lift[e], n, matrix, right)
+        upstream = lift[e]
+        if upstream != 0.0 and is_sensing(tables, k):
+            add_sensed(cluster, tables, k, i, j, upstream, n, matrix)
+            upstream = 0.0
+        add_valve(i, j, m[e], a[e], s[e], upstream, n, matrix, right)
     add_couplings(cluster, tables, out, n, matrix, right)
     for i in range(n):
         if connected[i] == 0.0:
@@ -231,10 +263,12 @@ def apply_step(cluster, tables, out, m, a, s, lift, right):
         out[layout["pressure"] + node] += right[i]
         most = max(most, abs(right[i]) / (BAR + abs(nodes[node]["pressure"] + out[layout["pressure"] + node])))
     for e in range(m.size):
-        valve = valves[integers[cluster["first_valve"] + e]]
+        k = integers[cluster["first_valve"] + e]
+        valve = valves[k]
         i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
         rise = right[i] if i >= 0 else 0.0
-        step = a[e] + s[e] * (rise - (right[j] if j >= 0 else 0.0)) + lift[e] * rise
+        lifting = sensed_step(cluster, tables, k, right) if lift[e] != 0.0 and is_sensing(tables, k) else rise
+        step = a[e] + s[e] * (rise - (right[j] if j >= 0 else 0.0)) + lift[e] * lifting
         m[e] += step
         scale = max(scale, abs(m[e]), sqrt(valve["conductance"]))
         p = nodes[valve["from_node"]]["pressure"] + out[layout["pressure"] + valve["from_node"]]
@@ -384,6 +418,10 @@ def prepare_cluster(cluster, tables, out, g, m):
         unchanged = unchanged and g[e] == valve["open"] and out[layout["drive"] + k] == valve["drive"]
         for i in (valve["from_node"], valve["to_node"]):
             unchanged = unchanged and out[layout["pressure"] + i] == 0.0
+        if valve["hooks"] >= 0 and is_sensing(tables, k):
+            device = tables.devices[valve["device"]]
+            for i in (device["node"], device["second"]):
+                unchanged = unchanged and (i < 0 or out[layout["pressure"] + i] == 0.0)
     for k in range(cluster["couples"]):
         pipe = tables.pipes[tables.delays[integers[cluster["first_couple"] + k]]["pipe"]]
         for i in (pipe["from_node"], pipe["to_node"]):

@@ -326,13 +326,21 @@ def is_lifted(tables, k):
 
 @njit
 def restriction_lift(tables, out, k, g, drop, denser, wide):
-    """Derivative of the flow of restriction k with respect to its upstream pressure at constant drop [kg/s/Pa].
+    """Derivative of the flow of restriction k with respect to its lifting pressure at constant drop [kg/s/Pa].
 
-    It is 0 if no pressure lifts the restriction. Arguments as for `restriction_step`.
+    The lifting pressure is the upstream pressure, or the weighted sum of those that its device senses (`is_sensing`).
+    The result is 0 if no pressure lifts the restriction. Arguments as for `restriction_step`.
     """
     if not is_lifted(tables, k):
         return 0.0
     return call_lift(tables.hooks[tables.valves[k]["hooks"], LIFT], out, tables, k, g, drop, denser, wide)
+
+
+@njit(forceinline=True)
+def is_sensing(tables, k):
+    """True if the device of restriction k senses pressures at given nodes."""
+    device = tables.valves[k]["device"]
+    return device >= 0 and tables.devices[device]["node"] >= 0
 
 
 @njit

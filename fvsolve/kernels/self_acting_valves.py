@@ -46,6 +46,24 @@ def loop_rate(out, tables, k, i, speed):
 
 
 @njit
+def sensed_pressure(tables, out, device):
+    """Weighted sum of the pressure changes since the start at the nodes that a device senses [Pa]."""
+    at = tables.layout[0]["pressure"]
+    total = device["node_weight"] * out[at + device["node"]]
+    return total + (device["second_weight"] * out[at + device["second"]] if device["second"] >= 0 else 0.0)
+
+
+@njit
+def sensed_rate(out, tables, device, speed):
+    """Sum of `loop_rate` [1/s] of the valve of a device over the nodes that it senses, by their weights."""
+    k = device["valve"]
+    rate = abs(device["node_weight"]) * loop_rate(out, tables, k, device["node"], speed)
+    if device["second"] >= 0:
+        rate += abs(device["second_weight"]) * loop_rate(out, tables, k, device["second"], speed)
+    return rate
+
+
+@njit
 def controls_column(tables, k):
     """True if restriction k is near its seat and controls the rigid column of which it is the only outlet."""
     if tables.valves[k]["device"] < 0:

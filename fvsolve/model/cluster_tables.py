@@ -18,11 +18,16 @@ def classify_nodes(draft) -> None:
     nodes, valves = draft.node_table, draft.valve_table
     inner, short = nodes["kind"] == rec.JUNCTION, np.flatnonzero(draft.delay_table["now"] > 0.0)
     joins = [draft.pipe_table[draft.delay_table["pipe"][k]] for k in short]
-    group = union(len(nodes), [(v["from_node"], v["to_node"]) for v in (*valves, *joins)
-                               if inner[v["from_node"]] and inner[v["to_node"]]])  # fmt: skip
+    pairs = [(v["from_node"], v["to_node"]) for v in (*valves, *joins) if inner[v["from_node"]] and inner[v["to_node"]]]
+    group, sensed = union(len(nodes), pairs), sensed_junctions(draft, inner)
+    if sensed:
+        refuse_sensed(draft, group, sensed)
+        group = union(
+            len(nodes), pairs + [pair for k, own in sensed.items() for pair in pairs_with(valves[k], own, inner)]
+        )
     touched: dict[int, list[int]] = {}
     couples = rows_by_group(group, inner, zip(short.tolist(), joins, strict=True), touched)
-    touched |= rows_by_group(group, inner, enumerate(valves), touched)
+    touched |= rows_by_group(group, inner, enumerate(valves), touched, sensed)
     mark_event_ends(draft, group)
     members = {root: [i for i in range(len(nodes)) if group[i] == root and inner[i]] for root in touched}
     nodes["solve"], clusters = rec.ALONE, []
@@ -31,6 +36,7 @@ def classify_nodes(draft) -> None:
         if not has_single_root(draft, members[root], ks, own):
             clusters.append(add_cluster(draft, members[root], ks, own))
     fixed = ~inner[valves["from_node"]] & ~inner[valves["to_node"]]
+    fixed[list(sensed)] = False
     for k in np.flatnonzero(fixed & ~has_closed_root(valves)):  # clusters without nodes
         valves["solve"][k] = rec.CLUSTER
         clusters.append(add_cluster(draft, [], [int(k)], []))
@@ -49,15 +55,52 @@ def classify_nodes(draft) -> None:
                        "make it a chamber, or make one of its links a pipe")  # fmt: skip
 
 
-def rows_by_group(group, inner, rows, touched: dict[int, list[int]]) -> dict[int, list[int]]:
+def sensed_junctions(draft, inner) -> dict[int, list[int]]:
+    """Junctions whose pressures lift a valve at once : row of the valve -> nodes; inner : as for `rows_by_group`."""
+    found = {}
+    for row in draft.device_table:
+        if row["second"] >= 0 and draft.valve_table["hooks"][row["valve"]] >= 0:
+            own = [int(row[column]) for column in ("node", "second") if inner[row[column]]]
+            found |= {int(row["valve"]): own} if own else {}
+    return found
+
+
+def pairs_with(valve, own: list[int], inner) -> list[tuple[int, int]]:
+    """Pairs that join the junctions `own`, which a valve senses, to each other and to its end nodes."""
+    places = [*own, *(int(valve[end]) for end in ("from_node", "to_node") if inner[valve[end]])]
+    return [(places[0], place) for place in places[1:]]
+
+
+def refuse_sensed(draft, group, sensed: dict[int, list[int]]) -> None:
+    """Add a fault for each valve that follows at once a junction whose pressure its own flow changes.
+
+    At its ends the pressure falls as the valve opens; elsewhere the flow may have several solutions, or none. group :
+    label of the group of nodes that valves join; sensed : as from `sensed_junctions`
+    """
+    nodes, names = draft.node_table, list(draft.case.places)
+    for k, own in sensed.items():
+        valve, row = draft.valve_table[k], draft.device_table[draft.valve_table[k]["device"]]
+        ends = [int(valve[end]) for end in ("from_node", "to_node")]
+        touched = {group[i] for i in ends if nodes["kind"][i] == rec.JUNCTION}
+        for i in own:
+            weight = sum(float(row[f"{column}_weight"]) for column in ("node", "second") if row[column] == i)
+            steady = (i == ends[0] and weight > 0.0) or (i == ends[1] and weight < 0.0)
+            if not steady and group[i] in touched:
+                name = draft.valve_names[k]
+                draft.fault(f"links.{name}", f"senses {names[i]}, a junction whose pressure follows the flow of this "
+                            f"valve at once; give the valve a time_constant, or make {names[i]} a chamber")  # fmt: skip
+
+
+def rows_by_group(group, inner, rows, touched: dict[int, list[int]], further=None) -> dict[int, list[int]]:
     """Numbers of the rows that end at inner nodes of each group : label of the group -> numbers.
 
     group, inner : label of each node, and True for a node without storage; rows : pairs of number and row
     touched : gets an empty list for each group that it lacks, so that groups keep the order of their first row
+    further : number of a row -> inner nodes that count as its ends too
     """
     found: dict[int, list[int]] = {root: [] for root in touched}
     for k, row in rows:
-        for i in {int(row["from_node"]), int(row["to_node"])}:
+        for i in {int(row["from_node"]), int(row["to_node"]), *(further or {}).get(k, ())}:
             if inner[i]:
                 touched.setdefault(group[i], [])
                 own = found.setdefault(group[i], [])
@@ -98,8 +141,8 @@ def mark_event_ends(draft, group) -> None:
     for v in valves:
         if v["hooks"] >= 0 or (v["device"] >= 0 and draft.devices[v["device"]][2].events):
             acting |= {int(v["from_node"]), int(v["to_node"])}
-    acting |= {int(row["node"]) for row, (_, _, device) in zip(draft.device_table, draft.devices, strict=True)
-               if device.events}  # fmt: skip
+    acting |= {int(row[column]) for row, (_, _, device) in zip(draft.device_table, draft.devices, strict=True)
+               for column in ("node", "second") if device.events}  # fmt: skip
     roots = {group[i] for i in acting if i >= 0 and inner[i]}
     for row in draft.delay_table:
         pipe = draft.pipe_table[row["pipe"]]
@@ -138,7 +181,7 @@ def has_closed_root(valves) -> np.ndarray:
 def store_gates(draft) -> None:
     """Store, for each node that only valves and rigid columns join, these valves and the number of columns.
 
-    Nodes with a demand, and nodes with a valve whose device senses a pressure, are left out.
+    Nodes with a demand, and nodes with the valve of a vessel, are left out.
     """
     nodes, valves, columns = draft.node_table, draft.valve_table, draft.column_table
     nodes["gates"], places = -1, list(draft.case.places.values())
@@ -146,7 +189,8 @@ def store_gates(draft) -> None:
     for i in np.flatnonzero(bare):
         joined = [k for k, v in enumerate(valves) if i in (v["from_node"], v["to_node"])]
         devices = [k for k in valves["device"][joined] if k >= 0 and not draft.devices[k][2].vessel]
-        if any(draft.device_table["node"][devices] >= 0):  # the device of a valve senses a pressure
+        own = [k for k in devices if not draft.devices[k][2].sensed(draft.devices[k][1])]
+        if any(draft.device_table["node"][own] >= 0):
             continue
         column_count, place = sum(i in (c["from_node"], c["to_node"]) for c in columns), places[i]
         if column_count == 0 or not joined:
@@ -198,13 +242,14 @@ def regularise(draft, ks) -> None:
     """Make valves without an adjacent pipe laminar below `LAMINAR_REYNOLDS`, to bound their slope at zero drop.
 
     They are also laminar below the drop of `tolerated_drop`, and at a bladder accumulator below at least 1 Pa, as its
-    neck stores hardly any mass. Valves with a law of their own or a stated transition are not changed. ks : rows of the
-    valves
+    neck stores hardly any mass. Valves with a law of their own (unless it is `regular`) or a stated transition are not
+    changed. ks : rows of the valves
     """
     places, unseen = list(draft.case.places.values()), tolerated_drop(draft, ks)
     for k in ks:
         row = draft.valve_table[k]
-        if row["transition"] == 0.0 and row["hooks"] < 0:
+        regular = row["device"] >= 0 and draft.devices[row["device"]][2].regular
+        if row["transition"] == 0.0 and (row["hooks"] < 0 or regular):
             name = draft.valve_names[k]
             link = draft.case.conduits[name]
             neck = any(getattr(places[row[end]], "precharge", None) is not None for end in ("from_node", "to_node"))

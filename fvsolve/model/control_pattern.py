@@ -77,7 +77,8 @@ class BlockCouplings:
             if lowering.quantities[row["side"]] in lowering.states:
                 return model.device_states(device)
             ends = model.valves[device["valve"]] if device["valve"] >= 0 else None
-            nodes = [device["node"]] if ends is None else [device["node"], ends["from_node"], ends["to_node"]]
+            nodes = [device["node"], device["second"]]
+            nodes += [] if ends is None else [ends["from_node"], ends["to_node"]]
             opening = unique_states() if ends is None else model.opening_states(ends)
             return unique_states(model.device_states(device), opening, *(model.sets[n] for n in nodes if n >= 0))
         if kind in (rec.PIPE_PRESSURE, rec.PIPE_FLOW) and model.pipes[i]["delay"] < 0:

@@ -61,6 +61,7 @@ class Couplings:
         self.patches = {int(row["node"]): row for row in tables.patches}
         self.network, self.inputs, self.switches = model.network, tables.network_inputs, tables.network_switches
         self.blocks = BlockCouplings(self, tables)
+        self.sets: list[np.ndarray] = []
         self.sets = self.pressures()  # for each node, the states that set its pressure
 
     def pairs(self) -> Iterator[Pairs]:
@@ -150,8 +151,18 @@ class Couplings:
         shaft, network, turned = rows.turns_with(part), self.network, unique_states()
         if shaft is not None:
             turned = self.network_states(network.columns_of_rows[network.node_row(shaft)])
+        lifting = [self.sets[i] if self.sets else self.pressure_states(i) for i in self.lifting_nodes(link)]
         own = device["schedule"] if rows.follows_at_once else -1
-        return unique_states(self.device_states(device), self.blocks.schedule(link["schedule"], own), turned)
+        schedules = self.blocks.schedule(link["schedule"], own)
+        return unique_states(self.device_states(device), schedules, turned, *lifting)
+
+    def lifting_nodes(self, link) -> list[int]:
+        """Nodes whose pressures open a link at once, besides its ends; empty for links without such a device."""
+        if "device" not in link.dtype.names or link["device"] < 0:
+            return []
+        row = self.devices[link["device"]]
+        at_once = row["second"] >= 0 and row["states"] == 0
+        return [int(row[column]) for column in ("node", "second")] if at_once else []
 
     def places(self, row, order: int) -> np.ndarray:
         """States of the positions (`order` 0) or velocities (1) of the masses or bodies that a row joins."""
@@ -208,8 +219,9 @@ class Couplings:
 
         In a group of nodes without storage these are the states of all flows into the group.
         """
-        ends = map(ends_of, self.joints())
-        group = union(len(self.nodes), [(i, j) for i, j in ends if self.inner[i] and self.inner[j]])
+        joined_nodes = [(*ends_of(link), *self.lifting_nodes(link)) for link in self.joints()]
+        inner = [[i for i in places if self.inner[i]] for places in joined_nodes]
+        group = union(len(self.nodes), [(i, j) for places in inner for i, j in zip(places, places[1:], strict=False)])
         enter: list[list] = [[] for _ in group]
         for pipe in self.pipes:
             for right, i in enumerate(ends_of(pipe)):
@@ -274,11 +286,11 @@ class Couplings:
     def device_pairs(self) -> Iterator[Pairs]:
         """Yield couplings of the states of each device with each other, and with pressures.
 
-        The pressures are those at its ends and at the node that it senses.
+        The pressures are those at its ends and at the nodes that it senses.
         """
         for row, (_, _, rows) in zip(self.devices, self.parts, strict=True):
             ends = ends_of(self.valves[row["valve"]]) if row["valve"] >= 0 else ()
-            read = [self.sets[i] for i in (*ends, row["node"]) if i >= 0]
+            read = [self.sets[i] for i in (*ends, row["node"], row["second"]) if i >= 0]
             read.append(self.blocks.schedule(row["schedule"], *rows.schedules_of_rates(row, self.valves, self.floats)))
             yield pairs_of(self.device_states(row), unique_states(self.device_states(row), *read))
 

@@ -131,6 +131,7 @@ class Link(Part):
     on_request: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded only by explicit probes
     along: ClassVar[dict[str, str]] = {}  # quantities that also exist at a fraction of the length
     joins: ClassVar[dict[str, str]] = {}  # port -> required domain of its place
+    sensed_keys: ClassVar[tuple[str, ...]] = ()  # keys that name hydraulic places whose pressure it only senses
     in_network: ClassVar[bool] = False  # True if it is an element of a network of rotation, electricity or heat
     network_ports: ClassVar[tuple[str, ...]] = ()  # ports whose places are in such a network; all if `in_network`
     main_quantities: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded where a case has no probes

@@ -28,6 +28,8 @@ MOVING = st.one_of(
     st.fixed_dictionaries({"time_constant": between(0.02, 0.5)}),
     st.fixed_dictionaries({"natural_frequency": between(1.0, 10.0), "damping_ratio": between(0.3, 1.5)}),
 )
+PILOT = {"pilot": st.sampled_from(["up", "a", "b"]), "pilot_ratio": between(0.5, 5.0)}
+SENSES = st.sampled_from([["up", "a"], ["a", "down"], ["b", "down"], ["a", "b"], ["up", "down"]])
 OPENING = st.one_of(st.just(1.0), between(0.1, 1.0), st.builds(ramp, between(0.1, 0.5), between(0.01, 0.4), ONE, NONE))
 HILL = [
     {"opening": 0.3, "unit_speed": [30, 70, 110], "unit_flow": [0.32, 0.3, 0.2], "efficiency": [0.6, 0.8, 0.1]},
@@ -52,7 +54,7 @@ def of(
 def disc(one: dict) -> dict:
     """Table with an overpressure, if the valve has a disc with a lag or a mass, or is a relief valve."""
     moves = "time_constant" in one or "natural_frequency" in one
-    return one | ({"overpressure": 2e4} if moves or one["type"] == "relief-valve" else {})
+    return one | ({"overpressure": 2e4} if moves or one["type"] in ("relief-valve", "counterbalance") else {})
 
 
 LINKS = {
@@ -63,6 +65,13 @@ LINKS = {
     "check-valve": of("check-valve", {}, CRACKING, a=SIZE, b=st.just({}) | MOVING).map(disc)
     | of("check-valve", {"area": between(1e-4, 5e-3), "deceleration": st.just(SLAMS)}, CRACKING),
     "relief-valve": of("relief-valve", {"set_pressure": between(1.5e5, 6e5)}, a=SIZE, b=st.just({}) | MOVING).map(disc),
+    "counterbalance": of(
+        "counterbalance", {"set_pressure": between(3e5, 9e5)} | PILOT, a=SIZE, b=st.just({}) | MOVING
+    ).map(disc),
+    "pilot-check": of("pilot-check", PILOT, CRACKING, a=SIZE),
+    "pressure-compensator": of(
+        "pressure-compensator", {"set_drop": between(2e4, 2e5), "senses": SENSES}, a=SIZE, b=st.just({}) | MOVING
+    ),
     "rupture-disc": of("rupture-disc", {"burst_pressure": between(1.1e5, 1.6e5)}, a=SIZE),
     "surge-anticipating": of(
         "surge-anticipating",
@@ -132,7 +141,7 @@ EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # war
 pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings fail, such as of NaN values
 ELSEWHERE = {
     "basin", "mass", "frame", "body", "cylinder", "damper", "end-stop", "force", "spring", "spool-valve", "torque",
-    "pin", "bushing",
+    "pin", "bushing", "shuttle",
     # of networks of rotation, electricity and heat, in parts/test_networks.py
     "shaft", "housing", "gear", "torsion-spring", "bearing", "clutch", "rack", "terminal", "ground", "voltage-source",
     "current-source", "resistor", "inductor", "capacitor", "switch", "diode", "dc-motor", "heat-capacity", "ambient",

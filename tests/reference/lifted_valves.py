@@ -26,7 +26,8 @@ def stopped(rates, push, start, kinks, t):
     """States at t of y' = rates(t, y, held) with the lift y[1] between stops at 0 and 1, and the times of events.
 
     rates(t, y, held) : list, with the rates of the lift zero while held; push(t, y) : drive of the lift. An optional
-    speed y[2] becomes zero at a stop. The solution is computed piece by piece between kinks and events.
+    speed y[2] becomes zero at a stop. Further states may follow. The solution is computed piece by piece between kinks
+    and events.
     """
     y, now, held = np.array(start, float), t[0], 0
     if y[1] <= 0.0 and push(now, y) <= 0.0:
@@ -45,7 +46,7 @@ def stopped(rates, push, start, kinks, t):
             held = 0 if held else 1 if len(step.t_events[0]) else -1
             if held:
                 y[1] = max(held, 0)
-                y[2:] = 0.0
+                y[2:3] = 0.0
     found[1] = np.clip(found[1], 0.0, 1.0)
     return found, events
 

@@ -3,8 +3,9 @@
 M is the mass flow, G the conductance at full opening, dP the drop, x the lift: 0 on the seat, 1 at the stop. The lift
 follows T dx/dt = target - x or x'' = w^2 (target - x) - 2 zeta w x', with time constant T, or angular frequency w and
 damping ratio zeta. target = (lifting pressure - opening pressure) / span; the lifting pressure is the upstream pressure
-of a relief valve, or the drop across a check valve. The disc rests at its stop (flag armed[event]) and on its seat
-(armed[event + 2]).
+of a relief valve, the drop across a check valve, or a weighted sum of two sensed pressures. The disc rests at its stop
+(flag armed[event]) and on its seat (armed[event + 2]). In mode FREE_BACK reverse flow (armed[event + 6]) passes the
+full opening, independent of the lift.
 
 A disc that alone joins a rigid column controls its flow near the seat (armed[event + 4]): `kernels.self_acting_valves`.
 """
@@ -14,14 +15,23 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import CLOSING, RATE, RATE_UNWANTED
 from fvsolve.kernels.restrictions import head_drop
-from fvsolve.kernels.self_acting_valves import control_events, controls_column, event_pair, loop_rate
+from fvsolve.kernels.self_acting_valves import (
+    control_events,
+    controls_column,
+    event_pair,
+    loop_rate,
+    sensed_pressure,
+    sensed_rate,
+)
 
-RELIEF, CHECK = 0, 1  # modes
+RELIEF, CHECK, SENSED, FREE_BACK = 0, 1, 2, 3  # modes
 # indices into its numbers: lift, target and lifting pressure at the start, then the keys
 LIFT, TARGET, LIFTING_PRESSURE, SPAN, TIME_CONSTANT, ANGULAR_FREQUENCY, DAMPING = 0, 1, 2, 3, 4, 5, 6
 STOP_MARGIN = 1e-10  # drive away from a stop, over the span, at which the disc leaves it; above rounding
 SETTLE_MARGIN = 0.5 * STOP_MARGIN  # share of the span by which it comes to rest earlier than it leaves
 DIRECTION_TIME = 1e-6  # time over 1 / w that its speed is extrapolated for the direction of motion
+ALMOST_SHUT = 1e-6  # lift below which its flow may be rounding
+BACK_MARGIN = 1e-3  # reverse drop that starts reverse flow through a seated disc [Pa]
 SLAM_TIME = 1e-9  # time over T or 1 / w before the seat at which a closing disc counts as seated
 
 
@@ -35,6 +45,8 @@ def disc_lift(y, tables, device):
 def set(t, y, out, tables, device):
     """Write to `out` the conductance G x^2 of the restriction [kg2/s2/Pa]; G : conductance at full opening, x : lift"""
     k, x = device["valve"], min(max(disc_lift(y, tables, device), 0.0), 1.0)
+    if device["mode"] == FREE_BACK and tables.armed[device["event"] + 6] > 0.0:
+        x = 1.0
     out[tables.layout[0]["conductance"] + k] = tables.valves[k]["conductance"] * x * x
 
 
@@ -43,6 +55,8 @@ def disc_drive(y, out, tables, device):
     """Target lift minus lift of the disc at the present pressures [-]."""
     k = device["valve"]
     before = out[tables.layout[0]["pressure"] + tables.valves[k]["from_node"]]
+    if device["mode"] >= SENSED:
+        before = sensed_pressure(tables, out, device)
     return disc_drive_at(y, tables, device, before, head_drop(tables, out, k)[1])
 
 
@@ -50,11 +64,12 @@ def disc_drive(y, out, tables, device):
 def disc_drive_at(y, tables, device, before, drop):
     """Target lift minus lift of the disc [-] at given pressures.
 
-    before : upstream pressure minus that at the start [Pa]; drop : pressure drop across the disc [Pa]
+    before : upstream pressure minus that at the start, or weighted sum of sensed pressures [Pa]
+    drop : pressure drop across the disc [Pa]
     y : state vector; device : row of the disc in the table of devices
     """
     floats, data = tables.floats, device["data"]
-    lifting = before if device["mode"] == RELIEF else drop - floats[data + LIFTING_PRESSURE]
+    lifting = before if device["mode"] != CHECK else drop - floats[data + LIFTING_PRESSURE]
     return (floats[data + TARGET] - floats[data + LIFT]) + lifting / floats[data + SPAN] - y[device["y"]]
 
 
@@ -118,8 +133,11 @@ def disc_rate_limit(y, out, tables, device, own):
     before, behind = tables.valves[k]["from_node"], tables.valves[k]["to_node"]
     if controls_column(tables, k):
         return own
-    rate = own + loop_rate(out, tables, k, before, speed)
-    if device["mode"] != RELIEF:
+    if device["mode"] >= SENSED:
+        rate = own + sensed_rate(out, tables, device, speed)
+    else:
+        rate = own + loop_rate(out, tables, k, before, speed)
+    if device["mode"] == CHECK:
         rate += loop_rate(out, tables, k, behind, speed)
     if nodes[before]["gates"] >= 0 or (nodes[behind]["gates"] >= 0 and device["mode"] != RELIEF):
         rate += 2.0 * speed * abs(head_drop(tables, out, k)[1]) / max(disc_lift(y, tables, device), 1e-300)
@@ -133,7 +151,8 @@ def events(t, y, out, tables, device, g):
     They are the distances of the lift from the stop and from the seat, and from the lift at which the disc stops
     controlling a rigid column, or begins to.
     While the disc rests there, the distance from stop or seat is replaced by the drive away from it, minus STOP_MARGIN.
-    The drive is the target minus the lift on the seat, and its negative at the stop.
+    The drive is the target minus the lift on the seat, and its negative at the stop. In mode FREE_BACK a fourth event
+    function is the flow [kg/s], or for a disc on its seat the drop plus BACK_MARGIN [Pa].
     """
     armed, at, o = tables.armed, device["event"], device["y"]
     x, drive = disc_lift(y, tables, device), disc_drive(y, out, tables, device)
@@ -150,10 +169,20 @@ def events(t, y, out, tables, device, g):
         seat = max(x + SLAM_TIME * min(speed, 0.0), onward[0])
     event_pair(tables, g, at, stop)
     event_pair(tables, g, at + 2, seat)
-    control_events(out, tables, device, g, x, 1.0 if armed[at + 2] > 0.0 else 0.0, lift_rate_slope(tables, device))
+    if device["controls_column"] >= 0:
+        control_events(out, tables, device, g, x, 1.0 if armed[at + 2] > 0.0 else 0.0, lift_rate_slope(tables, device))
+    else:
+        event_pair(tables, g, at + 4, 1.0)
+    if device["mode"] == FREE_BACK:
+        flow = out[tables.layout[0]["valve"] + device["valve"]]
+        if armed[at + 6] == 0.0 and (x <= ALMOST_SHUT or flow == 0.0):
+            flow = head_drop(tables, out, device["valve"])[1] + BACK_MARGIN
+        event_pair(tables, g, at + 6, flow)
 
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Lift of the disc, 0 to 1."""
+    """Lift of the disc, 0 to 1; 1 while a reversed flow passes the full opening."""
+    if device["mode"] == FREE_BACK and tables.armed[device["event"] + 6] > 0.0:
+        return 1.0
     return min(max(disc_lift(y, tables, device), 0.0), 1.0)

@@ -1,8 +1,9 @@
-"""Relief valve whose lift follows the upstream pressure at once.
+"""Valve whose lift follows its lifting pressure at once: the upstream pressure, or a sum of two sensed pressures.
 
 Partly open: M |M| = G x^2 dP with x = (p - set pressure) / span, solved with the nodes; M is the mass flow, G the
-conductance at full opening, x the lift, dP the drop, p the upstream pressure. Flags: armed[event], the valve is shut;
-armed[event + 2], it is fully open. Both change on accepted states only, so that each mode has a smooth law.
+conductance at full opening, x the lift, dP the drop, p the lifting pressure. Flags: armed[event], the valve is shut;
+armed[event + 2], it is fully open. Both change on accepted states only, so that each mode has a smooth law. In mode
+FREE_BACK the valve is also fully open while its flow is reversed.
 """
 
 from math import sqrt
@@ -12,14 +13,18 @@ from fvsolve.kernels.restrictions import (
     LEAST,
     flow_at_drop,
     flow_slope,
+    head_drop,
     is_lifted,
     root_slope,
     root_step,
     transition_of,
 )
-from fvsolve.kernels.self_acting_valves import event_pair
+from fvsolve.kernels.self_acting_valves import event_pair, sensed_pressure
 
+FREE_BACK = 1  # mode
 RELUCTANCE = 1e-10  # margin of lift at events, so that rounding does not open the valve
+ALMOST_SHUT = 1e-6  # lift below which its flow may be rounding
+BACK_MARGIN = 1e-3  # reverse drop that opens a shut valve to reverse flow [Pa]
 
 
 @njit
@@ -31,7 +36,9 @@ def set(t, y, out, tables, device):
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Lift of the valve, 0 to 1."""
+    """Lift of the valve, 0 to 1; 1 while a reversed flow passes the full opening."""
+    if device["mode"] == FREE_BACK and tables.armed[device["event"] + 2] > 0.0:
+        return 1.0
     return min(max(pressure_lift(tables, out, device["valve"]), 0.0), 1.0)
 
 
@@ -41,7 +48,7 @@ def events(t, y, out, tables, device, g):
 
     While the valve is shut, the first is the lift above a small margin.
     Between shut and fully open the valve always becomes partly open first. After a jump, a direct change to the
-    opposite stop might contradict the law of that stop.
+    opposite stop might contradict the law of that stop. In mode FREE_BACK a reversed flow counts as fully open.
     """
     armed, at, x = tables.armed, device["event"], pressure_lift(tables, out, device["valve"])
     left, missing = x, 1.0 - x
@@ -49,8 +56,29 @@ def events(t, y, out, tables, device, g):
         left, missing = x - RELUCTANCE, 1.0
     elif armed[at + 2] > 0.0:
         left, missing = 1.0, 1.0 - RELUCTANCE - x
+    if device["mode"] == FREE_BACK:
+        ahead = forward_flow(tables, out, device, x)
+        if armed[at + 2] == 0.0:
+            left = max(left, -ahead)
+        if armed[at] == 0.0:
+            missing = min(missing, ahead)
     event_pair(tables, g, at, left)
     event_pair(tables, g, at + 2, missing)
+
+
+@njit
+def forward_flow(tables, out, device, x):
+    """Flow through the fully open valve at the present drop, over its flow at a drop of the span [-].
+
+    For a shut valve, or without flow, it is the drop plus BACK_MARGIN, over the span. x : lift
+    """
+    k, span = device["valve"], tables.floats[device["data"] + 1]
+    flow, opening = out[tables.layout[0]["valve"] + k], 1.0 if tables.armed[device["event"] + 2] > 0.0 else x
+    if flow == 0.0 and tables.armed[device["event"] + 2] > 0.0:
+        return 0.0
+    if flow == 0.0 or opening <= ALMOST_SHUT:
+        return (head_drop(tables, out, k)[1] + BACK_MARGIN) / span
+    return flow / (opening * sqrt(tables.valves[k]["conductance"] * span))
 
 
 @njit
@@ -77,12 +105,25 @@ def slope(out, tables, k, g, drop):
         return root_slope(tables, k, g, drop)
     transition = transition_of(tables.valves[k], g)
     x, full = max(pressure_lift(tables, out, k), 0.0), flow_at_drop(g, transition, drop)
-    return x * flow_slope(g, transition, drop) + max(full, 0.0) * lift_rise(tables, k)
+    return x * flow_slope(g, transition, drop) + max(full, 0.0) * end_weight(tables, k) * lift_rise(tables, k)
+
+
+@njit
+def end_weight(tables, k):
+    """Weight of the drop of valve k in its lifting pressure, from the sensed nodes that are its ends; at least 0."""
+    valve, weight = tables.valves[k], 0.0
+    device = tables.devices[valve["device"]]
+    if device["node"] < 0:
+        return 1.0
+    for node, own in ((device["node"], device["node_weight"]), (device["second"], device["second_weight"])):
+        weight += own if node == valve["from_node"] else 0.0
+        weight -= own if node == valve["to_node"] else 0.0
+    return max(weight, 0.0)
 
 
 @njit
 def lift(out, tables, k, g, drop, denser, wide):
-    """Derivative [kg/s/Pa] of the mass flow of valve k by the upstream pressure through its lift, at constant drop.
+    """Derivative [kg/s/Pa] of the mass flow of valve k by its lifting pressure, at constant drop.
 
     Arguments as for `restriction_step`.
     """
@@ -92,15 +133,19 @@ def lift(out, tables, k, g, drop, denser, wide):
 
 @njit
 def pressure_lift(tables, out, k):
-    """Lift x of valve k [-], linear in the upstream pressure and not limited to 0 to 1."""
+    """Lift x of valve k [-], linear in its lifting pressure and not limited to 0 to 1."""
     floats, valve = tables.floats, tables.valves[k]
-    change = out[tables.layout[0]["pressure"] + valve["from_node"]]
+    device = tables.devices[valve["device"]]
+    if device["node"] >= 0:
+        change = sensed_pressure(tables, out, device)
+    else:
+        change = out[tables.layout[0]["pressure"] + valve["from_node"]]
     return floats[valve["data"]] + change / floats[valve["data"] + 1]
 
 
 @njit
 def lift_rise(tables, k):
-    """Derivative of the lift of valve k by the upstream pressure [1/Pa]."""
+    """Derivative of the lift of valve k by its lifting pressure [1/Pa]."""
     return 1.0 / tables.floats[tables.valves[k]["data"] + 1]
 
 
@@ -138,7 +183,7 @@ def lifting_step(tables, out, k, full, g, m, wide):
 
 @njit
 def lifting_slope(tables, out, k, full, wide):
-    """Derivative [kg/s/Pa] of the flow of a partly open valve k by the upstream pressure, through the lift.
+    """Derivative [kg/s/Pa] of the flow of a partly open valve k by its lifting pressure.
 
     It is negative for reverse flow; it is 0 for reverse flow if the valve counts as fully open, or if the lift that its
     pressure sets is not between 0 and 1.

@@ -60,7 +60,11 @@ class LiftedValve(Device, kind=""):
         if k in start.shut or start.valve_modes.setdefault(k, LIFTING) == OPEN:
             return None
         i, j = (int(start.valves[k][end]) for end in ("from_node", "to_node"))
-        return Edge(i, j, self.row(start, k), 0.0, sensed_node=i)
+        return Edge(i, j, self.row(start, k), 0.0, sensed_nodes=tuple(node for node, _ in self.sensed_at(start, k)))
+
+    def sensed_at(self, start, k: int) -> list[tuple[int, float]]:
+        """Nodes whose pressure lifts valve k, each with its weight in the lifting pressure."""
+        return [(int(start.valves[k]["from_node"]), 1.0)]
 
     def follow(self, start, k) -> None:
         """Do nothing: the function `begin` sets the drop of valve k."""
@@ -82,10 +86,14 @@ class LiftedValve(Device, kind=""):
             return False
         before = "shut" if k in start.shut else start.valve_modes[k]
         x, flow = self.lifting_pressure(start, k) / part.overpressure, float(start.valve_flows()[k])
-        after = self.next_mode(x, flow < -SMALL_LIFT * start.flow_scale, before)
+        after = self.next_mode(x, self.is_reversed(start, k, flow), before)
         start.shut = start.shut | {k} if after == "shut" else start.shut - {k}
         start.valve_modes[k] = LIFTING if after == "shut" else after
         return after != before
+
+    def is_reversed(self, start, k: int, flow: float) -> bool:
+        """True if the flow of valve k [kg/s] is reversed in the present iteration of the steady start."""
+        return flow < -SMALL_LIFT * start.flow_scale
 
     def next_mode(self, x: float, back: bool, now: str) -> str:
         """Mode of a valve in the next iteration of the steady start: "shut", LIFTING or OPEN.
@@ -103,7 +111,7 @@ class LiftedValve(Device, kind=""):
         k = int(row["valve"])
         valve, name = start.valves[k], start.draft.valve_names[k]
         lifts = k not in start.shut and start.valve_modes[k] == LIFTING
-        x = 0.0 if k in start.shut else opening_of(start, k) if lifts else 1.0
+        x = 0.0 if k in start.shut else self.lift_at_start(start, k) if lifts else 1.0
         self.store_lift(start, row, x, x if lifts else self.lifting_pressure(start, k) / part.overpressure)
         valve["open"] = valve["conductance"] * x * x if self.states or x == 0.0 else valve["conductance"]
         if self.states and x > 0.0 and valve["transition"] == 0.0:
@@ -113,6 +121,10 @@ class LiftedValve(Device, kind=""):
         target = self.lifting_pressure(start, k) / part.overpressure
         text = f"{name}: the valve is shut at the start, although the pressure there would open the valve"
         return [text] if start.rest and target > SMALL_LIFT else []
+
+    def lift_at_start(self, start, k: int) -> float:
+        """Lift of the partly lifted valve k at the start, with which it passes its steady flow."""
+        return opening_of(start, k)
 
     def store_lift(self, start, row, x: float, target: float) -> None:
         """Store the lift x and the target lift at the start in the parameters of the disc.
@@ -140,7 +152,7 @@ class CheckDisc(LiftedValve, kind=""):
     def row(self, start, k: int):
         part, ratio = self.part(start, k), start.ratio.get(k, 1.0)
 
-        def newton(flow, drop, potential):
+        def newton(flow, drop, *_):
             target, slope, rise = self.flow_at(
                 start, k, drop, (drop * ratio - part.cracking_pressure) / part.overpressure
             )
@@ -248,20 +260,30 @@ class ReliefDisc(LiftedValve, kind=""):
 
     mode = RELIEF
 
+    def opening_pressure(self, start, part) -> float:
+        """Lifting pressure at which the valve begins to open [Pa]."""
+        return part.set_pressure
+
     def lifting_pressure(self, start, k):
-        i, part = int(start.valves[k]["from_node"]), self.part(start, k)
-        return start.law.pressure_of(start.answer.potential[i], float(start.nodes["elevation"][i])) - part.set_pressure
+        return self.lifted_by(start, k, *(start.answer.potential[i] for i, _ in self.sensed_at(start, k)))
+
+    def lifted_by(self, start, k: int, *potentials: float) -> float:
+        """Lifting pressure of valve k minus its opening pressure [Pa], at given potentials of the sensed nodes [Pa]."""
+        places = zip(self.sensed_at(start, k), potentials, strict=True)
+        pressure = sum(
+            weight * start.law.pressure_of(potential, float(start.nodes["elevation"][i]))
+            for (i, weight), potential in places
+        )
+        return pressure - self.opening_pressure(start, self.part(start, k))
 
     def row(self, start, k: int):
-        i, part = int(start.valves[k]["from_node"]), self.part(start, k)
-        z = float(start.nodes["elevation"][i])
+        span, weights = self.part(start, k).overpressure, [weight for _, weight in self.sensed_at(start, k)]
 
-        def newton(flow, drop, potential):
-            x = (start.law.pressure_of(potential, z) - part.set_pressure) / part.overpressure
-            target, slope, rise = self.flow_at(start, k, drop, x)
-            rise /= part.overpressure
+        def newton(flow, drop, *potentials):
+            target, slope, rise = self.flow_at(start, k, drop, self.lifted_by(start, k, *potentials) / span)
+            rise /= span
             size = max(slope + rise, 1e-12 * start.flow_scale)
-            return 1.0 / size, slope / size, (target - flow) / size, rise / size
+            return 1.0 / size, slope / size, (target - flow) / size, *(weight * rise / size for weight in weights)
 
         return newton
 

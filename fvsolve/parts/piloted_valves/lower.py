@@ -1,0 +1,232 @@
+"""Piloted valves in the tables of a model, and their states at the steady start."""
+
+from fvsolve.assembly.lowering import Device, opening_of
+from fvsolve.errors import Notice
+from fvsolve.kernels import dtypes as rec
+from fvsolve.parts.self_acting import law_relief_valve
+from fvsolve.parts.self_acting.law_disc import FREE_BACK, SENSED
+from fvsolve.parts.self_acting.lower import (
+    LIFTING,
+    OPEN,
+    SMALL_FLOW,
+    SMALL_LIFT,
+    SMALL_PRESSURE,
+    STOP_EVENTS,
+    Relief,
+    ReliefDisc,
+)
+
+from . import law_pilot_check, law_shuttle
+
+BACK_EVENTS = ("flow reverses", "flow is forward again")
+
+
+class PilotedDisc(ReliefDisc, kind=""):
+    """Conversion to table rows of valves with disc dynamics that a sum of two sensed pressures lifts."""
+
+    controlling_event = -1
+
+    def numbers(self, draft, name, part):
+        self.check_columns(draft, name)
+        return super().numbers(draft, name, part)
+
+    def sensed_at(self, start, k):
+        row = start.draft.device_table[start.valves[k]["device"]]
+        return [(int(row[column]), float(row[f"{column}_weight"])) for column in ("node", "second")]
+
+    def lift_at_start(self, start, k):
+        if start.valve_flows()[k] <= 0.0:
+            return min(max(self.lifting_pressure(start, k) / self.part(start, k).overpressure, 0.0), 1.0)
+        return opening_of(start, k)
+
+    def check_columns(self, draft, name: str) -> None:
+        """Add a notice if a rigid column ends at the valve, whose exchange of flow and lift no step resolves."""
+        valve = draft.valve_table[draft.valve_names.index(name)]
+        ends = {int(valve[end]) for end in ("from_node", "to_node")}
+        for column, row in zip(draft.column_names, draft.column_table, strict=True):
+            if ends & {int(row[end]) for end in ("from_node", "to_node")}:
+                text = (f"{name}: joins the rigid column {column}: its lift and flow are not reliable near its seat; "
+                        "make the column a pipe, or put a chamber between them")  # fmt: skip
+                draft.warnings.append(Notice("range", f"links.{name}", text))
+
+
+class CounterbalanceDisc(PilotedDisc, kind=""):
+    """Conversion to table rows of counterbalance valves with disc dynamics; reverse flow passes the full size."""
+
+    mode = FREE_BACK
+    events = (*STOP_EVENTS, *BACK_EVENTS)
+
+    def sensed(self, part):
+        return (part.from_, 1.0), (part.pilot, part.pilot_ratio)
+
+    def opening_pressure(self, start, part):
+        return part.set_pressure + part.pilot_ratio * start.case.ambient_pressure
+
+    def is_reversed(self, start, k, flow):
+        before, behind = start.across(k)
+        return before - behind < -SMALL_PRESSURE if k in start.shut else super().is_reversed(start, k, flow)
+
+    def next_mode(self, x, back, now):
+        if back:
+            return OPEN
+        return LIFTING if now == OPEN and x < 1.0 - SMALL_LIFT else super().next_mode(x, False, now)
+
+    def store_lift(self, start, row, x, target):
+        super().store_lift(start, row, min(max(target, 0.0), 1.0) if x == 1.0 else x, target)
+
+
+class CounterbalanceSwing(CounterbalanceDisc, kind=""):
+    """Conversion to table rows of counterbalance valves with an oscillating disc (mass, spring, damper)."""
+
+    states = ("opening", "speed")
+
+
+class CounterbalanceLag(CounterbalanceDisc, kind=""):
+    """Conversion to table rows of counterbalance valves whose disc has a first-order lag."""
+
+    states = ("opening",)
+
+
+class CounterbalanceRows(CounterbalanceDisc, kind="counterbalance"):
+    """Conversion to table rows of counterbalance valves whose lift follows the pressures at once."""
+
+    law, mode, regular = law_relief_valve, law_relief_valve.FREE_BACK, True
+    events, numbers, store_lift = Relief.events, Relief.numbers, Relief.store_lift
+
+    def of(self, part) -> Device:
+        if not part.has_dynamics:
+            return self
+        return CounterbalanceLag() if part.natural_frequency is None else CounterbalanceSwing()
+
+
+class CompensatorDisc(PilotedDisc, kind=""):
+    """Conversion to table rows of pressure compensators with disc dynamics."""
+
+    mode = SENSED
+
+    def sensed(self, part):
+        before, behind = part.senses
+        return (before, -1.0), (behind, 1.0)
+
+    def opening_pressure(self, start, part):
+        return -part.set_drop - part.overpressure
+
+    def begin(self, start, part, row):
+        super().begin(start, part, row)
+        return []
+
+    def store_lift(self, start, row, x, target):
+        super().store_lift(start, row, min(max(target, 0.0), 1.0) if start.rest else x, target)
+
+    def add_start_notices(self, start, name, x):
+        """Add no notice: the valve is open at rest."""
+
+
+class CompensatorSwing(CompensatorDisc, kind=""):
+    """Conversion to table rows of pressure compensators with an oscillating spool (mass, spring, damper)."""
+
+    states = ("opening", "speed")
+
+
+class CompensatorLag(CompensatorDisc, kind=""):
+    """Conversion to table rows of pressure compensators whose spool has a first-order lag."""
+
+    states = ("opening",)
+
+
+class CompensatorRows(CompensatorDisc, kind="pressure-compensator"):
+    """Conversion to table rows of pressure compensators whose opening follows the pressures at once."""
+
+    law, mode, regular = law_relief_valve, 0, True
+    events, numbers, store_lift = Relief.events, Relief.numbers, Relief.store_lift
+
+    def of(self, part) -> Device:
+        if not part.has_dynamics:
+            return self
+        return CompensatorLag() if part.natural_frequency is None else CompensatorSwing()
+
+
+class PilotCheckRows(Device, kind="pilot-check"):
+    """Conversion to table rows of pilot-operated check valves, which are either open or shut.
+
+    In the steady state no open valve has a reverse flow that its pilot does not permit, and nothing opens a shut valve.
+    """
+
+    law, events_only = law_pilot_check, True
+    quantities = ("opening",)
+    events = ("shuts", "opens")
+    remedy = "raise the pilot pressure, or lower the pressure that its reverse flow builds up at `from`"
+
+    def sensed(self, part):
+        return ((part.pilot, 1.0),)
+
+    def numbers(self, draft, name, part) -> list[float]:
+        return [part.cracking_pressure, part.pilot_ratio, 0.0, 0.0]
+
+    def excesses(self, start, part, row) -> tuple[float, float]:
+        """(drop minus cracking pressure, excess of the pilot) [Pa], see `law_pilot_check.excesses`."""
+        valve = start.valves[row["valve"]]
+        before, behind, pilot = (start.pressure(int(i)) for i in (valve["from_node"], valve["to_node"], row["node"]))
+        excess = part.pilot_ratio * (pilot - before) + before - behind - part.cracking_pressure
+        return before - behind - part.cracking_pressure, excess
+
+    def revise_state(self, start, part, row) -> bool:
+        k = int(row["valve"])
+        forward, pilot = self.excesses(start, part, row)
+        if k in start.shut:
+            opens = max(forward, pilot) > SMALL_PRESSURE
+            start.shut -= {k} if opens else set()
+            return opens
+        shuts = pilot <= 0.0 and start.valve_flows()[k] < -SMALL_FLOW * start.flow_scale
+        start.shut |= {k} if shuts else set()
+        return shuts
+
+    def begin(self, start, part, row) -> list[str]:
+        forward, pilot = self.excesses(start, part, row)
+        floats, at = start.draft.tables.floats, int(row["data"])
+        floats[at + law_pilot_check.DROP] = forward + part.cracking_pressure
+        floats[at + law_pilot_check.PILOT_EXCESS] = pilot
+        return []
+
+
+class ShuttleRows(Device, kind="shuttle"):
+    """Conversion to table rows of shuttle valves: two rows for each valve, from A to out and from B to out."""
+
+    rows, law = 2, law_shuttle
+    quantities = ("flow_A", "flow_B", "flow_out", "position")
+    events = ("is at A", "leaves A", "is at B", "leaves B")
+    remedy = "give ports A and B chambers, so that its flow does not change their pressures at once"
+
+    def fill(self, draft, name, link, rows) -> None:
+        for port, row in zip("AB", rows, strict=True):
+            row["from_node"], row["to_node"] = draft.node_index[link.ports[port]], draft.node_index[link.ports["out"]]
+            row["schedule"] = -1
+            self.restriction(draft, name, link, row)
+
+    def row_names(self, name) -> list[str]:
+        return [f"{name}.A-out", f"{name}.B-out"]
+
+    def numbers(self, draft, name, part) -> list[float]:
+        first = draft.valve_names.index(name)
+        draft.valve_table["device"][first + 1] = draft.valve_table["device"][first]
+        inner = draft.node_table["kind"][[draft.node_index[part.ports[port]] for port in "AB"]] == rec.JUNCTION
+        return [0.0, float(not inner.any())]
+
+    def sensed(self, part):
+        return (part.ports["A"], -1.0), (part.ports["B"], 1.0)
+
+    def difference(self, start, row) -> float:
+        """Pressure at B minus that at A [Pa]."""
+        first = int(row["valve"])
+        a, b = (start.pressure(int(start.valves[k]["from_node"])) for k in (first, first + 1))
+        return b - a
+
+    def revise_state(self, start, part, row) -> bool:
+        first = int(row["valve"])
+        shut = first if self.difference(start, row) > law_shuttle.BAND else first + 1
+        before, start.shut = start.shut, (start.shut - {first, first + 1}) | {shut}
+        return start.shut != before
+
+    def begin(self, start, part, row) -> list[str]:
+        start.draft.tables.floats[int(row["data"])] = self.difference(start, row)
+        return []
