@@ -9,7 +9,8 @@ from fvsolve.kernels import dtypes as rec
 
 CAPACITY, INERTANCE, RESISTANCE, POTENTIAL, FLOW, TRANSFORMER, LOCK, GAUGE = range(8)
 """Kinds of elements: flow = value d potential / dt; potential = value d flow / dt; potential = value times flow; given
-potential; given flow; potential 1 = value times potential 2; equal potentials; a difference that is only read."""
+potential; given flow; potential 1 = value times potential 2; equal potentials, with the value as share of the flow of
+locks in parallel; a difference that is only read."""
 
 
 class Element(NamedTuple):

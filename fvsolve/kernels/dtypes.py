@@ -499,9 +499,9 @@ SURFACE_VALUE = 24  # of a surface described by modes
 PIPE_FORCE = 25  # on a whole pipe
 CONTROL_VALUE = 26  # of a block of `controls`: 0 output, 1 input, 2 error in `side`
 # of a network, by the code in `side`: value of row `index`; times that of row `cell`; row `cell` over its value;
-# 1 while the friction with the flag `index` sticks
+# 1 while the friction with the flag `index` sticks; force of the force element `cell` minus the value of row `index`
 NETWORK_VALUE = 27
-ROW, POWER, ENTROPY, LOCKED = 0, 1, 2, 3
+ROW, POWER, ENTROPY, LOCKED, NET_PUSH = 0, 1, 2, 3, 4
 
 BASIN = record(
     kind=i8,  # code of its physics, see `basins.basin_patches`

@@ -139,6 +139,8 @@ def observe_networks(t, y, out, handle, values):
                 value *= row_value(y, out, tables, probes[k]["cell"])
             elif side == rec.ENTROPY:
                 value = row_value(y, out, tables, probes[k]["cell"]) / value
+            elif side == rec.NET_PUSH:
+                value = out[tables.layout[0]["push"] + probes[k]["cell"]] - value
             values[k] = probes[k]["scale"] * value + 0.0  # no negative zero
 
 

@@ -199,6 +199,8 @@ class Elimination:
     def with_free_part(self, solution: np.ndarray, free: np.ndarray, block: EquationBlock) -> np.ndarray:
         """Choose the solution among several: of potentials by equal small leaks, of locks by the least flows.
 
+        Locks in parallel share a flow in proportion to their values.
+
         free : basis of the null space, a column for each vector
         """
         unknowns, laws = block.unknowns, []
@@ -208,7 +210,7 @@ class Elimination:
         for item in self.elements:
             if item.kind == LOCK:
                 laws.append(Equation())
-                add(laws[-1].left, {self.unknowns["flow", item.name]: 1.0})
+                add(laws[-1].left, {self.unknowns["flow", item.name]: item.value**-0.5})
         laws = [law for law in laws if law.left.keys() & set(unknowns)]
         further = {c for law in laws for c in law.right} - {*block.columns}
         block.columns += sorted(further)

@@ -136,6 +136,11 @@ class Link(Part):
     may_lack: ClassVar[tuple[str, ...]] = ()  # ports that may join nothing
     owns: ClassVar[dict[str, str]] = {}  # own place, `LINK.PLACE` for other parts -> domain
 
+    @property
+    def network_places(self) -> tuple[str, ...]:
+        """Places of its ports that its elements in a network of potential and flow join."""
+        return tuple(self.ports.values()) if self.in_network else ()
+
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
         """(places, links) of the solved network for this link, each by name.
 
