@@ -21,6 +21,7 @@ class Element(NamedTuple):
     that of the first pair
     state, small, initial : of a store, name of its state, size of a small deviation, and stated value at the start
     state_of : part whose state it is, if the network does not own the state; unit : potential of a unit of this state
+    A source with a state follows the integral of the difference of potentials at its ends, which is that state.
     schedule, key : of a source that follows a schedule of its part; reads : (kind of `network_inputs`, name) of another
     switch : name of the switch that is on while the element is active, "" for an element that is always active
     ledger : category in the energy ledger, "" for none; thermal : True if its flow is a heat flow

@@ -82,6 +82,7 @@ class Elimination:
     ) -> None:
         self.elements, self.columns, self.leaks, self.constant = elements, columns, leaks, constant
         self.stores = {columns[item.name]: item for item in elements if item.is_store}
+        self.integrating = {columns[item.name]: item for item in elements if item.is_source and item.state_of}
         self.names = {number: item.part for item in elements if (number := columns.get(item.name)) is not None}
         self.known: dict[str, int] = {}  # node -> column of its potential
         for kind in (POTENTIAL, CAPACITY):
@@ -230,6 +231,11 @@ class Elimination:
         relation = reduced(relation, self.relations)
         if not relation:
             return False
+        if self.leaks and len(relation) == 1 and (item := self.integrating.get(next(iter(relation)))):
+            self.relations.append(relation)  # no current of a coil in an open circuit, whose flux does not change
+            self.equations.append(Equation())
+            self.put_drop(self.equations[-1], item.ends)
+            return True
         sources = [column for column in relation if column not in self.stores and column not in self.constant]
         sources += [] if relation.keys() & self.stores.keys() else list(relation)
         if sources:
