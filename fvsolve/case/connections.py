@@ -85,7 +85,7 @@ def _island_faults(groups: list[list[str]], nodes: dict[str, Any], places: dict[
 
     places : names that links can join -> domain
     """
-    groups = [island for island in groups if not {places[name] for name in island} <= {*NETWORK_DOMAINS}]
+    groups = [island for island in groups if not is_apart({places[name] for name in island})]
     if len(groups) > 1:
         sizes = " | ".join(listing(island, 6) for island in groups)
         text = f"disconnected network of {len(groups)} parts: {sizes}"
@@ -96,6 +96,11 @@ def _island_faults(groups: list[list[str]], nodes: dict[str, Any], places: dict[
         if kinds and all(kind is not None and not kind.fixes_pressure for kind in kinds):
             where = "" if len(groups) == 1 else f" of {listing(island, 6)}"
             yield ("nodes",), f"nothing fixes the pressure{where}; expected a reservoir, tank or chamber"
+
+
+def is_apart(domains: set[str | None]) -> bool:
+    """True if an island of these domains may be separate: a network without fluid, which may move masses."""
+    return bool(domains & {*NETWORK_DOMAINS}) and domains <= {*NETWORK_DOMAINS, "translational"}
 
 
 def _dict(value: Any) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 import functools
 from copy import deepcopy
+from dataclasses import dataclass
 from math import pi
 
 import numpy as np
@@ -64,55 +65,101 @@ def moving(end=0.06, **keys):
                 voltage, saturation_flux=SATURATION, **keys)  # fmt: skip
 
 
-@functools.cache
-def by_hand(times, breaks=(0.005, 0.035), start=(0.0, -1e-6, 0.0), saturation=SATURATION):
-    """Flux [Wb], position [m] and velocity [m/s] of the armature of `moving` at times, by SciPy with contact events."""
-    mass, spring, free, stiff, damp, oil = 0.02, 900.0, 4.0, 4e6, 120.0, 2.0
-    turns, closed, per_gap = COIL["turns"], COIL["closed_position"], 1.0 / (MU_0 * COIL["pole_area"])
+@dataclass(frozen=True)
+class Armature:
+    """Armature with a coil, spring, damper and two stops, in SI units: equations written by hand, for SciPy.
 
-    def current(flux, x):
-        core = COIL["core_reluctance"] * (1.0 + (flux / saturation) ** 2)
-        return (core + per_gap * abs(closed - x)) * flux / turns
+    voltages : (time until which it holds [s], function of the current that gives the voltage at the coil [V])
+    """
 
-    def rates(t, y, volt, touched):
+    voltages: tuple
+    turns: float = 800.0
+    area: float = 8e-5
+    closed: float = 3e-3
+    core: float = 4e6
+    saturation: float = SATURATION
+    mass: float = 0.02
+    spring: float = 900.0
+    preload: float = 4.0
+    stop: float = 4e6
+    stop_damping: float = 120.0
+    travel: float = 2.8e-3
+    damping: float = 2.0
+
+    def current(self, flux, x):
+        core = self.core * (1.0 + (flux / self.saturation) ** 2)
+        return (core + abs(self.closed - x) / (MU_0 * self.area)) * flux / self.turns
+
+    def rates(self, t, y, voltage, touched):
+        """Rates of flux [Wb], position [m] and velocity [m/s]; touched : -1 or 1 on the lower or upper stop, else 0."""
         flux, x, v = y
-        force = -spring * (x + 1e-6) - free - oil * v + np.sign(closed - x) * 0.5 * per_gap * flux**2
+        force = -self.spring * (x - self.start) - self.preload - self.damping * v
+        force += np.sign(self.closed - x) * 0.5 * flux**2 / (MU_0 * self.area)
         if touched == -1:
-            force += max(0.0, -stiff * x - damp * v)
+            force += max(0.0, -self.stop * x - self.stop_damping * v)
         elif touched == 1:
-            force -= max(0.0, stiff * (x - 2.8e-3) + damp * v)
-        return [(volt - OHM * current(flux, x)) / turns, v, force / mass]
+            force -= max(0.0, self.stop * (x - self.travel) + self.stop_damping * v)
+        return [voltage(self.current(flux, x)) / self.turns, v, force / self.mass]
 
-    def end(limit, direction):
-        def left(t, y, *_):
-            return y[1] - limit
+    @property
+    def start(self):
+        """Position at the start, on the lower stop [m]."""
+        return -self.preload / self.stop
 
-        left.terminal, left.direction = True, direction
-        return left
+    @functools.cache  # noqa: B019
+    def pieces(self):
+        """(first time, last time, dense output) of each piece between events."""
 
-    times = np.array(times)
-    y, found = np.array(start), np.empty((3, len(times)))
-    edges = [times[0], *breaks, times[-1]]
-    for low, high in zip(edges, edges[1:], strict=False):
-        t, volt = low, VOLT if low == breaks[0] else 0.0
-        touched = -1 if y[1] < 0.0 else 1 if y[1] > 2.8e-3 else 0
-        while t < high:
-            ends = {-1: [end(0.0, 1)], 0: [end(0.0, -1), end(2.8e-3, 1)], 1: [end(2.8e-3, -1)]}[touched]
-            run = solve_ivp(rates, (t, high), y, "DOP853", args=(volt, touched), events=ends, dense_output=True,
-                            rtol=1e-12, atol=[1e-18, 1e-16, 1e-13], max_step=1e-4)  # fmt: skip
-            inside = (times >= t) & (times <= run.t[-1])
+        def end(limit, direction):
+            def left(t, y, *_):
+                return y[1] - limit
+
+            left.terminal, left.direction = True, direction
+            return left
+
+        t, y, found = 0.0, np.array([0.0, self.start, 0.0]), []
+        touched = -1
+        for high, voltage in self.voltages:
+            while t < high:
+                ends = {-1: [end(0.0, 1)], 0: [end(0.0, -1), end(self.travel, 1)], 1: [end(self.travel, -1)]}[touched]
+                run = solve_ivp(self.rates, (t, high), y, "DOP853", args=(voltage, touched), events=ends, rtol=1e-12,
+                                atol=[1e-18, 1e-16, 1e-13], dense_output=True, max_step=1e-4)  # fmt: skip
+                found.append((t, run.t[-1], run.sol))
+                t, y = run.t[-1], run.y[:, -1]
+                if run.status == 1:
+                    touched = 0 if touched else -1 if len(run.t_events[0]) else 1
+        return found
+
+    def at(self, times):
+        """(flux, position, velocity) at times : float64[3, n]."""
+        found = np.empty((3, len(times)))
+        for low, high, solution in self.pieces():
+            inside = (times >= low) & (times <= high)
             if inside.any():
-                found[:, inside] = run.sol(times[inside])
-            t, y = run.t[-1], run.y[:, -1]
-            if run.status == 1:
-                touched = 0 if touched else -1 if len(run.t_events[0]) else 1
-    return found, np.array([current(flux, x) for flux, x in found[:2].T])
+                found[:, inside] = solution(times[inside])
+        return found
+
+    def crossings(self, place):
+        """Times at which the armature passes a position [s]."""
+        found = []
+        for low, high, solution in self.pieces():
+            t = np.linspace(low, high, 2000)
+            x = solution(t)[1] - place
+            x[np.abs(x) < 1e-13] = 0.0  # a piece begins or ends there
+            found += [low] if x[0] == 0.0 else []
+            found += [brentq(lambda t: solution(t)[1] - place, *t[k : k + 2], xtol=1e-16)  # noqa: B023
+                      for k in np.flatnonzero(x[:-1] * x[1:] < 0.0)]  # fmt: skip
+        return found
+
+
+PULSED = Armature(((0.005, lambda i: -OHM * i), (0.035, lambda i: VOLT - OHM * i), (0.06, lambda i: -OHM * i)))
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_an_armature_closes_and_opens_as_that_of_scipy(method):
     run = runs(moving(), method)
-    (flux, x, _), current = by_hand(tuple(run.t))
+    flux, x, _ = PULSED.at(np.array(run.t))
+    current = PULSED.current(flux, x)
     assert x.max() > 2.8e-3 and abs(x[-1]) < 3e-5
     for name, exact in (("coil.flux", flux), ("plunger.position", x), ("coil.current", current)):
         assert np.array(run[name]) == pytest.approx(exact, abs=EXACT * np.abs(exact).max()), name
@@ -326,3 +373,28 @@ def test_a_coil_without_resistance_needs_its_flux():
     case["nodes"].pop("b")
     with pytest.raises(CaseError, match="no equilibrium of coil.flux"):
         fvsolve.build(fvsolve.load(case))
+
+
+def test_the_shipped_valve_opens_and_closes_at_the_times_of_scipy():
+    """The opening of the valve leaves 0 where the armature passes 0.2 mm, and reaches 1 at 2 mm."""
+    valve = Armature(
+        ((0.01, lambda i: -30.0 * i), (0.06, lambda i: 24.0 - 30.001 * i), (0.08, lambda i: -0.7 - 30.05 * i)),
+        turns=1200.0, area=1.2e-4, closed=2.2e-3, core=3e6, saturation=2e-4, mass=8e-3, spring=1500.0, preload=5.0,
+        stop=2e6, stop_damping=60.0, travel=2e-3, damping=1.0,
+    )  # fmt: skip
+    run = fvsolve.run("solenoid-valve", {"numerics.rtol": 1e-12, "expect": {}, "output.units": {}})
+    events = [(event["time"], event["what"]) for event in run.summary["events"] if event["name"] == "controls.lift"]
+    seat = [t for t, what in events if "lower" in what]
+    full = [t for t, what in events if "upper" in what]
+    assert seat == pytest.approx(valve.crossings(2e-4), abs=0.12 * EXACT)
+    assert full == pytest.approx(valve.crossings(2e-3), abs=0.12 * EXACT)
+    t = np.array(run.t)
+    inside = (t > 0.0) & (t < 0.08)
+    flux, x, _ = valve.at(t[inside])
+    assert np.array(run["armature.position"])[inside] == pytest.approx(x, abs=2e-3 * EXACT)
+    assert np.array(run["coil.current"])[inside] == pytest.approx(valve.current(flux, x), abs=EXACT)
+    print(
+        "delays [ms]",
+        [round(1e3 * (t - 0.01), 4) for t in (seat[0], full[0])],
+        [round(1e3 * (t - 0.06), 4) for t in (full[-1], seat[3])],
+    )
