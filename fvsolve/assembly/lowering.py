@@ -366,6 +366,13 @@ class Device(Restriction):
         """Fill in data that depend on the initial steady state; return texts of motions at the start."""
         return []
 
+    def source_at_start(self, start, part: Any, row, quantity: str, flow: float) -> float:
+        """Value at the start of a quantity that a source of the network reads.
+
+        flow : flow at the start of the element whose difference of potentials the state of the device integrates
+        """
+        raise NotImplementedError
+
     def passing_notice(self, model, name: str, part: Any, time: float) -> Notice:
         """Notice that the part was temporarily outside the range of its law, first at `time` [s].
 
@@ -404,7 +411,7 @@ def lower_devices(draft) -> None:
     lowered = [(name, part, lowering_of(type(part)).of(part)) for name, part in parts]
     draft.devices = [(name, part, device) for name, part, device in lowered if device.is_device]
     table = draft.device_table = np.zeros(len(draft.devices), rec.DEVICE)
-    for column in ("valve", "node", "second", "schedule", "y", "row"):
+    for column in ("valve", "node", "second", "schedule", "y", "row", "mass"):
         table[column] = -1
     for k, ((name, part, device), row) in enumerate(zip(draft.devices, table, strict=True)):
         states = device.states_of(draft, name, part)

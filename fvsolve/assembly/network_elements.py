@@ -9,7 +9,8 @@ from fvsolve.kernels import dtypes as rec
 
 CAPACITY, INERTANCE, RESISTANCE, POTENTIAL, FLOW, TRANSFORMER, LOCK, GAUGE = range(8)
 """Kinds of elements: flow = value d potential / dt; potential = value d flow / dt; potential = value times flow; given
-potential; given flow; potential 1 = value times potential 2; equal potentials; a difference that is only read."""
+potential; given flow; potential 1 = value times potential 2; equal potentials, with the value as share of the flow of
+locks in parallel; a difference that is only read."""
 
 
 class Element(NamedTuple):
@@ -20,6 +21,7 @@ class Element(NamedTuple):
     that of the first pair
     state, small, initial : of a store, name of its state, size of a small deviation, and stated value at the start
     state_of : part whose state it is, if the network does not own the state; unit : potential of a unit of this state
+    A source with a state follows the integral of the difference of potentials at its ends, which is that state.
     schedule, key : of a source that follows a schedule of its part; reads : (kind of `network_inputs`, name) of another
     switch : name of the switch that is on while the element is active, "" for an element that is always active
     ledger : category in the energy ledger, "" for none; thermal : True if its flow is a heat flow

@@ -161,9 +161,7 @@ class Case(Displayable):
     def network_places(self) -> frozenset[str]:
         """Places of a network of rotation, electricity and heat: its nodes, and other places that its links join."""
         own = [name for name, node in self.nodes.items() if node.domain in NETWORK_DOMAINS]
-        joined = [place for link in self.links.values() for port, place in link.ports.items()
-                  if port in link.network_ports]  # fmt: skip
-        return frozenset([*own, *joined])
+        return frozenset([*own, *(place for link in self.links.values() for place in link.network_places)])
 
     @property
     def needs_equilibrium(self) -> bool:

@@ -91,7 +91,7 @@ def _island_faults(groups: list[list[str]], nodes: dict[str, Any], places: dict[
 
     places : names that links can join -> domain
     """
-    groups = [island for island in groups if not {places[name] for name in island} <= {*NETWORK_DOMAINS}]
+    groups = [island for island in groups if not is_apart({places[name] for name in island})]
     if len(groups) > 1:
         sizes = " | ".join(listing(island, 6) for island in groups)
         text = f"disconnected network of {len(groups)} parts: {sizes}"
@@ -102,6 +102,11 @@ def _island_faults(groups: list[list[str]], nodes: dict[str, Any], places: dict[
         if kinds and all(kind is not None and not kind.fixes_pressure for kind in kinds):
             where = "" if len(groups) == 1 else f" of {listing(island, 6)}"
             yield ("nodes",), f"nothing fixes the pressure{where}; expected a reservoir, tank or chamber"
+
+
+def is_apart(domains: set[str | None]) -> bool:
+    """True if an island of these domains may be separate: a network without fluid, which may move masses."""
+    return bool(domains & {*NETWORK_DOMAINS}) and domains <= {*NETWORK_DOMAINS, "translational"}
 
 
 def _dict(value: Any) -> dict[str, Any]:
@@ -256,9 +261,15 @@ def joined_shafts(links: Any) -> list[str]:
         place
         for link in links.values()
         for keys, place, domain in _ports(_dict(link))
-        if "rotational" in str(domain) and isinstance(place, str) and keys[-1] in kind_of("links", link).network_ports
+        if "rotational" in str(domain) and isinstance(place, str) and is_port_of_network(link, keys[-1])
     ]
     return list(dict.fromkeys(place for place in places if place.endswith(".shaft")))
+
+
+def is_port_of_network(link: Any, port: Any) -> bool:
+    """True if a port of a link, with keys as in the file, is one of a network of rotation, electricity and heat."""
+    kind = kind_of("links", link)
+    return kind is not None and (kind.in_network or port in kind.network_ports)
 
 
 def chambers_of(link: Any) -> list[str]:

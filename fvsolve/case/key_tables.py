@@ -21,6 +21,7 @@ from fvsolve.parts.basin import BasinStart, Patch
 from fvsolve.parts.body import Joint
 from fvsolve.parts.connection import Connection
 from fvsolve.parts.control import Control
+from fvsolve.parts.cylinder import DryFriction
 from fvsolve.parts.nodes_and_links import PlaceOnBody, TwoPort
 from fvsolve.parts.pipe.pipe_wall import SI, Lining, Wall, materials
 from fvsolve.parts.self_acting.part import Disc
@@ -31,7 +32,7 @@ from fvsolve.units import DIMENSIONS, show
 
 TABLES: dict[str, type[Table]] = {
     "every node": Node, "riding": PlaceOnBody, "every link": TwoPort, "friction": Friction, "connection": Connection,
-    "compressor": Compressor,
+    "compressor": Compressor, "dry friction": DryFriction,
     "wall": Wall, "lining": Lining, "patch": Patch, "start": BasinStart, "line": OutputLine, "scalar": Scalar,
     "fluid": FluidSpec, "numerics": Numerics, "output": Output, "route": Route, "joint": Joint, "attitude": Attitude,
 }  # fmt: skip

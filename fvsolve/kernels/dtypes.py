@@ -341,6 +341,7 @@ DEVICE = record(
     data=i8,  # offset of its numbers in `floats`
     schedule=i8,  # -1 for none
     row=i8,  # number of the vessel that it fills, among nodes of variable stiffness; -1 for none
+    mass=i8,  # mass whose position it reads; -1 for none
     opens_by_event=i8,  # 1 if only events open it
     controls_column=i8,  # offset in `armed` of the flag that it controls its rigid column; -1 if it never does
 )
@@ -396,13 +397,13 @@ DRIVEN_VALVE, DRIVEN_DEVICE, DRIVEN_NODE = 0, 1, 2
 NETWORK_INPUT = record(  # source of a network of potential and flow, see `kernels.potential_networks`
     kind=i8,
     index=i8,  # schedule, device, mass, switch or element
-    side=i8,  # of a device: quantity whose value is the torque of the fluid on its shaft
+    side=i8,  # of a device: quantity that is read
     sign=f8,
     start=f8,  # value at the start
 )
-# Sources: a schedule; torque of the fluid on the shaft of a device; force on a mass; torque of dry friction that slips;
-# heat that an element dissipates. Later kinds depend on earlier ones.
-SCHEDULE_INPUT, TORQUE_INPUT, FORCE_INPUT, FRICTION_FLOW, HEAT_INPUT = 0, 1, 2, 3, 4
+# Sources: a schedule; quantity of a device, such as the torque of the fluid on its shaft; force on a mass; torque of
+# dry friction that slips; heat that an element dissipates. Later kinds depend on earlier ones.
+SCHEDULE_INPUT, DEVICE_INPUT, FORCE_INPUT, FRICTION_FLOW, HEAT_INPUT = 0, 1, 2, 3, 4
 
 NETWORK_RATE = record(y=i8)  # state whose rate is the value of the row of the same number
 NETWORK_ELEMENT = record(  # element of a network with power
@@ -503,9 +504,9 @@ SURFACE_VALUE = 24  # of a surface described by modes
 PIPE_FORCE = 25  # on a whole pipe
 CONTROL_VALUE = 26  # of a block of `controls`: 0 output, 1 input, 2 error in `side`
 # of a network, by the code in `side`: value of row `index`; times that of row `cell`; row `cell` over its value;
-# 1 while the friction with the flag `index` sticks
+# 1 while the friction with the flag `index` sticks; force of the force element `cell` minus the value of row `index`
 NETWORK_VALUE = 27
-ROW, POWER, ENTROPY, LOCKED = 0, 1, 2, 3
+ROW, POWER, ENTROPY, LOCKED, NET_PUSH = 0, 1, 2, 3, 4
 SCHEDULE_VALUE = 28  # of schedule `index`
 
 BASIN = record(

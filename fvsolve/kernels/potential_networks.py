@@ -2,7 +2,7 @@
 
 All quantities are linear in the states and in sources. A row has a value at the start and coefficients: value + sum of
 coefficient times change. The rows of rates come first, in the order of `network_rates`.
-The sources are schedules, torques and forces of other parts, torques of friction and heat.
+The sources are schedules, quantities of devices, forces on masses, torques of friction and heat.
 `network_places` contains for each row the offsets of its first entry, of its first entry for a source, and of the entry
 after its last; then for each entry the place of its state in y, or the number of its source.
 `network_factors` contains the value of each row at the start, then the coefficient of each entry. A switch, diode or
@@ -108,7 +108,7 @@ def write_sources(t, y, out, tables):
         kind, i = source["kind"], source["index"]
         if kind == rec.SCHEDULE_INPUT:
             value = schedule_value(tables, i, t)
-        elif kind == rec.TORQUE_INPUT:
+        elif kind == rec.DEVICE_INPUT:
             device = tables.devices[i]
             value = calls.call_value(tables.hooks[device["hooks"], VALUE], t, y, out, tables, device, source["side"])
         elif kind == rec.FORCE_INPUT:
@@ -155,6 +155,8 @@ def observe_networks(t, y, out, handle, values):
                 value *= row_value(y, out, tables, probes[k]["cell"])
             elif side == rec.ENTROPY:
                 value = row_value(y, out, tables, probes[k]["cell"]) / value
+            elif side == rec.NET_PUSH:
+                value = out[tables.layout[0]["push"] + probes[k]["cell"]] - value
             values[k] = probes[k]["scale"] * value + 0.0  # no negative zero
 
 

@@ -73,14 +73,10 @@ class BlockCouplings:
             ends = (model.sets[link[end]] for end in ("from_node", "to_node"))
             return unique_states(*ends, model.opening_states(link))
         if kind == rec.DEVICE_VALUE:
-            device, lowering = model.devices[i], model.lowerings[i]
-            if lowering.quantities[row["side"]] in lowering.states:
-                return model.device_states(device)
-            ends = model.valves[device["valve"]] if device["valve"] >= 0 else None
-            nodes = [device["node"], device["second"]]
-            nodes += [] if ends is None else [ends["from_node"], ends["to_node"]]
-            opening = unique_states() if ends is None else model.opening_states(ends)
-            return unique_states(model.device_states(device), opening, *(model.sets[n] for n in nodes if n >= 0))
+            rows = model.parts[i][2]
+            if rows.quantities[row["side"]] in rows.states:
+                return model.device_states(model.devices[i])
+            return model.device_reading(model.devices[i])
         if kind in (rec.PIPE_PRESSURE, rec.PIPE_FLOW) and model.pipes[i]["delay"] < 0:
             pipe, right = model.pipes[i], int(row["side"] > 0)
             if row["side"] != 0:

@@ -294,7 +294,9 @@ class Accounts:
         network = self.model.network
         for item in network.booked if network is not None else ():
             at, (group, _, name) = self.take(1), item.part.partition(".")
-            kind = getattr(self.model.case, group)[name].kind.replace("-", " ")
+            part = getattr(self.model.case, group)[name]
+            loss_of_other = item.ledger == "dissipated" and not part.in_network  # such as friction of a cylinder
+            kind = item.name.rpartition(".")[2] if loss_of_other else part.kind.replace("-", " ")
             stores = item.ledger == "stored"
             self.hold(name, kind, at if stores else None)
             if not stores and item.ledger and item.heat_to is None:

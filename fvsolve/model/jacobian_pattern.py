@@ -297,7 +297,7 @@ class Couplings:
     def network_pairs(self) -> Iterator[Pairs]:
         """Yield couplings of the stores of networks with each other, and with what their sources follow."""
         network = self.network
-        for r, place in enumerate([*network.states.values(), *network.angles.values()]):
+        for r, place in enumerate([*network.states.values(), *network.integrals.values()]):
             yield pairs_of(unique_states(place), self.network_states(network.columns_of_rows[r]))
 
     def network_states(self, columns: set[int]) -> np.ndarray:
@@ -311,8 +311,8 @@ class Couplings:
         network, r = self.network, int(row["index"])
         if row["side"] == rec.LOCKED:
             return unique_states()
-        if r >= network.rows.angles:
-            return unique_states(list(network.angles.values())[r - network.rows.angles])
+        if r >= network.rows.integrals:
+            return unique_states(list(network.integrals.values())[r - network.rows.integrals])
         rows = [r, *([int(row["cell"])] if row["side"] in (rec.POWER, rec.ENTROPY) else [])]
         return self.network_states(set().union(*(network.columns_of_rows[r] for r in rows)))
 
@@ -322,16 +322,22 @@ class Couplings:
         i = int(row["index"])
         if row["kind"] == rec.SCHEDULE_INPUT:
             return self.blocks.schedule(i)
-        if row["kind"] == rec.TORQUE_INPUT:
-            device = self.devices[i]
-            valve = self.valves[device["valve"]]
-            pressures = [self.sets[k] for k in ends_of(valve)]
-            return unique_states(self.device_states(device), self.opening_states(valve), *pressures)
+        if row["kind"] == rec.DEVICE_INPUT:
+            return self.device_reading(self.devices[i])
         if row["kind"] == rec.FORCE_INPUT:
             return unique_states(*self.pushing_states(i))
         stores = {column for column in network.columns_followed(j) if column in network.states}
         switch = int(self.switches[i]["schedule"]) if row["kind"] == rec.FRICTION_FLOW else -1
         return unique_states(*(network.states[column] for column in stores), self.blocks.schedule(switch))
+
+    def device_reading(self, device) -> np.ndarray:
+        """States on which a quantity of a device can depend."""
+        ends = self.valves[device["valve"]] if device["valve"] >= 0 else None
+        nodes = [device["node"], device["second"], *(() if ends is None else ends_of(ends))]
+        opening = unique_states() if ends is None else self.opening_states(ends)
+        mass = self.masses[device["mass"]] if device["mass"] >= 0 else -1
+        masses = unique_states(*([mass, mass + 1] if mass >= 0 else []))
+        return unique_states(self.device_states(device), opening, masses, *(self.sets[n] for n in nodes if n >= 0))
 
     def pushing_states(self, mass: int) -> Iterator[np.ndarray]:
         """Yield states of all force elements that act on a mass."""

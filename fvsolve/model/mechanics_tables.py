@@ -113,7 +113,8 @@ def start_masses(draft, start) -> list[str]:
     for name, row in zip(draft.mass_names, masses, strict=False):
         if row["velocity"] != 0.0:
             moving.append(f"mass {name} moves at {draft.case.amount(row['velocity'], 'velocity')}")
-        if row["force"] != 0.0 and row["lightness"] > 0.0:
+        in_network = name in draft.case.network_places  # its acceleration is in the texts of the network
+        if row["force"] != 0.0 and row["lightness"] > 0.0 and not in_network:
             acceleration = draft.case.amount(row["force"] * row["lightness"], "acceleration")
             moving.append(f"mass {name} accelerates at {acceleration}")
     return moving

@@ -30,17 +30,18 @@ from fvsolve.steady import union
 
 ROUNDING = 1e-12  # value of a row at the start that is rounding, over the sum of the magnitudes of its terms
 CUT = 1e-6  # stored quantity that a switch may cut, over a small deviation
+ANOTHER_WAY = "give this flow another way, such as a diode,"
 MOST_DIODES = 3  # diodes that begin to conduct at once when a switch opens
 MOST_STATES = 200  # of networks whose responses are computed
 
 
 class FirstRows(NamedTuple):
-    """Numbers of the first row of elements (two for each), of nodes, totals and angles; number of all rows."""
+    """Numbers of the first row of elements (two for each), of nodes, totals and integrals; number of all rows."""
 
     elements: int
     nodes: int
     totals: int
-    angles: int
+    integrals: int
     count: int
 
 
@@ -51,7 +52,8 @@ class Network:
     columns : stores and sources by name; sources come after all stores; states : column -> its place in y
     places : nodes of the case; dependent : column of a store that others determine -> linear function of these
     flags : name of a switch -> its first event flag; schedules : (place, key) -> index of the schedule
-    angles : nodes whose angle is a state -> its place in y; values : of all stores and sources at the start
+    integrals : nodes whose potential a state integrates, such as an angle, and elements whose difference of potentials
+    a state integrates, such as a flux -> its place in y; values : of all stores and sources at the start
     solved, written : results of `equations` and `arrays` by mode
     """
 
@@ -63,7 +65,7 @@ class Network:
     dependent: dict[int, Terms] = field(default_factory=dict)
     flags: dict[str, int] = field(default_factory=dict)
     schedules: dict[tuple[str, str], int] = field(default_factory=dict)
-    angles: dict[str, int] = field(default_factory=dict)
+    integrals: dict[str, int] = field(default_factory=dict)
     values: np.ndarray = field(default_factory=lambda: np.zeros(0))
     solved: dict[tuple, Elimination] = field(default_factory=dict)
     written: dict[tuple, tuple] = field(default_factory=dict)
@@ -139,12 +141,12 @@ class Network:
 
     @cached_property
     def rows(self) -> FirstRows:
-        """Numbers of the first rows; those of rates of states and angles come before."""
-        elements = len(self.states) + len(self.angles)
+        """Numbers of the first rows; those of rates of states and integrals come before."""
+        elements = len(self.states) + len(self.integrals)
         nodes = elements + 2 * len(self.elements)
         totals = nodes + len(self.nodes)
-        angles = totals + len(self.totals)
-        return FirstRows(elements, nodes, totals, angles, angles + len(self.angles))
+        integrals = totals + len(self.totals)
+        return FirstRows(elements, nodes, totals, integrals, integrals + len(self.integrals))
 
     @cached_property
     def node_numbers(self) -> dict[str, int]:
@@ -225,14 +227,14 @@ class Network:
 
     def is_known_early(self, row) -> bool:
         """True if a probe reads states alone."""
-        if row["side"] == rec.LOCKED or row["index"] >= self.rows.angles:
+        if row["side"] == rec.LOCKED or row["index"] >= self.rows.integrals:
             return True
         rows = [int(row["index"]), *([int(row["cell"])] if row["side"] in (rec.POWER, rec.ENTROPY) else [])]
         return all(column < len(self.stores) for r in rows for column in self.columns_of_rows[r])
 
     def inputs_of(self, row) -> set[int]:
         """Numbers of the sources that a probe reads, also through torques of friction and heat."""
-        if row["side"] == rec.LOCKED or row["index"] >= self.rows.angles:
+        if row["side"] == rec.LOCKED or row["index"] >= self.rows.integrals:
             return set()
         rows = [int(row["index"]), *([int(row["cell"])] if row["side"] in (rec.POWER, rec.ENTROPY) else [])]
         return self.inputs_of_columns(set().union(*(self.columns_of_rows[r] for r in rows)))
@@ -274,7 +276,7 @@ class Network:
     def fill_node_probe(self, draft, row, node: str, angle: bool) -> None:
         """Fill the row of a probe of the potential of a node, or of its angle."""
         row["kind"], row["side"], row["scale"] = rec.NETWORK_VALUE, rec.ROW, 1.0
-        row["index"] = self.rows.angles + list(self.angles).index(node) if angle else self.node_row(node)
+        row["index"] = self.rows.integrals + list(self.integrals).index(node) if angle else self.node_row(node)
 
     def terms(self, mode: tuple[bool, ...]) -> list[Terms]:
         """All rows in a mode, as linear functions of the stores and sources that are not determined by others."""
@@ -287,7 +289,8 @@ class Network:
                 for other, factor in terms.items():
                     add(rates[column], rates.get(other, {}), factor)
         rows = list(rates.values())
-        rows += [found.potential(node) for node in self.angles]
+        rows += [found.drop(self.elements[self.numbers[name]]) if name in self.numbers else found.potential(name)
+                 for name in self.integrals]  # fmt: skip
         flows = {}
         for item in self.elements:
             active = not item.switch or on[item.switch]
@@ -319,12 +322,12 @@ class Network:
             own = {self.states[c]: value * self.stores[c].unit / unit for c, value in terms.items() if c in self.states}
             given = {c - count: value / unit for c, value in terms.items() if c >= count}
             starts.append(self.start_of(terms, self.values, unit))
-            first = 3 * (len(rows) + len(self.angles)) + len(numbers)
+            first = 3 * (len(rows) + len(self.integrals)) + len(numbers)
             places += [first, first + len(own), first + len(own) + len(given)]
             numbers += [*own, *given]
             factors += [*own.values(), *given.values()]
-        for place in self.angles.values():
-            first = 3 * (len(rows) + len(self.angles)) + len(numbers)
+        for place in self.integrals.values():
+            first = 3 * (len(rows) + len(self.integrals)) + len(numbers)
             places += [first, first + 1, first + 1]
             numbers.append(place)
             factors.append(1.0)
@@ -346,15 +349,27 @@ class Network:
     def lightness(self, node: str) -> float:
         """Rate of the potential of a node per flow into it through its torque of the fluid [1/kg/m2], at least 0."""
         rows, found = self.terms(self.conducting), 0.0
-        torques = [item for item in self.sources if item.reads is not None and item.reads[0] == rec.TORQUE_INPUT]
+        torques = [item for item in self.sources if item.reads is not None and item.reads[0] == rec.DEVICE_INPUT]
         sources = [self.columns[item.name] for item in torques if item.ends[0] == node]
         rates = dict(zip(self.states, rows, strict=False))
         for column, factor in rows[self.node_row(node)].items():
             found = max([found, *(abs(factor * rates.get(column, {}).get(source, 0.0)) for source in sources)])
         return found
 
-    def fault_in(self, mode: tuple[bool, ...], y: np.ndarray) -> str:
-        """Text of the fault of a mode that has no solution, or whose ties would cut a flow at once; "" for none."""
+    def cut_sources(self, mode: tuple[bool, ...], values: np.ndarray) -> list[Element]:
+        """Integrating sources, such as coils, whose flow has no way in a mode but is not zero.
+
+        values : flows of all sources
+        """
+        columns = [column - len(self.stores) for relation in self.equations(mode).relations for column in relation
+                   if len(relation) == 1 and column >= len(self.stores)]  # fmt: skip
+        return [self.sources[j] for j in columns if abs(values[j]) > CUT * self.sources[j].small]
+
+    def fault_in(self, mode: tuple[bool, ...], y: np.ndarray, sources: np.ndarray) -> str:
+        """Text of the fault of a mode that has no solution, or would cut a flow at once; "" for none.
+
+        sources : present values of all sources
+        """
         changed = [item.part.partition(".")[2] for item, on, other in zip(
             self.switches, mode, self.conducting, strict=True) if on != other]  # fmt: skip
         try:
@@ -364,12 +379,15 @@ class Network:
             if error.sources:
                 return f"{listing(changed, 3)} would stick to {names}, whose speed changes with time or differs,"
             return f"{listing(changed, 3)} leaves {names} without a solution"
+        if cut := self.cut_sources(mode, sources):
+            names = listing([item.part.partition(".")[2] for item in cut], 3)
+            return f"{listing(changed, 3)} would cut the current of {names} at once; {ANOTHER_WAY}"
         for column, terms in ties.items():
             store, total = self.stores[column], self.sum_of(terms, y)
             before = self.value_of(column, y)
             if abs(total - before) > CUT * (store.small + abs(total) + abs(before)):
                 text = f"{listing(changed, 3)} would change {store.state} from {before:.6g} to {total:.6g}"
-                return f"{text} at once; give this flow another way, such as a diode,"
+                return f"{text} at once; {ANOTHER_WAY}"
         return ""
 
     def commutated(self, mode: tuple[bool, ...], y: np.ndarray, sources: np.ndarray) -> tuple[bool, ...] | None:
@@ -381,7 +399,8 @@ class Network:
         for count in range(1, min(len(blocking), MOST_DIODES) + 1):
             for chosen in combinations(blocking, count):
                 other = tuple(on or k in chosen for k, on in enumerate(mode))
-                if not self.fault_in(other, y) and all(self.current(other, k, y, sources) > 0.0 for k in chosen):
+                flows = (self.current(other, k, y, sources) for k in chosen)
+                if not self.fault_in(other, y, sources) and all(flow > 0.0 for flow in flows):
                     return other
         return None
 
@@ -426,5 +445,5 @@ class Network:
     def capacity(self) -> int:
         """Number of entries of all rows for which the arrays have space in any mode."""
         if not self.switches:
-            return sum(len(terms) for terms in self.terms(self.conducting)) + len(self.angles)
+            return sum(len(terms) for terms in self.terms(self.conducting)) + len(self.integrals)
         return self.rows.count * len(self.columns)

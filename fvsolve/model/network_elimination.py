@@ -82,6 +82,7 @@ class Elimination:
     ) -> None:
         self.elements, self.columns, self.leaks, self.constant = elements, columns, leaks, constant
         self.stores = {columns[item.name]: item for item in elements if item.is_store}
+        self.integrating = {columns[item.name]: item for item in elements if item.is_source and item.state_of}
         self.names = {number: item.part for item in elements if (number := columns.get(item.name)) is not None}
         self.known: dict[str, int] = {}  # node -> column of its potential
         for kind in (POTENTIAL, CAPACITY):
@@ -199,6 +200,8 @@ class Elimination:
     def with_free_part(self, solution: np.ndarray, free: np.ndarray, block: EquationBlock) -> np.ndarray:
         """Choose the solution among several: of potentials by equal small leaks, of locks by the least flows.
 
+        Locks in parallel share a flow in proportion to their values.
+
         free : basis of the null space, a column for each vector
         """
         unknowns, laws = block.unknowns, []
@@ -208,7 +211,7 @@ class Elimination:
         for item in self.elements:
             if item.kind == LOCK:
                 laws.append(Equation())
-                add(laws[-1].left, {self.unknowns["flow", item.name]: 1.0})
+                add(laws[-1].left, {self.unknowns["flow", item.name]: item.value**-0.5})
         laws = [law for law in laws if law.left.keys() & set(unknowns)]
         further = {c for law in laws for c in law.right} - {*block.columns}
         block.columns += sorted(further)
@@ -228,6 +231,11 @@ class Elimination:
         relation = reduced(relation, self.relations)
         if not relation:
             return False
+        if self.leaks and len(relation) == 1 and (item := self.integrating.get(next(iter(relation)))):
+            self.relations.append(relation)  # no current of a coil in an open circuit, whose flux does not change
+            self.equations.append(Equation())
+            self.put_drop(self.equations[-1], item.ends)
+            return True
         sources = [column for column in relation if column not in self.stores and column not in self.constant]
         sources += [] if relation.keys() & self.stores.keys() else list(relation)
         if sources:

@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.assembly.network_elements import Element
 from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.network_elimination import NetworkError, Terms, substituted
+from fvsolve.model.network_elimination import Elimination, NetworkError, Terms, substituted
 from fvsolve.model.network_tables import network_faults
 
 TURNS = 60  # changes of switches, and of nonlinear sources, in the search
@@ -24,11 +24,14 @@ class NetworkStart:
 
     values : of all columns; mode : as for `Network.equations`; directions : of each friction, 0 while it sticks
     solved : True if the start of all other parts is known
+    integrating : sources that follow the integral of the difference of their potentials, by column
+    free : columns of stores whose value is not known, then of integrating sources whose state is not known
     """
 
     def __init__(self, draft, start, solved: bool = True) -> None:
         self.draft, self.start, self.network, self.solved = draft, start, draft.network, solved
         self.values = np.zeros(len(self.network.columns))
+        self.integrating = {self.network.columns[item.name]: item for item in self.network.sources if item.state_of}
         self.free = self.stated_values()
         self.switches = self.network.switches
         self.known = self.stores.keys() - {*self.free}
@@ -40,6 +43,10 @@ class NetworkStart:
         """Stores by column."""
         return self.network.stores
 
+    def item(self, column: int) -> Element:
+        """Store or integrating source of a column."""
+        return self.stores.get(column) or self.integrating[column]
+
     def stated_values(self) -> list[int]:
         """Write the stated values of stores and sources; returns the columns of stores whose value is not known."""
         network, known = self.network, set()
@@ -47,7 +54,7 @@ class NetworkStart:
             if item.reads is None:
                 schedule = network.schedules[item.part, item.key]
                 self.values[network.columns[item.name]] = self.start.schedule_value(schedule)
-            elif item.reads[0] in (rec.TORQUE_INPUT, rec.FORCE_INPUT) and self.solved:
+            elif item.reads[0] in (rec.DEVICE_INPUT, rec.FORCE_INPUT) and self.solved:
                 self.values[network.columns[item.name]] = self.given_by_others(item)
         for column, item in self.stores.items():
             value = item.initial if item.state_of is None else self.state_of_other(item)
@@ -63,19 +70,21 @@ class NetworkStart:
                 known.add(unknown[0])
             elif column in known:
                 self.check_tie(column, float(rest), terms)
-        return [column for column in self.stores if column not in known and column not in network.dependent]
+        stores = [column for column in self.stores if column not in known and column not in network.dependent]
+        return stores + [column for column, item in self.integrating.items() if item.initial is None]
 
     def given_by_others(self, item: Element) -> float:
-        """Torque of the fluid on a shaft, or force on a mass, at the start."""
+        """Quantity of a device, such as the torque of the fluid on a shaft, or force on a mass, at the start."""
         kind, name = item.reads
         draft = self.draft
         if kind == rec.FORCE_INPUT:
             return float(draft.mass_table[draft.mass_index[name]]["force"])
-        name, sign = name
+        name, quantity, sign = name
         k = draft.device_names.index(name)
         _, part, device = draft.devices[k]
-        row = draft.device_table[k]
-        return sign * device.torque_at_start(self.start, part, row)
+        own = [column for column, other in self.integrating.items() if other.state_of == ("device", name)]
+        flow = float(self.values[own[0]]) if own else 0.0
+        return sign * device.source_at_start(self.start, part, draft.device_table[k], quantity, flow)
 
     def state_of_other(self, item: Element) -> float:
         """Potential at the start of a store whose state is that of another part."""
@@ -123,6 +132,9 @@ class NetworkStart:
             fault = self.switches[0].part, "its state at the start alternates; state the initial values of the stores"
         if fault is not None:
             self.draft.fault(*fault)
+        count = len(self.stores)
+        for item in self.network.cut_sources(self.mode, self.values[count:]) if fault is None else ():
+            self.draft.fault(item.part, "its current at the start has no way; close a switch, or leave out the flux")
         for column, terms in self.network.ties_of(self.mode).items() if fault is None else ():
             self.check_tie(column, self.sum_of(terms), terms)
         self.write()
@@ -178,31 +190,35 @@ class NetworkStart:
         if not place:
             return None
         ties = network.ties_of(self.mode)
-        laws = [substituted(found.rate(column), network.dependent) for column in self.free if column not in ties]
+        laws = [substituted(self.rate(found, column), network.dependent) for column in self.free if column not in ties]
         laws += [{column: -1.0} | terms for column, terms in ties.items() if place.keys() & {column, *terms}]
         matrix, given = np.zeros((len(laws), len(place))), np.zeros(len(laws))
         for row, law in enumerate(laws):
             given[row] = -self.sum_of(law)
             for column in law.keys() & place.keys():
                 matrix[row, place[column]] = law[column]
-        sizes = np.array([item.small for item in map(self.stores.get, self.free)])
+        sizes = np.array([self.item(column).small for column in self.free])
         largest = np.abs(matrix * sizes).max(axis=1)
         scale = 1.0 / np.where(largest > 0.0, largest, 1.0)
         solution, _, rank, _ = np.linalg.lstsq(matrix * sizes * scale[:, None], given * scale, rcond=1e-11)
         self.values[self.free] += solution * sizes
         for law in laws:
             if abs(self.sum_of(law)) > RESTING * self.size_of(law):
-                moving = [self.stores[c] for c in self.free]
+                moving = [self.item(c) for c in self.free]
                 names = listing([item.state for item in moving], 4)
                 return moving[0].part, f"there is no equilibrium of {names} at the start; state its initial value"
         null = np.linalg.svd(matrix * sizes * scale[:, None])[2][rank:]
-        loose = [self.stores[c] for c, k in place.items() if np.any(np.abs(null[:, k]) > LOOSE)]
+        loose = [self.item(c) for c, k in place.items() if np.any(np.abs(null[:, k]) > LOOSE)]
         if item := next((item for item in loose if item.thermal), None):
             return item.part, "nothing determines its temperature at the start; give the key `initial_temperature`"
         return None
 
+    def rate(self, found: Elimination, column: int) -> Terms:
+        """Rate of a store, or of the state of an integrating source."""
+        return found.rate(column) if column in self.stores else found.drop(self.integrating[column])
+
     def set_nonlinear_sources(self) -> None:
-        """Write torques of friction that slips, and heat that elements dissipate."""
+        """Write quantities of devices, torques of friction that slips, and heat that elements dissipate."""
         network, found = self.network, self.network.equations(self.mode)
         numbers = {switch.name: k for k, switch in enumerate(self.switches)}
         on = {switch.name: on for switch, on in zip(self.switches, self.mode, strict=True)}
@@ -210,7 +226,9 @@ class NetworkStart:
             if item.reads is None:
                 continue
             kind, name = item.reads
-            if kind == rec.FRICTION_FLOW:
+            if kind == rec.DEVICE_INPUT:
+                self.values[network.columns[item.name]] = self.given_by_others(item)
+            elif kind == rec.FRICTION_FLOW:
                 k = numbers[name]
                 slip = self.sum_of(substituted(found.drop(self.element(self.switches[k].drop)), network.dependent))
                 self.values[network.columns[item.name]] = self.directions[k] * self.friction_torque(k, slip)
@@ -309,8 +327,9 @@ def start_network(draft, start) -> list[str]:
     if not network.values.size or draft.faults:
         return []
     factors, texts = network.arrays(search.mode)[1], []
-    for rate, (column, _) in zip(factors, network.states.items(), strict=False):
-        item = network.stores[column]
-        if rate != 0.0 and item.state:
+    by_name = {item.name: item for item in network.elements}
+    items = [*(network.stores[column] for column in network.states), *map(by_name.get, network.integrals)]
+    for rate, item in zip(factors, items, strict=False):
+        if rate != 0.0 and item is not None and item.state:
             texts.append(f"{item.state} changes by {rate * item.unit:.4g} per second")
     return texts

@@ -54,7 +54,8 @@ def lower_networks(draft) -> None:
         if column not in network.dependent:
             network.states[column] = state_place(draft, item, sizes[column])
     for name in probed_angles(draft.case):
-        network.angles[name] = draft.states([f"{name}.angle"], 1.0)
+        network.integrals[name] = draft.states([f"{name}.angle"], 1.0)
+    network.integrals |= {item.name: state_place(draft, item, 1.0) for item in network.sources if item.state_of}
     for place, text in speed_faults(draft, network):
         draft.fault(place, text)
     fill_tables(draft, network)
@@ -79,7 +80,12 @@ def network_faults(error: NetworkError, case) -> Iterator[tuple[str, str]]:
     """Yield the fault (place, text) of a network without a unique solution."""
     names = [part.partition(".")[2] for part in error.parts]
     dry = [name for name in names if getattr(case.links.get(name), "kind", "") in ("bearing", "clutch")]
-    if error.sources and dry:
+    coils = [name for name in names if getattr(case.links.get(name), "kind", "") == "solenoid"]
+    if coils and len(names) > 1:
+        others = listing([name for name in names if name != coils[0]])
+        text = f"its flux gives the current, and {others} in series gives a current too"
+        yield f"links.{coils[0]}", f"{text}; put a resistor in parallel with one of them"
+    elif error.sources and dry:
         yield f"links.{dry[0]}", NO_INERTIA
     elif error.tied:
         sources = listing([part.partition(".")[2] for part in error.sources])
@@ -146,18 +152,17 @@ def fill_tables(draft, network: Network) -> None:
             row["kind"], row["index"] = rec.SCHEDULE_INPUT, network.schedules[item.part, item.key]
             continue
         row["kind"], name = item.reads
-        if row["kind"] == rec.TORQUE_INPUT:
-            name, sign = name
-            row["index"], row["sign"] = draft.device_names.index(name), sign
-            _, part, device = draft.devices[row["index"]]
-            row["side"] = device.quantities.index("torque")
+        if row["kind"] == rec.DEVICE_INPUT:
+            name, quantity, row["sign"] = name
+            row["index"] = draft.device_names.index(name)
+            row["side"] = draft.devices[row["index"]][2].quantities.index(quantity)
         elif row["kind"] == rec.FORCE_INPUT:
             row["index"] = draft.mass_index[name]
         elif row["kind"] == rec.FRICTION_FLOW:
             row["index"] = [switch.name for switch in network.switches].index(name)
         else:
             row["index"] = [other.name for other in network.booked].index(name)
-    places = [*network.states.values(), *network.angles.values()]
+    places = [*network.states.values(), *network.integrals.values()]
     draft.network_rate_table = np.array([(place,) for place in places], rec.NETWORK_RATE)
     draft.network_element_table = np.zeros(len(network.booked), rec.NETWORK_ELEMENT)
     for item, row in zip(network.booked, draft.network_element_table, strict=True):

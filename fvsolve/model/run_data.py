@@ -223,11 +223,9 @@ class RunData:
         if network is None or not network.switches:
             return ""
         mode = network.mode_of(self.armed)
-        if text := network.fault_in(mode, y):
-            at = int(self.model.layout["network"])
-            sources = (
-                self.tables.network_inputs["start"] + self.written.spare[at : at + len(self.tables.network_inputs)]
-            )
+        at, inputs = int(self.model.layout["network"]), self.tables.network_inputs
+        sources = inputs["start"] + self.written.spare[at : at + len(inputs)]
+        if text := network.fault_in(mode, y, sources):
             if (mode := network.commutated(mode, y, sources)) is None:
                 return text
             network.set_diodes(mode, self.armed)

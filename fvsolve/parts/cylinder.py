@@ -4,14 +4,37 @@ import math
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.assembly.mechanics import PushLowering, join_ports
+from fvsolve.assembly.network_elements import fill_network_probe
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.hydraulic_nodes import Chamber
+from fvsolve.parts.network_parts import dry_friction
 from fvsolve.parts.nodes_and_links import Link, Ports
-from fvsolve.parts.table_model import CaseContext, Faults
+from fvsolve.parts.table_model import CaseContext, Faults, Nested, Table
 from fvsolve.parts.value import PROFILE, VALUE, Quantity, UsualRange, nonnegative, positive
 
 SIZES = UsualRange(5e-4, 30.0, "micro-hydraulics to ship lifts")
 AREAS = UsualRange(1e-7, 30.0, "micro-hydraulics to presses")
+
+
+class DryFriction(Table):
+    """Dry friction F = (F_c + (F_s - F_c) exp(-(v / v_s)^2)) sign(v), with F_c `coulomb`, F_s `static`.
+
+    v_s is `stribeck_velocity`. It sticks, v = 0, until the force exceeds F_s.
+    """
+
+    coulomb: Annotated[float, Quantity("force", nonnegative, "force F_c of dry friction in motion [N]")]
+    static: Annotated[
+        float | None, Quantity("force", nonnegative, "greatest force F_s at rest; `coulomb` if left out [N]")
+    ] = None
+    stribeck_velocity: Annotated[float | None, Quantity(
+        "velocity", positive,
+        "speed v_s at which the excess of the force at rest has fallen to 1/e; no excess in motion if left out [m/s]",
+    )] = None  # fmt: skip
+
+    @property
+    def greatest(self) -> float:
+        """Greatest force at rest [N]."""
+        return self.coulomb if self.static is None else self.static
 
 
 class Cylinder(Link, kind="cylinder"):
@@ -19,9 +42,11 @@ class Cylinder(Link, kind="cylinder"):
 
     The volumes are dead_volume_A + area_A x and dead_volume_B + area_B (stroke - x), with the piston position
     x = x_rod - x_case - closed_length, or between points of bodies, their distance minus closed_length.
-    The piston pushes the rod forward by area_A p_A - area_B p_B - viscous_friction (v_rod - v_case), p above ambient,
-    and the case backward by the same force. Ports: rod, case (velocity, force); places A, B (pressure, flow). Stored
-    energy: that of its chambers. Dissipated power: leakage (p_A - p_B)^2 + viscous_friction (v_rod - v_case)^2 [W].
+    The piston pushes the rod forward by area_A p_A - area_B p_B - viscous_friction v - F, p above ambient, and the case
+    backward by the same force, with v = v_rod - v_case and the dry friction F = (F_c + (F_s - F_c) exp(-(v / v_s)^2))
+    sign(v) of `friction`; it sticks, v = 0, until the other forces exceed F_s. Ports: rod, case (velocity, force);
+    places A, B (pressure, flow). Stored energy: that of its chambers. Dissipated power: leakage (p_A - p_B)^2 +
+    viscous_friction v^2 + F v [W].
     """
 
     no_scalars: ClassVar[str] = "its chambers carry no scalars yet; leave out this part, or `[scalars]`"
@@ -74,7 +99,17 @@ class Cylinder(Link, kind="cylinder"):
     viscous_friction: Annotated[
         float, Quantity("damping", nonnegative, "viscous friction of piston and rod [N s/m]", changes=VALUE)
     ] = 0.0
+    friction: Annotated[DryFriction | None, Nested(DryFriction, "dry friction beside the viscous friction")] = None
     elevation: Annotated[float | None, Quantity("length", about="elevation of both chambers [m]")] = None
+
+    @property
+    def has_dry_friction(self) -> bool:
+        """True if the dry friction is not zero."""
+        return self.friction is not None and self.friction.greatest > 0.0
+
+    @property
+    def network_places(self) -> tuple[str, ...]:
+        return (self.ports["rod"], self.ports["case"]) if self.has_dry_friction else ()
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
@@ -91,6 +126,12 @@ class Cylinder(Link, kind="cylinder"):
         for place, pressure in (("A", self.initial_pressure_A), ("B", self.initial_pressure_B)):
             if pressure is not None:
                 yield from around.boiling_faults("links", name, f"initial_pressure_{place}", [pressure])
+        if self.friction is not None and any(map(around.spatial, self.ports.values())):
+            text = "dry friction acts between masses on an axis only, and this cylinder joins points in space"
+            yield ("friction",), f"{text}; remove this key, or use `viscous_friction`"
+        if self.friction is not None and self.friction.greatest < self.friction.coulomb:
+            text = f"is {self.friction.static:g} N, below `coulomb`, {self.friction.coulomb:g} N"
+            yield ("friction", "static"), f"{text}; expected at least that force"
         if (distance := around.separation(self, "case", "rod")) is None:
             return
         x, (rod, case) = distance - self.closed_length, (self.ports["rod"], self.ports["case"])
@@ -125,6 +166,14 @@ class CylinderRows(PushLowering, kind="cylinder"):
 
     table = "piston"
 
+    def network_elements(self, case, name, part):
+        """Elements of the dry friction between rod and case."""
+        if not part.has_dry_friction:
+            return [], []
+        rod, housing = (None if case.nodes[place].kind == "frame" else place for place in part.network_places)
+        coulomb, static, speed = part.friction.coulomb, part.friction.greatest, part.friction.stribeck_velocity
+        return dry_friction(f"links.{name}", (rod, housing), (coulomb, static, speed or 0.0, 1.0))
+
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
         distance, row["speed"] = join_ports(draft, row, ("case", "rod"), (link.ports["case"], link.ports["rod"]))
@@ -134,6 +183,10 @@ class CylinderRows(PushLowering, kind="cylinder"):
         row["stroke"], row["leakage"], row["damping"] = link.stroke, link.leakage, link.viscous_friction
 
     def probe(self, draft, name, probe, row) -> None:
+        if probe.quantity == "force" and draft.case.links[name].has_dry_friction:
+            fill_network_probe(draft, row, f"links.{name}", "all flows")
+            row["side"], row["cell"] = rec.NET_PUSH, draft.push_names.index(name)
+            return None
         if probe.quantity == "force":
             return super().probe(draft, name, probe, row)
         row["index"] = draft.piston_names.index(name)

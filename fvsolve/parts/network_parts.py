@@ -1,9 +1,10 @@
-"""Declarations common to parts of rotation, electricity and heat: given potentials, probes of nodes, `heat_to`."""
+"""Declarations common to parts of networks: given potentials, probes of nodes, dry friction, `heat_to`."""
 
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from fvsolve.assembly.network_elements import POTENTIAL, Element, NetworkRows, node_or_reference
+from fvsolve.assembly.network_elements import FLOW, LOCK, POTENTIAL, Element, NetworkRows, Switch, node_or_reference
+from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.nodes_and_links import Node
 from fvsolve.parts.schedule import Schedule
 from fvsolve.parts.value import Text
@@ -43,6 +44,21 @@ class GivenPotentialRows(NetworkNodeRows, kind=""):
 def ends_of(case, part: Any) -> tuple[str | None, str | None]:
     """Nodes of the network that both ports of a link join; None for the reference."""
     return node_or_reference(case, part.from_), node_or_reference(case, part.to)
+
+
+def dry_friction(
+    place: str, ends: tuple, numbers: tuple[float, ...], heat_to: str | None = None, torque: Schedule | None = None
+) -> tuple[list[Element], list[Switch]]:
+    """(elements, switches) of dry friction: a torque or force while it slips, equal speeds while it sticks.
+
+    numbers : as those of `Switch`; torque : schedule of the torque of a clutch
+    """
+    switch = Switch(rec.FRICTION, place, place, f"{place}.friction", f"{place}.lock", numbers, torque, "torque")
+    return [
+        Element(FLOW, f"{place}.friction", place, ends, reads=(rec.FRICTION_FLOW, place), ledger="dissipated",
+                heat_to=heat_to),
+        Element(LOCK, f"{place}.lock", place, ends, numbers[1] or 1.0, switch=place),
+    ], [switch]  # fmt: skip
 
 
 def heat_to_faults(part: Any, around: Any) -> Iterator:

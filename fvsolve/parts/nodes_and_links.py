@@ -133,15 +133,15 @@ class Link(Part):
     joins: ClassVar[dict[str, str]] = {}  # port -> required domain of its place
     sensed_keys: ClassVar[tuple[str, ...]] = ()  # keys that name hydraulic places whose pressure it only senses
     in_network: ClassVar[bool] = False  # True if it is an element of a network of rotation, electricity or heat
-    network_ports: ClassVar[tuple[str, ...]] = ()  # ports whose places are in such a network; all if `in_network`
+    network_ports: ClassVar[tuple[str, ...]] = ()  # its only ports in such a network, if it is a part of the fluid too
     main_quantities: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded where a case has no probes
     may_lack: ClassVar[tuple[str, ...]] = ()  # ports that may join nothing
     owns: ClassVar[dict[str, str]] = {}  # own place, `LINK.PLACE` for other parts -> domain
 
-    def __init_subclass__(cls, **rest: Any) -> None:
-        super().__init_subclass__(**rest)
-        if cls.in_network:
-            cls.network_ports = tuple(cls.joins)
+    @property
+    def network_places(self) -> tuple[str, ...]:
+        """Places of its ports that its elements in a network of potential and flow join."""
+        return tuple(place for port, place in self.ports.items() if self.in_network or port in self.network_ports)
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
         """(places, links) of the solved network for this link, each by name.

@@ -8,23 +8,20 @@ from pydantic import Field
 from fvsolve.assembly.lowering import ANGULAR_SPEED, InputKind
 from fvsolve.assembly.network_elements import (
     CAPACITY,
-    FLOW,
     INERTANCE,
-    LOCK,
     RESISTANCE,
     TRANSFORMER,
     Element,
     NetworkRows,
-    Switch,
     fill_network_probe,
     node_or_reference,
 )
-from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.network_parts import (
     HEAT_TO,
     GivenPotential,
     GivenPotentialRows,
     NetworkNodeRows,
+    dry_friction,
     ends_of,
     heat_to_faults,
 )
@@ -173,15 +170,6 @@ def resistances(place: str, ends: tuple, damping: float, heat_to: str | None = N
     return [Element(RESISTANCE, f"{place}.damping", place, ends, 1.0 / damping, ledger="dissipated", heat_to=heat_to)]
 
 
-def friction_elements(place: str, ends: tuple, heat_to: str | None = None) -> list[Element]:
-    """Elements of dry friction: a torque while it slips, equal speeds while it sticks."""
-    return [
-        Element(FLOW, f"{place}.friction", place, ends, reads=(rec.FRICTION_FLOW, place), ledger="dissipated",
-                heat_to=heat_to),
-        Element(LOCK, f"{place}.lock", place, ends, switch=place),
-    ]  # fmt: skip
-
-
 class Bearing(RotationalLink, kind="bearing"):
     """Bearing with viscous and dry friction: T = damping w + (T_c + (T_s - T_c) exp(-(w / w_s)^2)) sign(w).
 
@@ -222,8 +210,8 @@ class BearingRows(NetworkRows, kind="bearing"):
         if static == 0.0:
             return found, []
         numbers = part.friction_torque, static, part.stribeck_speed or 0.0, 1.0
-        switch = Switch(rec.FRICTION, place, place, f"{place}.friction", f"{place}.lock", numbers)
-        return found + friction_elements(place, ends, part.heat_to), [switch]
+        friction, switches = dry_friction(place, ends, numbers, part.heat_to)
+        return found + friction, switches
 
     def probe(self, draft, name, probe, row) -> None:
         fill_network_probe(draft, row, f"links.{name}", "all flows")
@@ -252,10 +240,8 @@ class ClutchRows(NetworkRows, kind="clutch"):
     input_kinds: ClassVar = {"torque": CLUTCH_TORQUE}
 
     def network_elements(self, case, name, part):
-        place = f"links.{name}"
-        switch = Switch(rec.FRICTION, place, place, f"{place}.friction", f"{place}.lock",
-                        (0.0, 0.0, 0.0, part.static_factor), part.torque, "torque")  # fmt: skip
-        return friction_elements(place, ends_of(case, part), part.heat_to), [switch]
+        numbers = (0.0, 0.0, 0.0, part.static_factor)
+        return dry_friction(f"links.{name}", ends_of(case, part), numbers, part.heat_to, part.torque)
 
     def probe(self, draft, name, probe, row) -> None:
         if probe.quantity == "torque":

@@ -54,7 +54,7 @@ class MachineRows(Device, kind="displacement-pump"):
         if shaft is None:
             return [], []
         ends, (_, viscous, dry) = (shaft, None), part.losses
-        found = [Element(FLOW, f"{place}.fluid", place, ends, reads=(rec.TORQUE_INPUT, (name, -1.0)))]
+        found = [Element(FLOW, f"{place}.fluid", place, ends, reads=(rec.DEVICE_INPUT, (name, "torque", -1.0)))]
         found += resistances(place, ends, viscous)
         if dry == 0.0:
             return found, []
@@ -147,8 +147,7 @@ class MachineRows(Device, kind="displacement-pump"):
             floats[at + law.LIGHTNESS] = draft.network.lightness(part.shaft)
         return []
 
-    def torque_at_start(self, start, part, row) -> float:
-        """Torque of the fluid on the shaft at the start [N m]."""
+    def source_at_start(self, start, part, row, quantity, flow) -> float:
         drop, setting = start.valve_drive(int(row["valve"]))[0], start.draft.tables.floats[row["data"] + law.SETTING]
         return float(setting) * part.displacement * float(drop)
 

@@ -288,11 +288,10 @@ class ShaftLowering:
             Element(CAPACITY, f"{place}.shaft", place, (shaft, None), part.inertia or 1.0, f"{name}.speed",
                     state_of=("device", name), unit=rated),
             Element(FLOW, f"{place}.fluid", place, (None, shaft),
-                    reads=(rec.TORQUE_INPUT, (name, self.fluid_torque_sign))),
+                    reads=(rec.DEVICE_INPUT, (name, "torque", self.fluid_torque_sign))),
         ], []  # fmt: skip
 
-    def torque_at_start(self, start, part, row) -> float:
-        """Value of the probe `torque` at the start [N m]."""
+    def source_at_start(self, start, part, row, quantity, flow) -> float:
         return -self.fluid_torque_sign * self.fluid_torque(start, row, start.valves[row["valve"]])
 
     def scales(self, draft, name, part) -> list[float]:

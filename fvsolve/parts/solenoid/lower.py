@@ -1,0 +1,88 @@
+"""Solenoids in the tables of a model, and in the network of their circuit and armature."""
+
+from math import asinh, pi, sinh, sqrt
+
+from fvsolve.assembly.lowering import Device
+from fvsolve.assembly.network_elements import FLOW, Element, node_or_reference
+from fvsolve.kernels import dtypes as rec
+from fvsolve.parts.solenoid import law
+
+MU_0 = 4e-7 * pi  # permeability of the vacuum, to 1e-9 [H/m]
+SMALL_FLUX_DENSITY = 0.1  # sets the size of a small flux [T]
+
+
+class SolenoidRows(Device, kind="solenoid"):
+    """Conversion of solenoids to a state, and to sources of current and force that follow it."""
+
+    law = law
+    table = ""
+    states = ("flux_linkage",)
+    quantities = ("current", "flux", "force")
+    events = ("passes its closed position", "passes its closed position")
+    remedy = "keep a gap between end stop and `closed_position`"
+
+    def network_elements(self, case, name, part):
+        place = f"links.{name}"
+        p, n = (node_or_reference(case, part.ports[port]) for port in "pn")
+        armature = part.ports["armature"]
+        found = [Element(FLOW, place, place, (p, n), state=f"{name}.flux", initial=part.initial_flux,
+                         state_of=("device", name), unit=1.0 / part.turns,
+                         reads=(rec.DEVICE_INPUT, (name, "current", 1.0)))]  # fmt: skip
+        if case.nodes[armature].kind == "mass":
+            reads = rec.DEVICE_INPUT, (name, "force", 1.0)
+            found.append(Element(FLOW, f"{place}.force", place, (None, armature), reads=reads))
+        return found, []
+
+    def numbers(self, draft, name, part) -> list[float]:
+        saturation = 0.0 if part.saturation_flux is None else part.saturation_flux**-2
+        per_gap = 1.0 / (MU_0 * part.pole_area)
+        return [part.turns, part.core_reluctance, saturation, per_gap, part.closed_position, 0.0]
+
+    def scales(self, draft, name, part) -> list[float]:
+        return [SMALL_FLUX_DENSITY * part.pole_area * part.turns]
+
+    def begin(self, start, part, row) -> list[str]:
+        row["mass"] = start.draft.mass_index[part.ports["armature"]]
+        start.draft.start_flags[int(row["event"])] = self.distance(start, row) >= 0.0
+        return []
+
+    def distance(self, start, row) -> float:
+        """Distance from the armature to its closed position at the start [m]."""
+        closed = start.draft.tables.floats[row["data"] + law.CLOSED]
+        return float(closed - start.draft.mass_table[row["mass"]]["position"])
+
+    def source_at_start(self, start, part, row, quantity: str, flow: float) -> float:
+        numbers, at, distance = start.draft.tables.floats, int(row["data"]), self.distance(start, row)
+        side = 1.0 if distance >= 0.0 else -1.0
+        flux = part.initial_flux
+        if flux is None:  # from (slope + cubic Phi^2) Phi = turns times current
+            slope = numbers[at + law.CORE] + numbers[at + law.PER_GAP] * side * distance
+            cubic = numbers[at + law.CORE] * numbers[at + law.SATURATION]
+            flux = numbers[at + law.TURNS] * flow / slope
+            if cubic > 0.0:
+                size = sqrt(slope / (3.0 * cubic))
+                flux = 2.0 * size * sinh(asinh(1.5 * flux / size) / 3.0)
+        numbers[at + law.FLUX] = flux
+        compute = getattr(law.quantity_of, "py_func", law.quantity_of)
+        return float(compute(self.quantities.index(quantity), numbers, at, flux, distance, side))
+
+    def energy_rows(self, model, part, row, y, out):
+        """Row of the energy matrix L for the flux at constant position: energy slope d^2 / (2 turns^2).
+
+        d is the deviation of the flux linkage, slope the derivative of reluctance times flux by the flux [1/H].
+        """
+        numbers, at = model.tables.floats, int(row["data"])
+        flux = numbers[at + law.FLUX] + y[row["y"]] / part.turns
+        armature = model.tables.masses[row["mass"]]
+        moved = y[armature["y"]] if armature["y"] >= 0 else 0.0
+        gap = abs(part.closed_position - armature["position"] - moved)
+        slope = part.core_reluctance * (1.0 + 3.0 * numbers[at + law.SATURATION] * flux**2)
+        slope += numbers[at + law.PER_GAP] * gap
+        return [{int(row["y"]): float(sqrt(0.5 * slope) / part.turns)}]
+
+    def above(self, model, part, row) -> float:
+        armature, numbers, at = model.tables.masses[row["mass"]], model.tables.floats, int(row["data"])
+        distance = part.closed_position - float(armature["position"])
+        compute = getattr(law.quantity_of, "py_func", law.quantity_of)
+        side = 1.0 if distance >= 0.0 else -1.0
+        return float(compute(law.ENERGY, numbers, at, numbers[at + law.FLUX], distance, side))
