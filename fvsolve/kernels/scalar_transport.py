@@ -434,27 +434,36 @@ def scalar_rates(t, y, dydt, out, handle):
 
 
 @njit
+def value_at_probe(y, out, tables, probe, kind, i, q):
+    """Value of scalar q at the place of a probe.
+
+    kind : NODE_SCALAR or PIPE_SCALAR; i : number of the node or pipe
+    """
+    layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes.size
+    if kind == NODE_SCALAR:
+        return out[layout["value"] + q * nodes + i]
+    if probe["side"] != 0:
+        right = 1 if probe["side"] > 0 else 0
+        if probe["side"] * end_flow(out, tables, i, right) < 0.0:
+            node = pipes[i]["to_node"] if right == 1 else pipes[i]["from_node"]
+            return out[layout["value"] + q * nodes + node]
+        return out[layout["edge"] + 2 * (q * pipes.size + i) + right]
+    value = 0.0
+    for j in range(probe["count"]):
+        c = probe["cell"] + j
+        w = y[pipes[i]["y"] + c] + y[pipes[i]["y"] + pipes[i]["cells"] + c]
+        m = tables.profile[pipes[i]["center"] + c] + w / pipes[i]["speed"]
+        s = y[tables.scalars[q]["y"] + pipes[i]["cell"] + c]
+        value += tables.floats[probe["weights"] + j] * s / m
+    return value
+
+
+@njit
 def observe_scalars(t, y, out, handle, values):
     """Write the values of scalar probes to `values`: at a node, at a pipe end, or between the centres of two cells."""
     tables = open_tables(handle)
-    layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes.size
     for k in range(tables.probes.size):
         probe = tables.probes[k]
-        q, i = probe["scalar"], probe["index"]
-        if probe["kind"] == NODE_SCALAR:
-            values[k] = out[layout["value"] + q * nodes + i]
-        elif probe["kind"] == PIPE_SCALAR and probe["side"] != 0:
-            right = 1 if probe["side"] > 0 else 0
-            if probe["side"] * end_flow(out, tables, i, right) < 0.0:
-                node = pipes[i]["to_node"] if right == 1 else pipes[i]["from_node"]
-                values[k] = out[layout["value"] + q * nodes + node]
-            else:
-                values[k] = out[layout["edge"] + 2 * (q * pipes.size + i) + right]
-        elif probe["kind"] == PIPE_SCALAR:
-            values[k] = 0.0
-            for j in range(probe["count"]):
-                c = probe["cell"] + j
-                w = y[pipes[i]["y"] + c] + y[pipes[i]["y"] + pipes[i]["cells"] + c]
-                m = tables.profile[pipes[i]["center"] + c] + w / pipes[i]["speed"]
-                s = y[tables.scalars[q]["y"] + pipes[i]["cell"] + c]
-                values[k] += tables.floats[probe["weights"] + j] * s / m
+        if probe["kind"] == NODE_SCALAR or probe["kind"] == PIPE_SCALAR:
+            values[k] = value_at_probe(y, out, tables, probe, probe["kind"], probe["index"], probe["scalar"])
+
