@@ -4,9 +4,9 @@ from fvsolve.basins.advection import THIN
 from fvsolve.basins.basin_scalars import cell_value
 from fvsolve.basins.cell_sides import deviations_of
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import CELL_SCALAR, LOCAL_AFFINITY, RATE, REACTION_VALUE
+from fvsolve.kernels.dtypes import CELL_SCALAR, LOCAL_AFFINITY, RATE, RATE_UNWANTED, REACTION_VALUE
 from fvsolve.kernels.reactions import (
-    add_observed, affinity_of, chosen, one_way_rates, react, read_amounts, sums_of_network,
+    add_observed, affinity_of, chosen, greatest_rate, one_way_rates, react, read_amounts, sums_of_network,
 )  # fmt: skip
 from fvsolve.kernels.table_handle import open_tables
 
@@ -28,18 +28,28 @@ def mass_per_depth(tables, basin, i):
 
 @njit
 def add_reactions(t, y, dydt, out, handle):
-    """Add changes by reactions to the rates of scalars in all basins; raise out[RATE] by the rate of reactions."""
+    """Add changes by reactions to the rates of scalars in all basins; write rates of reactions to the record of gains."""
     tables = open_tables(handle)
-    quick = 0.0
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         seen, n = deviations_of(basin, tables.seen, y), basin["n"]
         for i in range(n if basin["carried"] >= 0 else 0):
             depth, weight = cell_depth(tables, basin, seen, i), mass_per_depth(tables, basin, i)
             first, entry = basin["carried"] + i, basin["lost"] + i
-            rate = react(seen, dydt, out, tables, first, n, max(depth, THIN), depth, weight, entry)
-            quick = max(quick, rate)
-    out[RATE] += quick
+            react(seen, dydt, out, tables, first, n, max(depth, THIN), depth, weight, entry)
+
+
+@njit
+def limit_rates_in_basins(t, y, dydt, out, handle):
+    """Raise the greatest rate of change by reactions in `out` to that in basins, if it limits steps [1/s]."""
+    tables = open_tables(handle)
+    at = tables.layout[0]["quickest"]
+    for b in range(tables.basins.size if out[RATE] != RATE_UNWANTED and tables.reactions[0]["limits"] == 1 else 0):
+        basin = tables.basins[b]
+        seen, n = deviations_of(basin, tables.seen, y), basin["n"]
+        for i in range(n if basin["carried"] >= 0 else 0):
+            read_amounts(tables, seen, basin["carried"] + i, n, max(cell_depth(tables, basin, seen, i), THIN))
+            out[at] = max(out[at], greatest_rate(tables))
 
 
 @njit

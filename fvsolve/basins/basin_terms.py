@@ -38,6 +38,7 @@ MESHES = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: advect_on_meshes
 SOURCES = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: add_sources")
 REACTIONS = RhsTerms(
     package=PACKAGE,
+    prepare="basin_reactions: limit_rates_in_basins",
     scalar_rates="basin_reactions: add_reactions",
     observe="basin_reactions: observe_reactions_in_basins",
 )

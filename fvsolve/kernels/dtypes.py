@@ -447,6 +447,7 @@ LAYOUT = record(
     gain=i8,  # after `supply` in the ledger: inflow of each scalar through nodes [kg/s]
     loss=i8,  # then the negative decay of each scalar [kg/s]
     extent=i8,  # then the rates of reactions, times the mass that reacts [kg mol/m3/s]
+    quickest=i8,  # greatest rate of change by reactions [1/s], an entry if there are reactions
     value=i8,  # of each scalar at all nodes
     edge=i8,  # values of scalars in pipes at both ends
     carried=i8,  # flow of scalars along pipes through both ends [kg/s]

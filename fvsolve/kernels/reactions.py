@@ -11,7 +11,8 @@ from math import inf, log
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import (
-    CELL_SCALAR, CHANGE, CHEMICAL_POWER, FORWARD_ORDER, LOCAL_AFFINITY, MOLAR_RATE, RATE, REACTION_VALUE, REVERSE_ORDER,
+    CELL_SCALAR, CHANGE, CHEMICAL_POWER, FORWARD_ORDER, LOCAL_AFFINITY, MOLAR_RATE, RATE, RATE_UNWANTED,
+    REACTION_VALUE, REVERSE_ORDER,
 )  # fmt: skip
 from fvsolve.kernels.formula_programs import run_program
 from fvsolve.kernels.scalar_transport import DRY_DEPTH, cell_mass, has_storage, value_at_probe
@@ -96,7 +97,7 @@ def greatest_rate(tables):
 
 @njit
 def react(y, dydt, out, tables, first, stride, mass, present, weight, entry):
-    """Add the changes by all reactions at a place to its rates; returns `greatest_rate` if that limits steps, else 0.
+    """Add the changes by all reactions at a place to its rates.
 
     first, stride, mass : as for `read_amounts`; present : mass that reacts, less than `mass` in a thin film
     weight : mass [kg] per `present`; entry : number of the place in the ledger of reactions
@@ -116,7 +117,6 @@ def react(y, dydt, out, tables, first, stride, mass, present, weight, entry):
             out[at] += weight * change
         else:
             out[at + entry] = weight * change
-    return greatest_rate(tables) if tables.reactions[0]["limits"] == 1 else 0.0
 
 
 @njit(forceinline=True)
@@ -129,13 +129,32 @@ def stored_mass(y, node):
 
 
 @njit
-def reaction_rates(t, y, dydt, out, handle):
-    """Add changes by reactions to the rates in pipes and nodes; raise out[RATE] by half of their rate [1/s].
-
-    Rates of all reactions at all places are also written to the record of gains and losses.
-    """
+def limit_rates(t, y, dydt, out, handle):
+    """Write the greatest rate of change by reactions in pipes and nodes to `out`, if it limits steps [1/s]."""
     tables = open_tables(handle)
-    layout, scalar, stride, quick = tables.layout[0], tables.scalars[0], scalar_stride(tables), 0.0
+    at, scalar, stride = tables.layout[0]["quickest"], tables.scalars[0], scalar_stride(tables)
+    if out[RATE] == RATE_UNWANTED:
+        return
+    out[at] = 0.0
+    if tables.reactions[0]["limits"] == 0:
+        return
+    for p in range(tables.pipes.size):
+        for i in range(tables.pipes[p]["cells"]):
+            first = scalar["y"] + tables.pipes[p]["cell"] + i
+            read_amounts(tables, y, first, stride, cell_mass(y, tables, p, i))
+            out[at] = max(out[at], greatest_rate(tables))
+    for i in range(tables.nodes.size):
+        mass = stored_mass(y, tables.nodes[i])
+        if mass > 0.0:
+            read_amounts(tables, y, tables.integers[scalar["places"] + i], stride, mass)
+            out[at] = max(out[at], greatest_rate(tables))
+
+
+@njit
+def reaction_rates(t, y, dydt, out, handle):
+    """Add changes by reactions to the rates in pipes and nodes; write rates of all reactions to the record of gains."""
+    tables = open_tables(handle)
+    layout, scalar, stride = tables.layout[0], tables.scalars[0], scalar_stride(tables)
     for k in range(tables.reactions.size):
         for m in range(tables.reactions[k]["extents"]):
             out[layout["extent"] + tables.reactions[k]["extent"] + m] = 0.0
@@ -143,15 +162,12 @@ def reaction_rates(t, y, dydt, out, handle):
         pipe = tables.pipes[p]
         for i in range(pipe["cells"]):
             mass, entry = cell_mass(y, tables, p, i), pipe["cell"] + i
-            rate = react(y, dydt, out, tables, scalar["y"] + entry, stride, mass, mass, pipe["dx"], entry)
-            quick = max(quick, rate)
+            react(y, dydt, out, tables, scalar["y"] + entry, stride, mass, mass, pipe["dx"], entry)
     for i in range(tables.nodes.size):
         mass = stored_mass(y, tables.nodes[i])
         if mass > 0.0:
             first = tables.integers[scalar["places"] + i]
-            rate = react(y, dydt, out, tables, first, stride, mass, mass, 1.0, first - scalar["y"])
-            quick = max(quick, rate)
-    out[RATE] += 0.5 * quick
+            react(y, dydt, out, tables, first, stride, mass, mass, 1.0, first - scalar["y"])
 
 
 @njit(forceinline=True)

@@ -201,7 +201,11 @@ COMPONENTS = {
     "carried": RhsTerms(
         outlet_values="scalar_transport: pipe_outlet_values", scalar_rates="scalar_transport: scalar_rates"
     ),
-    "reactions": RhsTerms(scalar_rates="reactions: reaction_rates", observe="reactions: observe_reactions"),
+    "reactions": RhsTerms(
+        prepare="reactions: limit_rates",
+        scalar_rates="reactions: reaction_rates",
+        observe="reactions: observe_reactions",
+    ),
     "forces, linear": RhsTerms(observe="pipe_forces: observe_forces_linear"),
     "forces, barotropic": RhsTerms(observe="pipe_forces: observe_forces_barotropic"),
     "forces, cavitating": RhsTerms(observe="pipe_forces: observe_forces_cavitating"),

@@ -138,6 +138,13 @@ def has_storage(kind):
 
 
 @njit(forceinline=True)
+def change_rate(out, tables, q):
+    """Rate at which scalar q decays and reacts [1/s]; explicit steps are limited by half of it."""
+    decay = tables.scalars[q]["decay"]
+    return decay + out[tables.layout[0]["quickest"]] if tables.reactions.size > 0 else decay
+
+
+@njit(forceinline=True)
 def mixes(y, out, tables, i):
     """True if the value of a scalar at node i is that of the present inflow: the node is a junction or a dry tank."""
     node = tables.nodes[i]
@@ -203,7 +210,7 @@ def mix_nodes(t, y, out, tables, q):
     for i in range(n):
         if has_storage(nodes[i]["kind"]):
             mass = max(nodes[i]["mass"] + y[nodes[i]["y"]], RATE_DEPTH * nodes[i]["density"] * nodes[i]["area"])
-            out[RATE] = max(out[RATE], share[i] / mass + 0.5 * tables.scalars[q]["decay"])
+            out[RATE] = max(out[RATE], share[i] / mass + 0.5 * change_rate(out, tables, q))
 
 
 @njit(forceinline=True)
@@ -392,7 +399,7 @@ def pipe_scalar_rates(y, dydt, out, tables, p):
                 record_loss(out, tables, q, pipe["cell"] + i, dx * scalar["decay"] * (s[i] - scalar["ambient"] * m[i]))
         else:
             record_loss(out, tables, q, 0, dx * lost)
-        rate = quick + 2.0 * scalar["diffusivity"] / (dx * dx) + 0.5 * scalar["decay"]
+        rate = quick + 2.0 * scalar["diffusivity"] / (dx * dx) + 0.5 * change_rate(out, tables, q)
         out[RATE] = max(out[RATE], rate)
 
 
