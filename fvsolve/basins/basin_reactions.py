@@ -6,7 +6,14 @@ from fvsolve.basins.cell_sides import deviations_of
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import CELL_SCALAR, LOCAL_AFFINITY, RATE, RATE_UNWANTED, REACTION_VALUE
 from fvsolve.kernels.reactions import (
-    add_observed, affinity_of, chosen, greatest_rate, one_way_rates, react, read_amounts, sums_of_network,
+    add_observed,
+    affinity_of,
+    chosen,
+    greatest_rate,
+    rates_both_ways,
+    react,
+    read_amounts,
+    sums_of_network,
 )  # fmt: skip
 from fvsolve.kernels.table_handle import open_tables
 
@@ -28,7 +35,7 @@ def mass_per_depth(tables, basin, i):
 
 @njit
 def add_reactions(t, y, dydt, out, handle):
-    """Add changes by reactions to the rates of scalars in all basins; write rates of reactions to the record of gains."""
+    """Add changes by reactions to the rates of scalars in all basins; write rates of reactions to the ledger."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -75,5 +82,5 @@ def observe_reactions_in_basins(t, y, out, handle, values):
                     i, weight = tables.integers[probe["cell"] + m], tables.floats[probe["weights"] + m]
                     value += weight * cell_value(tables, tables.basins[probe["scalar"]], q, y, i)
                 tables.stack[q] = value * tables.scalars[q]["molar"]
-            ahead, back = one_way_rates(tables, k)
+            ahead, back = rates_both_ways(tables, k)
             values[j] = affinity_of(tables.reactions[k], ahead, back)

@@ -21,8 +21,8 @@ from fvsolve.fluid import LAWS, Fluid
 from fvsolve.fluid.laws import Law
 from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
-from fvsolve.parts.reaction import Reaction
 from fvsolve.parts.pipe.pipe_wall import elastic_compliance
+from fvsolve.parts.reaction import Reaction
 from fvsolve.parts.table_model import plain_value
 from fvsolve.schemes import SCHEMES
 from fvsolve.units import show

@@ -22,8 +22,8 @@ from fvsolve.parts.body import Joint
 from fvsolve.parts.connection import Connection
 from fvsolve.parts.control import Control
 from fvsolve.parts.nodes_and_links import PlaceOnBody, TwoPort
-from fvsolve.parts.reaction import Reaction
 from fvsolve.parts.pipe.pipe_wall import SI, Lining, Wall, materials
+from fvsolve.parts.reaction import Reaction
 from fvsolve.parts.self_acting.part import Disc
 from fvsolve.parts.table_model import Table, plain_value
 from fvsolve.parts.value import NEEDED, Quantity, Text, Value

@@ -1,4 +1,4 @@
-"""Reading of `[reactions]`: names, scalars and their units, balance of atoms, formulas of rates, quantities of probes."""
+"""Reading of `[reactions]`: names, units of scalars, balance of atoms, formulas of rates, quantities of probes."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field

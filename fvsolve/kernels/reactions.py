@@ -1,8 +1,8 @@
 """Reactions of scalars in pipe cells, tanks and chambers: rates, changes of amounts, probes of the chemical port.
 
 At a place with the mass m [kg, or per length or area] and the values c of its scalars, a reaction with the rate
-r(c) [mol/m3/s] changes each amount m c at the rate nu m r, with the coefficient nu of the scalar in its unit. The product
-m r is computed once, so that sums that the coefficients keep are kept to round-off.
+r(c) [mol/m3/s] changes each amount m c at the rate nu m r, with the coefficient nu of the scalar in its unit. The
+product m r is computed once, so that sums that the coefficients keep are kept to round-off.
 
 Three numbers of each scalar of a reaction lie in `floats`: its orders in the forward and in the reverse rate, and nu.
 """
@@ -11,8 +11,16 @@ from math import inf, log
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import (
-    CELL_SCALAR, CHANGE, CHEMICAL_POWER, FORWARD_ORDER, LOCAL_AFFINITY, MOLAR_RATE, RATE, RATE_UNWANTED,
-    REACTION_VALUE, REVERSE_ORDER,
+    CELL_SCALAR,
+    CHANGE,
+    CHEMICAL_POWER,
+    FORWARD_ORDER,
+    LOCAL_AFFINITY,
+    MOLAR_RATE,
+    RATE,
+    RATE_UNWANTED,
+    REACTION_VALUE,
+    REVERSE_ORDER,
 )  # fmt: skip
 from fvsolve.kernels.formula_programs import run_program
 from fvsolve.kernels.scalar_transport import DRY_DEPTH, cell_mass, has_storage, value_at_probe
@@ -49,7 +57,7 @@ def power_of(c, order):
 
 
 @njit
-def one_way_rates(tables, k):
+def rates_both_ways(tables, k):
     """(forward rate, reverse rate) of reaction k at the amounts in `stack` [mol/m3/s]; by a formula (rate, 0)."""
     reaction, floats = tables.reactions[k], tables.floats
     if reaction["program"] >= 0:
@@ -84,11 +92,11 @@ def greatest_rate(tables):
         size = max(size, abs(tables.stack[q]))
     step = DIFFERENCE * size if size > 0.0 else DIFFERENCE
     for k in range(tables.reactions.size):
-        ahead, back = one_way_rates(tables, k)
+        ahead, back = rates_both_ways(tables, k)
         total = 0.0
         for l in range(tables.reactions.size):
             move_along(tables, l, step)
-            more_ahead, more_back = one_way_rates(tables, k)
+            more_ahead, more_back = rates_both_ways(tables, k)
             move_along(tables, l, -step)
             total += abs((more_ahead - ahead) - (more_back - back)) / step
         bound = max(bound, total)
@@ -106,7 +114,7 @@ def react(y, dydt, out, tables, first, stride, mass, present, weight, entry):
     read_amounts(tables, y, first, stride, mass)
     for k in range(tables.reactions.size):
         reaction = tables.reactions[k]
-        ahead, back = one_way_rates(tables, k)
+        ahead, back = rates_both_ways(tables, k)
         change = present * (ahead - back)
         for e in range(reaction["count"] if dydt.size > 0 else 0):
             coefficient = floats[reaction["data"] + 3 * e + CHANGE]
@@ -152,7 +160,7 @@ def limit_rates(t, y, dydt, out, handle):
 
 @njit
 def reaction_rates(t, y, dydt, out, handle):
-    """Add changes by reactions to the rates in pipes and nodes; write rates of all reactions to the record of gains."""
+    """Add changes by reactions to the rates in pipes and nodes; write rates of all reactions to the ledger."""
     tables = open_tables(handle)
     layout, scalar, stride = tables.layout[0], tables.scalars[0], scalar_stride(tables)
     for k in range(tables.reactions.size):
@@ -182,7 +190,7 @@ def add_observed(tables, k, volume, sums):
 
     Amounts are those in `stack`; sums : float64[4]
     """
-    ahead, back = one_way_rates(tables, k)
+    ahead, back = rates_both_ways(tables, k)
     flow = volume * (ahead - back)
     sums[0] += flow
     sums[2] += abs(flow)
@@ -235,5 +243,5 @@ def observe_reactions(t, y, out, handle, values):
             for q in range(tables.scalars.size):
                 value = value_at_probe(y, out, tables, probe, probe["head"], probe["scalar"], q)
                 tables.stack[q] = value * tables.scalars[q]["molar"]
-            ahead, back = one_way_rates(tables, k)
+            ahead, back = rates_both_ways(tables, k)
             values[j] = affinity_of(tables.reactions[k], ahead, back)

@@ -473,4 +473,3 @@ def observe_scalars(t, y, out, handle, values):
         probe = tables.probes[k]
         if probe["kind"] == NODE_SCALAR or probe["kind"] == PIPE_SCALAR:
             values[k] = value_at_probe(y, out, tables, probe, probe["kind"], probe["index"], probe["scalar"])
-

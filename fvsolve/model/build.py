@@ -347,8 +347,8 @@ def layout_of(draft: ModelDraft) -> np.ndarray:
     scalars, layout, at = len(draft.scalar_table), np.zeros(1, rec.LAYOUT), rec.OUT_HEAD
     for name, size in (
         ("pressure", nodes), ("supply", nodes), ("gain", scalars * nodes), ("loss", sum(draft.scalar_table["losses"])),
-        ("extent", sum(draft.reaction_table["extents"])),
-        ("net", nodes), ("quickest", len(draft.reaction_table) > 0), ("ends", 4 * pipes), ("valve", valves), ("column", columns), ("valve_controlled", columns),
+        ("extent", sum(draft.reaction_table["extents"])), ("net", nodes), ("quickest", len(draft.reaction_table) > 0),
+        ("ends", 4 * pipes), ("valve", valves), ("column", columns), ("valve_controlled", columns),
         ("stiffness", draft.moving), ("outflow_fraction", draft.moving), ("swept", draft.moving),
         ("net_force", len(draft.mass_table)), ("push", len(draft.push_names)),
         ("conductance", valves), ("drive", valves), ("value", scalars * nodes), ("edge", 2 * pipes * scalars),

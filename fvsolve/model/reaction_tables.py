@@ -49,10 +49,20 @@ def lower_reactions(draft) -> None:
         check_start(draft, name, reaction)
 
 
-def reacting(case) -> set[str]:
-    """Names of the scalars that reactions change."""
-    return {name for reaction in case.reactions.values() for name in reaction.sides.names
-            if reaction.sides.change(name) != 0.0}  # fmt: skip
+def reacting(case, side: str = "") -> set[str]:
+    """Names of the scalars that reactions change; side : "right" for those that may grow, "left" for those that fall.
+
+    A formula may have either sign.
+    """
+    names = set()
+    for reaction in case.reactions.values():
+        signs = {"right": 1.0, "left": -1.0}
+        one_way = reaction.rate is None and not reaction.reverse
+        for name in reaction.sides.names:
+            change = reaction.sides.change(name)
+            if change != 0.0 and (not side or not one_way or change * signs[side] > 0.0):
+                names.add(name)
+    return names
 
 
 def names_read(reaction: Reaction, scalars: dict[str, Any]) -> list[str]:
@@ -139,10 +149,10 @@ def reaction_modes(model) -> list[tuple[str, np.ndarray]]:
         scale = max(abs(value) for value in values.values()) or 1.0
         slopes, step = np.zeros((len(case.reactions),) * 2), 1e-6 * scale
         for k, reaction in enumerate(case.reactions.values()):
-            for l, other in enumerate(case.reactions.values()):
+            for other_k, other in enumerate(case.reactions.values()):
                 moved, sides = dict(values), other.sides
                 for name in sides.names:
                     moved[name] += step * sides.change(name) / molar_factor(case.scalars[name])
-                slopes[k, l] = (rate_at(reaction, case, moved) - rate_at(reaction, case, values)) / step
+                slopes[k, other_k] = (rate_at(reaction, case, moved) - rate_at(reaction, case, values)) / step
         modes.append((f"{place}.{next(iter(case.reactions))}", np.linalg.eigvals(slopes)))
     return modes

@@ -48,10 +48,11 @@ def explicit(method: str) -> bool:
 def bounds(case, name: str) -> tuple[float, float]:
     """Least and greatest possible value of a scalar: those in the case, because mixing stays between them.
 
-    A scalar that reactions change has no greatest value.
+    A scalar that reactions form has no greatest value, and 0 bounds a scalar that they consume.
     """
     least, greatest = stated_range(case, name)
-    return (min(least, 0.0), UNBOUNDED) if name in reacting(case) else (least, greatest)
+    formed, consumed = (name in reacting(case, side) for side in ("right", "left"))
+    return min(least, 0.0) if consumed else least, UNBOUNDED if formed else greatest
 
 
 def stated_range(case, name: str) -> tuple[float, float]:
@@ -87,7 +88,7 @@ def scale_scalars(draft) -> None:
 
 
 def typical_value(case, name: str) -> float:
-    """Size of the values of a scalar: the greatest magnitude in the case; of a product without one that of reactants."""
+    """Size of the values of a scalar: the greatest magnitude in the case; without any that of other reacting scalars."""
     own = max(map(abs, stated_range(case, name)))
     if own == 0.0 and name in (names := reacting(case)):
         amounts = [max(map(abs, stated_range(case, other))) * molar_factor(case.scalars[other]) for other in names]
@@ -157,8 +158,9 @@ def total_amount(model, q: int, y: np.ndarray) -> float:
 def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[str, Any]]:
     """Balance of each scalar in a run : name -> initial, final, inflow, outflow, decayed, remainder [kg x its unit].
 
-    A scalar that reactions change has the entry `reacted` too: what they form, less what they consume. Further entries: net inflow (`by_node`), and inflow and outflow (`nodes`), of each node through which it flows.
-    relative : |remainder| over the greatest of |initial|, |final| and the sum inflow + outflow + |decayed|
+    Further entries: net inflow (`by_node`), and inflow and outflow (`nodes`), of each node through which it flows; if
+    reactions change it, what they form less what they consume (`reacted`).
+    relative : |remainder| over the greatest of |initial|, |final| and inflow + outflow + |decayed| + |reacted|
     ledger : float64[2, m]  integrals of positive rates, and of negative rates, of each row of the stepper's ledger
     """
     ledgers, n = {}, len(model.node_names)

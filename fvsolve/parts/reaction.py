@@ -24,7 +24,7 @@ BALANCED = 1e-9  # greatest relative difference of counts of atoms
 
 
 @dataclass(frozen=True)
-class Equation:
+class ReactionEquation:
     """Equation of a reaction: coefficients of its scalars on the left and on the right side, by name."""
 
     left: dict[str, float]
@@ -44,7 +44,7 @@ class Equation:
         return sum(getattr(self, side).values())
 
 
-def read_equation(text: Any) -> Equation:
+def read_equation(text: Any) -> ReactionEquation:
     """Equation from its text, such as "Cl + 2 B -> P". Raises ValueError."""
     if not isinstance(text, str):
         raise ValueError(f"{show(text)} is not text; expected for example {EXAMPLE}")
@@ -55,7 +55,7 @@ def read_equation(text: Any) -> Equation:
     left, right = (dict(read_side(side, text)) for side in sides)
     if not left and not right:
         raise ValueError(f"{show(text)} has no scalars; expected for example {EXAMPLE}")
-    return Equation(left, right)
+    return ReactionEquation(left, right)
 
 
 def read_side(side: str, text: str) -> Iterator[tuple[str, float]]:
@@ -138,7 +138,7 @@ class Reaction(Table):
         return result
 
     @property
-    def sides(self) -> Equation:
+    def sides(self) -> ReactionEquation:
         """Coefficients of its scalars on both sides of the equation."""
         return read_equation(self.equation)
 
@@ -181,11 +181,14 @@ def unit_fault(scalar: Scalar, reaction: str) -> tuple[tuple[str, ...], str] | N
     if molar_factor(scalar) is not None:
         return None
     if scalar.unit.replace(" ", "").replace("L", "l") == MASS_UNIT:
-        return (), f'molar_mass is missing: reaction {reaction} converts "mg/l" to mol/m3; give molar_mass = "NUMBER g/mol"'
+        return (
+            (),
+            f'molar_mass is missing: reaction {reaction} converts "mg/l" to mol/m3; give molar_mass = "NUMBER g/mol"',
+        )
     return ("unit",), f"{show(scalar.unit)} is not an amount, which reaction {reaction} needs; {UNIT_HINT}"
 
 
-def atom_faults(equation: Equation, scalars: dict[str, Scalar]) -> Iterator[str]:
+def atom_faults(equation: ReactionEquation, scalars: dict[str, Scalar]) -> Iterator[str]:
     """Yield the text of a fault for each element whose atoms do not balance; none if a composition is not stated."""
     compositions = {name: scalars[name].composition for name in equation.names}
     if not all(compositions.values()):
@@ -197,10 +200,9 @@ def atom_faults(equation: Equation, scalars: dict[str, Scalar]) -> Iterator[str]
             yield f"{element} does not balance: {left:g} on the left, {right:g} on the right; expected equal counts"
 
 
-def name_faults_of(equation: Equation, scalars: dict[str, Any]) -> Iterator[str]:
+def name_faults_of(equation: ReactionEquation, scalars: dict[str, Any]) -> Iterator[str]:
     """Yield the text of a fault for each name in an equation that is no scalar of the case."""
     for name in equation.names:
         if name not in scalars:
             known = f"; scalars are {listing(scalars)}" if scalars else "; the case has no [scalars]"
             yield f"unknown scalar {show(name)}{did_you_mean(name, scalars) or known}"
-

@@ -174,7 +174,10 @@ def test_a_steady_pipe_of_second_order(scheme, order):
 
 def test_a_chamber_and_pipes_react_under_implicit_methods_too():
     lake = reservoir(2e5, scalars={"A": 2.0, "B": 1.0})
-    nodes, friction = {"lake": lake, "box": chamber(0.05), "sea": reservoir(AMBIENT)}, {"model": "steady", "factor": 0.02}
+    nodes, friction = (
+        {"lake": lake, "box": chamber(0.05), "sea": reservoir(AMBIENT)},
+        {"model": "steady", "factor": 0.02},
+    )
     links = {"a": pipe("lake", "box", 5.0, 0.1, 50.0, 5, friction=friction), "b": valve("box", "sea", 2e-4)}
     reactions = {"r": {"equation": "A + B -> P", "forward": 2.0, "reverse": 0.1}}
     ends = []
@@ -201,20 +204,21 @@ def test_an_explicit_step_is_short_enough_for_the_reaction():
 def test_cells_of_a_basin_react():
     k = 0.3
     pool = {"level": 1.0, "size": ["4 m", "4 m"], "cells": [4, 4], "bed": "0.1*x", "scalars": {"A": "1 + 0.2*x"}}
-    case = alone({"type": "basin", "physics": "free-surface", **pool}, 5.0)
+    case = alone({"type": "basin", "physics": "free-surface", **pool}, 5.0, method="ssp-rk3", courant=0.2)
     case["output"]["probes"] = ["pool.A@0.5,0.5", "reactions.r.rate"]
     case |= {"scalars": moles(A=0.0, P=0.0), "reactions": {"r": {"equation": "2 A -> P", "forward": k}}}
     result = fvsolve.run(case)
     start = 1.0 + 0.2 * 0.5
-    assert result["pool.A@0.5,0.5"] == approx(start / (1.0 + 2.0 * k * start * result.t), rel=1e-4)
+    assert result["pool.A@0.5,0.5"] == approx(start / (1.0 + 2.0 * k * start * result.t), rel=1e-5)
     assert result.ledger["A"]["relative"] < 1e-13
     assert result.ledger["A"]["reacted"] == approx(-2.0 * result.ledger["P"]["reacted"], rel=1e-14)
 
 
 def test_a_killed_and_resumed_run_is_the_unbroken_run(tmp_path):
     reactions = {"r": {"equation": "A + B -> P", "forward": 0.3, "reverse": 0.1}}
-    case = stirred(moles(A=2.0, B=1.0, P=0.0), reactions, probes=["reactions.r.power"], method="rodas-5p", rtol=1e-9)
-    fvsolve.run(case, out=tmp_path / "whole")
+    case = stirred(moles(A=2.0, B=1.0, P=0.0), reactions, probes=["reactions.r.power"], method="rodas-5p", step=1e-3)
+    del case["numerics"]["rtol"]
+    fvsolve.run(case, out=tmp_path / "whole", pictures=False)
     same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 4.0))
 
 
@@ -251,7 +255,7 @@ FAULTS = [
     ((*R, "forward"), -1.0, "out of range"),
     ((*R, "forward"), "0.3 1/s", 'expected a constant of order 2 in m3/mol/s'),
     ((*R, "forwards"), 1.0, "did you mean"),
-    (("scalars", "A", "unit"), "degC", 'scalars.A.unit: "degC" is not an amount, which reaction r needs; expected unit'),
+    (("scalars", "A", "unit"), "degC", '"degC" is not an amount, which reaction r needs; expected unit'),
     (("scalars", "A", "unit"), "mg/l", "molar_mass is missing"),
     (("scalars", "A", "composition"), {"Cl": 2}, "Cl does not balance: 2 on the left, 1 on the right"),
     (("scalars", "A", "composition"), {"Cl": 0}, "out of range"),
