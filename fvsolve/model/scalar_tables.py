@@ -88,7 +88,7 @@ def scale_scalars(draft) -> None:
 
 
 def typical_value(case, name: str) -> float:
-    """Size of the values of a scalar: the greatest magnitude in the case; without any that of other reacting scalars."""
+    """Size of the values of a scalar: the greatest magnitude in the case; without any that of scalars that react."""
     own = max(map(abs, stated_range(case, name)))
     if own == 0.0 and name in (names := reacting(case)):
         amounts = [max(map(abs, stated_range(case, other))) * molar_factor(case.scalars[other]) for other in names]
