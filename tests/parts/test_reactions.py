@@ -214,6 +214,62 @@ def test_cells_of_a_basin_react():
     assert result.ledger["A"]["reacted"] == approx(-2.0 * result.ledger["P"]["reacted"], rel=1e-14)
 
 
+def test_a_given_velocity_carries_what_reacts_and_no_coupling_is_missing():
+    patches = {"inlet": {"side": "west", "scalars": {"A": 2.0}}, "outlet": {"side": "east"}}
+    sheet = {"type": "basin", "physics": "transport", "size": ["1 m", "1 m"], "cells": [6, 4],
+             "velocity": {"u": "0.5"}, "scalars": {"A": "1 + x"}, "patches": patches}  # fmt: skip
+    reactions = {"r": {"equation": "2 A -> B", "forward": 0.3, "reverse": 0.2},
+                 "q": {"equation": "B ->", "rate": "1e-3*T*B"}}  # fmt: skip
+    scalars = {**moles(A=0.0, B=0.0), "T": {"unit": "degC", "initial": 20.0}}
+    probes = ["reactions.r.power", "reactions.r.affinity", "reactions.r.affinity@sheet@0.5,0.5"]
+    case = scene({"sheet": sheet}, {}, 2.0, {"scheme": "upwind", "method": "rodas-5p", "rtol": 1e-6}, probes, 0.2,
+                 scalars=scalars, reactions=reactions)  # fmt: skip
+    del case["links"]
+    result = fvsolve.run(case)
+    assert all(result.ledger[name]["relative"] < 1e-13 for name in scalars)
+    assert result["reactions.r.power"].min() >= 0.0
+    assert 0.0 < result["reactions.r.affinity@sheet@0.5,0.5"][-1] < result["reactions.r.affinity"][-1]
+    model, rng = fvsolve.build(fvsolve.load(case)), np.random.default_rng(1)
+    assert max(stray(model, t, random_state(model, rng)) for t in (0.0, 0.1)) < 1e-9
+
+
+def test_two_reactions_of_parts_of_a_constant_are_a_single_reaction():
+    def run(scalars, **constants):
+        reactions = {name: {"equation": "A + B -> P", "forward": k} for name, k in constants.items()}
+        return fvsolve.run(stirred(scalars, reactions))["one.A"]
+
+    whole = run(moles(A=2.0, B=3.0, P=0.0), r=0.3)
+    assert run(moles(P=0.0, B=3.0, A=2.0), p=0.1, q=0.2) == approx(whole, rel=1e-11)
+
+
+def test_a_catalyst_counts_in_the_rate_and_stays():
+    """A + E -> P + E: A falls as exp(-k e t), and E does not change by a bit."""
+    case = stirred(moles(A=2.0, E=0.5, P=0.0), {"r": {"equation": "A + E -> P + E", "forward": 0.4}})
+    result = fvsolve.run(case)
+    assert result["one.A"] == approx(2.0 * np.exp(-0.2 * result.t), rel=1e-9)
+    assert np.all(result["one.E"] == 0.5)
+
+
+@pytest.mark.parametrize("method", METHODS[:3])
+def test_a_control_reads_the_rate_of_a_reaction(method):
+    """Dosing by the filtered rate: amount and level of a tank compared with SciPy."""
+    reactions = {"r": {"equation": "A ->", "forward": 0.2}}
+    dose = {"type": "function", "inputs": {"r": "reactions.r.rate"}, "formula": "1e-2*r", "unit": "m3/s", "filter": 0.5}
+    nodes = {"feed": {"type": "inflow", "flow": {"control": "dose"}, "scalars": {"A": 5.0}},
+             "pond": tank(1.0, 1.0, scalars={"A": 1.0})}  # fmt: skip
+    case = scene(nodes, {"v": valve("feed", "pond", 1e-2)}, 5.0, {"method": method, "rtol": 1e-11}, ["pond.A"], 0.5,
+                 scalars=moles(A=0.0), reactions=reactions, controls={"dose": dose})  # fmt: skip
+    result = fvsolve.run(case)
+
+    def rates(t, y):
+        level, amount, seen = y
+        flow = 1e-2 * seen
+        return [flow, 5.0 * flow - 0.2 * amount, (0.2 * amount - seen) / 0.5]
+
+    exact = solve_ivp(rates, (0.0, 5.0), [1.0, 1.0, 0.2], "DOP853", result.t, rtol=1e-12, atol=1e-14).y
+    assert result["pond.A"] == approx(exact[1] / exact[0], rel=1e-8)
+
+
 def test_a_killed_and_resumed_run_is_the_unbroken_run(tmp_path):
     reactions = {"r": {"equation": "A + B -> P", "forward": 0.3, "reverse": 0.1}}
     case = stirred(moles(A=2.0, B=1.0, P=0.0), reactions, probes=["reactions.r.power"], method="rodas-5p", step=1e-3)
