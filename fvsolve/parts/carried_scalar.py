@@ -12,6 +12,7 @@ from fvsolve.parts.value import (
     Quantity,
     ReadContext,
     Text,
+    UsualRange,
     Value,
     nonnegative,
     positive,
@@ -35,6 +36,9 @@ class Composition(Value):
         return read_each(given.items(), lambda item: Number(positive).read(item, setting))
 
 
+MOLAR_MASSES = UsualRange(1e-3, 1.0, "hydrogen to large organic molecules")  # [kg/mol]
+
+
 class Scalar(Table):
     """Quantity c per mass, transported by the fluid: (m c)_t + (M c - D m c_x)_x = -decay m (c - ambient).
 
@@ -49,7 +53,8 @@ class Scalar(Table):
     decay: Annotated[float, Quantity("rate", nonnegative, "rate of decay towards ambient [1/s]", changes=VALUE)] = 0.0
     ambient: Annotated[float, Number(about="value towards which the scalar decays", changes=VALUE)] = 0.0
     molar_mass: Annotated[
-        float | None, Quantity("molar_mass", positive, "molar mass, for reactions of a mass per volume", changes=VALUE)
+        float | None,
+        Quantity("molar_mass", positive, "molar mass, for reactions of a mass per volume", MOLAR_MASSES, VALUE),
     ] = None
     composition: Annotated[dict[str, float] | None, Composition()] = None
 

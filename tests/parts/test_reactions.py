@@ -337,6 +337,15 @@ def test_what_cannot_be_is_refused(keys, value, said):
     assert said in str(refused(case))
 
 
+def test_a_molar_mass_without_unit_is_noticed():
+    """A bare number is in kg/mol; 70.9 is legal but not plausible."""
+    scalars = {"A": {"unit": "mg/l", "molar_mass": 70.9}, "P": MOLES}
+    notices = [
+        item.text for item in fvsolve.load(stirred(scalars, {"r": {"equation": "A -> P", "forward": 1}})).notices
+    ]
+    assert len(notices) == 1 and "hydrogen to large organic molecules" in notices[0] and "70.9 g/mol" in notices[0]
+
+
 def test_a_rate_that_divides_by_nothing_at_the_start_is_refused_with_its_place():
     case = stirred(moles(A=1.0, B=0.0), {"r": {"equation": "A -> B", "rate": "A/B"}}, other={"B": 1.0})
     with pytest.raises(fvsolve.CaseError, match="A/B is not finite at the start in one, where A = 1, B = 0"):
