@@ -168,13 +168,21 @@ def parse_ratio(given: Any, over: str, under: str) -> float:
 
     Raises ValueError with the unit expected.
     """
+    si = f"{DIMENSIONS[over].si} / ({DIMENSIONS[under].si})"
+    return parse_in(given, si, f"expected a number in {_readable(over, under)}")
+
+
+def parse_in(given: Any, si: str, remedy: str) -> float:
+    """SI value of a bare number, or of text with a number and a unit of the same dimension as the unit `si`.
+
+    remedy : end of messages. Raises ValueError with it.
+    """
     if not isinstance(given, str):
         value = _parse_number(given, "number")
     else:
         import pint
 
-        si, match = f"{DIMENSIONS[over].si} / ({DIMENSIONS[under].si})", _NUMBER.fullmatch(given)
-        remedy = f"expected a number in {_readable(over, under)}"
+        match = _NUMBER.fullmatch(given)
         if match is None:
             raise ValueError(f"{show(given)} is not a number with a unit; {remedy}")
         number, spelling = match[1], _canonical(match[2])

@@ -232,6 +232,7 @@ class ModelDraft:
     basin_table: np.ndarray = no_rows(rec.BASIN)
     patch_table: np.ndarray = no_rows(rec.PATCHES)
     scalar_table: np.ndarray = no_rows(rec.SCALAR)
+    reaction_table: np.ndarray = no_rows(rec.REACTION)
     wall_table: np.ndarray = no_rows(rec.WALL)
     delay_table: np.ndarray = no_rows(rec.DELAY)
     probe_table: np.ndarray = no_rows(rec.PROBE)

@@ -15,7 +15,7 @@ from fvsolve.basins.cell_sides import deviations_of
 from fvsolve.jit import njit
 from fvsolve.kernels import stage_sums
 from fvsolve.kernels.dtypes import CELL_SCALAR, GIVEN_FLOW, MUSCL, RATE, UPWIND
-from fvsolve.kernels.scalar_transport import record_loss
+from fvsolve.kernels.scalar_transport import change_rate, record_loss
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
 
@@ -181,7 +181,7 @@ def advect_on_grids(t, y, dydt, out, handle):
         seen, n = deviations_of(basin, tables.seen, y), basin["n"]
         quick = basin["unsplit"] * basin["fastest"]  # at full speed: a periodic velocity may grow within a step
         for q in range(tables.scalars.size):
-            out[RATE] = max(out[RATE], quick + tables.scalars[q]["decay"])
+            out[RATE] = max(out[RATE], quick + change_rate(out, tables, q))
             flows = grid_flows(t, tables, basin, q)
             at, scheme, limiter = basin["carried"] + q * n, basin["scheme"], basin["limiter"]
             rate = dydt[at : at + n]
@@ -256,7 +256,7 @@ def diffuse_on_grids(t, y, dydt, out, handle):
                 flows = grid_flows(t, tables, basin, q)
                 s, rate = seen[at : at + n], dydt[at : at + n]
                 diffusion_rate = advection.grid_diffusion(grid, diffusivity, flows, depth, s, work, rate)
-                other_rates = basin["unsplit"] * basin["fastest"] + tables.scalars[q]["decay"]
+                other_rates = basin["unsplit"] * basin["fastest"] + change_rate(out, tables, q)
                 out[RATE] = max(out[RATE], other_rates + diffusion_rate)
 
 
@@ -289,7 +289,7 @@ def advect_on_meshes(t, y, dydt, out, handle):
             )  # fmt: skip
             # a periodic velocity returns to full speed
             full_rate = (1.0 - abs(factor)) * basin["unsplit"] * basin["fastest"]
-            out[RATE] = max(out[RATE], quickest + full_rate + scalars[q]["decay"])
+            out[RATE] = max(out[RATE], quickest + full_rate + change_rate(out, tables, q))
 
 
 @njit

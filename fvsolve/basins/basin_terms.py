@@ -36,8 +36,14 @@ FIFTH = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: add_fifth_order_o
 DIFFUSION = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: diffuse_on_grids")
 MESHES = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: advect_on_meshes")
 SOURCES = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: add_sources")
+REACTIONS = RhsTerms(
+    package=PACKAGE,
+    prepare="basin_reactions: limit_rates_in_basins",
+    scalar_rates="basin_reactions: add_reactions",
+    observe="basin_reactions: observe_reactions_in_basins",
+)
 # in the order in which they run within a phase
-SCALAR_TERMS = (PATCH_VALUES, MIXED, GRIDS, FIFTH, DIFFUSION, MESHES, SOURCES)
+SCALAR_TERMS = (PATCH_VALUES, MIXED, GRIDS, FIFTH, DIFFUSION, MESHES, SOURCES, REACTIONS)
 
 
 def terms_of_basins(basins: list, valves: bool) -> tuple[RhsTerms, ...]:
@@ -60,6 +66,8 @@ def scalar_terms(basin) -> Iterator[RhsTerms]:
     if not basin.scalars:
         return
     yield from (PATCH_VALUES, SOURCES)
+    if basin.case.reactions:
+        yield REACTIONS
     if not basin.given:
         yield MIXED
     if not basin.is_grid:

@@ -187,6 +187,8 @@ class BasinRows:
             return f"scalars flow through its open boundary {self.opening}"
         if decaying := [name for name in self.scalars if self.case.scalars[name].decay > 0.0]:
             return f"{listing(decaying)} {'decay' if len(decaying) > 1 else 'decays'}"
+        if self.scalars and self.case.reactions:
+            return "its scalars react"
         return "" if self.banded else f"its physics {self.part.physics} cannot be distributed over threads"
 
     @property

@@ -22,6 +22,7 @@ from fvsolve.fluid.laws import Law
 from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.parts.pipe.pipe_wall import elastic_compliance
+from fvsolve.parts.reaction import Reaction
 from fvsolve.parts.table_model import plain_value
 from fvsolve.schemes import SCHEMES
 from fvsolve.units import show
@@ -57,6 +58,7 @@ class Case(Displayable):
     routes: dict[str, Route]
     limits: dict[str, DesignLimit]
     controls: dict[str, Block]
+    reactions: dict[str, Reaction]
     exact: ExactSpec | None
     copies: dict[str, Path]
     raw: dict[str, Any] = field(repr=False)  # tables of the file, with overrides
@@ -289,6 +291,7 @@ class Case(Displayable):
                 name: {"type": block.control.kind, **block.control.table()} for name, block in self.controls.items()
             },
             "scalars": {name: item.table() for name, item in self.scalars.items()},
+            "reactions": {name: item.table() for name, item in self.reactions.items()},
             "numerics": self.numerics.table(),
             "output": self.output.table(),
             "expect": {name: item.table() for name, item in self.expect.items()},

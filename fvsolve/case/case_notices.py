@@ -36,7 +36,9 @@ TOP = {  # keys outside tables
 def range_notices(case: Any) -> list[Notice]:
     """Notices of values outside the usual range of their key, and of keys that contradict each other."""
     parts = {("fluid",): case.fluid}
-    parts |= {(group, name): part for group in ("nodes", "links") for name, part in getattr(case, group).items()}
+    parts |= {
+        (group, name): part for group in ("nodes", "links", "scalars") for name, part in getattr(case, group).items()
+    }
     result = [_notice((), (key,), case, *odd) for key, value in TOP.items()
              if (odd := _beyond(value, getattr(case, key), case.raw.get(key)))]  # fmt: skip
     result += [_notice(place, *odd[:1], case, *odd[1:]) for place, part in parts.items()

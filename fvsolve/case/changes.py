@@ -13,6 +13,7 @@ from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.control import Control
+from fvsolve.parts.reaction import Reaction
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table_model import Nested
 from fvsolve.parts.value import BY_CELLS, PROFILE, SHAPE, VALUE, Quantity, Text, Value
@@ -102,7 +103,8 @@ def declarations(raw: dict[str, Any]) -> dict[str, Value]:
         where = {"on": Text(), "at": Quantity("length", changes=SHAPE)}
         result[group] = Keys({**result[group].values, name: Keys({**result[group].values[name].values, **where})})
     named = {"expect": values_of(expect_keys("number")), "compare": values_of(COMPARE_KEYS), "scalars": Scalar.values()}
-    named |= {"routes": Route.values(), "limits": values_of(limit_keys("pressure", "pressure"))}
+    named |= {"reactions": Reaction.values(), "routes": Route.values()}
+    named |= {"limits": values_of(limit_keys("pressure", "pressure"))}
     return result | {group: Keys(dict.fromkeys(raw.get(group, {}), Keys(entry))) for group, entry in named.items()}
 
 

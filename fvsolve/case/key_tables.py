@@ -24,6 +24,7 @@ from fvsolve.parts.control import Control
 from fvsolve.parts.cylinder import DryFriction
 from fvsolve.parts.nodes_and_links import PlaceOnBody, TwoPort
 from fvsolve.parts.pipe.pipe_wall import SI, Lining, Wall, materials
+from fvsolve.parts.reaction import Reaction
 from fvsolve.parts.self_acting.part import Disc
 from fvsolve.parts.table_model import Table, plain_value
 from fvsolve.parts.value import NEEDED, Quantity, Text, Value
@@ -34,6 +35,7 @@ TABLES: dict[str, type[Table]] = {
     "every node": Node, "riding": PlaceOnBody, "every link": TwoPort, "friction": Friction, "connection": Connection,
     "compressor": Compressor, "dry friction": DryFriction,
     "wall": Wall, "lining": Lining, "patch": Patch, "start": BasinStart, "line": OutputLine, "scalar": Scalar,
+    "reaction": Reaction,
     "fluid": FluidSpec, "numerics": Numerics, "output": Output, "route": Route, "joint": Joint, "attitude": Attitude,
 }  # fmt: skip
 # base class -> part whose table lists its keys in full

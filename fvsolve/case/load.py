@@ -14,6 +14,7 @@ from fvsolve.case.controls import read_controls
 from fvsolve.case.part_reading import Parts
 from fvsolve.case.pipe_routes import legs, read_routes
 from fvsolve.case.probe import default_probes, read_probe
+from fvsolve.case.reactions import reaction_kinds, read_reactions
 from fvsolve.case.reading import Raw, Reading, copy_paths, default_faults, override, read_raw, split_key
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FluidError, did_you_mean
@@ -29,12 +30,12 @@ from fvsolve.validation import TABLE, validated
 SCHEMA = 1
 PRESENCE_KEYS = ("required_pressure",)  # keys of parts whose presence alone changes the case
 # Tables with names that other tables refer to.
-NAME_TABLES = ("nodes", "links", "signals", "controls", "scalars", "routes", "defaults")
+NAME_TABLES = ("nodes", "links", "signals", "controls", "scalars", "reactions", "routes", "defaults")
 STUDY_KEYS = {"events", "protections"}
 KEYS = (
     "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
-    "signals", "controls", "scalars", "defaults", "numerics", "output", "expect", "compare", "routes", "limits",
-    "exact",
+    "signals", "controls", "scalars", "reactions", "defaults", "numerics", "output", "expect", "compare", "routes",
+    "limits", "exact",
 )  # fmt: skip
 TOP = {
     "schema": (val.Whole(val.between(SCHEMA, SCHEMA)), SCHEMA),
@@ -111,11 +112,13 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     check_names(reading)
     network = part_reading.cut_pipes(reading, state, numerics)
     scalars = read_scalars(reading)
+    reactions = read_reactions(reading, scalars)
     parts = part_reading.read_parts(reading, network)
     check_unused_signals(reading)
     kinds = part_reading.place_kinds(network, parts, scalars, bool(reading.faults))
     routes = read_routes(reading, network, parts.links)
     kinds["routes"] = {name: route and (legs(route, parts.links), parts.links) for name, route in routes.items()}
+    kinds["reactions"] = reaction_kinds(reactions)
     blocks = read_controls(reading, kinds)
     output = read_output(reading, numerics, kinds)
     expect, compare = claims.read_expectations(reading, kinds, routes), claims.read_comparisons(reading, kinds)
@@ -135,7 +138,8 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
         name=raw.name, path=raw.path, folder=raw.folder, raw=raw.table, **general, ambient_pressure=setting.ambient,
         fluid=fluid, properties=state, nodes=parts.nodes, links=links, meshes=parts.meshes, lumped=parts.lumped,
         signals=dict(setting.used), scalars=scalars, numerics=numerics, output=output, expect=expect, compare=compare,
-        routes=routes, limits=limits, controls=blocks, exact=named, copies=dict(setting.files), read=reading.read,
+        routes=routes, limits=limits, controls=blocks, reactions=reactions, exact=named, copies=dict(setting.files),
+        read=reading.read,
     )  # fmt: skip
     return case if named is None else with_exact(reading, case)
 

@@ -30,15 +30,16 @@ class Probe:
     """Recorded quantity of a part.
 
     text : text of the probe in the case, such as "main.pressure@0.5"
-    part, name : "nodes", "links" or "controls", and name of the part or block
+    part, name : "nodes", "links", "controls" or "reactions", and name of the part, block or reaction
     quantity, dimension : such as "level" and "length"
     fraction : distance from the `from` end of a pipe over its length [-], else None
     point : x, y in a basin [m], else None
     straight : True to interpolate linearly between cells, not by the polynomial of the scheme
+    place : probe of a scalar at the place of a reaction, None for the sum over all places
     """
 
     text: str
-    part: str  # "nodes" | "links" | "controls"
+    part: str  # "nodes" | "links" | "controls" | "reactions"
     name: str
     quantity: str
     fraction: float | None
@@ -46,6 +47,7 @@ class Probe:
     point: tuple[float, float] | None = None
     unit: str = ""  # of a scalar, a label
     straight: bool = False
+    place: Probe | None = None
 
 
 Kinds = Mapping[str, Mapping[str, "type[Node] | type[Link] | BasinFields | Scalar | None"]]
@@ -62,7 +64,7 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     if match is None:
         raise ValueError(f'{show(given)} is not a probe; expected NAME.QUANTITY, for example "gate.pressure"')
     part, name, quantity, place = match.groups()
-    parts = [part] if part else ["nodes", "links", "controls"]
+    parts = [part] if part else ["nodes", "links", "controls", "reactions"]
     parts = [part for part in parts if name in kinds.get(part, ())]
     if not parts and part != "nodes" and name in kinds.get("routes", {}):
         return route_probe(given.strip(), name, quantity, place, kinds)
@@ -71,7 +73,8 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     if not parts and may_be_piece(name, kinds):
         return None
     if not parts:
-        names = [*kinds["nodes"], *kinds["links"], *kinds.get("controls", ())] if part is None else list(kinds[part])
+        groups = ("nodes", "links", "controls", "reactions") if part is None else (part,)
+        names = [name for group in groups for name in kinds.get(group, ())]
         noun = {"nodes": "node", "links": "link"}.get(part or "", "part")
         raise ValueError(f"no {noun} named {show(name)}; {noun}s are {listing(names)}{did_you_mean(name, names)}")
     if any(kinds[part][name] is None for part in parts):
@@ -161,9 +164,10 @@ def default_probes(kinds: Kinds) -> list[Probe]:
             for quantity in [*own, *_scalars_of(kind, kinds, "quantities")] if own else []:
                 text = f"{part}.{name}.{quantity}" if name in other else f"{name}.{quantity}"
                 probes.append(_probe(text, part, name, quantity, None, kinds))
-    for name, kind in kinds.get("controls", {}).items():
-        if kind is not None:
-            probes.append(_probe(f"{name}.output", "controls", name, "output", None, kinds))
+    for group, quantity in (("controls", "output"), ("reactions", "rate")):
+        for name, kind in kinds.get(group, {}).items():
+            if kind is not None:
+                probes.append(_probe(f"{name}.{quantity}", group, name, quantity, None, kinds))
     return probes
 
 
@@ -177,6 +181,8 @@ def _scalars_of(kind: type[Node] | type[Link], kinds: Kinds, where: str) -> dict
 
 def _probe(text: str, part: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe:
     kind = kinds[part][name]
+    if part == "reactions":
+        return reaction_probe(text, name, quantity, place, kinds)
     scalar = None if is_in_network(kind) else kinds["scalars"].get(quantity)
     unit = scalar.unit if scalar is not None else ""
     if quantity in (fields := getattr(kind, "fields", {})):  # of a basin
@@ -188,6 +194,28 @@ def _probe(text: str, part: str, name: str, quantity: str, place: str | None, ki
     begin = 0.0 if pipe is None or pipe.profile is None else float(pipe.profile.chainage[0])
     fraction, dimension = _quantity(kind, along, quantities, name, quantity, place, pipe and pipe.length, begin)
     return Probe(text, part, name, quantity, fraction, dimension, unit=unit)
+
+
+def reaction_probe(text: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe | None:
+    """Probe of a reaction; None if its place is faulty. Raises ValueError.
+
+    text : text of the probe; name : name of the reaction with its prefix; kinds : as for `read_probe`
+    place : text after "@", for an affinity: a node, PIPE@0.5 or BASIN@x,y
+    """
+    kind = kinds["reactions"][name]
+    if quantity not in kind.quantities:
+        known = kind.quantities
+        reason = kind.missing if quantity in ("affinity", "power") else f"it has {listing(known)}"
+        raise ValueError(f"{name} has no {show(quantity)}{did_you_mean(quantity, known)}; {reason}")
+    dimension, where = kind.quantities[quantity], None
+    if place is not None:
+        if quantity != "affinity":
+            raise ValueError(f"{quantity} of {name} is the sum over all places; leave @{place} out")
+        node, _, position = place.partition("@")
+        where = read_probe(f"{node}.{kind.scalar}" + (f"@{position}" if position else ""), kinds)
+        if where is None:
+            return None
+    return Probe(text, "reactions", name, quantity, None, dimension, place=where)
 
 
 def _quantity(

@@ -14,6 +14,7 @@ from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.control import Control
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
+from fvsolve.parts.reaction import Reaction
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table_model import keys_json
 from fvsolve.parts.value import Quantity
@@ -48,10 +49,10 @@ def full_schema() -> dict[str, Any]:
     any_block = [_typed(kind, block, definitions) for kind, block in sorted(Control.kinds.items())]
     properties["controls"] = {"type": "object", "additionalProperties": {"anyOf": any_block}}
     properties["defaults"] = _defaults(definitions)
-    scalar = _with_shared_definitions(Scalar, definitions)
-    properties["scalars"] = {"type": "object", "additionalProperties": scalar}
+    for name, model in (("scalars", Scalar), ("reactions", Reaction), ("routes", Route)):
+        content = _with_shared_definitions(model, definitions)
+        properties[name] = {"type": "object", "additionalProperties": content}
     properties["signals"] = {"type": "object", "additionalProperties": Scheduled("number").json()}
-    properties["routes"] = {"type": "object", "additionalProperties": _with_shared_definitions(Route, definitions)}
     limit = keys_json(limit_keys("pressure", "pressure"))
     properties["limits"] = {"type": "object", "additionalProperties": limit}
     properties["expect"] = properties["compare"] = {"type": "object", "additionalProperties": {"type": "object"}}

@@ -232,7 +232,7 @@ class OutputUnits(val.Value):
     quantities = (
         "pressure", "gauge_pressure", "head", "level", "flow", "velocity", "position", "force", "torque", "angle",
         "angular_velocity", "acceleration", "energy", "power", "time", "length", "area", "volume", "density",
-        "voltage", "current", "temperature",
+        "voltage", "current", "temperature", "molar_flow", "affinity",
     )  # fmt: skip
 
     def read(self, given: Any, setting: ReadContext) -> dict[str, str]:

@@ -155,6 +155,8 @@ def check_text(case, facts: dict, every: bool = False) -> Iterator:
              for name, part in lines.items()]  # fmt: skip
     if lines:
         notes += [f"{name} has cells: {part['line_why']}" for name, part in facts["pipes"].items() if name not in lines]
+    notes += [f"reaction {name}: {item['equation']}, rate {item['law']} [mol/m3/s]; {item['rate']:.4g} mol/s at the "
+              "start" for name, item in facts["reactions"].items()]  # fmt: skip
     yield from _first([*notes, *_network_lines(facts["network"])], every)
     yield from _first([f"moves from the start: {text}" for text in facts["moving"]], every)
     yield from _notices(facts["warnings"], every)

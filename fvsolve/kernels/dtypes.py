@@ -451,6 +451,8 @@ LAYOUT = record(
     drive=i8,  # present relative speeds of pumps, an entry for each valve
     gain=i8,  # after `supply` in the ledger: inflow of each scalar through nodes [kg/s]
     loss=i8,  # then the negative decay of each scalar [kg/s]
+    extent=i8,  # then the rates of reactions, times the mass that reacts [kg mol/m3/s]
+    quickest=i8,  # greatest rate of change by reactions [1/s], an entry if there are reactions
     value=i8,  # of each scalar at all nodes
     edge=i8,  # values of scalars in pipes at both ends
     carried=i8,  # flow of scalars along pipes through both ends [kg/s]
@@ -508,6 +510,10 @@ CONTROL_VALUE = 26  # of a block of `controls`: 0 output, 1 input, 2 error in `s
 NETWORK_VALUE = 27
 ROW, POWER, ENTROPY, LOCKED, NET_PUSH = 0, 1, 2, 3, 4
 SCHEDULE_VALUE = 28  # of schedule `index`
+# of a reaction, by the code in `side`: molar flow, power, mean affinity over all places; affinity at a place, whose
+# scalar probe has the kind in `head` and the index in `scalar`
+REACTION_VALUE, LOCAL_AFFINITY = 29, 30
+MOLAR_RATE, CHEMICAL_POWER, AFFINITY = 0, 1, 2
 
 BASIN = record(
     kind=i8,  # code of its physics, see `basins.basin_patches`
@@ -611,7 +617,22 @@ SCALAR = record(
     initial=f8,  # inflow value if no other is given
     least=f8,  # bounds of all possible values
     greatest=f8,
+    molar=f8,  # amount of substance per volume of the value 1 [mol/m3]; 1 if it is no amount
 )
+
+REACTION = record(
+    program=i8,  # header row of the formula of its rate in `pieces`; -1 for mass action
+    scalars=i8,  # offset of the numbers of its scalars in `integers`
+    count=i8,  # number of these
+    data=i8,  # offset in `floats` of three numbers of each scalar: both orders, and its change in its own unit
+    extent=i8,  # first of its rows in the ledger of reactions
+    extents=i8,  # number of these rows: 1, or a row for each place, see SCALAR
+    limits=i8,  # 1 if its rate limits steps
+    forward=f8,  # constants of mass action [(mol/m3)^(1 - order)/s]
+    reverse=f8,
+    thermal=f8,  # R T [J/mol]
+)
+FORWARD_ORDER, REVERSE_ORDER, CHANGE = 0, 1, 2
 
 CLOCK = record(
     limit=f8,  # end of the segment: schedules take their left limit from here on [s]
@@ -652,6 +673,7 @@ RECORDS = {
     "network_rates": NETWORK_RATE,
     "network_elements": NETWORK_ELEMENT,
     "network_switches": NETWORK_SWITCH,
+    "reactions": REACTION,
 }
 # `Tables`: of a model, read-only; `RunArrays`: written by a run; `HandleTables`: behind a handle, also addresses of
 # functions: `calls`, a row for each job, and `hooks`, a row for each law of devices.

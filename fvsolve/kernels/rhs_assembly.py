@@ -202,6 +202,11 @@ COMPONENTS = {
     "carried": RhsTerms(
         outlet_values="scalar_transport: pipe_outlet_values", scalar_rates="scalar_transport: scalar_rates"
     ),
+    "reactions": RhsTerms(
+        prepare="reactions: limit_rates",
+        scalar_rates="reactions: reaction_rates",
+        observe="reactions: observe_reactions",
+    ),
     "forces, linear": RhsTerms(observe="pipe_forces: observe_forces_linear"),
     "forces, barotropic": RhsTerms(observe="pipe_forces: observe_forces_barotropic"),
     "forces, cavitating": RhsTerms(observe="pipe_forces: observe_forces_cavitating"),
@@ -270,6 +275,7 @@ class ModelFeatures:
     controls: bool = False
     formulas: bool = False
     networks: bool = False
+    reactions: bool = False
 
     def components(self) -> Iterator[RhsTerms]:
         """Yield the terms (`RhsTerms`) of all components of the model, in the order in which the functions run."""
@@ -341,6 +347,8 @@ class ModelFeatures:
                 yield MIXED
             if self.pipes:
                 yield COMPONENTS["carried"]
+        if self.reactions:  # those in basins are added later
+            yield COMPONENTS["reactions"]
         yield from self.carried
         if self.controls:
             yield COMPONENTS["probes of controls"]

@@ -138,6 +138,13 @@ def has_storage(kind):
 
 
 @njit(forceinline=True)
+def change_rate(out, tables, q):
+    """Rate at which scalar q decays and reacts [1/s]; explicit steps are limited by half of it."""
+    decay = tables.scalars[q]["decay"]
+    return decay + out[tables.layout[0]["quickest"]] if tables.reactions.size > 0 else decay
+
+
+@njit(forceinline=True)
 def mixes(y, out, tables, i):
     """True if the value of a scalar at node i is that of the present inflow: the node is a junction or a dry tank."""
     node = tables.nodes[i]
@@ -203,7 +210,7 @@ def mix_nodes(t, y, out, tables, q):
     for i in range(n):
         if has_storage(nodes[i]["kind"]):
             mass = max(nodes[i]["mass"] + y[nodes[i]["y"]], RATE_DEPTH * nodes[i]["density"] * nodes[i]["area"])
-            out[RATE] = max(out[RATE], share[i] / mass + 0.5 * tables.scalars[q]["decay"])
+            out[RATE] = max(out[RATE], share[i] / mass + 0.5 * change_rate(out, tables, q))
 
 
 @njit(forceinline=True)
@@ -392,7 +399,7 @@ def pipe_scalar_rates(y, dydt, out, tables, p):
                 record_loss(out, tables, q, pipe["cell"] + i, dx * scalar["decay"] * (s[i] - scalar["ambient"] * m[i]))
         else:
             record_loss(out, tables, q, 0, dx * lost)
-        rate = quick + 2.0 * scalar["diffusivity"] / (dx * dx) + 0.5 * scalar["decay"]
+        rate = quick + 2.0 * scalar["diffusivity"] / (dx * dx) + 0.5 * change_rate(out, tables, q)
         out[RATE] = max(out[RATE], rate)
 
 
@@ -434,27 +441,35 @@ def scalar_rates(t, y, dydt, out, handle):
 
 
 @njit
+def value_at_probe(y, out, tables, probe, kind, i, q):
+    """Value of scalar q at the place of a probe.
+
+    kind : NODE_SCALAR or PIPE_SCALAR; i : number of the node or pipe
+    """
+    layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes.size
+    if kind == NODE_SCALAR:
+        return out[layout["value"] + q * nodes + i]
+    if probe["side"] != 0:
+        right = 1 if probe["side"] > 0 else 0
+        if probe["side"] * end_flow(out, tables, i, right) < 0.0:
+            node = pipes[i]["to_node"] if right == 1 else pipes[i]["from_node"]
+            return out[layout["value"] + q * nodes + node]
+        return out[layout["edge"] + 2 * (q * pipes.size + i) + right]
+    value = 0.0
+    for j in range(probe["count"]):
+        c = probe["cell"] + j
+        w = y[pipes[i]["y"] + c] + y[pipes[i]["y"] + pipes[i]["cells"] + c]
+        m = tables.profile[pipes[i]["center"] + c] + w / pipes[i]["speed"]
+        s = y[tables.scalars[q]["y"] + pipes[i]["cell"] + c]
+        value += tables.floats[probe["weights"] + j] * s / m
+    return value
+
+
+@njit
 def observe_scalars(t, y, out, handle, values):
     """Write the values of scalar probes to `values`: at a node, at a pipe end, or between the centres of two cells."""
     tables = open_tables(handle)
-    layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes.size
     for k in range(tables.probes.size):
         probe = tables.probes[k]
-        q, i = probe["scalar"], probe["index"]
-        if probe["kind"] == NODE_SCALAR:
-            values[k] = out[layout["value"] + q * nodes + i]
-        elif probe["kind"] == PIPE_SCALAR and probe["side"] != 0:
-            right = 1 if probe["side"] > 0 else 0
-            if probe["side"] * end_flow(out, tables, i, right) < 0.0:
-                node = pipes[i]["to_node"] if right == 1 else pipes[i]["from_node"]
-                values[k] = out[layout["value"] + q * nodes + node]
-            else:
-                values[k] = out[layout["edge"] + 2 * (q * pipes.size + i) + right]
-        elif probe["kind"] == PIPE_SCALAR:
-            values[k] = 0.0
-            for j in range(probe["count"]):
-                c = probe["cell"] + j
-                w = y[pipes[i]["y"] + c] + y[pipes[i]["y"] + pipes[i]["cells"] + c]
-                m = tables.profile[pipes[i]["center"] + c] + w / pipes[i]["speed"]
-                s = y[tables.scalars[q]["y"] + pipes[i]["cell"] + c]
-                values[k] += tables.floats[probe["weights"] + j] * s / m
+        if probe["kind"] == NODE_SCALAR or probe["kind"] == PIPE_SCALAR:
+            values[k] = value_at_probe(y, out, tables, probe, probe["kind"], probe["index"], probe["scalar"])

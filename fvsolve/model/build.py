@@ -48,6 +48,7 @@ from fvsolve.model.model import Model
 from fvsolve.model.network_start import unknown_speeds
 from fvsolve.model.network_tables import lower_networks, network_rate
 from fvsolve.model.probe_tables import lower_probes, probe_offsets
+from fvsolve.model.reaction_tables import lower_reactions
 from fvsolve.model.scalar_tables import lower_scalars, scale_scalars, start_amounts
 from fvsolve.model.start_notices import coarse_for_cavities, flow_notices, too_few_cells
 from fvsolve.model.steady_start import SteadyStart
@@ -224,6 +225,7 @@ def tables_before_start(case: Case, unfit: Collection[str] = ()) -> ModelDraft:
     classify_nodes(draft)
     lower_basins(draft)
     lower_scalars(draft)
+    lower_reactions(draft)
     lower_networks(draft)
     draft.check()
     lower_controls(draft)
@@ -326,7 +328,7 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         draft.moving_segment_table, draft.mass_table, draft.brace_table, draft.stop_table, draft.piston_table,
         draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table, draft.wall_table,
         draft.delay_table, draft.control_table, draft.sensor_table, draft.driven_table, draft.network_input_table,
-        draft.network_rate_table, draft.network_element_table, draft.network_switch_table,
+        draft.network_rate_table, draft.network_element_table, draft.network_switch_table, draft.reaction_table,
         np.array(draft.integers, dtype=np.int64), np.array(draft.floats, dtype=float), profile, draft.plane(), pieces,
     )  # fmt: skip
     pipes, nodes, out = len(draft.pipe_table), len(draft.node_table), int(layout["size"][0])
@@ -392,7 +394,8 @@ def layout_of(draft: ModelDraft) -> np.ndarray:
     scalars, layout, at = len(draft.scalar_table), np.zeros(1, rec.LAYOUT), rec.OUT_HEAD
     for name, size in (
         ("pressure", nodes), ("supply", nodes), ("gain", scalars * nodes), ("loss", sum(draft.scalar_table["losses"])),
-        ("net", nodes), ("ends", 4 * pipes), ("valve", valves), ("column", columns), ("valve_controlled", columns),
+        ("extent", sum(draft.reaction_table["extents"])), ("net", nodes), ("quickest", len(draft.reaction_table) > 0),
+        ("ends", 4 * pipes), ("valve", valves), ("column", columns), ("valve_controlled", columns),
         ("stiffness", draft.moving), ("outflow_fraction", draft.moving), ("swept", draft.moving),
         ("net_force", len(draft.mass_table)), ("push", len(draft.push_names)),
         ("conductance", valves), ("drive", valves), ("value", scalars * nodes), ("edge", 2 * pipes * scalars),

@@ -7,7 +7,7 @@ masses. Cells of a basin depend on the cells around them (`basins.lower_pattern`
 set by the cells behind it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array
@@ -16,6 +16,7 @@ from fvsolve.basins import lower_pattern as pattern
 from fvsolve.basins.lower_pattern import all_states
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.control_pattern import BlockCouplings, pairs_of, unique_states
+from fvsolve.model.reaction_tables import names_read
 from fvsolve.model.scalar_tables import STORES
 from fvsolve.schemes import SCHEMES, Reach
 from fvsolve.steady import union
@@ -639,6 +640,45 @@ class ScalarCouplings:
         return unique_states(self.of.sets[i], self.of.edge_cells(pipe, right), *near)
 
 
+def reaction_pairs(couplings, model) -> Iterator[Pairs]:
+    """Yield couplings of amounts that reactions change, and of the ledger of reactions, with what rates depend on.
+
+    These are amounts of scalars and the mass at the same place.
+    """
+    tables, scalars = model.tables, list(model.case.scalars)
+    ledger = couplings.size + len(couplings.nodes) * (1 + len(scalars)) + int(sum(tables.scalars["losses"]))
+    stores = np.flatnonzero(np.isin(tables.nodes["kind"], STORES))
+    for row, reaction in zip(tables.reactions, model.case.reactions.values(), strict=True):
+        changed = [scalars.index(name) for name in reaction.sides.names if reaction.sides.change(name) != 0.0]
+        read = [scalars.index(name) for name in names_read(reaction, model.case.scalars)]
+        first, single = ledger + row["extent"], row["extents"] == 1
+        for entries, masses, amounts in reacting_places(couplings, model, stores):
+            rows = [amounts(q) for q in changed] + [np.full(entries.size, first) if single else first + entries]
+            for states in [*(amounts(q) for q in read), *masses]:
+                yield from ((here, states) for here in rows)
+
+
+def reacting_places(couplings, model, stores: np.ndarray) -> Iterator[tuple[np.ndarray, list, Callable]]:
+    """Yield groups of places of reactions: their numbers, states of the masses there, states of amounts of a scalar.
+
+    stores : numbers of nodes with storage
+    """
+    tables = model.tables
+    scalars, nodes = tables.scalars, tables.nodes
+    for pipe in tables.pipes:
+        cells = np.arange(pipe["cells"])
+        masses = [pipe["y"] + cells, pipe["y"] + pipe["cells"] + cells]
+        yield pipe["cell"] + cells, masses, lambda q, k=pipe["cell"] + cells: scalars[q]["y"] + k
+    if stores.size:
+        places = tables.integers[scalars[0]["places"] + stores] - scalars[0]["y"]
+        yield places, [nodes["y"][stores]], lambda q: scalars[q]["y"] + places
+    for basin in couplings.basins:
+        cells = np.arange(basin.n)
+        depths = [basin.row["y"] + cells] if basin.quantities else []
+        if basin.scalars:
+            yield basin.row["lost"] + cells, depths, lambda q, b=basin, k=cells: pattern.amount_states(b, q, k)
+
+
 def jacobian_pattern(model) -> csc_array:
     """Sparsity pattern : bool[n + m, n], True where a derivative may differ from zero in any state of the model.
 
@@ -649,6 +689,7 @@ def jacobian_pattern(model) -> csc_array:
     pairs = [(np.arange(n), np.arange(n)), *couplings.pairs()]
     for q in range(len(model.tables.scalars)):
         pairs += ScalarCouplings(couplings, model, q).pairs()
+    pairs += reaction_pairs(couplings, model)
     rows, states = (np.concatenate(side) for side in zip(*pairs, strict=True))
     entries = np.ones(rows.size, dtype=bool), (rows, states)
     return csc_array(coo_array(entries, shape=(n + model.ledgers, n)), dtype=bool)

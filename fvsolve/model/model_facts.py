@@ -12,6 +12,7 @@ from fvsolve.case.basins import boundary_cells, patch_names
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.steady_friction import drag
+from fvsolve.model.reaction_tables import reaction_facts
 from fvsolve.parts.pipe.pipe_wall import Wall, materials, restraint_factor
 from fvsolve.steppers.automatic import first_method
 from fvsolve.steppers.tableau import AUTO, method_named
@@ -72,7 +73,7 @@ def checks(model) -> dict[str, Any]:
         "fluid": model.case.properties.plain(), "nodes": nodes, "masses": masses, "bodies": bodies,
         "pipes": pipes, "basins": {item.name: basin_facts(item) for item in model.basins},
         "states": model.y_size, "cells": model.all_cells, "step": step, "step_set_by": set_by, "steps": steps,
-        "network": None if model.network is None else model.network.facts(),
+        "network": None if model.network is None else model.network.facts(), "reactions": reaction_facts(model),
         "expected_seconds": expected, "moving": model.steady["moving"],
         "warnings": [item.plain() for item in (*model.warnings, *cost_notices(model, steps, set_by))],
     }  # fmt: skip

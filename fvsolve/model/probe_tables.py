@@ -9,6 +9,7 @@ from fvsolve.case import sloshing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.nodes_and_links import is_in_network
 
+REACTION_QUANTITIES = ("rate", "power", "affinity")  # in the order of `kernels.dtypes`
 BLOCK_QUANTITIES = ("output", "input", "error")  # in the order of `kernels.controls`
 
 
@@ -26,6 +27,8 @@ def fill_probes(draft, probes: list) -> np.ndarray:
         if probe.part == "controls":
             row["kind"], row["index"] = rec.CONTROL_VALUE, draft.schedules.blocks[probe.name.removeprefix("controls.")]
             row["side"] = BLOCK_QUANTITIES.index(probe.quantity)
+        elif probe.part == "reactions":
+            lower_reaction_probe(draft, row, probe)
         elif probe.point is not None:
             lower_basin_point(draft, row, probe)
         elif probe.quantity in draft.case.scalars and not is_in_network(parts[probe.part].get(probe.name)):
@@ -56,6 +59,19 @@ def scalar_probe(draft, row, probe) -> None:
     else:
         row["kind"], row["index"] = rec.PIPE_SCALAR, draft.pipe_names.index(probe.name)
         lower_position(draft, row, probe.fraction, 1)
+
+
+def lower_reaction_probe(draft, row, probe) -> None:
+    """Fill the row of a probe of a reaction; of an affinity at a place with the data of a scalar probe there."""
+    place = probe.place
+    if place is not None:
+        of_scalar = fill_probes(draft, [place])[0]
+        for key in ("side", "cell", "count", "weights"):
+            row[key] = of_scalar[key]
+        row["kind"], row["head"], row["scalar"] = rec.LOCAL_AFFINITY, of_scalar["kind"], of_scalar["index"]
+    else:
+        row["kind"], row["side"] = rec.REACTION_VALUE, REACTION_QUANTITIES.index(probe.quantity)
+    row["index"] = list(draft.case.reactions).index(probe.name.removeprefix("reactions."))
 
 
 def lower_body_point(draft, row, probe) -> None:

@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 
 from fvsolve.kernels import dtypes as rec
+from fvsolve.model.reaction_tables import reacting
 from fvsolve.parts.formula import means, samples
+from fvsolve.parts.reaction import molar_factor
 from fvsolve.steppers.tableau import METHODS
 
 STORES = (rec.TANK, rec.CHAMBER)
@@ -44,7 +46,17 @@ def explicit(method: str) -> bool:
 
 
 def bounds(case, name: str) -> tuple[float, float]:
-    """Least and greatest possible value of a scalar: those in the case, because mixing stays between them."""
+    """Least and greatest possible value of a scalar: those in the case, because mixing stays between them.
+
+    A scalar that reactions form has no greatest value, and 0 bounds a scalar that they consume.
+    """
+    least, greatest = stated_range(case, name)
+    formed, consumed = (name in reacting(case, side) for side in ("right", "left"))
+    return min(least, 0.0) if consumed else least, UNBOUNDED if formed else greatest
+
+
+def stated_range(case, name: str) -> tuple[float, float]:
+    """Least and greatest value of a scalar that a case states."""
     scalar = case.scalars[name]
     values = [scalar.initial] + [scalar.ambient] * (scalar.decay > 0.0)
     patches = [patch for basin in case.meshes for patch in case.nodes[basin].patches.values()]
@@ -64,8 +76,8 @@ def scale_scalars(draft) -> None:
         strain = (draft.profiles[k] - draft.fluid.pressure) / (rho * row["speed"] ** 2)
         profile[row["center"] + np.arange(row["cells"])] = rho * row["area"] * (1.0 + strain)
     scale = np.array(draft.scale)
-    for row in draft.scalar_table:
-        typical = max(abs(row["least"]), abs(row["greatest"])) or 1.0
+    for row, name in zip(draft.scalar_table, draft.case.scalars, strict=True):
+        typical = typical_value(draft.case, name)
         for pipe in draft.pipe_table:
             at = row["y"] + pipe["cell"]
             scale[at : at + pipe["cells"]] = typical * rho * pipe["area"]
@@ -73,6 +85,15 @@ def scale_scalars(draft) -> None:
             if node["kind"] in STORES:
                 scale[place] = typical * max(node["mass"], scale[node["y"]])
     draft.scale = array("d", scale.tobytes())
+
+
+def typical_value(case, name: str) -> float:
+    """Size of the values of a scalar: the greatest magnitude in the case; without any that of scalars that react."""
+    own = max(map(abs, stated_range(case, name)))
+    if own == 0.0 and name in (names := reacting(case)):
+        amounts = [max(map(abs, stated_range(case, other))) * molar_factor(case.scalars[other]) for other in names]
+        own = max(amounts) / molar_factor(case.scalars[name])
+    return own or 1.0
 
 
 def indices_at_nodes(draft, row) -> np.ndarray:
@@ -137,8 +158,9 @@ def total_amount(model, q: int, y: np.ndarray) -> float:
 def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[str, Any]]:
     """Balance of each scalar in a run : name -> initial, final, inflow, outflow, decayed, remainder [kg x its unit].
 
-    Further entries: net inflow (`by_node`), and inflow and outflow (`nodes`), of each node through which it flows.
-    relative : |remainder| over the greatest of |initial|, |final| and the sum inflow + outflow + |decayed|
+    Further entries: net inflow (`by_node`), and inflow and outflow (`nodes`), of each node through which it flows; if
+    reactions change it, what they form less what they consume (`reacted`).
+    relative : |remainder| over the greatest of |initial|, |final| and inflow + outflow + |decayed| + |reacted|
     ledger : float64[2, m]  integrals of positive rates, and of negative rates, of each row of the stepper's ledger
     """
     ledgers, n = {}, len(model.node_names)
@@ -147,12 +169,14 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
         decay = ledger[:, n * (1 + len(model.case.scalars)) + row["loss"] :]
         decayed = -float(np.sum(decay[:, : row["losses"]]))
         initial, final = total_amount(model, q, model.start), total_amount(model, q, y)
-        remainder = final - initial - (float(np.sum(flows)) - decayed)
+        formed = formed_amount(model, q, ledger)
+        remainder = final - initial - (float(np.sum(flows)) - decayed + formed)
         net = zip(model.node_names, flows.sum(axis=0), strict=True)
-        turnover = max(abs(initial), abs(final), float(np.sum(np.abs(flows))) + abs(decayed))
+        turnover = max(abs(initial), abs(final), float(np.sum(np.abs(flows))) + abs(decayed) + abs(formed))
         ledgers[name] = {
             "initial": initial, "final": final, "inflow": float(flows[0].sum()),
             "outflow": float(0.0 - flows[1].sum()), "decayed": decayed,
+            **({"reacted": formed} if name in reacting(model.case) else {}),
             "by_node": {node: float(x) for node, x in net if x != 0.0},
             "nodes": {node: {"inflow": float(x), "outflow": float(0.0 - y)}
                       for node, x, y in zip(model.node_names, *flows, strict=True) if x != 0.0 or y != 0.0},
@@ -161,7 +185,21 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
     return ledgers
 
 
+def formed_amount(model, q: int, ledger: np.ndarray) -> float:
+    """Amount of scalar q that reactions have formed [kg times its unit]; ledger : as for `scalar_ledgers`."""
+    tables, formed = model.tables, 0.0
+    first = len(model.node_names) * (1 + len(tables.scalars)) + int(sum(tables.scalars["losses"]))
+    for row in tables.reactions:
+        members = tables.integers[row["scalars"] : row["scalars"] + row["count"]].tolist()
+        if q in members:
+            at = first + int(row["extent"])
+            change = tables.floats[row["data"] + 3 * members.index(q) + rec.CHANGE]
+            formed += change * float(np.sum(ledger[:, at : at + int(row["extents"])]))
+    return formed
+
+
 NO_STATE = -1
+UNBOUNDED = 1e100  # greatest value of a scalar that reactions form
 
 
 def state_bounds(model) -> tuple[np.ndarray, np.ndarray]:
@@ -172,8 +210,9 @@ def state_bounds(model) -> tuple[np.ndarray, np.ndarray]:
     Bounds of depths come first, because depths bound the amounts of scalars.
     """
     rows = [*depths(model)]
-    for q in range(len(model.tables.scalars)):
-        rows += scalar_bounds(model, q)
+    for q, name in enumerate(model.case.scalars):
+        if name not in reacting(model.case):  # limits of single amounts would break sums that reactions keep
+            rows += scalar_bounds(model, q)
     if not rows:
         return np.zeros(0, dtype=np.int64), np.zeros((0, 4))
     at, by = (np.concatenate(column) for column in zip(*rows, strict=True))

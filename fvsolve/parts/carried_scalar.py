@@ -1,7 +1,7 @@
 """Scalars transported by the fluid: temperature, concentration, tracer."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table_model import Table
@@ -12,11 +12,31 @@ from fvsolve.parts.value import (
     Quantity,
     ReadContext,
     Text,
+    UsualRange,
     Value,
     nonnegative,
+    positive,
     read_each,
 )
 from fvsolve.units import show
+
+
+@dataclass(frozen=True)
+class Composition(Value):
+    """Value of a case file: atoms in a molecule, element -> count above 0."""
+
+    about: str = "atoms in a molecule, element -> count, which balance in reactions"
+    changes: str = VALUE
+    takes: ClassVar[str] = "`{ ELEMENT = COUNT }`"
+    schema: ClassVar[dict[str, Any]] = {"type": "object", "additionalProperties": {"type": "number"}}
+
+    def read(self, given: Any, setting: ReadContext) -> dict[str, float]:
+        if not isinstance(given, dict) or not given:
+            raise ValueError(f"{show(given)} is not a table of atoms; expected for example {{ H = 2, O = 1 }}")
+        return read_each(given.items(), lambda item: Number(positive).read(item, setting))
+
+
+MOLAR_MASSES = UsualRange(1e-3, 1.0, "hydrogen to large organic molecules")  # [kg/mol]
 
 
 class Scalar(Table):
@@ -32,6 +52,11 @@ class Scalar(Table):
     ] = 0.0
     decay: Annotated[float, Quantity("rate", nonnegative, "rate of decay towards ambient [1/s]", changes=VALUE)] = 0.0
     ambient: Annotated[float, Number(about="value towards which the scalar decays", changes=VALUE)] = 0.0
+    molar_mass: Annotated[
+        float | None,
+        Quantity("molar_mass", positive, "molar mass, for reactions of a mass per volume", MOLAR_MASSES, VALUE),
+    ] = None
+    composition: Annotated[dict[str, float] | None, Composition()] = None
 
 
 @dataclass(frozen=True)

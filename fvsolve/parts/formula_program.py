@@ -34,19 +34,21 @@ class Program:
     """Formula as steps of the stack machine.
 
     text : formula; names : its inputs; scale, offset : SI value = scale * value of the formula + offset
+    clock : False for a formula without the time t
     """
 
     text: str
     names: tuple[str, ...] = ()
     scale: float = 1.0
     offset: float = 0.0
+    clock: bool = True
 
     @cached_property
     def steps(self) -> list[tuple[int, float]]:
         """(code, number) of each step. Raises ValueError for a text that is not a formula."""
         result: list[tuple[int, float]] = []
         widths: list[list[int]] = []  # steps that compute each value on the stack
-        for step in Arithmetic(self.text, names=(*TIME_NAMES, *self.names)).steps:
+        for step in Arithmetic(self.text, names=(*TIME_NAMES[not self.clock :], *self.names)).steps:
             if step.count == 0:
                 self.push(result, widths, step.rule)
             elif step.rule is not np.positive:
@@ -56,7 +58,7 @@ class Program:
     def push(self, result: list, widths: list, rule: Any) -> None:
         """Add the step for a number or a name."""
         widths.append([len(result)])
-        if rule == "t":
+        if rule == "t" and self.clock:
             result.append((code.TIME, 0.0))
         elif isinstance(rule, str) and rule != "pi":
             result.append((code.INPUT, float(self.names.index(rule))))

@@ -24,6 +24,7 @@ import numpy as np
 from fvsolve.assembly.pipe_terms import elements
 from fvsolve.errors import Notice
 from fvsolve.kernels.steady_friction import drag_slope
+from fvsolve.model.reaction_tables import reaction_modes
 from fvsolve.schemes import SCHEMES
 from fvsolve.step_limits.grid_limits import bisected
 from fvsolve.step_limits.symbol import symbol
@@ -146,6 +147,7 @@ def lumped_modes(model, method: str, step: float) -> list[Mode]:
     cells = friction_modes(model)
     if fixed:  # a Courant number limits the other modes
         cells += memory_modes(model) + pipe_scalar_modes(model) + basin_scalar_modes(model)
+        cells += reaction_modes(model)
     candidates = [fastest_growing(r, modes, step, span, modes is own) for modes in (own, cells)]
     return [mode for mode in candidates if mode is not None]
 
