@@ -106,8 +106,8 @@ class RunData:
 
     @past.setter
     def past(self, past: np.ndarray) -> None:
-        self.written, self.full_at = self.written._replace(past=past), -np.inf
-        self.__dict__.pop("handle", None)
+        self.full_at = -np.inf
+        self.store("past", past)
 
     @property
     def histories(self) -> np.ndarray:
@@ -116,7 +116,15 @@ class RunData:
 
     @histories.setter
     def histories(self, histories: np.ndarray) -> None:
-        self.written = self.written._replace(histories=histories)
+        self.store("histories", histories)
+
+    def store(self, name: str, values: np.ndarray) -> None:
+        """Set an array of `written`; the array and the handle are replaced only if the size is new."""
+        array = getattr(self.written, name)
+        if array.size == values.size:
+            array[:] = values
+            return
+        self.written = self.written._replace(**{name: values})
         self.__dict__.pop("handle", None)
 
     def restore_history(self, state) -> None:

@@ -12,7 +12,7 @@ from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.model.energy_norm import EnergyForm
 from fvsolve.model.model import inputs_of
 from fvsolve.schemes import SCHEMES
-from fvsolve.solve.advance import hold
+from fvsolve.solve.held_inputs import hold
 from fvsolve.studies.operating_point import (
     COARSE_STEPS,
     SLOPE_TOLERANCE,
