@@ -1,8 +1,10 @@
 """Advance a state over an interval of time, for controllers and co-simulation."""
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
 from numbers import Real
+from operator import itemgetter
 
 import numpy as np
 
@@ -36,7 +38,9 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     kept = kept_loop(model, inputs or {})
     loop = kept.start(state)
     adaptive = loop.control["mode"] == loop_records.TOLERANCE
-    for end in [*(t for t, _ in model.breaks if state.t < t < until), until]:
+    first_break = bisect_right(model.breaks, state.t, key=itemgetter(0))
+    breaks = model.breaks[first_break : bisect_left(model.breaks, until, key=itemgetter(0))]
+    for end in [*(t for t, _ in breaks), until]:
         if end == loop.t:
             continue
         first = loop.t == state.t
@@ -57,6 +61,16 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         memory["past"] = loop.run_data.past.copy()
     if loop.run_data.histories.size:
         memory["histories"] = loop.run_data.histories.copy()
+    end = State(loop.t, loop.now.copy(), memory)
     if kept.is_reusable:
+        kept.state = end
         model.idle_loops.append(kept)
-    return State(loop.t, loop.now.copy(), memory)
+    return end
+
+
+def observe(model: Model, state: State, inputs: Mapping[str, float]) -> np.ndarray:
+    """Values of all probes in a state, as `Model.observe`, with named inputs held at constant values [SI]."""
+    kept = kept_loop(model, inputs)
+    values = kept.observe(state)
+    model.idle_loops.append(kept)
+    return values

@@ -7,7 +7,8 @@ from numbers import Real
 
 import numpy as np
 
-from fvsolve.assembly.lowering import HEAD, Input
+from fvsolve.assembly.lowering import HEAD, PRESSURE, Input
+from fvsolve.assembly.schedule_tables import value_at
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.model import Model
 from fvsolve.model.model import inputs_of
@@ -32,12 +33,16 @@ class HeldModel:
         self.targets, tables = [known[name] for name in self.names], model.tables
         self.fixed = bool(self.targets) and (bool(model.basins) or any(target.scalar >= 0 for target in self.targets))
         schedules, nodes, first = tables.schedules.copy(), tables.nodes.copy(), len(tables.pieces)
-        used = [at for target in self.targets if target.control < 0 for at in (target.schedule, target.other) if at >= 0]
+        used = [
+            at for target in self.targets if target.control < 0 for at in (target.schedule, target.other) if at >= 0
+        ]
         pieces = np.vstack([tables.pieces, *[[-np.inf, *[0.0] * 6]] * len(used)])
         for row, schedule in enumerate(used, first):
             schedules[schedule] = row, 1
         for target in self.targets:
-            if target.node >= 0 and not self.linear:  # under the linear law a head becomes a pressure, else it stays one
+            if (
+                target.node >= 0 and not self.linear
+            ):  # under the linear law a head becomes a pressure
                 nodes["head_given"][target.node] = target.sort is HEAD
         scalars, controls = tables.scalars.copy(), tables.controls.copy()
         changed = {"schedules": schedules, "nodes": nodes, "scalars": scalars, "pieces": pieces, "controls": controls}
@@ -91,3 +96,16 @@ def checked(name: str, value: float, target: Input) -> float:
         text = f"{name} = {number:g}" + (f" is {pressure:.4g} Pa absolute" if target.sort is HEAD else " is a vacuum")
         raise FvsolveError(f"{text}. Expected {target.sort.expected}")
     return number
+
+
+def input_value(model: Model, t: float, y: np.ndarray, target: Input) -> float:
+    """Value [SI] of an input that is no output of a control, at time t [s] in the state y."""
+    if target.node >= 0:
+        pressure = float(model.tables.nodes[target.node]["pressure"]
+                         + model.evaluate(t, y)[1][model.layout["pressure"] + target.node])  # fmt: skip
+        place = model.node_names[target.node]
+        return pressure if target.sort is PRESSURE else float(model.head(pressure, model.elevation[place]))
+    value = value_at(model.tables, target.schedule, t, np.inf)
+    if target.other >= 0:
+        value -= value_at(model.tables, target.other, t, np.inf)
+    return float(value / target.scale)

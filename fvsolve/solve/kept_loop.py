@@ -13,7 +13,7 @@ from fvsolve.steppers.run_handle import RunArrays
 
 HISTORIES = ("past", "histories")  # arrays that may grow in a run
 # Handles, made anew where an array is replaced, and rows of output, which `advance` neither writes nor reads.
-HANDLES, UNUSED = ("sharp", "sensing"), ("calls", "spare", "rows")
+HANDLES, UNUSED = ("sharp", "sensing"), ("calls", "spare", "rows", "coefficients", "dense")
 
 
 class KeptLoop:
@@ -39,6 +39,7 @@ class KeptLoop:
         self.resets = [reset_of(array) for array in arrays if array.size and array.flags.writeable]
         self.histories = {name: getattr(loop.run_data, name).copy() for name in HISTORIES}
         self.network_mode = loop.run_data.network_mode
+        self.state: State | None = None  # state in which the loop is, as `advance` returned it
 
     @property
     def is_reusable(self) -> bool:
@@ -54,7 +55,7 @@ class KeptLoop:
 
     def start(self, state: State) -> RunLoop:
         """Loop at a state, equal to a new loop. Raises ValueError if the state has no history that the model needs."""
-        loop, run_data = self.loop, self.loop.run_data
+        loop, run_data, self.state = self.loop, self.loop.run_data, None
         for words, value in self.resets:
             words[:] = value
         loop.switched, loop.at_once, loop.last_switch, loop.network_fault = [], 0, np.nan, ""
@@ -69,6 +70,14 @@ class KeptLoop:
         run_data.discrete[:] = state.memory.get("discrete", self.model.discrete)
         run_data.restore_history(state)
         return loop
+
+    def observe(self, state: State) -> np.ndarray:
+        """Values of all probes in a state, equal to `Model.observe`."""
+        if self.state is not state:
+            self.model.checked(state.t, state.y)
+            self.start(state)
+        run_data, self.state = self.loop.run_data, None  # flags may change
+        return run_data.observe(state.t, state.y, run_data.evaluate(state.t, state.y, np.inf)[1])
 
 
 def reset_of(array: np.ndarray) -> tuple[np.ndarray, np.ndarray | np.int64]:
