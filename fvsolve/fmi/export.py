@@ -73,8 +73,7 @@ def write_fmu(case: Case, path: Path | None = None) -> tuple[Path, list[Variable
     version, identifier = fvsolve.__version__, identifier_of(case.name)
     module = f"fvsolve_{re.sub(r'[^0-9A-Za-z]', '_', version)}_slave"  # FMUs of one version share it in a host
     needs = NEEDS.format(version=version)
-    files = {f"resources/{CASE_FOLDER}/{case.name}.toml": case.resolved().encode()}
-    files |= {f"resources/{CASE_FOLDER}/{name}": Path(source).read_bytes() for name, source in case.copies.items()}
+    files = {f"resources/{name}": data for name, data in case_files(case).items()}
     guid = hashlib.sha256(repr(sorted(files.items())).encode() + version.encode()).hexdigest()[:32]
     description = f"{case.title or case.name}. {needs}"
     files["modelDescription.xml"] = model_description(case, variables, identifier, guid, version, description)
@@ -89,6 +88,12 @@ def write_fmu(case: Case, path: Path | None = None) -> tuple[Path, list[Variable
         for name, data in files.items():
             archive.writestr(zipfile.ZipInfo(name, FIXED_DATE), data, zipfile.ZIP_DEFLATED)
     return path, variables
+
+
+def case_files(case: Case) -> dict[str, bytes]:
+    """Resolved case and its files : path in the resources of an FMU -> contents."""
+    files = {f"{CASE_FOLDER}/{case.name}.toml": case.resolved().encode()}
+    return files | {f"{CASE_FOLDER}/{name}": Path(source).read_bytes() for name, source in case.copies.items()}
 
 
 def folder_of_pythonfmu() -> Path:

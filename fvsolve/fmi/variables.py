@@ -81,6 +81,6 @@ def output_variable(case, probe) -> Variable:
     text = f"{probe.quantity.replace('_', ' ')} of {probe.name}"
     stated, display = case.unit_of(probe.dimension), None
     if not probe.unit and stated != unit and probe.dimension != "number":
-        zero, one = (units.convert(value, probe.dimension, stated, case.ambient_pressure) for value in (0.0, 1.0))
-        display = stated, float(one - zero), float(zero)
+        offset, unity = (units.convert(value, probe.dimension, stated, case.ambient_pressure) for value in (0.0, 1.0))
+        display = stated, float(unity - offset), float(offset)
     return Variable(probe.text, unit, text, display=display)

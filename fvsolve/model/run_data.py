@@ -128,12 +128,14 @@ class RunData:
         self.__dict__.pop("handle", None)
 
     def restore_history(self, state) -> None:
-        """Set histories of delay lines and of inputs of blocks from the memory of a state.
+        """Set histories of delay lines and of inputs of blocks, and numbers of blocks, from the memory of a state.
 
         They are unchanged if state or memory are missing. Raises ValueError if the memory contains no history.
         """
         if state is None or not state.memory:
             return
+        if self.discrete.size:
+            self.discrete[:] = state.memory.get("discrete", self.discrete)
         if len(self.model.tables.delays):
             self.past = stored_history(state.memory)
         if self.histories.size:

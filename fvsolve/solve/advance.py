@@ -10,7 +10,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.model import Model, State
-from fvsolve.solve.kept_loop import kept_loop
+from fvsolve.solve.reused_loop import reused_loop
 from fvsolve.solve.run_loop import NO_LIMIT
 from fvsolve.steppers import automatic, loop_records
 from fvsolve.units import show
@@ -35,8 +35,8 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         text = f"until = {until:g} s is before the time of the state, {state.t:g} s"
         raise FvsolveError(f"{text}. Expected at least {state.t:g} s")
     model.checked(state.t, state.y)
-    kept = kept_loop(model, inputs or {})
-    loop = kept.start(state)
+    reused = reused_loop(model, inputs or {})
+    loop = reused.start(state)
     adaptive = loop.control["mode"] == loop_records.TOLERANCE
     first_break = bisect_right(model.breaks, state.t, key=itemgetter(0))
     breaks = model.breaks[first_break : bisect_left(model.breaks, until, key=itemgetter(0))]
@@ -62,15 +62,15 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     if loop.run_data.histories.size:
         memory["histories"] = loop.run_data.histories.copy()
     end = State(loop.t, loop.now.copy(), memory)
-    if kept.is_reusable:
-        kept.state = end
-        model.idle_loops.append(kept)
+    if reused.is_reusable:
+        reused.state = end
+        model.idle_loops.append(reused)
     return end
 
 
 def observe(model: Model, state: State, inputs: Mapping[str, float]) -> np.ndarray:
     """Values of all probes in a state, as `Model.observe`, with named inputs held at constant values [SI]."""
-    kept = kept_loop(model, inputs)
-    values = kept.observe(state)
-    model.idle_loops.append(kept)
+    reused = reused_loop(model, inputs)
+    values = reused.observe(state)
+    model.idle_loops.append(reused)
     return values

@@ -40,9 +40,7 @@ class HeldModel:
         for row, schedule in enumerate(used, first):
             schedules[schedule] = row, 1
         for target in self.targets:
-            if (
-                target.node >= 0 and not self.linear
-            ):  # under the linear law a head becomes a pressure
+            if target.node >= 0 and not self.linear:  # under the linear law a head becomes a pressure
                 nodes["head_given"][target.node] = target.sort is HEAD
         scalars, controls = tables.scalars.copy(), tables.controls.copy()
         changed = {"schedules": schedules, "nodes": nodes, "scalars": scalars, "pieces": pieces, "controls": controls}

@@ -16,7 +16,7 @@ HISTORIES = ("past", "histories")  # arrays that may grow in a run
 HANDLES, UNUSED = ("sharp", "sensing"), ("calls", "spare", "rows", "coefficients", "dense")
 
 
-class KeptLoop:
+class ReusedLoop:
     """Loop of a model with named inputs held at constant values.
 
     A new loop takes about 0.3 ms; with `start` a used loop equals a new loop, since all its arrays are reset.
@@ -67,7 +67,6 @@ class KeptLoop:
         loop.now[:] = state.y
         loop.state["t"] = state.t
         loop.armed[:] = flags_of(state, self.model)
-        run_data.discrete[:] = state.memory.get("discrete", self.model.discrete)
         run_data.restore_history(state)
         return loop
 
@@ -86,10 +85,10 @@ def reset_of(array: np.ndarray) -> tuple[np.ndarray, np.ndarray | np.int64]:
     return words, words[0] if (words == words[0]).all() else words.copy()
 
 
-def kept_loop(model: Model, inputs: Mapping[str, float]) -> KeptLoop:
+def reused_loop(model: Model, inputs: Mapping[str, float]) -> ReusedLoop:
     """Loop of a model with these inputs: one that no call uses at present, or a new loop."""
     try:
-        kept = model.idle_loops.pop()  # atomic: no other thread gets the same object
+        reused = model.idle_loops.pop()  # atomic: no other thread gets the same object
     except IndexError:
-        return KeptLoop(model, inputs)
-    return kept if kept.accepts(inputs) else KeptLoop(model, inputs)
+        return ReusedLoop(model, inputs)
+    return reused if reused.accepts(inputs) else ReusedLoop(model, inputs)
