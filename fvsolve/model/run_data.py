@@ -188,7 +188,10 @@ class RunData:
 
         Waves arrive from delay lines as stored in `past`.
         """
-        t, y = self.model.checked(t, y)
+        return self.evaluate_checked(*self.model.checked(t, y), limit)
+
+    def evaluate_checked(self, t: float, y: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:
+        """Result of `evaluate` for arguments in the form that `Model.checked` returns."""
         self.clock["limit"] = limit
         dydt, out = np.zeros(y.size), self.model.new_out()
         self.set_flags(t, y)
@@ -208,7 +211,7 @@ class RunData:
             before = self.armed.copy()
             self.armed[:] = g <= 0.0
             self.update_network()
-            if np.array_equal(before, self.armed):
+            if (before == self.armed).all():
                 return
             self.store_times(t, before)
 

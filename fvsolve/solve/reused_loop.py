@@ -36,7 +36,11 @@ class ReusedLoop:
         arrays += [array for name, array in stepper.items() if name not in UNUSED]
         pairs = zip(loop.run_data.tables, self.model.tables, strict=True)
         arrays += [own for own, shared in pairs if own is not shared]  # a run changes its own copies
-        self.resets = [reset_of(array) for array in arrays if array.size and array.flags.writeable]
+        # words of 8 bytes of all arrays
+        words = [array.reshape(-1).view(np.int64) for array in arrays if array.size and array.flags.writeable]
+        uniform = [bool((word == word[0]).all()) for word in words]
+        self.fills = [(word, int(word[0])) for word, alike in zip(words, uniform, strict=True) if alike]
+        self.copies = [(word, word.copy()) for word, alike in zip(words, uniform, strict=True) if not alike]
         self.histories = {name: getattr(loop.run_data, name).copy() for name in HISTORIES}
         self.network_mode = loop.run_data.network_mode
         self.state: State | None = None  # state in which the loop is, as `advance` returned it
@@ -56,8 +60,10 @@ class ReusedLoop:
     def start(self, state: State) -> RunLoop:
         """Loop at a state, equal to a new loop. Raises ValueError if the state has no history that the model needs."""
         loop, run_data, self.state = self.loop, self.loop.run_data, None
-        for words, value in self.resets:
-            words[:] = value
+        for words, value in self.fills:
+            words.fill(value)
+        for words, values in self.copies:
+            words[:] = values
         loop.switched, loop.at_once, loop.last_switch, loop.network_fault = [], 0, np.nan, ""
         loop.recent_events.clear()
         run_data.network_mode, run_data.full_at = self.network_mode, -np.inf
@@ -76,13 +82,7 @@ class ReusedLoop:
             self.model.checked(state.t, state.y)
             self.start(state)
         run_data, self.state = self.loop.run_data, None  # flags may change
-        return run_data.observe(state.t, state.y, run_data.evaluate(state.t, state.y, np.inf)[1])
-
-
-def reset_of(array: np.ndarray) -> tuple[np.ndarray, np.ndarray | np.int64]:
-    """View of an array as words of 8 bytes, and their present values: a single number if all are equal."""
-    words = array.reshape(-1).view(np.int64)
-    return words, words[0] if (words == words[0]).all() else words.copy()
+        return run_data.observe(state.t, state.y, run_data.evaluate_checked(state.t, state.y, np.inf)[1])
 
 
 def reused_loop(model: Model, inputs: Mapping[str, float]) -> ReusedLoop:

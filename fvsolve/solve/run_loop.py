@@ -200,12 +200,14 @@ class RunLoop:
     def record_events(self, before: np.ndarray) -> None:
         """Record the events since the event flags were `before`, and apply their immediate effects."""
         first, count = tanks.EVENTS * self.tanks.size, len(self.model.events)
-        now = self.armed[first : first + count] > before[first : first + count]
+        armed, earlier = self.armed[first : first + count], before[first : first + count]
+        now = armed > earlier
         self.switched += [(self.t, int(k)) for k in now.nonzero()[0] if self.model.events[k][1]]
         self.run_data.store_times(self.t, before)
-        self.apply_events()  # diodes may take over the current of a switch
-        more = (self.armed[first : first + count] > before[first : first + count]) & ~now
-        self.switched += [(self.t, int(k)) for k in more.nonzero()[0] if self.model.events[k][1]]
+        self.apply_events()
+        if self.model.network is not None:  # diodes may have taken over the current of a switch
+            more = (armed > earlier) & ~now
+            self.switched += [(self.t, int(k)) for k in more.nonzero()[0] if self.model.events[k][1]]
 
     def apply_events(self) -> None:
         """Apply the immediate effects of events: limits of tank levels, and sudden changes of states of devices.
