@@ -6,6 +6,7 @@ import sys
 import zipfile
 
 import pytest
+from reference.folders import page, python_of
 
 import fvsolve
 from fvsolve import advance, initial_state
@@ -154,3 +155,10 @@ def test_the_command_writes_the_file_and_prints_the_variables(fvs, tmp_path, mon
     assert fvs("fmu", "two-tanks", "--out", "folder/tanks.fmu")[0] == 0 and (tmp_path / "folder/tanks.fmu").is_file()
     code, _, error = fvs("fmu", "hydropower")
     assert code == 2 and "hydropower.toml: 2 faults" in error
+
+
+def test_the_example_of_the_page_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    found = {}
+    exec(python_of(page("fmu")), found)
+    assert found["pressure"] > 5e5
