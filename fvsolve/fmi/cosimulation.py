@@ -32,7 +32,10 @@ class CoSimulation:
     def start(self) -> None:
         """Build the model of the case in the resources, and set its initial state."""
         (path,) = Path(self.resources, CASE_FOLDER).glob("*.toml")
-        self.model = build(load(path))
+        try:
+            self.model = build(load(path))
+        except FvsolveError as error:  # such as a part that is registered in another place
+            self.refuse(str(error))
         self.targets, self.variables = free_inputs(self.model), variables_of(self.model)
         names = [probe.text for probe in self.model.probes]
         self.places = [None if item.is_input else names.index(item.name) for item in self.variables]

@@ -208,6 +208,17 @@ def test_a_step_that_cannot_be_taken_leaves_the_state(slave, capsys):
     assert running.do_step(0.0, 0.1)
 
 
+def test_a_case_that_the_host_cannot_read_is_stated(slave, tmp_path, capsys):
+    slave("two-tanks")
+    path = tmp_path / "case/two-tanks.toml"
+    path.write_text(path.read_text().replace('type = "orifice"', 'type = "part-of-another-place"'))
+    second = CoSimulation()
+    second.resources, second.instance_name, second.log = str(tmp_path), "second", lambda *_: None
+    with pytest.raises(FvsolveError, match="part-of-another-place"):
+        second.start()
+    assert "fvsolve FMU second: two-tanks.toml: 1 fault" in capsys.readouterr().err
+
+
 def test_a_missing_package_is_named_with_its_remedy(fvs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "pythonfmu", None)
