@@ -111,6 +111,14 @@ def pint_unit(spelling: str) -> Unit | None:
     return Unit(f"quantity of [{base_units(unit_value.dimensionality)}]", factor)
 
 
+def powers_of_base_units(si: str) -> dict[str, int]:
+    """Powers of the base units in an SI unit of `DIMENSIONS`, such as {"kg": 1, "m": -1, "s": -2} for "Pa"."""
+    import pint
+
+    unit = pint.get_application_registry().parse_units("" if si == "-" else _for_pint(si))
+    return {BASE[name]: int(power) for name, power in unit.dimensionality.items()}
+
+
 def base_units(dimensionality: Mapping[str, float]) -> str:
     """Text of the base units of a quantity, such as "kg·m²/s³", sorted in numerator and denominator.
 

@@ -13,6 +13,7 @@ COMMANDS = dict.fromkeys(("run", "check", "list", "new", "schema", "methods", "c
     "chart": "accuracy_commands",
     "energy": "energy",
     "failure-map": "failure_map",
+    "fmu": "fmu_command",
     "import": "file_commands",
     "linearise": "linear_commands",
     "loop": "loop_commands",

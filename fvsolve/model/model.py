@@ -149,6 +149,7 @@ class Model(Displayable):
     # idle run data for evaluating single states; tables before the start is solved, reused by `vary`
     idle_run_data: deque[RunData] = field(default_factory=deque, init=False)
     tables_before_start: list = field(default_factory=list, init=False)
+    idle_loops: deque = field(default_factory=deque, init=False)  # loops of `advance` that no call uses
 
     picture = "fvsolve.draw.object_pictures:model_figure"
 

@@ -106,8 +106,8 @@ class RunData:
 
     @past.setter
     def past(self, past: np.ndarray) -> None:
-        self.written, self.full_at = self.written._replace(past=past), -np.inf
-        self.__dict__.pop("handle", None)
+        self.full_at = -np.inf
+        self.store("past", past)
 
     @property
     def histories(self) -> np.ndarray:
@@ -116,16 +116,26 @@ class RunData:
 
     @histories.setter
     def histories(self, histories: np.ndarray) -> None:
-        self.written = self.written._replace(histories=histories)
+        self.store("histories", histories)
+
+    def store(self, name: str, values: np.ndarray) -> None:
+        """Set an array of `written`; the array and the handle are replaced only if the size is new."""
+        array = getattr(self.written, name)
+        if array.size == values.size:
+            array[:] = values
+            return
+        self.written = self.written._replace(**{name: values})
         self.__dict__.pop("handle", None)
 
     def restore_history(self, state) -> None:
-        """Set histories of delay lines and of inputs of blocks from the memory of a state.
+        """Set histories of delay lines and of inputs of blocks, and numbers of blocks, from the memory of a state.
 
         They are unchanged if state or memory are missing. Raises ValueError if the memory contains no history.
         """
         if state is None or not state.memory:
             return
+        if self.discrete.size:
+            self.discrete[:] = state.memory.get("discrete", self.discrete)
         if len(self.model.tables.delays):
             self.past = stored_history(state.memory)
         if self.histories.size:
@@ -178,7 +188,10 @@ class RunData:
 
         Waves arrive from delay lines as stored in `past`.
         """
-        t, y = self.model.checked(t, y)
+        return self.evaluate_checked(*self.model.checked(t, y), limit)
+
+    def evaluate_checked(self, t: float, y: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:
+        """Result of `evaluate` for arguments in the form that `Model.checked` returns."""
         self.clock["limit"] = limit
         dydt, out = np.zeros(y.size), self.model.new_out()
         self.set_flags(t, y)
@@ -198,7 +211,7 @@ class RunData:
             before = self.armed.copy()
             self.armed[:] = g <= 0.0
             self.update_network()
-            if np.array_equal(before, self.armed):
+            if (before == self.armed).all():
                 return
             self.store_times(t, before)
 

@@ -1,17 +1,17 @@
 """Advance a state over an interval of time, for controllers and co-simulation."""
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
-from dataclasses import replace
 from numbers import Real
+from operator import itemgetter
 
 import numpy as np
 
-from fvsolve.assembly.lowering import HEAD, Input
-from fvsolve.errors import FvsolveError, nearest
+from fvsolve.errors import FvsolveError
 from fvsolve.model import Model, State
-from fvsolve.model.model import flags_of, inputs_of
-from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.solve.reused_loop import reused_loop
+from fvsolve.solve.run_loop import NO_LIMIT
 from fvsolve.steppers import automatic, loop_records
 from fvsolve.units import show
 
@@ -35,16 +35,12 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         text = f"until = {until:g} s is before the time of the state, {state.t:g} s"
         raise FvsolveError(f"{text}. Expected at least {state.t:g} s")
     model.checked(state.t, state.y)
-    held = hold(model, inputs or {})
-    loop = RunLoop(held, lambda: model.structure)  # the structure does not depend on the held inputs
-    loop.now[:] = state.y
-    loop.state["t"] = state.t
-    loop.armed[:] = flags_of(state, model)
-    loop.run_data.discrete[:] = state.memory.get("discrete", model.discrete)
-    loop.run_data.restore_history(state)
-    loop.on_switch = lambda: loop.stop_columns(loop.control["end"])
+    reused = reused_loop(model, inputs or {})
+    loop = reused.start(state)
     adaptive = loop.control["mode"] == loop_records.TOLERANCE
-    for end in [*(t for t, _ in model.breaks if state.t < t < until), until]:
+    first_break = bisect_right(model.breaks, state.t, key=itemgetter(0))
+    breaks = model.breaks[first_break : bisect_left(model.breaks, until, key=itemgetter(0))]
+    for end in [*(t for t, _ in breaks), until]:
         if end == loop.t:
             continue
         first = loop.t == state.t
@@ -65,59 +61,16 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         memory["past"] = loop.run_data.past.copy()
     if loop.run_data.histories.size:
         memory["histories"] = loop.run_data.histories.copy()
-    return State(loop.t, loop.now.copy(), memory)
+    end = State(loop.t, loop.now.copy(), memory)
+    if reused.is_reusable:
+        reused.state = end
+        model.idle_loops.append(reused)
+    return end
 
 
-def hold(model: Model, inputs: dict[str, float]) -> Model:
-    """Copy of a model with some inputs held at constant values: name of the input -> SI value.
-
-    Raises FvsolveError for an unknown input and for a value out of range.
-    """
-    if not inputs:
-        return model
-    tables = model.tables
-    schedules, pieces, nodes = tables.schedules.copy(), tables.pieces, tables.nodes.copy()
-    scalars, known, linear, rows = tables.scalars.copy(), inputs_of(model), model.case.law.linear, []
-    controls = tables.controls.copy()
-    for name, value in inputs.items():
-        if name not in known:
-            near = nearest(str(name), known)
-            hint = f'; did you mean "{near}"?' if near else f"; expected one of {', '.join(known)}"
-            raise FvsolveError(f"no input named {show(name)}{hint}")
-        target = known[name]
-        converted = checked(name, value, target)
-        if target.control >= 0:
-            controls["held"][target.control] = converted
-            continue
-        if target.node >= 0 and not linear:  # under the linear law a head becomes a pressure, else it stays a head
-            nodes["head_given"][target.node] = target.sort is HEAD
-        else:
-            converted = target.scale * converted + target.offset
-        parts = [(target.schedule, converted), *((k, max(0.0, a * converted + b)) for k, a, b in target.parts)]
-        for schedule, part in parts:
-            schedules[schedule] = (len(pieces) + len(rows), 1)
-            rows.append([-np.inf, 0.0, 0.0, part, 0.0, 0.0, 0.0])
-        if target.scalar >= 0:  # values of a scalar are limited to its bounds
-            bounds = scalars[target.scalar]
-            bounds["least"], bounds["greatest"] = min(bounds["least"], converted), max(bounds["greatest"], converted)
-    pieces = np.vstack([pieces, *([rows] if rows else [])])
-    changed = {"schedules": schedules, "nodes": nodes, "scalars": scalars, "pieces": pieces, "controls": controls}
-    return replace(model, tables=tables._replace(**changed))
-
-
-def checked(name: str, value: float, target: Input) -> float:
-    """Value of an input as a float; raises FvsolveError if it is not a number or out of the range of the input."""
-    if isinstance(value, np.ndarray) and value.size == 1:
-        value = value.item()
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
-        raise FvsolveError(f"{name} = {show(value)} is not a number. Expected {target.sort.expected}")
-    number = float(value)
-    if not math.isfinite(number):
-        raise FvsolveError(f"{name} = {number} is not finite. Expected {target.sort.expected}")
-    if not target.sort.least <= number <= target.sort.greatest:
-        raise FvsolveError(f"{name} = {number:g} is out of range. Expected {target.sort.expected}")
-    pressure = target.scale * number + target.offset
-    if target.node >= 0 and not pressure > 0.0:
-        text = f"{name} = {number:g}" + (f" is {pressure:.4g} Pa absolute" if target.sort is HEAD else " is a vacuum")
-        raise FvsolveError(f"{text}. Expected {target.sort.expected}")
-    return number
+def observe(model: Model, state: State, inputs: Mapping[str, float]) -> np.ndarray:
+    """Values of all probes in a state, as `Model.observe`, with named inputs held at constant values [SI]."""
+    reused = reused_loop(model, inputs)
+    values = reused.observe(state)
+    model.idle_loops.append(reused)
+    return values

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from fvsolve.assembly.lowering import Device
 from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tanks
@@ -79,6 +80,9 @@ class RunLoop:
         stepper.out, stepper.out_row = model.new_out(), model.new_out()
         stepper.values = np.zeros(len(model.tables.probes))
         self.tanks = np.flatnonzero(model.tables.nodes["kind"] == rec.TANK)
+        self.changed_at_events = [(device, row) for (_, _, device), row in
+                                  zip(model.devices, model.tables.devices, strict=True)
+                                  if type(device).apply_event is not Device.apply_event]  # fmt: skip
         events = self.armed.size
         stepper.g, stepper.g_new = np.zeros(events), np.zeros(events)
         stepper.rows = np.zeros((ROW_CAPACITY, 1 + len(model.tables.probes)))
@@ -196,24 +200,27 @@ class RunLoop:
     def record_events(self, before: np.ndarray) -> None:
         """Record the events since the event flags were `before`, and apply their immediate effects."""
         first, count = tanks.EVENTS * self.tanks.size, len(self.model.events)
-        now = self.armed[first : first + count] > before[first : first + count]
-        self.switched += [(self.t, int(k)) for k in np.flatnonzero(now) if self.model.events[k][1]]
+        armed, earlier = self.armed[first : first + count], before[first : first + count]
+        now = armed > earlier
+        self.switched += [(self.t, int(k)) for k in now.nonzero()[0] if self.model.events[k][1]]
         self.run_data.store_times(self.t, before)
-        self.apply_events()  # diodes may take over the current of a switch
-        more = (self.armed[first : first + count] > before[first : first + count]) & ~now
-        self.switched += [(self.t, int(k)) for k in np.flatnonzero(more) if self.model.events[k][1]]
+        self.apply_events()
+        if self.model.network is not None:  # diodes may have taken over the current of a switch
+            more = (armed > earlier) & ~now
+            self.switched += [(self.t, int(k)) for k in more.nonzero()[0] if self.model.events[k][1]]
 
     def apply_events(self) -> None:
         """Apply the immediate effects of events: limits of tank levels, and sudden changes of states of devices.
 
         Mass that a limit of a tank adds or removes is booked in the ledger.
         """
-        for i in self.tanks:
+        held = self.armed[: tanks.EVENTS * self.tanks.size].any()  # a tank at a limit
+        for i in self.tanks if held else ():
             node, sums = self.model.tables.nodes[i], self.stepper.ledger.reshape(LEDGER_ROWS, -1)
             part = tanks.overshoot_correction(node, self.armed, float(node["mass"] + self.now[node["y"]]))
             self.now[node["y"]] += part
             sums[0 if part > 0.0 else 1, i] += part
-        for (_, _, device), row in zip(self.model.devices, self.model.tables.devices, strict=True):
+        for device, row in self.changed_at_events:
             device.apply_event(self.run_data, row, self.t, self.now, self.stepper.scale)
         self.network_fault = self.run_data.apply_network(self.now)
 
@@ -246,15 +253,18 @@ class RunLoop:
         limit : time [s] at which schedules with a jump take the value before the jump
         Returns a pair (number of the column, lost mass flow [kg/s]) for each column whose flow has changed.
         """
-        if not len(self.model.tables.columns) and not self.armed.size:  # no columns and no events to record
+        if not len(self.model.tables.columns):
+            if self.armed.size:  # events to record
+                self.evaluate(limit)
             return []
         stopped, out, layout = [], self.evaluate(limit), self.model.layout
-        while (event := separate(self.run_data, self.t, self.now, out)) is not None:
+        places = shut_places(self.model, out)
+        while (event := separate(self.run_data, self.t, self.now, out, places)) is not None:
             before = self.armed.copy()
             self.armed[event], self.armed[event + 1] = 1.0, 0.0
             self.record_events(before)
             out = self.evaluate(limit)
-        places = shut_places(self.model, out)
+            places = shut_places(self.model, out)
         for k, row in enumerate(self.model.tables.columns):
             flow, new = float(row["flow"] + self.now[row["y"]]), float(out[layout["column"] + k])
             ends = row["from_node"] in places or row["to_node"] in places
@@ -439,13 +449,13 @@ def impact_impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: 
     return np.diag(matrix) * np.linalg.lstsq(matrix, sums)[0]
 
 
-def separate(run_data: RunData, t: float, y: np.ndarray, out: np.ndarray) -> int | None:
+def separate(run_data: RunData, t: float, y: np.ndarray, out: np.ndarray, places: list[int]) -> int | None:
     """Number of the opening event of the air valve where columns separate fastest; None if no columns separate.
 
     run_data : data of the run; y : state at time t [s]; out : output array of the right-hand side there
+    places : result of `shut_places`
     """
     model = run_data.model
-    places = shut_places(model, out)
     events = [air_valve_of(model, i) for i in places]
     if all(event is None for event in events):
         return None

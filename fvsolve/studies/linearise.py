@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 
 from fvsolve.assembly.lowering import PRESSURE, Input
-from fvsolve.assembly.schedule_tables import value_at
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.model.energy_norm import EnergyForm
 from fvsolve.model.model import inputs_of
 from fvsolve.schemes import SCHEMES
-from fvsolve.solve.advance import hold
+from fvsolve.solve.held_inputs import hold, input_value
 from fvsolve.studies.operating_point import (
     COARSE_STEPS,
     SLOPE_TOLERANCE,
@@ -162,11 +161,11 @@ def linearise_at(at: OperatingPoint, inputs=(), outputs: int = 0, hold_delays: b
     if uncut and not hold_delays:
         text = f"{listing(uncut)} of type delay needs earlier inputs, so no matrix A describes it"
         raise FvsolveError(f'{text}; cut the loop there, with the input "{uncut[0]}.output"')
-    cut = {name: input_value(at, name, available[name]) for name in inputs if available[name].control >= 0}
+    cut = {name: value_of_input(at, available[name]) for name in inputs if available[name].control >= 0}
     at = replace(at, model=hold(model, cut))
     a, size, error_a, steps = state_matrix(at)
     c, error_c = output_matrix(at, outputs, steps)
-    values = [input_value(at, name, available[name]) for name in inputs]
+    values = [value_of_input(at, available[name]) for name in inputs]
     columns = [input_column(at, name, available[name], value, size, outputs, steps)
                for (name, value) in zip(inputs, values, strict=True)]  # fmt: skip
     n, bd = model.y_size, np.array([column for column, _ in columns]).reshape(len(inputs), model.y_size + outputs).T
@@ -195,17 +194,11 @@ def refuse_limiter(model) -> None:
         )
 
 
-def input_value(at: OperatingPoint, name: str, input_: Input) -> float:
+def value_of_input(at: OperatingPoint, input_: Input) -> float:
     """Value of an input at the operating point, in SI units."""
-    model = at.model
-    if input_.node >= 0:
-        pressure = float(model.tables.nodes[input_.node]["pressure"]
-                         + model.evaluate(at.t, at.y)[1][model.layout["pressure"] + input_.node])  # fmt: skip
-        place = model.node_names[input_.node]
-        return pressure if input_.sort is PRESSURE else float(model.head(pressure, model.elevation[place]))
     if input_.control >= 0:
         return float(at.outputs[input_.control])
-    return float(value_at(model.tables, input_.schedule, at.t, np.inf) / input_.scale)
+    return input_value(at.model, at.t, at.y, input_)
 
 
 def input_column(at, name, input_, value, size, outputs, steps) -> tuple[np.ndarray, float]:

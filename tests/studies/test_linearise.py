@@ -28,7 +28,8 @@ import fvsolve
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.model.energy_norm import energy_form
 from fvsolve.solve import initial_state
-from fvsolve.solve.advance import advance, hold
+from fvsolve.solve.advance import advance
+from fvsolve.solve.held_inputs import hold
 from fvsolve.studies import operating_point
 from fvsolve.studies.linearise import eigenvalues_near, find_eigenvalues, linearise, linearise_at, poles_of
 from fvsolve.studies.ports.response import response

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from fvsolve import units
-from fvsolve.assembly.lowering import SPEED, Device, Input
+from fvsolve.assembly.lowering import SPEED, Device
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.pump import law
@@ -137,7 +137,7 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
     remedy = "replace the check_valve of the pump by a check-valve link with a time_constant"
 
     def inputs(self, model, name, part):
-        return {"speed": Input(SPEED, int(self.row_of(model, name)["schedule"]))}
+        return self.speed_input(model, name, SPEED)
 
     def restriction(self, draft, name, link, row) -> None:
         weight = draft.fluid.density * draft.case.gravity

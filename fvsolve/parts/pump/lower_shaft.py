@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fvsolve.assembly.lowering import Input
 from fvsolve.assembly.network_elements import CAPACITY, FLOW, Element
 from fvsolve.assembly.schedule_tables import value_at
 from fvsolve.kernels import dtypes as rec
@@ -290,6 +291,12 @@ class ShaftLowering:
             Element(FLOW, f"{place}.fluid", place, (None, shaft),
                     reads=(rec.DEVICE_INPUT, (name, "torque", self.fluid_torque_sign))),
         ], []  # fmt: skip
+
+    def speed_input(self, model, name, sort) -> dict[str, Input]:
+        """Input "speed"; none for a shaft that torques drive from the start: nothing reads its schedule."""
+        row = self.row_of(model, name)
+        driven = model.tables.floats[row["data"] + law.MODE] == law.TORQUE_DRIVEN
+        return {} if driven else {"speed": Input(sort, int(row["schedule"]))}
 
     def source_at_start(self, start, part, row, quantity, flow) -> float:
         return -self.fluid_torque_sign * self.fluid_torque(start, row, start.valves[row["valve"]])

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from fvsolve.assembly.lowering import ANGULAR_SPEED, Device, Input, opening_input
+from fvsolve.assembly.lowering import ANGULAR_SPEED, Device, opening_input
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.pump.law import INERTIA, RATED
@@ -180,7 +180,7 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
     fluid_torque_sign = 1.0
 
     def inputs(self, model, name, part):
-        return opening_input(model, name) | {"speed": Input(ANGULAR_SPEED, int(self.row_of(model, name)["schedule"]))}
+        return opening_input(model, name) | self.speed_input(model, name, ANGULAR_SPEED)
 
     def restriction(self, draft, name, link, row) -> None:
         density = draft.fluid.density

@@ -13,7 +13,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.kernels.delay_lines import wave_history as history
 from fvsolve.parts.control import PREFIX
-from fvsolve.solve.advance import hold
+from fvsolve.solve.held_inputs import hold
 from fvsolve.studies.linearise import linearise_at
 from fvsolve.studies.loops.delay_system import DelaySystem
 from fvsolve.studies.operating_point import OperatingPoint, operating_point

@@ -19,7 +19,7 @@ from fvsolve.assembly.control_rows import control_rows_of
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.control import PREFIX
-from fvsolve.solve.advance import hold
+from fvsolve.solve.held_inputs import hold
 from fvsolve.studies.linearise import linearise_at
 from fvsolve.studies.loops.open_loop import MAX_STATES, delay_blocks, refuse_limit, slope, state_limit_error
 from fvsolve.studies.operating_point import OperatingPoint, operating_point

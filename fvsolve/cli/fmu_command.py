@@ -1,0 +1,32 @@
+"""`fvsolve fmu`: export of a case as a functional mock-up unit."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+from typer import Option
+
+from fvsolve.cli.app import Set, SingleCase, app, load_case
+from fvsolve.cli.terminal import TextTable, present
+
+
+@app.command()
+def fmu(
+    case: SingleCase,
+    out: Annotated[Path | None, Option(metavar="FILE", help="file of the FMU (default NAME.fmu in the current "
+        "folder)")] = None,
+    set: Set = [],  # noqa: B006
+) -> None:  # fmt: skip
+    """Export a case as an FMU (FMI 2.0, co-simulation): schedules and setpoints as inputs, probes as outputs."""
+    from fvsolve.fmi.export import write_fmu
+
+    path, variables = write_fmu(load_case(case, set), out)
+    present(False, {}, fmu_text(path, variables))
+
+
+def fmu_text(path: Path, variables: list) -> Iterator:
+    """Table of the variables of an FMU, and its file."""
+    rows = [[item.name, "input" if item.is_input else "output", item.unit,
+             "" if item.start is None else f"{item.start:.6g}"] for item in variables]  # fmt: skip
+    yield TextTable(["variable", "", "unit", "start"], rows)
+    yield f"{path}: needs fvsolve of this version in the Python of its host"
