@@ -56,7 +56,6 @@ class SteadyStart:
         self.moving: list[str] = []
         self.shut: set[int] = set()  # valves that a device holds shut
         self.valve_modes: dict[int, str] = {}  # modes of valves that regulate
-        self.compensator_inlets: dict[int, float] = {}  # of regulated pumps: potentials assumed at their inlets [Pa]
         self.loads: dict[int, float] = {}  # of closed chambers: pressures that support bodies, held by `solve` [Pa]
 
     @cached_property

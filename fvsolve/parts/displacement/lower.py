@@ -6,17 +6,17 @@ from typing import ClassVar
 import numpy as np
 
 from fvsolve.assembly.lowering import ANGULAR_SPEED, POSITION, Device, Input
-from fvsolve.assembly.network_elements import FLOW, Element, Switch, fill_network_probe, node_or_reference
+from fvsolve.assembly.network_elements import FLOW, Element, fill_network_probe, node_or_reference
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.displacement import law
 from fvsolve.parts.displacement.part import LAG
-from fvsolve.parts.rotation import friction_elements, resistances
+from fvsolve.parts.network_parts import dry_friction
+from fvsolve.parts.rotation import resistances
 from fvsolve.steady import Edge
 
 SPEED, PRESSURE = 100.0, 1e5  # sizes of speeds [rad/s], where nothing states one, and of pressure drops [Pa]
 FULL, REGULATING, NONE = "full", "regulating", "none"  # modes of a compensator in the steady start
 SMALL_SHARE = 1e-9  # share of the displacement that counts as rounding
-SMALL_INLET = 1e-13  # change of the potential at an inlet that counts as rounding, relative
 
 
 class MachineRows(Device, kind="displacement-pump"):
@@ -56,10 +56,8 @@ class MachineRows(Device, kind="displacement-pump"):
         ends, (_, viscous, dry) = (shaft, None), part.losses
         found = [Element(FLOW, f"{place}.fluid", place, ends, reads=(rec.DEVICE_INPUT, (name, "torque", -1.0)))]
         found += resistances(place, ends, viscous)
-        if dry == 0.0:
-            return found, []
-        switch = Switch(rec.FRICTION, place, place, f"{place}.friction", f"{place}.lock", (dry, dry, 0.0, 1.0))
-        return found + friction_elements(place, ends), [switch]
+        friction, switches = dry_friction(place, ends, (dry, dry, 0.0, 1.0)) if dry > 0.0 else ([], [])
+        return found + friction, switches
 
     def probe(self, draft, name, probe, row) -> None:
         if probe.quantity == "torque" and f"links.{name}" in getattr(draft.network, "total_numbers", {}):
@@ -182,11 +180,10 @@ class CompensatedRows(MachineRows, kind=""):
 
         They are not limited to 0 to 1; a large number stands for a share that does not exist.
         """
-        part, row = self.part(start, k), start.draft.device_table[start.valves[k]["device"]]
-        floats, at, own = start.draft.tables.floats, int(row["data"]), part.compensator
+        own = self.part(start, k).compensator
         behind, values = start.pressure(int(start.valves[k]["to_node"])), [1e300, 1e300]
         if own.set_pressure is not None:
-            values[0] = (start.schedule_value(floats[at + law.SET_SCHEDULE]) - behind) / own.range
+            values[0] = (self.set_pressure(start, k) - behind) / own.range
         if own.senses is not None:
             values[1] = (start.pressure(start.draft.node_index[own.senses]) + own.margin - behind) / own.range
         return values[0], values[1]
@@ -197,36 +194,28 @@ class CompensatedRows(MachineRows, kind=""):
             return min(max(min(self.shares(start, k)), 0.0), 1.0)
         return float(mode == FULL)
 
-    def inlet(self, start, k: int) -> float:
-        """Potential at the inlet of valve row k [Pa]: as given, or in the latest solution."""
-        i = int(start.valves[k]["from_node"])
-        given = float(start.fixed_potentials[i])
-        return float(start.answer.potential[i]) if math.isnan(given) else given
-
     def edge_of(self, start, k, full, slope, ratio, edge):
         mode, own = start.valve_modes.setdefault(k, FULL), self.part(start, k).compensator
         if mode != REGULATING or full == 0.0:
             edge.flow = full if mode == FULL else 0.0
             return super().edge_of(start, k, edge.flow, slope, ratio, edge)
         per = PRESSURE / math.sqrt(float(start.valves[k]["conductance"]) * PRESSURE)
-        steep, height = full / own.range, start.nodes["elevation"]
         by_set, by_sense = self.shares(start, k)
-        follows, inlet = by_sense < by_set, self.inlet(start, k)
-        edge.sensed_node = s = start.draft.node_index[own.senses] if follows else edge.j
+        places = (edge.j, start.draft.node_index[own.senses]) if by_sense < by_set else (edge.j,)
+        edge.sensed_nodes, steep, height = places, per * full / own.range, start.nodes["elevation"]
 
-        def newton(flow, present, potential):
-            sensed = start.law.pressure_of(potential, height[s])
-            if follows:
-                behind = start.law.pressure_of(inlet - present, height[edge.j])
-                share, by_drop, by_potential = (sensed + own.margin - behind) / own.range, steep, steep
-            else:
-                index = start.draft.tables.floats[self.data_of(start, k) + law.SET_SCHEDULE]
-                share, by_drop, by_potential = (start.schedule_value(index) - sensed) / own.range, 0.0, -steep
-            target = full * share + slope * ratio * present
-            return per, per * (slope * ratio + by_drop), per * (target - flow), per * by_potential
+        def newton(flow, present, *potentials):
+            behind, *sensed = (start.law.pressure_of(p, height[i]) for p, i in zip(potentials, places, strict=True))
+            goal = sensed[0] + own.margin if sensed else self.set_pressure(start, k)
+            target = full * (goal - behind) / own.range + slope * ratio * present
+            return per, per * slope * ratio, per * (target - flow), *([-steep, steep][: len(places)])
 
-        edge.row, start.compensator_inlets[k] = newton, inlet
+        edge.row = newton
         return edge
+
+    def set_pressure(self, start, k: int) -> float:
+        """Set pressure of valve row k at the start [Pa]."""
+        return start.schedule_value(start.draft.tables.floats[self.data_of(start, k) + law.SET_SCHEDULE])
 
     def data_of(self, start, k: int) -> int:
         """Index of the numbers of valve row k in `floats`."""
@@ -241,15 +230,13 @@ class CompensatedRows(MachineRows, kind=""):
                  REGULATING: FULL if share > 1.0 + SMALL_SHARE else NONE if share < -SMALL_SHARE else REGULATING,
                  NONE: REGULATING if share > SMALL_SHARE else NONE}[before]  # fmt: skip
         start.valve_modes[k] = after
-        inlet = self.inlet(start, k)
-        moved = abs(start.compensator_inlets.get(k, inlet) - inlet) > SMALL_INLET * (PRESSURE + abs(inlet))
-        return after != before or (after == REGULATING and moved)
+        return after != before
 
     def begin(self, start, part, row) -> list[str]:
         k, floats, at = int(row["valve"]), start.draft.tables.floats, int(row["data"])
         floats[at + law.SHARE], floats[at + law.SENSED_SHARE] = self.shares(start, k)
         if part.compensator.set_pressure is not None:
-            floats[at + law.SET_PRESSURE] = start.schedule_value(floats[at + law.SET_SCHEDULE])
+            floats[at + law.SET_PRESSURE] = self.set_pressure(start, k)
         return super().begin(start, part, row)
 
 
