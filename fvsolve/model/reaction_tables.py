@@ -54,14 +54,11 @@ def reacting(case, side: str = "") -> set[str]:
 
     A formula may have either sign.
     """
-    names = set()
+    sign, names = {"right": 1.0, "left": -1.0, "": 0.0}[side], set()
     for reaction in case.reactions.values():
-        signs = {"right": 1.0, "left": -1.0}
-        one_way = reaction.rate is None and not reaction.reverse
-        for name in reaction.sides.names:
-            change = reaction.sides.change(name)
-            if change != 0.0 and (not side or not one_way or change * signs[side] > 0.0):
-                names.add(name)
+        sides, both = reaction.sides, reaction.rate is not None or bool(reaction.reverse) or not side
+        changes = {name: sides.change(name) for name in sides.names}
+        names |= {name for name, change in changes.items() if change * sign > 0.0 or (both and change != 0.0)}
     return names
 
 
