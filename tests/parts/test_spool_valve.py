@@ -434,7 +434,8 @@ def test_a_command_held_by_advance_is_that_of_the_file(keys):
 
 def test_a_killed_run_resumes_to_the_bit(tmp_path):
     changes = {"numerics.method": "radau-iia-5", "numerics.rtol": 1e-9, "numerics.end": 0.6, "expect": {}}
-    fvsolve.run("servo-axis", changes, out=tmp_path / "whole", pictures=False)
+    case = tomllib.loads((CASES / "servo-axis.toml").read_text(encoding="utf-8"))
+    fvsolve.run(fvsolve.load(case, changes), out=tmp_path / "whole", pictures=False)
     same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 0.205))
 
 
