@@ -1,5 +1,7 @@
 """Cost of controls and networks: a PI with filter and limits, an operation of a formula, a sample, a motor, an entry.
 
+The last rows compare the servo axis, with PI and spool, with SciPy's LSODA on rates written by hand, at equal error.
+
     python benchmarks/loops.py [--quick]
 
 Each number is the difference of two runs of the same scene in this process, with and without the block, by `rk4` with a
@@ -8,12 +10,20 @@ given step, divided by the number of stages, operations or samples. Least of sev
 
 from __future__ import annotations
 
+import sys
 import time
+from pathlib import Path
 
+import numpy as np
 from measure import parser
+from numba import njit
+from scipy.integrate import solve_ivp
 
 from fvsolve import build, load
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from reference import servo_axis as axis  # noqa: E402
 
 STEP, STAGES = 1e-2, 4  # [s], of rk4
 GOALS = {  # [ns]; of a network 25 ns and 4 ns an entry, beside 9 ns of rates written by hand
@@ -88,6 +98,79 @@ def seconds_per_step(case: dict, steps: int, turns: int) -> float:
     return min(found)
 
 
+# servo axis -------------------------------------------------------------------------------------------------------
+
+AXIS_GOALS = {"servo axis, LSODA with Python rates": 2.5, "servo axis, LSODA with compiled rates": 1.0}  # times the CPU
+AXIS_STATES = ("load.position", "load.velocity", "spool.position", "spool.speed")
+AXIS_SCALE = np.array([1e-2, 0.1, 0.1, 10.0])
+DAMPING = 1.0  # of the spool, which then stays within its stops; below its greatest speed: LSODA has no events
+SMOOTH = {"links.spool.damping_ratio": DAMPING, "links.spool.stroke_time": 1e-3}
+
+
+def least_time(function, turns: int) -> tuple[float, np.ndarray]:
+    """(least CPU time of a call [s], its result)."""
+    found = []
+    for _ in range(turns):
+        begun = time.process_time()
+        result = function()
+        found.append(time.process_time() - begun)
+    return min(found), result
+
+
+def axis_by_lsoda(rates, rtol: float) -> np.ndarray:
+    """State at the end by LSODA, started again at each jump."""
+    d, y, begin = np.empty(7), axis.start(), 0.0
+    for end in (axis.STEP, axis.LOADED, axis.END):
+        last = np.nextafter(end, 0.0)
+
+        def follow(t, y, last=last):
+            rates(min(t, last), y, d, False)
+            return d
+
+        y = solve_ivp(follow, (begin, end), y, "LSODA", rtol=rtol, atol=rtol * axis.SCALE).y[:, -1]
+        begin = end
+    return y[[0, 1, 4, 5]]
+
+
+def axis_here(rtol: float):
+    """Function that runs the case `servo-axis` with this tolerance and returns its last state."""
+    model = build(load("servo-axis", {"numerics.rtol": rtol, "expect": {}} | SMOOTH))
+    places = [model.state_names.index(name) for name in AXIS_STATES]
+    start = np.array([0.05, 0.0, 0.0, 0.0])
+
+    def run() -> np.ndarray:
+        loop = RunLoop(model)
+        for end in (axis.STEP, axis.LOADED, axis.END):
+            loop.begin(end, NO_LIMIT)
+            loop.run(NO_LIMIT)
+        return start + loop.now[places]
+
+    return run
+
+
+def cost_at_error(function, error, tolerances, near, turns) -> float:
+    """CPU time at an error `near`, interpolated in logarithms over tolerances [s]; prints each."""
+    times, errors = [], []
+    for rtol in tolerances:
+        call = function(rtol)
+        call()
+        seconds, found = least_time(call, turns)
+        times.append(seconds)
+        errors.append(error(found))
+    order = np.argsort(errors)
+    return float(np.exp(np.interp(np.log(near), np.log(errors)[order], np.log(times)[order])))
+
+
+def servo_axis(turns: int) -> dict[str, float]:
+    """CPU time [s] of the axis at an error of 1e-6 of its scales, here and by LSODA with both kinds of rates."""
+    plain, compiled = axis.axis(damping=DAMPING, fastest=np.inf), axis.axis(njit, DAMPING, np.inf)
+    truth = axis_by_lsoda(compiled, 1e-12)
+    tolerances, error = 10.0 ** np.arange(-9.0, -3.5), lambda y: float(np.max(np.abs(y - truth) / AXIS_SCALE))
+    calls = {"here": axis_here, "Python": lambda rtol: lambda: axis_by_lsoda(plain, rtol),
+             "compiled": lambda rtol: lambda: axis_by_lsoda(compiled, rtol)}  # fmt: skip
+    return {name: cost_at_error(call, error, tolerances, 1e-6, turns) for name, call in calls.items()}
+
+
 def main() -> None:
     """Print the table."""
     quick = parser(__doc__).parse_args().quick
@@ -110,6 +193,11 @@ def main() -> None:
     for name, value in found.items():
         factor = GOALS[name] / value
         print(f"| {name} | {value:.1f} | at most {GOALS[name]:g}: {'met' if factor >= 1.0 else 'missed'} |")
+    axis_cost = servo_axis(2 if quick else 5)
+    for (name, goal), kind in zip(AXIS_GOALS.items(), ("Python", "compiled"), strict=True):
+        ratio = axis_cost[kind] / axis_cost["here"]
+        print(f"| {name} | {ratio:.2f} times | at least {goal:g} times: {'met' if ratio >= goal else 'missed'} |")
+    print("ms of the servo axis: " + ", ".join(f"{name} {1e3 * value:.2f}" for name, value in axis_cost.items()))
     print("ns a step: " + ", ".join(f"{name} {value:.0f}" for name, value in cost.items()))
 
 

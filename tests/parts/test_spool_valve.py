@@ -397,11 +397,11 @@ def test_no_rate_depends_on_a_state_that_the_pattern_has_not(ways):
 
 def test_a_pressure_that_the_valve_sets_may_command_its_spool_at_once():
     """The pressure at a junction behind the valve follows from the position, a state: no loop without a state."""
-    case = bench("2/2", 0.3, command={"control": "hold"}, **SERVO)
+    case = bench("2/2", 2.0, command={"control": "hold"}, **SERVO)
     case["nodes"] |= {"A": {"type": "junction"}, "T": {"type": "reservoir", "pressure": 2e5}}
     case["links"]["load"] = {"type": "orifice", "from": "A", "to": "T", "area": 4e-6}
     case["controls"] = {"hold": {"type": "pi", "input": "A.pressure", "gain": 2e-8, "integral_time": 0.02,
-                                 "setpoint": table((0.01, 60e5), (0.02, 80e5)), "limits": [0, 1]}}  # fmt: skip
+                                 "setpoint": table((0.1, 60e5), (0.12, 80e5)), "limits": [0, 1]}}  # fmt: skip
     case["output"]["probes"] = ["A.pressure", "spool.position"]
     run = fvsolve.run(case, {"numerics.rtol": 1e-8})
     assert run["A.pressure"][:2] == approx(60e5, abs=1.0)
@@ -433,26 +433,17 @@ def test_a_command_held_by_advance_is_that_of_the_file(keys):
 
 
 def test_a_killed_run_resumes_to_the_bit(tmp_path):
-    fvsolve.run("servo-axis", {"numerics.end": 0.4, "expect": {}}, out=tmp_path / "whole", pictures=False)
-    same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 0.215))
-
-
-def test_a_rigid_column_stops_when_the_spool_shuts():
-    case = bench(end=0.3, command=table((0.05, 0.5), (0.1, -0.5)), **SERVO)
-    case["nodes"] |= {"A": {"type": "junction"}, "C": {"type": "reservoir", "pressure": 60e5}}
-    case["links"]["line"] = {"type": "rigid-column", "from": "A", "to": "C", "length": 2.0, "diameter": 0.01}
-    case["output"]["probes"] = ["line.flow", "spool.flow_A", "spool.position"]
-    run = fvsolve.run(case, {"numerics.rtol": 1e-7, "numerics.method": "radau-iia-5"})
-    assert run.ok and run["line.flow"][0] > 1e-4 and run["line.flow"][-1] < -1e-4
-    assert run["line.flow"] == approx(-run["spool.flow_A"], abs=1e-9)
+    changes = {"numerics.method": "radau-iia-5", "numerics.rtol": 1e-9, "numerics.end": 0.6, "expect": {}}
+    case = tomllib.loads((CASES / "servo-axis.toml").read_text(encoding="utf-8"))
+    fvsolve.run(fvsolve.load(case, changes), out=tmp_path / "whole", pictures=False)
+    same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 0.205))
 
 
 @pytest.mark.parametrize("keys", [{"position": WAVE}, {"command": STEP} | SERVO])
 def test_the_energy_of_a_spool_valve_closes(keys):
     found = energy(bench(held=False, **keys) | {"fluid": OIL | {"law": "log"}})
     assert abs(found.remainder[-1]) < 1e-9 * found.throughput
-    assert {name for name in found.dissipated if "spool" in name} == {f"spool.{edge}" for edge in ("P-A", "P-B", "A-T",
-                                                                                                  "B-T")}  # fmt: skip
+    assert {"spool.P-A", "spool.B-T"} <= found.dissipated.keys() and "spool" not in found.dissipated
 
 
 # the servo axis ---------------------------------------------------------------------------------------------------
@@ -505,24 +496,6 @@ def test_the_axis_begins_to_swing_at_the_predicted_gain_within_a_hundredth():
     for factor, grows in ((0.99, False), (1.01, True)):
         speed = np.abs(fvsolve.run(axis_with(20.0 * factor * found.gain_range[1]))["load.velocity"])
         assert (speed[2000:].max() > speed[500:1500].max()) == grows
-
-
-def test_a_ramped_command_moves_a_load_as_the_ratio_of_flow_and_area():
-    """Without load the speed is o Cd A sqrt(2 dp / rho) / area with equal drops over both edges."""
-    nodes = {"P": {"type": "reservoir", "pressure": 140e5}, "T": {"type": "reservoir", "pressure": 0.0 + 101325.0},
-             "ground": {"type": "frame"}, "load": {"type": "mass", "mass": 10.0, "initial_position": 0.1}}  # fmt: skip
-    links = {
-        "spool": {"type": "spool-valve", "ports": {"P": "P", "T": "T", "A": "cyl.A", "B": "cyl.B"}, "area": 1e-5,
-                  "command": {"start": 0.0, "duration": 0.01, "value": [0.0, 0.3]}, **SERVO},
-        "cyl": {"type": "cylinder", "ports": {"rod": "load", "case": "ground"}, "stroke": 0.4, "area_A": 1e-3,
-                "area_B": 1e-3, "dead_volume_A": 1e-4, "dead_volume_B": 1e-4, "initial_pressure_A": 70e5,
-                "initial_pressure_B": 70e5, "leakage": 0.0, "viscous_friction": 1e3},
-    }  # fmt: skip
-    case = {"fluid": OIL, "nodes": nodes, "links": links, "output": {"probes": ["load.velocity"], "every": 0.01},
-            "numerics": {"end": 0.4, "method": "dormand-prince", "rtol": 1e-8}}  # fmt: skip
-    speed = fvsolve.run(case)["load.velocity"][-1]
-    drop = 0.5 * (140e5 - 101325.0 - 1e3 * speed / 1e-3)
-    assert speed == approx(flow(0.3, drop) / 1e-3, rel=1e-3)
 
 
 # bad input --------------------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ STEP, LOADED, END = 0.2, 1.2, 2.0
 SCALE = np.array([1e-2, 0.1, 1e-3, 1e-3, 0.1, 10.0, 0.1])
 
 
-def axis(compiled=lambda function: function, damping=0.8):
+def axis(compiled=lambda function: function, damping=0.8, fastest=FASTEST):
     """Function (t, y, d, at_stop) that writes the rates of the axis to d, before LOADED and STEP by t.
 
     compiled : decorator of its functions; at_stop : True while the spool rests at its upper stop
@@ -46,7 +46,7 @@ def axis(compiled=lambda function: function, damping=0.8):
         out = min(max(wished, -1.0), 1.0)
         d[6] = GAIN / INTEGRAL * e + (out - wished) / TRACKING
         push = FREQUENCY * (FREQUENCY * (out - s) - 2.0 * damping * speed)
-        limited = (speed >= FASTEST and push > 0.0) or (speed <= -FASTEST and push < 0.0)
+        limited = (speed >= fastest and push > 0.0) or (speed <= -fastest and push < 0.0)
         d[4] = 0.0 if at_stop else speed
         d[5] = 0.0 if at_stop or limited else push
         volume_a, volume_b = DEAD + AREA_A * x, DEAD + AREA_B * (STROKE - x)
