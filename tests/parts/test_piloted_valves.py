@@ -294,11 +294,11 @@ def test_a_shuttle_valve_drawn_with_exchanged_sides_is_the_same_valve():
 
 SPOOLS = {"lag": {"time_constant": 0.005}, "swing": {"natural_frequency": 60.0, "damping_ratio": 1.0}}
 DROP = 1e6  # set drop [Pa]; the valve shuts over 5 % of it
-LOAD = {"time": [0.0, 0.3, 1.0, 1.5, 1.8, 2.0], "value": [2e6, 2e6, 6e6, 6e6, 2.4e7, 2.2e7]}
+LOAD = {"time": [0.0, 0.3, 1.0, 1.5, 1.8, 2.0], "value": [2e6, 2e6, 6e6, 6e6, 1.4e7, 1.2e7]}
 
 
 def compensated(numerics=TIGHT, **more):
-    """Case of a compensator before a metering orifice, whose load pressure triples and then exceeds the supply."""
+    """Case of a compensator before a metering orifice, whose load pressure triples and rises further."""
     nodes = {"pump": reservoir(2e7), "in": chamber(VOLUME, 2e7), "mid": chamber(VOLUME, 3e6),
              "load": chamber(VOLUME, 2e6), "far": reservoir(LOAD), "drain": reservoir(DRAIN)}  # fmt: skip
     links = {"pipe": valve("pump", "in", 4e-6), "spill": valve("in", "drain", 1e-6),
@@ -509,7 +509,8 @@ def test_a_pilot_of_another_domain_is_refused():
 # circuits of docs/fluid-power-circuits.md -------------------------------------------------------------------------
 
 PAGE = (TOP / "docs/fluid-power-circuits.md").read_text(encoding="utf-8")
-CIRCUITS = dict(re.findall(r"^##+ ([^\n]+)\n(?:(?!^##).*\n)*?```toml\n(.*?)```", PAGE, flags=re.MULTILINE | re.DOTALL))
+SECTIONS = (section.partition("\n") for section in re.split(r"^##+ ", PAGE, flags=re.MULTILINE)[1:])
+CIRCUITS = {title: text.split("```")[1].removeprefix("toml") for title, _, text in SECTIONS if "```toml" in text}
 
 
 def circuit(heading):

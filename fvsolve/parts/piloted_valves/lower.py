@@ -209,8 +209,7 @@ class ShuttleRows(Device, kind="shuttle"):
     def numbers(self, draft, name, part) -> list[float]:
         first = draft.valve_names.index(name)
         draft.valve_table["device"][first + 1] = draft.valve_table["device"][first]
-        inner = draft.node_table["kind"][[draft.node_index[part.ports[port]] for port in "AB"]] == rec.JUNCTION
-        return [0.0, float(not inner.any())]
+        return [0.0, 0.0]
 
     def sensed(self, part):
         return (part.ports["A"], -1.0), (part.ports["B"], 1.0)
@@ -228,5 +227,6 @@ class ShuttleRows(Device, kind="shuttle"):
         return start.shut != before
 
     def begin(self, start, part, row) -> list[str]:
-        start.draft.tables.floats[int(row["data"])] = self.difference(start, row)
+        stored = all(start.nodes["kind"][row[column]] != rec.JUNCTION for column in ("node", "second"))
+        start.draft.tables.floats[int(row["data"]) :][:2] = self.difference(start, row), stored
         return []
