@@ -232,6 +232,9 @@ class ModelDraft:
     basin_table: np.ndarray = no_rows(rec.BASIN)
     patch_table: np.ndarray = no_rows(rec.PATCHES)
     scalar_table: np.ndarray = no_rows(rec.SCALAR)
+    heat_source_table: np.ndarray = no_rows(rec.HEAT_SOURCE)
+    exchanger_table: np.ndarray = no_rows(rec.EXCHANGER)
+    heat_rows: int = 0  # rows in the ledger of the heat of restrictions and pipes
     wall_table: np.ndarray = no_rows(rec.WALL)
     delay_table: np.ndarray = no_rows(rec.DELAY)
     probe_table: np.ndarray = no_rows(rec.PROBE)

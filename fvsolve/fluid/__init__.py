@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from fvsolve.errors import FluidError, did_you_mean
-from fvsolve.fluid.coolprop import FluidTable, cached_properties, celsius
+from fvsolve.fluid.coolprop import FluidTable, cached_properties, cached_specific_heat, celsius
 from fvsolve.fluid.laws import LAWS, Air, check_cavities
-from fvsolve.fluid.oils import OILS, oil_name, oil_properties
+from fvsolve.fluid.oils import OILS, oil_name, oil_properties, oil_specific_heat
 
-__all__ = ["LAWS", "Fluid", "FluidTable", "properties"]
+__all__ = ["LAWS", "Fluid", "FluidTable", "properties", "specific_heat"]
 
 USER = dict(density=None, bulk_modulus=None, viscosity=None, vapor_pressure=0.0, table=None, source="user")
 
@@ -93,6 +93,17 @@ def properties(
             raise FluidError(key, _missing(name, key))
     check_cavities(fluid)
     return fluid
+
+
+def specific_heat(name: str, temperature: float, pressure: float) -> float:
+    """Specific heat at constant pressure [J/kg/K] of a fluid at temperature [K] and absolute pressure [Pa].
+
+    name : as for `properties`. Raises FluidError for "user", which has none.
+    """
+    name = oil_name(name) or name
+    if name == "user":
+        raise FluidError("specific_heat", 'heat without specific heat: a "user" fluid has none')
+    return oil_specific_heat(temperature) if name in OILS else cached_specific_heat(name, temperature, pressure)
 
 
 def _look_up(name: str, law: str, temperature: float, pressure: float) -> dict:

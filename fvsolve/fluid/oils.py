@@ -65,10 +65,15 @@ def oil_properties(name: str, temperature: float, pressure: float) -> dict[str, 
     c, b = TAIT_COEFFICIENTS[0], TAIT_COEFFICIENTS[1] + TAIT_COEFFICIENTS[2] * temperature
     rho /= 1.0 - c * math.log((b + p) / (b + ATMOSPHERE))
     isothermal = 1e5 * (b + p) / c * (1.0 - c * math.log((b + p) / b))
-    cp = HEAT_CAPACITY[0] + (HEAT_CAPACITY[1] - HEAT_CAPACITY[0]) * (temperature - ZERO - 25.0) / 55.0
+    cp = oil_specific_heat(temperature)
     isentropic = 1.0 / (1.0 / isothermal - temperature * expansion**2 / (rho * cp))
     values = dict(density=rho, bulk_modulus=isentropic, viscosity=rho * walther(oil, temperature))
     return values | dict(vapor_pressure=0.0, table=None, source="docs/fluids.md, oils")
+
+
+def oil_specific_heat(temperature: float) -> float:
+    """Specific heat of all oils at a temperature [K]: cp [J/kg/K], linear between 25 and 80 degC and beyond."""
+    return HEAT_CAPACITY[0] + (HEAT_CAPACITY[1] - HEAT_CAPACITY[0]) * (temperature - ZERO - 25.0) / 55.0
 
 
 def density_1atm(oil: Oil, temperature: float) -> tuple[float, float]:

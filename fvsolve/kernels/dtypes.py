@@ -113,6 +113,7 @@ PIPE = record(  # columns read by delay lines come first, in as few cache lines 
     to_mass=f8,
     moving_segment=i8,  # row of its first cell in `moving_segments`; -1 for a fixed pipe
     delay=i8,  # row of `delays` for a delay line, which has no cells; else -1
+    heat=i8,  # first row in the ledger of the heat of its friction; -1 if this does not heat the fluid
 )
 
 DELAY = record(  # delay line: stretches of equal travel time, friction in the middle of each
@@ -391,14 +392,14 @@ DRIVEN_VALVE, DRIVEN_DEVICE, DRIVEN_NODE = 0, 1, 2
 
 NETWORK_INPUT = record(  # source of a network of potential and flow, see `kernels.potential_networks`
     kind=i8,
-    index=i8,  # schedule, device, mass, switch or element
+    index=i8,  # schedule, device, mass, switch, element or heat exchanger
     side=i8,  # of a device: quantity whose value is the torque of the fluid on its shaft
     sign=f8,
     start=f8,  # value at the start
 )
 # Sources: a schedule; torque of the fluid on the shaft of a device; force on a mass; torque of dry friction that slips;
-# heat that an element dissipates. Later kinds depend on earlier ones.
-SCHEDULE_INPUT, TORQUE_INPUT, FORCE_INPUT, FRICTION_FLOW, HEAT_INPUT = 0, 1, 2, 3, 4
+# heat that an element dissipates; heat from the fluid through a heat exchanger. Later kinds depend on earlier ones.
+SCHEDULE_INPUT, TORQUE_INPUT, FORCE_INPUT, FRICTION_FLOW, HEAT_INPUT, FLUID_HEAT = 0, 1, 2, 3, 4, 5
 
 NETWORK_RATE = record(y=i8)  # state whose rate is the value of the row of the same number
 NETWORK_ELEMENT = record(  # element of a network with power
@@ -446,10 +447,12 @@ LAYOUT = record(
     drive=i8,  # present relative speeds of pumps, an entry for each valve
     gain=i8,  # after `supply` in the ledger: inflow of each scalar through nodes [kg/s]
     loss=i8,  # then the negative decay of each scalar [kg/s]
+    heat=i8,  # then heat over specific heat: of restrictions, of friction in pipes, of heat exchangers [kg K/s]
     value=i8,  # of each scalar at all nodes
     edge=i8,  # values of scalars in pipes at both ends
     carried=i8,  # flow of scalars along pipes through both ends [kg/s]
     scalar_inflow=i8,  # flow of scalars from links into nodes [kg/s]
+    exchange=i8,  # of each heat exchanger: value of the scalar at the thermal node, heat out of the fluid [W]
     moving_segment=i8,  # change of the driving energy of moving stretches since the start [J/kg]
     rates=i8,  # in `work`: rates, if `out` depends on them and they are not requested; else -1
     forces=i8,  # in `work`: rates from which forces on pipes are computed; else -1
@@ -605,6 +608,22 @@ SCALAR = record(
     initial=f8,  # inflow value if no other is given
     least=f8,  # bounds of all possible values
     greatest=f8,
+    specific_heat=f8,  # of a temperature that heat changes [J/kg/K]; 0 for other scalars
+    zero=f8,  # absolute temperature at which its value is 0 [K]
+    by_cell=i8,  # 1 if the heat of friction has a row in the ledger for each cell, 0 for a row for each pipe
+)
+
+HEAT_SOURCE = record(  # restriction whose dissipated power heats the fluid where its flow leaves
+    valve=i8,
+    device=i8,  # device whose further dissipation is included; -1 for none
+)
+
+EXCHANGER = record(  # heat exchanger between a fluid place and a thermal node
+    node=i8,
+    place=i8,  # row of the temperature of the thermal node in the rows of the network
+    conductance=f8,  # [W/K]
+    effectiveness=f8,
+    slowness=f8,  # 1 / heat capacity of the thermal node, 0 for an ambient [K/J]
 )
 
 CLOCK = record(
@@ -637,6 +656,8 @@ RECORDS = {
     "basins": BASIN,
     "patches": PATCHES,
     "scalars": SCALAR,
+    "heat_sources": HEAT_SOURCE,
+    "exchangers": EXCHANGER,
     "walls": WALL,
     "delays": DELAY,
     "controls": CONTROL,

@@ -201,6 +201,10 @@ COMPONENTS = {
     "carried": RhsTerms(
         outlet_values="scalar_transport: pipe_outlet_values", scalar_rates="scalar_transport: scalar_rates"
     ),
+    "heat": RhsTerms(outlet_values="fluid_heat: heat_of_restrictions", scalar_rates="fluid_heat: heat_of_pipes"),
+    "heat exchangers": RhsTerms(
+        outlet_values="fluid_heat: node_temperatures", scalar_rates="potential_networks: network_rates"
+    ),
     "forces, linear": RhsTerms(observe="pipe_forces: observe_forces_linear"),
     "forces, barotropic": RhsTerms(observe="pipe_forces: observe_forces_barotropic"),
     "forces, cavitating": RhsTerms(observe="pipe_forces: observe_forces_cavitating"),
@@ -269,6 +273,8 @@ class ModelFeatures:
     controls: bool = False
     formulas: bool = False
     networks: bool = False
+    heat: bool = False
+    exchangers: bool = False
 
     def components(self) -> Iterator[RhsTerms]:
         """Yield the terms (`RhsTerms`) of all components of the model, in the order in which the functions run."""
@@ -338,6 +344,10 @@ class ModelFeatures:
                 yield MIXED
             if self.pipes:
                 yield COMPONENTS["carried"]
+            if self.heat:
+                yield COMPONENTS["heat"]
+            if self.exchangers:
+                yield COMPONENTS["heat exchangers"]
         yield from self.carried
         if self.controls:
             yield COMPONENTS["probes of controls"]

@@ -12,7 +12,7 @@ from fvsolve.assembly.lowering import rows_in
 from fvsolve.assembly.pipe_terms import elements, memory_shares
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.scalar_tables import bounds
+from fvsolve.model.scalar_tables import stated_range
 from fvsolve.model.static_forces import mass_factor
 
 RANK_TOLERANCE = 1e-12  # singular values below this share of a group's greatest: motions that store no energy
@@ -222,7 +222,7 @@ def weigh_scalars(model, weights: np.ndarray) -> None:
 
 def greatest_value(model, q: int) -> float:
     """Greatest possible magnitude of the value of scalar q; 1 if all values are 0."""
-    return max(map(abs, bounds(model.case, list(model.case.scalars)[q]))) or 1.0
+    return max(map(abs, stated_range(model.case, list(model.case.scalars)[q]))) or 1.0
 
 
 def network_rows(model):

@@ -15,6 +15,7 @@ from scipy.sparse import coo_array, csc_array
 from fvsolve.basins import lower_pattern as pattern
 from fvsolve.basins.lower_pattern import all_states
 from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.pipe_energy import MAX_WIDTH
 from fvsolve.model.control_pattern import BlockCouplings, pairs_of, unique_states
 from fvsolve.model.scalar_tables import STORES
 from fvsolve.schemes import SCHEMES, Reach
@@ -289,6 +290,10 @@ class Couplings:
         own = [network.states[column] for column in columns if column in network.states]
         return unique_states(*own, *(self.source_states(j) for j in network.inputs_of_columns(columns)))
 
+    def network_potential(self, row: int) -> np.ndarray:
+        """States on which a row of a network depends."""
+        return self.network_states(self.network.columns_of_rows[row])
+
     def probe_states(self, row) -> np.ndarray:
         """States on which a probe of a network depends."""
         network, r = self.network, int(row["index"])
@@ -496,7 +501,38 @@ class ScalarCouplings:
             flow = [of.sets[i], of.sets[j], of.opening_states(valve)]
             self.through[i] += flow
             self.through[j] += flow
+        self.heated, self.tables, self.ledgers = self.row["specific_heat"] > 0.0, model.tables, model.ledgers
+        for exchanger in self.tables.exchangers if self.heated else ():
+            self.through[exchanger["node"]].append(of.network_potential(exchanger["place"]))
+        for source in self.tables.heat_sources if self.heated else ():
+            for i in ends_of(of.valves[source["valve"]]):
+                self.through[i] += self.heat_states(source)
         self.values = self.mixed_values()
+
+    def heat_states(self, source) -> list[np.ndarray]:
+        """States that set the heat of a restriction."""
+        valve = self.of.valves[source["valve"]]
+        device = [self.of.device_states(self.tables.devices[source["device"]])] if source["device"] >= 0 else []
+        return [*(self.of.sets[i] for i in ends_of(valve)), self.of.opening_states(valve), *device]
+
+    def heat_pairs(self) -> Iterator[Pairs]:
+        """Yield couplings of the heat in the ledger, and of amounts in cells with the waves that friction reads."""
+        first = self.of.size + len(self.of.nodes) * (1 + len(self.tables.scalars))
+        first += int(self.tables.scalars["losses"].sum())
+        for k, source in enumerate(self.tables.heat_sources):
+            yield pairs_of(unique_states(first + k), unique_states(*self.heat_states(source)))
+        for pipe in self.of.pipes[self.of.pipes["heat"] >= 0]:
+            n, cells = int(pipe["cells"]), np.arange(pipe["cells"])
+            memory = [pipe["memory"] + k * n for k in range(pipe["terms"])]
+            for offset in range(1 - MAX_WIDTH, MAX_WIDTH):
+                here = cells[(cells + offset >= 0) & (cells + offset < n)]
+                for at in (pipe["y"], pipe["y"] + n, *memory):
+                    yield self.row["y"] + pipe["cell"] + here, at + here + offset
+                    yield first + pipe["heat"] + (here if self.row["by_cell"] else 0 * here), at + here + offset
+        first = self.of.size + self.ledgers - len(self.tables.exchangers)
+        for k, exchanger in enumerate(self.tables.exchangers):
+            i = exchanger["node"]
+            yield pairs_of(unique_states(first + k), unique_states(self.values[i], *self.through[i]))
 
     def own(self, i: int) -> list:
         """States that set the scalar's value at node i, a storing node or a patch of a basin; else an empty list."""
@@ -551,6 +587,8 @@ class ScalarCouplings:
             yield from self.boundary_pairs(basin)
         if self.row["losses"] > 0:
             yield from self.decay_pairs()
+        if self.heated:
+            yield from self.heat_pairs()
         for pipe in self.of.pipes:
             yield from self.inside(pipe)
             for right, i in enumerate(ends_of(pipe)):

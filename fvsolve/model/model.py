@@ -175,7 +175,7 @@ class Model(Displayable):
 
     @property
     def ledgers(self) -> int:
-        """Number of rows of the stepper's ledger: supply of nodes, inflow of scalars at nodes, decay of scalars."""
+        """Number of rows of the stepper's ledger: supply of nodes, inflow of scalars at nodes, their decay, heat."""
         return int(self.layout["net"] - self.layout["supply"])
 
     @property
@@ -242,7 +242,8 @@ class Model(Displayable):
                     tuple(self.laws), basins, carried, has.scalars, valves, has.delays, alone,
                     forces=bool(self.layout["forces"] >= 0), controls=has.controls,
                     formulas=bool((self.tables.schedules["pieces"] < 0).any()),
-                    networks=self.network is not None)  # fmt: skip
+                    networks=self.network is not None, heat=bool((self.tables.scalars["specific_heat"] > 0.0).any()),
+                    exchangers=has.exchangers)  # fmt: skip
         return functions(cast)
 
     @property
