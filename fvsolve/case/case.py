@@ -161,7 +161,8 @@ class Case(Displayable):
     def network_places(self) -> frozenset[str]:
         """Places of a network of rotation, electricity and heat: its nodes, and other places that its links join."""
         own = [name for name, node in self.nodes.items() if node.domain in NETWORK_DOMAINS]
-        joined = [place for link in self.links.values() if link.in_network for place in link.ports.values()]
+        joined = [place for link in self.links.values() if link.in_network
+                  for port, place in link.ports.items() if link.joins.get(port) != "hydraulic"]  # fmt: skip
         return frozenset([*own, *joined])
 
     @property

@@ -245,9 +245,15 @@ def scalar_faults(
 def _heat_faults(heated: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], cut: Collection[str]) -> Faults:
     """Faults of scalars with heat, and of heat exchangers without such a scalar; arguments as for `scalar_faults`."""
     known = [*links, *cut, *nodes]
+    if not heated:
+        text = "exchanges heat with a temperature of the fluid; declare one, [scalars.NAME] with heat = true"
+        yield from ((("links", name), text) for name, link in links.items() if link.kind == "heat-exchanger")
     for k, (name, scalar) in enumerate(heated.items()):
         if k > 0:
-            yield ("scalars", name, "heat"), f"{next(iter(heated))} is the temperature already; expected one scalar with heat"
+            yield (
+                ("scalars", name, "heat"),
+                f"{next(iter(heated))} is the temperature already; expected one scalar with heat",
+            )
         for i, part in enumerate(scalar.heat_from or () if scalar.heat_from != "all" else ()):
             if part not in known:
                 hint = did_you_mean(part, known) or f"; links are {listing([*links, *cut])}"

@@ -76,9 +76,15 @@ def heat_of_pipes(t, y, dydt, out, handle):
 def node_temperatures(t, y, dydt, out, handle):
     """Write the temperatures of the thermal nodes of heat exchangers, in the unit of the scalar, to `out`."""
     tables = open_tables(handle)
-    exchangers, at, zero = tables.exchangers, tables.layout[0]["exchange"], tables.scalars[heated_scalar(tables)]["zero"]
+    exchangers, at, zero = (
+        tables.exchangers,
+        tables.layout[0]["exchange"],
+        tables.scalars[heated_scalar(tables)]["zero"],
+    )
     for k in range(exchangers.size):
         out[at + 2 * k] = row_value(y, out, tables, exchangers[k]["place"]) - zero
 
 
-heat_of_restrictions = specialise(_heat_of_restrictions, "heat_of_restrictions", POTENTIAL=total_pressure, BAROTROPIC=False)
+heat_of_restrictions = specialise(
+    _heat_of_restrictions, "heat_of_restrictions", POTENTIAL=total_pressure, BAROTROPIC=False
+)

@@ -8,6 +8,7 @@ set by the cells behind it.
 """
 
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array
@@ -40,7 +41,7 @@ class Couplings:
 
     def __init__(self, model) -> None:
         tables = model.tables
-        self.size = model.y_size
+        self.size, self.model = model.y_size, model
         self.nodes, self.pipes = tables.nodes, tables.pipes
         self.valves, self.columns = tables.valves, tables.columns
         self.short = self.pipes[tables.delays["pipe"][tables.delays["now"] > 0.0]]
@@ -317,9 +318,17 @@ class Couplings:
             return unique_states(self.device_states(device), self.opening_states(valve), *pressures)
         if row["kind"] == rec.FORCE_INPUT:
             return unique_states(*self.pushing_states(i))
+        if row["kind"] == rec.FLUID_HEAT:
+            node = int(self.model.tables.exchangers[i]["node"])
+            return unique_states(self.temperature.values[node], *self.temperature.through[node])
         stores = {column for column in network.columns_followed(j) if column in network.states}
         switch = int(self.switches[i]["schedule"]) if row["kind"] == rec.FRICTION_FLOW else -1
         return unique_states(*(network.states[column] for column in stores), self.blocks.schedule(switch))
+
+    @cached_property
+    def temperature(self):
+        """Couplings of the scalar that is the temperature of the fluid."""
+        return ScalarCouplings(self, self.model, int(np.argmax(self.model.tables.scalars["specific_heat"])))
 
     def pushing_states(self, mass: int) -> Iterator[np.ndarray]:
         """Yield states of all force elements that act on a mass."""
