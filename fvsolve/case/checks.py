@@ -13,7 +13,6 @@ from fvsolve.case.reading import Raw
 from fvsolve.case.resource_checks import name_faults
 from fvsolve.case.sections import CAVITY_SCHEMES, FluidSpec, Numerics
 from fvsolve.errors import article, did_you_mean, listing
-from fvsolve.fluid.laws import LAWS, law_names
 from fvsolve.parts import KINDS, Basin
 from fvsolve.parts.basin import VELOCITY_FIELDS, Physics
 from fvsolve.parts.formula_program import is_formula
@@ -205,7 +204,7 @@ def reserved_names() -> set[str]:
 
 
 def scalar_faults(
-    scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], fluid: Any, cut: Collection[str] = ()
+    scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], cut: Collection[str]
 ) -> Faults:
     """Faults (key path, message) of names of scalars, their values in parts, and parts that do not support them.
 
@@ -235,11 +234,6 @@ def scalar_faults(
                 yield (group, name), f"is {article(part.kind)}; {part.no_scalars}"
     yield from _heat_faults({name: item for name, item in scalars.items() if item is not None and item.heat}, nodes,
                             links, cut)  # fmt: skip
-    if not scalars:
-        return
-    if fluid is not None and not LAWS[fluid.law].scalars:
-        text = f"{show(fluid.law)} does not support scalars yet; expected {law_names(lambda law: law.scalars)}"
-        yield ("fluid", "law"), text
 
 
 def _heat_faults(heated: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], cut: Collection[str]) -> Faults:

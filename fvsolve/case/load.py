@@ -15,9 +15,9 @@ from fvsolve.case.part_reading import Parts
 from fvsolve.case.pipe_routes import legs, read_routes
 from fvsolve.case.probe import default_probes, read_probe
 from fvsolve.case.reading import Raw, Reading, copy_paths, default_faults, override, read_raw, split_key
-from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
+from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output, ViscosityLaw
 from fvsolve.errors import FluidError, did_you_mean
-from fvsolve.fluid import properties, specific_heat
+from fvsolve.fluid import follow_temperature, properties, specific_heat
 from fvsolve.parts import KINDS, Basin, Friction, Pipe, Scalar
 from fvsolve.parts import value as val
 from fvsolve.parts.control import Control
@@ -124,7 +124,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     cells = has_cells(network.table)
     check_times(reading, network, parts, fluid, state, numerics or valid_times(reading), cells, expect)
     numerics = fill_numerics(reading, parts, fluid, scalars, numerics, cells)
-    reading.add(checks.scalar_faults(scalars, parts.nodes, parts.links, state, network.pieces))
+    reading.add(checks.scalar_faults(scalars, parts.nodes, parts.links, network.pieces))
     links = part_reading.fill_cells(reading, parts.links, state, numerics)
     if None not in (numerics, output, state) and not reading.faults:
         reading.add(size_faults(numerics, output, links, parts.meshes, state))
@@ -188,6 +188,8 @@ def read_fluid(reading: Reading) -> tuple[FluidSpec | None, Any]:
                 density = properties(**{**stated, "viscosity": None}).density
             stated["viscosity"] = float(spec.viscosity) * density
             spec = spec.model_copy(update={"viscosity": stated["viscosity"]})
+        if isinstance(spec.viscosity, ViscosityLaw):
+            return spec, follow_temperature(properties(**stated | {"viscosity": None}), spec.viscosity.points)
         return spec, properties(**stated)
     except FluidError as error:
         reading.fault(("fluid", error.key), error.message + _in_celsius(reading, stated, error.key))

@@ -49,6 +49,9 @@ SETTINGS = record(
     leave="(2, 5)f8",  # of five cells, for the two cells at the end where it leaves
     rho=f8,  # reference density [kg/m3]
     viscosity=f8,  # dynamic [Pa s]
+    walther_a=f8,  # numbers a and b of Walther's equation of the viscosity, see `kernels.viscosity`; b is 0 without it
+    walther_b=f8,
+    temperature=i8,  # number of the scalar that is the temperature of the fluid
     ambient=f8,  # ambient pressure [Pa]
     start=f8,  # start of the run [s]
     late_blocks=i8,  # 1 if a block decides after the nodes are solved
@@ -113,6 +116,7 @@ PIPE = record(  # columns read by delay lines come first, in as few cache lines 
     to_mass=f8,
     moving_segment=i8,  # row of its first cell in `moving_segments`; -1 for a fixed pipe
     delay=i8,  # row of `delays` for a delay line, which has no cells; else -1
+    temperature=f8,  # of its fluid at the start, to which `reynolds` belongs; 0 if friction does not follow it [K]
     heat=i8,  # first row in the ledger of the heat of its friction; -1 if this does not heat the fluid
 )
 

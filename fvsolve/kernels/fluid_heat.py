@@ -8,12 +8,13 @@ its device dissipates beside. Friction heats the cells of its pipe. The rows `he
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels import calls
 from fvsolve.kernels.devices import POWER
-from fvsolve.kernels.network_energy import total_pressure
-from fvsolve.kernels.pipe_energy import GAUSS_WEIGHTS, at_point, polynomial_width
+from fvsolve.kernels.network_energy import total_head, total_pressure
+from fvsolve.kernels.pipe_energy import GAUSS_WEIGHTS, at_point, mass_at_point, polynomial_width
 from fvsolve.kernels.potential_networks import row_value
 from fvsolve.kernels.scalar_transport import heated_scalar
 from fvsolve.kernels.steady_friction import drag
 from fvsolve.kernels.table_handle import open_tables
+from fvsolve.kernels.viscosity import cell_reynolds
 
 POTENTIAL = BAROTROPIC = None  # constants of the templates
 
@@ -36,8 +37,7 @@ def _heat_of_restrictions(t, y, dydt, out, handle):
         out[layout["heat"] + j] = heat / specific_heat
 
 
-@njit
-def heat_of_pipes(t, y, dydt, out, handle):
+def _heat_of_pipes(t, y, dydt, out, handle):
     """Add the heat of friction in pipe cells to the rates of their amounts of heat, unless `dydt` is empty.
 
     The power of friction is averaged over a cell as in `pipe_energy.pipe_power`. Unsteady friction adds the part that
@@ -51,19 +51,23 @@ def heat_of_pipes(t, y, dydt, out, handle):
             continue
         n, o, at, row = pipe["cells"], pipe["y"], scalar["y"] + pipe["cell"], layout["heat"] + pipe["heat"]
         r, l, width, total = y[o : o + n], y[o + n : o + 2 * n], polynomial_width(st, n), 0.0
-        per = 1.0 / (st["rho"] * pipe["area"] * scalar["specific_heat"])
+        full = st["rho"] * pipe["area"]
         for i in range(n):
-            power = 0.0
+            power, reynolds = 0.0, cell_reynolds(y, tables, pipe, i)
             for g in range(3):
-                change = at_point(r, width, i, g) - at_point(l, width, i, g)
-                flow = pipe["flow"] + change
-                force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
-                power += GAUSS_WEIGHTS[g] * flow * force
+                a, b = at_point(r, width, i, g), at_point(l, width, i, g)
+                flow = pipe["flow"] + (a - b)
+                force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], reynolds, flow)
+                if BAROTROPIC:
+                    ratio = full / mass_at_point(st, tables.profile, pipe, i, g, (a + b) / pipe["speed"])
+                    power += GAUSS_WEIGHTS[g] * flow * force * ratio * ratio
+                else:
+                    power += GAUSS_WEIGHTS[g] * flow * force
                 for k in range(pipe["terms"]):
                     memory = pipe["memory"] + k * n
-                    lag = change - at_point(y[memory : memory + n], width, i, g)
+                    lag = (a - b) - at_point(y[memory : memory + n], width, i, g)
                     power += GAUSS_WEIGHTS[g] * tables.floats[pipe["term"] + 2 * k] * lag * lag
-            heat = per * power
+            heat = power / (full * scalar["specific_heat"])
             dydt[at + i] += heat
             total += heat
             if scalar["by_cell"] == 1:
@@ -85,6 +89,9 @@ def node_temperatures(t, y, dydt, out, handle):
         out[at + 2 * k] = row_value(y, out, tables, exchangers[k]["place"]) - zero
 
 
-heat_of_restrictions = specialise(
-    _heat_of_restrictions, "heat_of_restrictions", POTENTIAL=total_pressure, BAROTROPIC=False
-)
+LINEAR = {"POTENTIAL": total_pressure, "BAROTROPIC": False}
+OTHERS = {"POTENTIAL": total_head, "BAROTROPIC": True}
+heat_of_restrictions = specialise(_heat_of_restrictions, "heat_of_restrictions", **LINEAR)
+heat_of_restrictions_barotropic = specialise(_heat_of_restrictions, "heat_of_restrictions_barotropic", **OTHERS)
+heat_of_pipes = specialise(_heat_of_pipes, "heat_of_pipes", **LINEAR)
+heat_of_pipes_barotropic = specialise(_heat_of_pipes, "heat_of_pipes_barotropic", **OTHERS)

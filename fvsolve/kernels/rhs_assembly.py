@@ -201,7 +201,14 @@ COMPONENTS = {
     "carried": RhsTerms(
         outlet_values="scalar_transport: pipe_outlet_values", scalar_rates="scalar_transport: scalar_rates"
     ),
-    "heat": RhsTerms(outlet_values="fluid_heat: heat_of_restrictions", scalar_rates="fluid_heat: heat_of_pipes"),
+    "heat, linear": RhsTerms(
+        outlet_values="fluid_heat: heat_of_restrictions", scalar_rates="fluid_heat: heat_of_pipes"
+    ),
+    "heat, barotropic": RhsTerms(
+        outlet_values="fluid_heat: heat_of_restrictions_barotropic",
+        scalar_rates="fluid_heat: heat_of_pipes_barotropic",
+    ),
+    "viscosity": RhsTerms(rates="viscosity: viscous_friction"),
     "heat exchangers": RhsTerms(
         outlet_values="fluid_heat: node_temperatures", scalar_rates="potential_networks: network_rates"
     ),
@@ -275,6 +282,7 @@ class ModelFeatures:
     networks: bool = False
     heat: bool = False
     exchangers: bool = False
+    viscosity: bool = False
 
     def components(self) -> Iterator[RhsTerms]:
         """Yield the terms (`RhsTerms`) of all components of the model, in the order in which the functions run."""
@@ -345,7 +353,9 @@ class ModelFeatures:
             if self.pipes:
                 yield COMPONENTS["carried"]
             if self.heat:
-                yield COMPONENTS["heat"]
+                yield COMPONENTS["heat, linear" if family == "linear" else "heat, barotropic"]
+            if self.viscosity and self.pipes:
+                yield COMPONENTS["viscosity"]
             if self.exchangers:
                 yield COMPONENTS["heat exchangers"]
         yield from self.carried

@@ -200,7 +200,7 @@ def add_heat(out, tables, specific_heat, amount, weight):
 
 @njit(forceinline=True)
 def after_exchange(out, tables, q, i, value):
-    """Value of scalar q that leaves node i, from the mean `value` of its inflows, by the effectiveness of exchangers."""
+    """Value of scalar q that leaves node i: mean `value` of its inflows, cooled by the effectiveness of exchangers."""
     at = tables.layout[0]["exchange"]
     for k in range(tables.exchangers.size if tables.scalars[q]["specific_heat"] > 0.0 else 0):
         if tables.exchangers[k]["node"] == i:

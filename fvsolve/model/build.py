@@ -310,6 +310,9 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     s = table[0]
     scheme_settings(s, case.numerics.scheme, case.numerics.limiter)
     s["viscosity"] = draft.fluid.viscosity or 0.0
+    if draft.fluid.walther is not None and (draft.scalar_table["specific_heat"] > 0.0).any():
+        s["walther_a"], s["walther_b"] = draft.fluid.walther
+        s["temperature"] = int(draft.scalar_table["specific_heat"].argmax())
     s["start"], s["late_blocks"] = case.numerics.start, bool(draft.control_table["late"].any())
     s["late_sensors"] = has_late_sensors(draft)
     s["ambient"], s["gravity"] = case.ambient_pressure, case.gravity

@@ -530,14 +530,20 @@ class ScalarCouplings:
         first += int(self.tables.scalars["losses"].sum())
         for k, source in enumerate(self.tables.heat_sources):
             yield pairs_of(unique_states(first + k), unique_states(*self.heat_states(source)))
+        for pipe in self.of.pipes[self.of.pipes["temperature"] > 0.0]:
+            n, cells = int(pipe["cells"]), np.arange(pipe["cells"])
+            for wave in (pipe["y"], pipe["y"] + n):
+                yield wave + cells, self.row["y"] + pipe["cell"] + cells
         for pipe in self.of.pipes[self.of.pipes["heat"] >= 0]:
             n, cells = int(pipe["cells"]), np.arange(pipe["cells"])
+            row = first + pipe["heat"] + (cells if self.row["by_cell"] else 0 * cells)
+            yield row, self.row["y"] + pipe["cell"] + cells
             memory = [pipe["memory"] + k * n for k in range(pipe["terms"])]
             for offset in range(1 - MAX_WIDTH, MAX_WIDTH):
                 here = cells[(cells + offset >= 0) & (cells + offset < n)]
                 for at in (pipe["y"], pipe["y"] + n, *memory):
                     yield self.row["y"] + pipe["cell"] + here, at + here + offset
-                    yield first + pipe["heat"] + (here if self.row["by_cell"] else 0 * here), at + here + offset
+                    yield row[here], at + here + offset
         first = self.of.size + self.ledgers - len(self.tables.exchangers)
         for k, exchanger in enumerate(self.tables.exchangers):
             i = exchanger["node"]

@@ -243,7 +243,8 @@ class Model(Displayable):
                     forces=bool(self.layout["forces"] >= 0), controls=has.controls,
                     formulas=bool((self.tables.schedules["pieces"] < 0).any()),
                     networks=self.network is not None, heat=bool((self.tables.scalars["specific_heat"] > 0.0).any()),
-                    exchangers=has.exchangers)  # fmt: skip
+                    exchangers=has.exchangers,
+                    viscosity=bool((self.tables.pipes["temperature"] > 0.0).any()))  # fmt: skip
         return functions(cast)
 
     @property

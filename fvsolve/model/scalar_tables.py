@@ -49,7 +49,8 @@ def lower_scalars(draft) -> None:
 def lower_heat(draft, scalar: str, heat_from: Any, by_cell: bool) -> None:
     """Fill the table of restrictions that heat the fluid, and the rows of pipes in the ledger of heat.
 
-    heat_from : names of parts, or "all"; by_cell : True for a row of the ledger for each cell, else for each pipe. Adds a fault for a part that dissipates nothing in the fluid.
+    heat_from : names of parts, or "all"; by_cell : True for a row of the ledger for each cell, else for each pipe
+    Adds a fault for a part that dissipates nothing in the fluid.
     """
     case, cut, rows = draft.case, pieces_of(draft.case.raw), []
     owners = {link: name for name, part in [*case.nodes.items(), *case.links.items()] for link in part.inner(name)[1]}
@@ -71,6 +72,9 @@ def lower_heat(draft, scalar: str, heat_from: Any, by_cell: bool) -> None:
     count = len(rows)
     for name, row in zip(draft.pipe_names, draft.pipe_table, strict=True):
         if heats(name):
+            if case.links[name].friction.model == "unsteady" and not case.law.linear:
+                text = f'unsteady friction of {name} heats the fluid under law = "linear" only'
+                draft.fault(f"scalars.{scalar}.heat_from", f"{text}; expected quasi-steady friction")
             row["heat"] = count
             count += int(row["cells"]) if by_cell else 1
     draft.heat_rows = count
@@ -109,7 +113,7 @@ def stated_range(case, name: str) -> tuple[float, float]:
 def scale_scalars(draft) -> None:
     """Set steady masses per length in pipes, and the size of a small deviation of scalar amounts in pipes and nodes."""
     profile, rho = draft.tables.profile, draft.fluid.density
-    for k, row in enumerate(draft.pipe_table if len(draft.case.scalars) else ()):
+    for k, row in enumerate(draft.pipe_table if len(draft.case.scalars) and draft.case.law.linear else ()):
         strain = (draft.profiles[k] - draft.fluid.pressure) / (rho * row["speed"] ** 2)
         profile[row["center"] + np.arange(row["cells"])] = rho * row["area"] * (1.0 + strain)
     scale = np.array(draft.scale)

@@ -168,9 +168,9 @@ class HeatSourceRows(NetworkRows, kind="heat-source"):
 class HeatExchanger(ThermalLink, kind="heat-exchanger"):
     """Heat out of the fluid of a place into a thermal node: conductance (T - T_to), or effectiveness m cp (T - T_to).
 
-    T is the temperature of the fluid in a tank or chamber, with the mass flow m into it. At a junction T is that of the
-    mixed inflow m, before it is cooled for an effectiveness, and after it for a conductance. Ports: from, to. Stored and
-    dissipated energy: none; it supplies the heat [W] to the thermal network and takes it from the heat of the fluid.
+    T is the temperature of the fluid in a tank or chamber, with the mass flow m into it. At a junction T is that of
+    the mixed inflow m: before it is cooled for an effectiveness, after it for a conductance. Ports: from, to. Stored
+    and dissipated energy: none; it supplies the heat [W] to the thermal network, and takes it from the fluid.
     """
 
     joins: ClassVar[dict[str, str]] = {"from": "hydraulic", "to": "thermal"}
