@@ -251,6 +251,7 @@ class ModelFeatures:
     bands : True if threads or processes step bands of the state
     boundary_exchange : True if several bands have an open boundary
     forces : True if forces on pipes are probed
+    device_heat : True if the dissipation of devices heats the fluid
     other fields : True if the model has such parts or properties
     """
 
@@ -281,6 +282,7 @@ class ModelFeatures:
     formulas: bool = False
     networks: bool = False
     heat: bool = False
+    device_heat: bool = False
     exchangers: bool = False
     viscosity: bool = False
 

@@ -243,7 +243,7 @@ class Model(Displayable):
                     forces=bool(self.layout["forces"] >= 0), controls=has.controls,
                     formulas=bool((self.tables.schedules["pieces"] < 0).any()),
                     networks=self.network is not None, heat=bool((self.tables.scalars["specific_heat"] > 0.0).any()),
-                    exchangers=has.exchangers,
+                    exchangers=has.exchangers, device_heat=bool((self.tables.heat_sources["device"] >= 0).any()),
                     viscosity=bool((self.tables.pipes["temperature"] > 0.0).any()))  # fmt: skip
         return functions(cast)
 
