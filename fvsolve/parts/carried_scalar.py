@@ -74,7 +74,7 @@ class Scalar(Table):
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
         faults = super().key_faults(given)
         if given.get("heat") is True and isinstance(unit := given.get("unit", "K"), str) and unit not in ZEROS:
-            faults.append((("unit",), f"{show(unit)} is no unit of a temperature with heat; expected K or degC"))
+            faults.append((("unit",), f"{show(unit)} is not a unit of a temperature with heat; expected K or degC"))
         if given.get("heat", False) is False:
             faults += [((key,), "needs heat = true") for key in ("specific_heat", "heat_from") if key in given]
         return faults

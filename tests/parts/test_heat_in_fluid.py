@@ -85,6 +85,27 @@ def test_a_cooled_tank_follows_its_exponential(cooler, numerics):
     assert book["heat"]["throttle"] + book["heat"]["cooler"] == approx(gained, rel=1e-9)
 
 
+def test_an_hour_of_the_hydraulic_power_unit():
+    """All power at the relief valve and the throttle becomes heat of the oil, with and without its cooler."""
+    for conductance in (250.0, None):
+        raw = fvsolve.load("warm-oil").raw | {"expect": {}}
+        raw["output"] = {"every": 60.0, "probes": ["sump.temperature", "high.gauge_pressure", "relief.flow",
+                                                   "throttle.flow"]}  # fmt: skip
+        if conductance is None:
+            raw["links"] = {name: link for name, link in raw["links"].items() if name != "cooler"}
+            raw["nodes"] = {name: node for name, node in raw["nodes"].items() if name != "air"}
+        result = fvsolve.run(raw)
+        (pressure,), flow = {*result["high.gauge_pressure"]}, result["relief.flow"] + result["throttle.flow"]
+        power, capacity, t = pressure * flow[0], 870.0 * 0.1 * CP, np.array(result.t)
+        rise = power * t / capacity
+        if conductance is not None:
+            rise = -power / conductance * np.expm1(-conductance * t / capacity)
+        assert np.array(result["sump.temperature"]) - 20.0 == approx(rise, rel=1e-9)
+        book = result.ledger["temperature"]
+        assert book["relative"] < 1e-14
+        assert book["heat"]["relief"] + book["heat"]["throttle"] == approx(3600.0 * power, rel=1e-9)
+
+
 def body(capacity=4e3, **more) -> dict:
     return {"type": "heat-capacity", "heat_capacity": capacity, **more}
 
@@ -430,7 +451,7 @@ FAULTS = [
     ((*SCALAR, "heat_from"), ["sump"], '"sump" dissipates nothing in the fluid'),
     ((*SCALAR, "heat_from"), "some", 'is not a list of names; expected ["NAME", ...] or "all"'),
     ((*SCALAR, "heat"), False, "specific_heat: needs heat = true"),
-    ((*SCALAR, "unit"), "degF", '"degF" is no unit of a temperature with heat; expected K or degC'),
+    ((*SCALAR, "unit"), "degF", '"degF" is not a unit of a temperature with heat; expected K or degC'),
     ((*SCALAR, "specific_heat"), "1.9 kJ/K", "a specific heat"),
     ((*SCALAR, "specific_heat"), None, 'heat without specific heat: a "user" fluid has none'),
     (("scalars", "other"), {"heat": True, "specific_heat": 1.0}, "expected one scalar with heat"),
