@@ -7,6 +7,7 @@ import numpy as np
 
 from fvsolve.assembly.lowering import rows_in
 from fvsolve.case.chainage import pieces_of
+from fvsolve.errors import Notice
 from fvsolve.kernels import calls
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.formula import means, samples
@@ -42,6 +43,9 @@ def lower_scalars(draft) -> None:
             row["specific_heat"], row["zero"] = scalar.specific_heat, scalar.zero
             row["by_cell"] = not explicit(case.numerics.method)
             lower_heat(draft, name, scalar.heat_from or (), row["by_cell"])
+            if not scalar.heat_from and not exchanger_names(case):
+                text = f"{name}: no part heats or cools the fluid; expected parts in `heat_from`, or a heat-exchanger"
+                draft.warnings.append(Notice("start", f"scalars.{name}", text))
     if len(case.scalars):
         pipes["center"] = draft.cells + pipes["cell"]
 

@@ -494,6 +494,13 @@ def test_what_cannot_be_is_refused(keys, value, said):
     assert said in str(error.value)
 
 
+def test_a_temperature_that_nothing_heats_is_noted():
+    notes = [notice.text for notice in fvsolve.build(fvsolve.load(unit(heat_from=[]))).warnings]
+    assert any("no part heats or cools the fluid" in text for text in notes)
+    notes = [notice.text for notice in fvsolve.build(fvsolve.load(unit())).warnings]
+    assert not any("heats or cools" in text for text in notes)
+
+
 def test_all_faults_are_said_at_once():
     case = unit()
     case["scalars"]["temperature"] |= {"heat_from": ["pomp", "throtle"]}
