@@ -15,6 +15,7 @@ from fvsolve.assembly.lowering import Lowering, links_by_table
 from fvsolve.assembly.schedule_tables import Schedules
 from fvsolve.assembly.state_names import StateNames
 from fvsolve.errors import CaseError, Fault, Notice
+from fvsolve.fluid.oils import walther_viscosity
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tanks
 
@@ -77,7 +78,16 @@ class Hydraulics:
         else:
             row["friction"], row["rough"] = rec.FRICTION_ROUGH, per_factor
             row["roughness"] = law.roughness / link.diameter
-            row["reynolds"] = link.diameter / (area * self.fluid.viscosity)
+            row["reynolds"] = link.diameter / (area * self.viscosity_at_start(link, row))
+
+    def viscosity_at_start(self, link, row) -> float:
+        """Dynamic viscosity in a pipe at the start [Pa s], by its temperature if its friction follows it."""
+        heated = [(name, scalar) for name, scalar in self.case.scalars.items() if scalar.heat]
+        if self.fluid.walther is None or not heated or "temperature" not in row.dtype.names:
+            return self.fluid.viscosity
+        (name, scalar), *_ = heated
+        row["temperature"] = link.scalars.get(name, scalar.initial) + scalar.zero
+        return self.rho * walther_viscosity(self.fluid.walther, float(row["temperature"]))
 
     def compliance(self, name: str, speed: float, fault) -> float:
         """Relative growth of a pipe's area with pressure [1/Pa], from the density law and the wave speed [m/s].
@@ -233,6 +243,9 @@ class ModelDraft:
     patch_table: np.ndarray = no_rows(rec.PATCHES)
     scalar_table: np.ndarray = no_rows(rec.SCALAR)
     reaction_table: np.ndarray = no_rows(rec.REACTION)
+    heat_source_table: np.ndarray = no_rows(rec.HEAT_SOURCE)
+    exchanger_table: np.ndarray = no_rows(rec.EXCHANGER)
+    heat_rows: int = 0  # rows in the ledger of the heat of restrictions and pipes
     wall_table: np.ndarray = no_rows(rec.WALL)
     delay_table: np.ndarray = no_rows(rec.DELAY)
     probe_table: np.ndarray = no_rows(rec.PROBE)

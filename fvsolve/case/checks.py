@@ -3,7 +3,7 @@
 The keys of a part are checked when it is read, its connections in `connections`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Any
 
 from fvsolve import units
@@ -13,7 +13,6 @@ from fvsolve.case.reading import Raw
 from fvsolve.case.resource_checks import name_faults
 from fvsolve.case.sections import CAVITY_SCHEMES, FluidSpec, Numerics
 from fvsolve.errors import article, did_you_mean, listing
-from fvsolve.fluid.laws import LAWS, law_names
 from fvsolve.parts import KINDS, Basin
 from fvsolve.parts.basin import VELOCITY_FIELDS, Physics
 from fvsolve.parts.formula_program import is_formula
@@ -204,8 +203,13 @@ def reserved_names() -> set[str]:
     return RESERVED | fields | {name for kind in kinds for name in (*kind.quantities, *getattr(kind, "along", {}))}
 
 
-def scalar_faults(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], fluid: Any) -> Faults:
-    """Faults (key path, message) of names of scalars, their values in parts, and parts that do not support them."""
+def scalar_faults(
+    scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], cut: Collection[str]
+) -> Faults:
+    """Faults (key path, message) of names of scalars, their values in parts, and parts that do not support them.
+
+    cut : names of pipes that are cut into pieces
+    """
     for name in scalars:
         yield from ((("scalars", name), text) for text in name_faults(name))
         if name in reserved_names():
@@ -228,11 +232,26 @@ def scalar_faults(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[st
                         yield place, text + 'boundary = "open"'
             if scalars and part.no_scalars:
                 yield (group, name), f"is {article(part.kind)}; {part.no_scalars}"
-    if not scalars:
-        return
-    if fluid is not None and not LAWS[fluid.law].scalars:
-        text = f"{show(fluid.law)} does not support scalars yet; expected {law_names(lambda law: law.scalars)}"
-        yield ("fluid", "law"), text
+    yield from _heat_faults({name: item for name, item in scalars.items() if item is not None and item.heat}, nodes,
+                            links, cut)  # fmt: skip
+
+
+def _heat_faults(heated: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], cut: Collection[str]) -> Faults:
+    """Faults of scalars with heat, and of heat exchangers without such a scalar; arguments as for `scalar_faults`."""
+    known = [*links, *cut, *nodes]
+    if not heated:
+        text = "exchanges heat with a temperature of the fluid; declare one, [scalars.NAME] with heat = true"
+        yield from ((("links", name), text) for name, link in links.items() if link.kind == "heat-exchanger")
+    for k, (name, scalar) in enumerate(heated.items()):
+        if k > 0:
+            yield (
+                ("scalars", name, "heat"),
+                f"{next(iter(heated))} is the temperature already; expected one scalar with heat",
+            )
+        for i, part in enumerate(scalar.heat_from or () if scalar.heat_from != "all" else ()):
+            if part not in known:
+                hint = did_you_mean(part, known) or f"; links are {listing([*links, *cut])}"
+                yield ("scalars", name, "heat_from", i), f"no part named {show(part)}{hint}"
 
 
 def _scalar_value_fault(scalar: str, value: Any, part: Any, scalars: dict[str, Any]) -> str | None:

@@ -16,9 +16,9 @@ from fvsolve.case.pipe_routes import legs, read_routes
 from fvsolve.case.probe import default_probes, read_probe
 from fvsolve.case.reactions import reaction_kinds, read_reactions
 from fvsolve.case.reading import Raw, Reading, copy_paths, default_faults, override, read_raw, split_key
-from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
+from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output, ViscosityLaw
 from fvsolve.errors import FluidError, did_you_mean
-from fvsolve.fluid import properties
+from fvsolve.fluid import follow_temperature, properties, specific_heat
 from fvsolve.parts import KINDS, Basin, Friction, Pipe, Scalar
 from fvsolve.parts import value as val
 from fvsolve.parts.control import Control
@@ -111,7 +111,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     reading.setting.step = numerics.step if numerics is not None else None
     check_names(reading)
     network = part_reading.cut_pipes(reading, state, numerics)
-    scalars = read_scalars(reading)
+    scalars = read_scalars(reading, state)
     reactions = read_reactions(reading, scalars)
     parts = part_reading.read_parts(reading, network)
     check_unused_signals(reading)
@@ -127,7 +127,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     cells = has_cells(network.table)
     check_times(reading, network, parts, fluid, state, numerics or valid_times(reading), cells, expect)
     numerics = fill_numerics(reading, parts, fluid, scalars, numerics, cells)
-    reading.add(checks.scalar_faults(scalars, parts.nodes, parts.links, state))
+    reading.add(checks.scalar_faults(scalars, parts.nodes, parts.links, network.pieces))
     links = part_reading.fill_cells(reading, parts.links, state, numerics)
     if None not in (numerics, output, state) and not reading.faults:
         reading.add(size_faults(numerics, output, links, parts.meshes, state))
@@ -192,6 +192,8 @@ def read_fluid(reading: Reading) -> tuple[FluidSpec | None, Any]:
                 density = properties(**{**stated, "viscosity": None}).density
             stated["viscosity"] = float(spec.viscosity) * density
             spec = spec.model_copy(update={"viscosity": stated["viscosity"]})
+        if isinstance(spec.viscosity, ViscosityLaw):
+            return spec, follow_temperature(properties(**stated | {"viscosity": None}), spec.viscosity.points)
         return spec, properties(**stated)
     except FluidError as error:
         reading.fault(("fluid", error.key), error.message + _in_celsius(reading, stated, error.key))
@@ -226,13 +228,19 @@ def check_names(reading: Reading) -> None:
         reading.stop()  # the names are not known
 
 
-def read_scalars(reading: Reading) -> dict[str, Any]:
-    """Scalars by name; None for a faulty scalar."""
-    result = {}
+def read_scalars(reading: Reading, fluid: Any) -> dict[str, Any]:
+    """Scalars by name, with the specific heat of the fluid where none is stated; None for a faulty scalar."""
+    result: dict[str, Any] = {}
     for name, given in reading.group("scalars").items():
         result[name] = None
         with reading.catch("scalars", name):
-            result[name] = Scalar.model_validate(given, context=reading.setting)
+            scalar = result[name] = Scalar.model_validate(given, context=reading.setting)
+            if scalar.heat and scalar.specific_heat is None and fluid is not None:
+                try:
+                    found = specific_heat(fluid.name, fluid.temperature, fluid.pressure)
+                except FluidError as error:
+                    raise ValueError(f"{error.message}; give the key `specific_heat`") from None
+                result[name] = scalar.model_copy(update={"specific_heat": found})
     return result
 
 

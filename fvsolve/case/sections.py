@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -13,10 +14,11 @@ from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.exact import NAMES
 from fvsolve.fluid import LAWS
 from fvsolve.fluid.coolprop import OIL_WORDS
+from fvsolve.fluid.oils import ASTM_D341
 from fvsolve.parts import value as val
 from fvsolve.parts.csv_rows import copy_name, find_file
 from fvsolve.parts.pipe.part import LINES
-from fvsolve.parts.table_model import NamedTables, Table, check_table
+from fvsolve.parts.table_model import NamedTables, Table, check_table, read_keys
 from fvsolve.parts.value import BY_CELLS, SHAPE, VALUE, Choice, Number, Quantity, ReadContext, positive
 from fvsolve.schemes import LIMITERS, SCHEMES
 from fvsolve.steppers.structure import KINDS
@@ -47,6 +49,59 @@ MODULI = val.UsualRange(1e7, 4e10, "liquefied gases to mercury")
 VISCOSITIES = val.UsualRange(1e-5, 5.0, "liquefied gases to heavy fuel oil")
 
 
+@dataclass(frozen=True)
+class Walther(val.Value):
+    """Value of a case file for a viscosity, or for one that follows the temperature, { law, points }."""
+
+    number: Quantity
+    about: str = ""
+    changes: str = BY_CELLS
+
+    def read(self, given: Any, setting: ReadContext) -> Any:
+        if not isinstance(given, dict):
+            return self.number.read(given, setting)
+        keys = {"law": (Choice("viscosity law", (ASTM_D341,)), val.NEEDED), "points": (WaltherPoints(), ())}
+        return ViscosityLaw(**read_keys(given, keys, setting))
+
+    @property
+    def takes(self) -> str:
+        return f'{self.number.takes}, or `{{ law = "{ASTM_D341}", points = [[TEMPERATURE, VISCOSITY], ...] }}`'
+
+    def json(self) -> dict[str, Any]:
+        points = {"type": "array", "items": {"type": "array", "items": {"type": ["number", "string"]}}}
+        table = {"type": "object", "properties": {"law": {"const": ASTM_D341}, "points": points}, "required": ["law"],
+                 "additionalProperties": False}  # fmt: skip
+        return {"anyOf": [self.number.json(), table]}
+
+
+class WaltherPoints(val.Value):
+    """Value of a case file: two points of temperature [K] and viscosity, kinematic or dynamic."""
+
+    def read(self, given: Any, setting: ReadContext) -> tuple[tuple[float, float], ...]:
+        example = 'expected [[TEMPERATURE, VISCOSITY], ...], such as [["40 degC", "46 cSt"], ["100 degC", "6.8 cSt"]]'
+        pairs = isinstance(given, (list, tuple)) and all(isinstance(item, (list, tuple)) for item in given)
+        if not pairs or [len(item) for item in given] != [2, 2]:
+            raise ValueError(f"{show(given)} are not two points; {example}")
+        temperature, viscosity = Quantity("temperature", positive), Quantity("viscosity", positive)
+        points = tuple((temperature.read(a, setting), viscosity.read(b, setting)) for a, b in given)
+        if points[0][0] == points[1][0]:
+            raise ValueError(f"{show(given)} have the same temperature; {example}")
+        return points
+
+
+@dataclass(frozen=True)
+class ViscosityLaw:
+    """Viscosity by temperature: its law, and two points (temperature [K], viscosity); none for the points of an oil."""
+
+    law: str
+    points: tuple[tuple[float, float], ...] = ()
+
+    def table(self) -> dict[str, Any]:
+        """Table of a case file."""
+        points = [[a, f"{float(b)!r} m2/s" if isinstance(b, units.Kinematic) else b] for a, b in self.points]
+        return {"law": self.law} | ({"points": points} if points else {})
+
+
 class FluidSpec(Table):
     """Table `[fluid]`: fluid, its state and its density law. Stated properties replace the properties from CoolProp."""
 
@@ -64,9 +119,10 @@ class FluidSpec(Table):
     bulk_modulus: Annotated[
         float | None, Quantity("modulus", positive, "isentropic bulk modulus [Pa]", MODULI, BY_CELLS)
     ] = None
-    viscosity: Annotated[
-        float | None, Quantity("viscosity", val.nonnegative, "dynamic viscosity [Pa s]", VISCOSITIES)
-    ] = None
+    viscosity: Annotated[float | ViscosityLaw | None, Walther(
+        Quantity("viscosity", val.nonnegative, "", VISCOSITIES),
+        "dynamic viscosity [Pa s], or its law over the temperature, which friction of pipes follows",
+    )] = None  # fmt: skip
     vapor_pressure: Annotated[float | None, Quantity("pressure", val.nonnegative, "vapour pressure [Pa]")] = None
     air_fraction: Annotated[float | None, Number(
         val.between(0, 1), f"volume fraction of air at 1 atm, law mixture; {CAVITY_AIR:g} with cavitation if left out",

@@ -1,15 +1,24 @@
 """Properties of a fluid at its reference state."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from fvsolve.errors import FluidError, did_you_mean
-from fvsolve.fluid.coolprop import FluidTable, cached_properties, celsius
+from fvsolve.fluid.coolprop import FluidTable, cached_properties, cached_specific_heat, celsius
 from fvsolve.fluid.laws import LAWS, Air, check_cavities
-from fvsolve.fluid.oils import OILS, oil_name, oil_properties
+from fvsolve.fluid.oils import (
+    OILS,
+    oil_name,
+    oil_properties,
+    oil_specific_heat,
+    walther_numbers,
+    walther_points,
+    walther_viscosity,
+)
+from fvsolve.units import Kinematic
 
-__all__ = ["LAWS", "Fluid", "FluidTable", "properties"]
+__all__ = ["LAWS", "Fluid", "FluidTable", "follow_temperature", "properties", "specific_heat"]
 
 USER = dict(density=None, bulk_modulus=None, viscosity=None, vapor_pressure=0.0, table=None, source="user")
 
@@ -24,6 +33,7 @@ class Fluid:
     vapor_pressure : absolute [Pa], 0 for a fluid without vapour pressure
     table : density over pressure for the density law `table`, otherwise None; source : where the properties come from
     air : free gas for the density law `mixture`, otherwise None
+    walther : numbers of the viscosity over the temperature, see `oils.walther_numbers`; otherwise None
     """
 
     name: str
@@ -37,6 +47,7 @@ class Fluid:
     table: FluidTable | None
     source: str
     air: Air | None = None
+    walther: tuple[float, float] | None = None
 
     @property
     def sound_speed(self) -> float:
@@ -93,6 +104,32 @@ def properties(
             raise FluidError(key, _missing(name, key))
     check_cavities(fluid)
     return fluid
+
+
+def follow_temperature(fluid: Fluid, points: tuple[tuple[float, float], ...]) -> Fluid:
+    """Copy of a fluid whose viscosity follows its temperature through two points, for oils those of their grade.
+
+    points : (temperature [K], viscosity, dynamic [Pa s] or `Kinematic` [m2/s]). Raises FluidError.
+    """
+    kinematic = [(t, float(nu) if isinstance(nu, Kinematic) else nu / fluid.density) for t, nu in points]
+    found = tuple(kinematic) or walther_points(fluid.name)
+    if not found:
+        text = 'the law needs two points of this fluid, points = [["40 degC", "46 cSt"], ["100 degC", "6.8 cSt"]]'
+        raise FluidError("viscosity", text)
+    numbers = walther_numbers(found)
+    viscosity = fluid.density * walther_viscosity(numbers, fluid.temperature)
+    return replace(fluid, walther=numbers, viscosity=viscosity, source=f"{fluid.source}; viscosity by ASTM D341")
+
+
+def specific_heat(name: str, temperature: float, pressure: float) -> float:
+    """Specific heat at constant pressure [J/kg/K] of a fluid at temperature [K] and absolute pressure [Pa].
+
+    name : as for `properties`. Raises FluidError for "user", which has none.
+    """
+    name = oil_name(name) or name
+    if name == "user":
+        raise FluidError("specific_heat", 'heat without specific heat: a "user" fluid has none')
+    return oil_specific_heat(temperature) if name in OILS else cached_specific_heat(name, temperature, pressure)
 
 
 def _look_up(name: str, law: str, temperature: float, pressure: float) -> dict:

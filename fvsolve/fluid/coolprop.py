@@ -194,13 +194,40 @@ def cached_properties(name: str, temperature: float, pressure: float, law: str) 
 
     Arguments as for `coolprop_properties`.
     """
-    key = json.dumps([FORMAT, coolprop_version(), name, temperature, pressure, law])
+
+    def compute() -> dict[str, Any]:
+        source = f"CoolProp {coolprop_version()}"
+        return coolprop_properties(name, temperature, pressure, law) | {"source": source}
+
+    return _cached(name, [temperature, pressure, law], compute)
+
+
+def cached_specific_heat(name: str, temperature: float, pressure: float) -> float:
+    """Specific heat at constant pressure from CoolProp [J/kg/K], cached as by `cached_properties`.
+
+    Raises FluidError if CoolProp has none.
+    """
+
+    def compute() -> dict[str, Any]:
+        from CoolProp.CoolProp import PropsSI
+
+        value = value_or_none(lambda: PropsSI("C", "T", temperature, "P", pressure, name))
+        return {"specific_heat": value, "table": None}
+
+    value = _cached(name, [temperature, pressure, "specific heat"], compute)["specific_heat"]
+    if value is None:
+        raise FluidError("specific_heat", f"CoolProp has no specific heat of {name}")
+    return value
+
+
+def _cached(name: str, about: list, compute: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """Result of `compute`, read from a file if it is cached there; name, about : fluid, and further text of the key."""
+    key = json.dumps([FORMAT, coolprop_version(), name, *about])
     stem = re.sub(r"[^A-Za-z0-9.-]+", "-", name)[:40]
     path = cache_folder() / "fluids" / f"{stem}-{hashlib.sha256(key.encode()).hexdigest()[:24]}.json"
     properties = _read(path, key)
     if properties is None:
-        properties = coolprop_properties(name, temperature, pressure, law)
-        properties["source"] = f"CoolProp {coolprop_version()}"
+        properties = compute()
         _write(path, key, properties)
     return properties
 

@@ -100,7 +100,6 @@ class Law:
 
     name, code : name in case files, code in compiled functions
     linear : True if waves superpose: wave speed and impedance are constant, and pressure is linear in mass and in head
-    scalars : True if flows may transport scalars
     tabulated : True if the density is a table from CoolProp; keys : keys of [fluid] that only this law has
     ambient : ambient pressure [Pa]; gravity : [m/s2]. The argument z of methods is an elevation [m].
     """
@@ -108,7 +107,6 @@ class Law:
     name: ClassVar[str]
     code: ClassVar[int]
     linear: ClassVar[bool] = False
-    scalars: ClassVar[bool] = False
     tabulated: ClassVar[bool] = False
     keys: ClassVar[tuple[str, ...]] = ()
 
@@ -192,7 +190,7 @@ class Law:
 class LinearLaw(Law, name="linear"):
     """Density law `linear`: the fluid flows with constant density; mass stored in a volume is linear in pressure."""
 
-    code, linear, scalars = rec.LAW_LINEAR, True, True
+    code, linear = rec.LAW_LINEAR, True
 
     def density(self, pressure):
         """Density [kg/m3] at given pressures [Pa]: constant under the density law `linear`."""

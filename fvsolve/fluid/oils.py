@@ -12,6 +12,7 @@ from typing import Any
 
 from fvsolve.errors import FluidError
 
+ASTM_D341 = "astm-d341"  # name of Walther's equation in case files
 ZERO, ATMOSPHERE = 273.15, 1.01325  # [K], [bar]
 MIN_TEMPERATURE, MAX_TEMPERATURE, MAX_PRESSURE = 273.15, 373.15, 1e8  # range of the sources [K], [Pa]
 
@@ -65,10 +66,41 @@ def oil_properties(name: str, temperature: float, pressure: float) -> dict[str, 
     c, b = TAIT_COEFFICIENTS[0], TAIT_COEFFICIENTS[1] + TAIT_COEFFICIENTS[2] * temperature
     rho /= 1.0 - c * math.log((b + p) / (b + ATMOSPHERE))
     isothermal = 1e5 * (b + p) / c * (1.0 - c * math.log((b + p) / b))
-    cp = HEAT_CAPACITY[0] + (HEAT_CAPACITY[1] - HEAT_CAPACITY[0]) * (temperature - ZERO - 25.0) / 55.0
+    cp = oil_specific_heat(temperature)
     isentropic = 1.0 / (1.0 / isothermal - temperature * expansion**2 / (rho * cp))
     values = dict(density=rho, bulk_modulus=isentropic, viscosity=rho * walther(oil, temperature))
     return values | dict(vapor_pressure=0.0, table=None, source="docs/fluids.md, oils")
+
+
+def walther_points(name: str) -> tuple[tuple[float, float], ...]:
+    """Points (temperature [K], kinematic viscosity [m2/s]) of an oil, by its grade; empty for other fluids."""
+    if name not in OILS:
+        return ()
+    return (ZERO + 40.0, 1e-6 * OILS[name].viscosity_40), (ZERO + 100.0, 1e-6 * OILS[name].viscosity_100)
+
+
+def walther_numbers(points: tuple[tuple[float, float], ...]) -> tuple[float, float]:
+    """(a, b) of log10(log10(nu + 0.7)) = a - b log10(T), nu in mm2/s, through two points (T [K], nu [m2/s]).
+
+    Raises FluidError where the equation does not hold.
+    """
+    if min(nu for _, nu in points) <= 3e-7:
+        raise FluidError("viscosity", "a point has a viscosity of 0.3 cSt or less, where ASTM D341 does not hold")
+    (cold, first), (hot, last) = ((math.log10(t), math.log10(math.log10(1e6 * nu + 0.7))) for t, nu in points)
+    slope = (first - last) / (hot - cold)
+    if slope <= 0.0:
+        raise FluidError("viscosity", "the viscosity of the points rises with temperature; expected a fall")
+    return first + slope * cold, slope
+
+
+def walther_viscosity(numbers: tuple[float, float], temperature: float) -> float:
+    """Kinematic viscosity [m2/s] at a temperature [K]; numbers : of `walther_numbers`"""
+    return 1e-6 * (10.0 ** (10.0 ** (numbers[0] - numbers[1] * math.log10(temperature))) - 0.7)
+
+
+def oil_specific_heat(temperature: float) -> float:
+    """Specific heat of all oils at a temperature [K]: cp [J/kg/K], linear between 25 and 80 degC and beyond."""
+    return HEAT_CAPACITY[0] + (HEAT_CAPACITY[1] - HEAT_CAPACITY[0]) * (temperature - ZERO - 25.0) / 55.0
 
 
 def density_1atm(oil: Oil, temperature: float) -> tuple[float, float]:

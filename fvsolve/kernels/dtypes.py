@@ -49,6 +49,9 @@ SETTINGS = record(
     leave="(2, 5)f8",  # of five cells, for the two cells at the end where it leaves
     rho=f8,  # reference density [kg/m3]
     viscosity=f8,  # dynamic [Pa s]
+    walther_a=f8,  # numbers a and b of Walther's equation of the viscosity, see `kernels.viscosity`; b is 0 without it
+    walther_b=f8,
+    temperature=i8,  # number of the scalar that is the temperature of the fluid
     ambient=f8,  # ambient pressure [Pa]
     start=f8,  # start of the run [s]
     late_blocks=i8,  # 1 if a block decides after the nodes are solved
@@ -113,6 +116,8 @@ PIPE = record(  # columns read by delay lines come first, in as few cache lines 
     to_mass=f8,
     moving_segment=i8,  # row of its first cell in `moving_segments`; -1 for a fixed pipe
     delay=i8,  # row of `delays` for a delay line, which has no cells; else -1
+    temperature=f8,  # of its fluid at the start, to which `reynolds` belongs; 0 if friction does not follow it [K]
+    heat=i8,  # first row in the ledger of the heat of its friction; -1 if this does not heat the fluid
 )
 
 DELAY = record(  # delay line: stretches of equal travel time, friction in the middle of each
@@ -396,14 +401,15 @@ DRIVEN_VALVE, DRIVEN_DEVICE, DRIVEN_NODE = 0, 1, 2
 
 NETWORK_INPUT = record(  # source of a network of potential and flow, see `kernels.potential_networks`
     kind=i8,
-    index=i8,  # schedule, device, mass, switch or element
+    index=i8,  # schedule, device, mass, switch, element or heat exchanger
     side=i8,  # of a device: quantity that is read
     sign=f8,
     start=f8,  # value at the start
 )
 # Sources: a schedule; quantity of a device, such as the torque of the fluid on its shaft; force on a mass; torque of
-# dry friction that slips; heat that an element dissipates. Later kinds depend on earlier ones.
-SCHEDULE_INPUT, DEVICE_INPUT, FORCE_INPUT, FRICTION_FLOW, HEAT_INPUT = 0, 1, 2, 3, 4
+# dry friction that slips; heat that an element dissipates; heat from the fluid through a heat exchanger. Later kinds
+# depend on earlier ones.
+SCHEDULE_INPUT, DEVICE_INPUT, FORCE_INPUT, FRICTION_FLOW, HEAT_INPUT, FLUID_HEAT = 0, 1, 2, 3, 4, 5
 
 NETWORK_RATE = record(y=i8)  # state whose rate is the value of the row of the same number
 NETWORK_ELEMENT = record(  # element of a network with power
@@ -451,12 +457,14 @@ LAYOUT = record(
     drive=i8,  # present relative speeds of pumps, an entry for each valve
     gain=i8,  # after `supply` in the ledger: inflow of each scalar through nodes [kg/s]
     loss=i8,  # then the negative decay of each scalar [kg/s]
+    heat=i8,  # then heat over specific heat: of restrictions, of friction in pipes, of heat exchangers [kg K/s]
     extent=i8,  # then the rates of reactions, times the mass that reacts [kg mol/m3/s]
     quickest=i8,  # greatest rate of change by reactions [1/s], an entry if there are reactions
     value=i8,  # of each scalar at all nodes
     edge=i8,  # values of scalars in pipes at both ends
     carried=i8,  # flow of scalars along pipes through both ends [kg/s]
     scalar_inflow=i8,  # flow of scalars from links into nodes [kg/s]
+    exchange=i8,  # of each heat exchanger: value of the scalar at the thermal node, heat out of the fluid [W]
     moving_segment=i8,  # change of the driving energy of moving stretches since the start [J/kg]
     rates=i8,  # in `work`: rates, if `out` depends on them and they are not requested; else -1
     forces=i8,  # in `work`: rates from which forces on pipes are computed; else -1
@@ -618,6 +626,22 @@ SCALAR = record(
     least=f8,  # bounds of all possible values
     greatest=f8,
     molar=f8,  # amount of substance per volume of the value 1 [mol/m3]; 1 if it is no amount
+    specific_heat=f8,  # of a temperature that heat changes [J/kg/K]; 0 for other scalars
+    zero=f8,  # absolute temperature at which its value is 0 [K]
+    by_cell=i8,  # 1 if the heat of friction has a row in the ledger for each cell, 0 for a row for each pipe
+)
+
+HEAT_SOURCE = record(  # restriction whose dissipated power heats the fluid where its flow leaves
+    valve=i8,
+    device=i8,  # device whose further dissipation is included; -1 for none
+)
+
+EXCHANGER = record(  # heat exchanger between a fluid place and a thermal node
+    node=i8,
+    place=i8,  # row of the temperature of the thermal node in the rows of the network
+    conductance=f8,  # [W/K]
+    effectiveness=f8,
+    slowness=f8,  # 1 / heat capacity of the thermal node, 0 for an ambient [K/J]
 )
 
 REACTION = record(
@@ -664,6 +688,8 @@ RECORDS = {
     "basins": BASIN,
     "patches": PATCHES,
     "scalars": SCALAR,
+    "heat_sources": HEAT_SOURCE,
+    "exchangers": EXCHANGER,
     "walls": WALL,
     "delays": DELAY,
     "controls": CONTROL,

@@ -38,6 +38,7 @@ from fvsolve.kernels.density.steady_profile import rise_at
 from fvsolve.kernels.dtypes import JUNCTION, MUSCL, SHORT, UPWIND, WENO5
 from fvsolve.kernels.pipes import scheme_family
 from fvsolve.kernels.steady_friction import drag
+from fvsolve.kernels.viscosity import cell_reynolds
 
 GAUSS_POINTS = np.array([-0.5, 0.0, 0.5]) * np.sqrt(0.6)
 GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
@@ -114,12 +115,13 @@ def pipe_power(t, y, dydt, out, tables, k, rows):
     fall, flow = pipe["drag"] / pipe["area"], pipe["flow"]
     friction, rate = 0.0, 0.0
     for i in range(n):
+        reynolds = cell_reynolds(y, tables, pipe, i)
         for g in range(3):
             a, b = at_point(r, width, i, g), at_point(l, width, i, g)
             da, db = at_point(dr, width, i, g), at_point(dl, width, i, g)
             total = flow + (a - b)
             p = pipe["admittance"] * (start - fall * (i + 0.5 + GAUSS_POINTS[g]) * pipe["dx"])
-            force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], total)
+            force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], reynolds, total)
             friction += GAUSS_WEIGHTS[g] * (total * force)
             rate += GAUSS_WEIGHTS[g] * ((p * (da + db) + flow * (da - db)) + 2.0 * (a * da + b * db))
     rows[1], rows[2], rows[3] = per * pipe["dx"] * friction, 0.0, per * pipe["dx"] * rate
@@ -175,6 +177,7 @@ def pipe_power_barotropic(t, y, dydt, out, tables, k, rows):
     base, reference = enthalpy(st, floats, st["ambient"]), st["rho"] * pipe["area"]
     friction, rate = 0.0, 0.0
     for i in range(n):
+        reynolds = cell_reynolds(y, tables, pipe, i)
         for g in range(3):
             a, b = at_point(r, width, i, g), at_point(l, width, i, g)
             da, db = at_point(dr, width, i, g), at_point(dl, width, i, g)
@@ -182,7 +185,7 @@ def pipe_power_barotropic(t, y, dydt, out, tables, k, rows):
             v = flow / m
             h = enthalpy(st, floats, pressure_of_mass(st, floats, pipe, m)) - base
             h += st["gravity"] * (z + rise_at(profile, pipe, (i + 0.5 + GAUSS_POINTS[g]) * dx))
-            force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
+            force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], reynolds, flow)
             friction += GAUSS_WEIGHTS[g] * v * force * (reference / m)
             rate += GAUSS_WEIGHTS[g] * ((h - 0.5 * v * v) * (da + db) / c + v * (da - db))
     rows[1], rows[2], rows[3] = dx * friction, jet_losses(out, tables, k), dx * rate

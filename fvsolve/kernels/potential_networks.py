@@ -2,7 +2,8 @@
 
 All quantities are linear in the states and in sources. A row has a value at the start and coefficients: value + sum of
 coefficient times change. The rows of rates come first, in the order of `network_rates`.
-The sources are schedules, quantities of devices, forces on masses, torques of friction and heat.
+The sources are schedules, quantities of devices, forces on masses, torques of friction and heat. Heat from the fluid is
+known only after the scalars are mixed; `network_rates` then runs again.
 `network_places` contains for each row the offsets of its first entry, of its first entry for a source, and of the entry
 after its last; then for each entry the place of its state in y, or the number of its source.
 `network_factors` contains the value of each row at the start, then the coefficient of each entry. A switch, diode or
@@ -113,6 +114,8 @@ def write_sources(t, y, out, tables):
             value = calls.call_value(tables.hooks[device["hooks"], VALUE], t, y, out, tables, device, source["side"])
         elif kind == rec.FORCE_INPUT:
             value = out[tables.layout[0]["net_force"] + i]
+        elif kind == rec.FLUID_HEAT:
+            value = out[tables.layout[0]["exchange"] + 2 * i + 1]
         elif kind == rec.FRICTION_FLOW:
             value = slipping_torque(t, y, out, tables, tables.network_switches[i])
         else:

@@ -207,6 +207,17 @@ COMPONENTS = {
         scalar_rates="reactions: reaction_rates",
         observe="reactions: observe_reactions",
     ),
+    "heat, linear": RhsTerms(
+        outlet_values="fluid_heat: heat_of_restrictions", scalar_rates="fluid_heat: heat_of_pipes"
+    ),
+    "heat, barotropic": RhsTerms(
+        outlet_values="fluid_heat: heat_of_restrictions_barotropic",
+        scalar_rates="fluid_heat: heat_of_pipes_barotropic",
+    ),
+    "viscosity": RhsTerms(rates="viscosity: viscous_friction"),
+    "heat exchangers": RhsTerms(
+        outlet_values="fluid_heat: node_temperatures", scalar_rates="potential_networks: network_rates"
+    ),
     "forces, linear": RhsTerms(observe="pipe_forces: observe_forces_linear"),
     "forces, barotropic": RhsTerms(observe="pipe_forces: observe_forces_barotropic"),
     "forces, cavitating": RhsTerms(observe="pipe_forces: observe_forces_cavitating"),
@@ -246,6 +257,7 @@ class ModelFeatures:
     bands : True if threads or processes step bands of the state
     boundary_exchange : True if several bands have an open boundary
     forces : True if forces on pipes are probed
+    device_heat : True if the dissipation of devices heats the fluid
     other fields : True if the model has such parts or properties
     """
 
@@ -276,6 +288,10 @@ class ModelFeatures:
     formulas: bool = False
     networks: bool = False
     reactions: bool = False
+    heat: bool = False
+    device_heat: bool = False
+    exchangers: bool = False
+    viscosity: bool = False
 
     def components(self) -> Iterator[RhsTerms]:
         """Yield the terms (`RhsTerms`) of all components of the model, in the order in which the functions run."""
@@ -347,6 +363,12 @@ class ModelFeatures:
                 yield MIXED
             if self.pipes:
                 yield COMPONENTS["carried"]
+            if self.heat:
+                yield COMPONENTS["heat, linear" if family == "linear" else "heat, barotropic"]
+            if self.viscosity and self.pipes:
+                yield COMPONENTS["viscosity"]
+            if self.exchangers:
+                yield COMPONENTS["heat exchangers"]
         if self.reactions:  # those in basins are added later
             yield COMPONENTS["reactions"]
         yield from self.carried

@@ -155,6 +155,97 @@ def mixes(y, out, tables, i):
 
 
 @njit
+def heated_scalar(tables):
+    """Number of the scalar that is the temperature of the fluid; -1 without one."""
+    for q in range(tables.scalars.size):
+        if tables.scalars[q]["specific_heat"] > 0.0:
+            return q
+    return -1
+
+
+@njit(forceinline=True)
+def heated_node(out, tables, j):
+    """Node that heat source j heats: the node to which its flow leaves."""
+    valve = tables.valves[tables.heat_sources[j]["valve"]]
+    flow = out[tables.layout[0]["valve"] + tables.heat_sources[j]["valve"]]
+    return valve["from_node"] if flow < 0.0 else valve["to_node"]
+
+
+@njit
+def mass_inflow(out, tables, i):
+    """Sum of the mass flows from links and from outside into node i [kg/s]."""
+    layout, pipes, valves = tables.layout[0], tables.pipes, tables.valves
+    total = max(out[layout["supply"] + i], 0.0)
+    for p in range(pipes.size):
+        if pipes[p]["to_node"] == i:
+            total += max(end_flow(out, tables, p, 1), 0.0)
+        if pipes[p]["from_node"] == i:
+            total += max(-end_flow(out, tables, p, 0), 0.0)
+    for k in range(valves.size):
+        if valves[k]["to_node"] == i:
+            total += max(out[layout["valve"] + k], 0.0)
+        if valves[k]["from_node"] == i:
+            total += max(-out[layout["valve"] + k], 0.0)
+    return total
+
+
+@njit
+def add_heat(out, tables, specific_heat, amount, weight):
+    """Add the heat of restrictions, and heat through conductances of exchangers, to the inflows of all nodes.
+
+    amount, weight : sums of `pipe_inflows`; a conductance g between node and thermal node adds g times the value at
+    the thermal node, and g, as diffusion does
+    """
+    heat, at = tables.layout[0]["heat"], tables.layout[0]["exchange"]
+    for j in range(tables.heat_sources.size):
+        amount[heated_node(out, tables, j)] += out[heat + j]
+    for k in range(tables.exchangers.size):
+        g = tables.exchangers[k]["conductance"] / specific_heat
+        amount[tables.exchangers[k]["node"]] += g * out[at + 2 * k]
+        weight[tables.exchangers[k]["node"]] += g
+
+
+@njit(forceinline=True)
+def after_exchange(out, tables, q, i, value):
+    """Value of scalar q that leaves node i: mean `value` of its inflows, cooled by the effectiveness of exchangers."""
+    at = tables.layout[0]["exchange"]
+    for k in range(tables.exchangers.size if tables.scalars[q]["specific_heat"] > 0.0 else 0):
+        if tables.exchangers[k]["node"] == i:
+            value -= tables.exchangers[k]["effectiveness"] * (value - out[at + 2 * k])
+    return value
+
+
+@njit
+def write_exchange(y, out, tables, q, total, share):
+    """Write the heat out of the fluid through exchangers [W], and minus its effect on the amount of heat in the ledger.
+
+    total, share : inflow of scalar q and of mass into each node, of which the quotient is the mean of its inflows
+    Raises out[RATE] to the rates of stored mass and of the thermal node.
+    """
+    layout, exchangers, nodes = tables.layout[0], tables.exchangers, tables.nodes
+    at, specific_heat = layout["exchange"], tables.scalars[q]["specific_heat"]
+    first = layout["net"] - exchangers.size
+    for k in range(exchangers.size):
+        exchanger = exchangers[k]
+        i, other = exchanger["node"], out[at + 2 * k]
+        arriving = leaving = out[layout["value"] + q * nodes.size + i]
+        capacity = 0.0
+        if exchanger["effectiveness"] > 0.0:
+            if mixes(y, out, tables, i):
+                flow, arriving = share[i], total[i] / share[i] if share[i] > 0.0 else other
+            else:
+                flow = mass_inflow(out, tables, i)
+            capacity = exchanger["effectiveness"] * specific_heat * flow
+        heat = exchanger["conductance"] * (leaving - other) + capacity * (arriving - other)
+        out[at + 2 * k + 1], out[first + k] = heat, -heat / specific_heat
+        conductance = exchanger["conductance"] + capacity
+        out[RATE] = max(out[RATE], conductance * exchanger["slowness"])
+        if has_storage(nodes[i]["kind"]):
+            mass = max(nodes[i]["mass"] + y[nodes[i]["y"]], RATE_DEPTH * nodes[i]["density"] * nodes[i]["area"])
+            out[RATE] = max(out[RATE], (share[i] + capacity / specific_heat) / mass)
+
+
+@njit
 def start_values(t, y, out, tables, q, amount, weight, cells, count):
     """Write the values of scalar q at all nodes, as far as they do not depend on other nodes.
 
@@ -189,6 +280,9 @@ def mix_nodes(t, y, out, tables, q):
     amount, weight, total, share = scratch[:n], scratch[n : 2 * n], scratch[2 * n : 3 * n], scratch[3 * n : 4 * n]
     pipe_inflows(y, out, tables, q, amount, weight, total, share)
     start_values(t, y, out, tables, q, amount, weight, total, share)
+    specific_heat = tables.scalars[q]["specific_heat"]
+    if specific_heat > 0.0:
+        add_heat(out, tables, specific_heat, amount, weight)
     for _ in range(MAX_SWEEPS):
         for i in range(n):
             total[i], share[i] = amount[i], weight[i]
@@ -202,7 +296,7 @@ def mix_nodes(t, y, out, tables, q):
         changed = False
         for i in range(n):
             if share[i] > 0.0 and mixes(y, out, tables, i):
-                value = total[i] / share[i]
+                value = after_exchange(out, tables, q, i, total[i] / share[i])
                 changed = changed or abs(value - out[at + i]) > CHANGE_TOLERANCE * abs(value)
                 out[at + i] = value
         if not changed or valves.size == 0:
@@ -211,6 +305,8 @@ def mix_nodes(t, y, out, tables, q):
         if has_storage(nodes[i]["kind"]):
             mass = max(nodes[i]["mass"] + y[nodes[i]["y"]], RATE_DEPTH * nodes[i]["density"] * nodes[i]["area"])
             out[RATE] = max(out[RATE], share[i] / mass + 0.5 * change_rate(out, tables, q))
+    if specific_heat > 0.0:
+        write_exchange(y, out, tables, q, total, share)
 
 
 @njit(forceinline=True)
@@ -249,6 +345,11 @@ def exchange_amounts(t, y, dydt, out, tables, q):
         amount = flow * (out[value + i] if flow > 0.0 else out[value + j])
         out[inflow + i] -= amount
         out[inflow + j] += amount
+    if scalar["specific_heat"] > 0.0:
+        for j in range(tables.heat_sources.size):
+            out[inflow + heated_node(out, tables, j)] += out[layout["heat"] + j]
+        for k in range(tables.exchangers.size):
+            out[inflow + tables.exchangers[k]["node"]] += out[layout["net"] - tables.exchangers.size + k]
     for i in range(n):
         kind, supply = nodes[i]["kind"], out[layout["supply"] + i]
         if kind == FIXED:

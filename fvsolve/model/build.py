@@ -326,7 +326,8 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         draft.cluster_table, schedules, draft.probe_table, draft.body_table, draft.freedom_table,
         np.array(draft.points, rec.POINT), draft.line_table, draft.pin_table, draft.bushing_table,
         draft.moving_segment_table, draft.mass_table, draft.brace_table, draft.stop_table, draft.piston_table,
-        draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table, draft.wall_table,
+        draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table,
+        draft.heat_source_table, draft.exchanger_table, draft.wall_table,
         draft.delay_table, draft.control_table, draft.sensor_table, draft.driven_table, draft.network_input_table,
         draft.network_rate_table, draft.network_element_table, draft.network_switch_table, draft.reaction_table,
         np.array(draft.integers, dtype=np.int64), np.array(draft.floats, dtype=float), profile, draft.plane(), pieces,
@@ -358,6 +359,9 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     s = table[0]
     scheme_settings(s, case.numerics.scheme, case.numerics.limiter)
     s["viscosity"] = draft.fluid.viscosity or 0.0
+    if draft.fluid.walther is not None and (draft.scalar_table["specific_heat"] > 0.0).any():
+        s["walther_a"], s["walther_b"] = draft.fluid.walther
+        s["temperature"] = int(draft.scalar_table["specific_heat"].argmax())
     s["start"], s["late_blocks"] = case.numerics.start, bool(draft.control_table["late"].any())
     s["late_sensors"] = has_late_sensors(draft)
     s["ambient"], s["gravity"] = case.ambient_pressure, case.gravity
@@ -394,12 +398,14 @@ def layout_of(draft: ModelDraft) -> np.ndarray:
     scalars, layout, at = len(draft.scalar_table), np.zeros(1, rec.LAYOUT), rec.OUT_HEAD
     for name, size in (
         ("pressure", nodes), ("supply", nodes), ("gain", scalars * nodes), ("loss", sum(draft.scalar_table["losses"])),
-        ("extent", sum(draft.reaction_table["extents"])), ("net", nodes), ("quickest", len(draft.reaction_table) > 0),
+        ("heat", draft.heat_rows + len(draft.exchanger_table)), ("extent", sum(draft.reaction_table["extents"])),
+        ("net", nodes), ("quickest", len(draft.reaction_table) > 0),
         ("ends", 4 * pipes), ("valve", valves), ("column", columns), ("valve_controlled", columns),
         ("stiffness", draft.moving), ("outflow_fraction", draft.moving), ("swept", draft.moving),
         ("net_force", len(draft.mass_table)), ("push", len(draft.push_names)),
         ("conductance", valves), ("drive", valves), ("value", scalars * nodes), ("edge", 2 * pipes * scalars),
-        ("carried", 2 * pipes * scalars), ("scalar_inflow", scalars * nodes), ("wall", len(draft.wall_table)),
+        ("carried", 2 * pipes * scalars), ("scalar_inflow", scalars * nodes),
+        ("exchange", 2 * len(draft.exchanger_table)), ("wall", len(draft.wall_table)),
         ("moving_segment", len(draft.moving_segment_table)),
         ("tank", rec.TANK_OUT * len(draft.basin_table) if len(draft.body_table) else 0),
         ("travel", 2 * len(draft.push_names)), ("along", 3 * len(draft.line_table)),

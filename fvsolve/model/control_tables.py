@@ -198,12 +198,28 @@ def check_order(draft, early: set[str]) -> None:
 
 
 def check_network_order(draft, name: str, block: Block, rows: dict, numbers: dict[str, int]) -> None:
-    """Add a fault if a block passes on at once what a block drives in a network of rotation, electricity and heat."""
+    """Add a fault if a block passes on at once what a block drives in a network of rotation, electricity and heat.
+
+    Values of scalars, and heat of the fluid, are known only after these blocks.
+    """
+    for probe in block.inputs if block.control.feeds_through else ():
+        if not isinstance(probe, str) and follows_scalars(draft, rows[probe.text]):
+            text = f"{probe.text} is known only after what the control drives"
+            draft.fault(f"controls.{name}", f"{text}; give [controls.{name}] a `filter`")
     for probe in block.inputs if block.control.feeds_through and draft.network is not None else ():
         if not isinstance(probe, str) and rows[probe.text]["kind"] == rec.NETWORK_VALUE:
             if draft.network.follows_blocks(draft, rows[probe.text]):
                 text = f"{probe.text} may follow at once from what a control drives, a loop without a state"
                 draft.fault(f"controls.{name}", f"{text}; give [controls.{name}] a `filter`")
+
+
+def follows_scalars(draft, row) -> bool:
+    """True if a sensor reads the value of a scalar, or the heat of a heat exchanger."""
+    if row["kind"] in (rec.NODE_SCALAR, rec.PIPE_SCALAR, rec.CELL_SCALAR):
+        return True
+    sources = draft.network.inputs_of(row) if row["kind"] == rec.NETWORK_VALUE else ()
+    reads = (draft.network.sources[j].reads for j in sources)
+    return any(item is not None and item[0] == rec.FLUID_HEAT for item in reads)
 
 
 # start --------------------------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ set by the cells behind it.
 """
 
 from collections.abc import Callable, Iterator
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array
@@ -15,6 +16,7 @@ from scipy.sparse import coo_array, csc_array
 from fvsolve.basins import lower_pattern as pattern
 from fvsolve.basins.lower_pattern import all_states
 from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.pipe_energy import MAX_WIDTH
 from fvsolve.model.control_pattern import BlockCouplings, pairs_of, unique_states
 from fvsolve.model.reaction_tables import names_read
 from fvsolve.model.scalar_tables import STORES
@@ -40,7 +42,7 @@ class Couplings:
 
     def __init__(self, model) -> None:
         tables = model.tables
-        self.size = model.y_size
+        self.size, self.model = model.y_size, model
         self.nodes, self.pipes = tables.nodes, tables.pipes
         self.valves, self.columns = tables.valves, tables.columns
         self.short = self.pipes[tables.delays["pipe"][tables.delays["now"] > 0.0]]
@@ -307,6 +309,10 @@ class Couplings:
         own = [network.states[column] for column in columns if column in network.states]
         return unique_states(*own, *(self.source_states(j) for j in network.inputs_of_columns(columns)))
 
+    def network_potential(self, row: int) -> np.ndarray:
+        """States on which a row of a network depends."""
+        return self.network_states(self.network.columns_of_rows[row])
+
     def probe_states(self, row) -> np.ndarray:
         """States on which a probe of a network depends."""
         network, r = self.network, int(row["index"])
@@ -327,6 +333,9 @@ class Couplings:
             return self.device_reading(self.devices[i])
         if row["kind"] == rec.FORCE_INPUT:
             return unique_states(*self.pushing_states(i))
+        if row["kind"] == rec.FLUID_HEAT:
+            node = int(self.model.tables.exchangers[i]["node"])
+            return unique_states(self.temperature.values[node], *self.temperature.through[node])
         stores = {column for column in network.columns_followed(j) if column in network.states}
         switch = int(self.switches[i]["schedule"]) if row["kind"] == rec.FRICTION_FLOW else -1
         return unique_states(*(network.states[column] for column in stores), self.blocks.schedule(switch))
@@ -339,6 +348,11 @@ class Couplings:
         mass = self.masses[device["mass"]] if device["mass"] >= 0 else -1
         masses = unique_states(*([mass, mass + 1] if mass >= 0 else []))
         return unique_states(self.device_states(device), opening, masses, *(self.sets[n] for n in nodes if n >= 0))
+
+    @cached_property
+    def temperature(self):
+        """Couplings of the scalar that is the temperature of the fluid."""
+        return ScalarCouplings(self, self.model, int(np.argmax(self.model.tables.scalars["specific_heat"])))
 
     def pushing_states(self, mass: int) -> Iterator[np.ndarray]:
         """Yield states of all force elements that act on a mass."""
@@ -520,7 +534,44 @@ class ScalarCouplings:
             flow = [of.sets[i], of.sets[j], of.opening_states(valve)]
             self.through[i] += flow
             self.through[j] += flow
+        self.heated, self.tables, self.ledgers = self.row["specific_heat"] > 0.0, model.tables, model.ledgers
+        for exchanger in self.tables.exchangers if self.heated else ():
+            self.through[exchanger["node"]].append(of.network_potential(exchanger["place"]))
+        for source in self.tables.heat_sources if self.heated else ():
+            for i in ends_of(of.valves[source["valve"]]):
+                self.through[i] += self.heat_states(source)
         self.values = self.mixed_values()
+
+    def heat_states(self, source) -> list[np.ndarray]:
+        """States that set the heat of a restriction."""
+        valve = self.of.valves[source["valve"]]
+        device = [self.of.device_states(self.tables.devices[source["device"]])] if source["device"] >= 0 else []
+        return [*(self.of.sets[i] for i in ends_of(valve)), self.of.opening_states(valve), *device]
+
+    def heat_pairs(self) -> Iterator[Pairs]:
+        """Yield couplings of the heat in the ledger, and of amounts in cells with the waves that friction reads."""
+        first = self.of.size + len(self.of.nodes) * (1 + len(self.tables.scalars))
+        first += int(self.tables.scalars["losses"].sum())
+        for k, source in enumerate(self.tables.heat_sources):
+            yield pairs_of(unique_states(first + k), unique_states(*self.heat_states(source)))
+        for pipe in self.of.pipes[self.of.pipes["temperature"] > 0.0]:
+            n, cells = int(pipe["cells"]), np.arange(pipe["cells"])
+            for wave in (pipe["y"], pipe["y"] + n):
+                yield wave + cells, self.row["y"] + pipe["cell"] + cells
+        for pipe in self.of.pipes[self.of.pipes["heat"] >= 0]:
+            n, cells = int(pipe["cells"]), np.arange(pipe["cells"])
+            row = first + pipe["heat"] + (cells if self.row["by_cell"] else 0 * cells)
+            yield row, self.row["y"] + pipe["cell"] + cells
+            memory = [pipe["memory"] + k * n for k in range(pipe["terms"])]
+            for offset in range(1 - MAX_WIDTH, MAX_WIDTH):
+                here = cells[(cells + offset >= 0) & (cells + offset < n)]
+                for at in (pipe["y"], pipe["y"] + n, *memory):
+                    yield self.row["y"] + pipe["cell"] + here, at + here + offset
+                    yield row[here], at + here + offset
+        first = self.of.size + self.ledgers - len(self.tables.exchangers)
+        for k, exchanger in enumerate(self.tables.exchangers):
+            i = exchanger["node"]
+            yield pairs_of(unique_states(first + k), unique_states(self.values[i], *self.through[i]))
 
     def own(self, i: int) -> list:
         """States that set the scalar's value at node i, a storing node or a patch of a basin; else an empty list."""
@@ -575,6 +626,8 @@ class ScalarCouplings:
             yield from self.boundary_pairs(basin)
         if self.row["losses"] > 0:
             yield from self.decay_pairs()
+        if self.heated:
+            yield from self.heat_pairs()
         for pipe in self.of.pipes:
             yield from self.inside(pipe)
             for right, i in enumerate(ends_of(pipe)):

@@ -176,7 +176,7 @@ class Model(Displayable):
 
     @property
     def ledgers(self) -> int:
-        """Number of rows of the stepper's ledger: supply of nodes, inflow of scalars at nodes, decay, reactions."""
+        """Number of rows of the ledger: supply of nodes; inflow of scalars at nodes, decay, heat and reactions."""
         return int(self.layout["net"] - self.layout["supply"])
 
     @property
@@ -243,7 +243,10 @@ class Model(Displayable):
                     tuple(self.laws), basins, carried, has.scalars, valves, has.delays, alone,
                     forces=bool(self.layout["forces"] >= 0), controls=has.controls,
                     formulas=bool((self.tables.schedules["pieces"] < 0).any()),
-                    networks=self.network is not None, reactions=has.reactions)  # fmt: skip
+                    networks=self.network is not None, heat=bool((self.tables.scalars["specific_heat"] > 0.0).any()),
+                    exchangers=has.exchangers, device_heat=bool((self.tables.heat_sources["device"] >= 0).any()),
+                    viscosity=bool((self.tables.pipes["temperature"] > 0.0).any()),
+                    reactions=has.reactions)  # fmt: skip
         return functions(cast)
 
     @property

@@ -252,6 +252,8 @@ class Network:
     def columns_followed(self, j: int) -> set[int]:
         """Columns of stores and sources that the source j follows: torque of friction, heat of an element."""
         item = self.sources[j]
+        if item.reads is not None and item.reads[0] == rec.FLUID_HEAT:
+            return set(self.columns_of_rows[self.node_row(item.ends[1])])
         if item.reads is None or item.reads[0] not in (rec.FRICTION_FLOW, rec.HEAT_INPUT):
             return set()
         name = item.reads[1]

@@ -11,6 +11,7 @@ from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.network_elimination import Elimination, NetworkError, Terms, substituted
 from fvsolve.model.network_tables import network_faults
+from fvsolve.model.scalar_tables import exchanger_names
 
 TURNS = 60  # changes of switches, and of nonlinear sources, in the search
 AGREE = 1e-9  # relative difference of two values that are equal
@@ -35,6 +36,8 @@ class NetworkStart:
         self.free = self.stated_values()
         self.switches = self.network.switches
         self.known = self.stores.keys() - {*self.free}
+        self.exchange = [self.fluid_exchange(item) for item in self.network.sources
+                         if item.reads is not None and item.reads[0] == rec.FLUID_HEAT]  # fmt: skip
         self.directions = [self.first_direction(k) for k in range(len(self.switches))]
         self.mode = tuple(self.begins_on(k) for k in range(len(self.switches)))
 
@@ -85,6 +88,33 @@ class NetworkStart:
         own = [column for column, other in self.integrating.items() if other.state_of == ("device", name)]
         flow = float(self.values[own[0]]) if own else 0.0
         return sign * device.source_at_start(self.start, part, draft.device_table[k], quantity, flow)
+
+    def fluid_exchange(self, item: Element) -> tuple[int, int, float, float]:
+        """Heat exchanger at the start: (column of its heat, of its thermal node, conductance [W/K], temperature [K]).
+
+        The heat is conductance (temperature - that of the thermal node). Adds a fault at a junction, where the fluid is
+        mixed, if the temperature of the thermal node is not stated.
+        """
+        case, name = self.draft.case, item.reads[1]
+        link, row = case.links[name], self.draft.tables.exchangers[exchanger_names(case).index(name)]
+        label, scalar = next((key, value) for key, value in case.scalars.items() if value.heat)
+        place, i = case.nodes[link.from_], int(row["node"])
+        value = place.scalars[label].first if label in place.scalars else scalar.initial
+        heat, node = self.network.columns[item.name], self.potential_column(item.ends[1])
+        inflow = 0.0
+        for table in (self.draft.valve_table, self.draft.pipe_table):
+            inflow += float(table["flow"][table["to_node"] == i].clip(min=0.0).sum())
+            inflow -= float(table["flow"][table["from_node"] == i].clip(max=0.0).sum())
+        conductance = float(row["conductance"] + row["effectiveness"] * inflow * scalar.specific_heat)
+        if node in self.free and place.kind == "junction":
+            text = f"its temperature at the start follows from that of junction {link.from_}"
+            self.draft.fault(self.stores[node].part, f"{text}; give the key `initial_temperature`")
+        return heat, node, conductance, value + scalar.zero
+
+    def potential_column(self, node: str) -> int:
+        """Column of the store or source that gives a thermal node its temperature."""
+        (column,) = self.network.equations(self.network.conducting).potential(node)
+        return column
 
     def state_of_other(self, item: Element) -> float:
         """Potential at the start of a store whose state is that of another part."""
@@ -193,15 +223,20 @@ class NetworkStart:
         laws = [substituted(self.rate(found, column), network.dependent) for column in self.free if column not in ties]
         laws += [{column: -1.0} | terms for column, terms in ties.items() if place.keys() & {column, *terms}]
         matrix, given = np.zeros((len(laws), len(place))), np.zeros(len(laws))
+        self.set_fluid_heat()
         for row, law in enumerate(laws):
             given[row] = -self.sum_of(law)
             for column in law.keys() & place.keys():
                 matrix[row, place[column]] = law[column]
+            for heat, node, conductance, _ in self.exchange:
+                if heat in law and node in place:
+                    matrix[row, place[node]] -= law[heat] * conductance
         sizes = np.array([self.item(column).small for column in self.free])
         largest = np.abs(matrix * sizes).max(axis=1)
         scale = 1.0 / np.where(largest > 0.0, largest, 1.0)
         solution, _, rank, _ = np.linalg.lstsq(matrix * sizes * scale[:, None], given * scale, rcond=1e-11)
         self.values[self.free] += solution * sizes
+        self.set_fluid_heat()
         for law in laws:
             if abs(self.sum_of(law)) > RESTING * self.size_of(law):
                 moving = [self.item(c) for c in self.free]
@@ -217,8 +252,14 @@ class NetworkStart:
         """Rate of a store, or of the state of an integrating source."""
         return found.rate(column) if column in self.stores else found.drop(self.integrating[column])
 
+    def set_fluid_heat(self) -> None:
+        """Write the heat of heat exchangers at the present temperatures of thermal nodes."""
+        for heat, node, conductance, temperature in self.exchange:
+            self.values[heat] = conductance * (temperature - self.values[node])
+
     def set_nonlinear_sources(self) -> None:
         """Write quantities of devices, torques of friction that slips, and heat that elements dissipate."""
+        self.set_fluid_heat()
         network, found = self.network, self.network.equations(self.mode)
         numbers = {switch.name: k for k, switch in enumerate(self.switches)}
         on = {switch.name: on for switch, on in zip(self.switches, self.mode, strict=True)}

@@ -12,6 +12,7 @@ from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.network import MOST_STATES, Network
 from fvsolve.model.network_elimination import Elimination, NetworkError, dependent_stores, substituted
+from fvsolve.model.scalar_tables import exchanger_names
 
 CURRENT_ROUNDING = 1e-13  # of diodes, over the sum of all sources divided by their resistance
 NO_SPEED = "has neither an inertia nor a given speed; give this shaft the key `inertia`"
@@ -158,10 +159,13 @@ def fill_tables(draft, network: Network) -> None:
             row["side"] = draft.devices[row["index"]][2].quantities.index(quantity)
         elif row["kind"] == rec.FORCE_INPUT:
             row["index"] = draft.mass_index[name]
+        elif row["kind"] == rec.FLUID_HEAT:
+            row["index"] = exchanger_names(draft.case).index(name)
         elif row["kind"] == rec.FRICTION_FLOW:
             row["index"] = [switch.name for switch in network.switches].index(name)
         else:
             row["index"] = [other.name for other in network.booked].index(name)
+    draft.exchanger_table = exchanger_rows(draft, network)
     places = [*network.states.values(), *network.integrals.values()]
     draft.network_rate_table = np.array([(place,) for place in places], rec.NETWORK_RATE)
     draft.network_element_table = np.zeros(len(network.booked), rec.NETWORK_ELEMENT)
@@ -184,6 +188,18 @@ def fill_tables(draft, network: Network) -> None:
             if switch.kind == rec.DIODE:
                 ohm = network.elements[network.numbers[f"{switch.name}.resistance"]].value
                 row["rounding"] = CURRENT_ROUNDING * sum(map(source_size, network.sources)) / ohm
+
+
+def exchanger_rows(draft, network: Network) -> np.ndarray:
+    """Table of heat exchangers."""
+    case, capacity = draft.case, {item.ends[0]: item.value for item in network.stores.values() if item.thermal}
+    table = np.zeros(len(exchanger_names(case)), rec.EXCHANGER)
+    for name, row in zip(exchanger_names(case), table, strict=True):
+        link = case.links[name]
+        row["node"], row["place"] = draft.node_index[draft.inside(link.from_)], network.node_row(link.to)
+        row["conductance"], row["effectiveness"] = link.conductance or 0.0, link.effectiveness or 0.0
+        row["slowness"] = 1.0 / capacity[link.to] if link.to in capacity else 0.0
+    return table
 
 
 def response_sizes(network: Network, case) -> dict[int, float]:

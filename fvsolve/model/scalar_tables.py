@@ -5,11 +5,16 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.assembly.lowering import rows_in
+from fvsolve.case.chainage import pieces_of
+from fvsolve.errors import Notice
+from fvsolve.kernels import calls
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.reaction_tables import reacting
 from fvsolve.parts.formula import means, samples
 from fvsolve.parts.reaction import molar_factor
 from fvsolve.steppers.tableau import METHODS
+from fvsolve.units import show
 
 STORES = (rec.TANK, rec.CHAMBER)
 
@@ -17,7 +22,7 @@ STORES = (rec.TANK, rec.CHAMBER)
 def lower_scalars(draft) -> None:
     """Fill the table of scalars; add states for their amounts and schedules for their values."""
     case, pipes, nodes, basins = draft.case, draft.pipe_table, draft.node_table, draft.basin_table
-    draft.scalar_table = np.zeros(len(case.scalars), rec.SCALAR)
+    draft.scalar_table, pipes["heat"] = np.zeros(len(case.scalars), rec.SCALAR), -1
     for row, (name, scalar) in zip(draft.scalar_table, case.scalars.items(), strict=True):
         for key in ("diffusivity", "decay", "ambient", "initial"):
             row[key] = getattr(scalar, key)
@@ -36,8 +41,52 @@ def lower_scalars(draft) -> None:
             row["loss"] = sum(draft.scalar_table["losses"])
             row["losses"] = 1 if explicit(case.numerics.method) else draft.size - row["y"] + sum(basins["n"])
         basins["lost"] = draft.size - row["y"] + np.cumsum(basins["n"]) - basins["n"]
+        if scalar.heat:
+            row["specific_heat"], row["zero"] = scalar.specific_heat, scalar.zero
+            row["by_cell"] = not explicit(case.numerics.method)
+            lower_heat(draft, name, scalar.heat_from or (), row["by_cell"])
+            if not scalar.heat_from and not exchanger_names(case):
+                text = f"{name}: no part heats or cools the fluid; expected parts in `heat_from`, or a heat-exchanger"
+                draft.warnings.append(Notice("start", f"scalars.{name}", text))
     if len(case.scalars):
         pipes["center"] = draft.cells + pipes["cell"]
+
+
+def lower_heat(draft, scalar: str, heat_from: Any, by_cell: bool) -> None:
+    """Fill the table of restrictions that heat the fluid, and the rows of pipes in the ledger of heat.
+
+    heat_from : names of parts, or "all"; by_cell : True for a row of the ledger for each cell, else for each pipe
+    Adds a fault for a part that dissipates nothing in the fluid.
+    """
+    case, cut, rows = draft.case, pieces_of(draft.case.raw), []
+    owners = {link: name for name, part in [*case.nodes.items(), *case.links.items()] for link in part.inner(name)[1]}
+    unused = set() if heat_from == "all" else {*heat_from}
+    named = {name: whole for whole in unused for name in cut.get(whole, [whole])}
+    devices = {name: (k if calls.hook_of(device.law, "power") is not None else -1, device.dissipates(part))
+               for k, (name, part, device) in enumerate(draft.devices)}  # fmt: skip
+
+    def heats(name: str) -> bool:
+        unused.discard(named.get(name))
+        return heat_from == "all" or name in named
+
+    for link, _, lowering in rows_in(case, "valve"):
+        for name in lowering.row_names(link):
+            device, dissipates = devices.get(name, (-1, True))
+            if dissipates and (heats(owners.get(link, link)) or heats(link)):
+                rows.append((draft.valve_names.index(name), device))
+    draft.heat_source_table = np.array(rows, rec.HEAT_SOURCE)
+    count = len(rows)
+    for name, row in zip(draft.pipe_names, draft.pipe_table, strict=True):
+        if heats(name):
+            if case.links[name].friction.model == "unsteady" and not case.law.linear:
+                text = f'unsteady friction of {name} heats the fluid under law = "linear" only'
+                draft.fault(f"scalars.{scalar}.heat_from", f"{text}; expected quasi-steady friction")
+            row["heat"] = count
+            count += int(row["cells"]) if by_cell else 1
+    draft.heat_rows = count
+    for name in sorted(unused):
+        text = f"{show(name)} dissipates nothing in the fluid; expected valves, pipes and other parts with losses"
+        draft.fault(f"scalars.{scalar}.heat_from", text)
 
 
 def explicit(method: str) -> bool:
@@ -48,8 +97,11 @@ def explicit(method: str) -> bool:
 def bounds(case, name: str) -> tuple[float, float]:
     """Least and greatest possible value of a scalar: those in the case, because mixing stays between them.
 
-    A scalar that reactions form has no greatest value, and 0 bounds a scalar that they consume.
+    A scalar that heat changes has no bounds. A scalar that reactions form has no greatest value, and 0 bounds a scalar
+    that they consume.
     """
+    if case.scalars[name].heat:
+        return -np.inf, np.inf
     least, greatest = stated_range(case, name)
     formed, consumed = (name in reacting(case, side) for side in ("right", "left"))
     return min(least, 0.0) if consumed else least, UNBOUNDED if formed else greatest
@@ -72,7 +124,7 @@ def stated_range(case, name: str) -> tuple[float, float]:
 def scale_scalars(draft) -> None:
     """Set steady masses per length in pipes, and the size of a small deviation of scalar amounts in pipes and nodes."""
     profile, rho = draft.tables.profile, draft.fluid.density
-    for k, row in enumerate(draft.pipe_table if len(draft.case.scalars) else ()):
+    for k, row in enumerate(draft.pipe_table if len(draft.case.scalars) and draft.case.law.linear else ()):
         strain = (draft.profiles[k] - draft.fluid.pressure) / (rho * row["speed"] ** 2)
         profile[row["center"] + np.arange(row["cells"])] = rho * row["area"] * (1.0 + strain)
     scale = np.array(draft.scale)
@@ -159,8 +211,10 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
     """Balance of each scalar in a run : name -> initial, final, inflow, outflow, decayed, remainder [kg x its unit].
 
     Further entries: net inflow (`by_node`), and inflow and outflow (`nodes`), of each node through which it flows; if
-    reactions change it, what they form less what they consume (`reacted`).
-    relative : |remainder| over the greatest of |initial|, |final| and inflow + outflow + |decayed| + |reacted|
+    reactions change it, what they form less what they consume (`reacted`). The temperature that heat changes also has
+    `heated`, the sum of heat over specific heat, and `heat` [J] by part.
+    relative : |remainder| over the greatest of |initial|, |final| and inflow + outflow + |decayed| + |heated| +
+    |reacted|
     ledger : float64[2, m]  integrals of positive rates, and of negative rates, of each row of the stepper's ledger
     """
     ledgers, n = {}, len(model.node_names)
@@ -168,11 +222,14 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
         flows = ledger[:, n + q * n : n + (q + 1) * n]
         decay = ledger[:, n * (1 + len(model.case.scalars)) + row["loss"] :]
         decayed = -float(np.sum(decay[:, : row["losses"]]))
+        heat = heat_by_part(model, ledger, q)
+        heated = sum(heat.values()) / row["specific_heat"] if heat else 0.0
         initial, final = total_amount(model, q, model.start), total_amount(model, q, y)
         formed = formed_amount(model, q, ledger)
-        remainder = final - initial - (float(np.sum(flows)) - decayed + formed)
+        remainder = final - initial - (float(np.sum(flows)) - decayed + heated + formed)
         net = zip(model.node_names, flows.sum(axis=0), strict=True)
-        turnover = max(abs(initial), abs(final), float(np.sum(np.abs(flows))) + abs(decayed) + abs(formed))
+        turnover = float(np.sum(np.abs(flows))) + abs(decayed) + abs(heated) + abs(formed)
+        turnover = max(abs(initial), abs(final), turnover)
         ledgers[name] = {
             "initial": initial, "final": final, "inflow": float(flows[0].sum()),
             "outflow": float(0.0 - flows[1].sum()), "decayed": decayed,
@@ -180,6 +237,7 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
             "by_node": {node: float(x) for node, x in net if x != 0.0},
             "nodes": {node: {"inflow": float(x), "outflow": float(0.0 - y)}
                       for node, x, y in zip(model.node_names, *flows, strict=True) if x != 0.0 or y != 0.0},
+            **({"heated": float(heated), "heat": heat} if row["specific_heat"] > 0.0 else {}),
             "remainder": remainder, "relative": abs(remainder) / turnover if turnover > 0.0 else 0.0,
         }  # fmt: skip
     return ledgers
@@ -188,7 +246,7 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
 def formed_amount(model, q: int, ledger: np.ndarray) -> float:
     """Amount of scalar q that reactions have formed [kg times its unit]; ledger : as for `scalar_ledgers`."""
     tables, formed = model.tables, 0.0
-    first = len(model.node_names) * (1 + len(tables.scalars)) + int(sum(tables.scalars["losses"]))
+    first = int(model.layout["extent"] - model.layout["supply"])
     for row in tables.reactions:
         members = tables.integers[row["scalars"] : row["scalars"] + row["count"]].tolist()
         if q in members:
@@ -196,6 +254,31 @@ def formed_amount(model, q: int, ledger: np.ndarray) -> float:
             change = tables.floats[row["data"] + 3 * members.index(q) + rec.CHANGE]
             formed += change * float(np.sum(ledger[:, at : at + int(row["extents"])]))
     return formed
+
+
+def heat_by_part(model, ledger: np.ndarray, q: int) -> dict[str, float]:
+    """Heat into the fluid in a run from each part [J] by name, and from each heat exchanger (negative if it cools).
+
+    It is empty for a scalar q that heat does not change; ledger : as for `scalar_ledgers`
+    """
+    tables, scale = model.tables, float(model.tables.scalars[q]["specific_heat"])
+    if scale == 0.0:
+        return {}
+    first, last = (int(model.layout[name] - model.layout["supply"]) for name in ("heat", "extent"))
+    rows = scale * ledger[:, first:last].sum(axis=0)
+    heat = {model.valve_names[row["valve"]]: float(value)
+            for row, value in zip(tables.heat_sources, rows, strict=False)}  # fmt: skip
+    for pipe, row in zip(model.pipes, tables.pipes, strict=True):
+        if row["heat"] >= 0:
+            count = int(row["cells"]) if tables.scalars[q]["by_cell"] else 1
+            heat[pipe.name] = float(rows[row["heat"] :][:count].sum())
+    exchangers = rows[rows.size - len(tables.exchangers) :]
+    return heat | {name: float(value) for name, value in zip(exchanger_names(model.case), exchangers, strict=True)}
+
+
+def exchanger_names(case) -> list[str]:
+    """Names of the heat exchangers of a case, in the order of their table."""
+    return [name for name, link in case.links.items() if link.kind == "heat-exchanger"]
 
 
 NO_STATE = -1
@@ -243,6 +326,8 @@ def scalar_bounds(model, q: int):
     a basin it is the depth, or 1 without variable depth (`basin.deep` False).
     """
     row, tables = model.tables.scalars[q], model.tables
+    if np.isinf(row["least"]):
+        return
     limits = row["least"], row["greatest"]
     for pipe in tables.pipes:
         n, k = int(pipe["cells"]), np.arange(pipe["cells"])

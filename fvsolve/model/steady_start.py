@@ -358,6 +358,10 @@ class SteadyStart:
                 factor = (2.0 * math.log10(3.7 / e)) ** -2 if e > 0.0 else 0.0
                 text = f"{name}: no flow at the start; its friction factor is that of fully rough flow, {factor:.4g}"
                 self.draft.warnings.append(Notice("start", f"links.{name}", text, "friction", factor))
+            if "temperature" in row.dtype.names and row["temperature"] > 0.0:
+                text = f"{name}: its friction keeps the viscosity of the start; quasi-steady friction would follow it"
+                self.draft.warnings.append(Notice("start", f"links.{name}", text, "friction", factor))
+                row["temperature"] = 0.0
             row["loss"] += row["rough"] * factor
             row["rough"], row["friction"] = 0.0, rec.FRICTION_FACTOR
 

@@ -7,7 +7,9 @@ from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import (
     PROFILE,
+    SHAPE,
     VALUE,
+    Flag,
     Number,
     Quantity,
     ReadContext,
@@ -39,13 +41,34 @@ class Composition(Value):
 MOLAR_MASSES = UsualRange(1e-3, 1.0, "hydrogen to large organic molecules")  # [kg/mol]
 
 
-class Scalar(Table):
-    """Quantity c per mass, transported by the fluid: (m c)_t + (M c - D m c_x)_x = -decay m (c - ambient).
+@dataclass(frozen=True)
+class PartNames(Value):
+    """Value of a case file: names of parts, or "all"."""
 
-    m is the mass of fluid per length, M the mass flow, D the `diffusivity`; indices t and x are derivatives.
+    about: str = ""
+    changes: str = SHAPE
+    takes: ClassVar[str] = '`["NAME", ...]`, `"all"`'
+    schema: ClassVar[dict[str, Any]] = {"anyOf": [{"const": "all"}, {"type": "array", "items": {"type": "string"}}]}
+
+    def read(self, given: Any, setting: ReadContext) -> str | tuple[str, ...]:
+        if given == "all":
+            return given
+        if not isinstance(given, (list, tuple)) or not all(isinstance(name, str) for name in given):
+            raise ValueError(f'{show(given)} is not a list of names; expected ["NAME", ...] or "all"')
+        return tuple(given)
+
+
+ZEROS = {"K": 0.0, "degC": 273.15}  # units of a temperature that heat changes: absolute temperature of 0 [K]
+
+
+class Scalar(Table):
+    """Quantity c per mass, transported by the fluid: (m c)_t + (M c - D m c_x)_x = -decay m (c - ambient) + Q / cp.
+
+    m is the mass of fluid per length, M the mass flow, D the `diffusivity`; indices t and x are derivatives. Q is the
+    heat per length that parts in `heat_from` dissipate, cp the `specific_heat`.
     """
 
-    unit: Annotated[str, Text("unit, a label in headers", VALUE)] = "-"
+    unit: Annotated[str, Text("unit, a label in headers; with `heat` K (if left out) or degC", VALUE)] = "-"
     initial: Annotated[float, Number(about="initial value where a part states no other value")] = 0.0
     diffusivity: Annotated[
         float, Quantity("diffusivity", nonnegative, "diffusivity along pipes [m2/s]", changes=VALUE)
@@ -57,6 +80,32 @@ class Scalar(Table):
         Quantity("molar_mass", positive, "molar mass, for reactions of a mass per volume", MOLAR_MASSES, VALUE),
     ] = None
     composition: Annotated[dict[str, float] | None, Composition()] = None
+    heat: Annotated[bool, Flag("true for the temperature of the fluid, which heat changes")] = False
+    specific_heat: Annotated[float | None, Quantity(
+        "specific_heat", positive, "specific heat of the fluid, with `heat` [J/kg/K]; that of the fluid if left out",
+        UsualRange(500.0, 15e3, "liquid metals to liquid hydrogen"),
+    )] = None  # fmt: skip
+    heat_from: Annotated[str | tuple[str, ...] | None, PartNames(
+        'parts whose dissipated power heats the fluid, or "all"; none if left out'
+    )] = None  # fmt: skip
+
+    @classmethod
+    def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
+        return {"unit": "K"} | given if given.get("heat") is True else given
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
+        faults = super().key_faults(given)
+        if given.get("heat") is True and isinstance(unit := given.get("unit", "K"), str) and unit not in ZEROS:
+            faults.append((("unit",), f"{show(unit)} is not a unit of a temperature with heat; expected K or degC"))
+        if given.get("heat", False) is False:
+            faults += [((key,), "needs heat = true") for key in ("specific_heat", "heat_from") if key in given]
+        return faults
+
+    @property
+    def zero(self) -> float:
+        """Absolute temperature at which the value of a scalar with heat is 0 [K]."""
+        return ZEROS.get(self.unit, 0.0)
 
 
 @dataclass(frozen=True)

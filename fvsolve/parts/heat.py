@@ -1,5 +1,6 @@
-"""Heat: heat capacities, ambients, conductors, convection and heat sources."""
+"""Heat: heat capacities, ambients, conductors, convection, heat sources and heat exchangers."""
 
+from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
@@ -13,10 +14,12 @@ from fvsolve.assembly.network_elements import (
     NetworkRows,
     node_or_reference,
 )
+from fvsolve.errors import article
+from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.network_parts import GivenPotential, GivenPotentialRows, NetworkNodeRows, ends_of
 from fvsolve.parts.nodes_and_links import Link, Node, TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled
-from fvsolve.parts.value import Quantity, Text, UsualRange, positive
+from fvsolve.parts.value import Number, Quantity, Text, UsualRange, between, positive
 
 TEMPERATURE = InputKind("K", "a temperature above 0 [K]", 0.0)
 HEAT = InputKind("W", "a finite number [W]", small=100.0)
@@ -159,4 +162,51 @@ class HeatSourceRows(NetworkRows, kind="heat-source"):
     def network_elements(self, case, name: str, part: Any):
         place, to = f"links.{name}", node_or_reference(case, part.to)
         return [Element(FLOW, place, place, (None, to), schedule=part.heat, key="heat", ledger="supplied",
+                        thermal=True)], []  # fmt: skip
+
+
+class HeatExchanger(ThermalLink, kind="heat-exchanger"):
+    """Heat out of the fluid of a place into a thermal node: conductance (T - T_to), or effectiveness m cp (T - T_to).
+
+    T is the temperature of the fluid in a tank or chamber, with the mass flow m into it. At a junction T is that of
+    the mixed inflow m: before it is cooled for an effectiveness, after it for a conductance. Ports: from, to. Stored
+    and dissipated energy: none; it supplies the heat [W] to the thermal network, and takes it from the fluid.
+    """
+
+    joins: ClassVar[dict[str, str]] = {"from": "hydraulic", "to": "thermal"}
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("conductance", "effectiveness"),)
+    needs: ClassVar[tuple[tuple[str, ...], ...]] = (("conductance", "effectiveness"),)
+
+    from_: Annotated[str, Text("tank, chamber or junction whose fluid it cools or heats"), Field(alias="from")]
+    conductance: Annotated[float | None, Quantity(
+        "thermal_conductance", positive, "heat per temperature difference [W/K]"
+    )] = None  # fmt: skip
+    effectiveness: Annotated[float | None, Number(
+        between(0, 1), "heat over the greatest heat that the flow through the place could give"
+    )] = None  # fmt: skip
+
+    def faults(self, name: str, around: Any) -> Iterator:
+        """Faults of a place that has no temperature of its own, and of further exchangers at a junction."""
+        place = around.nodes.get(self.from_)
+        if place is not None and place.kind not in EXCHANGING:
+            text = f"{self.from_} is {article(place.kind)}, whose temperature no heat changes"
+            yield ("from",), f"{text}; expected a tank, a chamber or a junction"
+        others = [other for other, link in around.links.items()
+                  if other != name and link.kind == self.kind and link.from_ == self.from_]  # fmt: skip
+        if others and self.effectiveness is not None and getattr(place, "kind", "") == "junction":
+            text = f"{others[0]} is at {self.from_} too; expected one heat exchanger at a junction"
+            yield ("effectiveness",), f"{text}, or only exchangers with a conductance"
+
+
+EXCHANGING = ("tank", "chamber", "junction")  # kinds of places whose fluid exchanges heat
+
+
+class HeatExchangerRows(NetworkRows, kind="heat-exchanger"):
+    """Conversion of heat exchangers to given heat flows."""
+
+    quantities: ClassVar = {"heat": ("", "flow", 1.0), "entropy_flow": ("", "entropy", 1.0)}
+
+    def network_elements(self, case, name: str, part: Any):
+        place, to = f"links.{name}", node_or_reference(case, part.to)
+        return [Element(FLOW, place, place, (None, to), reads=(rec.FLUID_HEAT, name), ledger="supplied",
                         thermal=True)], []  # fmt: skip

@@ -141,7 +141,8 @@ class Link(Part):
     @property
     def network_places(self) -> tuple[str, ...]:
         """Places of its ports that its elements in a network of potential and flow join."""
-        return tuple(place for port, place in self.ports.items() if self.in_network or port in self.network_ports)
+        return tuple(place for port, place in self.ports.items() if port in self.network_ports
+                     or self.in_network and self.joins.get(port) != "hydraulic")  # fmt: skip
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
         """(places, links) of the solved network for this link, each by name.

@@ -328,7 +328,7 @@ EXTREMES = (  # quantity, its text, function of the index of the extreme, quanti
     ("min_head", "minimum head", np.argmin, "t_min"),
 )
 LEDGER_UNITS = {"mass": "kg", "energy": "J"}  # units of ledgers; ledgers of scalars, in kg times their unit, show none
-LEDGER_TERMS = ("initial", "inflow", "outflow", "spilled", "made_up", "final")
+LEDGER_TERMS = ("initial", "inflow", "outflow", "heated", "spilled", "made_up", "final")
 
 
 class Sentence(NamedTuple):

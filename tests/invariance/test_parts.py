@@ -147,6 +147,7 @@ ELSEWHERE = {
     "shaft", "housing", "gear", "torsion-spring", "bearing", "clutch", "rack", "terminal", "ground", "voltage-source",
     "current-source", "resistor", "inductor", "capacitor", "switch", "diode", "dc-motor", "heat-capacity", "ambient",
     "thermal-conductor", "convection", "heat-source",
+    "heat-exchanger",  # in parts/test_heat_in_fluid.py
 }  # fmt: skip
 HEAD = 20.0
 NEIGHBOURS = [

@@ -385,7 +385,6 @@ FAULTS = [
     (("nodes", "pool"), {"type": "accumulator", "volume": 1.0, "precharge": 5e4}, "its contents carry no scalars yet"),
     (("scalars", "dye", "decay"), -1.0, "out of range"),
     (("scalars", "dye", "diffusivity"), "3 m", "a diffusivity"),
-    (("fluid", "law"), "log", '"log" does not support scalars yet'),
     (("output", "probes"), ["lake.dye", "a.dye@0.5", "a.dye"], 'this probe needs a place, for example "a.dye@0.5"'),
     (("output", "probes"), ["v.dye"], "v is a valve"),
 ]
