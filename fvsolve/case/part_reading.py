@@ -11,7 +11,6 @@ from fvsolve.data import read_table
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import KINDS, Basin, Chamber, Pipe
 from fvsolve.parts.body import Body, BodyPoint
-from fvsolve.parts.nodes_and_links import Node
 from fvsolve.parts.pipe.part import MOST_CELLS
 from fvsolve.parts.rotation import ShaftPlace
 from fvsolve.units import show
@@ -117,8 +116,7 @@ def part_kind(reading: Reading, group: str, name: str, part: dict[str, Any]) -> 
 def read_part(reading: Reading, table: dict[str, Any], kind: Any, given: dict[str, Any]) -> Any:
     """Part of the class `kind` from its keys in the file, completed by the defaults of the case `table`."""
     rest = {key: value for key, value in with_defaults(table, given).items() if key != "type"}
-    kind = kind.variant(rest) if issubclass(kind, Node) else kind
-    return kind.model_validate(rest, context=reading.setting)
+    return kind.variant(rest).model_validate(rest, context=reading.setting)
 
 
 def inherit_elevations(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str, Any]:
@@ -146,9 +144,7 @@ def inherit_elevations(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str
 def table_kinds(table: dict[str, Any], group: str) -> dict[str, Any]:
     """Class of each node or link of a case by name; None for an unknown type. table : nested dicts as in the file"""
     kinds = {name: connections.kind_of(group, part) for name, part in table.get(group, {}).items()}
-    if group == "links":
-        return kinds
-    return {name: kind and kind.variant(table[group][name]) for name, kind in kinds.items()}
+    return {name: kind and kind.variant(with_defaults(table, table[group][name])) for name, kind in kinds.items()}
 
 
 def place_kinds(network: chainage.CutTable, parts: Parts, scalars: dict[str, Any], faulty: bool) -> dict[str, Any]:
@@ -206,7 +202,7 @@ def fill_cells(reading: Reading, links: dict[str, Any], properties: Any, numeric
     """Links in which pipes have their default number of cells; unchanged if the fluid or numerics are faulty."""
     if properties is None or numerics is None:
         return links
-    pipes = {name: link for name, link in links.items() if isinstance(link, Pipe)}
+    pipes = {name: link for name, link in links.items() if link.kind == "pipe"}
     counts = default_cells(pipes, properties, numerics.cell_time)
     worst = max(counts, key=counts.get, default=None)
     if worst is not None and counts[worst] > MOST_CELLS:

@@ -229,7 +229,7 @@ def read_routes(reading: Reading, network: CutTable, links: dict[str, Any]) -> d
     faulty = list(route_faults(result, links, named, network.pieces)) if network.connections_known else []
     reading.add(faulty)
     lost = odd | {keys[1] for keys, _ in faulty}
-    pipes = {name for name, link in links.items() if isinstance(link, Pipe)}
+    pipes = {name for name, link in links.items() if link.kind == "pipe"}
     lost |= {name for name, route in result.items()
              if route and (not pipes.issuperset(route.pipes) or first_gap(route, links) is not None)}  # fmt: skip
     return {name: None if name in lost else route for name, route in result.items()}

@@ -502,6 +502,9 @@ CONTROL_VALUE = 26  # of a block of `controls`: 0 output, 1 input, 2 error in `s
 # 1 while the friction with the flag `index` sticks
 NETWORK_VALUE = 27
 ROW, POWER, ENTROPY, LOCKED = 0, 1, 2, 3
+# between nodes `index` and `cell`; floats[weights:] : fraction of the way, elevation there [m], and pressure because
+# this place lies below the line between the nodes [Pa]
+PRESSURE_BETWEEN = 28
 
 BASIN = record(
     kind=i8,  # code of its physics, see `basins.basin_patches`

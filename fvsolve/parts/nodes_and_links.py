@@ -29,6 +29,12 @@ class Part(Table):
     kinds: ClassVar[dict[str, type[Part]]] = {}
     no_scalars: ClassVar[str] = ""  # reason why a case with scalars cannot have this part yet
     own_scalars: ClassVar[str] = ""
+    type_in_file: ClassVar[str] = ""  # type in the case file of a variant with a kind of its own
+
+    @classmethod
+    def variant(cls, given: dict[str, Any]) -> type[Part]:
+        """Class of a part with the given keys: this class, or a subclass, for example with more quantities."""
+        return cls
 
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)
@@ -69,11 +75,6 @@ class Node(Part):
     scalars: Annotated[
         dict[str, Any], ScalarValues("scalar values of the inflow (reservoir, inflow), or at the start (tank, chamber)")
     ] = {}
-
-    @classmethod
-    def variant(cls, given: dict[str, Any]) -> type[Node]:
-        """Class of a node with the given keys: this class, or a subclass with more quantities."""
-        return cls
 
     @classmethod
     def own_places(cls, given: dict[str, Any]) -> tuple[str, ...] | None:
