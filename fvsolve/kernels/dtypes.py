@@ -167,6 +167,7 @@ VALVE = record(
     table=i8,
     table_size=i8,
     solve=i8,  # SINGLE, CLUSTER, or ALONE between two stored or given pressures
+    chained=i8,  # 1: in a cluster with quasi-steady pipes; the other links at its junctions limit its rate
     conductance=f8,  # 2 rho (Cd A)^2 at full opening: M |M| = conductance * dp
     transition=f8,  # flow below which the law is laminar [kg/s]; 0 if pipes bound the slope of the root
     rounding_drop=f8,  # drop below which the law is laminar at any opening [Pa]: too small for error control
@@ -427,7 +428,16 @@ NETWORK_SWITCH = record(
 )
 SWITCH, DIODE, FRICTION = 0, 1, 2
 
-CLUSTER_RECORD = record(first_node=i8, nodes=i8, first_valve=i8, valves=i8, first_couple=i8, couples=i8, inverse=i8)
+CLUSTER_RECORD = record(
+    first_node=i8,
+    nodes=i8,
+    first_valve=i8,
+    valves=i8,
+    first_couple=i8,
+    couples=i8,
+    inverse=i8,
+    order=i8,  # offset in `integers` of an order of elimination that keeps its matrix sparse; -1: none
+)
 
 LAYOUT = record(
     pressure=i8,  # offsets in `out`

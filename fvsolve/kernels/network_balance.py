@@ -12,6 +12,8 @@ from fvsolve.kernels.restrictions import conductance, head_drop, open_scheduled,
 from fvsolve.kernels.table_handle import open_tables
 from fvsolve.kernels.tanks import BOTTOM, EVENTS, RIM
 
+NO_WAY_OUT = 1e300  # impedance of a junction without an open link [Pa s/kg]
+
 
 @njit(forceinline=True)
 def clear_outputs(out, tables):
@@ -80,6 +82,21 @@ def node_impedance(tables, i):
     """Pressure rise at junction i per flow into it [Pa s/kg], 1 / admittance of its pipes; 0 for other nodes."""
     node = tables.nodes[i]
     return 1.0 / node["admittance"] if node["kind"] == JUNCTION and node["admittance"] > 0.0 else 0.0
+
+
+@njit
+def chain_impedance(tables, out, i, k):
+    """Pressure rise at junction i per flow that enters through restriction k [Pa s/kg]; 0 for other nodes.
+
+    The flow leaves through pipes and the other restrictions, whose other ends keep their pressures.
+    """
+    if tables.nodes[i]["kind"] != JUNCTION:
+        return 0.0
+    valves, total = tables.valves, tables.nodes[i]["admittance"]
+    for e in range(valves.size):
+        if e != k and (valves[e]["from_node"] == i or valves[e]["to_node"] == i) and conductance(tables, out, e) > 0.0:
+            total += restriction_slope(tables, out, e, head_drop(tables, out, e)[1])
+    return 1.0 / total if total > 0.0 else NO_WAY_OUT
 
 
 @njit(forceinline=True)
@@ -157,8 +174,10 @@ def valve_rate_limit(t, y, dydt, out, handle):
             g = conductance(tables, out, k)
             slope = restriction_slope(tables, out, k, drop)
             soft = node_impedance(tables, i) + node_impedance(tables, j)
+            if valve["chained"] == 1:
+                soft = chain_impedance(tables, out, i, k) + chain_impedance(tables, out, j, k)
             rate = max(rate, stiff * slope / (1.0 + soft * slope))
-            if valve["transition"] > 0.0 and g > 0.0:
+            if valve["transition"] > 0.0 and g > 0.0 and valve["chained"] == 0:
                 change = stiff_i * out[layout["net"] + i]
                 change -= stiff_j * out[layout["net"] + j]
                 width = max(valve["transition"] ** 2 / g, valve["rounding_drop"])

@@ -19,6 +19,7 @@ class QuasiSteadyPipeRows(Restriction, kind="quasi-steady-pipe"):
         """Set the conductance M^2 over the drop at 1 m/s, by which scales of flows are computed."""
         *friction, per, _ = self.coefficients(draft, name, link, lambda *_: None)
         flow = draft.fluid.density * math.pi / 4.0 * link.diameter**2
+        row["chained"] = 1
         row["conductance"] = flow * flow / max(per * drag(*friction, flow), TINY_DROP)
 
     def numbers(self, draft, name, link) -> list[float]:
