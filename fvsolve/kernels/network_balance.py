@@ -88,15 +88,24 @@ def node_impedance(tables, i):
 def chain_impedance(tables, out, i, k):
     """Pressure rise at junction i per flow that enters through restriction k [Pa s/kg]; 0 for other nodes.
 
-    The flow leaves through pipes and the other restrictions, whose other ends keep their pressures.
+    The flow leaves through pipes and the other restrictions, whose other ends keep their pressures. Where a single
+    restriction leaves a junction, it is followed to its other end.
     """
-    if tables.nodes[i]["kind"] != JUNCTION:
-        return 0.0
-    valves, total = tables.valves, tables.nodes[i]["admittance"]
-    for e in range(valves.size):
-        if e != k and (valves[e]["from_node"] == i or valves[e]["to_node"] == i) and conductance(tables, out, e) > 0.0:
-            total += restriction_slope(tables, out, e, head_drop(tables, out, e)[1])
-    return 1.0 / total if total > 0.0 else NO_WAY_OUT
+    valves, nodes, impedance = tables.valves, tables.nodes, 0.0
+    for _ in range(nodes.size):
+        if nodes[i]["kind"] != JUNCTION:
+            return impedance
+        total, count, last = nodes[i]["admittance"], 0, k
+        for e in range(valves.size):
+            valve = valves[e]
+            if e != k and (valve["from_node"] == i or valve["to_node"] == i) and conductance(tables, out, e) > 0.0:
+                total += restriction_slope(tables, out, e, head_drop(tables, out, e)[1])
+                count, last = count + 1, e
+        impedance += 1.0 / total if total > 0.0 else NO_WAY_OUT
+        if count != 1 or nodes[i]["admittance"] > 0.0:
+            break
+        i, k = valves[last]["from_node"] + valves[last]["to_node"] - i, last
+    return impedance
 
 
 @njit(forceinline=True)
