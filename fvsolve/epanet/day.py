@@ -113,9 +113,6 @@ class DayTranslation(Translation):
         names = (link.start_node_name, link.end_node_name)
         return tuple(self.inlets.get(end, self.node_names.given[end]) for end in names)
 
-    def length(self, link: Any) -> float:
-        return link.length
-
     def pipe(self, name: str, link: Any) -> part_tables.Part:
         ends, ours = self.ends(link), self.link_names.given[name]
         if link.check_valve:
@@ -127,9 +124,12 @@ class DayTranslation(Translation):
             ends = (ends[0], place)
         elif (opening := self.opening(name, link)) != OPEN:
             ends = (ends[0], self.shut_off(name, link, link.diameter, opening))
-        self.lengths[name] = link.length
         law = part_tables.friction(self.formula, link.roughness)
-        part = part_tables.pipe(ends, link.length, link.diameter, law, link.minor_loss, 1.0)
+        length = self.lengths[name] = self.length(link)
+        if length > link.length:
+            law = self.spread(name, link, length)
+            self.note(f"lengthened to {length:.4g} m; the friction loss is that of the original length", name)
+        part = part_tables.pipe(ends, length, link.diameter, law, link.minor_loss, 1.0)
         del part["wave_speed"]
         return part
 

@@ -40,7 +40,7 @@ class QuasiSteadyPipeRows(Restriction, kind="quasi-steady-pipe"):
             draft.floats.append(math.pi / 4.0 * link.diameter**2)
             return
         row["kind"], row["index"], row["cell"] = rec.PRESSURE_BETWEEN, *(draft.node_index[end] for end in (link.from_, link.to))
-        z = draft.node_table["elevation"][[row["index"], row["cell"]]]
-        line = z[0] + x * (z[1] - z[0])
-        axis = line if link.profile is None else link.profile.at(x * link.length)
-        draft.floats += [x, float(axis), float(draft.fluid.density * draft.case.gravity * (line - axis))]
+        low, high = draft.node_table["elevation"][[row["index"], row["cell"]]]
+        axis = float(draft.case.axis_elevation(name, x))
+        below = low + x * (high - low) - axis  # the line between both ends
+        draft.floats += [x, axis, float(draft.fluid.density * draft.case.gravity * below)]
