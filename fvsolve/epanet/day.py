@@ -6,12 +6,13 @@ from typing import Any
 from fvsolve.epanet import part_tables
 from fvsolve.epanet.network_file import HourState
 from fvsolve.epanet.switching import Statement, Untranslatable, clause_of, opposite, relay_keys, schedule_keys
-from fvsolve.epanet.translating import Translation
+from fvsolve.epanet.translating import US_UNITS, Translation
 
 DAY = 86400.0  # length of the run [s]
 DAY_LOSS = 1e-4  # loss coefficient of a valve that opens and shuts a link without loss in EPANET
 STEP_WIDTH = 1e-3  # difference of levels over which the area of a tank changes at a point of its volume curve [m]
 OPEN, CLOSED = 1.0, 0.0
+RULE_TOLERANCE, FOOT = 1e-3, 0.3048  # of levels in EPANET's rules, in the length unit of the file; foot [m]
 
 
 class DayTranslation(Translation):
@@ -192,11 +193,12 @@ class DayTranslation(Translation):
         self.statements: dict[str, list[Statement]] = {}
         self.refused: list[tuple[str, str]] = []  # reason, name of the control or rule
         clock = float(network.options.time.start_clocktime)
+        tolerance = RULE_TOLERANCE * (FOOT if network.options.hydraulic.inpfile_units in US_UNITS else 1.0)
         for number, (_, control) in enumerate(network.controls(), start=1):
-            kind = "rule" if type(control).__name__ == "Rule" else "control"
-            label = f"{kind} {control.name}" if kind == "rule" else f"control {number}"
+            is_rule = type(control).__name__ == "Rule"
+            label = f"rule {control.name}" if is_rule else f"control {number}"
             try:
-                clause = clause_of(control.condition, clock, DAY)
+                clause = clause_of(control.condition, clock, DAY, tolerance if is_rule else 0.0)
                 actions = [(action, clause) for action in control._then_actions]
                 actions += [(action, opposite(clause)) for action in control._else_actions]
             except Untranslatable as reason:

@@ -51,14 +51,15 @@ class Statement:
     speed: bool
 
 
-def clause_of(condition: Any, clock: float, end: float) -> Clause:
+def clause_of(condition: Any, clock: float, end: float, tolerance: float) -> Clause:
     """Clause of a condition of WNTR; raises Untranslatable.
 
     clock : clock time at the start of the run [s after midnight]; end : end of the run [s]
+    tolerance : of levels [m], by which EPANET's rules are early for > and <, and late for >= and <=
     """
     kind = type(condition).__name__
     if kind in ("AndCondition", "OrCondition"):
-        return combined(kind == "AndCondition", *(clause_of(part, clock, end) for part in parts_of(condition)))
+        return combined(kind == "AndCondition", *(clause_of(part, clock, end, tolerance) for part in parts_of(condition)))
     if kind == "SimTimeCondition":
         return time_clause(condition, [float(condition._threshold)], (2.0 * end, 2.0 * end), end)
     if kind == "TimeOfDayCondition":
@@ -67,7 +68,7 @@ def clause_of(condition: Any, clock: float, end: float) -> Clause:
         return time_clause(condition, moments, (since, DAY - since), end)
     source = getattr(condition, "_source_obj", None)
     if getattr(source, "node_type", "") == "Tank" and condition._source_attr in ("level", "head", "pressure"):
-        return level_clause(condition, source)
+        return level_clause(condition, source, tolerance)
     if getattr(source, "node_type", "") == "Junction":
         raise Untranslatable(f"acts by the {condition._source_attr} of a junction, which follows its own action at once")
     if hasattr(source, "link_type"):
@@ -88,12 +89,13 @@ def relation_of(condition: Any) -> tuple[bool, bool, bool]:
     return name in ("gt", "ge"), name == "eq", name in ("ge", "le", "eq")
 
 
-def level_clause(condition: Any, tank: Any) -> Clause:
-    """Clause of a condition on the level of a tank."""
+def level_clause(condition: Any, tank: Any, tolerance: float) -> Clause:
+    """Clause of a condition on the level of a tank; tolerance : as for `clause_of`"""
     above, equal, closed = relation_of(condition)
     if equal:
         raise Untranslatable("acts where a level equals a number")
     level = float(condition._threshold) - (tank.elevation if condition._source_attr == "head" else 0.0)
+    level += tolerance if above == closed else -tolerance
     sign, name = (">" if above else "<") + "=" * closed, tank.name
 
     def holds(levels):
