@@ -290,7 +290,9 @@ class Case(Displayable):
             "gravity": self.gravity,
             "fluid": self.fluid.table(),
             "nodes": {name: {"type": node.kind, **node.table()} for name, node in self.nodes.items()},
-            "links": {name: {"type": link.type_in_file or link.kind, **link.table()} for name, link in self.links.items()},
+            "links": {
+                name: {"type": link.type_in_file or link.kind, **link.table()} for name, link in self.links.items()
+            },
             "signals": {name: plain_value(signal) for name, signal in self.signals.items()},
             "controls": {
                 name: {"type": block.control.kind, **block.control.table()} for name, block in self.controls.items()

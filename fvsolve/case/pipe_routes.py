@@ -11,7 +11,6 @@ from fvsolve.case.connections import islands, kind_of
 from fvsolve.case.probe import ALL
 from fvsolve.case.reading import Reading
 from fvsolve.errors import article, did_you_mean, listing
-from fvsolve.parts import Pipe
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import VALUE, Quantity, ReadContext, Value, ValueFault
 from fvsolve.units import show

@@ -9,7 +9,6 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from fvsolve.parts import Pipe
 from fvsolve.steppers.loop_records import LEAST_STEP
 from fvsolve.steppers.tableau import METHODS
 from fvsolve.units import show

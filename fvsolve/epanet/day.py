@@ -1,4 +1,4 @@
-"""Translation of an EPANET network over a day: patterns as signals, controls and rules as blocks, quasi-steady pipes."""
+"""Translation of an EPANET network over a day: patterns as signals, controls and rules as blocks, no waves."""
 
 import math
 from typing import Any
@@ -44,6 +44,7 @@ class DayTranslation(Translation):
 
         unit : "l/s", "m" or "" ; multiplier : factor on all values
         """
+
         def text(value):
             return part_tables.quantity_text(value, unit) if unit else part_tables.rounded_number(value)
 
@@ -70,9 +71,7 @@ class DayTranslation(Translation):
         if len(parts) == 1:
             demand = self.scheduled(parts[0], "l/s", self.multiplier)
         else:
-            values = [
-                node.demand_timeseries_list.at(t + self.clock, multiplier=self.multiplier) for t in self.times()
-            ]
+            values = [node.demand_timeseries_list.at(t + self.clock, multiplier=self.multiplier) for t in self.times()]
             demand = part_tables.quantity_text(values[0], "l/s")
             if len(set(values)) > 1:
                 texts = [part_tables.quantity_text(value, "l/s") for value in values]

@@ -110,11 +110,10 @@ def _day_lines(translation: DayTranslation) -> list[str]:
     for group in ("signals", "controls"):
         if table := getattr(translation, group):
             lines += ["", f"[{group}]", *(f"{name} = {text.inline(part)}" for name, part in table.items())]
-    return [
-        *lines, "", "[numerics]", f'end = "{DAY / 3600.0:g} h"', f'pipe_model = "{QUASI_STEADY}"', f"rtol = {DAY_RTOL:g}",
-        "", "[output]", f'every = "{DAY_ROWS}"', f"probes = {text.inline(_probes(translation))}",
-        'units = { flow = "l/s", pressure = "barg", time = "h" }',
-    ]  # fmt: skip
+    numerics = [f'end = "{DAY / 3600.0:g} h"', f'pipe_model = "{QUASI_STEADY}"', f"rtol = {DAY_RTOL:g}"]
+    probes = f"probes = {text.inline(_probes(translation))}"
+    output = [f'every = "{DAY_ROWS}"', probes, 'units = { flow = "l/s", pressure = "barg", time = "h" }']
+    return [*lines, "", "[numerics]", *numerics, "", "[output]", *output]
 
 
 def _short_pipes_comment(translation: Translation, short: list[str]) -> str:

@@ -59,7 +59,9 @@ def clause_of(condition: Any, clock: float, end: float, tolerance: float) -> Cla
     """
     kind = type(condition).__name__
     if kind in ("AndCondition", "OrCondition"):
-        return combined(kind == "AndCondition", *(clause_of(part, clock, end, tolerance) for part in parts_of(condition)))
+        return combined(
+            kind == "AndCondition", *(clause_of(part, clock, end, tolerance) for part in parts_of(condition))
+        )
     if kind == "SimTimeCondition":
         return time_clause(condition, [float(condition._threshold)], (2.0 * end, 2.0 * end), end)
     if kind == "TimeOfDayCondition":
@@ -70,7 +72,9 @@ def clause_of(condition: Any, clock: float, end: float, tolerance: float) -> Cla
     if getattr(source, "node_type", "") == "Tank" and condition._source_attr in ("level", "head", "pressure"):
         return level_clause(condition, source, tolerance)
     if getattr(source, "node_type", "") == "Junction":
-        raise Untranslatable(f"acts by the {condition._source_attr} of a junction, which follows its own action at once")
+        raise Untranslatable(
+            f"acts by the {condition._source_attr} of a junction, which follows its own action at once"
+        )
     if hasattr(source, "link_type"):
         raise Untranslatable(f"acts by the {condition._source_attr} of a link, which follows its own action at once")
     raise Untranslatable(f"acts by a condition without a key here ({kind})")

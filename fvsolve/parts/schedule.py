@@ -243,7 +243,9 @@ class Scheduled(Value):
             for bound in (value.min(), value.max()):
                 self.range.check(float(bound), float(bound))
         except ValueError as error:
-            raise ValueFault([(("factor",), f"gives values from {value.min():g} to {value.max():g}: {error}")]) from None
+            raise ValueFault(
+                [(("factor",), f"gives values from {value.min():g} to {value.max():g}: {error}")]
+            ) from None
         if schedule.kind == "harmonic":
             mean, amplitude, *rest = schedule.wave
             schedule = replace(schedule, wave=(factor * mean, factor * amplitude, *rest))

@@ -123,22 +123,41 @@ HEADLOSS H-W
 def town(tmp_path, **keys):
     path = tmp_path / "town.inp"
     keys["points"] = "v 0 0\nv 3 1200\nv 6 2900" if "curve" in keys else ""
-    given = {"curve": "", "status": "Open", "valve": "Open", "speed": "", "controls": "", "rules": "", "width": 12, "drawn": 4}
+    given = {
+        "curve": "",
+        "status": "Open",
+        "valve": "Open",
+        "speed": "",
+        "controls": "",
+        "rules": "",
+        "width": 12,
+        "drawn": 4,
+    }
     path.write_text(TOWN.format(**given | keys))
     return path, import_network(path, day=True)
 
 
 LEVELS = "LINK lift CLOSED IF NODE tower ABOVE 4.5\nLINK lift OPEN IF NODE tower BELOW 2.5"
+RULES = """RULE 1
+IF TANK tower LEVEL >= 4.2
+OR TANK pond LEVEL >= 3.9
+THEN PUMP lift STATUS IS CLOSED
+RULE 2
+IF TANK tower LEVEL <= 2.6
+AND SYSTEM CLOCKTIME >= 6:00 AM
+THEN PUMP lift STATUS IS OPEN
+RULE 3
+IF SYSTEM TIME > 12
+AND SYSTEM TIME < 15
+THEN PIPE p3 STATUS IS CLOSED
+ELSE PIPE p3 STATUS IS OPEN"""
 CASES = {
     "levels": ({"controls": LEVELS}, ["lift"], ["relay"]),
     "times": ({"controls": "LINK p3 CLOSED AT TIME 2:15\nLINK p3 OPEN AT TIME 7.5\n"
                            "LINK p5 CLOSED AT CLOCKTIME 1 PM\nLINK p5 OPEN AT CLOCKTIME 9:30 PM"}, ["p3", "p5"], []),
     "mixed": ({"controls": "LINK lift CLOSED IF NODE tower ABOVE 4.2\nLINK lift OPEN AT TIME 9"},
               ["lift"], ["latch", "function", "function"]),
-    "rules": ({"rules": "RULE 1\nIF TANK tower LEVEL >= 4.2\nOR TANK pond LEVEL >= 3.9\nTHEN PUMP lift STATUS IS CLOSED\n"
-                        "RULE 2\nIF TANK tower LEVEL <= 2.6\nAND SYSTEM CLOCKTIME >= 6:00 AM\nTHEN PUMP lift STATUS IS OPEN\n"
-                        "RULE 3\nIF SYSTEM TIME > 12\nAND SYSTEM TIME < 15\nTHEN PIPE p3 STATUS IS CLOSED\n"
-                        "ELSE PIPE p3 STATUS IS OPEN"}, ["lift", "p3"], ["latch", "function", "function"]),
+    "rules": ({"rules": RULES}, ["lift", "p3"], ["latch", "function", "function"]),
     "speed": ({"controls": LEVELS.replace("CLOSED", "0.8").replace("OPEN", "1.05"), "speed": "SPEED 1.05"},
               [], ["relay"]),
     "shut": ({"status": "Closed", "controls": LEVELS}, ["lift"], ["relay"]),
@@ -178,7 +197,10 @@ def test_patterns_are_signals_and_the_command_writes_the_case(tmp_path, fvs):
     path, imported = town(tmp_path)
     case = tomllib.loads(imported.text)
     assert case["nodes"]["b"]["demand"] == {"signal": "pattern-day", "factor": "6 l/s"}
-    assert case["signals"]["pattern-day"]["time"][:3] == [0, 3600, 9000] and case["signals"]["pattern-day"]["kind"] == "step"
+    assert (
+        case["signals"]["pattern-day"]["time"][:3] == [0, 3600, 9000]
+        and case["signals"]["pattern-day"]["kind"] == "step"
+    )
     assert case["numerics"]["pipe_model"] == "quasi-steady" and case["numerics"]["end"] == "24 h"
     assert all("wave_speed" not in link for link in case["links"].values())
     code, *_ = fvs("import", path, tmp_path / "town.toml", "--day")

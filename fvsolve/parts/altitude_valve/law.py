@@ -1,7 +1,7 @@
 """An altitude valve: open, shut because its tank is full, or shut because its tank is empty.
 
-The flags armed[event + FULL] and armed[event + EMPTY] are above 0 while it is shut; they change on accepted states only.
-`floats` holds both levels of the tank [m].
+The flags armed[event + FULL] and armed[event + EMPTY] are above 0 while it is shut; they change on accepted states
+only. `floats` holds both levels of the tank [m].
 """
 
 from fvsolve.jit import njit

@@ -28,7 +28,6 @@ class FunctionRows(StaticRows, kind="function"):
     def begin(self, control, start, numbers):
         numbers[law.START], numbers[law.VALUE] = start.output, self.value(control, start)
 
-
     def flags_at_start(self, control, start, numbers):
         """Flags of the kinks: blocks that remember read a consistent value from the first moment."""
         program = program_of(start.case, start.block)

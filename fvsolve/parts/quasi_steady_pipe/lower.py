@@ -10,6 +10,7 @@ from . import law
 
 TINY_DROP = 1e-3  # of a pipe with hardly any loss [Pa]
 
+
 class QuasiSteadyPipeRows(Restriction, kind="quasi-steady-pipe"):
     """Conversion to table rows of quasi-steady pipes: restrictions by the friction law of the pipe."""
 
@@ -39,7 +40,10 @@ class QuasiSteadyPipeRows(Restriction, kind="quasi-steady-pipe"):
         if probe.quantity in ("flow", "velocity"):
             draft.floats.append(math.pi / 4.0 * link.diameter**2)
             return
-        row["kind"], row["index"], row["cell"] = rec.PRESSURE_BETWEEN, *(draft.node_index[end] for end in (link.from_, link.to))
+        row["kind"], row["index"], row["cell"] = (
+            rec.PRESSURE_BETWEEN,
+            *(draft.node_index[end] for end in (link.from_, link.to)),
+        )
         low, high = draft.node_table["elevation"][[row["index"], row["cell"]]]
         axis = float(draft.case.axis_elevation(name, x))
         below = low + x * (high - low) - axis  # the line between both ends
