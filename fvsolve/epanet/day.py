@@ -25,6 +25,8 @@ class DayTranslation(Translation):
     def __init__(self, network: Any, hour: HourState) -> None:
         self.signals: dict[str, part_tables.Part] = {}
         self.controls: dict[str, part_tables.Part] = {}
+        # relays with outputs 0 and 1: (tank, level at which it turns on, and off, state at the start) -> name
+        self.relays: dict[tuple[str, float, float, bool], str] = {}
         self.inlets: dict[str, str] = {}  # EPANET's name of a tank -> junction before its altitude valve
         self.step = float(network.options.time.pattern_timestep)
         self.read_statements(network)
@@ -243,6 +245,17 @@ class DayTranslation(Translation):
         keys = relay_keys(actions)
         if keys is not None:
             tank, on, off = keys
+            if (other := self.relays.get((tank, off, on, not state))) is not None and output == [0, 1]:
+                self.controls[ours] = {
+                    "type": "function",
+                    "inputs": {"other": f"controls.{other}"},
+                    "formula": "1 - other",
+                }
+                return {"control": ours}  # both switch at one time
+            if output == [0, 1]:
+                other = self.relays.setdefault((tank, on, off, state), ours)
+                if other != ours:
+                    return {"control": other}
             block = {"type": "relay", "input": probes[tank], "on": part_tables.quantity_text(on, "m"),
                      "off": part_tables.quantity_text(off, "m")}  # fmt: skip
         else:
@@ -271,9 +284,9 @@ class DayTranslation(Translation):
 
 def step_table(times: list[float], values: list[Any]) -> part_tables.Part:
     """Table of a schedule of steps, without entries at which nothing changes; times [s]."""
-    kept = [k for k in range(len(times)) if k == 0 or values[k] != values[k - 1]]
-    numbers = [values[k] if isinstance(values[k], str) else part_tables.rounded_number(values[k]) for k in kept]
-    return {"time": [part_tables.rounded_number(times[k]) for k in kept], "value": numbers, "kind": "step"}
+    changes = [k for k in range(len(times)) if k == 0 or values[k] != values[k - 1]]
+    numbers = [values[k] if isinstance(values[k], str) else part_tables.rounded_number(values[k]) for k in changes]
+    return {"time": [part_tables.rounded_number(times[k]) for k in changes], "value": numbers, "kind": "step"}
 
 
 def area_table(points: list[tuple[float, float]]) -> part_tables.Part:

@@ -39,8 +39,8 @@ def events(t, y, out, tables, device, g):
     node, flow = tables.nodes[tables.valves[k]["to_node"]], out[tables.layout[0]["valve"] + k]
     rho = st["rho"] if st["law"] == LAW_LINEAR else node["density"]
     level, drop = tank_level(node, tables.floats, rho, y[node["y"]]), head_drop(tables, out, k)[1]
-    room, depth = tables.floats[device["data"]] - level, level - tables.floats[device["data"] + 1]
-    full, empty = room if room > 0.0 else -flow, depth if depth > 0.0 else flow
+    space, depth = tables.floats[device["data"]] - level, level - tables.floats[device["data"] + 1]
+    full, empty = space if space > 0.0 else -flow, depth if depth > 0.0 else flow
     if tables.armed[at + FULL] > 0.0:
         full, empty = -drop - MARGIN, 1.0
     elif tables.armed[at + EMPTY] > 0.0:
