@@ -222,6 +222,12 @@ class Case(Displayable):
         """Elevations of all hydraulic nodes, patches and chambers above datum [m], by full name."""
         return {name: self.elevation(name) for name in self.places}
 
+    def axis_elevation(self, name: str, fraction: Any) -> Any:
+        """Elevation of the axis of a pipe at fractions of its length [m]."""
+        link = self.links[name]
+        low, high = (self.elevations[end] for end in (link.from_, link.to))
+        return low + fraction * (high - low) if link.profile is None else link.profile.at(fraction * link.length)
+
     def unit_of(self, dimension: str) -> str:
         """Unit of a dimension in `[output]`, such as "bar" for "pressure"; the SI unit if `[output]` states none.
 
@@ -285,7 +291,9 @@ class Case(Displayable):
             "gravity": self.gravity,
             "fluid": self.fluid.table(),
             "nodes": {name: {"type": node.kind, **node.table()} for name, node in self.nodes.items()},
-            "links": {name: {"type": link.kind, **link.table()} for name, link in self.links.items()},
+            "links": {
+                name: {"type": link.type_in_file or link.kind, **link.table()} for name, link in self.links.items()
+            },
             "signals": {name: plain_value(signal) for name, signal in self.signals.items()},
             "controls": {
                 name: {"type": block.control.kind, **block.control.table()} for name, block in self.controls.items()

@@ -15,7 +15,7 @@ from fvsolve.case.part_reading import Parts
 from fvsolve.case.pipe_routes import legs, read_routes
 from fvsolve.case.probe import default_probes, read_probe
 from fvsolve.case.reactions import reaction_kinds, read_reactions
-from fvsolve.case.reading import Raw, Reading, copy_paths, default_faults, override, read_raw, split_key
+from fvsolve.case.reading import Raw, Reading, copy_paths, default_faults, defaults_of, override, read_raw, split_key
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output, ViscosityLaw
 from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.fluid import follow_temperature, properties, specific_heat
@@ -75,7 +75,7 @@ def shortest_cell_time(links: Mapping[str, Any], meshes: Mapping[str, Any], flui
 
     In basins a wave speed of 1 m/s is assumed. meshes : meshes of basins; fluid : properties of the fluid
     """
-    times = [link.length / link.cells / wave_speed(link, fluid) for link in links.values() if isinstance(link, Pipe)]
+    times = [link.length / link.cells / wave_speed(link, fluid) for link in links.values() if link.kind == "pipe"]
     return min([*times, *(float(mesh.area.min()) ** 0.5 for mesh in meshes.values())], default=math.inf)
 
 
@@ -176,7 +176,7 @@ def reusable_values(reading: Reading, previous: Case | None) -> dict[tuple, tupl
     """
     if previous is None or previous.ambient_pressure != reading.setting.ambient:
         return {}
-    return previous.read if previous.raw.get("defaults") is reading.raw.table.get("defaults") else {}
+    return previous.read if defaults_of(previous.raw, "pipe") == defaults_of(reading.raw.table, "pipe") else {}
 
 
 def read_fluid(reading: Reading) -> tuple[FluidSpec | None, Any]:

@@ -143,7 +143,8 @@ def inherit_elevations(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str
 
 def table_kinds(table: dict[str, Any], group: str) -> dict[str, Any]:
     """Class of each node or link of a case by name; None for an unknown type. table : nested dicts as in the file"""
-    return {name: connections.kind_of(group, part) for name, part in table.get(group, {}).items()}
+    kinds = {name: connections.kind_of(group, part) for name, part in table.get(group, {}).items()}
+    return {name: kind and kind.variant(with_defaults(table, table[group][name])) for name, kind in kinds.items()}
 
 
 def place_kinds(network: chainage.CutTable, parts: Parts, scalars: dict[str, Any], faulty: bool) -> dict[str, Any]:
@@ -201,7 +202,7 @@ def fill_cells(reading: Reading, links: dict[str, Any], properties: Any, numeric
     """Links in which pipes have their default number of cells; unchanged if the fluid or numerics are faulty."""
     if properties is None or numerics is None:
         return links
-    pipes = {name: link for name, link in links.items() if isinstance(link, Pipe)}
+    pipes = {name: link for name, link in links.items() if link.kind == "pipe"}
     counts = default_cells(pipes, properties, numerics.cell_time)
     worst = max(counts, key=counts.get, default=None)
     if worst is not None and counts[worst] > MOST_CELLS:

@@ -11,7 +11,6 @@ from fvsolve.case.connections import islands, kind_of
 from fvsolve.case.probe import ALL
 from fvsolve.case.reading import Reading
 from fvsolve.errors import article, did_you_mean, listing
-from fvsolve.parts import Pipe
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import VALUE, Quantity, ReadContext, Value, ValueFault
 from fvsolve.units import show
@@ -229,7 +228,7 @@ def read_routes(reading: Reading, network: CutTable, links: dict[str, Any]) -> d
     faulty = list(route_faults(result, links, named, network.pieces)) if network.connections_known else []
     reading.add(faulty)
     lost = odd | {keys[1] for keys, _ in faulty}
-    pipes = {name for name, link in links.items() if isinstance(link, Pipe)}
+    pipes = {name for name, link in links.items() if link.kind == "pipe"}
     lost |= {name for name, route in result.items()
              if route and (not pipes.issuperset(route.pipes) or first_gap(route, links) is not None)}  # fmt: skip
     return {name: None if name in lost else route for name, route in result.items()}

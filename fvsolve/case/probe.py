@@ -262,10 +262,11 @@ class Extent:
         quantity, dimension = ("pressure", "pressure") if pressed else (self.quantity, self.dimension)
         for group, name in self.parts:
             pipe = links.get(name) if group == "links" else None
-            if pipe is None or pipe.kind != "pipe" or not (pressed or self.quantity in pipe.along):
+            if pipe is None or quantity not in pipe.along:
                 yield Probe(f"{group}.{name}.{quantity}", group, name, quantity, None, dimension)
             else:
-                shares = [] if pressed else [(k + 0.5) / pipe.cells for k in range(pipe.cells)]
+                count = 0 if pressed or pipe.kind != "pipe" else pipe.cells
+                shares = [(k + 0.5) / count for k in range(count)]
                 for share in (0.0, *shares, 1.0):
                     yield along(name, quantity, share, dimension)
 
@@ -353,7 +354,7 @@ def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) 
     if name in ALL:
         known = {part: kind for part, kind in kinds[ALL[name]].items() if kind is not None}
         if name == "pipes":
-            matches = [(ALL[name], part) for part, kind in known.items() if kind is Pipe]
+            matches = [(ALL[name], part) for part, kind in known.items() if issubclass(kind, Pipe)]
         else:  # without reservoirs, whose pressure is given
             matches = [(ALL[name], part) for part, kind in known.items() if quantity in quantities_of(kind)
                        and not (kind is Reservoir and quantity in OF_PRESSURE)]  # fmt: skip

@@ -19,6 +19,7 @@ from fvsolve.case.text import key_lines
 from fvsolve.errors import CaseError, Fault, article, did_you_mean, listing
 from fvsolve.parts import KINDS, Pipe
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
+from fvsolve.parts.pipe.part import QUASI_STEADY
 from fvsolve.parts.table_model import exclusive_key_faults
 from fvsolve.parts.value import ROOT, ReadContext, Value, faults_of
 from fvsolve.units import show
@@ -282,9 +283,12 @@ def default_values(kind: str) -> dict[str, Value]:
 
 def defaults_of(table: Mapping[str, Any], kind: Any) -> dict[str, Any]:
     """Keys and values in `[defaults]` for a type of part; empty if there are none or if they are not a table."""
-    result = table.get("defaults")
+    result, numerics = table.get("defaults"), table.get("numerics")
     result = result.get(kind) if isinstance(result, dict) and isinstance(kind, str) and kind in WITH_DEFAULTS else None
-    return result if isinstance(result, dict) else {}
+    result = result if isinstance(result, dict) else {}
+    if kind == "pipe" and isinstance(numerics, dict) and numerics.get("pipe_model") == QUASI_STEADY:
+        return {"pipe_model": QUASI_STEADY, **result}  # a part of its own
+    return result
 
 
 def with_defaults(table: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:

@@ -9,7 +9,6 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from fvsolve.parts import Pipe
 from fvsolve.steppers.loop_records import LEAST_STEP
 from fvsolve.steppers.tableau import METHODS
 from fvsolve.units import show
@@ -29,7 +28,7 @@ def find_faults(
 
     An output interval must exceed the rounding of the time. meshes : meshes of basins
     """
-    pipes = {name: link for name, link in links.items() if isinstance(link, Pipe)}
+    pipes = {name: link for name, link in links.items() if link.kind == "pipe"}
     method, span = METHODS.get(numerics.method), numerics.end - numerics.start
     implicit = method is None or not method.explicit
     cells = sum(pipe.cells or 0 for pipe in pipes.values())
@@ -77,7 +76,7 @@ def name_faults(name: str) -> Iterator[str]:
 def disk_size(case: Any, text: int = TEXT, frame_cell: int = FRAME_CELL) -> float:
     """Estimated size of history.csv and the frames [B]; text, frame_cell : bytes per number and per cell of a frame."""
     numerics, output = case.numerics, case.output
-    cells = sum(link.cells for link in case.links.values() if isinstance(link, Pipe))
+    cells = sum(link.cells for link in case.links.values() if link.kind == "pipe")
     cells += sum(len(mesh.cells) for mesh in case.meshes.values())
     rows = (numerics.end - numerics.start) / output.every
     return text * rows * (1 + len(case.probes)) + frame_cell * output.fields * cells

@@ -109,6 +109,8 @@ def import_(
     wave_speed: Annotated[str, Option(metavar="A", help="wave speed of all pipes, in m/s or with a unit")] = "1200 m/s",
     min_pipe_length: Annotated[str | None, Option(metavar="L", help="length to which shorter pipes are lengthened, "
         'for example "10 m" (default none: pipes keep their lengths)')] = None,
+    day: Annotated[bool, Option("--day", help="a run of 24 h from hour 0, with patterns, controls and rules, and with "
+        "pipes whose flow follows their losses at once (default a run of seconds, with waves)")] = False,
 ) -> None:  # fmt: skip
     """Import an EPANET network: write its case file and print all differences from EPANET."""
     from fvsolve.epanet import import_network
@@ -122,7 +124,7 @@ def import_(
         raise FvsolveError(f"{to} exists. Give another file: fvsolve import {source} CASE")
     speed = _positive("--wave-speed", wave_speed, "velocity")
     shortest = _positive("--min-pipe-length", min_pipe_length, "length") if min_pipe_length else 0.0
-    network = import_network(source, hour, speed, shortest)
+    network = import_network(source, hour, speed, shortest, day)
     to.parent.mkdir(parents=True, exist_ok=True)
     to.write_text(network.text, encoding="utf-8")
     written = [to]

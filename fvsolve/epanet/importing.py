@@ -6,14 +6,17 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.case import text
+from fvsolve.epanet.day import DAY, DayTranslation
 from fvsolve.epanet.network_file import read_network, state_at
 from fvsolve.epanet.part_tables import DENSITY
 from fvsolve.epanet.translating import Translation
 from fvsolve.errors import FvsolveError, listing
+from fvsolve.parts.pipe.part import QUASI_STEADY
 
 CELL_TIME = 0.01  # travel time of a cell in small networks [s]
 MOST_CELLS = 40_000  # largest number of cells; larger networks get longer cells
 END = "20 s"
+DAY_RTOL, DAY_ROWS = 1e-7, "5 min"  # tolerance of a run over a day, and its interval of rows
 PROBES = 5  # number of recorded junctions: those with the largest demands
 
 
@@ -33,9 +36,13 @@ class Imported:
     short_pipes: list[str]
 
 
-def import_network(path: str | Path, hour: float = 0.0, wave_speed: float = 1200.0, shortest: float = 0.0) -> Imported:
-    """Import an EPANET file with the state at an hour of EPANET's run.
+def import_network(
+    path: str | Path, hour: float = 0.0, wave_speed: float = 1200.0, shortest: float = 0.0, day: bool = False
+) -> Imported:
+    """Import an EPANET file with the state at an hour of EPANET's run, or for a day.
 
+    day : True for a run of 24 h from hour 0 with patterns, controls and rules, and with pipes that follow their losses
+    at once; the other arguments then have no effect
     hour : time from the start of EPANET's run [h]; wave_speed : wave speed of every pipe [m/s]
     shortest : least length of a pipe in the case [m]; a shorter pipe is lengthened, and keeps the friction loss of its
     original length
@@ -44,11 +51,16 @@ def import_network(path: str | Path, hour: float = 0.0, wave_speed: float = 1200
     if not (math.isfinite(hour) and hour >= 0.0):
         raise FvsolveError(f"hour {hour:g} is not valid; expected hours from the start of EPANET's run, 0 or more")
     network = read_network(Path(path))
+    if day:
+        daily = DayTranslation(network, state_at(network, 0.0))
+        text_of_day = _text(Path(path), network, daily, f"{Path(path).stem} over a day, from EPANET", _day_lines(daily))
+        return Imported(text_of_day, daily.node_names.given, daily.link_names.given, daily.notes, [])
     time = cell_time([pipe.length for _, pipe in network.pipes()], wave_speed)
     translation = Translation(network, state_at(network, hour), wave_speed, shortest)
     lengths = translation.lengths
     short = sorted((name for name, length in lengths.items() if length < wave_speed * time), key=lengths.get)
-    case_text = _text(Path(path), network, translation, hour, time, short)
+    title = f"{Path(path).stem} at hour {hour:g}, from EPANET"
+    case_text = _text(Path(path), network, translation, title, _hour_lines(translation, time, short))
     return Imported(case_text, translation.node_names.given, translation.link_names.given, translation.notes, short)
 
 
@@ -60,12 +72,9 @@ def cell_time(lengths: list[float], wave_speed: float) -> float:
     return float(f"{max(CELL_TIME, sum(lengths) / wave_speed / MOST_CELLS):.2g}")
 
 
-def _text(path: Path, network: Any, translation: Translation, hour: float, time: float, short: list[str]) -> str:
-    lines = [
-        "#:schema schema.json",
-        "schema = 1",
-        f"title = {text.inline(f'{path.stem} at hour {hour:g}, from EPANET')}",
-    ]
+def _text(path: Path, network: Any, translation: Translation, title: str, closing: list[str]) -> str:
+    """Text of the case file; closing : its lines after nodes and links"""
+    lines = ["#:schema schema.json", "schema = 1", f"title = {text.inline(title)}"]
     description = " ".join(line.strip() for line in network.title if line.strip())
     if description:
         lines.append(f"description = {text.inline(description)}")
@@ -80,17 +89,31 @@ def _text(path: Path, network: Any, translation: Translation, hour: float, time:
     for group in ("nodes", "links"):
         lines += ["", f"[{group}]"]
         lines += [f"{name} = {text.inline(part)}" for name, part in getattr(translation, group).items()]
-    lines += [
+    return "\n".join(lines + closing) + "\n"
+
+
+def _hour_lines(translation: Translation, time: float, short: list[str]) -> list[str]:
+    """Lines of numerics and output for a run of seconds; time : of a cell [s]; short : pipes shorter than a cell"""
+    return [
         "",
         "[numerics]",
         f'end = "{END}"',
         f'cell_time = "{1e3 * time:.10g} ms"  # pipes with a shorter travel time get one cell',
         'pipe_model = "auto"' + (f"  # {_short_pipes_comment(translation, short)}" if short else ""),
-    ]
-    lines += [
         "", "[output]", f"probes = {text.inline(_probes(translation))}", 'units = { flow = "l/s", pressure = "barg" }',
     ]  # fmt: skip
-    return "\n".join(lines) + "\n"
+
+
+def _day_lines(translation: DayTranslation) -> list[str]:
+    """Lines of signals, controls, numerics and output for a run over a day."""
+    lines = []
+    for group in ("signals", "controls"):
+        if table := getattr(translation, group):
+            lines += ["", f"[{group}]", *(f"{name} = {text.inline(part)}" for name, part in table.items())]
+    numerics = [f'end = "{DAY / 3600.0:g} h"', f'pipe_model = "{QUASI_STEADY}"', f"rtol = {DAY_RTOL:g}"]
+    probes = f"probes = {text.inline(_probes(translation))}"
+    output = [f'every = "{DAY_ROWS}"', probes, 'units = { flow = "l/s", pressure = "barg", time = "h" }']
+    return [*lines, "", "[numerics]", *numerics, "", "[output]", *output]
 
 
 def _short_pipes_comment(translation: Translation, short: list[str]) -> str:
@@ -106,6 +129,6 @@ def _probes(translation: Translation) -> list[str]:
     nodes, links = translation.nodes, translation.links
     probes = [f"nodes.{name}.level" for name, part in nodes.items() if part["type"] == "tank"]
     probes += [f"links.{name}.flow" for name, part in links.items() if part["type"] == "pump"]
-    demands = {name: float(part["demand"].split()[0]) for name, part in nodes.items() if "demand" in part}
+    demands = translation.demands
     greatest = sorted(demands, key=demands.get, reverse=True)[:PROBES]
     return probes + [f"nodes.{name}.head" for name in greatest]

@@ -50,6 +50,7 @@ class Translation:
     network : network of WNTR; hour : EPANET's solution at the imported hour
     wave_speed : wave speed of every pipe [m/s]; shortest : least length of a pipe [m]
     nodes, links : name -> table of the case file
+    demands : name of a junction in the case -> its demand [m3/s]
     lengths : EPANET's name of a pipe -> its length in the case [m]
     notes : list of (text, EPANET's names)
     """
@@ -60,6 +61,7 @@ class Translation:
         self.links: dict[str, part_tables.Part] = {}
         self.lengths: dict[str, float] = {}
         self.notes_by_text: dict[str, list[str]] = {}
+        self.demands: dict[str, float] = {}
         self.node_names, self.link_names = FreeNames(), FreeNames()
         hydraulic = network.options.hydraulic
         self.formula, self.multiplier = hydraulic.headloss, hydraulic.demand_multiplier
@@ -69,7 +71,8 @@ class Translation:
         self.drawn = any(any(node.coordinates) for _, node in network.nodes())
         self.elevation = self.elevations()
         for name, node in network.nodes():
-            self.nodes[self.node_names.add(name)] = getattr(self, node.node_type.lower())(name, node)
+            ours = self.node_names.add(name)
+            self.nodes[ours] = getattr(self, node.node_type.lower())(name, node)
         for name, link in network.links():
             ours = self.link_names.add(name)
             self.links[ours] = getattr(self, link.link_type.lower())(name, link)
@@ -138,6 +141,8 @@ class Translation:
     def junction(self, name: str, node: Any) -> part_tables.Part:
         demand = self.demand_at(node)
         part = part_tables.junction(self.elevation[name], demand, self.position(node))
+        if demand:
+            self.demands[self.node_names.given[name]] = demand
         if self.pressure_driven and demand > 0.0:
             hydraulic = self.network.options.hydraulic
             least = MIN_REQUIRED * (1.0 / PSI_OF_METRE if hydraulic.inpfile_units in US_UNITS else 1.0)

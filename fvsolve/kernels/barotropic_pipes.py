@@ -154,6 +154,13 @@ def observe_barotropic(t, y, out, handle, values):
                 value = flow / m if probe["head"] == 2 else flow / law.density(st, floats, p)
         elif kind == rec.VALVE_FLOW:
             value = valve_volume_flow(st, floats, tables, out, i)
+            if probe["head"] == 2:
+                value /= floats[probe["weights"]]
+        elif kind == rec.PRESSURE_BETWEEN:
+            x, j = floats[probe["weights"]], probe["cell"]
+            p = floats[probe["weights"] + 2] + (1.0 - x) * (nodes[i]["pressure"] + out[layout["pressure"] + i])
+            p += x * (nodes[j]["pressure"] + out[layout["pressure"] + j])
+            value = pressure_or_head(st, floats, probe, p)
         elif kind == rec.SPOOL_FLOW:
             for e in range(probe["count"]):
                 value += floats[probe["weights"] + e] * valve_volume_flow(st, floats, tables, out, i + e)

@@ -172,6 +172,7 @@ VALVE = record(
     table=i8,
     table_size=i8,
     solve=i8,  # SINGLE, CLUSTER, or ALONE between two stored or given pressures
+    chained=i8,  # 1: in a cluster with quasi-steady pipes; the other links at its junctions limit its rate
     conductance=f8,  # 2 rho (Cd A)^2 at full opening: M |M| = conductance * dp
     transition=f8,  # flow below which the law is laminar [kg/s]; 0 if pipes bound the slope of the root
     rounding_drop=f8,  # drop below which the law is laminar at any opening [Pa]: too small for error control
@@ -438,7 +439,16 @@ NETWORK_SWITCH = record(
 )
 SWITCH, DIODE, FRICTION = 0, 1, 2
 
-CLUSTER_RECORD = record(first_node=i8, nodes=i8, first_valve=i8, valves=i8, first_couple=i8, couples=i8, inverse=i8)
+CLUSTER_RECORD = record(
+    first_node=i8,
+    nodes=i8,
+    first_valve=i8,
+    valves=i8,
+    first_couple=i8,
+    couples=i8,
+    inverse=i8,
+    order=i8,  # offset in `integers` of an order of elimination that keeps its matrix sparse; -1: none
+)
 
 LAYOUT = record(
     pressure=i8,  # offsets in `out`
@@ -522,6 +532,9 @@ SCHEDULE_VALUE = 28  # of schedule `index`
 # scalar probe has the kind in `head` and the index in `scalar`
 REACTION_VALUE, LOCAL_AFFINITY = 29, 30
 MOLAR_RATE, CHEMICAL_POWER, AFFINITY = 0, 1, 2
+# between nodes `index` and `cell`; floats[weights:] : fraction of the way, elevation there [m], and pressure because
+# this place lies below the line between the nodes [Pa]
+PRESSURE_BETWEEN = 31
 
 BASIN = record(
     kind=i8,  # code of its physics, see `basins.basin_patches`

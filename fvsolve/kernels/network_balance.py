@@ -12,6 +12,8 @@ from fvsolve.kernels.restrictions import conductance, head_drop, open_scheduled,
 from fvsolve.kernels.table_handle import open_tables
 from fvsolve.kernels.tanks import BOTTOM, EVENTS, RIM
 
+NO_WAY_OUT = 1e300  # impedance of a junction without an open link [Pa s/kg]
+
 
 @njit(forceinline=True)
 def clear_outputs(out, tables):
@@ -80,6 +82,30 @@ def node_impedance(tables, i):
     """Pressure rise at junction i per flow into it [Pa s/kg], 1 / admittance of its pipes; 0 for other nodes."""
     node = tables.nodes[i]
     return 1.0 / node["admittance"] if node["kind"] == JUNCTION and node["admittance"] > 0.0 else 0.0
+
+
+@njit
+def chain_impedance(tables, out, i, k):
+    """Pressure rise at junction i per flow that enters through restriction k [Pa s/kg]; 0 for other nodes.
+
+    The flow leaves through pipes and the other restrictions, whose other ends keep their pressures. Where a single
+    restriction leaves a junction, it is followed to its other end.
+    """
+    valves, nodes, impedance = tables.valves, tables.nodes, 0.0
+    for _ in range(nodes.size):
+        if nodes[i]["kind"] != JUNCTION:
+            return impedance
+        total, count, last = nodes[i]["admittance"], 0, k
+        for e in range(valves.size):
+            valve = valves[e]
+            if e != k and (valve["from_node"] == i or valve["to_node"] == i) and conductance(tables, out, e) > 0.0:
+                total += restriction_slope(tables, out, e, head_drop(tables, out, e)[1])
+                count, last = count + 1, e
+        impedance += 1.0 / total if total > 0.0 else NO_WAY_OUT
+        if count != 1 or nodes[i]["admittance"] > 0.0:
+            break
+        i, k = valves[last]["from_node"] + valves[last]["to_node"] - i, last
+    return impedance
 
 
 @njit(forceinline=True)
@@ -157,8 +183,10 @@ def valve_rate_limit(t, y, dydt, out, handle):
             g = conductance(tables, out, k)
             slope = restriction_slope(tables, out, k, drop)
             soft = node_impedance(tables, i) + node_impedance(tables, j)
+            if valve["chained"] == 1:
+                soft = chain_impedance(tables, out, i, k) + chain_impedance(tables, out, j, k)
             rate = max(rate, stiff * slope / (1.0 + soft * slope))
-            if valve["transition"] > 0.0 and g > 0.0:
+            if valve["transition"] > 0.0 and g > 0.0 and valve["chained"] == 0:
                 change = stiff_i * out[layout["net"] + i]
                 change -= stiff_j * out[layout["net"] + j]
                 width = max(valve["transition"] ** 2 / g, valve["rounding_drop"])

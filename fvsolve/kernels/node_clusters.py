@@ -81,6 +81,51 @@ def solve_dense(a, b, n):
     return sign
 
 
+@njit
+def solve_in_order(a, b, n, integers, at):
+    """Solve a x = b by elimination without pivoting in a given order; x replaces b. Returns 1.0.
+
+    The result is 0.0, and b is not the solution, if a pivot is not above 0.
+    a : float64[n * n]  matrix row by row, overwritten in the pattern of the order
+    integers[at:] : for each pivot the place, after `at`, of its node, the count of nodes that its elimination couples,
+    and these nodes
+    """
+    for k in range(n):
+        e = at + integers[at + k]
+        p, count = integers[e], integers[e + 1]
+        pivot = a[n * p + p]
+        if not pivot > 0.0:
+            return 0.0
+        for u in range(count):
+            row = n * integers[e + 2 + u]
+            f = a[row + p] / pivot
+            if f != 0.0:
+                for v in range(count):
+                    q = integers[e + 2 + v]
+                    a[row + q] -= f * a[n * p + q]
+                b[integers[e + 2 + u]] -= f * b[p]
+    for k in range(n - 1, -1, -1):
+        e = at + integers[at + k]
+        p = integers[e]
+        for u in range(integers[e + 1]):
+            q = integers[e + 2 + u]
+            b[p] -= a[n * p + q] * b[q]
+        b[p] /= a[n * p + p]
+    return 1.0
+
+
+@njit
+def clear_pattern(a, n, integers, at):
+    """Set the entries of a matrix to 0 that `solve_in_order` reads; arguments as there."""
+    for k in range(n):
+        e = at + integers[at + k]
+        p = integers[e]
+        a[n * p + p] = 0.0
+        for u in range(integers[e + 1]):
+            q = integers[e + 2 + u]
+            a[n * p + q] = a[n * q + p] = 0.0
+
+
 @njit(forceinline=True)
 def has_converged(change, last_change):
     """True if the last relative change of Newton is rounding: below 1e-14, or below 1e-9 and no longer falling."""
@@ -186,15 +231,19 @@ def step_arrays(n, k, work):
     return work[: n * n], work[n * n : at], work[at : at + k], work[at + k : at + 2 * k], work[at + 2 * k : at + 3 * k]
 
 
-def _assemble(cluster, tables, out, g, m, c, connected, slope, wide, work):
+def _assemble(cluster, tables, out, g, m, c, connected, slope, wide, work, sparse):
     """Assemble the linear equations for the pressure steps of a cluster; the changes of valve flows are eliminated.
 
     Arguments as for `newton_step`; the equations are written to `work`, see `step_arrays`.
+    sparse : True to clear only the entries of the matrix that `solve_in_order` reads
     """
     matrix, right, a, s, lift = step_arrays(c.size, g.size, work)
     nodes, valves, integers, n = tables.nodes, tables.valves, tables.integers, c.size
-    for i in range(matrix.size):
-        matrix[i] = 0.0
+    if sparse:
+        clear_pattern(matrix, n, integers, cluster["order"])
+    else:
+        for i in range(matrix.size):
+            matrix[i] = 0.0
     for i in range(n):
         right[i], matrix[n * i + i] = BALANCE(cluster, tables, out, c, slope, i)
     for e in range(m.size):
@@ -304,11 +353,17 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, work):
     """
     n, k = c.size, g.size
     matrix, right, a, s, lift = step_arrays(n, k, work)
-    ASSEMBLE(cluster, tables, out, g, m, c, connected, slope, wide, work)
-    imbalance = largest_magnitude(right) if BAROTROPIC else 0.0
-    sign = solve_dense(matrix, right, n)
+    sparse = cluster["order"] >= 0
+    ASSEMBLE(cluster, tables, out, g, m, c, connected, slope, wide, work, sparse)
+    imbalance, sign = largest_magnitude(right) if BAROTROPIC else 0.0, 0.0
+    if sparse:
+        sign = solve_in_order(matrix, right, n, tables.integers, cluster["order"])
+        if sign == 0.0:
+            ASSEMBLE(cluster, tables, out, g, m, c, connected, slope, wide, work, False)
+    if sign == 0.0:
+        sign = solve_dense(matrix, right, n)
     if sign <= 0.0 and not wide and close_unstable(cluster, tables, g, m):
-        ASSEMBLE(cluster, tables, out, g, m, c, connected, slope, wide, work)
+        ASSEMBLE(cluster, tables, out, g, m, c, connected, slope, wide, work, False)
         imbalance = largest_magnitude(right) if BAROTROPIC else 0.0
         sign = solve_dense(matrix, right, n)
     if sign == 0.0:

@@ -58,6 +58,9 @@ def observe_linear(t, y, out, handle, values):
             value = pipe["flow"] + wave_sum(probe, pipe, -1.0, i, y, out, tables)
         elif kind == rec.VALVE_FLOW:
             value = out[layout["valve"] + i]
+        elif kind == rec.PRESSURE_BETWEEN:
+            x = tables.floats[probe["weights"]]
+            value = (1.0 - x) * out[layout["pressure"] + i] + x * out[layout["pressure"] + probe["cell"]]
         elif kind == rec.COLUMN_FLOW:
             value = out[layout["column"] + i]
         elif kind == rec.SPOOL_FLOW:

@@ -1,5 +1,6 @@
 """Solution method of each node without storage: alone, with its valve by a closed formula, or in a group by Newton."""
 
+import heapq
 import math
 
 import numpy as np
@@ -33,6 +34,7 @@ def classify_nodes(draft) -> None:
     nodes["solve"], clusters = rec.ALONE, []
     for root, ks in touched.items():
         own = couples.get(root, [])
+        valves["chained"][ks] = valves["chained"][ks].any() if ks else 0
         if not has_single_root(draft, members[root], ks, own):
             clusters.append(add_cluster(draft, members[root], ks, own))
     fixed = ~inner[valves["from_node"]] & ~inner[valves["to_node"]]
@@ -128,7 +130,41 @@ def add_cluster(draft, members, ks, own) -> tuple[int, ...]:
     draft.node_table["row"][members] = np.arange(n)
     inverse = add_inverse(draft, members, own) if own and not ks else -1
     draft.integers += [*members, *ks, *own]
-    return at, n, at + n, len(ks), at + n + len(ks), len(own), inverse
+    order = -1
+    if ks and draft.valve_table["chained"][ks].all():
+        order = len(draft.integers)
+        draft.integers += elimination_order(draft, members, ks, own)
+    return at, n, at + n, len(ks), at + n + len(ks), len(own), inverse, order
+
+
+def elimination_order(draft, members, ks, own) -> list[int]:
+    """Order of elimination of the nodes of a group, least degree first, as `node_clusters.solve_in_order` reads it.
+
+    members : indices of the nodes; ks, own : rows of the valves and delay lines that join them
+    """
+    rows = {i: k for k, i in enumerate(members)}
+    near: list[set[int]] = [set() for _ in members]
+    joins = [draft.valve_table[k] for k in ks] + [draft.pipe_table[draft.delay_table["pipe"][k]] for k in own]
+    for row in joins:
+        i, j = (rows.get(int(row[end]), -1) for end in ("from_node", "to_node"))
+        if i >= 0 and j >= 0 and i != j:
+            near[i].add(j)
+            near[j].add(i)
+    heap = [(len(others), k) for k, others in enumerate(near)]
+    heapq.heapify(heap)
+    places, entries, eliminated = [], [], set()
+    while heap:
+        degree, k = heapq.heappop(heap)
+        if k in eliminated or degree != len(near[k]):
+            continue  # an entry of an earlier degree
+        eliminated.add(k)
+        places.append(len(members) + len(entries))
+        entries += [k, degree, *sorted(near[k])]
+        for other in near[k]:
+            near[other] |= near[k]
+            near[other] -= {other, k}
+            heapq.heappush(heap, (len(near[other]), other))
+    return places + entries
 
 
 def mark_event_ends(draft, group) -> None:

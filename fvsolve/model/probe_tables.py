@@ -124,8 +124,8 @@ def probe_offsets(draft, start) -> None:
             draft.watched_start[k] = start.profile_at(int(row["index"]), probe.fraction)[0]
     rows = [*draft.probe_table, *draft.sensor_table]
     for row, probe in zip(rows, [*all_probes(draft.case), *draft.sensors], strict=True):
-        if row["kind"] >= rec.CELL_FIELD:  # basins hold the profile of theirs, the others need none
-            continue
+        if row["kind"] >= rec.CELL_FIELD and row["kind"] != rec.PRESSURE_BETWEEN:
+            continue  # basins hold the profile of theirs, the others need none
         if draft.case.law.linear:
             linear_offsets(draft, start, row, probe)
         else:
@@ -142,10 +142,15 @@ def linear_offsets(draft, start, row, probe) -> None:
     if row["kind"] in (rec.VALVE_FLOW, rec.COLUMN_FLOW, rec.PIPE_FLOW, rec.SPOOL_FLOW):
         row["scale"] = 1.0 / draft.fluid.density
         if probe.quantity == "velocity":
-            row["scale"] /= draft.pipe_table[row["index"]]["area"]
-    elif row["kind"] in (rec.PRESSURE, rec.PIPE_PRESSURE):
+            is_pipe, floats = row["kind"] == rec.PIPE_FLOW, draft.tables.floats
+            row["scale"] /= draft.pipe_table[row["index"]]["area"] if is_pipe else floats[row["weights"]]
+    elif row["kind"] in (rec.PRESSURE, rec.PIPE_PRESSURE, rec.PRESSURE_BETWEEN):
         if row["kind"] == rec.PRESSURE:
             base, z = (draft.node_table[row["index"]][key] for key in ("pressure", "elevation"))
+        elif row["kind"] == rec.PRESSURE_BETWEEN:
+            x, z, lower = draft.tables.floats[row["weights"] :][:3]
+            base = lower + (1.0 - x) * draft.node_table["pressure"][row["index"]]
+            base += x * draft.node_table["pressure"][row["cell"]]
         else:
             base, z = start.profile_at(int(row["index"]), probe.fraction)
             row["scale"] = 1.0 / draft.pipe_table[row["index"]]["admittance"]
@@ -174,6 +179,8 @@ def barotropic_offsets(draft, start, row, probe) -> None:
         row["head"] = 1
         if row["kind"] == rec.PRESSURE:
             row["offset"] = draft.node_table[row["index"]]["elevation"]
+        elif row["kind"] == rec.PRESSURE_BETWEEN:
+            row["offset"] = draft.tables.floats[row["weights"] + 1]
         else:
             row["offset"] = start.profile_at(int(row["index"]), probe.fraction)[1]
         if draft.case.gravity == 0.0:

@@ -29,6 +29,7 @@ class Part(Table):
     kinds: ClassVar[dict[str, type[Part]]] = {}
     no_scalars: ClassVar[str] = ""  # reason why a case with scalars cannot have this part yet
     own_scalars: ClassVar[str] = ""
+    type_in_file: ClassVar[str] = ""  # type in the case file of a variant with a kind of its own
 
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)
@@ -39,7 +40,7 @@ class Part(Table):
             cls.kinds[kind] = cls
 
     @classmethod
-    def variant(cls, given: dict[str, Any]) -> type[Any]:
+    def variant(cls, given: dict[str, Any]) -> type[Part]:
         """Class of a part with the given keys: this class, or a subclass with other ports or quantities."""
         return cls
 

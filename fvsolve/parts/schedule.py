@@ -140,7 +140,7 @@ class Scheduled(Value):
                 "phase": (Quantity("angle"), 0.0),
             },
             "file": {"file": (Text(), NEEDED), "time": (Text(), None), "value": (Text(), None), "kind": kind},
-            "signal": {"signal": (Text(), NEEDED)},
+            "signal": {"signal": (Text(), NEEDED), "factor": (Quantity(self.dimension), None)},
             "control": {"control": (Text(), NEEDED)},
             "formula": {"formula": (Text(), NEEDED), "unit": (Text(), "")},
         }  # fmt: skip
@@ -212,7 +212,8 @@ class Scheduled(Value):
 
     def _read_signal(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
         setting.lookups += 1
-        name = read_keys(given, self.forms["signal"], setting)["signal"]
+        values = read_keys(given, self.forms["signal"], setting)
+        name, factor = values["signal"], values["factor"]
         if name not in setting.signals:
             near, names = did_you_mean(name, setting.signals), listing(setting.signals) or "none"
             raise ValueFault([(("signal",), f"no signal named {show(name)}{near}; [signals] has {names}")])
@@ -224,11 +225,32 @@ class Scheduled(Value):
                 [(("signal",), f"signal {show(name)} refers to another signal; expected a signal with values")]
             )
         try:
-            schedule = self.read(shared, setting)
+            schedule = self.read(shared, setting) if factor is None else Scheduled("number").read(shared, setting)
         except ValueError as error:
             raise ValueFault(val.faults_of(error, val.ROOT, "signals", name)) from None
         setting.used[name] = schedule.table()
-        return replace(schedule, origin={"signal": name})
+        if factor is None:
+            return replace(schedule, origin={"signal": name})
+        return self._scaled(schedule, factor, name)
+
+    def _scaled(self, schedule: Schedule, factor: float, name: str) -> Schedule:
+        """Schedule of the numbers of a signal times `factor` [SI]; name : name of the signal"""
+        if schedule.kind == "formula":
+            text = f"signal {show(name)} is a formula, which takes no factor"
+            raise ValueFault([(("factor",), f"{text}; write the factor in the formula")])
+        value = factor * schedule.value
+        try:
+            for bound in (value.min(), value.max()):
+                self.range.check(float(bound), float(bound))
+        except ValueError as error:
+            raise ValueFault(
+                [(("factor",), f"gives values from {value.min():g} to {value.max():g}: {error}")]
+            ) from None
+        if schedule.kind == "harmonic":
+            mean, amplitude, *rest = schedule.wave
+            schedule = replace(schedule, wave=(factor * mean, factor * amplitude, *rest))
+            value = np.sort(value)
+        return replace(schedule, value=value, origin={"signal": name, "factor": factor})
 
     def _read_formula(self, given: dict[str, Any], setting: ReadContext, origin: Any) -> Schedule:
         setting.lookups += 1  # its range depends on the times of the run

@@ -62,9 +62,11 @@ def part_extremes(model, summary, extent) -> list[PartExtremes]:
             parts.append(PartExtremes(group, name, *(np.asarray(envelope[name][key]) for key in ENVELOPE_KEYS)))
         elif group == "links" and name in rows:
             # probes of which only extremes are recorded
-            distance = np.array([probe.fraction for probe in rows[name]]) * pipes[name].length
+            fraction = np.array([probe.fraction for probe in rows[name]])
+            distance = fraction * model.case.links[name].length
+            height = pipes[name].height(distance) if name in pipes else model.case.axis_elevation(name, fraction)
             found = np.array([summary.watched[probe.text] for probe in rows[name]])
-            parts.append(PartExtremes("links", name, distance, pipes[name].height(distance), *found.T))
+            parts.append(PartExtremes("links", name, distance, height, *found.T))
         else:
             z = model.elevation.get(name, np.nan) if group == "nodes" else np.nan
             extremes = summary.watched[f"{group}.{name}.{quantity}"]

@@ -84,7 +84,7 @@ JUMP_SHARE = 0.75  # a jump keeps at least this fraction of its greatest differe
 
 def pipes(case) -> dict[str, Pipe]:
     """Pipes of a case, by name."""
-    return {name: link for name, link in case.links.items() if isinstance(link, Pipe)}
+    return {name: link for name, link in case.links.items() if link.kind == "pipe"}
 
 
 def pipes_with_cells(case) -> dict[str, Pipe]:

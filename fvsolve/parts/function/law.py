@@ -4,8 +4,9 @@ from fvsolve.jit import njit
 from fvsolve.kernels.controls import flag_count, input_change
 from fvsolve.kernels.formula_programs import run_program
 
-START, VALUE, PROGRAM = range(3)
-"""Numbers of a block: output and value of the formula at the start; header row of its steps in `pieces`."""
+START, VALUE, PROGRAM, FLAG = range(4)
+"""Numbers of a block: output and value of the formula at the start; header row of its steps in `pieces`; first event
+flag of its kinks, -1 for a sampled block."""
 
 
 @njit

@@ -1,5 +1,7 @@
 """Pipes: keys, faults, and names of catalogue entries turned into numbers."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -42,7 +44,8 @@ CATALOGUE = frozenset(("material", "class", "lining"))  # keys from which others
 LENGTH_TOLERANCE = 1e-6  # allowed difference of the span of chainage, over length
 ELEVATION_TOLERANCE = 1e-6  # allowed difference in elevation of profile and nodes [m]
 END_VERBS = {"from": "begins", "to": "ends"}
-LINES = ("finite-volume", "delay-line", "auto")  # numerical methods for waves in a pipe
+QUASI_STEADY = "quasi-steady"
+LINES = ("finite-volume", "delay-line", "auto", QUASI_STEADY)  # models of the flow in a pipe
 
 
 # Most are between 50 and 1500 m/s, Wylie and Streeter 1993
@@ -61,6 +64,7 @@ class Pipe(Conduit, kind="pipe"):
     pressure p above ambient and elevation z. Dissipated power: friction and minor loss, pressure drop times flow [W].
     """
 
+    models: ClassVar[dict[str, type[Pipe]]] = {}  # pipe model -> class of pipes with keys and rows of their own
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "force": "force"}
     on_request: ClassVar[tuple[str, ...]] = ("force",)
     own_scalars: ClassVar[str] = "along"
@@ -105,10 +109,20 @@ class Pipe(Conduit, kind="pipe"):
     ] = None
     pipe_model: Annotated[str | None, Choice(
         "pipe model", LINES,
-        "method for waves: finite volumes, a delay line, whose cells are only output positions, or auto "
-        "(a delay line where its error bound is below numerics.delay_tolerance); numerics.pipe_model if left out",
+        "method for waves: finite volumes, a delay line, whose cells are only output positions, auto (a delay line "
+        "where its error bound is below numerics.delay_tolerance), or quasi-steady (no waves, no inertia: the flow "
+        "follows its losses at once); numerics.pipe_model if left out",
     )] = None  # fmt: skip
     scalars: Annotated[dict[str, Any], ScalarValues("scalar values in the pipe at the start", Number())] = {}
+
+    def __init_subclass__(cls, pipe_model: str = "", **rest: Any) -> None:
+        super().__init_subclass__(**rest)
+        if pipe_model:
+            Pipe.models[pipe_model] = cls
+
+    @classmethod
+    def variant(cls, given: dict[str, Any]) -> type[Pipe]:
+        return Pipe.models.get(str(given.get("pipe_model")), Pipe)
 
     @property
     def creep_elements(self) -> tuple[tuple[float, float], ...]:

@@ -1,0 +1,55 @@
+"""An altitude valve: open, shut because its tank is full, or shut because its tank is empty.
+
+The flags armed[event + FULL] and armed[event + EMPTY] are above 0 while it is shut; they change on accepted states
+only. `floats` holds both levels of the tank [m].
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import LAW_LINEAR
+from fvsolve.kernels.restrictions import head_drop
+from fvsolve.kernels.self_acting_valves import event_pair
+from fvsolve.kernels.tanks import tank_level
+
+FULL, EMPTY = 0, 2  # offsets of event flags
+MARGIN = 1.0  # drop in the allowed direction at which it opens, so that rounding does not [Pa]
+
+
+@njit
+def is_shut(tables, device):
+    """True if the valve is shut."""
+    at = device["event"]
+    return tables.armed[at + FULL] > 0.0 or tables.armed[at + EMPTY] > 0.0
+
+
+@njit
+def set(t, y, out, tables, device):
+    """Write to `out` the conductance of the valve [kg2/s2/Pa], 0 while it is shut."""
+    k = device["valve"]
+    out[tables.layout[0]["conductance"] + k] = 0.0 if is_shut(tables, device) else tables.valves[k]["conductance"]
+
+
+@njit
+def events(t, y, out, tables, device, g):
+    """Write event functions of both limits and their negatives to g.
+
+    While the valve is open: the distance of the level from the limit [m], and at the limit the flow away from it
+    [kg/s]. While it is shut: the drop towards the allowed direction, less `MARGIN` [Pa].
+    """
+    k, at, st = device["valve"], device["event"], tables.settings[0]
+    node, flow = tables.nodes[tables.valves[k]["to_node"]], out[tables.layout[0]["valve"] + k]
+    rho = st["rho"] if st["law"] == LAW_LINEAR else node["density"]
+    level, drop = tank_level(node, tables.floats, rho, y[node["y"]]), head_drop(tables, out, k)[1]
+    space, depth = tables.floats[device["data"]] - level, level - tables.floats[device["data"] + 1]
+    full, empty = space if space > 0.0 else -flow, depth if depth > 0.0 else flow
+    if tables.armed[at + FULL] > 0.0:
+        full, empty = -drop - MARGIN, 1.0
+    elif tables.armed[at + EMPTY] > 0.0:
+        full, empty = 1.0, drop - MARGIN
+    event_pair(tables, g, at + FULL, full)
+    event_pair(tables, g, at + EMPTY, empty)
+
+
+@njit
+def value(t, y, out, tables, device, quantity):
+    """Opening of the valve: 1 if open, 0 if shut."""
+    return 0.0 if is_shut(tables, device) else 1.0
