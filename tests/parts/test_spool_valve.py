@@ -439,6 +439,23 @@ def test_a_killed_run_resumes_to_the_bit(tmp_path):
     same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 0.205))
 
 
+@pytest.mark.parametrize("key, overlap, noted", [("position", 0.0, False), ("command", 0.0, True),
+                                                 ("command", -0.02, False)])  # fmt: skip
+def test_a_rigid_column_at_a_spool_that_shuts_is_noted(key, overlap, noted):
+    keys = SERVO if key == "command" else {}
+    case = bench(end=0.3, overlap=overlap, **{key: table((0.05, 0.5), (0.1, -0.5))}, **keys)
+    del case["links"]["spool"]["laminar_reynolds"]
+    case["nodes"] |= {"A": {"type": "junction"}, "C": {"type": "reservoir", "pressure": 60e5}}
+    case["links"]["line"] = {"type": "rigid-column", "from": "A", "to": "C", "length": 2.0, "diameter": 0.01}
+    case["output"]["probes"] = ["line.flow", "spool.flow_A"]
+    model = fvsolve.build(fvsolve.load(case, {"numerics.rtol": 1e-6}))
+    assert any("a rigid column ends at a port" in notice.text for notice in model.warnings) == noted
+    if not noted:
+        run = fvsolve.run(model)
+        assert run.ok and run["line.flow"][-1] < -3e-4
+        assert run["line.flow"] == approx(-run["spool.flow_A"], abs=1e-7)
+
+
 @pytest.mark.parametrize("keys", [{"position": WAVE}, {"command": STEP} | SERVO])
 def test_the_energy_of_a_spool_valve_closes(keys):
     found = energy(bench(held=False, **keys) | {"fluid": OIL | {"law": "log"}})

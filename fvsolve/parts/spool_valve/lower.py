@@ -3,6 +3,7 @@
 import math
 
 from fvsolve.assembly.lowering import POSITION, Device, Input, Restriction
+from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.spool_valve import law
 from fvsolve.parts.spool_valve.part import EDGES, PORTS
@@ -124,6 +125,12 @@ class CommandedRows(SpoolValveRows, Device, kind=""):
 
     def begin(self, start, part, row) -> list[str]:
         start.draft.tables.floats[row["data"] + law.START] = self.position_at_start(start, part, row)
+        name, k = start.draft.valve_names[row["valve"]], int(row["valve"])
+        ends = {int(valve[end]) for valve in start.valves[k : k + self.rows] for end in ("from_node", "to_node")}
+        if max(map(part.overlap_of, self.edges)) >= 0.0 and any(start.nodes["gates"][i] >= 0 for i in ends):
+            text = (f"{name}: a rigid column ends at a port that its spool shuts: steps become very short there; make "
+                    "the column a pipe, put a chamber between them, or give the edges an underlap")  # fmt: skip
+            start.draft.warnings.append(Notice("range", f"links.{name}", text))
         return []
 
     def apply_event(self, run_data, row, t, y, scale) -> None:
