@@ -35,8 +35,6 @@ HOOKS = {  # functions of the law of a part: types of arguments and of the resul
     "value": ("tVVTDi", "t"),  # t, y, out, tables, device, quantity: value of its quantity of that number
     # out, tables, device: 1 outside the range of validity of its law, TEMPORARY if this ends by itself, otherwise 0
     "outside": ("VTD", "i"),
-    # t, y, out, tables, device: writes conductances that follow pressures of nodes with storage or given pressure
-    "adjust": ("tVVTD", ""),
     # t, y, dydt, out, tables, device: power supplied, rate of stored energy, dissipation [W]
     "power": ("tVVVTD", "ttt"),
     "stored": ("VTD", "t"),  # y, tables, device: stored energy, change since the profile [J]
@@ -142,7 +140,6 @@ call_reader = call_at_address("call_reader", READS)  # reads a state and fills `
 call_energies = call_at_address("call_energies", ENERGIES)  # fills `rows` with powers [W] or stored energies [J]
 # Functions of the law of a device, or of restriction k (from `step` on).
 call_set = call_at_address("call_set", *HOOKS["set"])
-call_adjust = call_at_address("call_adjust", *HOOKS["adjust"])
 call_move = call_at_address("call_move", *HOOKS["move"])
 call_events = call_at_address("call_events", *HOOKS["events"])
 call_value = call_at_address("call_value", *HOOKS["value"])

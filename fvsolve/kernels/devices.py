@@ -8,8 +8,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 # columns of `hooks`
 (
-    SET, MOVE, EVENTS, VALUE, OUTSIDE, ADJUST, POWER, STORED, STEP, SLOPE, LIFT, BENDS, LEAD, DECIDE, ADAPT, SWITCH,
-    SAMPLE,
+    SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, STORED, STEP, SLOPE, LIFT, BENDS, LEAD, DECIDE, ADAPT, SWITCH, SAMPLE,
 ) = range(len(calls.HOOKS))  # fmt: skip
 TEMPORARY = 2  # result of a hook `outside`: to be reported, but it ends by itself when a check valve closes
 
@@ -23,17 +22,6 @@ def set_devices(t, y, dydt, out, handle):
         hook = tables.hooks[device["hooks"], SET]
         if hook != 0:
             calls.call_set(hook, t, y, out, tables, device)
-
-
-@njit
-def adjust_devices(t, y, dydt, out, handle):
-    """Write conductances that follow known pressures to `out`, before the other nodes are solved."""
-    tables = open_tables(handle)
-    for k in range(tables.devices.size):
-        device = tables.devices[k]
-        hook = tables.hooks[device["hooks"], ADJUST]
-        if hook != 0:
-            calls.call_adjust(hook, t, y, out, tables, device)
 
 
 @njit

@@ -197,7 +197,6 @@ COMPONENTS = {
         power="devices: power_devices",
         stored="devices: stored_devices",
     ),
-    "devices that follow pressures": RhsTerms(inflow="devices: adjust_devices"),
     "scalars": RhsTerms(outlet_values="scalar_transport: clear_losses", observe="scalar_transport: observe_scalars"),
     "carried": RhsTerms(
         outlet_values="scalar_transport: pipe_outlet_values", scalar_rates="scalar_transport: scalar_rates"
@@ -344,8 +343,6 @@ class ModelFeatures:
             yield COMPONENTS["lines"]
         if self.devices:
             yield COMPONENTS["devices"]
-        if any(hook_of(law, "adjust") is not None for law in self.modules()):
-            yield COMPONENTS["devices that follow pressures"]
         if self.networks:
             yield COMPONENTS["networks"]
         if self.unsteady_friction:

@@ -232,13 +232,10 @@ SIDES = {"a": {"time": [0.0, 0.5, 1.0, 2.0], "value": [5e6, 5e6, 1e6, 9e6]},
 
 
 def shuttle(numerics=TIGHT, **more):
-    nodes = {"a": chamber(VOLUME, 5e6), "b": chamber(VOLUME, 1e6), "signal": chamber(VOLUME, 3e6),
-             "drain": reservoir(DRAIN),
-             **{f"{side}-in": reservoir(table) for side, table in SIDES.items()}}  # fmt: skip
+    nodes = {"a": reservoir(SIDES["a"]), "b": reservoir(SIDES["b"]), "signal": chamber(VOLUME, 3e6),
+             "drain": reservoir(DRAIN)}  # fmt: skip
     links = {"select": sized("shuttle", ports={"A": "a", "B": "b", "out": "signal"}, **more),
-             "from-a": valve("a-in", "a", 2e-6), "from-b": valve("b-in", "b", 2e-6),
-             "bleed": valve("signal", "drain", 1e-7), "bleed-a": valve("a", "drain", 1e-6),
-             "bleed-b": valve("b", "drain", 1e-6)}  # fmt: skip
+             "bleed": valve("signal", "drain", 1e-7)}  # fmt: skip
     probes = [f"{place}.pressure" for place in ("a", "b", "signal")]
     probes += [f"select.{one}" for one in ("flow_A", "flow_B", "flow_out", "position")]
     return scene(nodes, links, 2.0, numerics, probes, 0.02, fluid=OIL)
@@ -247,23 +244,20 @@ def shuttle(numerics=TIGHT, **more):
 def test_a_shuttle_valve_is_that_of_scipy():
     result = fvsolve.run(shuttle())
 
-    def rates(t, y, mode):
-        a, b, signal = y
-        qa, qb = (through(a - signal), 0.0) if mode == "A" else (0.0, through(b - signal))
-        sides = zip("ab", (a, b), strict=True)
-        fed = [through(follows(SIDES[side])(t) - p, 2e-6) - through(p - DRAIN, 1e-6) for side, p in sides]
-        return [STIFF * (fed[0] - qa), STIFF * (fed[1] - qb), STIFF * (qa + qb - through(signal - DRAIN, 1e-7))]
+    a, b = (follows(table) for table in SIDES.values())
 
-    modes = {"A": [("B", lambda s, z: z[1] - z[0])], "B": [("A", lambda s, z: z[0] - z[1])]}
+    def rates(t, y, mode):
+        higher = (a if mode == "A" else b)(t)
+        return [STIFF * (through(higher - y[0]) - through(y[0] - DRAIN, 1e-7))]
+
+    modes = {"A": [("B", lambda s, z: b(s) - a(s))], "B": [("A", lambda s, z: a(s) - b(s))]}
     kinks = sorted({*SIDES["a"]["time"], *SIDES["b"]["time"]} - {0.0})
-    exact, switches = pieces(rates, modes, "A", [5e6, 1e6, 3e6], kinks, result.t)
+    exact, switches = pieces(rates, modes, "A", [3e6], kinks, result.t)
     assert result.ok and [mode for _, mode in switches] == ["B", "A"]
-    for name, values in zip(("a", "b", "signal"), exact, strict=True):
-        assert result[f"{name}.pressure"] == pytest.approx(values, abs=1e-9 * 1e7)
+    assert result["signal.pressure"] == pytest.approx(exact[0], abs=1e-9 * 1e7)
     events = result.summary["events"]
-    assert [event["what"] for event in events if event["time"] > 0.0] == ["leaves A", "is at B", "leaves B", "is at A"]
-    times = [event["time"] for event in events if event["what"].startswith("leaves")]
-    assert times == pytest.approx([time for time, _ in switches], abs=1e-9 * 2.0)
+    assert [event["what"] for event in events] == ["switches to B", "switches to A"]
+    assert [event["time"] for event in events] == pytest.approx([time for time, _ in switches], abs=1e-9 * 2.0)
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])

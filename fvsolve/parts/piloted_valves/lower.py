@@ -2,7 +2,6 @@
 
 from fvsolve.assembly.lowering import Device, opening_of
 from fvsolve.errors import Notice
-from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.self_acting import law_relief_valve
 from fvsolve.parts.self_acting.law_disc import FREE_BACK, SENSED
 from fvsolve.parts.self_acting.lower import (
@@ -192,10 +191,10 @@ class PilotCheckRows(Device, kind="pilot-check"):
 class ShuttleRows(Device, kind="shuttle"):
     """Conversion to table rows of shuttle valves: two rows for each valve, from A to out and from B to out."""
 
-    rows, law = 2, law_shuttle
+    rows, law, events_only = 2, law_shuttle, True
     quantities = ("flow_A", "flow_B", "flow_out", "position")
-    events = ("is at A", "leaves A", "is at B", "leaves B")
-    remedy = "give ports A and B chambers, so that its flow does not change their pressures at once"
+    events = ("switches to B", "switches to A")
+    remedy = "its own flow lowers the higher pressure below the lower; reduce it, or give A and B stiffer supplies"
 
     def fill(self, draft, name, link, rows) -> None:
         for port, row in zip("AB", rows, strict=True):
@@ -209,24 +208,20 @@ class ShuttleRows(Device, kind="shuttle"):
     def numbers(self, draft, name, part) -> list[float]:
         first = draft.valve_names.index(name)
         draft.valve_table["device"][first + 1] = draft.valve_table["device"][first]
-        return [0.0, 0.0]
-
-    def sensed(self, part):
-        return (part.ports["A"], -1.0), (part.ports["B"], 1.0)
+        return [0.0]
 
     def difference(self, start, row) -> float:
-        """Pressure at B minus that at A [Pa]."""
+        """Pressure at A minus that at B [Pa]."""
         first = int(row["valve"])
         a, b = (start.pressure(int(start.valves[k]["from_node"])) for k in (first, first + 1))
-        return b - a
+        return a - b
 
     def revise_state(self, start, part, row) -> bool:
         first = int(row["valve"])
-        shut = first if self.difference(start, row) > law_shuttle.BAND else first + 1
+        shut = first if self.difference(start, row) < -law_shuttle.PRESSURE_MARGIN else first + 1
         before, start.shut = start.shut, (start.shut - {first, first + 1}) | {shut}
         return start.shut != before
 
     def begin(self, start, part, row) -> list[str]:
-        stored = all(start.nodes["kind"][row[column]] != rec.JUNCTION for column in ("node", "second"))
-        start.draft.tables.floats[int(row["data"]) :][:2] = self.difference(start, row), stored
+        start.draft.tables.floats[int(row["data"])] = self.difference(start, row)
         return []
