@@ -222,7 +222,9 @@ class Network:
             greatest = float(np.linalg.eigvalsh(q @ a + a.T @ q).max())
             size = float(np.abs(q @ a).max(initial=0.0))
             greatest = 0.0 if abs(greatest) <= ROUNDING * size else greatest
-        return {"states": [name[column] for column in columns], "tied": tied, "eliminated": len(found.unknowns),
+        states = [name[column] for column in columns]
+        states += [self.elements[self.numbers[item]].state for item in self.integrals if item in self.numbers]
+        return {"states": states, "tied": tied, "eliminated": len(found.unknowns),
                 "passive": None if greatest is None else greatest <= 0.0, "greatest": greatest}  # fmt: skip
 
     def is_known_early(self, row) -> bool:

@@ -210,7 +210,7 @@ def test_a_held_load_does_not_move_by_a_bit(law, method):
         run = runs(case, method)
         assert set(run["load.velocity"]) == {0.0} and set(run["load.position"]) == {JACK.x}
         assert len(set(run["cyl.A.pressure"])) == 1 and not run.summary["events"]
-        assert not [text for text in run.summary.get("notices", []) if "accelerates" in str(text)]
+        assert not fvsolve.build(fvsolve.load(case)).steady["moving"]
 
 
 @pytest.mark.parametrize("method", ["dormand-prince", "radau-iia-5"])
@@ -229,11 +229,11 @@ def test_friction_only_takes_energy_and_the_ledger_closes(method):
 
 
 def test_a_run_with_friction_resumes_to_the_bit(tmp_path):
-    case = fed(end=1.0)
+    case = fed(end=0.5)
     case["numerics"]["rtol"] = 1e-9
     whole = fvsolve.run(case, out=tmp_path / "whole", pictures=False)
     assert whole.ok
-    same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 0.4))
+    same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 0.2))
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
