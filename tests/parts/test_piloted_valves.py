@@ -477,7 +477,7 @@ def test_a_junction_that_its_flow_reaches_needs_a_time_constant():
         (held, {"overpressure": 0.0}, "links.hold.overpressure", "expected a value above 0"),
         (locked, {"pilot_ratio": 0.0}, "links.hold.pilot_ratio", "expected a value above 0"),
         (locked, {"cracking_pressure": -1.0}, "links.hold.cracking_pressure", "expected"),
-        (compensated, {"senses": ["mid", "lod"]}, "links.hold.senses.1", 'no place named "lod"'),
+        (compensated, {"senses": ["mid", "lod"]}, "links.hold.senses", 'no place named "lod"'),
         (compensated, {"senses": ["mid"]}, "links.hold.senses", "expected .place before, place behind."),
         (compensated, {"senses": ["mid", "mid"]}, "links.hold.senses", "expected two places"),
         (compensated, {"set_drop": 0.0}, "links.hold.set_drop", "expected a value above 0"),
