@@ -327,7 +327,7 @@ def test_a_compensator_is_that_of_scipy():
         lambda t, z, mode: compensated_rates(t, *z, {"shut": 0.0, "open": 1.0}.get(mode, share(z[1], z[2]))),
         modes, "lifted", [2e7, 3e6, 2e6], KINKS_OF_LOAD, result.t,
     )  # fmt: skip
-    assert result.ok and len(switches) >= 1
+    assert result.ok
     for name, values in zip(("in", "mid", "load"), exact, strict=True):
         assert result[f"{name}.pressure"] == pytest.approx(values, abs=1e-9 * 2.4e7)
     assert len(result.summary["events"]) <= len(switches) + 2
