@@ -153,7 +153,7 @@ BAD = {
     "missing key": (swap('length = "914.4 m"\n', ""), "line 22: links.main: expected one of length, profile"),
     "unknown type": (
         swap('"valve"', '"vavle"'),
-        'line 33: links.valve.type: unknown type "vavle"; types are bearing, bushing, capacitor, check-',
+        'line 33: links.valve.type: unknown type "vavle"; types are altitude-valve, bearing, bushing, c',
     ),
     "unknown type, nearest": (swap('"valve"', '"vavle"'), 'did you mean "valve"?'),
     "missing type": (

@@ -168,3 +168,18 @@ def test_a_relay_without_hysteresis_is_refused_with_its_remedy():
     run = fvsolve.run(tower({"control": "act"}, 0.5, controls={"act": act}))
     assert not run.ok and "controls.act changes its state without end" in run.reason
     assert run.reason.endswith("set the thresholds of the block farther apart, or give it a `filter`")
+
+
+def test_a_latch_keeps_its_state_at_the_start_beside_comparisons_of_levels():
+    """Its inputs are comparisons that are false at the start: nothing is reset before the level passes 4.5 m."""
+    controls = {
+        "full": {"type": "function", "inputs": {"h": "tower.level"}, "formula": "(h > 4.5)"},
+        "low": {"type": "function", "inputs": {"h": "tower.level"}, "formula": "(h < 3.5)*(t > 10)"},
+        "valve": {"type": "latch", "set": "controls.low", "reset": "controls.full", "output": [0.0, 0.6], "initial": 1},
+    }
+    run = fvsolve.run(tower({"control": "valve"}, 0.5, end=900.0, controls=controls))
+    events = {"on": (lambda t, y: y[0] - 4.5, "off"), "off": (lambda t, y: y[0] - 3.5, "on")}
+    outputs = {"on": 0.6, "off": 0.0}
+    y, times = switched(lambda t, y, mode: [level_rate(outputs[mode], y[0])], [4.0], 900.0, events)
+    assert run.ok and events_of(run, "valve") == pytest.approx(times, abs=NEAR)
+    assert run["tower.level"][-1] == pytest.approx(y[0], abs=NEAR)
