@@ -36,6 +36,7 @@ HOOKS = {  # functions of the law of a part: types of arguments and of the resul
     # out, tables, device: 1 outside the range of validity of its law, TEMPORARY if this ends by itself, otherwise 0
     "outside": ("VTD", "i"),
     # t, y, dydt, out, tables, device: power supplied, rate of stored energy, dissipation [W]
+    # for the heat of the fluid the dissipation is computed with `y` in place of `dydt`
     "power": ("tVVVTD", "ttt"),
     "stored": ("VTD", "t"),  # y, tables, device: stored energy, change since the profile [J]
     # Restriction k, conductance g [kg2/s2/Pa], drop [Pa]; denser, wide : see `restrictions.restriction_step`

@@ -16,7 +16,7 @@ from fvsolve.kernels.steady_friction import drag
 from fvsolve.kernels.table_handle import open_tables
 from fvsolve.kernels.viscosity import cell_reynolds
 
-POTENTIAL = BAROTROPIC = None  # constants of the templates
+POTENTIAL = BAROTROPIC = RESTRICTIONS = None  # constants of the templates
 
 
 def _heat_of_restrictions(t, y, dydt, out, handle):
@@ -89,9 +89,19 @@ def node_temperatures(t, y, dydt, out, handle):
         out[at + 2 * k] = row_value(y, out, tables, exchangers[k]["place"]) - zero
 
 
+def _heat_for_events(t, y, out, handle, g):
+    """Write heat and temperatures of exchangers to `out`, which scalars at nodes follow, before event functions."""
+    RESTRICTIONS(t, y, g[:0], out, handle)
+    node_temperatures(t, y, g[:0], out, handle)
+
+
 LINEAR = {"POTENTIAL": total_pressure, "BAROTROPIC": False}
 OTHERS = {"POTENTIAL": total_head, "BAROTROPIC": True}
 heat_of_restrictions = specialise(_heat_of_restrictions, "heat_of_restrictions", **LINEAR)
 heat_of_restrictions_barotropic = specialise(_heat_of_restrictions, "heat_of_restrictions_barotropic", **OTHERS)
 heat_of_pipes = specialise(_heat_of_pipes, "heat_of_pipes", **LINEAR)
 heat_of_pipes_barotropic = specialise(_heat_of_pipes, "heat_of_pipes_barotropic", **OTHERS)
+heat_for_events = specialise(_heat_for_events, "heat_for_events", RESTRICTIONS=heat_of_restrictions)
+heat_for_events_barotropic = specialise(
+    _heat_for_events, "heat_for_events_barotropic", RESTRICTIONS=heat_of_restrictions_barotropic
+)

@@ -213,6 +213,9 @@ COMPONENTS = {
         outlet_values="fluid_heat: heat_of_restrictions_barotropic",
         scalar_rates="fluid_heat: heat_of_pipes_barotropic",
     ),
+    "heat of sensors, linear": RhsTerms(events="fluid_heat: heat_for_events"),
+    "heat of sensors, barotropic": RhsTerms(events="fluid_heat: heat_for_events_barotropic"),
+    "scalars of sensors": RhsTerms(events="scalar_transport: mix_for_events"),
     "viscosity": RhsTerms(rates="viscosity: viscous_friction"),
     "heat exchangers": RhsTerms(
         outlet_values="fluid_heat: node_temperatures", scalar_rates="potential_networks: network_rates"
@@ -257,6 +260,7 @@ class ModelFeatures:
     boundary_exchange : True if several bands have an open boundary
     forces : True if forces on pipes are probed
     device_heat : True if the dissipation of devices heats the fluid
+    scalar_sensors : True if blocks read values of scalars
     other fields : True if the model has such parts or properties
     """
 
@@ -289,6 +293,7 @@ class ModelFeatures:
     reactions: bool = False
     heat: bool = False
     device_heat: bool = False
+    scalar_sensors: bool = False
     exchangers: bool = False
     viscosity: bool = False
 
@@ -316,6 +321,10 @@ class ModelFeatures:
             yield COMPONENTS["closed"]
         if self.networks:
             yield COMPONENTS["sources after blocks" if self.controls else "sources of networks"]
+        if self.scalar_sensors:
+            if self.heat:
+                yield COMPONENTS["heat of sensors, linear" if linear else "heat of sensors, barotropic"]
+            yield COMPONENTS["scalars of sensors"]
         if bends:
             yield COMPONENTS["bends"]
         if self.controls:

@@ -534,6 +534,15 @@ def mix_scalars(t, y, dydt, out, handle):
 
 
 @njit
+def mix_for_events(t, y, out, handle, g):
+    """Write values of scalars at pipe ends and nodes to `out` before event functions of blocks; g is not used."""
+    tables = open_tables(handle)
+    for q in range(tables.scalars.size):
+        outlet_values(y, out, tables, q)
+        mix_nodes(t, y, out, tables, q)
+
+
+@njit
 def scalar_rates(t, y, dydt, out, handle):
     """Write d/dt of the amounts of all scalars in pipes to `dydt`, unless it is empty."""
     tables = open_tables(handle)

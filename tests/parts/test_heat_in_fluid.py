@@ -523,6 +523,26 @@ def test_a_block_that_passes_on_a_temperature_at_once_needs_a_filter():
     assert fvsolve.run(case).ok
 
 
+@pytest.mark.parametrize("numerics", METHODS, ids=lambda item: item["method"])
+def test_a_thermostat_switches_at_its_temperature(numerics):
+    """A relay that reads the temperature of the sump, and one that reads that of the mixed flow behind the throttle."""
+    flow, power = throttled()
+    warmer = RHO / 2.0 * (flow / 4e-6) ** 2 / (RHO * CP)
+    nodes = {"cast": body(initial_temperature=300.0), "air": {"type": "ambient", "temperature": 290.0},
+             "back": junction()}  # fmt: skip
+    links = {"throttle": valve("high", "back", 4e-6), "return": valve("back", "sump", 1e-2),
+             "outer": {"type": "thermal-conductor", "from": "cast", "to": "air", "conductance": 5.0}}  # fmt: skip
+    case = unit(links, nodes, numerics=numerics)
+    relay = {"type": "relay", "on": 45.0, "off": 44.0, "output": [0.0, 100.0], "initial": 0}
+    case["controls"] = {"hot": relay | {"input": "sump.temperature"},
+                        "hotter": relay | {"input": "back.temperature", "on": 47.0 + warmer}}  # fmt: skip
+    for name in case["controls"]:
+        case["links"][f"fan-{name}"] = {"type": "heat-source", "to": "cast", "heat": {"control": name}}
+    events = {event["name"]: event["time"] for event in fvsolve.run(case).summary["events"]}
+    rate = power / (MASS * CP)
+    assert events == approx({"controls.hot": 5.0 / rate, "controls.hotter": 7.0 / rate}, rel=1e-6)
+
+
 def test_a_tank_with_a_level_is_heated_too():
     case = unit()
     case["nodes"]["sump"] = tank(0.5, 0.2)
