@@ -245,13 +245,9 @@ class Model(Displayable):
                     formulas=bool((self.tables.schedules["pieces"] < 0).any()),
                     networks=self.network is not None, heat=bool((self.tables.scalars["specific_heat"] > 0.0).any()),
                     exchangers=has.exchangers, device_heat=bool((self.tables.heat_sources["device"] >= 0).any()),
-<<<<<<< HEAD
+                    scalar_sensors=bool(np.isin(self.tables.sensors["kind"], (rec.NODE_SCALAR, rec.PIPE_SCALAR)).any()),
                     viscosity=bool((self.tables.pipes["temperature"] > 0.0).any()),
                     reactions=has.reactions)  # fmt: skip
-=======
-                    scalar_sensors=bool(np.isin(self.tables.sensors["kind"], (rec.NODE_SCALAR, rec.PIPE_SCALAR)).any()),
-                    viscosity=bool((self.tables.pipes["temperature"] > 0.0).any()))  # fmt: skip
->>>>>>> hc-heat
         return functions(cast)
 
     @property
