@@ -111,10 +111,11 @@ FAULTS = [
     ),
     Fault("studies/stability/growth.py", "scaled @ result + x * v", "scaled @ result - x * v"),
     Fault(
-        "studies/linearise.py",
-        "float(value / input_.scale)",
-        "float(value * input_.scale)",
+        "solve/held_inputs.py",
+        "value_at(model.tables, target.schedule, t, np.inf) / target.scale",
+        "value_at(model.tables, target.schedule, t, np.inf) * target.scale",
     ),
+    Fault("fmi/variables.py", "inputs + list({variable.name", "inputs[:-1] + list({variable.name"),
     Fault("studies/loops/sampled.py", "self.drive * (1.0 + z[place])", "self.drive * (1.0 - z[place])"),
     Fault(
         "model/network_elimination.py",

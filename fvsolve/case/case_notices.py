@@ -109,6 +109,8 @@ def _beyond(declared: Any, value: Any, given: Any) -> tuple[float, float, str] |
 
     declared : declaration of the key; value, given : its value as read and as in the file
     """
+    if isinstance(value, float):
+        declared = getattr(declared, "number", declared)  # a key that is a number or a table
     usual = getattr(declared, "usual", None)
     for x in _numbers(value) if usual else ():
         if x == 0.0 or not math.isfinite(x) or usual.least <= x <= usual.greatest:

@@ -78,6 +78,13 @@ Nms: newton*meter*second | kN m s: kilonewton*meter*second | N s: newton*second 
 kN s: kilonewton*second | kg m2/s: kilogram*meter**2/second
 V: volt | mV: millivolt | kV: kilovolt | A: ampere | mA: milliampere | kA: kiloampere | ohm: ohm | mohm: milliohm
 kohm: kiloohm | Mohm: megaohm | H: henry | mH: millihenry | uH: microhenry | Wb: weber | mWb: milliweber
+uWb: microweber | A/Wb: ampere/weber | 1/H: 1/henry | m3/rad: meter**3/radian
+cm3/rad: centimeter**3/radian | l/rad: liter/radian | m3/rev: meter**3/revolution | l/rev: liter/revolution
+cm3/rev: centimeter**3/revolution | cc/rev: centimeter**3/revolution | ml/rev: milliliter/revolution
+in3/rev: inch**3/revolution | J/kg/K: joule/kilogram/kelvin | kJ/kg/K: kilojoule/kilogram/kelvin
+kg/mol: kilogram/mole | g/mol: gram/mole | kg/kmol: kilogram/kilomole | mol/s: mole/second
+mmol/s: millimole/second | mol/min: mole/minute | mol/h: mole/hour | mol/day: mole/day | J/mol: joule/mole
+kJ/mol: kilojoule/mole
 N m/A: newton*meter/ampere | mN m/A: millinewton*meter/ampere | V s/rad: volt*second | V/(rad/s): volt*second
 V s: volt*second | N m/rad: newton*meter | kN m/rad: kilonewton*meter | N m/deg: newton*meter/degree
 J/K: joule/kelvin | kJ/K: kilojoule/kelvin | MJ/K: megajoule/kelvin | W/K: watt/kelvin | kW/K: kilowatt/kelvin
@@ -98,6 +105,8 @@ PINT_SI = {
     "N m s": "newton*meter*second", "N s": "newton*second",
     "kg m2/s": "kilogram*meter**2/second", "C": "coulomb", "F": "farad",
     "V": "volt", "A": "ampere", "ohm": "ohm", "H": "henry", "Wb": "weber", "N m/A": "newton*meter/ampere",
+    "1/H": "1/henry", "m3/rad": "meter**3/radian", "J/kg/K": "joule/kilogram/kelvin", "kg/mol": "kilogram/mole",
+    "mol/s": "mole/second", "J/mol": "joule/mole",
     "N m/rad": "newton*meter/radian", "J/K": "joule/kelvin", "W/K": "watt/kelvin", "W/m2/K": "watt/meter**2/kelvin",
 }  # fmt: skip
 

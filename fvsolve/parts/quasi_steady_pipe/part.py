@@ -1,6 +1,7 @@
 """Pipes whose flow follows their losses at once: a pipe with `pipe_model = "quasi-steady"`."""
 
-from typing import ClassVar
+from collections.abc import Iterator
+from typing import Any, ClassVar
 
 from fvsolve.parts.pipe.part import QUASI_STEADY, Pipe
 from fvsolve.parts.table_model import CaseContext, Faults
@@ -20,6 +21,9 @@ class QuasiSteadyPipe(Pipe, pipe_model=QUASI_STEADY):
     on_request: ClassVar[tuple[str, ...]] = ()
     own_scalars: ClassVar[str] = ""
     no_scalars: ClassVar[str] = 'it has no volume to carry scalars; use pipe_model = "finite-volume"'
+
+    def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
+        yield from (found for found in super().unusual() if found[0] != ("diameter",))  # short pipes stand for losses
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         yield from super().faults(name, around)

@@ -406,14 +406,16 @@ class Regulator(Device, kind=""):
         """Set value of valve k at the start, as a potential [Pa] for a set pressure, or as a mass flow [kg/s]."""
         if not self.end:
             return self.set_value(start, k)
-        return start.law.potential_of(self.set_value(start, k), float(start.nodes["elevation"][self.sensed(start, k)]))
+        return start.law.potential_of(
+            self.set_value(start, k), float(start.nodes["elevation"][self.regulated_node(start, k)])
+        )
 
-    def sensed(self, start, k: int) -> int:
+    def regulated_node(self, start, k: int) -> int:
         return int(start.valves[k][f"{self.end}_node"])
 
     def is_controllable(self, start, k: int) -> bool:
         """True if valve k can change the quantity that it senses: the flow, or a pressure that is not fixed."""
-        return not self.end or bool(np.isnan(start.fixed_potentials[self.sensed(start, k)]))
+        return not self.end or bool(np.isnan(start.fixed_potentials[self.regulated_node(start, k)]))
 
     def steady_mode(self, start, k: int) -> str:
         return start.valve_modes.setdefault(k, ACTIVE if self.is_controllable(start, k) else OPEN)
@@ -426,8 +428,8 @@ class Regulator(Device, kind=""):
         if not self.end:
             return Edge(i, j, None if start.rest else lambda flow, drop: (1.0, 0.0, goal - flow), drop=lambda flow: 0.0)
         if start.rest:
-            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0, held_potential=(self.sensed(start, k), goal))
-        return Edge(i, j, lambda flow, drop: (0.0, 0.0, 0.0), 0.0, held_potential=(self.sensed(start, k), goal))
+            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0, held_potential=(self.regulated_node(start, k), goal))
+        return Edge(i, j, lambda flow, drop: (0.0, 0.0, 0.0), 0.0, held_potential=(self.regulated_node(start, k), goal))
 
     def revise_state(self, start, part, row) -> bool:
         k = int(row["valve"])
@@ -471,7 +473,7 @@ class Regulator(Device, kind=""):
         given = self.set_value(start, k)
         if not self.end:
             return given - float(start.valves[k]["flow"])
-        pressure = float(start.nodes["pressure"][self.sensed(start, k)])
+        pressure = float(start.nodes["pressure"][self.regulated_node(start, k)])
         return given - pressure if self.end == "to" else pressure - given
 
     def refuse(self, start, k: int) -> None:
