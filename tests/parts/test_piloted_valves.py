@@ -439,8 +439,10 @@ def test_at_rest_it_does_not_move_by_a_bit(name, law, method):
 
 
 def test_a_killed_and_resumed_run_is_the_unbroken_run(tmp_path):
-    fvsolve.run(held({"method": "rodas-5p", "rtol": 1e-7}, **DISCS["lag"]), out=tmp_path / "whole")
-    same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 1.2))
+    fvsolve.run(
+        held({"method": "dormand-prince", "rtol": 1e-9}, **DISCS["lag"]), out=tmp_path / "whole", pictures=False
+    )
+    same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 0.5))
 
 
 def test_a_pilot_at_a_junction_of_a_pipe_opens_it():
@@ -449,13 +451,14 @@ def test_a_pilot_at_a_junction_of_a_pipe_opens_it():
         case = held({"method": "rk4", "courant": 0.5})
         case["nodes"]["pilot"], case["fluid"]["law"] = junction(), law
         case["nodes"]["end"] = chamber(VOLUME, 1e6)
-        case["links"]["sense"] = pipe("signal", "pilot", 5.0, 0.01, 1200.0, 4, friction={"model": "laminar"})
+        friction = {"model": "quasi-steady", "roughness": 0.0}
+        case["links"]["sense"] = pipe("signal", "pilot", 5.0, 0.01, 1200.0, 4, friction=friction)
         case["links"]["leak"] = valve("pilot", "end", 1e-8)
         result = fvsolve.run(case)
         lift = np.clip([lifting(*p) for p in zip(result["load.pressure"], result["pilot.pressure"], strict=True)], 0, 1)
         forward = result["load.pressure"] > result["line.pressure"]
         assert result.ok and np.max(lift[forward]) > 0.1
-        assert result["hold.opening"] == pytest.approx(lift, abs=1e-9)
+        assert result["hold.opening"][forward] == pytest.approx(lift[forward], abs=1e-9)
 
 
 def junction_pilot(**more):
@@ -516,7 +519,8 @@ def circuit(heading):
     case = tomllib.loads(CIRCUITS[heading])
     if heading == "Pilot check valve":
         case = tomllib.loads(CIRCUITS["Counterbalance valve"]) | {"output": {}}
-        case["links"] |= tomllib.loads(CIRCUITS[heading])["links"]
+        for group, parts in tomllib.loads(CIRCUITS[heading]).items():
+            case[group] |= parts
     result = fvsolve.run(case)
     assert result.ok
     return result

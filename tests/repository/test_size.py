@@ -18,11 +18,11 @@ MAX_LINES = 60
 # folder -> (lines, files), with its subfolders
 FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve": (1629, 11),
-    "tests": (928, 7),
+    "tests": (929, 7),
     "benchmarks": (6515, 49),
     "fvsolve/assembly": (1889, 10),
     "fvsolve/basins": (9147, 45),
-    "fvsolve/case": (6684, 24),
+    "fvsolve/case": (6686, 24),
     "fvsolve/cli": (3322, 15),
     "fvsolve/compile": (1050, 6),
     "fvsolve/data": (12, 1),
@@ -35,7 +35,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/mesh": (1077, 4),
     "fvsolve/model": (8844, 26),
     "fvsolve/output": (1535, 9),
-    "fvsolve/parts": (16455, 124),
+    "fvsolve/parts": (16461, 124),
     "fvsolve/report": (2037, 7),
     "fvsolve/run": (1638, 7),
     "fvsolve/solve": (2420, 10),
@@ -56,16 +56,16 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/mesh": (411, 1),
     "tests/model": (2827, 9),
     "tests/output": (518, 2),
-    "tests/parts": (16414, 45),
+    "tests/parts": (16422, 45),
     "tests/reference": (3503, 34),
     "tests/report": (850, 4),
-    "tests/repository": (2546, 14),
+    "tests/repository": (2544, 14),
     "tests/schemes": (254, 1),
     "tests/solve": (1914, 8),
     "tests/step_limits": (1022, 4),
     "tests/steppers": (2114, 12),
     "tests/studies": (7952, 22),
-    "tests/units": (250, 1),
+    "tests/units": (259, 1),
 }
 # functions that exceed a limit: "path: function" -> (arguments, lines). Commands and studies are excepted by rule.
 LONG: dict[str, tuple[int, int]] = {}
