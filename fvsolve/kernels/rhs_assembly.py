@@ -354,15 +354,16 @@ class ModelFeatures:
             yield COMPONENTS["devices"]
         if self.networks:
             yield COMPONENTS["networks"]
+        yield from self.last_components(family)
+
+    def last_components(self, family: str) -> Iterator[RhsTerms]:
+        """Yield the last terms: memory of pipes, basins, scalars, and probes; family : kernels of the density law."""
+        linear = self.family == "linear"
         if self.unsteady_friction:
             yield COMPONENTS["memory" if linear else "memory, barotropic"]
         if self.viscoelastic_walls:
             yield COMPONENTS["creep" if linear else "creep, barotropic"]
         yield from self.basins
-        yield from self.carried_and_observed(family)
-
-    def carried_and_observed(self, family: str) -> Iterator[RhsTerms]:
-        """Yield the last terms: scalars, and probes that need all others; family : kernels of the density law."""
         if self.scalars:  # carried by the flow from the rates of waves, which come before
             yield COMPONENTS["scalars"]
             if not self.alone:
