@@ -161,6 +161,10 @@ class Lowering:
         """Names of the rows of a link in the energy ledger."""
         return [name]
 
+    def turns_with(self, part: Any) -> str | None:
+        """Place of a network of rotation whose speed its law reads before the nodes are solved; None for none."""
+        return None
+
 
 class Restriction(Lowering):
     """Links with one row in the valve table, with the square-root law M |M| = G dp or a law of their own.
@@ -349,10 +353,6 @@ class Device(Restriction):
     def scales(self, draft, name: str, part: Any) -> list[float]:
         """Size of a small deviation of each state of this part."""
         return []
-
-    def turns_with(self, part: Any) -> str | None:
-        """Place of a network of rotation whose speed its law reads before the nodes are solved; None for none."""
-        return None
 
     def schedules_of_rates(self, row, valves, floats) -> list[int]:
         """Indices of further schedules that the rates of its states read; row : of the device"""

@@ -62,7 +62,8 @@ def start_profile(draft) -> dict[str, Any]:
 
     Raises CaseError if no steady state is found.
     """
-    if draft.network is not None and (columns := unknown_speeds(draft, SteadyStart(draft))):
+    turning = any(device.turns_with(part) is not None for _, part, device in draft.devices)
+    if turning and (columns := unknown_speeds(draft, SteadyStart(draft))):
         draft.start_speeds = balanced_speeds(draft, columns)
     return steady_profile(draft)
 

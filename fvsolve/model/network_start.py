@@ -341,10 +341,8 @@ class NetworkStart:
 
 def unknown_speeds(draft, start) -> list[int]:
     """Columns of stores without a stated value whose potential turns a displacement machine."""
-    if draft.network is None or not any(hasattr(part, "displacement") for _, part, _ in draft.devices):
-        return []
     search, network = NetworkStart(draft, start, solved=False), draft.network
-    rows, shafts = network.terms(network.conducting), {getattr(part, "shaft", None) for _, part, _ in draft.devices}
+    rows, shafts = network.terms(network.conducting), {device.turns_with(part) for _, part, device in draft.devices}
     read = {column for node in network.nodes if node in shafts for column in rows[network.node_row(node)]}
     return [column for column in search.free if column in read]
 

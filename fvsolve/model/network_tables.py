@@ -92,8 +92,8 @@ def network_faults(error: NetworkError, case) -> Iterator[tuple[str, str]]:
         sources = listing([part.partition(".")[2] for part in error.sources])
         text = f"lies on the source {sources}, which gives its potential or flow"
         yield error.tied[0], f"{text}; put a resistance between them (a resistor, bearing or thermal-conductor)"
-    elif turning := [name for name in names if hasattr(case.links.get(name), "displacement")]:
-        yield f"links.{turning[0]}.ports.shaft", f"{case.links[turning[0]].shaft} {NO_SPEED}"
+    elif turning := [(name, shaft) for name in names if (shaft := shaft_of(case.links.get(name))) is not None]:
+        yield f"links.{turning[0][0]}.ports.shaft", f"{turning[0][1]} {NO_SPEED}"
     elif error.sources:
         text = f"the sources {listing(names)} contradict each other" if len(names) > 1 else "its flow has no way"
         yield error.sources[0], f"{text}; put a resistance between them, or in parallel"
@@ -102,6 +102,11 @@ def network_faults(error: NetworkError, case) -> Iterator[tuple[str, str]]:
     else:
         text = f"nothing determines the potential or flow of {listing(names, 6)}"
         yield error.parts[0] if error.parts else "links", f"{text}; join a ground, housing, ambient or store"
+
+
+def shaft_of(part) -> str | None:
+    """Shaft whose speed the law of a link reads; None without one."""
+    return None if part is None else lowering_of(type(part)).turns_with(part)
 
 
 def friction_faults(network: Network, found: Elimination) -> Iterator[tuple[str, str]]:

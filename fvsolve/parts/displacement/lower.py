@@ -120,7 +120,6 @@ class MachineRows(Device, kind="displacement-pump"):
         full : mass flow at full share [kg/s]; slope : derivative by the drop [kg/s/Pa]; ratio : of drops
         """
         if slope == 0.0:
-            edge.drop = None if edge.flow != 0.0 else edge.drop
             edge.shut = edge.flow == 0.0
             return edge
         per = PRESSURE / math.sqrt(float(start.valves[k]["conductance"]) * PRESSURE)
