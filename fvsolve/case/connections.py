@@ -3,6 +3,7 @@
 Arguments of most functions are keys as in the file: nodes, links : name -> keys; node, link : keys of one part.
 """
 
+import functools
 from collections.abc import Iterator
 from typing import Any
 
@@ -237,11 +238,13 @@ def _ports(link: dict[str, Any]) -> list[tuple[tuple, Any, str | None]]:
 def _sensed_places(link: dict[str, Any]) -> list[tuple[tuple, str, str]]:
     """List of (key path in the link, name, domain) of the places that a link only senses; entries as of `_ports`."""
     kind, found = kind_of("links", link), []
-    for key in kind.sensed_keys if kind is not None else ():
-        if isinstance(given := link.get(key), str):
-            found.append(((key,), given, "hydraulic"))
+    for path in kind.sensed_keys if kind is not None else ():
+        *tables, key = keys = tuple(path.split("."))
+        given = functools.reduce(lambda table, name: _dict(table.get(name)), tables, link).get(key)
+        if isinstance(given, str):
+            found.append((keys, given, "hydraulic"))
         elif isinstance(given, (list, tuple)):
-            found += [((key, k), place, "hydraulic") for k, place in enumerate(given) if isinstance(place, str)]
+            found += [((*keys, k), place, "hydraulic") for k, place in enumerate(given) if isinstance(place, str)]
     return found
 
 

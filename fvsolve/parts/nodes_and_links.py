@@ -132,7 +132,7 @@ class Link(Part):
     on_request: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded only by explicit probes
     along: ClassVar[dict[str, str]] = {}  # quantities that also exist at a fraction of the length
     joins: ClassVar[dict[str, str]] = {}  # port -> required domain of its place
-    sensed_keys: ClassVar[tuple[str, ...]] = ()  # keys that name hydraulic places whose pressure it only senses
+    sensed_keys: ClassVar[tuple[str, ...]] = ()  # keys of hydraulic places that it only senses, as TABLE.KEY in a table
     in_network: ClassVar[bool] = False  # True if it is an element of a network of rotation, electricity or heat
     network_ports: ClassVar[tuple[str, ...]] = ()  # its only ports in such a network, if it is a part of the fluid too
     main_quantities: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded where a case has no probes

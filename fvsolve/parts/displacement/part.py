@@ -4,12 +4,10 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.nodes_and_links import Ports, TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table_model import CaseContext, Faults, Nested, Table
 from fvsolve.parts.value import Number, Quantity, Text, UsualRange, between, nonnegative, positive
-from fvsolve.units import show
 
 DISPLACEMENTS = UsualRange(1e-9, 1e-2, "0.006 cc/rev to 63 l/rev")  # [m3/rad]
 SPEEDS = UsualRange(0.1, 3200.0, "1 rpm of motors of winches to 30 000 rpm of dental drills")
@@ -159,6 +157,8 @@ class DisplacementPump(DisplacementMachine, kind="displacement-pump"):
     energy: none. Dissipated power: leakage dp^2 + viscous_friction w^2 + friction_torque |w| [W].
     """
 
+    sensed_keys: ClassVar[tuple[str, ...]] = ("compensator.senses",)
+
     compensator: Annotated[Compensator | None, Nested(Compensator, "pressure compensator, or load sensing")] = None
 
     def flow_loss(self, efficiency: float) -> float:
@@ -166,14 +166,6 @@ class DisplacementPump(DisplacementMachine, kind="displacement-pump"):
 
     def torque_loss(self, efficiency: float) -> float:
         return 1.0 / efficiency - 1.0
-
-    def faults(self, name: str, around: CaseContext) -> Faults:
-        yield from super().faults(name, around)
-        sensed = None if self.compensator is None else self.compensator.senses
-        places = wet_places(around)
-        if sensed is not None and sensed not in places:
-            text = f"no place of the fluid named {show(sensed)}; places are {listing(places)}"
-            yield ("compensator", "senses"), text + did_you_mean(sensed, places)
 
 
 class DisplacementMotor(DisplacementMachine, kind="displacement-motor"):
@@ -190,11 +182,3 @@ class DisplacementMotor(DisplacementMachine, kind="displacement-motor"):
 
     def torque_loss(self, efficiency: float) -> float:
         return 1.0 - efficiency
-
-
-def wet_places(around: CaseContext) -> list[str]:
-    """Full names of all places of the fluid of a case."""
-    own = [name for name, node in around.nodes.items() if node.domain == "hydraulic"]
-    inner = [f"{name}.{place}" for name, link in around.links.items()
-             for place, domain in link.owns.items() if domain == "hydraulic"]  # fmt: skip
-    return own + inner
