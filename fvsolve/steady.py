@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-DENSE_LIMIT = 300  # number of unknowns up to which a dense solver is faster
+DENSE_LIMIT = 150  # number of unknowns up to which a dense solver is faster
 DAMPING = 1e-12  # weight of |x|^2 in the least-squares solution of a singular system
 ROUNDING = 1e-13  # Newton change below which only rounding is left, relative to the scales
 SMALL_DROP = 1e-12  # relative difference of potentials that counts as rounding

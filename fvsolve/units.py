@@ -194,6 +194,8 @@ def parse_in(given: Any, si: str, remedy: str) -> float:
         if match is None:
             raise ValueError(f"{show(given)} is not a number with a unit; {remedy}")
         number, spelling = match[1], _canonical(match[2])
+        if re.match(r",\d", spelling):
+            raise ValueError(f"{show(given)} has a decimal comma; did you mean {show(given.replace(',', '.', 1))}?")
         bare = spelling.removeprefix("1/").replace("%", "percent")
         if spelling and not _SAFE_SPELLING.fullmatch(bare):
             raise ValueError(f"{show(given)}: unknown unit {show(spelling)}; {remedy}")
@@ -362,7 +364,9 @@ def _parse_text(text: str, dimension: str) -> tuple[float, Unit | None]:
             raise ValueError(f'{show(text)} has no unit; did you mean "{number} {si}", or the bare number {number}?')
         return float(number), None
     if re.match(r",\d", spelling):
-        raise ValueError(f"{show(text)} has a decimal comma; did you mean {show(text.replace(',', '.', 1))}?")
+        raise ValueError(
+            f"{show(text)} has a decimal comma; did you mean {show(text.replace('.', '').replace(',', '.', 1))}?"
+        )
     unit = find(spelling, dimension, number)
     return unit.read(number), unit
 

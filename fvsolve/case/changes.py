@@ -49,8 +49,9 @@ def class_of_key(case: Case, keys: tuple[Any, ...]) -> str:
     if result == BY_CELLS:
         result = SHAPE if any(link["type"] == "pipe" and "cells" not in link for link in links) else PROFILE
     unsteady = any(link.get("friction", {}).get("model") == "unsteady" for link in links)
-    if result == VALUE and case.needs_equilibrium and keys[0] in ("nodes", "links"):
-        result = PROFILE  # it may change the equilibrium
+    driven = any(name in case.nodes and case.nodes[name].kind == "mass" for name in case.network_places)
+    if result == VALUE and (case.needs_equilibrium or driven) and keys[0] in ("nodes", "links"):
+        result = PROFILE  # it may change the equilibrium, or the force of a mass on a network at the start
     return SHAPE if result == PROFILE and unsteady else result  # the start chooses the terms of unsteady friction
 
 

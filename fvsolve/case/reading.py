@@ -473,9 +473,9 @@ class Reading:
         if not (isinstance(nodes, dict) and isinstance(links, dict)):
             return False
         kinds = [KINDS["nodes"].get(str(part.get("type")) if isinstance(part, dict) else "") for part in nodes.values()]
-        domains = {"" if kind is None else kind.domain for kind in kinds}
+        domains = {kind.domain for kind in kinds if kind is not None}  # an unknown type is a fault of its own
         found = [KINDS["links"].get(str(part.get("type")) if isinstance(part, dict) else "") for part in links.values()]
-        dry = all(kind is not None and "hydraulic" not in {*kind.joins.values(), *kind.owns.values()} for kind in found)
+        dry = all(kind is None or "hydraulic" not in {*kind.joins.values(), *kind.owns.values()} for kind in found)
         return bool(domains & {*NETWORK_DOMAINS}) and domains <= {*NETWORK_DOMAINS, "translational"} and dry
 
     def valid_keys(self, name: str, model: Any) -> Any:

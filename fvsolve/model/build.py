@@ -93,14 +93,14 @@ def balanced_speeds(draft, columns: list[int]) -> dict[int, float]:
         size = np.where(found != 0.0, np.sign(found), 1.0) * DIFFERENCE * (1.0 + np.abs(speeds))
         slopes = np.array([(rates(speeds + change) - found) / change.sum() for change in np.diag(size)]).T
         step = np.linalg.lstsq(slopes, -found, rcond=None)[0]
-        for _ in range(30):
-            after = rates(speeds + step)
+        for halvings in range(30):
+            trial = speeds + 0.5**halvings * step
+            after = rates(trial)
             if np.max(np.abs(after)) <= np.max(np.abs(found)):
                 break
-            step *= 0.5
-        if np.all(np.abs(step) <= 1e-15 * np.abs(speeds)):
+        if np.all(np.abs(trial - speeds) <= 1e-15 * np.abs(speeds)):
             return dict(zip(columns, map(float, speeds), strict=True))
-        speeds, found = speeds + step, after
+        speeds, found = trial, after
     store = draft.network.stores[columns[0]]
     draft.fault(store.part, "no speed balances the torques on it at the start; give the key `initial_speed`")
     draft.check()

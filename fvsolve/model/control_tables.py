@@ -137,8 +137,9 @@ def driven_rows(draft) -> Iterator[tuple[int, int, int]]:
         if row["schedule"] in followers and row["device"] < 0:
             yield rec.DRIVEN_VALVE, k, followers[row["schedule"]]
     for k, row in enumerate(draft.device_table):
-        valve = draft.valve_table[row["valve"]]["schedule"] if row["valve"] >= 0 else -1
-        _, part, device = draft.devices[k]
+        name, part, device = draft.devices[k]
+        lags = "setting" in device.states_of(draft, name, part)  # only the rate of its setting follows the schedule
+        valve = draft.valve_table[row["valve"]]["schedule"] if row["valve"] >= 0 and not lags else -1
         shaft, own = device.turns_with(part), row["schedule"] if device.follows_at_once else -1
         turned = [] if shaft is None else draft.network.schedules_of_node(shaft)
         for block in {followers[index] for index in (own, valve, *turned) if index in followers}:
@@ -243,9 +244,10 @@ class Balance:
         self.stated: set[int] = set()  # as `stated_inputs`
 
     def guess(self) -> np.ndarray:
-        """First outputs: as stated, or in the middle of the limits, or zero."""
-        middle = [0.5 * (a + b) if math.isfinite(a) and math.isfinite(b) else min(max(0.0, a), b)
-                  for a, b in zip(self.low, self.high, strict=True)]  # fmt: skip
+        """First outputs: as stated, or in the middle of the limits, or 0, of numbers without a unit 1."""
+        usual = [float(block.dimensions[1] == "number") for block in self.blocks.values()]
+        middle = [0.5 * (a + b) if math.isfinite(a) and math.isfinite(b) else min(max(value, a), b)
+                  for a, b, value in zip(self.low, self.high, usual, strict=True)]  # fmt: skip
         stated = [block.control.initial_output for block in self.blocks.values()]
         return np.array([m if s is None else s for m, s in zip(middle, stated, strict=True)])
 

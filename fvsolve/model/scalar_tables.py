@@ -69,11 +69,11 @@ def lower_heat(draft, scalar: str, heat_from: Any, by_cell: bool) -> None:
         unused.discard(named.get(name))
         return heat_from == "all" or name in named
 
-    for link, _, lowering in rows_in(case, "valve"):
-        for name in lowering.row_names(link):
-            device, dissipates = devices.get(name, (-1, True))
-            if dissipates and (heats(owners.get(link, link)) or heats(link)):
-                rows.append((draft.valve_names.index(name), device))
+    restrictions = [(link, name) for link, _, lowering in rows_in(case, "valve") for name in lowering.row_names(link)]
+    for k, (link, name) in enumerate(restrictions):
+        device, dissipates = devices.get(name, (-1, True))
+        if dissipates and (heats(owners.get(link, link)) or heats(link)):
+            rows.append((k, device))
     draft.heat_source_table = np.array(rows, rec.HEAT_SOURCE)
     count = len(rows)
     for name, row in zip(draft.pipe_names, draft.pipe_table, strict=True):
@@ -266,8 +266,10 @@ def heat_by_part(model, ledger: np.ndarray, q: int) -> dict[str, float]:
         return {}
     first, last = (int(model.layout[name] - model.layout["supply"]) for name in ("heat", "extent"))
     rows = scale * ledger[:, first:last].sum(axis=0)
-    heat = {model.valve_names[row["valve"]]: float(value)
-            for row, value in zip(tables.heat_sources, rows, strict=False)}  # fmt: skip
+    heat: dict[str, float] = {}
+    for row, value in zip(tables.heat_sources, rows, strict=False):
+        name = model.valve_names[row["valve"]]
+        heat[name] = heat.get(name, 0.0) + float(value)
     for pipe, row in zip(model.pipes, tables.pipes, strict=True):
         if row["heat"] >= 0:
             count = int(row["cells"]) if tables.scalars[q]["by_cell"] else 1

@@ -147,7 +147,8 @@ class Reservoir(PlaceOnBody, kind="reservoir"):
         pressure = around.ambient + around.fluid.density * around.gravity * (head - height)
         if pressure <= boiling:
             place = f"a head of {head:g} m at elevation {height:g} m"
-            yield ("head",), f"{place}: {units.vacuum(pressure, pressure, boiling)}"
+            low = "a vacuum" if pressure <= 0.0 else f"not above the vapour pressure of {boiling:.4g} Pa"
+            yield ("head",), f"{place} is {pressure:.4g} Pa absolute, {low}; expected a greater head"
 
 
 class ReservoirRows(Lowering, kind="reservoir"):

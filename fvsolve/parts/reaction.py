@@ -78,9 +78,10 @@ class RateConstant(Value):
     changes: str = VALUE
     takes: ClassVar[str] = "number of at least 0, (mol/m3)^(1 - order)/s"
     schema: ClassVar[dict[str, Any]] = {"type": ["number", "string"]}
+    number: ClassVar[Quantity] = Quantity("number", nonnegative)
 
     def read(self, given: Any, setting: ReadContext) -> float:
-        return Quantity("number", nonnegative).read(given, setting)
+        return self.number.read(given, setting)
 
 
 def constant_in_si(given: Any, order: float) -> Any:

@@ -207,7 +207,7 @@ class BearingRows(NetworkRows, kind="bearing"):
         place, ends = f"links.{name}", ends_of(case, part)
         found = resistances(place, ends, part.damping, part.heat_to)
         static = part.friction_torque if part.static_torque is None else part.static_torque
-        if static == 0.0:
+        if static == 0.0 and found:
             return found, []
         numbers = part.friction_torque, static, part.stribeck_speed or 0.0, 1.0
         friction, switches = dry_friction(place, ends, numbers, part.heat_to)

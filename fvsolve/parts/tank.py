@@ -46,6 +46,7 @@ class Surface(Value):
     takes = "m2, or `{ level = [0, ...], area = [...] }`"
     usual = UsualRange(1e-6, 1e10, "tubes to lakes")
     dimension = "area"
+    number = Quantity("area", positive)
     changes = PROFILE
     keys = {"level": (Rows("level", nonnegative), NEEDED), "area": (Rows("area", positive), NEEDED)}
 
@@ -53,13 +54,13 @@ class Surface(Value):
         if isinstance(given, AreaTable):
             return given
         if not isinstance(given, dict):
-            return Quantity("area", positive).read(given, setting)
+            return self.number.read(given, setting)
         bottom = [(("level",), "levels are measured from the bottom; the first must be 0")]
         lists = read_lists(given, self.keys, setting, "levels", lambda level, _: bottom * (level[0] != 0))
         return AreaTable(*map(np.array, lists))
 
     def json(self) -> dict[str, Any]:
-        return {"anyOf": [Quantity("area").json(), keys_json(self.keys)]}
+        return {"anyOf": [self.number.json(), keys_json(self.keys)]}
 
 
 class Tank(PlaceOnBody, kind="tank"):

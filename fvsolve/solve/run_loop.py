@@ -41,7 +41,8 @@ FAILURES = {  # reason for the return of the loop -> text
     "halve the step",
 }
 STATUS_FAILURES = {  # status of the right-hand side -> text
-    rec.NO_SOLUTION: "the demand{place} cannot be supplied at {when}; all connections to its node are shut",
+    rec.NO_SOLUTION: "the demand{place} cannot be supplied at {when}; all connections to its node are shut, or pass "
+    "a flow that its pressure does not change: open one, give a machine a leakage, or replace the node by a chamber",
     rec.NO_VOLUME: "the chamber volume{place} is zero at {when}; give the piston an end-stop",
     rec.NO_WIDTH: "the wall has no space left{place} at {when}; give its mass an end-stop, or a wider zone",
     rec.NO_WEIGHT: "the water in {name} has no weight left at {when}; reduce the downward acceleration of its body",

@@ -75,6 +75,8 @@ def range_of(case: Case, key: str, given: Sequence[Any]) -> tuple[float, float]:
     if quantity is None:
         raise ValueError("is not a continuous quantity, so it has no range. Use a grid: --set KEY=a,b,c")
     low, high = (quantity.read(parsed(end), setting) for end in given)
+    if isinstance(low, units.Kinematic) or isinstance(high, units.Kinematic):
+        raise ValueError(f"{show(list(given))} is a kinematic viscosity. Expected dynamic viscosities in Pa s or mPa s")
     if not low < high:
         reason = "is empty" if low == high else "is reversed"
         raise ValueError(f"the range from {show(given[0])} to {show(given[1])} {reason}. Expected LOW below HIGH")
@@ -92,6 +94,7 @@ def key_quantity(raw: dict[str, Any], key: str) -> Quantity | None:
         within = len(keys) > 1 and isinstance(declaration_of(raw, keys[:-1]), Scheduled)
         forms = value.forms.values() if within else ()
         value = next((form[keys[-1]][0] for form in forms if keys[-1] in form), Quantity(value.dimension, value.range))
+    value = getattr(value, "number", value)  # of a value that is a number or a table
     return value if isinstance(value, Quantity) else None
 
 

@@ -14,7 +14,7 @@ from fvsolve.case.changes import CLASSES, changes, declaration_of
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.value import SHAPE, Choice
 
-LARGE = ("net3-pump-trip", "adelaide", "bowl", "swirl", "accumulator")  # cases that take seconds to build
+LARGE = ("net3-day", "net3-pump-trip", "adelaide", "bowl", "swirl", "accumulator")  # cases that take seconds to build
 NUMBER = re.compile(r"\s*([+-]?[\d._]+(?:[eE][+-]?\d+)?)(\s*\S.*|)")
 HAIR = 1e-4
 # keys of class `shape` that do not change the shape of the shipped case; a separate test shows that they can

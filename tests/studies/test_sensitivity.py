@@ -121,6 +121,10 @@ def test_what_cannot_be_asked_is_named(line):
             "is not a continuous quantity",
         ),
         ({"vary": {"fluid.viscosity": [1e-3, 2e-3]}, "outcome": "max(gate.pressure)"}, "no key changes it"),
+        (
+            {"vary": {"fluid.viscosity": ["1 cSt", "2 cSt"]}, "outcome": "max(gate.pressure)"},
+            "is a kinematic viscosity",
+        ),
         ({"vary": bounds, "outcome": "t [s]"}, 'no outcome "t .s."'),
     ):
         with pytest.raises(FvsolveError, match=said):

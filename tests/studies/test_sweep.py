@@ -387,6 +387,19 @@ def test_ends_of_ranges_are_read_in_their_units_pressures_absolute(case):
     }  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("name", "key", "given", "read"),
+    [
+        ("two-tanks", "nodes.high.area", ["100 cm2", 0.02], (0.01, 0.02)),
+        ("pump-trip", "links.pump.efficiency", [0.6, 0.7], (0.6, 0.7)),
+        ("cylinder-servo", "links.spool.overlap", [-0.1, 0.1], (-0.1, 0.1)),
+        ("chlorine", "reactions.oxidation.forward", [1e-6, 2e-6], (1e-6, 2e-6)),
+    ],
+)
+def test_a_number_that_may_also_be_a_table_has_a_range(name, key, given, read):
+    assert key_ranges(fvsolve.load(name), {key: given}) == {key: read}
+
+
 @pytest.mark.parametrize("kind", ["sobol", "lhs"])
 def test_a_sample_fills_its_ranges_more_evenly_than_chance_and_its_seed_says_which(case, kind):
     found = sample_points(case, RANGES, f"{kind}:64", seed=3)

@@ -115,6 +115,11 @@ class CompensatorDisc(PilotedDisc, kind=""):
     def opening_pressure(self, start, part):
         return -part.set_drop - part.overpressure
 
+    def flow_at(self, start, k, drop, lift):
+        """Results of `LiftedValve.flow_at`; a reversed flow changes with the lift too."""
+        full, steep, _ = super().flow_at(start, k, drop, 1.0)
+        return lift * full, max(lift, 0.0) * steep, full
+
     def begin(self, start, part, row):
         super().begin(start, part, row)
         return []

@@ -49,22 +49,20 @@ class BelowUnity(Range):
         return "below 1" if self.least == -math.inf else f"of at least {self.least:g} and below 1"
 
 
-OVERLAP = Number(BelowUnity(), usual=UsualRange(-0.5, 0.5, "critical centre to wide overlap"))
-
-
 @dataclass(frozen=True)
 class Overlap(Value):
     """Value of a case file for the overlap of metering edges: a number for all of them, or a table by edge."""
 
     edges: tuple[Edge, ...]
     about: str = "overlap of the edges, share of the stroke from the centre to an end; negative is an underlap"
+    number: ClassVar[Quantity] = Number(BelowUnity(), usual=UsualRange(-0.5, 0.5, "critical centre to wide overlap"))
 
     def read(self, given: Any, setting: ReadContext) -> Any:
-        return read_keys(given, self.keys, setting) if isinstance(given, dict) else OVERLAP.read(given, setting)
+        return read_keys(given, self.keys, setting) if isinstance(given, dict) else self.number.read(given, setting)
 
     @property
     def keys(self) -> dict[str, tuple[Value, Any]]:
-        return {f"{start}-{end}": (OVERLAP, 0.0) for start, end, _ in self.edges}
+        return {f"{start}-{end}": (self.number, 0.0) for start, end, _ in self.edges}
 
     @property
     def takes(self) -> str:
@@ -74,7 +72,7 @@ class Overlap(Value):
         return self.keys[key][0]
 
     def json(self) -> dict[str, Any]:
-        return {"anyOf": [OVERLAP.json(), keys_json(self.keys)]}
+        return {"anyOf": [self.number.json(), keys_json(self.keys)]}
 
 
 @dataclass(frozen=True)
