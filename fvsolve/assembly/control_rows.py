@@ -103,6 +103,10 @@ class StaticRows(ControlRows):
     def residual(self, control, start):
         return self.value(control, start) - start.output
 
+    def start_and_value(self, control: Any, start: BlockStart, value: float) -> tuple[float, float]:
+        """(output from which the law continues, value of the law at the start); a stated `initial` leaves no offset."""
+        return value if control.initial is not None else start.output, value
+
     def output_rate(self, control, start, rates):
         result, here = 0.0, self.value(control, start)
         for j, rate in enumerate(rates):

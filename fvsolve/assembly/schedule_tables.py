@@ -19,6 +19,8 @@ from fvsolve.kernels.schedule_pieces import (
 )
 
 STEPS_PER_PERIOD = 8  # least number of steps in a period
+SMALL_MOVE = 1e-9  # change of a formula between two samples that is rounding, over its range
+SAMPLES_IN_HALF_WAVE, LEVELS = 4, 6  # samples that show a wave; divisions of a run in search of short waves
 SAMPLED = 32  # schedules with more entries are samples of a smooth function
 SAMPLE_KINK = 0.2  # for samples, change of slope, relative to the greatest slope, at which a step must end
 
@@ -105,11 +107,7 @@ class Schedules:
         self.records.append((first, -1))
         for time, jump in schedule.program.breaks():
             self.breaks[time] = self.breaks.get(time, False) or jump
-        times, values = schedule.program.samples(*self.span)
-        turns = times[1:-1][np.diff(np.sign(np.diff(values))) != 0.0]
-        gaps = np.diff(turns)
-        if gaps[gaps > 0.0].size:  # two turns in a period
-            self.spacing = min(self.spacing, 2.0 * float(np.median(gaps[gaps > 0.0])) / STEPS_PER_PERIOD)
+        self.spacing = min(self.spacing, period_of(schedule.program, *self.span) / STEPS_PER_PERIOD)
         return len(self.records) - 1
 
     def add_program(self, program, scale: float = 1.0, offset: float = 0.0, located: bool = True) -> int:
@@ -128,6 +126,26 @@ class Schedules:
         rows = np.array(self.rows, dtype=np.float64).reshape(-1, PIECE_COLUMNS)
         rows[rows[:, 1] == FORMULA, FLAG] += flags
         return np.array(self.records, dtype=[("first", "i8"), ("pieces", "i8")]).astype(SCHEDULE), rows
+
+
+def period_of(program, start: float, end: float) -> float:
+    """Period of the waves of a formula of time [s]: twice the median time between its turns; inf without waves.
+
+    The samples of a run are too few for short waves: then it is that of the first hundredth of the run, and so on.
+    """
+    gap = np.inf
+    for _ in range(LEVELS):
+        times, values = program.samples(start, end)
+        change = np.diff(values)
+        moves = np.flatnonzero(np.abs(change) > SMALL_MOVE * np.ptp(values))  # the ends of plateaus are no turns
+        turns = times[moves[1:][np.diff(np.sign(change[moves])) != 0.0]]
+        if turns.size < 3:
+            break
+        gap = float(np.median(np.diff(turns)))
+        if gap > SAMPLES_IN_HALF_WAVE * (end - start) / len(times):
+            break
+        end = start + 0.01 * (end - start)
+    return 2.0 * gap
 
 
 def value_at(tables, index: int, t: float, limit: float) -> float:

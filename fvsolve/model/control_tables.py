@@ -137,9 +137,8 @@ def driven_rows(draft) -> Iterator[tuple[int, int, int]]:
         if row["schedule"] in followers and row["device"] < 0:
             yield rec.DRIVEN_VALVE, k, followers[row["schedule"]]
     for k, row in enumerate(draft.device_table):
-        name, part, device = draft.devices[k]
-        lags = "setting" in device.states_of(draft, name, part)  # only the rate of its setting follows the schedule
-        valve = draft.valve_table[row["valve"]]["schedule"] if row["valve"] >= 0 and not lags else -1
+        valve = draft.valve_table[row["valve"]]["schedule"] if row["valve"] >= 0 else -1
+        _, part, device = draft.devices[k]
         shaft, own = device.turns_with(part), row["schedule"] if device.follows_at_once else -1
         turned = [] if shaft is None else draft.network.schedules_of_node(shaft)
         for block in {followers[index] for index in (own, valve, *turned) if index in followers}:
@@ -244,8 +243,8 @@ class Balance:
         self.stated: set[int] = set()  # as `stated_inputs`
 
     def guess(self) -> np.ndarray:
-        """First outputs: as stated, or in the middle of the limits, or 0, of numbers without a unit 1."""
-        usual = [float(block.dimensions[1] == "number") for block in self.blocks.values()]
+        """First outputs: as stated, or in the middle of the limits, or 0; 1 for integrals without a unit."""
+        usual = [float(block.control.integrates and block.dimensions[1] == "number") for block in self.blocks.values()]
         middle = [0.5 * (a + b) if math.isfinite(a) and math.isfinite(b) else min(max(value, a), b)
                   for a, b, value in zip(self.low, self.high, usual, strict=True)]  # fmt: skip
         stated = [block.control.initial_output for block in self.blocks.values()]
@@ -452,6 +451,18 @@ def read_sensors(model, data, t: float, y: np.ndarray, out: np.ndarray) -> np.nd
     return values
 
 
+def before_limits(own, control, start: BlockStart, row) -> BlockStart:
+    """Values of a block at the start, with its output before its limits if these limit it.
+
+    own : conversion of its type; row : row of the block
+    """
+    if control.initial_output is not None or control.integrates or start.output not in (row["least"], row["greatest"]):
+        return start
+    beyond = own.residual(control, start)
+    rounding = ROUNDING * (abs(start.output) + abs(row["greatest"] - row["least"]))
+    return start if abs(beyond) <= rounding else start._replace(output=start.output + beyond)
+
+
 def set_starts(draft, outputs: np.ndarray, starts: list[BlockStart]) -> None:
     """Write the values of all blocks at the start to the tables of a draft."""
     tables = draft.tables
@@ -460,7 +471,7 @@ def set_starts(draft, outputs: np.ndarray, starts: list[BlockStart]) -> None:
         row["start"], row["setpoint_start"], row["held"] = outputs[k], start.setpoint, np.nan
         tables.floats[row["starts"] :][: len(start.inputs)] = start.inputs
         own, numbers = control_rows_of(type(control)), tables.floats[row["data"] :]
-        own.begin(control, start, numbers)
+        own.begin(control, before_limits(own, control, start, row), numbers)
         if row["period"] > 0.0:
             draft.discrete[row["memory"]] = outputs[k]
         draft.start_flags |= own.flags_at_start(control, start, numbers)

@@ -150,6 +150,8 @@ class Program:
         times = np.linspace(start, end, SAMPLES)
         places = np.arange(1, SAMPLES - 1) * 0.6180339887498949 % 1.0 - 0.5  # no period falls on all samples
         times[1:-1] += places * (times[1] - times[0])
+        for t, _ in self.breaks():  # only both sides of a break, not its value once more
+            times = times[np.abs(times - t) > 1e-6 * (end - start) / SAMPLES]
         pairs = [(t, self.value(t)) for t in times.tolist()]
         for t, _ in self.breaks():
             pairs += [(t, self.value(t, t)), (t, self.value(t))] if start <= t <= end else []

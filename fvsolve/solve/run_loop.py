@@ -30,7 +30,7 @@ NO_LIMIT = 1e308
 STEPS_IN_DELAY = MOST_POINTS
 MOST_EVENTS_AT_ONCE = 20  # events at the same time; more is chattering
 # events within this fraction of the run, or within a given step; more is chattering
-MOST_EVENTS_IN_SPAN, SPAN = 2000, 1e-6
+MOST_EVENTS_IN_SPAN, SPAN = 2000, 1e-5
 
 FAILURES = {  # reason for the return of the loop -> text
     loop_records.STOPPED: '{event} at {when}, and numerics.below_vapor = "stop" ends the run there',

@@ -491,8 +491,8 @@ def test_a_pump_that_trips_does_not_follow_a_control():
         ("t or 1", "is not a formula of t: unknown operator or; did you mean max(a, b)?"),
         ("0.5*cos(t) m", "is not a formula of t: *; numbers in a formula are in SI, without units"),
         ("0.5 + 0.1", "is neither a number with a unit nor a formula of t; expected a number*"),
-        ("2*t", "at t = 0.6 s is 1.2, out of range; expected a value between 0 and 1"),
-        ("0.5 - t", "at t = 0.6 s is -0.1, out of range; expected a value between 0 and 1"),
+        ("2*t", "at t = 0.5* s is 1.0*, out of range; expected a value between 0 and 1"),
+        ("0.5 - t", "at t = 0.5* s is -0.0*, out of range; expected a value between 0 and 1"),
         ("1/t", "at t = 0 s is not a finite number"),
         ("log(t - 1)", "at t = 0 s is not a finite number"),
     ],
@@ -513,7 +513,7 @@ def test_a_formula_does_not_compare_for_equality():
         ({"formula": "t/999", "unit": "zz"}, 'unit: "zz": unknown unit "zz"; expected a number*'),
         ({"formula": "t/999", "unit": 3}, "unit: 3 is not text; expected text in quotes"),
         ({"formula": "t/999", "units": "%"}, 'units: unknown key; did you mean "unit"?'),
-        ({"formula": "t", "unit": "%"}, 'formula: "t" at t = 100.05 s is 1.0005, out of range; *'),
+        ({"formula": "t", "unit": "%"}, 'formula: "t" at t = 100.0* s is 1.000*, out of range; *'),
         ({"formula": 3}, "formula: 3 is not text; expected text in quotes"),
         ({"formula": ""}, 'formula: "" is not a formula of t'),
     ],
@@ -529,7 +529,7 @@ def test_a_formula_and_its_unit_have_faults_of_their_own():
 
 def test_a_formula_of_a_pressure_stays_above_the_vapour_pressure():
     changes = PLAIN | {"nodes.source": {"type": "reservoir", "pressure": "1e5*sin(t)", "elevation": 0.0}}
-    text = '"1e5*sin(t)" falls to -1e+05 Pa absolute; expected values above the vapour pressure of * Pa'
+    text = '"1e5*sin(t)" falls to -* Pa absolute; expected values above the vapour pressure of * Pa'
     assert matches(only_fault(changes), f"nodes.source.pressure: {text}")
 
 
@@ -546,6 +546,13 @@ def test_a_number_with_a_wrong_unit_is_not_taken_for_a_formula(text, message):
 def test_with_faulty_times_of_the_run_a_formula_gives_no_second_fault():
     changes = PLAIN | {"links.inlet.opening": "2*t", "numerics.end": "-3 s"}
     assert only_fault(changes) == "numerics.end: -3 s is not after the start at 0 s"
+
+
+@pytest.mark.parametrize("frequency, end", [(50, 40.0), (100, 20.0), (200, 10.0), (20, 100.0)])
+def test_a_formula_that_leaves_its_range_between_even_samples_is_refused(frequency, end):
+    """All even samples of the run fall on the same phase of the wave."""
+    text = f"0.9 + 0.3*sin(2*pi*{frequency}*t)"
+    assert "links.inlet.opening" in only_fault(PLAIN | {"links.inlet.opening": text, "numerics.end": end})
 
 
 @pytest.mark.parametrize("formula", ["0.5 + 0.5*sin(2*pi*t/11)", "t < 3", "min(1, t/10)", "exp(-t)", "t^0.5/100"])

@@ -15,7 +15,9 @@ from solve.test_implicit_runs import killed_and_resumed
 from solve.test_resume import same_files
 
 import fvsolve
+from fvsolve.assembly.schedule_tables import period_of
 from fvsolve.model.jacobian_pattern import jacobian_pattern
+from fvsolve.parts.formula_program import Program
 from fvsolve.studies.linearise import linearise
 
 METHODS = ("dormand-prince", "radau-iia-5", "rodas-5p", "auto")
@@ -255,6 +257,55 @@ def test_a_stated_initial_output_is_that_at_the_start():
     case = tower({"control": "hold"}, 0.5, controls={"hold": pi(4.3, initial=0.4)})
     model = fvsolve.build(fvsolve.load(case))
     assert model.observe(fvsolve.initial_state(model)).tolist() == [4.0, 0.4]
+
+
+PROPORTIONAL = {  # u = 2 (4 - x): 2 at the start, where the limit is 1
+    "pi": pi(4.0, 2.0, None),
+    "function": {"type": "function", "inputs": {"x": "tower.level"}, "formula": "2*(4 - x)"},
+    "table": {"type": "table", "input": "tower.level", "table": {"input": [2.0, 6.0], "output": [4.0, -4.0]}},
+    "transfer-function": {"type": "transfer-function", "input": "controls.error", "numerator": [2.0],
+                          "denominator": [1e-9, 1.0]},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kind", "method"),
+    [*((kind, "radau-iia-5") for kind in PROPORTIONAL), ("pi", "rodas-5p"), ("pi", "dormand-prince")],
+)
+def test_a_law_that_begins_beyond_its_limits_is_followed_when_it_comes_back(kind, method):
+    error = {"type": "function", "inputs": {"x": "tower.level"}, "formula": "4 - x"}
+    controls = {"hold": PROPORTIONAL[kind]} | ({"error": error} if kind == "transfer-function" else {})
+    limits = {} if kind != "table" else {"limits": [0.0, 1.0]}
+    case = tower({"control": "hold"}, 0.3, 3.0, controls=controls | {"hold": controls["hold"] | limits})
+
+    def rates(t, y, k):
+        u = min(max(2.0 * (4.0 - y[0]), 0.0), 1.0)
+        return [(orifice_flow(u, SUPPLY - y[0]) - orifice_flow(0.3, y[0])) / SECTION]
+
+    (level,) = solved(rates, [3.0], [0.0, 300.0])
+    assert final(case, method)[0] == pytest.approx(level, abs=1e-8) and 3.5 < level < 4.0
+
+
+@pytest.mark.parametrize("period", [None, 0.5])
+def test_initial_of_a_function_leaves_no_offset(period):
+    act = {"type": "function", "inputs": {}, "formula": "0.1 + 0.01*t", "initial": 0.5}
+    act |= {} if period is None else {"period": period, "offset": 0.25}
+    run = fvsolve.run(tower({"control": "act"}, 0.3, end=10.0, controls={"act": act}))
+    found = dict(zip(run.t.round(6).tolist(), run["controls.act.output"].tolist(), strict=True))
+    assert found[0.1] == pytest.approx(0.101 if period is None else 0.5, abs=1e-12)
+    assert found[9.7] == pytest.approx(0.197 if period is None else 0.1 + 0.01 * 9.25, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("formula", "end", "period"),
+    [
+        ("sin(2*pi*t/11)", 120.0, 11.0), ("sin(1e4*t)", 100.0, 2e-4 * math.pi), ("sin(2*pi*100*t)", 20.0, 0.01),
+        ("sin(2*pi*t*50) > -0.3", 0.1, 0.02), ("t > 0.02", 0.1, math.inf), ("exp(-t)*(t > 0.03)", 0.1, math.inf),
+        ("max(0, min(1, (t - 3600)/60))", 86400.0, math.inf), ("t^2", 3.0, math.inf),
+    ],
+)  # fmt: skip
+def test_the_period_of_a_formula_is_that_of_its_waves_not_of_jumps_or_plateaus(formula, end, period):
+    assert period_of(Program(formula), 0.0, end) == pytest.approx(period, rel=0.02)
 
 
 def test_explicit_and_implicit_methods_agree_on_a_pump_a_pipe_and_a_filter_under_all_laws():

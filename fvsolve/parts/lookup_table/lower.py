@@ -24,7 +24,8 @@ class LookupTableRows(StaticRows, kind="table"):
         return float(cubic(points)(np.clip(start.inputs[0], points.input[0], points.input[-1])))
 
     def begin(self, control, start, numbers):
-        numbers[law.START], numbers[law.VALUE] = start.output, table_value_at(numbers, start.inputs[0])
+        value = table_value_at(numbers, start.inputs[0])
+        numbers[[law.START, law.VALUE]] = self.start_and_value(control, start, value)
 
 
 def cubic(points):
