@@ -112,6 +112,7 @@ class Trial:
         self.cases: Counter = Counter()  # number of cases for each kind of key
         self.told: dict[int, bool] = {}
         self.names: dict[int, str] = {}
+        self.of_signals: dict[tuple, object] = {}  # declarations of signals are new for each signal
         self.values: list = []  # keeps objects alive, so that their ids stay unique
 
     def case(self, name: str, given: dict | None = None) -> None:
@@ -120,11 +121,13 @@ class Trial:
         before, often = fvsolve.build(case), Counter()
         for keys, _ in leaves(table):
             words = tuple(key for key in keys if isinstance(key, str))
-            value = declaration_of(table, words)
+            declared = declaration_of(table, words)
+            value = self.of_signals.setdefault(words[2:], declared) if words[0] == "signals" else declared
             self.values.append(value)
             often[id(value)] += 1
             several = self.every and name not in LARGE and often[id(value)] == 1 and self.cases[id(value)] < 4
-            if several or id(value) not in self.done:
+            new = name not in LARGE or not self.cases[id(value)]
+            if several or (id(value) not in self.done and new):
                 self.cases[id(value)] += 1
                 self.key(name, table, before, changes(case, spoken(words)), keys, value)
 

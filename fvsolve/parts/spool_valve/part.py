@@ -9,6 +9,7 @@ from fvsolve.parts.nodes_and_links import Link, Ports
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import keys_json, read_keys
 from fvsolve.parts.value import (
+    PROFILE,
     SHAPE,
     VALUE,
     Choice,
@@ -55,6 +56,7 @@ class Overlap(Value):
 
     edges: tuple[Edge, ...]
     about: str = "overlap of the edges, share of the stroke from the centre to an end; negative is an underlap"
+    changes: str = PROFILE
     number: ClassVar[Quantity] = Number(BelowUnity(), usual=UsualRange(-0.5, 0.5, "critical centre to wide overlap"))
 
     def read(self, given: Any, setting: ReadContext) -> Any:
