@@ -60,7 +60,7 @@ class Couplings:
         joined = [[int(self.bodies[i]["root"]) for i in pair] for pair in joined if min(pair) >= 0]
         self.ties = union(len(self.bodies), joined)
         self.devices, self.parts, self.floats = tables.devices, model.devices, tables.floats
-        self.basins, self.integers, self.walls = model.basins, tables.integers, tables.walls
+        self.model, self.basins, self.integers, self.walls = model, model.basins, tables.integers, tables.walls
         self.patches = {int(row["node"]): row for row in tables.patches}
         self.network, self.inputs, self.switches = model.network, tables.network_inputs, tables.network_switches
         self.blocks = BlockCouplings(self, tables)
@@ -156,7 +156,7 @@ class Couplings:
             turned = self.network_states(network.columns_of_rows[network.node_row(shaft)])
         lifting = [self.sets[i] if self.sets else self.pressure_states(i) for i in self.lifting_nodes(link)]
         own = device["schedule"] if rows.follows_at_once else -1
-        lags = "setting" in rows.states_of(None, name, part)
+        lags = "setting" in rows.states_of(self.model, name, part)
         schedules = self.blocks.schedule(-1 if lags else link["schedule"], own)
         return unique_states(self.device_states(device), schedules, turned, *lifting)
 
