@@ -373,7 +373,6 @@ def test_a_cascade_starts_balanced():
         (with_block(setpoint="4.5 m"), ": the input is 4 m, but the setpoint 4.5 m"),
         (BY_PRESSURE | with_block(filter="1 s", setpoint="9 bar"), ": the input is *, but the setpoint 9e+05 Pa"),
         ({"links.outlet.area": "1 m2"}, ""),  # the outlet takes more than the inlet can supply
-        ({"links.inlet.opening": 0.3}, ""),  # the block drives nothing
         ({"controls.level": LAG | {"denominator": [1, 0]}}, ": the input is 4 m, but not 0"),
     ],
 )
@@ -382,6 +381,52 @@ def test_a_loop_without_balance_asks_for_its_initial_output(changes, state):
         f"controls.level: no output of level balances the start{state}; give the key `initial`, the output at the start"
     )
     assert matches(only_fault(changes), text)
+
+
+def test_each_block_without_balance_has_a_fault_and_a_relay_without_state_too():
+    second = {"type": "pi", "input": "tower.level", "setpoint": "5 m", "gain": 1, "integral_time": 3}
+    relay = {"type": "relay", "input": "tower.level", "on": 3, "off": 5}
+    changes = with_block(setpoint="4.5 m") | {"controls.second": second, "controls.relay": relay,
+                                              "links.outlet.opening": {"control": "second"}}  # fmt: skip
+    found = sorted(faults(changes))
+    start = "no output of {} balances the start: the input is 4 m, but the setpoint"
+    assert [text.partition(";")[0] for text in found] == [
+        f"controls.level: {start.format('level')} 4.5 m",
+        "controls.relay: its input is 4 m at the start, between `on` and `off`",
+        f"controls.second: {start.format('second')} 5 m",
+    ]
+
+
+def test_a_block_that_drives_nothing_is_named():
+    idle = 'controls.level: drives no key; write { control = "level" } where it acts'
+    assert only_fault({"links.inlet.opening": 0.3}) == idle
+    assert only_fault({"links.inlet.opening": 0.3, "output.probes": ["controls.level.output"]}) == idle
+    spare = {"controls.spare": FUNCTION}
+    texts = [[notice.text for notice in fvsolve.build(fvsolve.load(edited(LEVEL, spare | more))).warnings]
+             for more in ({}, {"output.probes": ["controls.spare.output"]},
+                          {"controls.sum": {"type": "function", "inputs": {"x": "controls.spare"}, "formula": "x"},
+                           "output.probes": ["controls.sum.output"]})]  # fmt: skip
+    assert texts == [['controls.spare: drives no key; write { control = "spare" } where it acts'], [], []]
+
+
+def test_a_relay_is_refused_in_a_state_that_its_input_contradicts():
+    relay = {"type": "relay", "input": "tower.level", "on": 1, "off": 3}
+    drives = {"links.inlet.opening": {"control": "level"}}
+    text = only_fault(drives | {"controls.level": relay | {"initial": 1}})
+    assert matches(
+        text, "controls.level: `initial` is 1, but its input is 4 m at the start, with `on` at 1 m and `off`*"
+    )
+    assert text.endswith("expected 0, or leave this key out")
+    fvsolve.build(fvsolve.load(edited(LEVEL, drives | {"controls.level": relay | {"initial": 0}})))
+
+
+def test_a_function_beyond_the_range_of_its_key_gives_a_notice_at_the_start():
+    tall = edited(LEVEL, {"controls.level": FUNCTION | {"formula": "2.5*h - 0.5"}})
+    (notice,) = fvsolve.build(fvsolve.load(tall)).warnings
+    assert notice.text.startswith("controls.level: its output at the start, 9.5, is beyond its limits")
+    assert notice.text.endswith("it is limited to 1")
+    stated = {**tall, "controls": {"level": tall["controls"]["level"] | {"limits": [0, 1]}}}
+    assert not fvsolve.build(fvsolve.load(stated)).warnings
 
 
 def test_with_its_initial_output_a_loop_may_start_out_of_balance():
@@ -491,8 +536,8 @@ def test_a_pump_that_trips_does_not_follow_a_control():
         ("t or 1", "is not a formula of t: unknown operator or; did you mean max(a, b)?"),
         ("0.5*cos(t) m", "is not a formula of t: *; numbers in a formula are in SI, without units"),
         ("0.5 + 0.1", "is neither a number with a unit nor a formula of t; expected a number*"),
-        ("2*t", "at t = 0.6 s is 1.2, out of range; expected a value between 0 and 1"),
-        ("0.5 - t", "at t = 0.6 s is -0.1, out of range; expected a value between 0 and 1"),
+        ("2*t", "at t = * s is *, out of range; expected a value between 0 and 1"),
+        ("0.5 - t", "at t = * s is *, out of range; expected a value between 0 and 1"),
         ("1/t", "at t = 0 s is not a finite number"),
         ("log(t - 1)", "at t = 0 s is not a finite number"),
     ],
@@ -513,7 +558,7 @@ def test_a_formula_does_not_compare_for_equality():
         ({"formula": "t/999", "unit": "zz"}, 'unit: "zz": unknown unit "zz"; expected a number*'),
         ({"formula": "t/999", "unit": 3}, "unit: 3 is not text; expected text in quotes"),
         ({"formula": "t/999", "units": "%"}, 'units: unknown key; did you mean "unit"?'),
-        ({"formula": "t", "unit": "%"}, 'formula: "t" at t = 100.05 s is 1.0005, out of range; *'),
+        ({"formula": "t", "unit": "%"}, 'formula: "t" at t = 100.* s is 1.*, out of range; *'),
         ({"formula": 3}, "formula: 3 is not text; expected text in quotes"),
         ({"formula": ""}, 'formula: "" is not a formula of t'),
     ],
@@ -529,7 +574,7 @@ def test_a_formula_and_its_unit_have_faults_of_their_own():
 
 def test_a_formula_of_a_pressure_stays_above_the_vapour_pressure():
     changes = PLAIN | {"nodes.source": {"type": "reservoir", "pressure": "1e5*sin(t)", "elevation": 0.0}}
-    text = '"1e5*sin(t)" falls to -1e+05 Pa absolute; expected values above the vapour pressure of * Pa'
+    text = '"1e5*sin(t)" falls to -9.*e+04 Pa absolute; expected values above the vapour pressure of * Pa'
     assert matches(only_fault(changes), f"nodes.source.pressure: {text}")
 
 
