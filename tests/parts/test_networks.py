@@ -872,6 +872,15 @@ def part(kind, **keys):
     return {"type": kind, **keys}
 
 
+def test_a_port_of_a_wrong_domain_is_the_only_fault():
+    links = {"m": {"type": "dc-motor", "ports": {"p": "a", "n": "gnd", "shaft": "gnd"}, "torque_constant": 0.1,
+                   "resistance": 1}, "E": two_port("voltage-source", "gnd", "a", voltage=12)}  # fmt: skip
+    nodes = {"gnd": part("ground"), "a": part("terminal")}
+    with pytest.raises(CaseError, match="needs a rotational place") as error:
+        fvsolve.load({"nodes": nodes, "links": links, "numerics": {"end": 1.0}})
+    assert len(error.value.faults) == 1
+
+
 MANY = {
     "nodes": {
         "gnd": part("ground"), "a": part("terminal"), "b": part("terminal"), "c": part("terminal"), "s": part("shaft"),
