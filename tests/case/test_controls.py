@@ -409,6 +409,12 @@ def test_a_block_that_drives_nothing_is_named():
     assert texts == [['controls.spare: drives no key; write { control = "spare" } where it acts'], [], []]
 
 
+def test_keys_of_samples_are_unknown_to_a_block_that_acts_at_all_times():
+    relay = {"type": "relay", "input": "tower.level", "on": 1, "off": 3, "period": 1}
+    text = "unknown key; use it in a `function` that reads this block, which acts at all times"
+    assert only_fault({"controls.level": relay}) == f"controls.level.period: {text}"
+
+
 def test_a_relay_is_refused_in_a_state_that_its_input_contradicts():
     relay = {"type": "relay", "input": "tower.level", "on": 1, "off": 3}
     drives = {"links.inlet.opening": {"control": "level"}}
