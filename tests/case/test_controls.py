@@ -409,6 +409,13 @@ def test_a_block_that_drives_nothing_is_named():
     assert texts == [['controls.spare: drives no key; write { control = "spare" } where it acts'], [], []]
 
 
+@pytest.mark.parametrize("key", ["contol", "formla", "singal", "fle"])
+def test_a_misspelt_key_of_a_schedule_has_the_key_of_its_form(key):
+    near = {"contol": "control", "formla": "formula", "singal": "signal", "fle": "file"}[key]
+    text = f'links.outlet.opening.{key}: unknown key; did you mean "{near}"?'
+    assert only_fault({"links.outlet.opening": {key: "level"}}) == text
+
+
 def test_keys_of_samples_are_unknown_to_a_block_that_acts_at_all_times():
     relay = {"type": "relay", "input": "tower.level", "on": 1, "off": 3, "period": 1}
     text = "unknown key; use it in a `function` that reads this block, which acts at all times"
