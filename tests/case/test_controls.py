@@ -214,6 +214,10 @@ def with_block(**keys):
         (with_block(limits=[0.5, 0.5]), "controls.level.limits: [0.5, 0.5] has no values between*"),
         (with_block(limits=[0, 2]), "controls.level.limits: [0, 2] goes beyond *; expected values between 0 and 1"),
         (with_block(limits=3), "controls.level.limits: 3 is not a list; expected a list of values"),
+        (
+            {"controls.level": TABLE | {"table": {"input": [3, 5], "output": [100, 10]}}},
+            "controls.level.table.output: [100.0, 10.0] goes beyond what the driven keys may be; expected values *",
+        ),
     ],
 )  # fmt: skip
 def test_a_fault_of_a_block_has_one_message_with_its_remedy(changes, message):
@@ -359,6 +363,18 @@ def test_a_loop_through_the_network_without_a_state_needs_a_filter():
 def test_a_loop_on_a_pressure_with_a_filter_starts_balanced():
     model = fvsolve.build(fvsolve.load(edited(LEVEL, BY_PRESSURE | with_block(filter="1 s"))))
     assert model.tables.controls["start"][0] == pytest.approx(0.78102, abs=1e-5)  # where mid has 2 bar
+
+
+def test_a_speed_without_limits_is_balanced_from_full_speed():
+    """At rest the pump gives no flow to a demand, so that a search from 0 finds no start."""
+    curve = {"flow": [0, 0.05, 0.08], "head": [60, 50, 34.4]}
+    pump = {"type": "pump", "from": "source", "to": "mid", "speed": {"control": "level"}, "curve": curve}
+    case = edited(LEVEL, BY_PRESSURE | {"links": {"pump": pump}, "nodes.mid.demand": "30 l/s"})
+    case["nodes"] = {name: node for name, node in case["nodes"].items() if name in ("source", "mid")}
+    case["controls"]["level"] |= {"setpoint": "7 bar", "gain": "0.1 1/bar", "filter": "1 s"}
+    model = fvsolve.build(fvsolve.load(case))
+    assert model.tables.controls["start"][0] > 0.5
+    assert fvsolve.run(case)["mid.pressure"] == pytest.approx(7e5, rel=1e-9)
 
 
 def test_a_cascade_starts_balanced():

@@ -356,6 +356,21 @@ def shafts(links, probes, a=None, b=None, end=1.0, **more):
     return network(nodes, links, end, probes, **more)
 
 
+def test_a_bearing_without_friction_does_nothing():
+    found = fvsolve.run(shafts({"bearing": two_port("bearing", "a", "frame", damping=0.0)}, ["a.speed"],
+                               {"initial_speed": 7.0}))  # fmt: skip
+    assert np.array(found["a.speed"]) == pytest.approx(7.0, rel=1e-15)
+
+
+def test_a_misspelt_type_in_a_network_does_not_ask_for_a_fluid():
+    case = shafts({"bearing": two_port("bearing", "a", "frame", damping=0.0)}, ["a.speed"])
+    case["links"]["drive"], case["nodes"]["c"] = {"type": "toque", "to": "a"}, {"type": "shft"}
+    case.pop("fluid", None)
+    with pytest.raises(CaseError) as error:
+        fvsolve.load(case)
+    assert [fault.place for fault in error.value.faults] == ["nodes.c.type", "links.drive.type"]
+
+
 @pytest.mark.parametrize("ratio", [5.0, -5.0])
 def test_a_gear_joins_two_inertias_to_one_state(ratio):
     links = {
