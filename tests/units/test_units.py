@@ -103,7 +103,7 @@ PINT_SI = {
     "1/Pa": "1/pascal", "Pa s/m": "pascal*second/meter",
     "rad/s": "radian/second", "N m": "newton*meter", "kg m2": "kilogram*meter**2",
     "N m s": "newton*meter*second", "N s": "newton*second",
-    "kg m2/s": "kilogram*meter**2/second", "C": "coulomb", "F": "farad",
+    "kg m2/s": "kilogram*meter**2/second", "C": "coulomb", "F": "farad", "mF": "millifarad", "uF": "microfarad",
     "V": "volt", "A": "ampere", "ohm": "ohm", "H": "henry", "Wb": "weber", "N m/A": "newton*meter/ampere",
     "1/H": "1/henry", "m3/rad": "meter**3/radian", "J/kg/K": "joule/kilogram/kelvin", "kg/mol": "kilogram/mole",
     "mol/s": "mole/second", "J/mol": "joule/mole",
