@@ -89,7 +89,8 @@ N m/A: newton*meter/ampere | mN m/A: millinewton*meter/ampere | V s/rad: volt*se
 V s: volt*second | N m/rad: newton*meter | kN m/rad: kilonewton*meter | N m/deg: newton*meter/degree
 J/K: joule/kelvin | kJ/K: kilojoule/kelvin | MJ/K: megajoule/kelvin | W/K: watt/kelvin | kW/K: kilowatt/kelvin
 W/m2/K: watt/meter**2/kelvin | W/(m2 K): watt/meter**2/kelvin | kW/m2/K: kilowatt/meter**2/kelvin
-lb ft2: pound*foot**2 | C: coulomb | F: farad | K: kelvin | degC: degC | celsius: degC | degF: degF | degR: degR
+lb ft2: pound*foot**2 | C: coulomb | F: farad | mF: millifarad | uF: microfarad | K: kelvin
+degC: degC | celsius: degC | degF: degF | degR: degR
 """
 PINT = dict(row.strip().split(": ") for line in ROWS.splitlines() for row in line.split("|") if row.strip())
 PINT_SI = {
@@ -103,7 +104,7 @@ PINT_SI = {
     "1/Pa": "1/pascal", "Pa s/m": "pascal*second/meter",
     "rad/s": "radian/second", "N m": "newton*meter", "kg m2": "kilogram*meter**2",
     "N m s": "newton*meter*second", "N s": "newton*second",
-    "kg m2/s": "kilogram*meter**2/second", "C": "coulomb", "F": "farad", "mF": "millifarad", "uF": "microfarad",
+    "kg m2/s": "kilogram*meter**2/second", "C": "coulomb", "F": "farad",
     "V": "volt", "A": "ampere", "ohm": "ohm", "H": "henry", "Wb": "weber", "N m/A": "newton*meter/ampere",
     "1/H": "1/henry", "m3/rad": "meter**3/radian", "J/kg/K": "joule/kilogram/kelvin", "kg/mol": "kilogram/mole",
     "mol/s": "mole/second", "J/mol": "joule/mole",
