@@ -14,6 +14,7 @@ from fvsolve.case.claims import Compare, DesignLimit, Expect
 from fvsolve.case.controls import Block
 from fvsolve.case.pipe_routes import Route
 from fvsolve.case.probe import Probe, of_profiles
+from fvsolve.case.reading import driven_keys
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
@@ -189,9 +190,16 @@ class Case(Displayable):
         return result
 
     @cached_property
+    def unread_blocks(self) -> set[str]:
+        """Names of the blocks of `controls` that no key follows and no other block reads."""
+        read = {other for name, block in self.controls.items() for other in block.blocks_read if other != name}
+        return {name for name in self.controls if name not in read and not any(driven_keys(self.raw, "control", name))}
+
+    @cached_property
     def notices(self) -> list[Notice]:
-        """Notices of values outside usual ranges and of schedules after the end of the run."""
-        return [*case_notices.range_notices(self), *case_notices.end_notices(self)]
+        """Notices of values outside usual ranges, of schedules after the end of the run, and of blocks without use."""
+        found = case_notices.range_notices(self), case_notices.end_notices(self), case_notices.unread_notices(self)
+        return [notice for notices in found for notice in notices]
 
     @cached_property
     def elevations_stated(self) -> bool:

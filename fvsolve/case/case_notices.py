@@ -155,6 +155,18 @@ def end_notices(case: Any) -> list[Notice]:
     return result
 
 
+def unread_text(name: str) -> str:
+    """Text on a block of `controls` that drives no key."""
+    return f'drives no key; write {{ control = "{name}" }} where it acts'
+
+
+def unread_notices(case: Any) -> list[Notice]:
+    """Notices of each block that no key, no other block and no probe reads."""
+    stated = str([case.raw.get(section) for section in ("output", "expect", "compare")])  # without default probes
+    return [Notice("start", f"controls.{name}", f"controls.{name}: {unread_text(name)}")
+            for name in case.controls if name in case.unread_blocks and f"controls.{name}." not in stated]  # fmt: skip
+
+
 def starts_after_end(part: Any, end: float) -> Iterator[tuple[str, float]]:
     """Yield (key, time [s]) for schedules of a part that change after the time `end` [s], and for a trip after it.
 

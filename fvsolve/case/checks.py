@@ -204,11 +204,11 @@ def reserved_names() -> set[str]:
 
 
 def scalar_faults(
-    scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], cut: Collection[str]
+    scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], cut: Collection[str], table: dict[str, Any]
 ) -> Faults:
     """Faults (key path, message) of names of scalars, their values in parts, and parts that do not support them.
 
-    cut : names of pipes that are cut into pieces
+    cut : names of pipes that are cut into pieces; table : nested dicts of the case as in the file
     """
     for name in scalars:
         yield from ((("scalars", name), text) for text in name_faults(name))
@@ -232,14 +232,57 @@ def scalar_faults(
                         yield place, text + 'boundary = "open"'
             if scalars and part.no_scalars:
                 yield (group, name), f"is {article(part.kind)}; {part.no_scalars}"
-    yield from _heat_faults({name: item for name, item in scalars.items() if item is not None and item.heat}, nodes,
-                            links, cut)  # fmt: skip
+    heated = {name: item for name, item in scalars.items() if item is not None and item.heat}
+    given = [*table.get("links", {}), *(name for name in links if name not in table.get("links", {}))]
+    yield from _heat_faults(
+        heated, links, [*given, *cut], [*table.get("nodes", {})], any(item is None for item in scalars.values())
+    )
 
 
-def _heat_faults(heated: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], cut: Collection[str]) -> Faults:
-    """Faults of scalars with heat, and of heat exchangers without such a scalar; arguments as for `scalar_faults`."""
-    known = [*links, *cut, *nodes]
-    if not heated:
+def _value_range(scalar: str, item: Any, reactions: dict[str, Any]) -> tuple[float, bool, str] | None:
+    """Least value of a scalar, True if it is excluded, and the reason; None for any value."""
+    if item.heat:
+        unit = f" {item.unit}"
+        return -item.zero, True, f"is not above absolute zero; expected a temperature above {-item.zero:g}{unit}"
+    for name, reaction in reactions.items():
+        if reaction is not None and reaction.rate is None and scalar in reaction.sides.names:
+            return 0.0, False, f"is negative, and reaction {name} follows mass action; expected a value of at least 0"
+    return None
+
+
+def scalar_range_faults(
+    scalars: dict[str, Any], reactions: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any]
+) -> Faults:
+    """Faults (key path, message) of temperatures that are not above 0 K, and of negative amounts in mass action.
+
+    scalars, reactions : by name, None if faulty
+    """
+    sound = {name: item for name, item in scalars.items() if item is not None}
+    bounds = {name: bound for name, item in sound.items() if (bound := _value_range(name, item, reactions))}
+    places = [(("scalars", name, "initial"), name, sound[name].initial) for name in bounds]
+    for group, parts in (("nodes", nodes), ("links", links)):
+        for name, part in parts.items():
+            own = {} if isinstance(part, Basin) else getattr(part, "scalars", {})
+            places += [((group, name, "scalars", scalar), scalar, value) for scalar, value in own.items()]
+            for patch, options in getattr(part, "patches", {}).items():
+                where = (group, name, "patches", patch, "scalars")
+                places += [((*where, scalar), scalar, value) for scalar, value in options.scalars.items()]
+    for keys, scalar, value in places:
+        if scalar in bounds and getattr(value, "kind", "") != "control":
+            (low, is_open, text), least = bounds[scalar], float(min(getattr(value, "value", [value])))
+            if least < low or (is_open and least == low):
+                yield keys, f"{least:g} {text}"
+
+
+def _heat_faults(
+    heated: dict[str, Any], links: dict[str, Any], link_names: list[str], node_names: list[str], faulty: bool
+) -> Faults:
+    """Faults of scalars with heat, and of heat exchangers without such a scalar.
+
+    link_names, node_names : names of all parts, faulty ones too; faulty : True if a scalar is, which may have heat
+    """
+    known = [*link_names, *node_names]
+    if not heated and not faulty:
         text = "exchanges heat with a temperature of the fluid; declare one, [scalars.NAME] with heat = true"
         yield from ((("links", name), text) for name, link in links.items() if link.kind == "heat-exchanger")
     for k, (name, scalar) in enumerate(heated.items()):
@@ -250,7 +293,7 @@ def _heat_faults(heated: dict[str, Any], nodes: dict[str, Any], links: dict[str,
             )
         for i, part in enumerate(scalar.heat_from or () if scalar.heat_from != "all" else ()):
             if part not in known:
-                hint = did_you_mean(part, known) or f"; links are {listing([*links, *cut])}"
+                hint = did_you_mean(part, known) or f"; links are {listing(link_names)}"
                 yield ("scalars", name, "heat_from", i), f"no part named {show(part)}{hint}"
 
 

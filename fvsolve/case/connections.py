@@ -70,20 +70,21 @@ def _port_faults(
 
     ports : as from `_ports`; places : names that links can join -> domain
     """
-    fits = True
+    wrong = []
     for keys, place, domain in ports:
         if isinstance(place, str) and place not in places:
             yield keys, _unknown_place(place, places, nodes, links)
         elif isinstance(place, str) and None not in (domain, places[place]) and not _fits(places[place], domain):
-            fits = False
+            wrong.append(keys)
             yield keys, _wrong_domain(place, domain, places, nodes, link)
     sorts = {places.get(place): (keys, place) for keys, place, _ in ports if isinstance(place, str)}
-    if fits and {"translational", "spatial"} <= set(sorts):
+    if not wrong and {"translational", "spatial"} <= set(sorts):
         keys, place = sorts["translational"]
         text = f"{show(place)} is a place on the axis of masses, {show(sorts['spatial'][1])} a place in space"
         yield keys, f"{text}; expected two masses, or two points in space (FRAME.POINT for a frame)"
-    for k, (keys, place, _) in enumerate(ports):
-        if isinstance(place, str) and place in [other for _, other, _ in ports[:k]]:
+    sound = [(keys, place) for keys, place, _ in ports if keys not in wrong]
+    for k, (keys, place) in enumerate(sound):
+        if isinstance(place, str) and place in [other for _, other in sound[:k]]:
             yield keys, f"joins {show(place)} to itself"
 
 

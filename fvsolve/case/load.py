@@ -127,7 +127,8 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     cells = has_cells(network.table)
     check_times(reading, network, parts, fluid, state, numerics or valid_times(reading), cells, expect)
     numerics = fill_numerics(reading, parts, fluid, scalars, numerics, cells)
-    reading.add(checks.scalar_faults(scalars, parts.nodes, parts.links, network.pieces))
+    reading.add(checks.scalar_faults(scalars, parts.nodes, parts.links, network.pieces, reading.raw.table))
+    reading.add(checks.scalar_range_faults(scalars, reactions, parts.nodes, parts.links))
     links = part_reading.fill_cells(reading, parts.links, state, numerics)
     if None not in (numerics, output, state) and not reading.faults:
         reading.add(size_faults(numerics, output, links, parts.meshes, state))

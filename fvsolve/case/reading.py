@@ -499,5 +499,6 @@ def driven_keys(table: Any, word: str, name: str = "", keys: tuple[Any, ...] = (
     if isinstance(table, dict):
         if isinstance(table.get(word), str) and name in ("", table[word]) and keys[:1] != ("signals",):
             yield keys
-        for key, inner in table.items():
+    if isinstance(table, (dict, list)):
+        for key, inner in table.items() if isinstance(table, dict) else enumerate(table):
             yield from driven_keys(inner, word, name, (*keys, key))

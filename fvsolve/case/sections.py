@@ -46,6 +46,7 @@ DEFAULT_ACCURACY = 1e-2  # fraction of the largest jump
 TEMPERATURES = val.UsualRange(60.0, 1000.0, "liquefied gases to molten salt")
 DENSITIES = val.UsualRange(60.0, 14e3, "liquid hydrogen to mercury")
 MODULI = val.UsualRange(1e7, 4e10, "liquefied gases to mercury")
+OILS = val.UsualRange(200.0, 600.0, "cold to hot oil")  # temperatures [K]
 VISCOSITIES = val.UsualRange(1e-5, 5.0, "liquefied gases to heavy fuel oil")
 
 
@@ -152,11 +153,13 @@ class FluidSpec(Table):
         return f"[fluid] with name = {show(name)}, its temperature and more"
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
-        value, usual = self.temperature, TEMPERATURES
-        if self.name == "user" and not usual.least <= value <= usual.greatest:
-            text = f"{value:g} K is outside {usual.least:g} to {usual.greatest:g} K, {usual.source}"
-            text += units.likely(value, "temperature", usual.least, usual.greatest)
-            yield ("temperature",), value, usual.least if value < usual.least else usual.greatest, text
+        given = [(("temperature",), self.temperature, TEMPERATURES)] * (self.name == "user")
+        given += [(("viscosity", "points"), a, OILS) for a, _ in getattr(self.viscosity, "points", ())]
+        for keys, value, usual in given:
+            if not usual.least <= value <= usual.greatest:
+                text = f"{value:g} K is outside {usual.least:g} to {usual.greatest:g} K, {usual.source}"
+                text += units.likely(value, "temperature", usual.least, usual.greatest)
+                yield keys, value, usual.least if value < usual.least else usual.greatest, text
 
 
 class MethodNames(Collection):

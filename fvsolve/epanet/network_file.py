@@ -65,7 +65,7 @@ def read_network(path: Path) -> Any:
             warnings.simplefilter("ignore")
             network, faults = package.network.WaterNetworkModel(str(path)), []
     except Exception as error:  # WNTR raises any exception of its parser
-        faults = [_root_cause(error)]
+        faults = _clock_faults(path) or [_root_cause(error)]
     listed = _listed_faults(package, path)  # also faults that WNTR ignores, for example an undefined pattern
     if faults or listed:
         raise FvsolveError(_fault_message(path, listed or faults, "EPANET" if listed else "WNTR"))
@@ -121,6 +121,18 @@ def _root_cause(error: BaseException) -> str:
     if not coded and isinstance(chain[-1], KeyError):
         text = f"unknown to WNTR: {text!r}"
     return re.sub(r"\s+", " ", re.sub(r"^\(Error \d+\) ", "", text)).strip()
+
+
+def _clock_faults(path: Path) -> list[str]:
+    """Faults of rules with a clock time that WNTR cannot read: an hour without minutes, such as 6 PM."""
+    rule, faults = "", []
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        words = line.partition(";")[0].split()
+        rule = words[1] if len(words) > 1 and words[0].upper() == "RULE" else rule
+        if rule and (found := re.search(r"\bCLOCKTIME\s+\S+\s+(\d+) *([AP]M)\b", " ".join(words), re.IGNORECASE)):
+            hour, half = found.groups()
+            faults.append(f'rule {rule}: the time "{hour} {half}" has no minutes; write {hour}:00 {half}')
+    return faults
 
 
 def _fault_message(path: Path, faults: list[str], source: str) -> str:

@@ -59,13 +59,13 @@ NEEDS = (
 )
 
 
-def write_fmu(case: Case, path: Path | None = None) -> tuple[Path, list[Variable]]:
+def write_fmu(case: Case, path: str | Path | None = None) -> tuple[Path, list[Variable]]:
     """Write the FMU of a case to the file `path`, by default NAME.fmu; return the path and all variables.
 
     Raises FvsolveError without PythonFMU or for a name that does not end in .fmu, and CaseError where an input and a
     probe share a name.
     """
-    path = path or Path(f"{case.name}{SUFFIX}")
+    path = Path(path or f"{case.name}{SUFFIX}")
     if path.suffix.lower() != SUFFIX:
         raise FvsolveError(f"{path}: unknown type of file. Expected a name that ends in {SUFFIX}")
     package = folder_of_pythonfmu()

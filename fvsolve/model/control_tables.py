@@ -13,10 +13,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from fvsolve.assembly.control_rows import BlockStart, control_rows_of, small_change
+from fvsolve.assembly.control_rows import BlockStart, StaticRows, control_rows_of, small_change
 from fvsolve.assembly.schedule_tables import value_at
+from fvsolve.case.case_notices import unread_text
 from fvsolve.case.controls import Block, decision_order
-from fvsolve.errors import listing
+from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.probe_tables import fill_probes
 from fvsolve.units import show
@@ -317,6 +318,7 @@ class Balance:
             if lost and not self.infinite(starts):
                 self.refuse(lost, starts)
         self.refuse_infinite(starts)
+        self.note_limited(starts)
         return outputs, starts
 
     def polish(self, outputs: np.ndarray, matrix: np.ndarray, acts: np.ndarray, by_rates: bool) -> None:
@@ -337,10 +339,9 @@ class Balance:
 
     def stopped(self, outputs: np.ndarray, residual: np.ndarray) -> list[int]:
         """Numbers of the blocks whose integral a limit stops; residual : relative to its change with the outputs."""
-        integrating = [k for k in self.free if list(self.blocks.values())[k].control.integrates]
-        rows = [*zip(self.free, residual, strict=False), *zip(integrating, residual[len(self.free) :], strict=False)]
-        found = {k for k, rest in rows if abs(rest) > STOPPED and outputs[k] in (self.low[k], self.high[k])}
-        return sorted(found.intersection(integrating))
+        rows = np.abs(residual) > STOPPED
+        found = (k for k in self.blocks_of_rows(rows) if outputs[k] in (self.low[k], self.high[k]))
+        return [k for k in found if list(self.blocks.values())[k].control.integrates]
 
     def iterate(self, outputs: np.ndarray) -> list[int]:
         """Iterate the outputs to their balance; returns the numbers of blocks that no output balances."""
@@ -350,8 +351,10 @@ class Balance:
             matrix = np.array([self.slope(outputs, k, residual, by_rates) for k in self.free]).T
             size = np.max(np.abs(matrix), axis=1)
             acts = size > 0.0
-            if residual[~acts].any() or not np.isfinite(matrix).all():
+            if not np.isfinite(matrix).all():
                 return self.free
+            if residual[~acts].any():  # no output changes it
+                return self.blocks_of_rows((residual != 0.0) & ~acts)
             step, _, rank, _ = np.linalg.lstsq(matrix[acts] / size[acts, None], -residual[acts] / size[acts], RANK)
             before = outputs.copy()
             change = step * self.range[self.free]
@@ -367,6 +370,12 @@ class Balance:
                     return self.free
                 by_rates = True
         return self.free
+
+    def blocks_of_rows(self, chosen: np.ndarray) -> list[int]:
+        """Numbers of the blocks of chosen rows of the residuals : bool[rows]."""
+        blocks = list(self.blocks.values())
+        rows = [*self.free, *(k for k in self.free if blocks[k].control.integrates)]
+        return sorted({k for k, is_chosen in zip(rows, chosen, strict=False) if is_chosen})
 
     def passed_on(self, starts: list[BlockStart]) -> np.ndarray:
         """Outputs in which each block that does not integrate has the value that its inputs give."""
@@ -388,15 +397,48 @@ class Balance:
         return (self.residuals(moved, by_rates) - residual) / change
 
     def refuse(self, numbers: list[int], starts: list[BlockStart]) -> None:
-        """Add a fault for blocks that no output balances."""
-        names = [list(self.blocks)[k] for k in numbers]
-        block, start, state = starts[numbers[0]].block, starts[numbers[0]], ""
-        if block.control.integrates and self.residual(start) != 0.0:
-            unit, setpoint = block.dimensions[0], block.control.setpoint_schedule
-            found, set_value = (self.case.amount(x, unit).removesuffix(" -") for x in (start.inputs[0], start.setpoint))
-            state = f": the input is {found}, but {'not 0' if setpoint is None else f'the setpoint {set_value}'}"
-        text = f"no output of {listing(names)} balances the start{state}"
-        self.packed.fault(f"controls.{names[0]}", f"{text}; give the key `initial`, the output at the start")
+        """Add a fault for each block that no output balances; first for blocks whose state at the start is unknown.
+
+        numbers : blocks that may lack a balance; if no input tells which, they have one fault
+        """
+        names, left = list(self.blocks), []
+        for k in range(len(names)):
+            control = starts[k].block.control
+            if text := control_rows_of(type(control)).fault(control, starts[k]):
+                self.packed.fault(f"controls.{names[k]}", text)
+            elif k in numbers and names[k] in self.case.unread_blocks:
+                self.packed.fault(f"controls.{names[k]}", unread_text(names[k]))
+            elif k in numbers:
+                left.append(k)
+        states = {k: state for k in left if (state := self.unbalanced_state(starts[k]))}
+        groups = [([k], state) for k, state in states.items()] or [(left, "")] * bool(left)
+        for group, state in groups:
+            text = f"no output of {listing([names[k] for k in group])} balances the start{state}"
+            self.packed.fault(f"controls.{names[group[0]]}", f"{text}; give the key `initial`, the output at the start")
+
+    def unbalanced_state(self, start: BlockStart) -> str:
+        """Text of the input and setpoint of an integrating block that differ; "" for another block."""
+        block = start.block
+        if not block.control.integrates or self.residual(start) == 0.0:
+            return ""
+        unit, setpoint = block.dimensions[0], block.control.setpoint_schedule
+        found, set_value = (self.case.amount(x, unit).removesuffix(" -") for x in (start.inputs[0], start.setpoint))
+        if setpoint is not None and found == set_value:
+            return ""
+        return f": the input is {found}, but {'not 0' if setpoint is None else f'the setpoint {set_value}'}"
+
+    def note_limited(self, starts: list[BlockStart]) -> None:
+        """Add a notice of each block without `limits` whose inputs give an output beyond those of the driven keys."""
+        for k in self.free:
+            control, start, name = starts[k].block.control, starts[k], list(self.blocks)[k]
+            if isinstance(control_rows_of(type(control)), StaticRows) and control.limits is None:
+                given = self.residual(start) + start.output
+                if not self.low[k] <= given <= self.high[k]:
+                    unit = start.block.dimensions[1]
+                    given, output = (self.case.amount(x, unit).removesuffix(" -") for x in (given, start.output))
+                    text = f"its output at the start, {given}, is beyond its limits, those of the driven keys"
+                    text = f"controls.{name}: {text}; it is limited to {output}"
+                    self.packed.warnings.append(Notice("start", f"controls.{name}", text))
 
     def infinite(self, starts: list[BlockStart]) -> list[int]:
         """Numbers of the blocks whose output at the start is not finite."""

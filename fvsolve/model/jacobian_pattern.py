@@ -60,7 +60,7 @@ class Couplings:
         joined = [[int(self.bodies[i]["root"]) for i in pair] for pair in joined if min(pair) >= 0]
         self.ties = union(len(self.bodies), joined)
         self.devices, self.parts, self.floats = tables.devices, model.devices, tables.floats
-        self.basins, self.integers, self.walls = model.basins, tables.integers, tables.walls
+        self.model, self.basins, self.integers, self.walls = model, model.basins, tables.integers, tables.walls
         self.patches = {int(row["node"]): row for row in tables.patches}
         self.network, self.inputs, self.switches = model.network, tables.network_inputs, tables.network_switches
         self.blocks = BlockCouplings(self, tables)

@@ -379,8 +379,10 @@ class Network:
         try:
             ties = self.ties_of(mode)
         except NetworkError as error:
-            names = listing([part.partition(".")[2] for part in error.sources or error.parts], 3)
-            if error.sources:
+            fault = error.faults[0]
+            parts = [item.part for item in fault.sources] or fault.parts
+            names = listing(list(dict.fromkeys(part.partition(".")[2] for part in parts)), 3)
+            if fault.sources:
                 return f"{listing(changed, 3)} would stick to {names}, whose speed changes with time or differs,"
             return f"{listing(changed, 3)} leaves {names} without a solution"
         if cut := self.cut_sources(mode, sources):

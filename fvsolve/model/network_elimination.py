@@ -9,7 +9,8 @@ example two inertias by a gear. Its time derivative is a further equation, so th
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,16 +34,28 @@ REFINEMENTS = 2  # corrections of a solution by its residual in extended precisi
 Terms = dict[int, float]  # column -> coefficient of a linear function of stores and sources
 
 
+class NetworkFault(NamedTuple):
+    """Reason for which a network has no unique solution.
+
+    parts : places of the parts concerned; tied : stores that are tied to sources; sources : sources that contradict
+    each other, or to which stores are tied; laws : parts of elements whose laws contradict each other
+    """
+
+    parts: list[str]
+    tied: list[Element] = []
+    sources: list[Element] = []
+    laws: list[str] = []
+
+
 class NetworkError(Exception):
     """Network without a unique solution.
 
-    parts : places of the parts concerned; tied : those of stores that are tied to sources; sources : those of sources
-    that contradict each other, or to which stores are tied
+    faults : independent reasons, at least one; relations : as in `Elimination`
     """
 
-    def __init__(self, parts: Iterable[str], tied: Iterable[str] = (), sources: Iterable[str] = ()) -> None:
+    def __init__(self, faults: list[NetworkFault], relations: list[Terms]) -> None:
         super().__init__()
-        self.parts, self.tied, self.sources = list(dict.fromkeys(parts)), list(tied), list(dict.fromkeys(sources))
+        self.faults, self.relations = faults, relations
 
 
 def add(terms: Terms, more: Terms, factor: float = 1.0) -> Terms:
@@ -59,10 +72,13 @@ def cleaned(terms: Terms) -> Terms:
 
 
 class Equation:
-    """Equation: linear function of unknowns, `left` = linear function of stores and sources, `right`."""
+    """Equation: linear function of unknowns, `left` = linear function of stores and sources, `right`.
 
-    def __init__(self) -> None:
-        self.left, self.right = {}, {}
+    parts : place of the part whose law it is, in a list; empty for a balance
+    """
+
+    def __init__(self, *parts: str) -> None:
+        self.left, self.right, self.parts = {}, {}, list(parts)
 
 
 class Elimination:
@@ -83,7 +99,7 @@ class Elimination:
         self.elements, self.columns, self.leaks, self.constant = elements, columns, leaks, constant
         self.stores = {columns[item.name]: item for item in elements if item.is_store}
         self.integrating = {columns[item.name]: item for item in elements if item.is_source and item.state_of}
-        self.names = {number: item.part for item in elements if (number := columns.get(item.name)) is not None}
+        self.items = {number: item for item in elements if (number := columns.get(item.name)) is not None}
         self.known: dict[str, int] = {}  # node -> column of its potential
         for kind in (POTENTIAL, CAPACITY):
             for item in elements:
@@ -99,9 +115,19 @@ class Elimination:
                 self.unknowns.setdefault(("flow", item.name), len(self.unknowns))
         self.equations = list(self.make_equations())
         self.relations: list[Terms] = []  # sums of stores and sources that are zero
+        self.contradictions: list[Terms] = []  # sums of sources that would have to be zero, or of stores tied to them
+        self.faults: list[NetworkFault] = []
         self.solution: dict[int, Terms] = {}
         while self.solve():
             pass
+        if self.faults:
+            raise NetworkError(self.faults, self.relations)
+
+    def add_fault(self, fault: NetworkFault) -> None:
+        """Add a fault, unless earlier faults have parts of it; of a contradiction, all parts of it."""
+        known = {part for other in self.faults for part in other.parts}
+        if known.isdisjoint(fault.parts) or (fault.sources and not known.issuperset(fault.parts)):
+            self.faults.append(fault)
 
     def parts_of(self, unknown: int) -> list[str]:
         """Places of the parts that an unknown concerns."""
@@ -141,7 +167,7 @@ class Elimination:
         for item in self.elements:
             column = self.columns.get(item.name, -1)
             if item.kind in HAS_FLOW and self.known.get(item.ends[0], -2) != column:
-                law = Equation()
+                law = Equation(item.part)
                 self.put_drop(law, item.ends)
                 if item.kind == TRANSFORMER:
                     self.put_drop(law, item.ends[2:], -item.value)
@@ -162,12 +188,13 @@ class Elimination:
 
     def solve(self) -> bool:
         """Solve all blocks of equations; True if relations were found, whose derivatives must be solved too."""
-        found = [equation.right for equation in self.equations if not equation.left and any(equation.right.values())]
+        found = [(equation.right, equation.parts) for equation in self.equations
+                 if not equation.left and any(equation.right.values())]  # fmt: skip
         self.equations = [equation for equation in self.equations if equation.left]
-        new = [self.tie(relation) for relation in found]
+        new = [self.tie(*relation) for relation in found]
         if not any(new):
             blocks = [EquationBlock(*block) for block in self.blocks()]
-            new = [self.tie(relation) for block in blocks for relation in block.relations()]
+            new = [self.tie(*relation) for block in blocks for relation in block.relations()]
             if not any(new):
                 for block in blocks:
                     self.solution |= self.solve_block(block)
@@ -222,15 +249,18 @@ class Elimination:
         if np.linalg.matrix_rank(choice, 1e-9) < free.shape[1]:
             loose = np.abs(free).max(axis=1) > 1e-6 * np.abs(free).max()
             parts = [part for u, is_loose in zip(unknowns, loose, strict=True) if is_loose for part in self.parts_of(u)]
-            raise NetworkError(parts)
+            self.add_fault(NetworkFault(list(dict.fromkeys(parts))))
         rest = rows @ solution - given.reshape(len(laws), len(block.columns))
         return solution - free @ (np.linalg.pinv(choice) @ rest)
 
-    def tie(self, relation: Terms) -> bool:
-        """Add a relation, and its derivative as an equation; False if it follows from earlier ones."""
-        relation = reduced(relation, self.relations)
-        if not relation:
+    def tie(self, relation: Terms, laws: list[str]) -> bool:
+        """Add a relation, and its derivative as an equation; False if it follows from earlier ones or cannot hold.
+
+        laws : places of the parts from whose laws it follows
+        """
+        if not reduced(relation, [*self.relations, *self.contradictions]):
             return False
+        relation = reduced(relation, self.relations)
         if self.leaks and len(relation) == 1 and (item := self.integrating.get(next(iter(relation)))):
             self.relations.append(relation)  # no current of a coil in an open circuit, whose flux does not change
             self.equations.append(Equation())
@@ -239,8 +269,11 @@ class Elimination:
         sources = [column for column in relation if column not in self.stores and column not in self.constant]
         sources += [] if relation.keys() & self.stores.keys() else list(relation)
         if sources:
-            tied = [self.names[column] for column in relation if column in self.stores]
-            raise NetworkError([self.names[c] for c in relation], tied, [self.names[c] for c in sources])
+            self.contradictions.append(relation)
+            items = [self.items[column] for column in relation]
+            tied, parts = [item for item in items if item.is_store], dict.fromkeys(item.part for item in items)
+            self.add_fault(NetworkFault(list(parts), tied, [self.items[c] for c in sources], laws))
+            return False
         self.relations.append(relation)
         equation = Equation()
         for column, factor in relation.items():
@@ -294,7 +327,7 @@ class EquationBlock:
     """
 
     def __init__(self, equations: list[Equation], unknowns: list[int]) -> None:
-        self.unknowns = unknowns
+        self.unknowns, self.equations = unknowns, equations
         self.columns = sorted({column for equation in equations for column in equation.right})
         place, side = {u: k for k, u in enumerate(unknowns)}, {c: k for k, c in enumerate(self.columns)}
         self.matrix = np.zeros((len(equations), len(unknowns)))
@@ -312,8 +345,11 @@ class EquationBlock:
         self.left, self.singular, self.right = np.linalg.svd(self.matrix * self.by_row * self.by_column.T)
         self.rank = int(np.sum(self.singular > RANK * self.singular.max(initial=0.0)))
 
-    def relations(self) -> list[Terms]:
-        """Relations between stores and sources, from the left null vectors of the matrix."""
+    def relations(self) -> list[tuple[Terms, list[str]]]:
+        """Relations between stores and sources, from the left null vectors of the matrix.
+
+        Places of the parts from whose laws each of them follows are added.
+        """
         if self.rank == len(self.matrix):
             return []
         scaled, found = self.given * self.by_row, []
@@ -322,9 +358,9 @@ class EquationBlock:
             terms = vector @ scaled
             largest = np.abs(terms).max(initial=0.0)
             if largest > SMALL * size:
-                found.append(
-                    {c: float(v) for c, v in zip(self.columns, terms, strict=True) if abs(v) > SMALL * largest}
-                )
+                laws = [equation.parts for equation, v in zip(self.equations, vector, strict=True) if abs(v) > SMALL]
+                relation = {c: float(v) for c, v in zip(self.columns, terms, strict=True) if abs(v) > SMALL * largest}
+                found.append((relation, list(dict.fromkeys(sum(laws, [])))))
         return found
 
     def solve(self) -> tuple[np.ndarray, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +11,11 @@ from fvsolve.assembly.network_elements import Element
 from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.network_elimination import Elimination, NetworkError, Terms, substituted
-from fvsolve.model.network_tables import network_faults
+from fvsolve.model.network_faults import network_faults, tie_fault
 from fvsolve.model.scalar_tables import exchanger_names
+from fvsolve.steady import union
 
 TURNS = 60  # changes of switches, and of nonlinear sources, in the search
-AGREE = 1e-9  # relative difference of two values that are equal
 RESTING = 1e-9  # rate of a store in equilibrium, over the sum of the magnitudes of its terms
 LOOSE = 1e-6  # share of a store in a change of values under which no rate changes
 SLIP = 1e-12  # slip that is rounding, over the sum of the magnitudes of its speeds
@@ -149,33 +150,31 @@ class NetworkStart:
         """Search for the start, and write it to the tables of the draft and to `draft.network`."""
         for _ in range(TURNS):
             try:
-                fault = self.solve()
+                faults = self.solve()
             except NetworkError as error:
                 if self.let_slip():
                     continue
-                for place, text in network_faults(error, self.draft.case):
+                for place, text in network_faults(error.faults, self.draft.case):
                     self.draft.fault(place, text)
                 return
             if not self.change_switch():
                 break
         else:
-            fault = self.switches[0].part, "its state at the start alternates; state the initial values of the stores"
-        if fault is not None:
-            self.draft.fault(*fault)
+            text = "its state at the start alternates; state the initial values of the stores"
+            faults = [(self.switches[0].part, text)]
+        for place, text in faults:
+            self.draft.fault(place, text)
         count = len(self.stores)
-        for item in self.network.cut_sources(self.mode, self.values[count:]) if fault is None else ():
+        for item in self.network.cut_sources(self.mode, self.values[count:]) if not faults else ():
             self.draft.fault(item.part, "its current at the start has no way; close a switch, or leave out the flux")
-        for column, terms in self.network.ties_of(self.mode).items() if fault is None else ():
+        for column, terms in self.network.ties_of(self.mode).items() if not faults else ():
             self.check_tie(column, self.sum_of(terms), terms)
         self.write()
 
     def check_tie(self, column: int, value: float, terms: Terms) -> None:
         """Add a fault if a store does not have the value that the stores have to which it is tied."""
-        if abs(value - self.values[column]) > AGREE * (abs(value) + abs(self.values[column])):
-            tied = [self.stores[other].part.partition(".")[2] for other in terms if other in self.stores]
-            text = f"its value at the start, {self.values[column]:.6g}, contradicts "
-            text += f"{listing(tied)}, to which it is tied" if tied else "the parts that hold it"
-            self.draft.fault(self.stores[column].part, f"{text}; expected {value:.6g}")
+        if fault := tie_fault(self.draft.case, self.stores, column, float(self.values[column]), value, terms):
+            self.draft.fault(*fault)
 
     def let_slip(self) -> bool:
         """Let the last friction slip that sticks, where the mode has no solution; False if there is none."""
@@ -201,24 +200,24 @@ class NetworkStart:
         small = sum(abs(value) * self.stores[column].small for column, value in terms.items() if column in self.stores)
         return SLIP * (small + self.size_of(terms))
 
-    def solve(self) -> tuple[str, str] | None:
-        """Solve for the free stores in the present mode; returns a fault (place, text) if there is no equilibrium."""
-        fault = None
+    def solve(self) -> list[tuple[str, str]]:
+        """Solve for the free stores in the present mode; returns the faults (place, text) without an equilibrium."""
+        faults: list[tuple[str, str]] = []
         for _ in range(TURNS):
             before = self.values.copy()
-            fault = self.balance()
+            faults = self.balance()
             for column, terms in self.network.dependent.items():
                 self.values[column] = self.sum_of(terms)
             self.set_nonlinear_sources()
             if np.all(np.abs(self.values - before) <= 1e-14 * (np.abs(before) + np.abs(self.values))):
                 break
-        return fault
+        return faults
 
-    def balance(self) -> tuple[str, str] | None:
-        """Set the free stores so that their rates are zero and ties of the mode hold; returns a fault, or None."""
+    def balance(self) -> list[tuple[str, str]]:
+        """Set the free stores so that their rates are zero and ties of the mode hold; returns faults (place, text)."""
         network, found, place = self.network, self.network.equations(self.mode), {c: k for k, c in enumerate(self.free)}
         if not place:
-            return None
+            return []
         ties = network.ties_of(self.mode)
         laws = [substituted(self.rate(found, column), network.dependent) for column in self.free if column not in ties]
         laws += [{column: -1.0} | terms for column, terms in ties.items() if place.keys() & {column, *terms}]
@@ -237,16 +236,28 @@ class NetworkStart:
         solution, _, rank, _ = np.linalg.lstsq(matrix * sizes * scale[:, None], given * scale, rcond=1e-11)
         self.values[self.free] += solution * sizes
         self.set_fluid_heat()
-        for law in laws:
-            if abs(self.sum_of(law)) > RESTING * self.size_of(law):
-                moving = [self.item(c) for c in self.free]
-                names = listing([item.state for item in moving], 4)
-                return moving[0].part, f"there is no equilibrium of {names} at the start; state its initial value"
+        moves = [abs(self.sum_of(law)) > RESTING * self.size_of(law) for law in laws]
+        if any(moves):
+            reads = matrix != 0.0
+            for k, column in enumerate(column for column in self.free if column not in ties):
+                reads[k, place[column]] = True
+            return list(self.moving_faults(moves, reads))
         null = np.linalg.svd(matrix * sizes * scale[:, None])[2][rank:]
         loose = [self.item(c) for c, k in place.items() if np.any(np.abs(null[:, k]) > LOOSE)]
-        if item := next((item for item in loose if item.thermal), None):
-            return item.part, "nothing determines its temperature at the start; give the key `initial_temperature`"
-        return None
+        text = "nothing determines its temperature at the start; give the key `initial_temperature`"
+        return [(item.part, text) for item in loose if item.thermal]
+
+    def moving_faults(self, moves: list[bool], reads: np.ndarray) -> Iterator[tuple[str, str]]:
+        """Yield a fault (place, text) for each group of free stores that has no equilibrium.
+
+        moves : True for laws that do not hold; reads : True for the stores of each law, bool[laws, stores]
+        """
+        laws, count = reads.shape
+        labels = union(laws + count, [(k, j + laws) for k, j in np.argwhere(reads).tolist()])
+        for label in dict.fromkeys(labels[k] for k in range(laws) if moves[k]):
+            items = [self.item(column) for j, column in enumerate(self.free) if labels[laws + j] == label]
+            names = listing([item.state for item in items], 4)
+            yield items[0].part, f"there is no equilibrium of {names} at the start; state its initial value"
 
     def rate(self, found: Elimination, column: int) -> Terms:
         """Rate of a store, or of the state of an integrating source."""

@@ -8,17 +8,15 @@ import numpy as np
 
 from fvsolve.assembly.lowering import lowering_of
 from fvsolve.assembly.network_elements import FLOW, INERTANCE, Element, Switch, node_or_reference
-from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.network import MOST_STATES, Network
 from fvsolve.model.network_elimination import Elimination, NetworkError, dependent_stores, substituted
+from fvsolve.model.network_faults import NO_INERTIA, NO_SPEED, network_faults, stated_faults
 from fvsolve.model.scalar_tables import exchanger_names
 
 CURRENT_ROUNDING = 1e-13  # of diodes, over the sum of all sources divided by their resistance
-NO_SPEED = "has neither an inertia nor a given speed; give this shaft the key `inertia`"
 SAMPLES = 12  # times at which responses are computed for the sizes of states
 CATEGORIES = {"": rec.NOT_BOOKED, "stored": rec.STORED, "dissipated": rec.DISSIPATED, "supplied": rec.SUPPLIED}
-NO_INERTIA = "its speeds depend on its own torque at once; give the shafts at both ends an `inertia`"
 EVENTS = {
     rec.SWITCH: ("closes", "opens"),
     rec.DIODE: ("conducts", "blocks"),
@@ -36,7 +34,9 @@ def lower_networks(draft) -> None:
     try:
         found = network.equations(network.conducting)
     except NetworkError as error:
-        for place, text in network_faults(error, draft.case):
+        case, fixed = draft.case, network.states_of_others
+        found = [*network_faults(error.faults, case), *stated_faults(error.relations, network.stores, fixed, case)]
+        for place, text in found:
             draft.fault(place, text)
         return
     network.dependent = dependent_stores(found.relations, network.stores, network.states_of_others)
@@ -75,38 +75,6 @@ def parts_of_network(case) -> tuple[list[Element], list[Switch]]:
         elements.append(Element(FLOW, f"{item.name}.heat", item.part, (None, node), reads=(rec.HEAT_INPUT, item.name),
                                 thermal=True))  # fmt: skip
     return elements, switches
-
-
-def network_faults(error: NetworkError, case) -> Iterator[tuple[str, str]]:
-    """Yield the fault (place, text) of a network without a unique solution."""
-    names = [part.partition(".")[2] for part in error.parts]
-    dry = [name for name in names if getattr(case.links.get(name), "kind", "") in ("bearing", "clutch")]
-    coils = [name for name in names if getattr(case.links.get(name), "kind", "") == "solenoid"]
-    if coils and len(names) > 1:
-        others = listing([name for name in names if name != coils[0]])
-        text = f"its flux gives the current, and {others} in series gives a current too"
-        yield f"links.{coils[0]}", f"{text}; put a resistor in parallel with one of them"
-    elif error.sources and dry:
-        yield f"links.{dry[0]}", NO_INERTIA
-    elif error.tied:
-        sources = listing([part.partition(".")[2] for part in error.sources])
-        text = f"lies on the source {sources}, which gives its potential or flow"
-        yield error.tied[0], f"{text}; put a resistance between them (a resistor, bearing or thermal-conductor)"
-    elif turning := [(name, shaft) for name in names if (shaft := shaft_of(case.links.get(name))) is not None]:
-        yield f"links.{turning[0][0]}.ports.shaft", f"{turning[0][1]} {NO_SPEED}"
-    elif error.sources:
-        text = f"the sources {listing(names)} contradict each other" if len(names) > 1 else "its flow has no way"
-        yield error.sources[0], f"{text}; put a resistance between them, or in parallel"
-    elif names and all(getattr(case.links.get(name), "kind", "") in ("gear", "rack", "dc-motor") for name in names):
-        yield error.parts[0], f"{listing(names, 6)} form a closed loop, whose torques are not determined; leave one out"
-    else:
-        text = f"nothing determines the potential or flow of {listing(names, 6)}"
-        yield error.parts[0] if error.parts else "links", f"{text}; join a ground, housing, ambient or store"
-
-
-def shaft_of(part) -> str | None:
-    """Shaft whose speed the law of a link reads; None without one."""
-    return None if part is None else lowering_of(type(part)).turns_with(part)
 
 
 def friction_faults(network: Network, found: Elimination) -> Iterator[tuple[str, str]]:

@@ -124,13 +124,11 @@ class Control(Table):
     """Block of `controls`: its output is a schedule for keys of parts and for other blocks.
 
     kinds : type in the case file -> class; passes_at_once : True if its output depends on the present values of its
-    inputs; integrates : see its docstring; may_sample : True if it can act at samples, with `period`;
-    same_unit : True if its output has the unit of its input
+    inputs; integrates : see its docstring; same_unit : True if its output has the unit of its input
     """
 
     kind: ClassVar[str] = ""
     kinds: ClassVar[dict[str, type[Control]]] = {}
-    may_sample: ClassVar[bool] = True
     same_unit: ClassVar[bool] = False
 
     filter: Annotated[
@@ -155,13 +153,6 @@ class Control(Table):
                 raise FvsolveError(f"a control of type {show(kind)} exists already; expected another name")
             cls.kind = kind
             cls.kinds[kind] = cls
-
-    @classmethod
-    def key_faults(cls, given: dict[str, Any]) -> list:
-        text = (
-            "does not apply to this type, which acts at all times; remove the key, or read it by a sampled `function`"
-        )
-        return super().key_faults(given) + [(("period",), text)] * ("period" in given and not cls.may_sample)
 
     @classmethod
     def inputs_of(cls, given: dict[str, Any]) -> dict[tuple[str, ...], Any]:
@@ -205,6 +196,16 @@ class Control(Table):
     def passes_at_once(self) -> bool:
         """True if its output depends on the present values of its inputs."""
         return self.filter is None
+
+
+class Unsampled(Control):
+    """Block that acts at all times, and has no keys for samples."""
+
+    period: ClassVar[None] = None
+    offset: ClassVar[float] = 0.0
+    synonyms: ClassVar[dict[str, str]] = dict.fromkeys(
+        ("period", "offset"), "it in a `function` that reads this block, which acts at all times"
+    )
 
 
 class SingleInput(Control):

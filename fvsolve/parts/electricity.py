@@ -37,6 +37,10 @@ from fvsolve.parts.value import Quantity, Text, UsualRange, nonnegative, nonzero
 VOLTAGE = InputKind("V", "a finite number [V]")
 CURRENT = InputKind("A", "a finite number [A]")
 CONTACT = "1 mohm"  # resistance of closed switches and conducting diodes that state none
+VOLTAGES = UsualRange(-1e6, 1e6, "to transmission lines")  # [V]
+RESISTANCES = UsualRange(1e-6, 1e9, "contacts to insulation")  # [ohm]
+INDUCTANCES = UsualRange(1e-9, 100.0, "conductors to iron-core chokes")  # [H]
+CAPACITANCES = UsualRange(1e-12, 10.0, "ceramic to double-layer capacitors")  # [F]
 SMALL_VOLTAGE, SMALL_CURRENT = 1.0, 1.0  # sizes of small deviations, where the network does not tell [V], [A]
 
 
@@ -67,7 +71,7 @@ class Ground(GivenPotential, kind="ground"):
     main_quantities: ClassVar[tuple[str, ...]] = ("voltage",)
     potential_key: ClassVar[str] = "voltage"
 
-    voltage: Annotated[Schedule, Scheduled("voltage", about="voltage [V]")] = Field(
+    voltage: Annotated[Schedule, Scheduled("voltage", about="voltage [V]", usual=VOLTAGES)] = Field(
         default_factory=lambda: constant(0.0)
     )
 
@@ -99,7 +103,7 @@ class VoltageSource(ElectricalLink, kind="voltage-source"):
 
     quantities: ClassVar[dict[str, str]] = {"current": "current", "power": "power"}
 
-    voltage: Annotated[Schedule, Scheduled("voltage", about="voltage of `to` above `from` [V]")]
+    voltage: Annotated[Schedule, Scheduled("voltage", about="voltage of `to` above `from` [V]", usual=VOLTAGES)]
 
 
 class SourceRows(NetworkRows, kind=""):
@@ -148,7 +152,7 @@ class Resistor(ElectricalLink, kind="resistor"):
     Ports: from, to. Stored energy: none. Dissipated power: resistance current^2 [W].
     """
 
-    resistance: Annotated[float, Quantity("resistance", positive, "resistance [ohm]")]
+    resistance: Annotated[float, Quantity("resistance", positive, "resistance [ohm]", RESISTANCES)]
     heat_to: Annotated[str | None, HEAT_TO] = None
 
     def faults(self, name: str, around: Any) -> Iterator:
@@ -176,7 +180,7 @@ class Inductor(ElectricalLink, kind="inductor"):
     Ports: from, to. Stored energy: inductance current^2 / 2 [J]. Dissipated: none.
     """
 
-    inductance: Annotated[float, Quantity("inductance", positive, "inductance [H]")]
+    inductance: Annotated[float, Quantity("inductance", positive, "inductance [H]", INDUCTANCES)]
     initial_current: Annotated[
         float | None, Quantity("current", about="current at the start; that of equilibrium if left out [A]")
     ] = None
@@ -197,7 +201,7 @@ class Capacitor(ElectricalLink, kind="capacitor"):
     Ports: from, to. Stored energy: capacitance voltage^2 / 2 [J]. Dissipated: none.
     """
 
-    capacitance: Annotated[float, Quantity("capacitance", positive, "capacitance [F]")]
+    capacitance: Annotated[float, Quantity("capacitance", positive, "capacitance [F]", CAPACITANCES)]
     initial_voltage: Annotated[
         float | None, Quantity("voltage", about="voltage at the start; that of equilibrium if left out [V]")
     ] = None
@@ -228,7 +232,7 @@ class ElectricalSwitch(ElectricalLink, kind="switch"):
     """
 
     closed: Annotated[Schedule, Scheduled("number", about="closed above 0.5, open otherwise")]
-    resistance: Annotated[float, Quantity("resistance", positive, "resistance while closed [ohm]")] = 1e-3
+    resistance: Annotated[float, Quantity("resistance", positive, "resistance while closed [ohm]", RESISTANCES)] = 1e-3
 
 
 class SwitchRows(NetworkRows, kind="switch"):
@@ -255,7 +259,9 @@ class Diode(ElectricalLink, kind="diode"):
     """
 
     forward_voltage: Annotated[float, Quantity("voltage", nonnegative, "voltage above which it conducts [V]")] = 0.0
-    resistance: Annotated[float, Quantity("resistance", positive, "resistance while it conducts [ohm]")] = 1e-3
+    resistance: Annotated[
+        float, Quantity("resistance", positive, "resistance while it conducts [ohm]", RESISTANCES)
+    ] = 1e-3
 
 
 class DiodeRows(NetworkRows, kind="diode"):
@@ -291,9 +297,9 @@ class DcMotor(Link, kind="dc-motor"):
         "torque_constant", nonzero, "torque per current, and voltage per angular velocity [N m/A]",
         UsualRange(1e-5, 1e3, "watch motors to rolling mills"),
     )]  # fmt: skip
-    resistance: Annotated[float, Quantity("resistance", positive, "resistance of the armature [ohm]")]
+    resistance: Annotated[float, Quantity("resistance", positive, "resistance of the armature [ohm]", RESISTANCES)]
     inductance: Annotated[
-        float | None, Quantity("inductance", positive, "inductance of the armature; none if left out [H]")
+        float | None, Quantity("inductance", positive, "inductance of the armature; none if left out [H]", INDUCTANCES)
     ] = None
     initial_current: Annotated[
         float | None, Quantity("current", about="current at the start; that of equilibrium if left out [A]")

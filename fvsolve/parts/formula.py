@@ -26,6 +26,7 @@ CALL_FORMS = (  # allowed calls; "..." stands for any number of arguments
     "min(a, b, ...)", "max(a, b, ...)", "hypot(a, b)", "where(condition, a, b)",
 )  # fmt: skip
 FUNCTIONS = {form[: form.index("(")]: form for form in CALL_FORMS}
+SMOOTH_FUNCTIONS = tuple(name for name in FUNCTIONS if name not in ("abs", "min", "max", "where"))
 OPERATORS = {
     ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide, ast.Pow: np.power,
     ast.UAdd: np.positive, ast.USub: np.negative, ast.Lt: np.less, ast.LtE: np.less_equal, ast.Gt: np.greater,
@@ -64,9 +65,19 @@ class Arithmetic:
     All values are floats; comparisons give 1 or 0. Values that the function `where` does not select may be invalid.
     """
 
-    def __init__(self, text: str, otherwise: str = "", names: tuple[str, ...] = NAMES) -> None:
-        """Parse a formula; otherwise : error message for a text that is not a formula at all; names : its variables."""
-        self.text, self.source, self.names = text, text.replace("^", "**").strip(), names
+    def __init__(
+        self,
+        text: str,
+        otherwise: str = "",
+        names: tuple[str, ...] = NAMES,
+        functions: tuple[str, ...] = tuple(FUNCTIONS),
+    ) -> None:
+        """Parse a formula.
+
+        otherwise : error message for a text that is not a formula at all; names : its variables
+        functions : names of functions that messages list
+        """
+        self.text, self.source, self.names, self.functions = text, text.replace("^", "**").strip(), names, functions
         of = " and ".join(name for name in names if name != "pi") if len(names) < 4 else listing(names, 20)
         about = f"{show(text)} is not a formula of {of}"
         if len(text) > MAX_LENGTH:
@@ -95,7 +106,7 @@ class Arithmetic:
         elif isinstance(node, ast.Name):
             if node.id not in self.names:
                 hint = f"; did you mean {FUNCTIONS[node.id]}?" if node.id in FUNCTIONS else ""
-                known = [*self.names, *FUNCTIONS]
+                known = [*self.names, *self.functions]
                 raise ValueError(f"{node.id} is unknown{hint or did_you_mean(node.id, known)}; known are "
                                  f"{listing(known, 20)}")  # fmt: skip
             yield Step(node.id, 0, part)
@@ -129,7 +140,8 @@ class Arithmetic:
         name = node.func.id if isinstance(node.func, ast.Name) else ""
         if name not in FUNCTIONS:
             text = self.source_of(node.func)
-            raise ValueError(f"{text} is unknown{did_you_mean(text, FUNCTIONS)}; known are {listing(FUNCTIONS, 20)}")
+            near, known = did_you_mean(text, self.functions), listing(self.functions, 20)
+            raise ValueError(f"{text} is unknown{near}; known are {known}")
         form, given = FUNCTIONS[name], len(node.args)
         count, endless = form.count(",") + 1 - ("..." in form), "..." in form
         if node.keywords or given < count or (given > count and not endless):

@@ -23,6 +23,7 @@ from fvsolve.parts.value import Number, Quantity, Text, UsualRange, between, pos
 
 TEMPERATURE = InputKind("K", "a temperature above 0 [K]", 0.0)
 HEAT = InputKind("W", "a finite number [W]", small=100.0)
+TEMPERATURES = UsualRange(150.0, 3000.0, "polar winters to furnaces")  # [K]
 SMALL_TEMPERATURE = 1.0  # size of a small deviation, where the network does not tell [K]
 
 
@@ -40,9 +41,9 @@ class HeatCapacity(Node, kind="heat-capacity"):
     heat_capacity: Annotated[float, Quantity(
         "heat_capacity", positive, "heat per temperature [J/K]", UsualRange(1e-6, 1e12, "chips to buildings"),
     )]  # fmt: skip
-    initial_temperature: Annotated[
-        float | None, Quantity("temperature", positive, "temperature at the start; that of equilibrium if left out [K]")
-    ] = None
+    initial_temperature: Annotated[float | None, Quantity(
+        "temperature", positive, "temperature at the start; that of equilibrium if left out [K]", TEMPERATURES,
+    )] = None  # fmt: skip
 
 
 class HeatCapacityRows(NetworkNodeRows, kind="heat-capacity"):
@@ -66,7 +67,7 @@ class Ambient(GivenPotential, kind="ambient"):
     main_quantities: ClassVar[tuple[str, ...]] = ("temperature",)
     potential_key: ClassVar[str] = "temperature"
 
-    temperature: Annotated[Schedule, Scheduled("temperature", positive, "temperature [K]")]
+    temperature: Annotated[Schedule, Scheduled("temperature", positive, "temperature [K]", TEMPERATURES)]
 
 
 class AmbientRows(GivenPotentialRows, kind="ambient"):

@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar
 from fvsolve import units
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.carried_scalar import Scalar
+from fvsolve.parts.formula import SMOOTH_FUNCTIONS, Arithmetic
 from fvsolve.parts.formula_program import Program
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import VALUE, Quantity, ReadContext, Text, Value, ValueFault, nonnegative
@@ -91,7 +92,8 @@ def constant_in_si(given: Any, order: float) -> Any:
     if order == 1.0:
         return units.parse(given, "rate")
     if order not in (0.0, 2.0, 3.0):
-        raise ValueError(f"{show(given)} has a unit, and the order is {order:g}; expected a number in mol, m3 and s")
+        state = "has a unit" if units.is_number_with_unit(given) else "is text"
+        raise ValueError(f"{show(given)} {state}, and the order is {order:g}; expected a number in mol, m3 and s")
     si = {0.0: "mol/m3/s", 2.0: "m3/mol/s", 3.0: "m6/mol2/s"}[order]
     return units.parse_in(given, si, f"expected a constant of order {order:g} in {si}")
 
@@ -126,7 +128,8 @@ class Reaction(Table):
         try:
             equation = read_equation(given["equation"])
         except ValueError as error:
-            raise ValueFault([(("equation",), str(error))], {**given, "equation": ""}) from None
+            unknown = {key: 0.0 for key in ("forward", "reverse") if isinstance(given.get(key), str)}  # of any order
+            raise ValueFault([(("equation",), str(error))], {**given, "equation": "", **unknown}) from None
         for key, side in (("forward", "left"), ("reverse", "right")):
             try:
                 result[key] = constant_in_si(given.get(key), equation.order(side))
@@ -162,6 +165,7 @@ class Reaction(Table):
 
     def program(self, scalars: dict[str, Any]) -> Program:
         """Steps of the formula of the rate; its inputs are all scalars of the case. Raises ValueError."""
+        Arithmetic(self.rate, names=("pi", *scalars), functions=SMOOTH_FUNCTIONS)
         program = Program(self.rate, tuple(scalars), clock=False)
         if program.kinks:
             text = "has kinks: comparisons, abs, min or max; expected a smooth formula of scalars"

@@ -30,6 +30,7 @@ from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.value import VALUE, Number, Quantity, Range, Text, UsualRange, nonnegative, nonzero, positive
 
 CLUTCH_TORQUE = InputKind("N m", "a torque of at least 0 [N m]", 0.0)
+SPEEDS = UsualRange(-1300.0, 1300.0, "to 12 000 rpm of machine tools")  # of shafts [rad/s]
 SMALL_SPEED, SMALL_TORQUE = 1.0, 1.0  # sizes of small deviations, where the network does not tell [rad/s], [N m]
 
 
@@ -51,6 +52,7 @@ class Shaft(Node, kind="shaft"):
     )] = None  # fmt: skip
     initial_speed: Annotated[float | None, Quantity(
         "angular_velocity", about="angular velocity at the start; that of equilibrium if left out [rad/s]",
+        usual=SPEEDS,
     )] = None  # fmt: skip
 
     @classmethod
@@ -90,7 +92,7 @@ class Housing(GivenPotential, kind="housing"):
     quantities: ClassVar[dict[str, str]] = {"speed": "angular_velocity"}
     potential_key: ClassVar[str] = "speed"
 
-    speed: Annotated[Schedule, Scheduled("angular_velocity", about="angular velocity [rad/s]")] = Field(
+    speed: Annotated[Schedule, Scheduled("angular_velocity", about="angular velocity [rad/s]", usual=SPEEDS)] = Field(
         default_factory=lambda: constant(0.0)
     )
 

@@ -121,6 +121,9 @@ class Scheduled(Value):
             return self._read_ramp(given, setting)
         if any(key in given for key in ("mean", "amplitude", "period", "phase")):
             return self._read_wave(given, setting)
+        if given and not given.keys() & self.forms["table"].keys():
+            known = list(dict.fromkeys(key for form in self.forms.values() for key in form))
+            raise ValueFault([((key,), f"unknown key{val.key_hint(str(key), known)}") for key in given])
         return self._read_table(given, setting)
 
     @cached_property

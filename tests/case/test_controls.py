@@ -214,6 +214,10 @@ def with_block(**keys):
         (with_block(limits=[0.5, 0.5]), "controls.level.limits: [0.5, 0.5] has no values between*"),
         (with_block(limits=[0, 2]), "controls.level.limits: [0, 2] goes beyond *; expected values between 0 and 1"),
         (with_block(limits=3), "controls.level.limits: 3 is not a list; expected a list of values"),
+        (
+            {"controls.level": TABLE | {"table": {"input": [3, 5], "output": [100, 10]}}},
+            "controls.level.table.output: [100.0, 10.0] goes beyond what the driven keys may be; expected values *",
+        ),
     ],
 )  # fmt: skip
 def test_a_fault_of_a_block_has_one_message_with_its_remedy(changes, message):
@@ -361,6 +365,18 @@ def test_a_loop_on_a_pressure_with_a_filter_starts_balanced():
     assert model.tables.controls["start"][0] == pytest.approx(0.78102, abs=1e-5)  # where mid has 2 bar
 
 
+def test_a_speed_without_limits_is_balanced_from_full_speed():
+    """At rest the pump gives no flow to a demand, so that a search from 0 finds no start."""
+    curve = {"flow": [0, 0.05, 0.08], "head": [60, 50, 34.4]}
+    pump = {"type": "pump", "from": "source", "to": "mid", "speed": {"control": "level"}, "curve": curve}
+    case = edited(LEVEL, BY_PRESSURE | {"links": {"pump": pump}, "nodes.mid.demand": "30 l/s"})
+    case["nodes"] = {name: node for name, node in case["nodes"].items() if name in ("source", "mid")}
+    case["controls"]["level"] |= {"setpoint": "7 bar", "gain": "0.1 1/bar", "filter": "1 s"}
+    model = fvsolve.build(fvsolve.load(case))
+    assert model.tables.controls["start"][0] > 0.5
+    assert fvsolve.run(case)["mid.pressure"] == pytest.approx(7e5, rel=1e-9)
+
+
 def test_a_cascade_starts_balanced():
     outer = {"controls.outer": {"type": "function", "formula": "4"}}
     model = fvsolve.build(fvsolve.load(edited(LEVEL, with_block(setpoint={"control": "outer"}) | outer)))
@@ -373,7 +389,6 @@ def test_a_cascade_starts_balanced():
         (with_block(setpoint="4.5 m"), ": the input is 4 m, but the setpoint 4.5 m"),
         (BY_PRESSURE | with_block(filter="1 s", setpoint="9 bar"), ": the input is *, but the setpoint 9e+05 Pa"),
         ({"links.outlet.area": "1 m2"}, ""),  # the outlet takes more than the inlet can supply
-        ({"links.inlet.opening": 0.3}, ""),  # the block drives nothing
         ({"controls.level": LAG | {"denominator": [1, 0]}}, ": the input is 4 m, but not 0"),
     ],
 )
@@ -382,6 +397,65 @@ def test_a_loop_without_balance_asks_for_its_initial_output(changes, state):
         f"controls.level: no output of level balances the start{state}; give the key `initial`, the output at the start"
     )
     assert matches(only_fault(changes), text)
+
+
+def test_each_block_without_balance_has_a_fault_and_a_relay_without_state_too():
+    second = {"type": "pi", "input": "tower.level", "setpoint": "5 m", "gain": 1, "integral_time": 3}
+    relay = {"type": "relay", "input": "tower.level", "on": 3, "off": 5}
+    changes = with_block(setpoint="4.5 m") | {"controls.second": second, "controls.relay": relay,
+                                              "links.outlet.opening": {"control": "second"}}  # fmt: skip
+    found = sorted(faults(changes))
+    start = "no output of {} balances the start: the input is 4 m, but the setpoint"
+    assert [text.partition(";")[0] for text in found] == [
+        f"controls.level: {start.format('level')} 4.5 m",
+        "controls.relay: its input is 4 m at the start, between `on` and `off`",
+        f"controls.second: {start.format('second')} 5 m",
+    ]
+
+
+def test_a_block_that_drives_nothing_is_named():
+    idle = 'controls.level: drives no key; write { control = "level" } where it acts'
+    assert only_fault({"links.inlet.opening": 0.3}) == idle
+    assert only_fault({"links.inlet.opening": 0.3, "output.probes": ["controls.level.output"]}) == idle
+    spare = {"controls.spare": FUNCTION}
+    texts = [[notice.text for notice in fvsolve.build(fvsolve.load(edited(LEVEL, spare | more))).warnings]
+             for more in ({}, {"output.probes": ["controls.spare.output"]},
+                          {"controls.sum": {"type": "function", "inputs": {"x": "controls.spare"}, "formula": "x"},
+                           "output.probes": ["controls.sum.output"]})]  # fmt: skip
+    assert texts == [['controls.spare: drives no key; write { control = "spare" } where it acts'], [], []]
+
+
+@pytest.mark.parametrize("key", ["contol", "formla", "singal", "fle"])
+def test_a_misspelt_key_of_a_schedule_has_the_key_of_its_form(key):
+    near = {"contol": "control", "formla": "formula", "singal": "signal", "fle": "file"}[key]
+    text = f'links.outlet.opening.{key}: unknown key; did you mean "{near}"?'
+    assert only_fault({"links.outlet.opening": {key: "level"}}) == text
+
+
+def test_keys_of_samples_are_unknown_to_a_block_that_acts_at_all_times():
+    relay = {"type": "relay", "input": "tower.level", "on": 1, "off": 3, "period": 1}
+    text = "unknown key; use it in a `function` that reads this block, which acts at all times"
+    assert only_fault({"controls.level": relay}) == f"controls.level.period: {text}"
+
+
+def test_a_relay_is_refused_in_a_state_that_its_input_contradicts():
+    relay = {"type": "relay", "input": "tower.level", "on": 1, "off": 3}
+    drives = {"links.inlet.opening": {"control": "level"}}
+    text = only_fault(drives | {"controls.level": relay | {"initial": 1}})
+    assert matches(
+        text, "controls.level: `initial` is 1, but its input is 4 m at the start, with `on` at 1 m and `off`*"
+    )
+    assert text.endswith("expected 0, or leave this key out")
+    fvsolve.build(fvsolve.load(edited(LEVEL, drives | {"controls.level": relay | {"initial": 0}})))
+
+
+def test_a_function_beyond_the_range_of_its_key_gives_a_notice_at_the_start():
+    tall = edited(LEVEL, {"controls.level": FUNCTION | {"formula": "2.5*h - 0.5"}})
+    (notice,) = fvsolve.build(fvsolve.load(tall)).warnings
+    assert notice.text.startswith("controls.level: its output at the start, 9.5, is beyond its limits")
+    assert notice.text.endswith("it is limited to 1")
+    stated = {**tall, "controls": {"level": tall["controls"]["level"] | {"limits": [0, 1]}}}
+    assert not fvsolve.build(fvsolve.load(stated)).warnings
 
 
 def test_with_its_initial_output_a_loop_may_start_out_of_balance():

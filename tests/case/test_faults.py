@@ -285,7 +285,15 @@ BAD = {
         SCENE + CHAMBER,
         'nodes.t.initial_pressure: "0 bar" is absolute, a vacuum; did you mean "0 barg"?',
     ),
-    "vacuum by head": (swap('"45.72 m"', '"-45.72 m"'), "nodes.lake.head: a head of -45.72 m at elevation 0 m: "),
+    "vacuum by head": (
+        swap('"45.72 m"', '"-45.72 m"'),
+        "nodes.lake.head: a head of -45.72 m at elevation 0 m is -3.461e+05 Pa absolute, "
+        "a vacuum; expected a greater head",
+    ),
+    "boiling by head": (
+        swap('"45.72 m"', '"-10.2 m"'),
+        "Pa absolute, not above the vapour pressure of 2339 Pa; expected",
+    ),
     "gauge ambient": (
         'ambient_pressure = "1 barg"\n' + SCENE,
         'line 1: ambient_pressure: "1 barg" is a gauge pressure',

@@ -90,6 +90,49 @@ SLIPS = {  # settings -> (place, key, value, limit, part of the text)
 }  # fmt: skip
 
 
+NETWORK_SLIPS = [  # part, key, value, part of the text
+    ({"type": "heat-capacity", "heat_capacity": 3}, "initial_temperature", 20, '"20 degC"'),
+    ({"type": "ambient"}, "temperature", 25, '"25 degC"'),
+    ({"type": "shaft", "inertia": 1}, "initial_speed", 1500, '"1500 rpm"'),
+    ({"type": "housing"}, "speed", 1500, '"1500 rpm"'),
+    ({"type": "voltage-source", "from": "a", "to": "b"}, "voltage", 24e6, "to transmission lines"),
+    ({"type": "resistor", "from": "a", "to": "b"}, "resistance", 1e-7, "contacts to insulation"),
+    ({"type": "capacitor", "from": "a", "to": "b"}, "capacitance", 100, '"100 uF"'),
+    ({"type": "inductor", "from": "a", "to": "b"}, "inductance", 200, '"200 mH"'),
+]
+MACHINE = {"type": "displacement-pump", "from": "lake", "to": "gate", "displacement": "28 cm3/rev", "speed": "1500 rpm"}
+MACHINE_SLIPS = [
+    ({}, "speed", 1500, '"1500 rpm"'),
+    ({"volumetric_efficiency": 0.9, "rated_speed": "1500 rpm"}, "rated_pressure", 180, '"180 bar"'),
+    ({"volumetric_efficiency": 0.9, "rated_pressure": "180 bar"}, "rated_speed", 1500, '"1500 rpm"'),
+]
+
+
+@pytest.mark.parametrize("part, key, value, says", NETWORK_SLIPS, ids=[item[0]["type"] for item in NETWORK_SLIPS])
+def test_a_slip_of_units_in_a_network_is_noted(part, key, value, says):
+    group = "links" if "from" in part else "nodes"
+    given = {name: item for name, item in (part | {key: value}).items() if name != "type"}
+    said = {**load(tomllib.loads(SCENE)).__dict__, "raw": {group: {"x": part | {key: value}}}, "nodes": {}, "links": {}}
+    said[group] = {"x": KINDS[group][part["type"]].model_validate(given)}
+    (note,) = range_notices(SimpleNamespace(**said))
+    assert (note.place, note.key) == (f"{group}.x", key) and says in note.text
+
+
+@pytest.mark.parametrize("more, key, value, says", MACHINE_SLIPS, ids=[item[1] for item in MACHINE_SLIPS])
+def test_a_slip_of_units_in_a_displacement_machine_is_noted(more, key, value, says):
+    (note,) = load(tomllib.loads(SCENE), {"links.x": MACHINE | more | {key: value}}).notices
+    assert (note.place, note.key) == ("links.x", key) and says in note.text
+
+
+def test_slips_of_units_in_tables_are_noted():
+    compensator = {"set_pressure": 180, "range": "10 bar"}
+    (note,) = load(tomllib.loads(SCENE), {"links.x": MACHINE | {"compensator": compensator}}).notices
+    assert note.key == "compensator.set_pressure" and '"180 bar"' in note.text
+    law = {"law": "astm-d341", "points": [[40, "46 cSt"], [100, "6.8 cSt"]]}
+    notes = load(tomllib.loads(SCENE), {"fluid.viscosity": law}).notices
+    assert [note.text.partition("mean ")[2] for note in notes] == ['"40 degC"?', '"100 degC"?']
+
+
 @pytest.mark.parametrize("name", SLIPS)
 def test_a_slip_of_units_is_noted_once_with_the_likely_unit(name):
     settings, place, key, value, limit, says = SLIPS[name]

@@ -229,4 +229,4 @@ def test_a_missing_package_is_named_with_its_remedy(fvs, tmp_path, monkeypatch):
 
 def test_a_name_of_another_type_is_refused(tmp_path):
     with pytest.raises(FvsolveError, match=r"tanks.zip: unknown type of file. Expected a name that ends in .fmu"):
-        write_fmu(fvsolve.load("two-tanks"), tmp_path / "tanks.zip")
+        write_fmu(fvsolve.load("two-tanks"), str(tmp_path / "tanks.zip"))

@@ -454,6 +454,8 @@ FAULTS = [
     ((*SCALAR, "unit"), "degF", '"degF" is not a unit of a temperature with heat; expected K or degC'),
     ((*SCALAR, "specific_heat"), "1.9 kJ/K", "a specific heat"),
     ((*SCALAR, "specific_heat"), None, 'heat without specific heat: a "user" fluid has none'),
+    ((*SCALAR, "initial"), -300.0, "initial: -300 is not above absolute zero; expected a temperature above -273.15"),
+    (("nodes", "sump", "scalars"), {"temperature": -273.15}, "sump.scalars.temperature: -273.15 is not above"),
     (("scalars", "other"), {"heat": True, "specific_heat": 1.0}, "expected one scalar with heat"),
     ((*COOLER, "conductance"), None, "expected one of conductance, effectiveness"),
     ((*COOLER, "effectiveness"), 0.5, "conductance and effectiveness are given; keep one"),
@@ -507,6 +509,15 @@ def test_all_faults_are_said_at_once():
     case["links"]["cooler"] = {"type": "heat-exchanger", "from": "sump", "to": "nowhere", "effectiveness": 2.0}
     text = str(refused(case))
     assert '"pomp"' in text and '"throtle"' in text and "nowhere" in text and "effectiveness" in text
+
+
+def test_a_faulty_part_gives_no_second_fault_in_the_heat_of_the_fluid():
+    case = unit({"cooler": {"type": "heat-exchanger", "from": "sump", "to": "air", "conductance": 5.0}},
+                {"air": {"type": "ambient", "temperature": 290.0}})  # fmt: skip
+    case["links"]["throttle"]["area"] = -1.0
+    assert [fault.place for fault in refused(case).faults] == ["links.throttle.area"]
+    case["links"]["throttle"]["area"], case["scalars"]["temperature"]["specific_heat"] = 1e-6, -1.0
+    assert [fault.place for fault in refused(case).faults] == ["scalars.temperature.specific_heat"]
 
 
 def test_a_block_that_passes_on_a_temperature_at_once_needs_a_filter():

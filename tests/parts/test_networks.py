@@ -356,6 +356,21 @@ def shafts(links, probes, a=None, b=None, end=1.0, **more):
     return network(nodes, links, end, probes, **more)
 
 
+def test_a_bearing_without_friction_does_nothing():
+    found = fvsolve.run(shafts({"bearing": two_port("bearing", "a", "frame", damping=0.0)}, ["a.speed"],
+                               {"initial_speed": 7.0}))  # fmt: skip
+    assert np.array(found["a.speed"]) == pytest.approx(7.0, rel=1e-15)
+
+
+def test_a_misspelt_type_in_a_network_does_not_ask_for_a_fluid():
+    case = shafts({"bearing": two_port("bearing", "a", "frame", damping=0.0)}, ["a.speed"])
+    case["links"]["drive"], case["nodes"]["c"] = {"type": "toque", "to": "a"}, {"type": "shft"}
+    case.pop("fluid", None)
+    with pytest.raises(CaseError) as error:
+        fvsolve.load(case)
+    assert [fault.place for fault in error.value.faults] == ["nodes.c.type", "links.drive.type"]
+
+
 @pytest.mark.parametrize("ratio", [5.0, -5.0])
 def test_a_gear_joins_two_inertias_to_one_state(ratio):
     links = {
@@ -866,3 +881,64 @@ def test_floating_and_tied_networks_are_refused_by_name():
         fvsolve.build(fvsolve.load(massless))
     with pytest.raises(CaseError, match="a rotational place"):
         fvsolve.load(resonant() | {"nodes": resonant()["nodes"] | {"a": {"type": "shaft"}}})
+
+
+def part(kind, **keys):
+    return {"type": kind, **keys}
+
+
+def test_a_port_of_a_wrong_domain_is_the_only_fault():
+    links = {"m": {"type": "dc-motor", "ports": {"p": "a", "n": "gnd", "shaft": "gnd"}, "torque_constant": 0.1,
+                   "resistance": 1}, "E": two_port("voltage-source", "gnd", "a", voltage=12)}  # fmt: skip
+    nodes = {"gnd": part("ground"), "a": part("terminal")}
+    with pytest.raises(CaseError, match="needs a rotational place") as error:
+        fvsolve.load({"nodes": nodes, "links": links, "numerics": {"end": 1.0}})
+    assert len(error.value.faults) == 1
+
+
+MANY = {
+    "nodes": {
+        "gnd": part("ground"), "a": part("terminal"), "b": part("terminal"), "c": part("terminal"), "s": part("shaft"),
+        "h": part("housing"), "h2": part("housing", speed=10.0),
+        "s1": part("shaft", inertia=1, initial_speed=3), "s2": part("shaft", inertia=1, initial_speed=3),
+    },
+    "links": {
+        "E": two_port("voltage-source", "gnd", "a", voltage=12),
+        "E2": two_port("voltage-source", "gnd", "a", voltage=24),
+        "C": two_port("capacitor", "a", "gnd", capacitance=1e-3), "R": two_port("resistor", "b", "c", resistance=10),
+        "C2": two_port("capacitor", "b", "c", capacitance=1e-3), "T": part("torque", to="s", torque=3),
+        "T2": part("torque", to="h", torque=3), "G2": two_port("gear", "h", "h2", ratio=2),
+        "G": two_port("gear", "s1", "s2", ratio=2),
+    },
+    "numerics": {"end": 1.0},
+}  # fmt: skip
+TEXTS = {
+    "links.E": "the voltages of E, E2 contradict each other; put a resistor between them",
+    "links.C": "lies on the source E, which gives its voltage; put a resistor between them",
+    "links.R": "nothing determines the voltage or current of C2, R; join a ground",
+    "links.T": "its torque has no way: nothing at s takes it; give a shaft an `inertia`, or join a bearing",
+    "links.T2": "its torque acts on housing h, whose speed is given; join another place",
+    "links.G2": "its law contradicts the given speed of h2, and nothing can give way; put a bearing between them, or "
+    "leave it out",
+    "nodes.s2.initial_speed": "3 rad/s at the start contradicts s1, to which it is tied; expected 1.5 rad/s",
+}
+
+
+def test_independent_faults_of_networks_come_at_once_in_the_words_of_their_domains():
+    with pytest.raises(CaseError) as error:
+        fvsolve.build(fvsolve.load(MANY))
+    assert {fault.place: fault.message for fault in error.value.faults} == TEXTS
+
+
+def test_independent_faults_of_the_start_of_a_network_come_at_once():
+    hot = {name: part("heat-capacity", heat_capacity=3) for name in ("p", "q", "r")}
+    links = {"P": part("heat-source", to="p", heat=3), "Q": part("heat-source", to="q", heat=3),
+             "L": two_port("thermal-conductor", "q", "r", conductance=2), "G": MANY["links"]["G"],
+             "C": two_port("capacitor", "a", "gnd", capacitance=1, initial_voltage=3),
+             "C2": two_port("capacitor", "gnd", "a", capacitance=2, initial_voltage=-5)}  # fmt: skip
+    nodes = hot | {name: MANY["nodes"][name] for name in ("s1", "s2", "gnd", "a")}
+    with pytest.raises(CaseError) as error:
+        fvsolve.build(fvsolve.load({"nodes": nodes, "links": links, "numerics": {"end": 1.0}}))
+    found = {fault.place: fault.message for fault in error.value.faults}
+    assert found.keys() == {"nodes.p", "nodes.q", "nodes.s2.initial_speed", "links.C.initial_voltage"}
+    assert "expected 5 V" in found["links.C.initial_voltage"] and "q.temperature, r.temperature" in found["nodes.q"]

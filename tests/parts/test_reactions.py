@@ -311,6 +311,12 @@ FAULTS = [
     ((*R, "forward"), -1.0, "out of range"),
     ((*R, "forward"), "0.3 1/s", 'expected a constant of order 2 in m3/mol/s'),
     ((*R, "forwards"), 1.0, "did you mean"),
+    ((*R,), {"equation": "A + B = P", "forward": "0.3 m3/mol/s"}, "1 fault"),  # none of the unit, of unknown order
+    ((*R,), {"equation": "0.5 A -> P", "forward": "1"}, '"1" is text, and the order is 0.5; expected a number'),
+    ((*R,), {"equation": "0.5 A -> P", "forward": "1 1/s"}, '"1 1/s" has a unit, and the order is 0.5'),
+    ((*R,), {"equation": "A -> P", "rate": "A*x"}, "known are A, B, P, arctan2, cos, exp, hypot, log, pi, sin, "),
+    (("scalars", "A", "initial"), -1.0, "scalars.A.initial: -1 is negative, and reaction r follows mass action"),
+    (("nodes", "one", "scalars"), {"A": -2.0}, "nodes.one.scalars.A: -2 is negative"),
     (("scalars", "A", "unit"), "degC", '"degC" is not an amount, which reaction r needs; expected unit'),
     (("scalars", "A", "unit"), "mg/l", "molar_mass is missing"),
     (("scalars", "A", "composition"), {"Cl": 2}, "Cl does not balance: 2 on the left, 1 on the right"),

@@ -199,7 +199,7 @@ def test_open_at_the_start_it_says_so_and_nothing_moves(disc):
     case = main(SMOOTH, set_pressure=3e5, flow_area=2e-3, **disc)
     case["links"]["gate"]["opening"] = 1.0
     model = fvsolve.build(fvsolve.load(case))
-    assert any("open at the start" in warning.text for warning in model.warnings)
+    assert any("the relief valve is open at the start" in warning.text for warning in model.warnings)
     rates = model.rhs(0.0, np.zeros(model.y_size))
     assert not rates.any()
     held = fvsolve.run(case)

@@ -545,6 +545,10 @@ FAULTS = {
         {"position": None, "command": 0.1, "dead_band": 1.0},
         "links.spool.dead_band: 1.0 is out of range; expected a value of at least 0 and below 1",
     ),
+    "ways of two ports": (
+        {"ways": "5/2", "ports": {"P": "P", "A": "A"}},
+        'links.spool.ways: no type of spool valve named "5/2"; did you mean "3/2"?',
+    ),
     "command": ({"position": None, "command": 1.5}, "links.spool.command: 1.5 is out of range"),
 }  # fmt: skip
 
@@ -556,6 +560,7 @@ def test_bad_input_has_one_fault_each(name):
     spool = case["links"]["spool"] | keys
     case["links"]["spool"] = {key: value for key, value in spool.items() if value is not None}
     case["output"] = {"probes": ["P.pressure"]}
+    case["nodes"] = {name: node for name, node in case["nodes"].items() if name in str(case["links"])}
     with pytest.raises(CaseError) as error:
         fvsolve.load(case)
     faults = [f"{fault.place}: {fault.message}" for fault in error.value.faults]

@@ -89,7 +89,8 @@ N m/A: newton*meter/ampere | mN m/A: millinewton*meter/ampere | V s/rad: volt*se
 V s: volt*second | N m/rad: newton*meter | kN m/rad: kilonewton*meter | N m/deg: newton*meter/degree
 J/K: joule/kelvin | kJ/K: kilojoule/kelvin | MJ/K: megajoule/kelvin | W/K: watt/kelvin | kW/K: kilowatt/kelvin
 W/m2/K: watt/meter**2/kelvin | W/(m2 K): watt/meter**2/kelvin | kW/m2/K: kilowatt/meter**2/kelvin
-lb ft2: pound*foot**2 | C: coulomb | F: farad | K: kelvin | degC: degC | celsius: degC | degF: degF | degR: degR
+lb ft2: pound*foot**2 | C: coulomb | F: farad | mF: millifarad | uF: microfarad | K: kelvin
+degC: degC | celsius: degC | degF: degF | degR: degR
 """
 PINT = dict(row.strip().split(": ") for line in ROWS.splitlines() for row in line.split("|") if row.strip())
 PINT_SI = {
@@ -211,6 +212,7 @@ def test_pint_knows_the_rest():
         ("3 kg/s", "flow", '"3 kg/s" is a mass flow; expected a flow, for example "20 l/s"'),
         ("3 lp", "flow", '"3 lp": unknown unit "lp"; did you mean "3 lps"?'),
         ("300", "length", '"300" has no unit; did you mean "300 m", or the bare number 300?'),
+        ("1.304,8 mm", "length", '"1.304,8 mm" has a decimal comma; did you mean "1304.8 mm"?'),
         ("304,8 mm", "length", '"304,8 mm" has a decimal comma; did you mean "304.8 mm"?'),
         ("a lot", "length", '"a lot" is not a number with a unit; expected a length, for example "300 mm"'),
         ("", "length", '"" is not a number with a unit; expected a length, for example "300 mm"'),
@@ -236,6 +238,11 @@ def test_near_misses_are_refused(text, dimension, message):
     with pytest.raises(ValueError) as caught:
         parse(text, dimension)
     assert message in str(caught.value)
+
+
+def test_a_decimal_comma_is_refused_in_units_of_ratios_too():
+    with pytest.raises(ValueError, match=r'"0,8 1/m" has a decimal comma; did you mean "0.8 1/m"\?'):
+        units.parse_ratio("0,8 1/m", "number", "length")
 
 
 @pytest.mark.parametrize("text, meant", [("0 bar", "0 barg"), ("-0.5 bar", "-0.5 barg"), ("-2 bar", "")])

@@ -10,7 +10,7 @@ from fvsolve.parts.table_model import CaseContext, Faults, Nested, Table
 from fvsolve.parts.value import Number, Quantity, Text, UsualRange, between, nonnegative, positive
 
 DISPLACEMENTS = UsualRange(1e-9, 1e-2, "0.006 cc/rev to 63 l/rev")  # [m3/rad]
-SPEEDS = UsualRange(0.1, 3200.0, "1 rpm of motors of winches to 30 000 rpm of dental drills")
+SPEEDS = UsualRange(0.1, 950.0, "1 rpm of motors of winches to 9000 rpm of pumps of aircraft")
 LAG = 0.05  # lag of a compensator without `setting_time` [s], of axial piston pumps of 28 to 100 cc/rev
 
 
@@ -23,7 +23,12 @@ class Compensator(Table):
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("set_pressure", "senses"),)
 
     set_pressure: Annotated[
-        Schedule | None, Scheduled("pressure", about="pressure at `to` at which the displacement is 0 [Pa]")
+        Schedule | None,
+        Scheduled(
+            "pressure",
+            about="pressure at `to` at which the displacement is 0 [Pa]",
+            usual=UsualRange(2e5, 1e8, "of compensators"),
+        ),
     ] = None
     range: Annotated[float, Quantity(
         "pressure_drop", positive, "pressure range below it in which the displacement falls to 0 [Pa]",
@@ -61,7 +66,7 @@ class DisplacementMachine(TwoPort):
     ] = Field(None, alias="ports")
     speed: Annotated[Schedule | None, Scheduled(
         "angular_velocity", about="angular velocity, if no shaft turns with it [rad/s]",
-        usual=UsualRange(-3200.0, 3200.0, "to 30 000 rpm of dental drills"),
+        usual=UsualRange(-950.0, 950.0, "to 9000 rpm of pumps of aircraft"),
     )] = None  # fmt: skip
     displacement: Annotated[
         float, Quantity("displacement", positive, "volume per angle at full setting [m3/rad]", DISPLACEMENTS)
@@ -81,8 +86,10 @@ class DisplacementMachine(TwoPort):
         "dry friction",
     )] = None  # fmt: skip
     rated_pressure: Annotated[
-        float | None, Quantity("pressure_drop", positive, "pressure difference of the efficiencies [Pa]")
-    ] = None
+        float | None,
+        Quantity("pressure_drop", positive, "pressure difference of the efficiencies [Pa]",
+                 UsualRange(1e4, 1e8, "cooling circuits to presses")),
+    ] = None  # fmt: skip
     rated_speed: Annotated[
         float | None, Quantity("angular_velocity", positive, "speed of the efficiencies [rad/s]", SPEEDS)
     ] = None

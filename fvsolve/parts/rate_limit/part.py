@@ -2,14 +2,13 @@
 
 from typing import Annotated, ClassVar
 
-from fvsolve.parts.control import OfRate, SingleInput
+from fvsolve.parts.control import OfRate, SingleInput, Unsampled
 from fvsolve.parts.value import Quantity, positive
 
 
-class RateLimit(SingleInput, kind="rate-limit"):
+class RateLimit(Unsampled, SingleInput, kind="rate-limit"):
     """Block whose output follows its input no quicker than its limits: dv/dt = (x - v) / T, within them."""
 
-    may_sample: ClassVar[bool] = False
     same_unit: ClassVar[bool] = True
 
     rising: Annotated[float, OfRate("greatest rate of rise of the output")]

@@ -289,7 +289,8 @@ class ReliefDisc(LiftedValve, kind=""):
 
     def add_start_notices(self, start, name, x):
         if x > 0.0:
-            text = f"{name}: the relief valve is open at the start, lift {x:.3g} of 1"
+            kind = start.draft.case.conduits[name].kind.removesuffix("-valve")
+            text = f"{name}: the {kind} valve is open at the start, lift {x:.3g} of 1"
             start.draft.warnings.append(Notice("start", f"links.{name}", text, "lift", float(x)))
 
 

@@ -50,8 +50,15 @@ class RelayRows(SwitchingRows, kind="relay"):
     def fault(self, control, start):
         low, high = sorted((control.on, control.off))
         if control.initial is None and low < start.inputs[0] < high:
-            value = f"{start.inputs[0]:.6g}"
+            value = start.case.amount(start.inputs[0], start.block.dimensions[0], 6).removesuffix(" -")
             return f"its input is {value} at the start, between `on` and `off`; give the key `initial`, 0 or 1"
+        if not low < start.inputs[0] < high and self.state(control, start) != self.state_of(control, start):
+            known = [
+                start.case.amount(x, start.block.dimensions[0], 6) for x in (start.inputs[0], control.on, control.off)
+            ]
+            text = "`initial` is {}, but its input is {} at the start, with `on` at {} and `off` at {}"
+            text = text.format(control.initial, *(item.removesuffix(" -") for item in known))
+            return f"{text}; expected {int(self.state_of(control, start))}, or leave this key out"
         return ""
 
 

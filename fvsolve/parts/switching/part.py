@@ -1,8 +1,8 @@
 """Relays, latches and timers: keys and faults."""
 
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
-from fvsolve.parts.control import Control, OfInputNumber, OfOutput, SingleInput
+from fvsolve.parts.control import OfInputNumber, OfOutput, SingleInput, Unsampled
 from fvsolve.parts.value import PROFILE, Quantity, Text, Whole, between, nonnegative
 from fvsolve.units import show
 
@@ -10,10 +10,8 @@ STATE = Whole(between(0, 1), "state at the start: 0 off, 1 on; that of its input
 OUTPUTS = OfOutput("output while it is off, and while it is on", 2)
 
 
-class Switching(Control):
+class Switching(Unsampled):
     """Block with two outputs, one for each of its states off and on; events change the state."""
-
-    may_sample: ClassVar[bool] = False
 
     output: Annotated[tuple[float, float], OUTPUTS] = (0.0, 1.0)
     initial: Annotated[int | None, STATE] = None
