@@ -150,14 +150,12 @@ class Couplings:
         if link["device"] < 0:
             return self.blocks.schedule(link["schedule"])
         device = self.devices[link["device"]]
-        name, part, rows = self.parts[link["device"]]
+        _, part, rows = self.parts[link["device"]]
         shaft, network, turned = rows.turns_with(part), self.network, unique_states()
         if shaft is not None:
             turned = self.network_states(network.columns_of_rows[network.node_row(shaft)])
         lifting = [self.sets[i] if self.sets else self.pressure_states(i) for i in self.lifting_nodes(link)]
-        own = device["schedule"] if rows.follows_at_once else -1
-        lags = "setting" in rows.states_of(None, name, part)
-        schedules = self.blocks.schedule(-1 if lags else link["schedule"], own)
+        schedules = self.blocks.schedule(*rows.schedules_at_once(device, self.valves, self.floats))
         return unique_states(self.device_states(device), schedules, turned, *lifting)
 
     def lifting_nodes(self, link) -> list[int]:

@@ -5,7 +5,6 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve import units
 from fvsolve.assembly.lowering import FLOW, HEAD, PRESSURE, Input, Lowering, scalar_inputs
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.nodes_and_links import PlaceOnBody

@@ -185,6 +185,29 @@ def test_other_density_laws_change_a_drive_by_the_compressibility_alone(fluid):
     assert np.ptp(ends) < 1e-7 * ends[0]
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_a_controller_drives_a_setting_that_lags(method):
+    """0.02 s dx/dt = u - x, with the PI output u of the pressure p0 + rho / 2 (x D w / A)^2 before an orifice."""
+    flow, area, gain = 20.0 * CC * W1, 0.61 * pi * 0.003**2 / 4.0, 1e-8
+    size = {"type": "orifice", "from": "high", "to": "tank", "diameter": "3 mm"}
+    pump = machine("pump", "tank", "high", speed="1500 rpm", displacement="20 cc/rev", setting_time="20 ms",
+                   setting={"control": "k"})  # fmt: skip
+    block = {"type": "pi", "input": "high.pressure", "setpoint": ramp(0.1, 0.0, 5e6, 8e6), "gain": gain,
+             "integral_time": "0.1 s", "limits": [0.0, 1.0]}  # fmt: skip
+    case = scene({"high": {"type": "junction"}}, {"pump": pump, "orifice": size}, 0.5,
+                 ["high.pressure", "pump.setting"], controls={"k": block})  # fmt: skip
+
+    def rates(t, y):
+        error = 8e6 - P0 - RHO / 2.0 * (y[0] * flow / area) ** 2
+        wanted = gain * error + y[1]
+        output = min(max(wanted, 0.0), 1.0)
+        return [(output - y[0]) / 0.02, (gain * error + output - wanted) / 0.1]
+
+    run, first = runs(case, method), sqrt(2.0 * (5e6 - P0) / RHO) * area / flow
+    exact = solve_ivp(rates, (0.1, 0.5), [first, first], "DOP853", dense_output=True, rtol=1e-12, atol=1e-13).sol
+    assert run["pump.setting"] == pytest.approx(exact(np.maximum(run.t, 0.1))[0], abs=1e-8)
+
+
 # start --------------------------------------------------------------------------------------------------------------
 
 
