@@ -13,6 +13,7 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.model.network import MOST_STATES, Network
 from fvsolve.model.network_elimination import Elimination, NetworkError, dependent_stores, substituted
 from fvsolve.model.scalar_tables import exchanger_names
+from fvsolve.model.static_forces import rounding
 
 CURRENT_ROUNDING = 1e-13  # of diodes, over the sum of all sources divided by their resistance
 NO_SPEED = "has neither an inertia nor a given speed; give this shaft the key `inertia`"
@@ -32,7 +33,7 @@ def lower_networks(draft) -> None:
     elements, switches = parts_of_network(draft.case)
     if not elements:
         return
-    network = Network(elements, switches, tuple(sorted(draft.case.network_places)))
+    network = Network(elements, switches, tuple(sorted(draft.case.network_places)), rounding=rounding(draft))
     try:
         found = network.equations(network.conducting)
     except NetworkError as error:
