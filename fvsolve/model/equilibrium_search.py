@@ -110,13 +110,13 @@ class Configuration(StaticForces):
         net : float64[masses]  net forces of force elements and pistons [N]
         """
         forces, masses = np.zeros(len(self.masses)), self.masses
-        kept = masses["position"].copy(), masses["force"].copy()
+        before = masses["position"].copy(), masses["force"].copy()
         masses["position"][self.free] += self.y[masses["y"][self.free]]
         masses["force"] = net
         for name, acceleration in accelerations_of_masses(self.draft).items():
             i = self.draft.mass_index[name]
             forces[i] = acceleration / masses["lightness"][i] - net[i]
-        masses["position"], masses["force"] = kept
+        masses["position"], masses["force"] = before
         return forces
 
     def scale(self) -> np.ndarray:

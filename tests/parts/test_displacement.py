@@ -208,6 +208,26 @@ def test_a_controller_drives_a_setting_that_lags(method):
     assert run["pump.setting"] == pytest.approx(exact(np.maximum(run.t, 0.1))[0], abs=1e-8)
 
 
+@pytest.mark.parametrize("turns", [0.0, 1.0, -1.0])
+def test_swept_flow_has_the_density_of_the_inlet_and_leakage_that_upstream(turns):
+    """Two chambers under the law `log`, rho = RHO exp((p - P0) / BETA), beside SciPy."""
+    q, leak, high, low = 20e-6 * turns, 0.5e-3 / 60.0 / 1e5, 300e5, 10e5
+    nodes = {"low": {"type": "chamber", "volume": "2 l", "initial_pressure": low},
+             "high": {"type": "chamber", "volume": "1 l", "initial_pressure": high}}  # fmt: skip
+    pump = machine("pump", "low", "high", speed=f"{60.0 * turns} rpm", displacement="20 cc/rev", leakage=leak)
+    run = runs(scene(nodes, {"pump": pump}, 0.02, ["high.pressure", "pump.flow"], fluid={"law": "log"}))
+    density = lambda p: RHO * np.exp((p - P0) / BETA)  # noqa: E731
+    mass_flow = lambda a, b: density(a if q >= 0.0 else b) * q - density(b) * leak * (b - a)  # noqa: E731
+
+    def rates(t, p):
+        m = mass_flow(*p)
+        return [-m * BETA / 2e-3 / density(p[0]), m * BETA / 1e-3 / density(p[1])]
+
+    exact = solve_ivp(rates, (0.0, 0.02), [low, high], "DOP853", run.t.clip(0.0, 0.02), rtol=1e-12, atol=1e-3)
+    assert run["high.pressure"] == pytest.approx(exact.y[1], rel=EXACT)
+    assert run["pump.flow"][0] == pytest.approx(mass_flow(low, high) / density(high), rel=1e-12)
+
+
 # start --------------------------------------------------------------------------------------------------------------
 
 
