@@ -487,6 +487,12 @@ def test_all_losses_of_a_displacement_machine_heat_the_fluid(kind, drive):
     assert sum(line[-1] for line in found.dissipated.values()) == approx(sum(book["heat"].values()), rel=1e-6)
 
 
+@pytest.mark.parametrize("drive", ["speed", "inertia"])
+def test_the_pattern_of_the_jacobian_has_what_heats_by_a_machine(drive):
+    model, rng = fvsolve.build(fvsolve.load(circuit("motor", drive))), np.random.default_rng(1)
+    assert stray(model, 0.0, model.scale * rng.normal(scale=0.1, size=model.y_size)) < 1e-7
+
+
 def test_a_machine_that_stands_still_heats_by_its_leakage_alone():
     case = circuit("motor", "inertia", friction_torque="200 N m")
     case["nodes"]["shaft"]["initial_speed"], case["nodes"]["high"]["initial_pressure"] = 0.0, 2e7
