@@ -358,6 +358,15 @@ class Device(Restriction):
         """Indices of further schedules that the rates of its states read; row : of the device"""
         return []
 
+    def schedules_at_once(self, row, valves, floats) -> list[int]:
+        """Indices of the schedules, of the device and of its restriction, that it follows at once, -1 for none.
+
+        The rates of its states read the others; row : of the device
+        """
+        own = int(row["schedule"]) if self.follows_at_once else -1
+        opening = int(valves[row["valve"]]["schedule"]) if row["valve"] >= 0 else -1
+        return [own, -1 if opening in self.schedules_of_rates(row, valves, floats) else opening]
+
     def revise_state(self, start, part: Any, row) -> bool:
         """Set the state of the device, such as open or shut, that the steady solution implies; True if it changed."""
         return False

@@ -258,6 +258,7 @@ class ModelDraft:
     network_switch_table: np.ndarray = no_rows(rec.NETWORK_SWITCH)
     network: Any = None  # `model.network.Network` of rotation, electricity and heat; None without one
     start_speeds: dict[int, float] = field(default_factory=dict)  # column of a network -> speed found for the start
+    network_start: Any = None  # its steady start, with which the start of a network can be computed again
     sensors: list[Any] = field(default_factory=list)  # probes that blocks of `controls` read
     discrete: list[float] = field(default_factory=list)  # `discrete` at the start
     start_flags: dict[int, bool] = field(default_factory=dict)  # event flags at the start, of blocks

@@ -36,8 +36,9 @@ HOOKS = {  # functions of the law of a part: types of arguments and of the resul
     # out, tables, device: 1 outside the range of validity of its law, TEMPORARY if this ends by itself, otherwise 0
     "outside": ("VTD", "i"),
     # t, y, dydt, out, tables, device: power supplied, rate of stored energy, dissipation [W]
-    # for the heat of the fluid the dissipation is computed with `y` in place of `dydt`
+    # for the heat of the fluid the dissipation is computed with `y` in place of `dydt`, unless the law has `heat`
     "power": ("tVVVTD", "ttt"),
+    "heat": ("tVVTD", "t"),  # t, y, out, tables, device: heat into the fluid beside drop times flow [W]
     "stored": ("VTD", "t"),  # y, tables, device: stored energy, change since the profile [J]
     # Restriction k, conductance g [kg2/s2/Pa], drop [Pa]; denser, wide : see `restrictions.restriction_step`
     "step": ("VTittttb", "tt"),  # out, tables, k, g, m, drop, denser, wide: Newton step, see `kernels.restrictions`
@@ -146,6 +147,7 @@ call_events = call_at_address("call_events", *HOOKS["events"])
 call_value = call_at_address("call_value", *HOOKS["value"])
 call_outside = call_at_address("call_outside", *HOOKS["outside"])
 call_power = call_at_address("call_power", *HOOKS["power"])
+call_heat = call_at_address("call_heat", *HOOKS["heat"])
 call_stored = call_at_address("call_stored", *HOOKS["stored"])
 call_lead = call_at_address("call_lead", *HOOKS["lead"])
 call_step = call_at_address("call_step", *HOOKS["step"])

@@ -33,7 +33,7 @@ class Functions:
         code = f"{others}{READER_IMPORTS}compile_readers({cast!r}); {COMPILE_TIME_LOOP}"
         with compile_in_parallel(code, "run_steps"):
             self.rhs = self.compile_job(calls.RHS, rates, calls.rhs_in_turn)
-            self.store_hooks(*RHS_HOOKS, *["lead"] * cast.columns, *["power"] * cast.device_heat)
+            self.store_hooks(*RHS_HOOKS, *["lead"] * cast.columns, *["power", "heat"] * cast.device_heat)
         self.store_addresses(calls.CLOSE, cast.functions(*CLOSING))
         self.store_addresses(calls.DERIVE, cast.functions("derive_state"))
         self.store_addresses(calls.DAMP, cast.functions("damp"))

@@ -24,6 +24,7 @@ LAW_LINEAR, LAW_LOG, LAW_TABLE, LAW_MIXTURE = 0, 1, 2, 3
 OK, NO_SOLUTION, NOT_CONVERGED, NOT_FINITE, NO_VOLUME, NO_WIDTH, NO_WEIGHT = 0, 1, 2, 3, 4, 5, 6
 AMENDED = 7  # no fault: a record function has corrected the accepted state; evaluate it again
 ARRIVED = 8  # no fault: record functions must let the jumps arrive that end the step
+NO_COOLANT = 9  # too little fluid flows through a junction for the heat of a part
 
 i8, f8 = "i8", "f8"
 

@@ -7,7 +7,7 @@ its device dissipates beside. Friction heats the cells of its pipe. The rows `he
 
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels import calls
-from fvsolve.kernels.devices import POWER
+from fvsolve.kernels.devices import HEAT, POWER
 from fvsolve.kernels.network_energy import total_head, total_pressure
 from fvsolve.kernels.pipe_energy import GAUSS_WEIGHTS, at_point, mass_at_point, polynomial_width
 from fvsolve.kernels.potential_networks import row_value
@@ -31,8 +31,10 @@ def _heat_of_restrictions(t, y, dydt, out, handle):
         heat = per * drop * out[layout["valve"] + k]
         if sources[j]["device"] >= 0:
             device = tables.devices[sources[j]["device"]]
-            hook = tables.hooks[device["hooks"], POWER]
-            if hook != 0:  # `y` in place of rates, which the dissipation does not read
+            hook, own = tables.hooks[device["hooks"], POWER], tables.hooks[device["hooks"], HEAT]
+            if own != 0:
+                heat += calls.call_heat(own, t, y, out, tables, device)
+            elif hook != 0:  # `y` in place of rates, which the dissipation does not read
                 heat += calls.call_power(hook, t, y, y, out, tables, device)[2]
         out[layout["heat"] + j] = heat / specific_heat
 

@@ -15,7 +15,22 @@ remains uniform.
 """
 
 from fvsolve.jit import inline, njit
-from fvsolve.kernels.dtypes import CHAMBER, FIXED, FLAT, JUNCTION, NODE_SCALAR, PATCH, PIPE_SCALAR, RATE, TANK, UPWIND
+from fvsolve.kernels.dtypes import (
+    CHAMBER,
+    FIXED,
+    FLAT,
+    JUNCTION,
+    NO_COOLANT,
+    NODE_SCALAR,
+    OK,
+    PATCH,
+    PIPE_SCALAR,
+    RATE,
+    STATUS,
+    TANK,
+    UPWIND,
+    WHERE,
+)
 from fvsolve.kernels.reconstruction import by_limiter, limited, slope
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
@@ -24,6 +39,9 @@ from fvsolve.kernels.table_handle import open_tables
 MAX_SWEEPS, CHANGE_TOLERANCE = 10000, 4e-16
 # depths of a tank below which it has no value of its own; its rate stays constant [m]
 DRY_DEPTH, RATE_DEPTH = 1e-9, 1e-3
+# Rise of temperature of the flow through a junction by the heat of a part beyond which no liquid remains liquid [K];
+# throttling by 4000 bar, the greatest pressure of water jets, gives 95 K.
+GREATEST_RISE = 300.0
 
 
 @njit(forceinline=True)
@@ -205,6 +223,19 @@ def add_heat(out, tables, specific_heat, amount, weight):
         weight[tables.exchangers[k]["node"]] += g
 
 
+@njit
+def check_heated_junctions(out, tables, share):
+    """Set STATUS to NO_COOLANT, and WHERE to the heat source, if a part heats a junction by more than GREATEST_RISE.
+
+    share : mass flow into each node, plus conductances over the specific heat [kg/s]
+    """
+    for j in range(tables.heat_sources.size):
+        i = heated_node(out, tables, j)
+        too_hot = out[tables.layout[0]["heat"] + j] > GREATEST_RISE * share[i]
+        if too_hot and tables.nodes[i]["kind"] == JUNCTION and out[STATUS] == OK:
+            out[STATUS], out[WHERE] = NO_COOLANT, j
+
+
 @njit(forceinline=True)
 def after_exchange(out, tables, q, i, value):
     """Value of scalar q that leaves node i: mean `value` of its inflows, cooled by the effectiveness of exchangers."""
@@ -306,6 +337,7 @@ def mix_nodes(t, y, out, tables, q):
             mass = max(nodes[i]["mass"] + y[nodes[i]["y"]], RATE_DEPTH * nodes[i]["density"] * nodes[i]["area"])
             out[RATE] = max(out[RATE], share[i] / mass + 0.5 * change_rate(out, tables, q))
     if specific_heat > 0.0:
+        check_heated_junctions(out, tables, share)
         write_exchange(y, out, tables, q, total, share)
 
 

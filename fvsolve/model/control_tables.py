@@ -138,11 +138,10 @@ def driven_rows(draft) -> Iterator[tuple[int, int, int]]:
         if row["schedule"] in followers and row["device"] < 0:
             yield rec.DRIVEN_VALVE, k, followers[row["schedule"]]
     for k, row in enumerate(draft.device_table):
-        valve = draft.valve_table[row["valve"]]["schedule"] if row["valve"] >= 0 else -1
         _, part, device = draft.devices[k]
-        shaft, own = device.turns_with(part), row["schedule"] if device.follows_at_once else -1
+        shaft, own = device.turns_with(part), device.schedules_at_once(row, draft.valve_table, draft.floats)
         turned = [] if shaft is None else draft.network.schedules_of_node(shaft)
-        for block in {followers[index] for index in (own, valve, *turned) if index in followers}:
+        for block in {followers[index] for index in (*own, *turned) if index in followers}:
             yield rec.DRIVEN_DEVICE, k, block
     for i, row in enumerate(draft.node_table):
         if row["schedule"] in followers:

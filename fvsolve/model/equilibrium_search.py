@@ -1,9 +1,9 @@
 """Search for the static equilibrium of bodies, with forces in any configuration, and its notices.
 
 The unknowns q are displacements along joint freedoms, then positions of masses, F the forces on them, M the mass matrix
-and K = -dF/dq the stiffness. Pressures and velocities are those of the start. Lines of action, springs, stops and
-bushings act as in the configuration; water in basins on bodies is level there. Pins, and pistons with closed chambers
-that support a load, are constraints with given forces.
+and K = -dF/dq the stiffness. Pressures and velocities are those of the start. Lines of action, springs, stops,
+bushings, solenoids and dry friction of cylinders act as in the configuration; water in basins on bodies is level
+there. Pins, and pistons with closed chambers that support a load, are constraints with given forces.
 
 Steps are computed in the coordinates M^(1/2) dq: there K has squares of angular frequencies as eigenvalues, and lengths
 and angles have comparable weight. The search runs in the directions that constraints leave free. If all eigenvalues are
@@ -26,6 +26,7 @@ from fvsolve.case.bodies import joint_coordinate
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.mechanics_tables import pushed_masses
+from fvsolve.model.network_start import accelerations_of_masses
 from fvsolve.model.static_forces import (
     EQUILIBRIUM_SHARE,
     GAPS,
@@ -63,6 +64,7 @@ class Configuration(StaticForces):
         self.starting_forces = [draft.piston_table[k]["force"].item() for k in self.locked]
         self.first = len(draft.brace_table) + len(draft.stop_table)
         self.count = self.pins + len(self.locked)
+        self.by_network = np.zeros(len(self.masses))
         self.hold(np.zeros(self.count))
 
     def hold(self, sizes: np.ndarray) -> None:
@@ -98,8 +100,24 @@ class Configuration(StaticForces):
         if self.freedoms:
             self.run(*self.pushes[1:], *(HOLD,) * (len(self.draft.pin_table) > 0))
             own = self.forces()
-        net = self.out[int(self.layout["net_force"]) :][: len(self.masses)]
-        return np.concatenate([own, net[self.free]])
+        net = self.out[int(self.layout["net_force"]) :][: len(self.masses)].copy()
+        self.by_network[:] = self.network_forces(net)
+        return np.concatenate([own, (net + self.by_network)[self.free]])
+
+    def network_forces(self, net: np.ndarray) -> np.ndarray:
+        """Forces of a network on masses in the current configuration : float64[masses] [N].
+
+        net : float64[masses]  net forces of force elements and pistons [N]
+        """
+        forces, masses = np.zeros(len(self.masses)), self.masses
+        before = masses["position"].copy(), masses["force"].copy()
+        masses["position"][self.free] += self.y[masses["y"][self.free]]
+        masses["force"] = net
+        for name, acceleration in accelerations_of_masses(self.draft).items():
+            i = self.draft.mass_index[name]
+            forces[i] = acceleration / masses["lightness"][i] - net[i]
+        masses["position"], masses["force"] = before
+        return forces
 
     def scale(self) -> np.ndarray:
         """Upper bound of the sum of force magnitudes on each joint freedom and mass : float64[size].
@@ -116,6 +134,7 @@ class Configuration(StaticForces):
         for row in self.draft.piston_table:
             parts = [self.draft.node_table[row[side]]["pressure"] * row[f"area_{side}"] for side in "ab"]
             net += sum(parts) * np.isin(self.free, (row["case"], row["rod"]))
+        net += np.abs(self.by_network[self.free])
         for row in self.draft.wall_table:
             net += abs(row["rest"]) * (self.free == row["mass"])
         return sizes

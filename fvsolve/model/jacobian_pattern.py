@@ -155,8 +155,7 @@ class Couplings:
         if shaft is not None:
             turned = self.network_states(network.columns_of_rows[network.node_row(shaft)])
         lifting = [self.sets[i] if self.sets else self.pressure_states(i) for i in self.lifting_nodes(link)]
-        own = device["schedule"] if rows.follows_at_once else -1
-        schedules = self.blocks.schedule(link["schedule"], own)
+        schedules = self.blocks.schedule(*rows.schedules_at_once(device, self.valves, self.floats))
         return unique_states(self.device_states(device), schedules, turned, *lifting)
 
     def lifting_nodes(self, link) -> list[int]:

@@ -28,7 +28,7 @@ from fvsolve.model.network_elimination import (
 )
 from fvsolve.steady import union
 
-ROUNDING = 1e-12  # value of a row at the start that is rounding, over the sum of the magnitudes of its terms
+ROUNDING = 1e-12  # sum of terms that is rounding, over the sum of their magnitudes
 CUT = 1e-6  # stored quantity that a switch may cut, over a small deviation
 ANOTHER_WAY = "give this flow another way, such as a diode,"
 MOST_DIODES = 3  # diodes that begin to conduct at once when a switch opens
@@ -54,6 +54,7 @@ class Network:
     flags : name of a switch -> its first event flag; schedules : (place, key) -> index of the schedule
     integrals : nodes whose potential a state integrates, such as an angle, and elements whose difference of potentials
     a state integrates, such as a flux -> its place in y; values : of all stores and sources at the start
+    rounding : value of a row at the start that is rounding, over the sum of the magnitudes of its terms
     solved, written : results of `equations` and `arrays` by mode
     """
 
@@ -67,6 +68,7 @@ class Network:
     schedules: dict[tuple[str, str], int] = field(default_factory=dict)
     integrals: dict[str, int] = field(default_factory=dict)
     values: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    rounding: float = ROUNDING
     solved: dict[tuple, Elimination] = field(default_factory=dict)
     written: dict[tuple, tuple] = field(default_factory=dict)
 
@@ -342,7 +344,7 @@ class Network:
         """Value of a row at given values of stores and sources, in this unit; zero if it is rounding."""
         parts = [value * values[column] / unit for column, value in terms.items()]
         total = float(np.sum(parts))
-        return total if abs(total) > ROUNDING * float(np.sum(np.abs(parts))) else 0.0
+        return total if abs(total) > self.rounding * float(np.sum(np.abs(parts))) else 0.0
 
     def schedules_of_node(self, node: str) -> list[int]:
         """Indices of the schedules that the potential of a node reads."""

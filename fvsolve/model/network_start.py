@@ -371,7 +371,7 @@ def start_network(draft, start) -> list[str]:
     """Compute the start of the network of a draft; returns texts of the motions of its states at the start."""
     if draft.network is None:
         return []
-    search = NetworkStart(draft, start)
+    search, draft.network_start = NetworkStart(draft, start), start
     search.find()
     network = draft.network
     if not network.values.size or draft.faults:
@@ -383,3 +383,20 @@ def start_network(draft, start) -> list[str]:
         if rate != 0.0 and item is not None and item.state:
             texts.append(f"{item.state} changes by {rate * item.unit:.4g} per second")
     return texts
+
+
+def accelerations_of_masses(draft) -> dict[str, float]:
+    """Accelerations of the masses that are stores of a network, at present positions and forces in their table.
+
+    name -> acceleration [m/s2]. Forces include those of solenoids and of friction, which holds a mass if it can. Raises
+    CaseError if the network has no start.
+    """
+    if draft.network_start is None:
+        return {}
+    search = NetworkStart(draft, draft.network_start)
+    search.find()
+    draft.check()
+    network = draft.network
+    rates = zip(network.states, network.arrays(search.mode)[1], strict=False)
+    found = ((network.stores[column], float(rate)) for column, rate in rates)
+    return {item.state_of[1]: item.unit * rate for item, rate in found if item.state_of and item.state_of[0] == "mass"}

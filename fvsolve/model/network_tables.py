@@ -13,6 +13,7 @@ from fvsolve.model.network import MOST_STATES, Network
 from fvsolve.model.network_elimination import Elimination, NetworkError, dependent_stores, substituted
 from fvsolve.model.network_faults import NO_INERTIA, NO_SPEED, network_faults, stated_faults
 from fvsolve.model.scalar_tables import exchanger_names
+from fvsolve.model.static_forces import rounding
 
 CURRENT_ROUNDING = 1e-13  # of diodes, over the sum of all sources divided by their resistance
 SAMPLES = 12  # times at which responses are computed for the sizes of states
@@ -30,7 +31,7 @@ def lower_networks(draft) -> None:
     elements, switches = parts_of_network(draft.case)
     if not elements:
         return
-    network = Network(elements, switches, tuple(sorted(draft.case.network_places)))
+    network = Network(elements, switches, tuple(sorted(draft.case.network_places)), rounding=rounding(draft))
     try:
         found = network.equations(network.conducting)
     except NetworkError as error:

@@ -12,6 +12,7 @@ from fvsolve.kernels import tanks
 from fvsolve.kernels.column_junctions import gate_inflow
 from fvsolve.kernels.compiled_functions import fused_step_function
 from fvsolve.kernels.input_histories import BEGINS, MOST_POINTS
+from fvsolve.kernels.scalar_transport import GREATEST_RISE
 from fvsolve.model import Model, RunData
 from fvsolve.model.input_histories import delays_of
 from fvsolve.model.scalar_tables import amount_indices, state_bounds
@@ -45,6 +46,8 @@ STATUS_FAILURES = {  # status of the right-hand side -> text
     "a flow that its pressure does not change: open one, give a machine a leakage, or replace the node by a chamber",
     rec.NO_VOLUME: "the chamber volume{place} is zero at {when}; give the piston an end-stop",
     rec.NO_WIDTH: "the wall has no space left{place} at {when}; give its mass an end-stop, or a wider zone",
+    rec.NO_COOLANT: f"{{part}} heats {{name}} by more than {GREATEST_RISE:g} K at {{when}}: too little fluid flows "
+    "through this junction to take up the heat; make it a chamber, or leave the part out of `heat_from`",
     rec.NO_WEIGHT: "the water in {name} has no weight left at {when}; reduce the downward acceleration of its body",
 }
 
@@ -315,6 +318,10 @@ class RunLoop:
             if status == rec.NO_WEIGHT:
                 bodies = [*(basin.name for basin in model.basins), *model.node_names]
                 names["name"] = bodies[index].removesuffix(".inside")
+            elif status == rec.NO_COOLANT:
+                k = model.tables.heat_sources[index]["valve"]
+                end = "from_node" if self.out[model.layout["valve"] + k] < 0.0 else "to_node"
+                names["part"], names["name"] = model.valve_names[k], model.node_names[model.tables.valves[k][end]]
             else:
                 names["place"] = f" at {model.node_names[index]}" if index >= 0 else ""
             self.step_back()

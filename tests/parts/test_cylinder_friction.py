@@ -213,6 +213,28 @@ def test_a_held_load_does_not_move_by_a_bit(law, method):
         assert not fvsolve.build(fvsolve.load(case)).steady["moving"]
 
 
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("force", [90.0, -90.0, 500.0, -500.0])
+def test_an_equilibrium_start_counts_the_friction_that_holds(force, method):
+    """A mass stays where friction can hold it; a greater force moves it until its spring and friction hold it."""
+    links = JACK.links() | {"push": {"type": "force", "to": "load", "force": force - JACK.thrust(*JACK.pressures)},
+                            "spring": {"type": "spring", "from": "post", "to": "load", "stiffness": 1e5}}  # fmt: skip
+    nodes = JACK.nodes() | {"post": {"type": "frame", "initial_position": JACK.x}}
+    case = fed() | {"nodes": nodes, "links": links}
+    case["numerics"]["initial"] = "equilibrium"
+    run, moved = runs(case, method), 0.0 if abs(force) < 100.0 else (abs(force) - 100.0) / 1e5
+    assert set(run["load.velocity"]) == {0.0} and not run.summary["events"]
+    assert run["load.position"] == pytest.approx(JACK.x + np.sign(force) * moved, abs=1e-12)
+
+
+def test_a_force_that_nothing_holds_is_named():
+    links = JACK.links() | {"push": {"type": "force", "to": "load", "force": 150.0 - JACK.thrust(*JACK.pressures)}}
+    case = fed() | {"nodes": JACK.nodes(), "links": links}
+    case["numerics"]["initial"] = "equilibrium"
+    with pytest.raises(CaseError, match="the forces on load balance: 50 N remain; add a spring"):
+        fvsolve.build(fvsolve.load(case))
+
+
 @pytest.mark.parametrize("method", ["dormand-prince", "radau-iia-5"])
 def test_friction_only_takes_energy_and_the_ledger_closes(method):
     case = fed(law="log")  # the law `linear` does not conserve energy, which is an account of its own

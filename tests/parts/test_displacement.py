@@ -185,6 +185,51 @@ def test_other_density_laws_change_a_drive_by_the_compressibility_alone(fluid):
     assert np.ptp(ends) < 1e-7 * ends[0]
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_a_controller_drives_a_setting_that_lags(method):
+    """0.02 s dx/dt = u - x, with the PI output u of the pressure p0 + rho / 2 (x D w / A)^2 before an orifice."""
+    flow, area, gain = 20.0 * CC * W1, 0.61 * pi * 0.003**2 / 4.0, 1e-8
+    size = {"type": "orifice", "from": "high", "to": "tank", "diameter": "3 mm"}
+    pump = machine("pump", "tank", "high", speed="1500 rpm", displacement="20 cc/rev", setting_time="20 ms",
+                   setting={"control": "k"})  # fmt: skip
+    block = {"type": "pi", "input": "high.pressure", "setpoint": ramp(0.1, 0.0, 5e6, 8e6), "gain": gain,
+             "integral_time": "0.1 s", "limits": [0.0, 1.0]}  # fmt: skip
+    case = scene({"high": {"type": "junction"}}, {"pump": pump, "orifice": size}, 0.5,
+                 ["high.pressure", "pump.setting"], controls={"k": block})  # fmt: skip
+
+    def rates(t, y):
+        error = 8e6 - P0 - RHO / 2.0 * (y[0] * flow / area) ** 2
+        wanted = gain * error + y[1]
+        output = min(max(wanted, 0.0), 1.0)
+        return [(output - y[0]) / 0.02, (gain * error + output - wanted) / 0.1]
+
+    run, first = runs(case, method), sqrt(2.0 * (5e6 - P0) / RHO) * area / flow
+    exact = solve_ivp(rates, (0.1, 0.5), [first, first], "DOP853", dense_output=True, rtol=1e-12, atol=1e-13).sol
+    assert run["pump.setting"] == pytest.approx(exact(np.maximum(run.t, 0.1))[0], abs=1e-8)
+
+
+@pytest.mark.parametrize("turns", [0.0, 1.0, -1.0])
+def test_swept_flow_has_the_density_of_the_inlet_and_leakage_that_upstream(turns):
+    """Two chambers under the law `log`, rho = RHO exp((p - P0) / BETA), beside SciPy."""
+    q, leak, high, low = 20e-6 * turns, 0.5e-3 / 60.0 / 1e5, 300e5, 10e5
+    nodes = {"low": {"type": "chamber", "volume": "2 l", "initial_pressure": low},
+             "high": {"type": "chamber", "volume": "1 l", "initial_pressure": high}}  # fmt: skip
+    pump = machine("pump", "low", "high", speed=f"{60.0 * turns} rpm", displacement="20 cc/rev", leakage=leak)
+    case = scene(nodes, {"pump": pump}, 0.02, ["high.pressure", "pump.flow"], fluid={"law": "log"})
+    del case["nodes"]["tank"]
+    run = runs(case)
+    density = lambda p: RHO * np.exp((p - P0) / BETA)  # noqa: E731
+    mass_flow = lambda a, b: density(a if q >= 0.0 else b) * q - density(b) * leak * (b - a)  # noqa: E731
+
+    def rates(t, p):
+        m = mass_flow(*p)
+        return [-m * BETA / 2e-3 / density(p[0]), m * BETA / 1e-3 / density(p[1])]
+
+    exact = solve_ivp(rates, (0.0, 0.02), [low, high], "DOP853", run.t.clip(0.0, 0.02), rtol=1e-12, atol=1e-3)
+    assert run["high.pressure"] == pytest.approx(exact.y[1], rel=EXACT)
+    assert run["pump.flow"][0] == pytest.approx(mass_flow(low, high) / density(high), rel=1e-12)
+
+
 # start --------------------------------------------------------------------------------------------------------------
 
 

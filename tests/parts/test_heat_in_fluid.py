@@ -421,6 +421,103 @@ def test_steady_friction_keeps_the_viscosity_of_the_start_and_says_so():
     assert any("its friction keeps the viscosity of the start" in text for text in notes)
 
 
+# parts of fluid power ---------------------------------------------------------------------------------------------
+
+PORTS = {"P": "a", "T": "b", "A": "c", "B": "d"}
+SPOOL = {"type": "spool-valve", "ports": PORTS, "diameter": "2 mm"}
+SEVERAL = {
+    "position": SPOOL | {"position": 0.5},
+    "command": SPOOL | {"command": -0.5, "natural_frequency": "60 Hz", "damping_ratio": 0.8},
+    "shuttle": {"type": "shuttle", "ports": {"A": "a", "B": "b", "out": "c"}, "diameter": "2 mm"},
+}
+
+
+@pytest.mark.parametrize("name", SEVERAL)
+@pytest.mark.parametrize("heat_from", ["all", ["several"]], ids=["all", "name"])
+def test_all_restrictions_of_a_link_heat_the_fluid(name, heat_from):
+    """Their heat is the energy V p^2 / (2 K) that the chambers lose."""
+    nodes = {place: chamber(5e-3, pressure) for place, pressure in zip("abcd", (1e7, 1e6, 2e6, 2e6), strict=True)}
+    links = {"first": valve("c", "d", 1e-6, 0.0), "several": SEVERAL[name], "last": valve("d", "b", 1e-6, 0.0)}
+    case = heated(nodes, links, 0.5, heat_from, probes=[f"{place}.pressure" for place in nodes],
+                  fluid=OIL | {"law": "linear"})  # fmt: skip
+    result = fvsolve.run(case)
+    energies = sum(5e-3 / (2.0 * 1.6e9) * np.array(result[f"{place}.pressure"]) ** 2 for place in nodes)
+    book = result.ledger["temperature"]
+    assert result.ok and book["heat"]["several"] == approx(energies[0] - energies[-1], rel=1e-6)
+    assert book["heat"]["several"] > 40.0 and sum(book["heat"].values()) == book["heat"]["several"]
+
+
+LOSSES = {"displacement": "20 cc/rev", "leakage": "0.02 l/min/bar", "viscous_friction": 0.02, "friction_torque": 5.0}
+
+
+def circuit(kind, drive, **more):
+    """Machine between two chambers that a throttle joins; it turns by `speed`, by a housing, or by its inertia."""
+    shaft = {"speed": "1500 rpm"} if drive == "speed" else {"ports": {"shaft": "shaft"}}
+    ends = ("low", "high") if kind == "pump" else ("high", "low")
+    own = {"type": f"displacement-{kind}", "from": ends[0], "to": ends[1], **LOSSES, **shaft, **more}
+    turned = {"type": "housing", "speed": "1500 rpm"}
+    if drive == "inertia":
+        turned = {"type": "shaft", "inertia": 0.5, "initial_speed": "1500 rpm"}
+    nodes = {"low": chamber(0.02, 1e7), "high": chamber(1e-3)} | ({} if drive == "speed" else {"shaft": turned})
+    probes = ["low.temperature", "high.temperature", "low.pressure", "high.pressure", "machine.torque"]
+    probes += ["shaft.speed"] if drive == "inertia" else []
+    return heated(nodes, {"machine": own, "throttle": valve("high", "low", 5e-6)}, 2.0, "all", probes=probes,
+                  fluid=OIL | {"law": "linear"})  # fmt: skip
+
+
+@pytest.mark.parametrize("drive", ["speed", "housing", "inertia"])
+@pytest.mark.parametrize("kind", ["pump", "motor"])
+def test_all_losses_of_a_displacement_machine_heat_the_fluid(kind, drive):
+    """The fluid gets the work at the shaft, less what its pressure stores; the network keeps no friction for itself."""
+    case, speed = circuit(kind, drive), 1500.0 * math.pi / 30.0
+    result = fvsolve.run(case)
+    book, found = result.ledger["temperature"], energy(case)
+    stored = sum(volume / (2.0 * 1.6e9) * np.array(result[f"{place}.pressure"]) ** 2
+                 for place, volume in (("low", 0.02), ("high", 1e-3)))  # fmt: skip
+    if drive == "inertia":
+        work = 0.25 * (result["shaft.speed"][0] ** 2 - result["shaft.speed"][-1] ** 2)
+        assert result["shaft.speed"][-1] < 0.9 * speed
+    else:
+        taken = 1.0 if kind == "pump" else -1.0
+        assert np.ptp(result["machine.torque"]) < 1e-6
+        work = taken * result["machine.torque"][0] * speed * 2.0
+    assert result.ok and book["relative"] < 1e-12
+    assert sum(book["heat"].values()) == approx(work - stored[-1] + stored[0], rel=1e-6)
+    assert abs(found.remainder[-1]) < 1e-7 * found.throughput
+    assert sum(line[-1] for line in found.dissipated.values()) == approx(sum(book["heat"].values()), rel=1e-6)
+
+
+@pytest.mark.parametrize("drive", ["speed", "inertia"])
+def test_the_pattern_of_the_jacobian_has_what_heats_by_a_machine(drive):
+    model, rng = fvsolve.build(fvsolve.load(circuit("motor", drive))), np.random.default_rng(1)
+    assert stray(model, 0.0, model.scale * rng.normal(scale=0.1, size=model.y_size)) < 1e-7
+
+
+def test_a_machine_that_stands_still_heats_by_its_leakage_alone():
+    case = circuit("motor", "inertia", friction_torque="200 N m")
+    case["nodes"]["shaft"]["initial_speed"], case["nodes"]["high"]["initial_pressure"] = 0.0, 2e7
+    case["links"]["throttle"]["opening"] = 0.0
+    result = fvsolve.run(case)
+    p = np.array([result["low.pressure"], result["high.pressure"]])
+    stored = np.array([0.02, 1e-3]) @ p**2 / (2.0 * 1.6e9)
+    assert np.ptp(result["shaft.speed"]) == 0.0
+    assert result.ledger["temperature"]["heat"]["machine"] == approx(stored[0] - stored[-1], rel=1e-6)
+
+
+@pytest.mark.parametrize("setting", [0.0, 1e-6])
+def test_heat_of_a_junction_without_flow_ends_the_run(setting):
+    case = circuit("pump", "speed", leakage=0.0, setting=setting)
+    case["nodes"]["high"] = junction()
+    case["output"]["probes"] = ["high.temperature"]
+    result = fvsolve.run(case)
+    assert not result.ok
+    for text in ("machine heats high by more than 300 K at t = 0 s", "too little fluid flows", "make it a chamber"):
+        assert text in result.reason
+    case["nodes"]["high"] = chamber(1e-3)
+    result, rate = fvsolve.run(case), (0.02 * 50.0 * math.pi + 5.0) * 50.0 * math.pi / (RHO * 1e-3 * CP)
+    assert result.ok and result["high.temperature"][-1] - 40.0 == approx(2.0 * rate, rel=1e-2)
+
+
 # what a case states -----------------------------------------------------------------------------------------------
 
 

@@ -385,6 +385,27 @@ def test_its_flow_hardly_changes_while_the_load_triples(law):
             assert q == pytest.approx(through(mid - p, 1e-6), rel=1e-9)
 
 
+@pytest.mark.parametrize("ends", [("pump", "mid"), ("mid", "pump")], ids=["drawn forward", "drawn the other way"])
+@pytest.mark.parametrize("spool", [{}, *SPOOLS.values()], ids=["at once", *SPOOLS])
+@pytest.mark.parametrize("set_drop", [8e5, 4e6])
+def test_its_steady_start_follows_its_closed_form(ends, spool, set_drop):
+    """Two metering orifices with the drop d each; the valve passes x A(2 d) and is fully open under 40 bar."""
+    nodes = {"pump": reservoir(6e6), "drain": reservoir(DRAIN), "mid": chamber(VOLUME), "load": chamber(VOLUME)}
+    links = {"meter": valve("mid", "load", 2e-6), "out": valve("load", "drain", 2e-6),
+             "hold": sized("pressure-compensator", 8e-6, **dict(zip(("from", "to"), ends, strict=True)),
+                           senses=["mid", "load"], set_drop=set_drop, **spool)}  # fmt: skip
+    result = fvsolve.run(
+        scene(nodes, links, 0.1, {"rtol": 1e-9}, ["mid.pressure", "load.pressure", "hold.opening"], 0.05, fluid=OIL)
+    )
+    opening = lambda d: min(max(1.0 - (d - set_drop) / (0.05 * set_drop), 0.0), 1.0)  # noqa: E731
+    balance = lambda d: opening(d) * through(6e6 - DRAIN - 2.0 * d, 8e-6) - through(d, 2e-6)  # noqa: E731
+    drop = brentq(balance, 1e3, 2.95e6, xtol=1e-9)
+    assert result.ok and (opening(drop) == 1.0) == (set_drop == 4e6)
+    assert result["mid.pressure"] == pytest.approx(DRAIN + 2.0 * drop, rel=1e-9)
+    assert result["load.pressure"] == pytest.approx(DRAIN + drop, rel=1e-9)
+    assert result["hold.opening"] == pytest.approx(opening(drop), abs=1e-8)
+
+
 # all of them ----------------------------------------------------------------------------------------------------
 
 SCENES = {

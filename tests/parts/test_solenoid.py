@@ -190,6 +190,33 @@ def test_the_force_is_the_slope_of_the_coenergy(x):
     assert np.sign(run["coil.force"][0]) == np.sign(COIL["closed_position"] - x)
 
 
+@pytest.mark.parametrize("method", ["dormand-prince", "radau-iia-5"])
+@pytest.mark.parametrize("begins", [0.0, 1e-4, 4e-3])
+@pytest.mark.parametrize("saturation", [None, 2e-5])
+def test_an_equilibrium_start_balances_spring_and_coil(saturation, begins, method):
+    """k x = Phi^2 / (2 mu0 A) with the flux of the steady current, from either side of the closed position."""
+    nodes = {"plunger": {"type": "mass", "mass": 0.02, "initial_position": begins}, "wall": {"type": "frame"},
+             "weight": {"type": "mass", "mass": 0.5, "initial_position": 0.1}}  # fmt: skip
+    links = {"spring": two_port("spring", "wall", "plunger", stiffness=4e4),
+             "rod": two_port("spring", "plunger", "weight", stiffness=1e5, preload=-3.0),
+             "push": {"type": "force", "to": "weight", "force": 3.0}}  # fmt: skip
+    keys = {} if saturation is None else {"saturation_flux": saturation}
+    case = coil(0.1, nodes, links, ["plunger.position", "weight.position", "coil.force"], **keys)
+    case["numerics"]["initial"] = "equilibrium"
+    run, current = runs(case, method), VOLT / OHM
+
+    def pull(x):
+        gap, core = (3e-3 - x) / (MU_0 * COIL["pole_area"]), COIL["core_reluctance"]
+        share = 0.0 if saturation is None else saturation**-2
+        law = lambda flux: (core * (1.0 + share * flux * flux) + gap) * flux - COIL["turns"] * current  # noqa: E731
+        return brentq(law, 0.0, 1e-3, xtol=1e-20, rtol=1e-14) ** 2 / (2.0 * MU_0 * COIL["pole_area"])
+
+    place = brentq(lambda x: 4e4 * x - 3.0 - pull(x), 0.0, 1e-3, xtol=1e-18)
+    for probe, value in (("plunger.position", place), ("weight.position", place + 0.1 - begins)):
+        assert np.ptp(run[probe]) < 1e-15 and run[probe][0] == pytest.approx(value, rel=1e-9)
+    assert run["coil.force"][0] == pytest.approx(4e4 * place - 3.0, rel=1e-9)
+
+
 @pytest.mark.parametrize(("share", "holds"), [(1.001, True), (0.999, False)])
 def test_a_closed_armature_is_held_down_to_its_holding_current(share, holds):
     """The spring pulls with 4 N + 900 N/m x; the flux for this force needs a current, and that a voltage."""

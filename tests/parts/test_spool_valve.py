@@ -89,7 +89,22 @@ def test_valves_with_fewer_ports_have_fewer_edges(ways, x, flows, more):
     assert [str(probe) for probe in run.probes] == [*(f"spool.flow_{port}" for port in PORTS[ways]), "spool.position"]
     for port, q in flows.items():
         assert run[f"spool.flow_{port}"] == approx(q, rel=CLOSE, abs=1e-15)
-    assert run["spool.position"] == approx(0.0 if ways == "2/2" and x < 0 and more is SERVO else x, abs=1e-14)
+    assert run["spool.position"] == approx(0.0 if ways == "2/2" and x < 0 else x, abs=1e-14)
+
+
+@pytest.mark.parametrize("method, rtol", METHODS)
+@pytest.mark.parametrize("keys", [{"key": "position"}, {"key": "command"}, {"key": "command", "dead_band": 0.1}],
+                         ids=["position", "command", "dead band"])  # fmt: skip
+def test_the_spool_of_a_2_2_valve_stops_at_0(keys, method, rtol):
+    """Also with an underlap, with which it stays open there."""
+    keys, wave = dict(keys), {"mean": 0.0, "amplitude": 1.0, "period": 0.05}
+    run = fvsolve.run(bench("2/2", 0.1, **{keys.pop("key"): wave}, overlap=-0.1, **keys),
+                      {"numerics.method": method, "numerics.rtol": rtol})  # fmt: skip
+    u, dead = np.sin(2.0 * pi * np.array(run.t) / 0.05), keys.get("dead_band", 0.0)
+    x = np.maximum(u - dead, 0.0) / (1.0 - dead)
+    assert run["spool.position"] == approx(x, abs=1e-11)
+    assert run["spool.flow_P"] == approx(np.array([flow((y + 0.1) / 1.1, 80e5) for y in x]), rel=1e-9)
+    assert "reaches its lower stop" in {event["what"] for event in run.summary["events"]}
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])

@@ -102,7 +102,7 @@ def pressure_drop(out, tables, k):
 
 @njit
 def shaft_torque(t, y, out, tables, device):
-    """Torque on the shaft with all losses [N m], for a scheduled speed."""
+    """Torque on the shaft with all losses [N m]; at rest without dry friction."""
     floats, at = tables.floats, device["data"]
     w = machine_speed(t, y, tables, device)
     dry = copysign(floats[at + DRY], w) if w != 0.0 else 0.0
@@ -217,3 +217,9 @@ def power(t, y, dydt, out, tables, device):
         return 0.0, 0.0, -fluid_torque(t, y, out, tables, device) * w
     taken = -shaft_torque(t, y, out, tables, device) * w
     return taken, 0.0, taken
+
+
+@njit
+def heat(t, y, out, tables, device):
+    """Power that the fluid and all losses take from the shaft [W]."""
+    return -shaft_torque(t, y, out, tables, device) * machine_speed(t, y, tables, device)

@@ -40,6 +40,8 @@ class MachineRows(Device, kind="displacement-pump"):
         return part.shaft if part.speed is None else None
 
     def schedules_of_rates(self, row, valves, floats):
+        if row["states"] == 0:
+            return []
         return [int(valves[row["valve"]]["schedule"]), int(floats[row["data"] + law.SET_SCHEDULE])]
 
     def inputs(self, model, name, part):

@@ -115,6 +115,10 @@ class CompensatorDisc(PilotedDisc, kind=""):
     def opening_pressure(self, start, part):
         return -part.set_drop - part.overpressure
 
+    def edge(self, start, k):
+        start.valve_modes.setdefault(k, OPEN)  # a spool below its seat would pass a reversed flow forward
+        return super().edge(start, k)
+
     def flow_at(self, start, k, drop, lift):
         """Results of `LiftedValve.flow_at`; a reversed flow changes with the lift too."""
         full, steep, _ = super().flow_at(start, k, drop, 1.0)

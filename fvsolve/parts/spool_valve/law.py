@@ -2,7 +2,7 @@
 
 x'' = w^2 e - 2 zeta w x', |x'| <= fastest, with position x, angular frequency w, damping ratio zeta and
 e = command - x; hysteresis takes half its width off |e|, and a dead band acts on the command. An edge has the opening
-max(0, a x + b). Without states x is the command.
+max(0, a x + b). Without states x is the command, or the position of the lower stop if that is greater.
 
 The state is the deviation of x from its start, and x'. Flags, which change on accepted states only: the spool rests at
 its stop (UPPER, LOWER) or moves at its greatest speed (FORWARD, BACKWARD); the error does not exceed the half width
@@ -38,7 +38,8 @@ def spool_command(t, tables, device):
 def spool_position(t, y, tables, device):
     """Position x of the spool [-]."""
     if device["states"] == 0:
-        return spool_command(t, tables, device)
+        at_stop = tables.armed[device["event"] + LOWER] > 0.0
+        return tables.floats[device["data"] + LEAST] if at_stop else spool_command(t, tables, device)
     return tables.floats[device["data"] + START] + y[device["y"]]
 
 
@@ -105,6 +106,8 @@ def events(t, y, out, tables, device, g):
         kink_event(tables, g, at + EDGE + 2 * i, x - floats[positions + 1 + i])
     if device["states"] > 0:
         motion_events(t, y, tables, device, g, x)
+    else:
+        kink_event(tables, g, at + LOWER, spool_command(t, tables, device) - floats[data + LEAST])
 
 
 @njit

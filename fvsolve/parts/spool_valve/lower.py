@@ -27,7 +27,8 @@ class SpoolValveRows(Restriction, kind="spool-valve"):
         self.edges, self.ports, self.rows = EDGES[ways], PORTS[ways], len(EDGES[ways])
 
     def of(self, part) -> Restriction:
-        if part.natural_frequency is not None or part.dead_band:
+        stops = part.ways_of == "2/2"  # at its stop 0, where the position does not follow its schedule
+        if part.natural_frequency is not None or part.dead_band or stops:
             return CommandedRows(part)
         return SpoolValveRows(part.ways_of)
 
@@ -70,7 +71,7 @@ class SpoolValveRows(Restriction, kind="spool-valve"):
 
 
 class CommandedRows(SpoolValveRows, Device, kind=""):
-    """Conversion to table rows of spool valves whose spool follows a command."""
+    """Conversion to table rows of spool valves whose spool follows a command, or has a stop at 0."""
 
     law = law
     quantities = ("position",)
@@ -117,7 +118,7 @@ class CommandedRows(SpoolValveRows, Device, kind=""):
     def position_at_start(self, start, part, row) -> float:
         """Position of the spool at the start; row : that of its device."""
         position = part.after_dead_band(start.schedule_value(row["schedule"]))
-        return max(position, self.least) if self.moves else position
+        return max(position, self.least)
 
     def opening_at_start(self, start, part, row, k) -> float:
         a, b = part.opening_line(self.edges[k - int(row["valve"])])
