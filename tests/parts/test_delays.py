@@ -204,7 +204,7 @@ def test_advance_in_parts_carries_the_inputs_on():
 def test_a_killed_and_resumed_run_with_delays_is_the_unbroken_run(tmp_path):
     case = delayed_loop(0.52, tau=3.0, end=2000.0, rtol=1e-9)
     controls = case["controls"]
-    controls["swing"] = {"type": "relay", "input": "controls.plant", "on": 0.1, "off": -0.1, "initial": 0}
+    controls["swing"] = {"type": "relay", "input": "controls.plant", "on": 0.1, "off": -0.1, "initial": 1}
     controls["follow"] = {"type": "delay", "input": "controls.swing", "delay": 40.0}
     whole = fvsolve.run(case, out=tmp_path / "whole", pictures=False)
     assert whole.ok and whole.summary["steps"] > 2000
