@@ -37,7 +37,8 @@ FAILURES = {  # reason for the return of the loop -> text
     loop_records.STOPPED: '{event} at {when}, and numerics.below_vapor = "stop" ends the run there',
     loop_records.NEWTON_STUCK: "Newton did not converge at {when}, however short the step, worst in {worst}; check the "
     "parts there for jumps, or try an explicit method",
-    loop_records.TINY_STEP: "the step became too small at {when}; try a larger rtol, or numerics.courant instead",
+    loop_records.TINY_STEP: "the step became too small at {when}; try a larger rtol, or numerics.courant or "
+    "numerics.step instead; a formula with an infinite slope there is another cause",
     loop_records.BAD_VALUE: "a value is not finite{place} at {when}; the step is too long for the method: "
     "halve the step",
 }

@@ -1,4 +1,4 @@
-"""Each kind of key changes no more of a model than its class states, in up to four shipped cases."""
+"""Each kind of key changes no more of a model than its class states, in up to two shipped cases."""
 
 import copy
 import re
@@ -107,7 +107,7 @@ class Trial:
     """Trial of changed keys in cases: wrong classes, and for each key of class `shape` if it changed the shape."""
 
     def __init__(self, every: bool) -> None:
-        # every : each kind of key in four cases, in large cases only kinds of no other case; otherwise in one case
+        # every : each kind of key in two cases, in large cases only kinds of no other case; otherwise in one case
         self.every, self.wrong, self.done = every, [], set()
         self.cases: Counter = Counter()  # number of cases for each kind of key
         self.told: dict[int, bool] = {}
@@ -125,7 +125,7 @@ class Trial:
             value = self.of_signals.setdefault(words[2:], declared) if words[0] == "signals" else declared
             self.values.append(value)
             often[id(value)] += 1
-            several = self.every and name not in LARGE and often[id(value)] == 1 and self.cases[id(value)] < 4
+            several = self.every and name not in LARGE and often[id(value)] == 1 and self.cases[id(value)] < 2
             new = name not in LARGE or not self.cases[id(value)]
             if several or (id(value) not in self.done and new):
                 self.cases[id(value)] += 1
@@ -159,7 +159,7 @@ def beside_their_files(monkeypatch):
 
 
 def test_a_key_changes_no_more_than_it_says_and_each_that_says_shape_does():
-    """Each kind of key in one case; a test below takes four cases."""
+    """Each kind of key in one case; a test below takes two cases."""
     trial = Trial(every=False)
     for path in sorted(CASES.glob("*.toml")):
         if path.stem not in LARGE:

@@ -452,6 +452,7 @@ def test_the_pattern_of_the_jacobian_is_complete(name, law):
 def test_at_rest_it_does_not_move_by_a_bit(name, law, method):
     make, more = SCENES[name]
     case = make({"method": method, "rtol": 1e-8}, **more)
+    case["numerics"]["end"] *= 0.1 if method == "dormand-prince" else 1.0  # it takes the most steps
     case["fluid"]["law"] = law
     for node in case["nodes"].values():
         node.update({"pressure": 2e6} if node["type"] == "reservoir" else {"initial_pressure": 2e6})
