@@ -101,8 +101,9 @@ def test_a_free_piston_on_a_spring_swings_at_the_root_of_the_cotangent_law(metho
 # scalars, and walls on masses ----------
 
 
-@pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
-@pytest.mark.parametrize("method", ["ssp-rk3", "radau-iia-3"])
+@pytest.mark.parametrize(
+    "method, scheme", [("radau-iia-3", "upwind"), ("ssp-rk3", "muscl"), ("radau-iia-3", "muscl"), ("ssp-rk3", "weno5")]
+)
 def test_what_is_even_stays_even_and_amounts_and_mass_are_kept_between_walls_that_swing(scheme, method):
     swings = {"mean": 0.1, "amplitude": 0.25, "period": 1.1, "phase": 0.4}
     patches = {
