@@ -449,6 +449,7 @@ CLUSTER_RECORD = record(
     couples=i8,
     inverse=i8,
     order=i8,  # offset in `integers` of an order of elimination that keeps its matrix sparse; -1: none
+    senses=i8,  # 1 if a device senses pressures for one of its valves
 )
 
 LAYOUT = record(

@@ -239,6 +239,7 @@ def _assemble(cluster, tables, out, g, m, c, connected, slope, wide, work, spars
     """
     matrix, right, a, s, lift = step_arrays(c.size, g.size, work)
     nodes, valves, integers, n = tables.nodes, tables.valves, tables.integers, c.size
+    senses = cluster["senses"] == 1
     if sparse:
         clear_pattern(matrix, n, integers, cluster["order"])
     else:
@@ -255,7 +256,7 @@ def _assemble(cluster, tables, out, g, m, c, connected, slope, wide, work, spars
             a[e], s[e] = restriction_step(tables, out, k, g[e], m[e], drop, denser, wide)
             lift[e] = restriction_lift(tables, out, k, g[e], drop, denser, wide)
         upstream = lift[e]
-        if upstream != 0.0 and is_sensing(tables, k):
+        if senses and upstream != 0.0 and is_sensing(tables, k):
             add_sensed(cluster, tables, k, i, j, upstream, n, matrix)
             upstream = 0.0
         add_valve(i, j, m[e], a[e], s[e], upstream, n, matrix, right)
@@ -316,7 +317,8 @@ def apply_step(cluster, tables, out, m, a, s, lift, right):
         valve = valves[k]
         i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
         rise = right[i] if i >= 0 else 0.0
-        lifting = sensed_step(cluster, tables, k, right) if lift[e] != 0.0 and is_sensing(tables, k) else rise
+        senses = cluster["senses"] == 1 and lift[e] != 0.0 and is_sensing(tables, k)
+        lifting = sensed_step(cluster, tables, k, right) if senses else rise
         step = a[e] + s[e] * (rise - (right[j] if j >= 0 else 0.0)) + lift[e] * lifting
         m[e] += step
         scale = max(scale, abs(m[e]), sqrt(valve["conductance"]))
@@ -461,7 +463,7 @@ def prepare_cluster(cluster, tables, out, g, m):
     Returns True if all conductances, pump speeds and pressures at the valves are those of the initial steady state.
     """
     layout, valves = tables.layout[0], tables.valves
-    integers, unchanged = tables.integers, True
+    integers, unchanged, senses = tables.integers, True, cluster["senses"] == 1
     for i in range(cluster["nodes"]):
         out[layout["pressure"] + integers[cluster["first_node"] + i]] = 0.0
     for e in range(g.size):
@@ -473,7 +475,7 @@ def prepare_cluster(cluster, tables, out, g, m):
         unchanged = unchanged and g[e] == valve["open"] and out[layout["drive"] + k] == valve["drive"]
         for i in (valve["from_node"], valve["to_node"]):
             unchanged = unchanged and out[layout["pressure"] + i] == 0.0
-        if valve["hooks"] >= 0 and is_sensing(tables, k):
+        if senses and valve["hooks"] >= 0 and is_sensing(tables, k):
             device = tables.devices[valve["device"]]
             for i in (device["node"], device["second"]):
                 unchanged = unchanged and (i < 0 or out[layout["pressure"] + i] == 0.0)

@@ -134,7 +134,9 @@ def add_cluster(draft, members, ks, own) -> tuple[int, ...]:
     if ks and draft.valve_table["chained"][ks].all():
         order = len(draft.integers)
         draft.integers += elimination_order(draft, members, ks, own)
-    return at, n, at + n, len(ks), at + n + len(ks), len(own), inverse, order
+    devices = draft.valve_table["device"][ks]
+    senses = (draft.device_table["node"][devices[devices >= 0]] >= 0).any() if ks else False
+    return at, n, at + n, len(ks), at + n + len(ks), len(own), inverse, order, int(senses)
 
 
 def elimination_order(draft, members, ks, own) -> list[int]:
