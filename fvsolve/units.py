@@ -195,7 +195,7 @@ def parse_in(given: Any, si: str, remedy: str) -> float:
             raise ValueError(f"{show(given)} is not a number with a unit; {remedy}")
         number, spelling = match[1], _canonical(match[2])
         if re.match(r",\d", spelling):
-            raise ValueError(f"{show(given)} has a decimal comma; did you mean {show(given.replace(',', '.', 1))}?")
+            raise ValueError(comma_text(given))
         bare = spelling.removeprefix("1/").replace("%", "percent")
         if spelling and not _SAFE_SPELLING.fullmatch(bare):
             raise ValueError(f"{show(given)}: unknown unit {show(spelling)}; {remedy}")
@@ -353,6 +353,14 @@ def _parse_number(given: Any, dimension: str) -> float:
         return math.inf
 
 
+def comma_text(text: str) -> str:
+    """Text of the fault of a number with a comma: the last of comma and point is the decimal sign."""
+    number = re.match(r"[^\d]*[\d.,]*", text)[0]
+    decimal, other = (",", ".") if number.rfind(",") > number.rfind(".") else (".", ",")
+    corrected = number.replace(other, "").replace(decimal, ".") + text.removeprefix(number)
+    return f"{show(text)} has a comma; did you mean {show(corrected)}?"
+
+
 def _parse_text(text: str, dimension: str) -> tuple[float, Unit | None]:
     match = _NUMBER.fullmatch(text.replace("\N{MINUS SIGN}", "-"))
     if match is None:
@@ -364,9 +372,7 @@ def _parse_text(text: str, dimension: str) -> tuple[float, Unit | None]:
             raise ValueError(f'{show(text)} has no unit; did you mean "{number} {si}", or the bare number {number}?')
         return float(number), None
     if re.match(r",\d", spelling):
-        raise ValueError(
-            f"{show(text)} has a decimal comma; did you mean {show(text.replace('.', '').replace(',', '.', 1))}?"
-        )
+        raise ValueError(comma_text(text))
     unit = find(spelling, dimension, number)
     return unit.read(number), unit
 

@@ -139,7 +139,7 @@ def period_of(program, start: float, end: float) -> float:
         change = np.diff(values)
         moves = np.flatnonzero(np.abs(change) > SMALL_MOVE * np.ptp(values))  # the ends of plateaus are no turns
         turns = times[moves[1:][np.diff(np.sign(change[moves])) != 0.0]]
-        if turns.size < 3:
+        if turns.size < 2:
             break
         gap = float(np.median(np.diff(turns)))
         if gap > SAMPLES_IN_HALF_WAVE * (end - start) / len(times):

@@ -299,7 +299,8 @@ def test_initial_of_a_function_leaves_no_offset(period):
 @pytest.mark.parametrize(
     ("formula", "end", "period"),
     [
-        ("sin(2*pi*t/11)", 120.0, 11.0), ("sin(1e4*t)", 100.0, 2e-4 * math.pi), ("sin(2*pi*100*t)", 20.0, 0.01),
+        ("sin(2*pi*t/11)", 120.0, 11.0), ("sin(2*pi*t/11)", 11.0, 11.0),
+        ("sin(1e4*t)", 100.0, 2e-4 * math.pi), ("sin(2*pi*100*t)", 20.0, 0.01),
         ("sin(2*pi*t*50) > -0.3", 0.1, 0.02), ("t > 0.02", 0.1, math.inf), ("exp(-t)*(t > 0.03)", 0.1, math.inf),
         ("max(0, min(1, (t - 3600)/60))", 86400.0, math.inf), ("t^2", 3.0, math.inf),
     ],

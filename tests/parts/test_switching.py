@@ -163,6 +163,14 @@ def test_events_name_their_blocks_and_states_survive_advance():
     assert [event["what"] for event in run.summary["events"]][:2] == ["turns on", "turns off"]
 
 
+def test_a_relay_that_would_switch_a_billion_times_is_refused_soon():
+    place = {"type": "transfer-function", "input": "controls.act", "numerator": [1.0], "denominator": [1.0, 0.0],
+             "initial": 0.0}  # fmt: skip
+    act = {"type": "relay", "input": "controls.place", "on": 0.0, "off": 1e-9, "output": [-1.0, 1.0], "initial": 1}
+    run = fvsolve.run(tower(0.5, 0.5, end=1.0, controls={"place": place, "act": act}))
+    assert not run.ok and "controls.act changes its state without end" in run.reason and run.t[-1] < 1e-4
+
+
 def test_a_relay_without_hysteresis_is_refused_with_its_remedy():
     act = {"type": "relay", "input": "tower.level", "on": 4.0 - 1e-13, "off": 4.0, "output": [0.1, 0.9], "initial": 0}
     run = fvsolve.run(tower({"control": "act"}, 0.5, controls={"act": act}))

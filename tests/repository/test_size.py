@@ -17,12 +17,12 @@ MAX_ARGUMENTS = 12
 MAX_LINES = 60
 # folder -> (lines, files), with its subfolders
 FOLDERS: dict[str, tuple[int, int]] = {
-    "fvsolve": (1633, 11),
+    "fvsolve": (1639, 11),
     "tests": (929, 7),
     "benchmarks": (6515, 49),
     "fvsolve/assembly": (1921, 10),
     "fvsolve/basins": (9147, 45),
-    "fvsolve/case": (6766, 24),
+    "fvsolve/case": (6764, 24),
     "fvsolve/cli": (3322, 15),
     "fvsolve/compile": (1050, 6),
     "fvsolve/data": (12, 1),
@@ -56,7 +56,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/mesh": (411, 1),
     "tests/model": (2827, 9),
     "tests/output": (518, 2),
-    "tests/parts": (16802, 45),
+    "tests/parts": (16811, 45),
     "tests/reference": (3503, 34),
     "tests/report": (850, 4),
     "tests/repository": (2544, 14),
@@ -65,7 +65,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/step_limits": (1022, 4),
     "tests/steppers": (2114, 12),
     "tests/studies": (7969, 22),
-    "tests/units": (266, 1),
+    "tests/units": (267, 1),
 }
 # functions that exceed a limit: "path: function" -> (arguments, lines). Commands and studies are excepted by rule.
 LONG: dict[str, tuple[int, int]] = {}
