@@ -84,9 +84,8 @@ def network_fault(fault: NetworkFault, case) -> tuple[str, str]:
         return contradiction(fault, case)
     words = words_of(case, fault.parts[0]) if fault.parts else OTHER
     if names and all(kinds[name] in ("gear", "rack", "dc-motor") for name in names):
-        return fault.parts[
-            0
-        ], f"{listing(names, 6)} form a closed loop, whose torques are not determined; leave one out"
+        text = f"{listing(names, 6)} form a closed loop, whose torques are not determined; leave one out"
+        return fault.parts[0], text
     text = f"nothing determines the {words.potential} or {words.flow} of {listing(names, 6)}"
     return fault.parts[0] if fault.parts else "links", f"{text}; join {words.anchor}"
 
@@ -103,10 +102,8 @@ def contradiction(fault: NetworkFault, case) -> tuple[str, str]:
         return first.part, f"the {quantity}s of {listing(names)} contradict each other; put {put}"
     if flows and given:
         kind = case.nodes[given[0]].kind
-        return (
-            first.part,
-            f"its {words.flow} acts on {kind} {given[0]}, whose {words.potential} is given; join another place",
-        )
+        text = f"its {words.flow} acts on {kind} {given[0]}, whose {words.potential} is given; join another place"
+        return first.part, text
     if flows:
         where = listing([end for end in first.ends if end is not None])
         return first.part, f"its {words.flow} has no way: nothing at {where} takes it; {words.way}"

@@ -33,7 +33,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/fmi": (439, 5),
     "fvsolve/kernels": (15675, 64),
     "fvsolve/mesh": (1077, 4),
-    "fvsolve/model": (9114, 27),
+    "fvsolve/model": (9111, 27),
     "fvsolve/output": (1535, 9),
     "fvsolve/parts": (16516, 124),
     "fvsolve/report": (2037, 7),
