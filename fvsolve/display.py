@@ -5,7 +5,7 @@ from html import escape
 from importlib import import_module
 from typing import Any, ClassVar
 
-from fvsolve.validation import PATH, validated
+from fvsolve.argument_checks import PATH, validated
 
 TABLE_ROWS = 12  # rows of a table in a notebook; `.frame()` contains all rows
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import exact, units
+from fvsolve.argument_checks import TABLE, validated
 from fvsolve.case import basins, chainage, checks, claims, connections, part_reading, resource_checks, shipped
 from fvsolve.case.case import Case, wave_speed
 from fvsolve.case.controls import read_controls
@@ -25,7 +26,6 @@ from fvsolve.parts.control import Control
 from fvsolve.parts.schedule import Schedule, Scheduled, signal_fault
 from fvsolve.parts.table_model import read_keys
 from fvsolve.units import Kinematic, show
-from fvsolve.validation import TABLE, validated
 
 SCHEMA = 1
 PRESENCE_KEYS = ("required_pressure",)  # keys of parts whose presence alone changes the case

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.argument_checks import TABLE, instance_of, validated
 from fvsolve.assembly.lowering import lower_devices, lowering_of
 from fvsolve.assembly.model_draft import ModelDraft
 from fvsolve.assembly.pipe_terms import MAX_TERMS, add_terms, limit_creep_step
@@ -54,7 +55,6 @@ from fvsolve.model.start_notices import coarse_for_cavities, flow_notices, too_f
 from fvsolve.model.steady_start import SteadyStart
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named
-from fvsolve.validation import TABLE, instance_of, validated
 
 
 def start_profile(draft) -> dict[str, Any]:

@@ -9,10 +9,10 @@ from importlib.metadata import entry_points
 from importlib.util import module_from_spec
 from pathlib import Path
 
+from fvsolve.argument_checks import PATH, validated
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import add_sources
 from fvsolve.units import show
-from fvsolve.validation import PATH, validated
 
 GROUP = "fvsolve.parts"
 VARIABLE = "FVSOLVE_PARTS"  # environment variable with the folders of registered parts, for other processes

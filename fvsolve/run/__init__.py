@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from fvsolve.argument_checks import COUNT_FROM_ONE, FLAG, FUNCTION, PATH, TABLE, validated
 from fvsolve.draw.plot_process import Picture, PlotProcess
 from fvsolve.errors import CaseError, RunError
 from fvsolve.output.directory import SUMMARY_FILE, RunDirectory, existing_pictures, read_directory
@@ -15,7 +16,6 @@ from fvsolve.output.summary_file import summary_data, write_summary
 from fvsolve.run import mpi_run
 from fvsolve.run.result import Result, check_summary
 from fvsolve.run.verdicts import claims
-from fvsolve.validation import COUNT_FROM_ONE, FLAG, FUNCTION, PATH, TABLE, validated
 
 __all__ = ["Result", "open_run", "run"]
 

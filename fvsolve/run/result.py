@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fvsolve.argument_checks import COUNT_FROM_ZERO, NUMBER, PATH, TEXT, validated
 from fvsolve.display import Displayable, save_if_path
 from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean, listing
 from fvsolve.output.fields import read_series
 from fvsolve.output.unit_columns import UnitColumn
 from fvsolve.units import show
-from fvsolve.validation import COUNT_FROM_ZERO, NUMBER, PATH, TEXT, validated
 
 KINDS_WITH_FIELDS = frozenset(("pipe", "basin", "body"))  # kinds of parts that frames show
 

@@ -23,12 +23,12 @@ from numbers import Rational
 
 import numpy as np
 
+from fvsolve.argument_checks import NAME, NAMES, POSITIVE, TEXT, Kind, is_row, validated
 from fvsolve.step_limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
 from fvsolve.steppers.analysis.stability_function import StabilityFunction, stability_function
 from fvsolve.steppers.analysis.stability_properties import a_stable
 from fvsolve.steppers.numbers.polynomial import Polynomial, count_roots, odd_part, sign
 from fvsolve.steppers.tableau import METHODS, Method, method_named
-from fvsolve.validation import NAME, NAMES, POSITIVE, TEXT, Kind, is_row, validated
 
 BITS = 400
 MOST_BOXES = 400  # number of boxes after which the sign is left undecided

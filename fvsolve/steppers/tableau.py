@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
+from fvsolve.argument_checks import COUNT, ROW, TABLE, TEXT, validated
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.steppers.analysis.trees import Conditions, stage_order
 from fvsolve.steppers.numbers.algebraic import MIXED_ROOTS, Algebraic, digits, root, value_of
 from fvsolve.steppers.numbers.polynomial import collocation, extrapolated
 from fvsolve.units import show
-from fvsolve.validation import COUNT, ROW, TABLE, TEXT, validated
 
 AUTO = "auto"  # in place of a method name: `automatic.py` chooses the method
 METHODS: dict[str, Method] = {}  # some methods have two names: `gauss-2` is `implicit-midpoint`

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.argument_checks import COUNT, COUNT_FROM_ZERO, FUNCTION, TABLE, TEXT, validated
 from fvsolve.case import Case, load
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.run.verdicts import interpolated
@@ -14,7 +15,6 @@ from fvsolve.studies.parallel import TaskPool
 from fvsolve.studies.result_table import Column, PlainData, ResultTable
 from fvsolve.studies.sampling import key_ranges, sample_points
 from fvsolve.studies.sweep import VARY, RowMaker
-from fvsolve.validation import COUNT, COUNT_FROM_ZERO, FUNCTION, TABLE, TEXT, validated
 
 SAMPLE_PER_KEY = 16  # sample points per key; the minimisations start at the best of them
 DESCENTS = 3  # number of minimisations

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fvsolve.argument_checks import FUNCTION, TABLE, TEXT, validated
 from fvsolve.errors import CaseError, FvsolveError, did_you_mean
 from fvsolve.kernels.delay_lines.wave_history import JUMPS_TRAVELLING, time_tolerance
 from fvsolve.model.delay_lines import jump_times
@@ -19,7 +20,6 @@ from fvsolve.studies.outcome import RowSink, end_if_interrupted, refusal_text, s
 from fvsolve.studies.passivity import AUTO, check_names, method_names
 from fvsolve.studies.result_cache import ResultCache
 from fvsolve.studies.result_table import Column
-from fvsolve.validation import FUNCTION, TABLE, TEXT, validated
 
 TABLE_ROWS = 1000  # approximate number of rows of the table
 QUADRATURE_TOLERANCE = 1e-3  # allowed quadrature error of the dissipated energy in a step, relative to its total

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fvsolve.argument_checks import NAMES, NUMBER, NUMBERS, ROW, TEXT, Kind, is_row, validated
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.schemes import LIMITED
@@ -39,7 +40,6 @@ from fvsolve.studies.reference import Reference, find_reference
 from fvsolve.studies.resolution import delay_lines, fixed_choices
 from fvsolve.studies.result_cache import OUT, ResultCache, cache_in
 from fvsolve.studies.result_table import PlainData
-from fvsolve.validation import NAMES, NUMBER, NUMBERS, ROW, TEXT, Kind, is_row, validated
 
 STABLE, RINGING, COARSE, WRONG, BLOWN_UP, REFUSED, NOT_RUN = (
     "stable", "ringing", "coarse", "wrong", "blown up", "refused", "not run",

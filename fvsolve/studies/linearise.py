@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.argument_checks import FLAG, NAMES, NUMBER, TABLE, TEXT, validated
 from fvsolve.assembly.lowering import PRESSURE, Input
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.model.energy_norm import EnergyForm
@@ -27,7 +28,6 @@ from fvsolve.studies.operating_point import (
 )
 from fvsolve.studies.result_table import Column
 from fvsolve.units import DIMENSIONS
-from fvsolve.validation import FLAG, NAMES, NUMBER, TABLE, TEXT, validated
 
 STATE_UNITS = {
     **dict.fromkeys(("mass", "excess", "air"), "kg"),

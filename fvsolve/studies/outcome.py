@@ -6,10 +6,10 @@ from time import perf_counter
 
 import numpy as np
 
+from fvsolve.argument_checks import COUNT, FUNCTION, TABLE, TEXT
 from fvsolve.errors import CaseError, FvsolveError, collect_faults, listing
 from fvsolve.run import model_of
 from fvsolve.solve.solve import Run
-from fvsolve.validation import COUNT, FUNCTION, TABLE, TEXT
 
 NO_FIELDS = {"output.fields": 0, "output.lines": {}}  # overrides: no output of cell values, which no study needs
 POINTS = 5  # points of a cell of a line at which waves are evaluated

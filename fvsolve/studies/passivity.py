@@ -17,13 +17,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fvsolve.argument_checks import FUNCTION, NAMES, validated
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT, TIGHT_BELOW, TIGHT_IMPLICIT
 from fvsolve.studies.outcome import name_list
 from fvsolve.studies.result_table import PlainData
 from fvsolve.studies.stability.growth import bisect
-from fvsolve.validation import FUNCTION, NAMES, validated
 
 CELLS = 20  # cells of the closed pipe
 NORM_TOLERANCE = 1e-10  # excess of a norm over 1 that counts as rounding

@@ -10,13 +10,13 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
+from fvsolve.argument_checks import PATH, Kind
 from fvsolve.compile.cache_folders import EXTRA_FOLDERS, PACKAGE
 from fvsolve.errors import RunError
 from fvsolve.output.directory import lock_folder, release
 from fvsolve.output.restart import identity
 from fvsolve.output.summary_file import plain
 from fvsolve.steppers.tableau import BUILT_IN, METHODS
-from fvsolve.validation import PATH, Kind
 
 
 class ResultCache:

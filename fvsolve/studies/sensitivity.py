@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.argument_checks import COUNT, COUNT_FROM_ZERO, PATH, TEXT, validated
 from fvsolve.case import load
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError
@@ -16,7 +17,6 @@ from fvsolve.studies.result_table import Column, PlainData, ResultTable
 from fvsolve.studies.sampling import key_ranges
 from fvsolve.studies.sweep import VARY, sweep
 from fvsolve.units import show
-from fvsolve.validation import COUNT, COUNT_FROM_ZERO, PATH, TEXT, validated
 
 COLUMNS = ("S1", "S1_conf", "ST", "ST_conf", "mu_star", "mu_star_conf", "mu", "sigma")
 LEVELS = 4  # levels of the Morris grid

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fvsolve.argument_checks import COUNT_FROM_ZERO, PATH, ROW, SERIES, TABLE, TEXT, Kind, validated
 from fvsolve.case import Case, load
 from fvsolve.case.load import find_source
 from fvsolve.case.reading import read_raw, split_key
@@ -24,7 +25,6 @@ from fvsolve.studies.result_cache import ResultCache, digest_of, write_errors
 from fvsolve.studies.result_table import Column, ResultTable
 from fvsolve.studies.sampling import grid, points_from_file, refuse_unknown, sample_points
 from fvsolve.units import show
-from fvsolve.validation import COUNT_FROM_ZERO, PATH, ROW, SERIES, TABLE, TEXT, Kind, validated
 
 REFUSED = "refused: "
 LOST_REASON = "lost: the process of this run was killed repeatedly. Is there enough memory?"

@@ -8,10 +8,10 @@ from math import factorial
 
 import numpy as np
 
+from fvsolve.argument_checks import COUNT_FROM_ZERO, Kind, is_array, validated
 from fvsolve.steppers.analysis.trees import short
 from fvsolve.steppers.numbers.polynomial import Polynomial
 from fvsolve.steppers.tableau import Method, method_named
-from fvsolve.validation import COUNT_FROM_ZERO, Kind, is_array, validated
 
 NOTHING = Polynomial([])
 PLANE = Kind(lambda given: is_array(given, "fiuc", 0, 9, finite=False), "complex numbers")

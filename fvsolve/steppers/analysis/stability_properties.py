@@ -10,10 +10,10 @@ from fractions import Fraction
 
 import numpy as np
 
+from fvsolve.argument_checks import COUNT_FROM_ZERO, NAME, NUMBER, POINT, POSITIVE, validated
 from fvsolve.steppers.analysis.stability_function import StabilityFunction, chopped, stability_function
 from fvsolve.steppers.numbers.polynomial import Polynomial, first_sign_change, nowhere_negative, roots_right, sign
 from fvsolve.steppers.tableau import Method, method_named
-from fvsolve.validation import COUNT_FROM_ZERO, NAME, NUMBER, POINT, POSITIVE, validated
 
 ANGLE_BITS = 36  # precision of the cosine of alpha in A(alpha)
 

@@ -11,6 +11,7 @@ from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 
+from fvsolve.argument_checks import NAMES, NUMBER, NUMBERS, PATH, validated
 from fvsolve.case import load
 from fvsolve.case.case import Case
 from fvsolve.errors import CaseError, FvsolveError, listing
@@ -53,7 +54,6 @@ from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.reference import Reference, find_reference
 from fvsolve.studies.resolution import as_cells, basins_from_files, cells_for_lines, delay_lines, fixed_choices
 from fvsolve.studies.result_cache import ResultCache
-from fvsolve.validation import NAMES, NUMBER, NUMBERS, PATH, validated
 
 WRONG_ERROR = 1.0  # errors above the range of the component are wrong results
 

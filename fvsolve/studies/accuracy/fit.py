@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fvsolve.argument_checks import NUMBER, SERIES, Kind, is_array, validated
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import PlainData
-from fvsolve.validation import NUMBER, SERIES, Kind, is_array, validated
 
 LEAST_ROWS = 3
 FLOOR_MARGIN = 10.0  # an error below this multiple of the floor is not used

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.argument_checks import FUNCTION, NUMBER, TABLE, validated
 from fvsolve.assembly.schedule_tables import value_at
 from fvsolve.case.chainage import add_bends, placed
 from fvsolve.case.reading import raw_link
@@ -27,7 +28,6 @@ from fvsolve.studies.distance import Deviation, moving_probes
 from fvsolve.studies.outcome import GIVEN_UP, Outcome, capped, outcome, refuse_basins, study_model
 from fvsolve.studies.reference import reference_of_run
 from fvsolve.studies.result_table import PlainData
-from fvsolve.validation import FUNCTION, NUMBER, TABLE, validated
 
 SLOSHING = ("frozen", "modes", "cells")
 MIN_REFINED_CELLS = 4  # sides of a tank with at most so many cells are not refined

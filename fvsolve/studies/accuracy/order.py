@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fvsolve.argument_checks import COUNT, FUNCTION, NAMES, TEXT, validated
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.exact.solution import Solution, averages
 from fvsolve.model import RunData
@@ -18,7 +19,6 @@ from fvsolve.studies.parallel import RunQueue
 from fvsolve.studies.reference import Reference, reference_of_solution
 from fvsolve.studies.resolution import delay_lines, fixed_choices, pipes
 from fvsolve.studies.result_cache import OUT, ResultCache, cache_in
-from fvsolve.validation import COUNT, FUNCTION, NAMES, TEXT, validated
 
 REFERENCE_KINDS = ("auto", "exact", "finer", "richardson")
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fvsolve.argument_checks import FLAG, NUMBER, TABLE, TEXT, validated
 from fvsolve.case import load
 from fvsolve.studies.loops.delay_system import DelaySystem
 from fvsolve.studies.loops.loop import MOST_POLES, frequencies
 from fvsolve.studies.loops.open_loop import delayed_system
-from fvsolve.validation import FLAG, NUMBER, TABLE, TEXT, validated
 
 
 @dataclass(frozen=True, eq=False)

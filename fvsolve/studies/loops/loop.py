@@ -7,12 +7,12 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from fvsolve.argument_checks import NUMBER, TABLE, TEXT, validated
 from fvsolve.studies.loops.delay_system import DelaySystem, sorted_poles
 from fvsolve.studies.loops.margins import Margins, find_margins
 from fvsolve.studies.loops.open_loop import block_of, open_loop
 from fvsolve.studies.loops.sampled import STABLE, SampledLoop, gain_within
 from fvsolve.studies.result_table import PlainData, plain
-from fvsolve.validation import NUMBER, TABLE, TEXT, validated
 
 PER_DECADE = 200  # frequencies of the table
 DECADES = 3.0  # below the slowest and above the fastest rate

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fvsolve.argument_checks import COMPLEX, FUNCTION, NUMBER, POSITIVE, Kind, instance_of, is_number, validated
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import PlainData
 from fvsolve.units import show
-from fvsolve.validation import COMPLEX, FUNCTION, NUMBER, POSITIVE, Kind, instance_of, is_number, validated
 
 MAX_SAMPLES = 200_000  # greatest number of samples of a sweep
 ROUNDING = 1e-12  # rounding error of a sample, relative to |H|

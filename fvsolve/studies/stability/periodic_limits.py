@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fvsolve.argument_checks import COUNT, FUNCTION, NAMES, validated
 from fvsolve.assembly.scheme_codes import scheme_settings
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.kernels import dtypes as rec
@@ -35,7 +36,6 @@ from fvsolve.steppers.tableau import METHODS, method_named
 from fvsolve.studies.outcome import Progress, name_list
 from fvsolve.studies.result_table import PlainData
 from fvsolve.studies.stability.growth import bisect
-from fvsolve.validation import COUNT, FUNCTION, NAMES, validated
 
 THRESHOLD = 1e3
 CELLS, STEPS = 100, 1000

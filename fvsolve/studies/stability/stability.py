@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fvsolve.argument_checks import COUNT, FLAG, NAMES, NUMBER, PATH, validated
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError
 from fvsolve.model.energy_norm import EnergyForm, energy_form
@@ -48,7 +49,6 @@ from fvsolve.studies.stability.stability_row import (
     region_limit,
     row_from_json,
 )
-from fvsolve.validation import COUNT, FLAG, NAMES, NUMBER, PATH, validated
 
 AUTO_NOTE = (
     f"auto starts with {automatic.EXPLICIT}, and its row is that of {automatic.EXPLICIT}; a run continues with "
