@@ -68,6 +68,7 @@ class Case(Displayable):
     lumped: dict[str, Any] = field(default_factory=dict, repr=False)  # meshes of basins with water as lumped masses
     read: dict[tuple, tuple] = field(default_factory=dict, repr=False)  # place -> (raw value, value as read)
     equilibrium_nodes: dict[str, Node] = field(default_factory=dict, repr=False)  # bodies and masses in equilibrium
+    validation: Any = None  # `Validation`, or None
 
     picture = "fvsolve.draw.object_pictures:case_figure"
 
@@ -93,6 +94,8 @@ class Case(Displayable):
         """Probes to record: the probes of `[output]`, then further probes that `[expect]` and `[compare]` name."""
         named = [*self.output.probes]
         named += [claim.probe for claim in [*self.expect.values(), *self.compare.values()] if claim.probe is not None]
+        rows = self.validation.compare if self.validation else ()
+        named += [row.measure.probe for row in rows if row.measure.probe is not None]
         return list({probe.text: probe for probe in named}.values())
 
     @cached_property
@@ -100,6 +103,8 @@ class Case(Displayable):
         """Probes of which only the extremes are recorded: at points of pipe profiles, for limits and expectations."""
         named = [*of_profiles(self.links)]
         extents = [claim.extent for claim in [*self.limits.values(), *self.expect.values()] if claim.extent is not None]
+        rows = self.validation.compare if self.validation else ()
+        extents += [row.measure.extent for row in rows if row.measure.extent is not None]
         for extent in extents:
             named += extent.probes(self.links)
         return list({probe.text: probe for probe in named}.values())
@@ -315,6 +320,7 @@ class Case(Displayable):
             "routes": {name: item.table() for name, item in self.routes.items()},
             "limits": {name: item.table() for name, item in self.limits.items()},
             "exact": self.exact.table() if self.exact else {},
+            "validation": self.raw.get("validation", {}),
         }
         return {key: value for key, value in result.items() if value not in ("", {})}
 

@@ -10,6 +10,7 @@ from fvsolve.case.load import TOP
 from fvsolve.case.pipe_routes import Route
 from fvsolve.case.reading import WITH_DEFAULTS, default_values, driven_keys, raw_link, split_key
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
+from fvsolve.case.validation_table import KEYS as VALIDATION_KEYS
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.control import Control
@@ -106,6 +107,7 @@ def declarations(raw: dict[str, Any]) -> dict[str, Value]:
     named = {"expect": values_of(expect_keys("number")), "compare": values_of(COMPARE_KEYS), "scalars": Scalar.values()}
     named |= {"reactions": Reaction.values(), "routes": Route.values()}
     named |= {"limits": values_of(limit_keys("pressure", "pressure"))}
+    result["validation"] = Keys(values_of(VALIDATION_KEYS))
     return result | {group: Keys(dict.fromkeys(raw.get(group, {}), Keys(entry))) for group, entry in named.items()}
 
 

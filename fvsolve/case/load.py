@@ -18,6 +18,7 @@ from fvsolve.case.probe import default_probes, read_probe
 from fvsolve.case.reactions import reaction_kinds, read_reactions
 from fvsolve.case.reading import Raw, Reading, copy_paths, default_faults, defaults_of, override, read_raw, split_key
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output, ViscosityLaw
+from fvsolve.case.validation_table import read_validation
 from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.fluid import follow_temperature, properties, specific_heat
 from fvsolve.parts import KINDS, Basin, Friction, Pipe, Scalar
@@ -35,7 +36,7 @@ STUDY_KEYS = {"events", "protections"}
 KEYS = (
     "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
     "signals", "controls", "scalars", "reactions", "defaults", "numerics", "output", "expect", "compare", "routes",
-    "limits", "exact",
+    "limits", "exact", "validation",
 )  # fmt: skip
 TOP = {
     "schema": (val.Whole(val.between(SCHEMA, SCHEMA)), SCHEMA),
@@ -122,6 +123,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     blocks = read_controls(reading, kinds)
     output = read_output(reading, numerics, kinds)
     expect, compare = claims.read_expectations(reading, kinds, routes), claims.read_comparisons(reading, kinds)
+    validation = read_validation(reading, kinds, routes)
     limits = claims.read_limits(reading, kinds, routes, parts.links, state, general["gravity"])
     check_parts(reading, network, parts, state, numerics, general["gravity"])
     cells = has_cells(network.table)
@@ -140,7 +142,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
         fluid=fluid, properties=state, nodes=parts.nodes, links=links, meshes=parts.meshes, lumped=parts.lumped,
         signals=dict(setting.used), scalars=scalars, numerics=numerics, output=output, expect=expect, compare=compare,
         routes=routes, limits=limits, controls=blocks, reactions=reactions, exact=named, copies=dict(setting.files),
-        read=reading.read,
+        read=reading.read, validation=validation,
     )  # fmt: skip
     return case if named is None else with_exact(reading, case)
 
@@ -150,6 +152,9 @@ def read_general(reading: Reading) -> dict[str, Any]:
     table = reading.raw.table
     if STUDY_KEYS & table.keys() and not {"nodes", "links"} & table.keys():
         reading.fault((), f"is a study of a case; fvsolve study {reading.raw.file} runs it")
+        reading.stop()
+    if "validation" in table and not {"nodes", "links", "controls"} & table.keys():
+        reading.fault((), f"has a validation without a scene; fvsolve validate {reading.raw.file} runs it")
         reading.stop()
     for key in table:
         if key not in KEYS:

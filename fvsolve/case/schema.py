@@ -5,6 +5,7 @@ from collections import Counter
 from json import dumps, loads
 from typing import Any
 
+from fvsolve.case import validation_table
 from fvsolve.case.claims import limit_keys
 from fvsolve.case.load import KEYS, TOP
 from fvsolve.case.part_reading import LINKLESS
@@ -55,22 +56,26 @@ def full_schema() -> dict[str, Any]:
     properties["signals"] = {"type": "object", "additionalProperties": Scheduled("number").json()}
     limit = keys_json(limit_keys("pressure", "pressure"))
     properties["limits"] = {"type": "object", "additionalProperties": limit}
+    properties["validation"] = validation_table.schema()
     properties["expect"] = properties["compare"] = {"type": "object", "additionalProperties": {"type": "object"}}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "fvsolve case",
         "type": "object",
         "properties": properties,
-        "required": ["numerics"],
         "anyOf": [
-            {"required": ["fluid", "nodes"]},
+            {"required": ["validation"], "not": {"required": ["numerics"]}},
+            {"required": ["numerics", "fluid", "nodes"]},
             {
-                "required": ["nodes", "links"],
+                "required": ["numerics", "nodes", "links"],
                 "properties": {
                     "nodes": {"additionalProperties": {"properties": {"type": {"enum": nodes_without_fluid()}}}}
                 },
             },
-            {"required": ["controls"], "not": {"anyOf": [{"required": ["nodes"]}, {"required": ["links"]}]}},
+            {
+                "required": ["numerics", "controls"],
+                "not": {"anyOf": [{"required": ["nodes"]}, {"required": ["links"]}]},
+            },
         ],  # fmt: skip
         "if": {
             "required": ["nodes"],

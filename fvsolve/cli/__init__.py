@@ -30,6 +30,7 @@ COMMANDS = dict.fromkeys(("run", "check", "list", "new", "schema", "methods", "c
     "calibrate": "sweep",
     "size": "design_commands",
     "stability": "stability",
+    "validate": "validate_command",
 }
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from fvsolve.errors import RunError, listing
 
 # Keys of the resolved case that change the report of a run, not its numbers.
-UNCHECKED_KEYS = ("title", "expect", "compare")
+UNCHECKED_KEYS = ("title", "expect", "compare", "validation")
 
 
 @dataclass(frozen=True)

@@ -158,15 +158,7 @@ class Arithmetic:
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Values of the formula at points x, y [m] : float64[n]. Raises ValueError at the first invalid value."""
-        known, stack = {"x": np.asarray(x, float), "y": np.asarray(y, float), "pi": np.pi}, []
-        with np.errstate(all="ignore"):
-            for at, step in enumerate(self.steps):
-                if step.count == 0:
-                    stack.append((known.get(step.rule, step.rule), -1))
-                    continue
-                values, wrongs = zip(*stack[-step.count :], strict=True)
-                stack[-step.count :] = [apply_step(at, step.rule, values, wrongs)]
-        result, wrong = (np.broadcast_to(array, known["x"].shape) for array in stack[0])
+        result, wrong = self.evaluate({"x": np.asarray(x, float), "y": np.asarray(y, float)})
         if (wrong >= 0).any():
             k = int(np.argmax(wrong >= 0))
             at, reason = divmod(int(wrong[k]), len(ERRORS))
@@ -176,6 +168,20 @@ class Arithmetic:
                 f"{show(self.text)} {where}" if part == self.text else f"{show(self.text)}: {part} {where}"
             )
         return np.array(result, dtype=float)
+
+    def evaluate(self, known: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """(values, error codes as of `apply_step`) : float64[n], int64[n]; known : name -> float64[n]"""
+        stack: list[tuple] = []
+        known = known | {"pi": np.pi}
+        with np.errstate(all="ignore"):
+            for at, step in enumerate(self.steps):
+                if step.count == 0:
+                    stack.append((known.get(step.rule, step.rule), -1))
+                    continue
+                values, wrongs = zip(*stack[-step.count :], strict=True)
+                stack[-step.count :] = [apply_step(at, step.rule, values, wrongs)]
+        shape = np.shape(next(iter(known.values())))
+        return tuple(np.broadcast_to(array, shape) for array in stack[0])
 
 
 def apply_step(at: int, rule: Callable, values: tuple, wrongs: tuple) -> tuple[np.ndarray, np.ndarray]:

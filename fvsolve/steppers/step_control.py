@@ -18,6 +18,7 @@ COUNT_DECREASE = 0.4  # decrease of the count by a step that stability does not 
 CLOSING_FRACTION = 0.15
 LIMITED = 0.8  # fraction of a limit of the step, so that the limit does not act at every step
 APPROACH = 0.95  # fraction of the rest of a segment that the second-last step takes
+EARLY = 1e-12  # least time relative to the end, to which the least step is relative
 NEVER = 1e308  # a time that is never reached [s]
 DEAD_BAND = 1.2  # a step solved by Newton that may grow by a smaller factor keeps its length, and so its factorisation
 
@@ -30,8 +31,11 @@ def shortest(control, state):
 
 @njit(forceinline=True)
 def too_short(control, state, h):
-    """True if a step of length h [s] is too short to change the time in floating point."""
-    return not h > LEAST_STEP * max(abs(state["t"]), abs(control["end"]))
+    """True if a step of length h [s] is too short to change the time in floating point.
+
+    Near t = 0 steps may be much shorter than near the end: a run of 1e11 s may begin with a layer of 1e-5 s.
+    """
+    return not h > LEAST_STEP * max(abs(state["t"]), EARLY * abs(control["end"]))
 
 
 @njit(forceinline=True)

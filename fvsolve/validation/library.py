@@ -1,0 +1,283 @@
+"""Library of validations: names, runs of their cases, and results with verdicts."""
+
+import importlib
+import tempfile
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fvsolve.case import load, shipped
+from fvsolve.case.reading import Raw, Reading, read_raw
+from fvsolve.case.validation_table import EXACT, OF_ERROR, OF_SERIES, Row, Validation, read_validation
+from fvsolve.errors import FvsolveError, did_you_mean, listing
+from fvsolve.output.memory_sink import MemorySink
+from fvsolve.run import model_of, solved
+from fvsolve.studies.parallel import TaskPool, Work
+from fvsolve.studies.resolution import refined_keys
+from fvsolve.validation import data_files, measures
+from fvsolve.validation.row_verdicts import DIFFERS, OUTSIDE, VERDICTS, WITHIN, judge, known_values
+
+FOLDER = "validation"  # below the shipped cases
+LACKING = "data lacking"
+COARSER = 0.5  # resolution of the run from which the numerical error follows
+CODES = {WITHIN: 0, DIFFERS: 0, OUTSIDE: 1, LACKING: 3}  # exit codes of the command
+PROGRAMS = {  # name in a case file -> module of this package with the function `compute`
+    "ode-problems": "ode_problems",
+    "epanet-networks": "epanet_networks",
+}
+
+
+@dataclass(frozen=True)
+class Computed:
+    """Value that a program computes for a row, with its numerical error and (code, value) of other programs beside it.
+
+    text : further results in words; lines : as for `RowResult`
+    """
+
+    value: float
+    error: float | None = None
+    others: tuple[tuple[str, float], ...] = ()
+    text: str = ""
+    lines: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RowResult:
+    """Row of a validation with its computed value and its verdict, in SI.
+
+    error : numerical error; tolerance : of the gate; text : reason, or what is wrong; shift : shift in time [s] with
+    which the computed series fits much better, 0 without; lines : name -> float64[n, 2], for the figure
+    """
+
+    row: Row
+    unit: str
+    value: float
+    error: float | None
+    verdict: str
+    tolerance: float
+    text: str
+    converged: float | None = None
+    others: tuple[tuple[str, float], ...] = ()
+    shift: float = 0.0
+    lines: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def plain(self) -> dict[str, Any]:
+        """Plain data of the row."""
+        row, others = self.row, [{"code": code, "value": value} for code, value in self.others]
+        return {"what": row.what, "computed": row.computed, "value": self.value, "unit": self.unit,
+                "numerical_error": self.error, "measured": row.measured, "others": [*row.others, *others],
+                "exact": row.exact if self.converged is None else {**(row.exact or {}), "value": self.converged},
+                "gate": row.gate, "tolerance": self.tolerance, "verdict": self.verdict, "reason": self.text,
+                "shift": self.shift, "because": row.because}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ValidationResult:
+    """Result of a validation: rows, seconds of stepping, and texts on data that lack.
+
+    verdict : the worst of its rows, or `LACKING`
+    """
+
+    name: str
+    title: str
+    validation: Validation
+    rows: tuple[RowResult, ...] = ()
+    seconds: float = 0.0
+    lacking: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """Worst verdict of the rows, or `LACKING`."""
+        return LACKING if self.lacking else max((row.verdict for row in self.rows), key=VERDICTS.index)
+
+    def plain(self) -> dict[str, Any]:
+        """Plain data of the validation."""
+        about = self.validation
+        return {"name": self.name, "title": self.title, "verdict": self.verdict, "source": about.source,
+                "licence": about.licence, "get": about.get, "note": about.note, "seconds": self.seconds,
+                "lacking": list(self.lacking), "rows": [row.plain() for row in self.rows]}  # fmt: skip
+
+
+def exit_code(results: Iterable[ValidationResult]) -> int:
+    """Exit code of several validations: 1 if one is outside, else 3 if data lack, else 0."""
+    verdicts = {result.verdict for result in results}
+    return 1 if OUTSIDE in verdicts else CODES[LACKING] if LACKING in verdicts else 0
+
+
+def paths() -> dict[str, Path]:
+    """Shipped cases with a validation : name -> path of the case file, sorted by name."""
+    files = [*shipped.folder().glob("*.toml"), *(shipped.folder() / FOLDER).glob("*.toml")]
+    return {path.stem: path for path in sorted(files, key=lambda path: path.stem) if "[validation]" in path.read_text()}
+
+
+def find(names: Iterable[str]) -> dict[str, Path]:
+    """Case files by name; all shipped ones without names. Raises FvsolveError for each unknown name."""
+    known, chosen, unknown = paths(), {}, []
+    for name in names:
+        path = Path(name)
+        if path.is_file():
+            chosen[path.stem] = path
+        elif name in known:
+            chosen[name] = known[name]
+        else:
+            unknown.append(f"{name}{did_you_mean(name, known)}")
+    if unknown:
+        raise FvsolveError(f"no file and no shipped validation {', '.join(unknown)}; validations are {listing(known)}")
+    return chosen or known
+
+
+def validate(
+    names: Iterable[str] = (), data: Path | None = None, jobs: int = 1, out: Path | None = None
+) -> Iterator[ValidationResult]:
+    """Run validations, and yield each result when it is finished.
+
+    names : case files, or names of shipped validations (default all); data : folder with files of measurements
+    out : folder for the files of the runs, each below its name; None for none
+    Raises FvsolveError for unknown names, CaseError for faults of a case.
+    """
+    chosen = find(names)
+    for path in chosen.values():  # faults before the first run
+        read_table(read_raw(path))
+    with TaskPool(CaseWork(data, out), jobs) as pool:
+        for _, result in pool.run(list(chosen.values())):
+            yield result
+
+
+@dataclass(frozen=True)
+class CaseWork(Work):
+    """Task of validating one case file; data : folder of measurements; out : as for `validate`."""
+
+    data: Path | None
+    out: Path | None
+
+    def __call__(self, path: Path) -> ValidationResult:
+        return validate_file(path, self.data, self.out)
+
+    def process_text(self, task: Path) -> str:
+        return f"that validates {task.stem}"
+
+
+def read_table(raw: Raw) -> Validation:
+    """Table `[validation]` of a case whose parts are not read. Raises CaseError."""
+    reading = Reading(raw)
+    if "validation" not in raw.table:
+        reading.fault((), "has no table [validation]; expected source, compare and a gate for each row")
+    validation = read_validation(reading, None, {})
+    reading.stop()
+    return validation
+
+
+def validate_file(path: Path, data: Path | None = None, out: Path | None = None) -> ValidationResult:
+    """Validate one case file; arguments as for `validate`."""
+    raw = read_raw(path)
+    validation, title = read_table(raw), raw.table.get("title", "")
+    if lacking := data_files.missing_files(validation, data):
+        return ValidationResult(path.stem, title, validation, lacking=tuple(lacking))
+    begun = time.perf_counter()
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder) if out is None else Path(out) / path.stem
+        place.mkdir(parents=True, exist_ok=True)
+        data_files.prepare(validation, data, place)
+        if validation.program is not None:
+            rows, seconds = program_rows(validation, place), time.perf_counter() - begun
+        else:
+            validation, rows, seconds = scene_rows(raw, validation, place)
+    return ValidationResult(path.stem, title, validation, tuple(rows), seconds)
+
+
+def program_rows(validation: Validation, folder: Path) -> list[RowResult]:
+    """Rows of a validation whose values a program of this package computes."""
+    name = validation.program
+    if name not in PROGRAMS:
+        raise FvsolveError(f"validation.program: {name} is unknown; programs are {listing(PROGRAMS)}")
+    found = importlib.import_module(f"fvsolve.validation.{PROGRAMS[name]}").compute(validation, folder)
+    rows = []
+    for row in validation.compare:
+        if row.computed not in found:
+            near = did_you_mean(row.computed, found)
+            raise FvsolveError(f"validation.compare: {name} computes no {row.computed}{near}")
+        made = found[row.computed]
+        judged = judge(row, made.value, made.error, known_values(row, [value for _, value in made.others]))
+        text = "; ".join(filter(None, (judged.text, made.text)))
+        rows.append(RowResult(row, row.unit or "-", made.value, made.error, judged.verdict, judged.tolerance, text,
+                              others=made.others, lines=made.lines))  # fmt: skip
+    return rows
+
+
+def scene_rows(raw: Raw, validation: Validation, folder: Path) -> tuple[Validation, list[RowResult], float]:
+    """(validation with its measures, rows, seconds of stepping) of a scene; rows with equal overrides share runs."""
+    table = data_files.completed({key: raw.table[key] for key in raw.table}, validation, folder)
+    raw = Raw(table, raw.name, raw.path, folder, raw.text)
+    results: dict[int, RowResult] = {}
+    whole = load(raw)
+    groups: dict[str, list[int]] = {}
+    seconds = 0.0
+    for number, row in enumerate(whole.validation.compare):
+        groups.setdefault(repr(row.set), []).append(number)
+    for numbers in groups.values():
+        runs = Runs(raw, whole.validation.compare[numbers[0]].set)
+        for number in numbers:
+            results[number] = scene_row(runs.own.case.validation.compare[number], runs)
+        seconds += sum(result.summary["seconds"] for result in runs.results.values() if result is not None)
+    return whole.validation, [results[number] for number in range(len(results))], seconds
+
+
+class Runs:
+    """Runs of a case at several resolutions, each made at its first use."""
+
+    def __init__(self, raw: Raw, settings: Mapping[str, Any]) -> None:
+        self.raw, self.settings, self.results = raw, dict(settings), {}
+        self.own = self.at(1.0)
+
+    def at(self, times: float) -> Any:
+        """Result of a run at `times` the resolution; None if the case has no such resolution."""
+        if times not in self.results:
+            keys = refined_keys(self.own.case, times) if times != 1.0 else {}
+            changed = bool(keys) or times == 1.0
+            self.results[times] = run(load(self.raw, self.settings | keys)) if changed else None
+        return self.results[times]
+
+
+class FrameSink(MemorySink):
+    """Receiver of a run in memory that keeps the last frame of fields."""
+
+    last_frame: dict[str, Any]
+
+    def field(self, t: float, frame: dict[str, Any]) -> None:
+        """Keep the fields; frame : result of `RunData.fields`"""
+        self.last_frame = frame
+
+
+def run(case: Any) -> Any:
+    """Run a case; its result has the last frame of fields as `last_frame`. Raises FvsolveError if it stops early."""
+    sink = FrameSink(model := model_of(case))
+    result = solved(model, sink)
+    if not result.ok:
+        raise FvsolveError(f"{case.name}: the run stopped: {result.reason}")
+    result.last_frame = getattr(sink, "last_frame", {})
+    return result
+
+
+def scene_row(row: Row, runs: Runs) -> RowResult:
+    """Computed value, numerical error and verdict of a row."""
+    value = measures.value_of(row, runs.own)
+    finer = (row.exact or {}).get("resolution")
+    other = runs.at(finer or COARSER)
+    second = np.nan if other is None else measures.value_of(row, other)
+    error = float(abs(value - second)) if np.isfinite(second) else None
+    if error is not None and row.gate["of"] == EXACT and row.measure.function in OF_ERROR:
+        error = max(value, second)  # the value is the numerical error itself
+    converged = second if finer else None
+    judged = judge(row, value, error, known_values(row, converged=converged))
+    lines, shift, text = measures.lines_of(row, runs.own), 0.0, judged.text
+    if row.measure.function in OF_SERIES:
+        shift, left = measures.best_shift(row, runs.own)
+        if shift and judged.verdict != WITHIN:
+            text += f"; arrival: the computed series is {abs(shift):.3g} s {'early' if shift > 0 else 'late'}"
+            text += f", and differs by {left:.3g} without that"
+    unit = measures.unit_of(row, runs.own.case)
+    return RowResult(row, unit, value, error, judged.verdict, judged.tolerance, text, converged, (), shift, lines)

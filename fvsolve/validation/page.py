@@ -1,0 +1,127 @@
+"""Page of validations: a table, and for each case its source, rows and figure, in Markdown for the site."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from fvsolve.case.validation_table import OF_ERROR
+from fvsolve.draw.validation_pictures import LinePanel, ValueRow, validation_figure
+from fvsolve.units import DIMENSIONS
+from fvsolve.validation.library import LACKING, RowResult, ValidationResult
+from fvsolve.validation.row_texts import amounts
+from fvsolve.validation.row_verdicts import WITHIN, known_values
+
+THEMES = ("light", "dark")
+PAGE = "index.md"
+INTRODUCTION = """# Validation
+
+Each row compares a computed value with a measurement, with published results of other programs, or with an exact
+solution. The gate of a row says with which. `within` means that the value passes its gate. `equations solved, model
+differs` means that the value agrees with other programs of the same equations, or with a converged solution, but not
+with the measurement; the reason stands beside it. `outside` means that the value fails. The error is the numerical
+error, from a run at half the resolution, or at a finer one. This page is made by
+
+```sh
+fvsolve validate --data DIR --page docs/validation
+```
+"""
+
+
+def write_page(folder: Path, results: list[ValidationResult]) -> None:
+    """Write index.md and the figures NAME-light.png and NAME-dark.png of each case into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    parts = [INTRODUCTION, summary_table(results)]
+    for result in results:
+        names = write_figures(folder, result)
+        parts.append(section(result, names))
+    (folder / PAGE).write_text("\n".join(parts), encoding="utf-8")
+
+
+def summary_table(results: list[ValidationResult]) -> str:
+    """Table with a line for each case."""
+    lines = ["| case | what | rows | verdict | seconds |", "|---|---|---|---|---|"]
+    for result in results:
+        cells = [f"[{result.name}](#{result.name})", result.title, str(len(result.rows)), result.verdict]
+        lines.append(f"| {' | '.join(map(cell, cells))} | {result.seconds:.2g} |")
+    return "\n".join([*lines, ""])
+
+
+def section(result: ValidationResult, figures: list[str]) -> str:
+    """Section of a case: source, figure, rows and reasons."""
+    about = result.validation
+    lines = [f"({result.name})=", f"## {result.title or result.name}", "", f"Source: {about.source}."]
+    lines += [f"Data: {about.licence}."] if about.licence else []
+    lines += [about.note] if about.note else []
+    if result.verdict == LACKING:
+        return "\n".join([*lines, "", f"Not run: {'; '.join(result.lacking)}. {about.get}", ""])
+    lines += ["", *(f"![{result.title}, {theme}]({name}){{.only-{theme}}}\n"
+                    for theme, name in zip(THEMES, figures, strict=False))]  # fmt: skip
+    lines += [
+        "| quantity | measured | computed | error | other programs | unit | verdict |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in result.rows:
+        texts = amounts(row)
+        cells = [row.row.what, texts.reference, texts.value, texts.error, texts.others, row.unit, row.verdict]
+        lines.append(f"| {' | '.join(map(cell, cells))} |")
+    notes = [f"- {row.row.what}: {row.text}" for row in result.rows if row.text]
+    notes += [f"- {row.row.what}: gate: {row.row.gate['reason']}" for row in result.rows if row.row.gate["reason"]]
+    lines += ["", *notes, "", f"`fvsolve validate {result.name}`", ""]
+    return "\n".join(lines)
+
+
+def cell(text: str) -> str:
+    """Text for a cell of a table in Markdown."""
+    return text.replace("|", "\\|")
+
+
+def write_figures(folder: Path, result: ValidationResult) -> list[str]:
+    """Write the figures of a case for a light and a dark page; returns their names."""
+    panels, rows = panels_of(result), [value_row(row) for row in result.rows]
+    if not rows:
+        return []
+    names = []
+    for theme in THEMES:
+        names.append(f"{result.name}-{theme}.png")
+        validation_figure(panels, rows, theme).savefig(folder / names[-1])
+    return names
+
+
+def panels_of(result: ValidationResult) -> list[LinePanel]:
+    """Panels of lines of a case; rows with equal lines share a panel."""
+    panels: dict[str, LinePanel] = {}
+    for row in result.rows:
+        if not row.lines:
+            continue
+        measure = row.row.measure
+        if measure is None:
+            title, label, logarithmic = (
+                row.row.computed.rpartition(".")[0],
+                "CPU time [s]; error of the end state",
+                True,
+            )
+        elif measure.field is not None:
+            title, label, logarithmic = f"{'.'.join(measure.field)} [SI]", "x [m]", False
+        else:
+            unit = measure.probe.unit or DIMENSIONS[measure.probe.dimension].si
+            title, label, logarithmic = f"{measure.probe.text} [{unit}]", "t [s]", False
+        key = title + repr(row.row.set)
+        panels.setdefault(key, LinePanel(title, label, row.lines, logarithmic))
+    return list(panels.values())
+
+
+def value_row(row: RowResult) -> ValueRow:
+    """Row of the panel of values."""
+    known = known_values(row.row, [value for _, value in row.others], row.converged)
+    reference = getattr(known, row.row.gate["of"]) or (row.value, row.value)
+    gate = reference[0] - row.tolerance, reference[1] + row.tolerance
+    codes = [*(item["value"] for item in row.row.others), *(value for _, value in row.others)]
+    is_error = row.row.measure is None or row.row.measure.function in OF_ERROR
+    error = row.error if row.error is not None and math.isfinite(row.error) and not is_error else 0.0
+    gate = (0.0, gate[1]) if is_error else gate
+    measured = None if is_error else known.measured
+    value = row.value if np.isfinite(row.value) else gate[0]
+    unit = "" if row.unit == "-" else row.unit
+    passes = row.verdict == WITHIN
+    return ValueRow(row.row.what, unit, value, error, measured, tuple(codes), gate, passes)

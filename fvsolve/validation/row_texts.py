@@ -1,0 +1,41 @@
+"""Texts of the values of a row: measured or exact, computed, numerical error, other programs."""
+
+import math
+from typing import NamedTuple
+
+from fvsolve.case.validation_table import OF_ERROR
+from fvsolve.validation.library import RowResult
+
+
+class Amounts(NamedTuple):
+    """Texts of the values of a row, "-" for none."""
+
+    reference: str
+    value: str
+    error: str
+    others: str
+
+
+def amounts(row: RowResult) -> Amounts:
+    """Texts of the values of a row, in its unit."""
+    measured, exact = row.row.measured or {}, row.row.exact or {}
+    is_error = row.row.measure is not None and row.row.measure.function in OF_ERROR
+    if measured.get("spread"):
+        reference = " to ".join(number(value) for value in measured["spread"])
+    elif measured.get("value") is not None:
+        reference = number(measured["value"])
+    else:
+        value = row.converged if row.converged is not None else exact.get("value")
+        reference = f"exact {number(value)}" if value is not None else "0" if is_error else "-"
+    others = [*((item["code"], item["value"]) for item in row.row.others), *row.others]
+    return Amounts(
+        reference,
+        number(row.value),
+        "-" if row.error is None else f"{row.error:.1e}",
+        "; ".join(f"{code} {number(value)}" for code, value in others) or "-",
+    )
+
+
+def number(value: float) -> str:
+    """Text of a number with four digits."""
+    return f"{value:.4g}" if math.isfinite(value) else "none"
