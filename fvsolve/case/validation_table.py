@@ -73,7 +73,8 @@ class Validation:
     """Table `[validation]` as read.
 
     files : path in the data folder -> sum; tables : CSV file to make -> {of, skip, columns}; get : how to get the files
-    network : EPANET file that the case completes, with keys of the import; program, profile : name with parameters
+    case : shipped case that the file completes; network : EPANET file that it completes, with keys of the import
+    program, profile : name with parameters
     """
 
     source: str
@@ -82,6 +83,7 @@ class Validation:
     note: str
     files: dict[str, str]
     tables: dict[str, dict[str, Any]]
+    case: str | None
     network: dict[str, Any] | None
     program: str | None
     profile: dict[str, Any] | None
@@ -211,6 +213,7 @@ TABLE_KEYS = {
     "skip": (val.Whole(val.between(0, 10**6), "number of lines before the rows of numbers", VALUE), 0),
     "matrix": (val.Flag("true if the file is a matrix: c1, c2 are indices from 0, c3 the entry", VALUE), False),
     "every": (val.Whole(val.between(1, 1000), "step between the rows and columns of a matrix that count", VALUE), 1),
+    "where": text("condition for a row to count, for example c2 > 0"),
     "columns": (ByName(val.Text(changes=VALUE), '{ "t [s]" = "c1 - 22" }, formulas of columns c1, c2, ...'), NEEDED),
 }
 NETWORK_KEYS = {
@@ -225,6 +228,7 @@ KEYS = {
     "note": text("what a reader must know about the case"),
     "files": (ByName(FileSum(changes=VALUE), "{ PATH = SUM }, files of the data folder"), {}),
     "tables": (ByName(Subtable(TABLE_KEYS, "{ of, skip, columns }"), "CSV files to make, by name"), {}),
+    "case": text("shipped case that this file completes", None),
     "network": (Subtable(NETWORK_KEYS, '{ inp = "town.inp" }'), None),
     "program": text("program of fvsolve that computes the values, in place of a scene", None),
     "profile": (ByName(val.Anything(), "{ solution = NAME, ... }, exact fields at the end of the run"), None),
@@ -241,7 +245,7 @@ def schema() -> dict[str, Any]:
 def read_validation(reading: Reading, kinds: Kinds | None, routes: Mapping[str, Any]) -> Validation | None:
     """Table `[validation]` of a case; None if there is none, or if it is faulty.
 
-    kinds, routes : as for `read_claim`; kinds is None in a validation by a program, which has no parts
+    kinds, routes : as for `read_claim`; kinds is None where the parts are not read; then only the rows of a program are
     """
     given = reading.raw.table.get("validation")
     if given is None:
@@ -255,10 +259,11 @@ def read_validation(reading: Reading, kinds: Kinds | None, routes: Mapping[str, 
         if listed is not None:
             reading.fault(("validation", "compare"), f"{show(listed)} is not a list of tables; expected rows")
         return None
-    for number, row in enumerate(listed):
+    by_scene = kinds is None and "program" not in given  # rows are read with the parts
+    for number, row in enumerate([] if by_scene else listed):
         with reading.catch("validation", "compare", number):
             rows.append(read_row(row, kinds, routes, reading))
-    if not values or None in rows or len(rows) < len(listed):
+    if not values or None in rows or (len(rows) < len(listed) and not by_scene):
         return None
     return Validation(**{key: values[key] for key in KEYS if key != "compare"}, compare=tuple(rows))
 
@@ -332,7 +337,8 @@ def read_measure(given: Any, kinds: Kinds, routes: Mapping[str, Any], reading: R
             pass
         argument = Quantity(probe.dimension).read(argument, reading.setting)
         return Measure(given, function, "time", probe, argument=argument)
-    if inner not in reading.group("compare"):
-        raise ValueError(f'{show(inner)} has no measured series; expected [compare] "{inner}" = {{ file }}')
+    if inner not in reading.group("compare") and "exact" not in reading.raw.table:
+        text = f'{show(inner)} has no measured series; expected [compare] "{inner}" = {{ file }}, or [exact]'
+        raise ValueError(text)
     difference = "modulus" if probe.dimension.endswith("pressure") else probe.dimension
     return Measure(given, function, difference if function == DIFFERENCE else "number", probe)

@@ -105,7 +105,16 @@ def draw_values(axes, rows: Sequence[ValueRow]) -> None:
         axes.barh(k, 0.5, left=0.25, height=0.7, color=EXACT, alpha=0.18)
         if row.measured is not None:
             ends = [place(value) for value in row.measured]
-            axes.plot(ends, [k, k], "-", color=MEASURED, linewidth=5, alpha=0.7, solid_capstyle="round")
+            axes.plot(
+                ends,
+                [k, k],
+                "D-" if ends[0] == ends[1] else "-",
+                markersize=5,
+                color=MEASURED,
+                linewidth=5,
+                alpha=0.7,
+                solid_capstyle="round",
+            )
         for value in row.others:
             axes.plot(place(value), k, "|", color=style.COLOURS[3], markersize=11, markeredgewidth=1.6)
         axes.plot([place(row.value - row.error), place(row.value + row.error)], [k, k], color=COMPUTED, linewidth=1.2)

@@ -55,13 +55,6 @@ def parabolic_bump(x: np.ndarray) -> np.ndarray:
 
 
 @solution
-def lake(x, t, level: float = 0.1) -> Flow:
-    """Water at rest over the bump, which emerges below a level of 0.2 m."""
-    bed = parabolic_bump(x)
-    return Flow(np.maximum(level - bed, 0.0), np.zeros_like(x), bed)
-
-
-@solution
 def bump(x, t, flow: float = 4.42, level: float = 2.0, transcritical: float = 0.0) -> Flow:
     """Steady flow over the bump: subcritical, critical at the crest (`transcritical` 1), or with a jump behind it (2).
 

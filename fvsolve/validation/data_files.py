@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.case import shipped
 from fvsolve.case.validation_table import Validation
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.csv_rows import number
@@ -74,12 +75,14 @@ def write_profile(given: Mapping[str, Any], folder: Path) -> None:
         write_table(folder / f"exact-{name}.csv", rows)
 
 
-def made_table(path: Path, skip: int, columns: Mapping[str, str], matrix: bool, every: int) -> dict[str, np.ndarray]:
+def made_table(
+    path: Path, skip: int, columns: Mapping[str, str], matrix: bool, every: int, where: str
+) -> dict[str, np.ndarray]:
     """Columns of a table made from a text file : header -> float64[n].
 
     skip : number of lines before the rows; columns : header -> formula of the columns c1, c2, ... of the file
     matrix : True if the file is a matrix; then c1, c2 are the indices of an entry and c3 is the entry, of which every
-    `every`-th row and column counts
+    `every`-th row and column counts; where : condition for a row to count, "" for none
     `integral(F)` is the integral of F over the first made column, by trapezoids. Rows in which a used column is not a
     number are left out. Raises FvsolveError for an invalid formula, or if no row is left.
     """
@@ -90,13 +93,16 @@ def made_table(path: Path, skip: int, columns: Mapping[str, str], matrix: bool, 
                  if i % every == 0]  # fmt: skip
     names = tuple(f"c{k + 1}" for k in range(max(map(len, cells), default=0)))
     formulas = {header: formula_of(text, names, f"{path.name}, column {header}") for header, text in columns.items()}
-    used = sorted({int(step.rule[1:]) - 1 for formula, _ in formulas.values() for step in formula.steps
-                   if step.count == 0 and step.rule in names})  # fmt: skip
+    condition = formula_of(where or "1", names, f"{path.name}, where")[0]
+    used = sorted({int(step.rule[1:]) - 1 for formula in (condition, *(pair[0] for pair in formulas.values()))
+                   for step in formula.steps if step.count == 0 and step.rule in names})  # fmt: skip
     numbers = [[number(row[k]) if k < len(row) else None for k in used] for row in cells]
     rows = np.array([row for row in numbers if None not in row], float).reshape(-1, len(used))
     if not len(rows):
         raise FvsolveError(f"{path.name}: no row has numbers in columns {', '.join(names[k] for k in used)}")
     known = {names[k]: rows[:, j] for j, k in enumerate(used)}
+    counts = condition.evaluate(known)[0] != 0.0
+    known = {name: column[counts] for name, column in known.items()}
     result: dict[str, np.ndarray] = {}
     for header, (formula, integrated) in formulas.items():
         values = np.array(formula.evaluate(known)[0], float)
@@ -148,7 +154,10 @@ def write_table(path: Path, columns: Mapping[str, np.ndarray]) -> None:
 
 
 def completed(table: dict[str, Any], validation: Validation, folder: Path) -> dict[str, Any]:
-    """Tables of a case, completed by those of its EPANET network if it has one."""
+    """Tables of a case, completed by those of a shipped case or of an EPANET network if it names one."""
+    if validation.case is not None:
+        with shipped.find(validation.case).open("rb") as file:
+            return merged(tomllib.load(file), table)
     if validation.network is None:
         return table
     from fvsolve.epanet import import_network

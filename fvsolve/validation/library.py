@@ -12,9 +12,10 @@ import numpy as np
 
 from fvsolve.case import load, shipped
 from fvsolve.case.reading import Raw, Reading, read_raw
-from fvsolve.case.validation_table import EXACT, OF_ERROR, OF_SERIES, Row, Validation, read_validation
+from fvsolve.case.validation_table import DIFFERENCE, EXACT, OF_ERROR, OF_SERIES, Row, Validation, read_validation
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.output.memory_sink import MemorySink
+from fvsolve.output.unit_columns import UnitColumn
 from fvsolve.run import model_of, solved
 from fvsolve.studies.parallel import TaskPool, Work
 from fvsolve.studies.resolution import refined_keys
@@ -47,14 +48,14 @@ class Computed:
 
 @dataclass(frozen=True)
 class RowResult:
-    """Row of a validation with its computed value and its verdict, in SI.
+    """Row of a validation with its computed value and its verdict, in SI; shown : unit in which tables show it.
 
     error : numerical error; tolerance : of the gate; text : reason, or what is wrong; shift : shift in time [s] with
     which the computed series fits much better, 0 without; lines : name -> float64[n, 2], for the figure
     """
 
     row: Row
-    unit: str
+    shown: UnitColumn
     value: float
     error: float | None
     verdict: str
@@ -64,11 +65,26 @@ class RowResult:
     others: tuple[tuple[str, float], ...] = ()
     shift: float = 0.0
     lines: dict[str, np.ndarray] = field(default_factory=dict)
+    unit_of_lines: str = "-"
+
+    @property
+    def unit(self) -> str:
+        """Unit in which the values are shown; "-" for ratios."""
+        return (self.shown.span_unit if self.is_difference else self.shown.unit) or "-"
+
+    @property
+    def is_difference(self) -> bool:
+        """True if the value is a difference in the unit of a probe."""
+        return self.row.measure is not None and self.row.measure.function == DIFFERENCE
+
+    def in_unit(self, value: float) -> float:
+        """Convert a value of the row from SI to the unit of its tables."""
+        return self.shown.span_from_si(value) if self.is_difference else float(self.shown.from_si(value))
 
     def plain(self) -> dict[str, Any]:
         """Plain data of the row."""
         row, others = self.row, [{"code": code, "value": value} for code, value in self.others]
-        return {"what": row.what, "computed": row.computed, "value": self.value, "unit": self.unit,
+        return {"what": row.what, "computed": row.computed, "value": self.value,
                 "numerical_error": self.error, "measured": row.measured, "others": [*row.others, *others],
                 "exact": row.exact if self.converged is None else {**(row.exact or {}), "value": self.converged},
                 "gate": row.gate, "tolerance": self.tolerance, "verdict": self.verdict, "reason": self.text,
@@ -203,8 +219,9 @@ def program_rows(validation: Validation, folder: Path) -> list[RowResult]:
         made = found[row.computed]
         judged = judge(row, made.value, made.error, known_values(row, [value for _, value in made.others]))
         text = "; ".join(filter(None, (judged.text, made.text)))
-        rows.append(RowResult(row, row.unit or "-", made.value, made.error, judged.verdict, judged.tolerance, text,
-                              others=made.others, lines=made.lines))  # fmt: skip
+        shown, (verdict, tolerance, _) = UnitColumn("", "number", row.unit), judged
+        rows.append(RowResult(row, shown, made.value, made.error, verdict, tolerance, text, others=made.others,
+                              lines=made.lines))  # fmt: skip
     return rows
 
 
@@ -269,7 +286,7 @@ def scene_row(row: Row, runs: Runs) -> RowResult:
     other = runs.at(finer or COARSER)
     second = np.nan if other is None else measures.value_of(row, other)
     error = float(abs(value - second)) if np.isfinite(second) else None
-    if error is not None and row.gate["of"] == EXACT and row.measure.function in OF_ERROR:
+    if error is not None and finer is None and row.gate["of"] == EXACT and row.measure.function in OF_ERROR:
         error = max(value, second)  # the value is the numerical error itself
     converged = second if finer else None
     judged = judge(row, value, error, known_values(row, converged=converged))
@@ -279,5 +296,18 @@ def scene_row(row: Row, runs: Runs) -> RowResult:
         if shift and judged.verdict != WITHIN:
             text += f"; arrival: the computed series is {abs(shift):.3g} s {'early' if shift > 0 else 'late'}"
             text += f", and differs by {left:.3g} without that"
-    unit = measures.unit_of(row, runs.own.case)
-    return RowResult(row, unit, value, error, judged.verdict, judged.tolerance, text, converged, (), shift, lines)
+    shown = measures.shown_in(row, runs.own.case)
+    return RowResult(
+        row,
+        shown,
+        value,
+        error,
+        judged.verdict,
+        judged.tolerance,
+        text,
+        converged,
+        (),
+        shift,
+        lines,
+        measures.unit_of_lines(row, runs.own.case),
+    )

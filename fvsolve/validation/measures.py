@@ -1,17 +1,22 @@
 """Values that rows of a validation compute from runs: extremes, crossing times, differences from measured series."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from fvsolve import exact as exact_solutions
 from fvsolve.case.validation_table import CROSSING, DIFFERENCE, ERRORS, OF_SERIES, PROFILE, Row
 from fvsolve.errors import FvsolveError
 from fvsolve.exact import shallow_water
-from fvsolve.units import DIMENSIONS
+from fvsolve.output.unit_columns import UnitColumn, column
+from fvsolve.run import model_of
+from fvsolve.studies.reference import initial_values
 
 SHIFT_SHARE = 0.5  # a shift in time that leaves at most this share of the difference is named
 MAX_SHIFT = 0.25  # greatest shift that is tried, as a fraction of the compared time
+PLACE_KEYS = ("solution", "length", "from", "to")  # keys of a profile that are not data of its solution
 SHIFTS = 401  # number of shifts that are tried
 
 
@@ -78,15 +83,23 @@ def crossing_time(t: np.ndarray, values: np.ndarray, level: float) -> float:
 
 def series_of(row: Row, run: Any) -> Series:
     """Measured and computed series of a row at the measured times. Raises FvsolveError if no measured time counts."""
-    name = row.measure.probe.text
-    series = next(item for item in run.case.compare.values() if item.probe.text == name)
-    computed_t = run.seconds
+    name, computed_t = row.measure.probe.text, run.seconds
+    series = measured_series(run.case, row.measure.probe)
+    if series is None:
+        exact = exact_solutions.solution(run.case, initial_values(model_of(run.case)))
+        t, computed = window(row, computed_t, run.si(name))
+        return Series(t, exact.probe(row.measure.probe, t), computed)
     t, measured = window(row, series.t + series.shift, series.v)
     inside = (t >= computed_t[0]) & (t <= computed_t[-1])
     if inside.sum() < 2:
         raise FvsolveError(f"{row.what}: {series.file} has no two rows between the times that count")
     t, measured = t[inside], measured[inside]
     return Series(t, measured, np.interp(t, computed_t, run.si(name)))
+
+
+def measured_series(case: Any, probe: Any) -> Any:
+    """Series in `[compare]` of a case for a probe, None without one."""
+    return next((item for item in case.compare.values() if item.probe.text == probe.text), None)
 
 
 def difference(series: Series, function: str) -> float:
@@ -115,22 +128,25 @@ def best_shift(row: Row, run: Any) -> tuple[float, float]:
 
 
 def lines_of(row: Row, run: Any) -> dict[str, np.ndarray]:
-    """Lines for a figure of a row : name -> float64[n, 2], times [s] or places [m] and values; {} for a single value.
+    """Lines for a figure of a row : name -> float64[n, 2], times [s] or places [m] and values in units of `[output]`.
 
-    Names are "measured" or "exact", and "computed".
+    Names are "measured" or "exact", and "computed"; the result is {} for a probe without measured series.
     """
     measure = row.measure
-    if measure.function in OF_SERIES:
-        pair = series_of(row, run)
+    series = None if measure.probe is None else measured_series(run.case, measure.probe)
+    if series is not None or measure.function in OF_SERIES:
+        pair = series_of(replace(row, from_=None, to=None), run)
+        shown = column("", measure.probe.dimension, run.case, measure.probe.unit)
         inside = (run.seconds >= pair.t[0]) & (run.seconds <= pair.t[-1])
-        computed = np.column_stack([run.seconds, run.si(measure.probe.text)])[inside]
-        return {"measured": np.column_stack([pair.t, pair.measured]), "computed": computed}
+        computed = np.column_stack([run.seconds, shown.from_si(run.si(measure.probe.text))])[inside]
+        name = "exact" if series is None else "measured"
+        return {name: np.column_stack([pair.t, shown.from_si(pair.measured)]), "computed": computed}
     if measure.function != PROFILE:
         return {}
     basin, quantity = measure.field
     x = run.case.meshes[basin].centre[:, 0]
     line = np.unique(x, return_index=True)[1]  # one cell of each column
-    exact = getattr(profile(run.case.validation.profile, x[line], run.summary["t"]), quantity)
+    exact = exact_field(run, x[line], quantity)
     computed = end_field(run.last_frame[basin], quantity)[line]
     return {"exact": np.column_stack([x[line], exact]), "computed": np.column_stack([x[line], computed])}
 
@@ -142,16 +158,23 @@ def profile_error(run: Any, field: tuple[str, str]) -> float:
     """
     basin, quantity = field
     mesh = run.case.meshes[basin]
-    exact = getattr(profile(run.case.validation.profile, mesh.centre[:, 0], run.summary["t"]), quantity)
+    exact = exact_field(run, mesh.centre[:, 0], quantity)
     computed = end_field(run.last_frame[basin], quantity)
     area = np.where(np.isnan(exact), 0.0, mesh.area)
     gap = np.abs(computed - np.nan_to_num(exact))
     return float(np.sum(gap * area) / np.sum(np.abs(np.nan_to_num(exact)) * area))
 
 
+def exact_field(run: Any, x: np.ndarray, quantity: str) -> np.ndarray:
+    """Exact field at places x [m] at the end of a run, nan outside the keys `from` and `to` of the profile."""
+    given = run.case.validation.profile
+    values = getattr(profile(given, x, run.summary["t"]), quantity)
+    return np.where((x >= given.get("from", -np.inf)) & (x <= given.get("to", np.inf)), values, np.nan)
+
+
 def profile(given: Mapping[str, Any], x: np.ndarray, t: float) -> shallow_water.Flow:
     """Exact fields at places x [m] and time t [s]; given : table `profile` of a validation"""
-    data = {key: float(value) for key, value in given.items() if key not in ("solution", "length")}
+    data = {key: float(value) for key, value in given.items() if key not in PLACE_KEYS}
     return shallow_water.SOLUTIONS[given["solution"]](x, t, **data)
 
 
@@ -163,9 +186,18 @@ def end_field(frame: Mapping[str, np.ndarray], quantity: str) -> np.ndarray:
     )
 
 
-def unit_of(row: Row, case: Any) -> str:
-    """SI unit of the computed value of a row; "-" for a ratio."""
+def shown_in(row: Row, case: Any) -> UnitColumn:
+    """Unit in which tables show the values of a row: that of `[output]`; none for a ratio."""
     measure = row.measure
-    if measure.probe is not None and measure.probe.unit and measure.dimension == "number":
-        return measure.probe.unit if measure.function not in ERRORS else "-"
-    return DIMENSIONS[measure.dimension].si
+    target = measure.probe or measure.extent
+    if target is None or measure.function in ERRORS:
+        return UnitColumn("", "number", "")
+    if measure.function == CROSSING:
+        return column("", "time", case)
+    return column("", target.dimension, case, getattr(target, "unit", ""))
+
+
+def unit_of_lines(row: Row, case: Any) -> str:
+    """Unit of the values in `lines_of`; "-" for a number without unit."""
+    probe = row.measure.probe
+    return "-" if probe is None else column("", probe.dimension, case, probe.unit).unit or "-"

@@ -7,7 +7,6 @@ import numpy as np
 
 from fvsolve.case.validation_table import OF_ERROR
 from fvsolve.draw.validation_pictures import LinePanel, ValueRow, validation_figure
-from fvsolve.units import DIMENSIONS
 from fvsolve.validation.library import LACKING, RowResult, ValidationResult
 from fvsolve.validation.row_texts import amounts
 from fvsolve.validation.row_verdicts import WITHIN, known_values
@@ -104,8 +103,7 @@ def panels_of(result: ValidationResult) -> list[LinePanel]:
         elif measure.field is not None:
             title, label, logarithmic = f"{'.'.join(measure.field)} [SI]", "x [m]", False
         else:
-            unit = measure.probe.unit or DIMENSIONS[measure.probe.dimension].si
-            title, label, logarithmic = f"{measure.probe.text} [{unit}]", "t [s]", False
+            title, label, logarithmic = f"{measure.probe.text} [{row.unit_of_lines}]", "t [s]", False
         key = title + repr(row.row.set)
         panels.setdefault(key, LinePanel(title, label, row.lines, logarithmic))
     return list(panels.values())
@@ -122,6 +120,17 @@ def value_row(row: RowResult) -> ValueRow:
     gate = (0.0, gate[1]) if is_error else gate
     measured = None if is_error else known.measured
     value = row.value if np.isfinite(row.value) else gate[0]
+    shown = row.in_unit
+    gate, measured = tuple(map(shown, gate)), measured and tuple(map(shown, measured))
     unit = "" if row.unit == "-" else row.unit
     passes = row.verdict == WITHIN
-    return ValueRow(row.row.what, unit, value, error, measured, tuple(codes), gate, passes)
+    return ValueRow(
+        row.row.what,
+        unit,
+        shown(value),
+        row.shown.span_from_si(error),
+        measured,
+        tuple(map(shown, codes)),
+        gate,
+        passes,
+    )

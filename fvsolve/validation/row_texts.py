@@ -20,19 +20,23 @@ def amounts(row: RowResult) -> Amounts:
     """Texts of the values of a row, in its unit."""
     measured, exact = row.row.measured or {}, row.row.exact or {}
     is_error = row.row.measure is not None and row.row.measure.function in OF_ERROR
+
+    def text(value: float) -> str:
+        return number(row.in_unit(value))
+
     if measured.get("spread"):
-        reference = " to ".join(number(value) for value in measured["spread"])
+        reference = " to ".join(text(value) for value in measured["spread"])
     elif measured.get("value") is not None:
-        reference = number(measured["value"])
+        reference = text(measured["value"])
     else:
         value = row.converged if row.converged is not None else exact.get("value")
-        reference = f"exact {number(value)}" if value is not None else "0" if is_error else "-"
+        reference = f"exact {text(value)}" if value is not None else "0" if is_error else "-"
     others = [*((item["code"], item["value"]) for item in row.row.others), *row.others]
     return Amounts(
         reference,
-        number(row.value),
-        "-" if row.error is None else f"{row.error:.1e}",
-        "; ".join(f"{code} {number(value)}" for code, value in others) or "-",
+        text(row.value),
+        "-" if row.error is None else f"{row.shown.span_from_si(row.error):.1e}",
+        "; ".join(f"{code} {text(value)}" for code, value in others) or "-",
     )
 
 

@@ -48,7 +48,8 @@ def known_values(row: Row, others: Sequence[float] = (), converged: float | None
         EXACT: [exact.get("value"), converged],
     }
     if row.measure is None or row.measure.function in OF_ERROR:  # programs compute errors
-        pairs[MEASURED if row.gate["of"] == MEASURED else EXACT].append(0.0)
+        reference = pairs[MEASURED if row.gate["of"] == MEASURED else EXACT]
+        reference += [0.0] if converged is None else []
         pairs[OTHERS] += [0.0] if codes else []
     numbers = {key: [value for value in values if value is not None] for key, values in pairs.items()}
     return Known(*((min(values), max(values)) if values else None for values in numbers.values()))
