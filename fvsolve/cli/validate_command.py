@@ -67,6 +67,8 @@ def result_text(results: list) -> Iterator:
         for row in result.rows:
             if row.text:
                 yield f"{result.name}, {row.row.what}: {row.verdict}: {row.text}", STYLES.get(row.verdict, "yellow")
+        if result.fault:
+            yield f"{result.name}: {result.fault}", "bold red"
         for text in result.lacking:
             yield f"{result.name}: {text}", "bold red"
         if result.lacking:

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case import shipped
+from fvsolve.case import load, shipped
+from fvsolve.case.reading import read_raw
 from fvsolve.case.validation_table import Validation
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.csv_rows import number
@@ -156,8 +157,10 @@ def write_table(path: Path, columns: Mapping[str, np.ndarray]) -> None:
 def completed(table: dict[str, Any], validation: Validation, folder: Path) -> dict[str, Any]:
     """Tables of a case, completed by those of a shipped case or of an EPANET network if it names one."""
     if validation.case is not None:
-        with shipped.find(validation.case).open("rb") as file:
-            return merged(tomllib.load(file), table)
+        path = shipped.find(validation.case)
+        for used in load(path).files:
+            shutil.copyfile(used, folder / Path(used).name)
+        return merged(read_raw(path).table, table)
     if validation.network is None:
         return table
     from fvsolve.epanet import import_network

@@ -23,9 +23,9 @@ from fvsolve.validation import data_files, measures
 from fvsolve.validation.row_verdicts import DIFFERS, OUTSIDE, VERDICTS, WITHIN, judge, known_values
 
 FOLDER = "validation"  # below the shipped cases
-LACKING = "data lacking"
+LACKING, FAULTY = "data lacking", "not run"
 COARSER = 0.5  # resolution of the run from which the numerical error follows
-CODES = {WITHIN: 0, DIFFERS: 0, OUTSIDE: 1, LACKING: 3}  # exit codes of the command
+CODES = {FAULTY: 2, OUTSIDE: 1, LACKING: 3, DIFFERS: 0, WITHIN: 0}  # exit codes of the command, first one first
 PROGRAMS = {  # name in a case file -> module of this package with the function `compute`
     "ode-problems": "ode_problems",
     "epanet-networks": "epanet_networks",
@@ -93,9 +93,7 @@ class RowResult:
 
 @dataclass(frozen=True)
 class ValidationResult:
-    """Result of a validation: rows, seconds of stepping, and texts on data that lack.
-
-    verdict : the worst of its rows, or `LACKING`
+    """Result of a validation: rows, seconds of stepping, texts on data that lack, and message of a faulty case.
     """
 
     name: str
@@ -104,24 +102,27 @@ class ValidationResult:
     rows: tuple[RowResult, ...] = ()
     seconds: float = 0.0
     lacking: tuple[str, ...] = ()
+    fault: str = ""
 
     @property
     def verdict(self) -> str:
-        """Worst verdict of the rows, or `LACKING`."""
-        return LACKING if self.lacking else max((row.verdict for row in self.rows), key=VERDICTS.index)
+        """Worst verdict of the rows, `LACKING`, or `FAULTY`."""
+        worst = max((row.verdict for row in self.rows), key=VERDICTS.index, default=FAULTY)
+        return FAULTY if self.fault else LACKING if self.lacking else worst
 
     def plain(self) -> dict[str, Any]:
         """Plain data of the validation."""
         about = self.validation
         return {"name": self.name, "title": self.title, "verdict": self.verdict, "source": about.source,
                 "licence": about.licence, "get": about.get, "note": about.note, "seconds": self.seconds,
-                "lacking": list(self.lacking), "rows": [row.plain() for row in self.rows]}  # fmt: skip
+                "lacking": list(self.lacking), "fault": self.fault,
+                "rows": [row.plain() for row in self.rows]}  # fmt: skip
 
 
 def exit_code(results: Iterable[ValidationResult]) -> int:
-    """Exit code of several validations: 1 if one is outside, else 3 if data lack, else 0."""
+    """Exit code of several validations: 2 if one is faulty, else 1 if one is outside, else 3 if data lack, else 0."""
     verdicts = {result.verdict for result in results}
-    return 1 if OUTSIDE in verdicts else CODES[LACKING] if LACKING in verdicts else 0
+    return next((code for verdict, code in CODES.items() if verdict in verdicts), 0)
 
 
 def paths() -> dict[str, Path]:
@@ -153,7 +154,7 @@ def validate(
 
     names : case files, or names of shipped validations (default all); data : folder with files of measurements
     out : folder for the files of the runs, each below its name; None for none
-    Raises FvsolveError for unknown names, CaseError for faults of a case.
+    Raises FvsolveError for unknown names, CaseError for faults of a table [validation].
     """
     chosen = find(names)
     for path in chosen.values():  # faults before the first run
@@ -197,11 +198,14 @@ def validate_file(path: Path, data: Path | None = None, out: Path | None = None)
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder) if out is None else Path(out) / path.stem
         place.mkdir(parents=True, exist_ok=True)
-        data_files.prepare(validation, data, place)
-        if validation.program is not None:
-            rows, seconds = program_rows(validation, place), time.perf_counter() - begun
-        else:
-            validation, rows, seconds = scene_rows(raw, validation, place)
+        try:
+            data_files.prepare(validation, data, place)
+            if validation.program is not None:
+                rows, seconds = program_rows(validation, place), time.perf_counter() - begun
+            else:
+                validation, rows, seconds = scene_rows(raw, validation, place)
+        except FvsolveError as error:  # the other cases go on
+            return ValidationResult(path.stem, title, validation, fault=str(error))
     return ValidationResult(path.stem, title, validation, tuple(rows), seconds)
 
 

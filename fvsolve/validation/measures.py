@@ -107,6 +107,8 @@ def difference(series: Series, function: str) -> float:
     gap = np.abs(series.computed - series.measured)
     if function == DIFFERENCE:
         return float(np.sqrt(np.mean(gap**2)))
+    if np.ptp(series.measured) == 0.0:
+        raise FvsolveError("the measured series is constant over the times that count; expected other times")
     size = {"mean_error": gap.mean(), "rms_error": np.sqrt(np.mean(gap**2)), "greatest_error": gap.max()}[function]
     return float(size / np.ptp(series.measured))
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from fvsolve.case.validation_table import OF_ERROR
 from fvsolve.draw.validation_pictures import LinePanel, ValueRow, validation_figure
-from fvsolve.validation.library import LACKING, RowResult, ValidationResult
+from fvsolve.validation.library import RowResult, ValidationResult
 from fvsolve.validation.row_texts import amounts
 from fvsolve.validation.row_verdicts import WITHIN, known_values
 
@@ -52,8 +52,8 @@ def section(result: ValidationResult, figures: list[str]) -> str:
     lines = [f"({result.name})=", f"## {result.title or result.name}", "", f"Source: {about.source}."]
     lines += [f"Data: {about.licence}."] if about.licence else []
     lines += [about.note] if about.note else []
-    if result.verdict == LACKING:
-        return "\n".join([*lines, "", f"Not run: {'; '.join(result.lacking)}. {about.get}", ""])
+    if not result.rows:
+        return "\n".join([*lines, "", f"Not run: {result.fault or '; '.join(result.lacking)}. {about.get}", ""])
     lines += ["", *(f"![{result.title}, {theme}]({name}){{.only-{theme}}}\n"
                     for theme, name in zip(THEMES, figures, strict=False))]  # fmt: skip
     lines += [
