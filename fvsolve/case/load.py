@@ -248,12 +248,21 @@ def read_scalars(reading: Reading) -> dict[str, Any]:
 
 
 def fill_specific_heats(reading: Reading, scalars: dict[str, Any], links: dict[str, Any], fluid: Any) -> dict[str, Any]:
-    """Scalars with the specific heat of the fluid where none is stated: with `heat`, and where walls store heat."""
+    """Scalars with the specific heat of the fluid where none is stated: with `heat`, and where walls store heat.
+
+    Adds a fault for a specific heat that has no effect.
+    """
     factors = [getattr(link, "retardation", {}).items() for link in links.values()]
     stored = {name for items in factors for name, factor in items if factor == OF_WALL}
     result = dict(scalars)
     for name, scalar in scalars.items():
-        needed = scalar is not None and (scalar.heat or (name in stored and scalar.unit in ZEROS))
+        if scalar is None:
+            continue
+        needed = scalar.heat or (name in stored and scalar.unit in ZEROS)
+        if scalar.specific_heat is not None and not needed and None not in links.values():
+            reading.fault(
+                ("scalars", name, "specific_heat"), 'needs heat = true, or a pipe with the retardation "wall"'
+            )
         if needed and scalar.specific_heat is None and fluid is not None:
             try:
                 found = specific_heat(fluid.name, fluid.temperature, fluid.pressure)

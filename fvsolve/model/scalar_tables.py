@@ -348,8 +348,8 @@ def depths(model):
 def scalar_bounds(model, q: int):
     """Yield `bound_rows` of the amounts of scalar q: its least and greatest value, times the mass or depth there.
 
-    The mass per length in the cells of a pipe follows from both waves, plus the wall mass. The mass in a tank or chamber
-    follows from its state. In a basin it is the depth, or 1 without variable depth (`basin.deep` False).
+    The mass per length in the cells of a pipe follows from both waves, plus the wall mass. The mass in a tank or
+    chamber follows from its state. In a basin it is the depth, or 1 without variable depth (`basin.deep` False).
     """
     row, tables = model.tables.scalars[q], model.tables
     if np.isinf(row["least"]):

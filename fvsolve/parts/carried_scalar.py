@@ -100,9 +100,7 @@ class Scalar(Table):
         if given.get("heat") is True and isinstance(unit := given.get("unit", "K"), str) and unit not in ZEROS:
             faults.append((("unit",), f"{show(unit)} is not a unit of a temperature with heat; expected K or degC"))
         if given.get("heat", False) is False:
-            faults += [((key,), "needs heat = true") for key in ("heat_from",) if key in given]
-            if "specific_heat" in given and given.get("unit") not in ZEROS:
-                faults.append((("specific_heat",), 'needs heat = true, or unit = "degC" or "K"'))
+            faults += [(("heat_from",), "needs heat = true")] if "heat_from" in given else []
         return faults
 
     @property
