@@ -259,10 +259,9 @@ def fill_specific_heats(reading: Reading, scalars: dict[str, Any], links: dict[s
         if scalar is None:
             continue
         needed = scalar.heat or (name in stored and scalar.unit in ZEROS)
-        if scalar.specific_heat is not None and not needed and None not in links.values():
-            reading.fault(
-                ("scalars", name, "specific_heat"), 'needs heat = true, or a pipe with the retardation "wall"'
-            )
+        if scalar.specific_heat is not None and not needed and not reading.faults:
+            text = 'needs heat = true, or a pipe with the retardation factor "wall"'
+            reading.fault(("scalars", name, "specific_heat"), text)
         if needed and scalar.specific_heat is None and fluid is not None:
             try:
                 found = specific_heat(fluid.name, fluid.temperature, fluid.pressure)
