@@ -135,7 +135,7 @@ def scale_scalars(draft) -> None:
         typical = typical_value(draft.case, name)
         for pipe, wall in zip(draft.pipe_table, wall_masses(draft.tables, row), strict=True):
             at = row["y"] + pipe["cell"]
-            scale[at : at + pipe["cells"]] = typical * (rho * pipe["area"] + wall)
+            scale[at : at + pipe["cells"]] = typical * rho * pipe["area"] + typical * wall
         for node, place in zip(draft.node_table, indices_at_nodes(draft, row), strict=True):
             if node["kind"] in STORES:
                 scale[place] = typical * max(node["mass"], scale[node["y"]])
