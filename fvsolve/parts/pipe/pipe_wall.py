@@ -163,7 +163,9 @@ class Elements(Value):
 MODULI = UsualRange(1e5, 1.2e12, "soft rubber to diamond")
 THICKNESS = UsualRange(1e-6, 2.0, "foils to lined rock")
 THIN_WALL = 25.0  # least bore over wall of a thin wall, Wylie, Streeter and Suo 1993
-DENSITY = Quantity("density", positive, "density, for `retardation`", UsualRange(500.0, 2.3e4, "wood to tungsten"))
+DENSITY = Quantity(
+    "density", positive, "density, for `retardation` [kg/m3]", UsualRange(500.0, 2.3e4, "wood to tungsten")
+)
 SPECIFIC_HEAT = Quantity(
     "specific_heat", positive, "specific heat, for `retardation` [J/kg/K]", UsualRange(100.0, 3e3, "lead to plastics")
 )
