@@ -132,6 +132,14 @@ def test_direction_and_division_of_a_pipe_do_not_matter():
     assert found["halves"] == approx(found["whole"], abs=1e-9)
 
 
+def test_pieces_of_a_cut_pipe_keep_the_factor_of_the_pipe_also_from_defaults():
+    nodes = {"lake": given(), "tap": junction(FLOW), "mid": {"type": "junction", "on": "a", "at": "1 m"}}
+    case = case_of(nodes, {"a": line("lake", "tap", 4.0, 40)}, 1.0) | {"defaults": {"pipe": SLOWER}}
+    del case["links"]["a"]["cells"]
+    case = fvsolve.load(case)
+    assert [case.retardation(name, "dye") for name in case.links] == [R, R]
+
+
 def test_decay_and_diffusion_are_per_unit_of_fluid():
     """At rest the rate is decay / R; in steady flow the loss on the way does not depend on the wall."""
     nodes = {"left": given(), "stop": junction()}
@@ -265,7 +273,7 @@ FAULTS = [
     (("scalars", "warm"), {"unit": "mg/l"}, '"wall" is the heat in a wall, and warm has the unit "mg/l"'),
     (("scalars", "warm"), {"unit": "K"}, 'a "user" fluid has none; give the key `specific_heat`'),
     ((*LINK, "retardation", "warm"), 1.5, "specific_heat: needs heat = true, or a pipe with the retardation factor"),
-    ((*LINK, "pipe_model"), "delay-line", "XXX"),
+    ((*LINK, "pipe_model"), "delay-line", "scalars are carried in cells"),
     ((*LINK, "pipe_model"), "quasi-steady", "it has no volume to carry scalars"),
     ((*LINK, "type"), "rigid-column", "retardation: unknown key"),
 ]
