@@ -43,7 +43,7 @@ def add_reactions(t, y, dydt, out, handle):
         for i in range(n if basin["carried"] >= 0 else 0):
             depth, weight = cell_depth(tables, basin, seen, i), mass_per_depth(tables, basin, i)
             first, entry = basin["carried"] + i, basin["lost"] + i
-            react(seen, dydt, out, tables, first, n, max(depth, THIN), depth, weight, entry)
+            react(seen, dydt, out, tables, first, n, max(depth, THIN), tables.pipes.size, depth, weight, entry)
 
 
 @njit
@@ -55,7 +55,8 @@ def limit_rates_in_basins(t, y, dydt, out, handle):
         basin = tables.basins[b]
         seen, n = deviations_of(basin, tables.seen, y), basin["n"]
         for i in range(n if basin["carried"] >= 0 else 0):
-            read_amounts(tables, seen, basin["carried"] + i, n, max(cell_depth(tables, basin, seen, i), THIN))
+            depth = max(cell_depth(tables, basin, seen, i), THIN)
+            read_amounts(tables, seen, basin["carried"] + i, n, depth, tables.pipes.size)
             out[at] = max(out[at], greatest_rate(tables))
 
 
@@ -72,7 +73,7 @@ def observe_reactions_in_basins(t, y, out, handle, values):
                 basin = tables.basins[b]
                 for i in range(basin["n"] if basin["carried"] >= 0 else 0):
                     depth, weight = cell_depth(tables, basin, y, i), mass_per_depth(tables, basin, i)
-                    read_amounts(tables, y, basin["carried"] + i, basin["n"], max(depth, THIN))
+                    read_amounts(tables, y, basin["carried"] + i, basin["n"], max(depth, THIN), tables.pipes.size)
                     add_observed(tables, k, depth * weight / tables.settings[0]["rho"], sums)
             values[j] = chosen(probe["side"], sums)
         elif probe["kind"] == LOCAL_AFFINITY and probe["head"] == CELL_SCALAR:

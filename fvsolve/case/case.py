@@ -22,7 +22,7 @@ from fvsolve.fluid import LAWS, Fluid
 from fvsolve.fluid.laws import Law
 from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
-from fvsolve.parts.pipe.pipe_wall import elastic_compliance
+from fvsolve.parts.pipe.pipe_wall import OF_WALL, elastic_compliance, heat_retardation
 from fvsolve.parts.reaction import Reaction
 from fvsolve.parts.table_model import plain_value
 from fvsolve.schemes import SCHEMES
@@ -276,6 +276,13 @@ class Case(Displayable):
         if link is None or link.kind != "pipe":
             link = self._known(name, {key: pipe for key, pipe in self.links.items() if pipe.kind == "pipe"}, "pipe")
         return wave_speed(link, self.properties)
+
+    def retardation(self, name: str, scalar: str) -> float:
+        """Retardation factor of a scalar in a pipe: what fluid and wall store, over what the fluid stores."""
+        factor = self.links[name].retardation.get(scalar, 1.0)
+        if factor != OF_WALL:
+            return factor
+        return heat_retardation(self.links[name], self.properties.density, self.scalars[scalar].specific_heat)
 
     def _known(self, name: str, known: dict[str, Any], noun: str) -> Any:
         if not isinstance(name, str) or name not in known:

@@ -15,8 +15,10 @@ from fvsolve.case.sections import CAVITY_SCHEMES, FluidSpec, Numerics
 from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts import KINDS, Basin
 from fvsolve.parts.basin import VELOCITY_FIELDS, Physics
+from fvsolve.parts.carried_scalar import ZEROS
 from fvsolve.parts.formula_program import is_formula
 from fvsolve.parts.nodes_and_links import is_in_network
+from fvsolve.parts.pipe.pipe_wall import OF_WALL
 from fvsolve.parts.table_model import CaseContext
 from fvsolve.parts.value import ROOT
 from fvsolve.steppers.loop_records import LEAST_STEP, LEAST_TOLERANCE
@@ -219,6 +221,9 @@ def scalar_faults(
             for scalar, value in getattr(part, "scalars", {}).items():
                 if (text := _scalar_value_fault(scalar, value, part, scalars)) is not None:
                     yield (group, name, "scalars", scalar), text
+            for scalar, factor in getattr(part, "retardation", {}).items():
+                if (text := _retardation_fault(scalar, factor, scalars)) is not None:
+                    yield (group, name, "retardation", scalar), text
             if scalars and isinstance(part, Basin) and not part.physics_type.carries:
                 text = f"scalars are not supported with physics {show(part.physics)}; expected a free surface"
                 yield (group, name), text
@@ -310,6 +315,16 @@ def _scalar_value_fault(scalar: str, value: Any, part: Any, scalars: dict[str, A
             f"{article(part.kind)} has no scalar values; expected an inflow, a reservoir, a tank, a chamber or a pipe"
         )
     return None
+
+
+def _retardation_fault(scalar: str, factor: Any, scalars: dict[str, Any]) -> str | None:
+    """Fault text for the retardation factor of a scalar in a pipe; None if it is valid."""
+    if scalar not in scalars:
+        return _unknown_scalar(scalar, scalars)
+    if factor != OF_WALL or scalars[scalar] is None or scalars[scalar].unit in ZEROS:
+        return None
+    unit = show(scalars[scalar].unit)
+    return f'"{OF_WALL}" is the heat in a wall, and {scalar} has the unit {unit}; expected a number, or unit = "degC"'
 
 
 def _unknown_scalar(scalar: str, scalars: dict[str, Any]) -> str:

@@ -65,7 +65,8 @@ def key_table(name: str) -> str:
 
 def materials_table() -> str:
     """Markdown table of materials: range of each property, and the sources."""
-    head = ("material", "modulus [GPa]", "Poisson's ratio", "roughness [mm]", "density [kg/m3]", "read in")
+    head = ("material", "modulus [GPa]", "Poisson's ratio", "roughness [mm]", "density [kg/m3]",
+            "specific heat [J/kg/K]", "read in")  # fmt: skip
     rows = [head, ("---",) * len(head)]
     for name, material in materials().items():
         figures = [material.figures.get(key) for key in SI]

@@ -23,7 +23,9 @@ from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.fluid import follow_temperature, properties, specific_heat
 from fvsolve.parts import KINDS, Basin, Friction, Pipe, Scalar
 from fvsolve.parts import value as val
+from fvsolve.parts.carried_scalar import ZEROS
 from fvsolve.parts.control import Control
+from fvsolve.parts.pipe.pipe_wall import OF_WALL
 from fvsolve.parts.schedule import Schedule, Scheduled, signal_fault
 from fvsolve.parts.table_model import read_keys
 from fvsolve.units import Kinematic, show
@@ -112,9 +114,10 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     reading.setting.step = numerics.step if numerics is not None else None
     check_names(reading)
     network = part_reading.cut_pipes(reading, state, numerics)
-    scalars = read_scalars(reading, state)
+    scalars = read_scalars(reading)
     reactions = read_reactions(reading, scalars)
     parts = part_reading.read_parts(reading, network)
+    scalars = fill_specific_heats(reading, scalars, parts.links, state)
     check_unused_signals(reading)
     kinds = part_reading.place_kinds(network, parts, scalars, bool(reading.faults))
     routes = read_routes(reading, network, parts.links)
@@ -234,19 +237,38 @@ def check_names(reading: Reading) -> None:
         reading.stop()  # the names are not known
 
 
-def read_scalars(reading: Reading, fluid: Any) -> dict[str, Any]:
-    """Scalars by name, with the specific heat of the fluid where none is stated; None for a faulty scalar."""
+def read_scalars(reading: Reading) -> dict[str, Any]:
+    """Scalars by name, None for a faulty scalar."""
     result: dict[str, Any] = {}
     for name, given in reading.group("scalars").items():
         result[name] = None
         with reading.catch("scalars", name):
-            scalar = result[name] = Scalar.model_validate(given, context=reading.setting)
-            if scalar.heat and scalar.specific_heat is None and fluid is not None:
-                try:
-                    found = specific_heat(fluid.name, fluid.temperature, fluid.pressure)
-                except FluidError as error:
-                    raise ValueError(f"{error.message}; give the key `specific_heat`") from None
-                result[name] = scalar.model_copy(update={"specific_heat": found})
+            result[name] = Scalar.model_validate(given, context=reading.setting)
+    return result
+
+
+def fill_specific_heats(reading: Reading, scalars: dict[str, Any], links: dict[str, Any], fluid: Any) -> dict[str, Any]:
+    """Scalars with the specific heat of the fluid where none is stated: with `heat`, and where walls store heat.
+
+    Adds a fault for a specific heat that has no effect.
+    """
+    factors = [getattr(link, "retardation", {}).items() for link in links.values()]
+    stored = {name for items in factors for name, factor in items if factor == OF_WALL}
+    result = dict(scalars)
+    for name, scalar in scalars.items():
+        if scalar is None:
+            continue
+        needed = scalar.heat or (name in stored and scalar.unit in ZEROS)
+        if scalar.specific_heat is not None and not needed and not reading.faults:
+            text = 'needs heat = true, or a pipe with the retardation factor "wall"'
+            reading.fault(("scalars", name, "specific_heat"), text)
+        if needed and scalar.specific_heat is None and fluid is not None:
+            try:
+                found = specific_heat(fluid.name, fluid.temperature, fluid.pressure)
+            except FluidError as error:
+                reading.fault(("scalars", name), f"{error.message}; give the key `specific_heat`")
+                continue
+            result[name] = scalar.model_copy(update={"specific_heat": found})
     return result
 
 

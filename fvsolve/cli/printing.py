@@ -214,6 +214,7 @@ def _wall_text(case, pipe: dict) -> str:
         texts.append(f"viscoelastic, {pipe['creep']['elements']} elements, speed of slow waves {speed}")
     if "restraint_factor" in pipe:
         texts.append(f"restraint factor {pipe['restraint_factor']:.4g}")
+    texts += [f"retardation factor of {name} {factor:.4g}" for name, factor in pipe.get("retardation", {}).items()]
     if "source" in pipe:
         texts.append(pipe["source"])
     if pipe.get("unread"):

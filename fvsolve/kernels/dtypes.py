@@ -630,6 +630,7 @@ WALL = record(
 SCALAR = record(
     y=i8,  # offset in y of its amounts per length [kg/m], pipe by pipe, then of those in nodes with storage
     places=i8,  # offset in `integers`, by node: offset of its amount in y, or schedule of its value
+    wall_masses=i8,  # offset in `floats` of the wall mass of each pipe, and of a 0 for places without walls [kg/m]
     diffusivity=f8,
     decay=f8,  # [1/s]
     ambient=f8,  # value to which it decays

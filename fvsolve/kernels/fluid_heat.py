@@ -55,7 +55,7 @@ def _heat_of_pipes(t, y, dydt, out, handle):
         r, l, width, total = y[o : o + n], y[o + n : o + 2 * n], polynomial_width(st, n), 0.0
         full = st["rho"] * pipe["area"]
         for i in range(n):
-            power, reynolds = 0.0, cell_reynolds(y, tables, pipe, i)
+            power, reynolds = 0.0, cell_reynolds(y, tables, p, i)
             for g in range(3):
                 a, b = at_point(r, width, i, g), at_point(l, width, i, g)
                 flow = pipe["flow"] + (a - b)

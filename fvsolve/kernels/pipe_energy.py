@@ -115,7 +115,7 @@ def pipe_power(t, y, dydt, out, tables, k, rows):
     fall, flow = pipe["drag"] / pipe["area"], pipe["flow"]
     friction, rate = 0.0, 0.0
     for i in range(n):
-        reynolds = cell_reynolds(y, tables, pipe, i)
+        reynolds = cell_reynolds(y, tables, k, i)
         for g in range(3):
             a, b = at_point(r, width, i, g), at_point(l, width, i, g)
             da, db = at_point(dr, width, i, g), at_point(dl, width, i, g)
@@ -177,7 +177,7 @@ def pipe_power_barotropic(t, y, dydt, out, tables, k, rows):
     base, reference = enthalpy(st, floats, st["ambient"]), st["rho"] * pipe["area"]
     friction, rate = 0.0, 0.0
     for i in range(n):
-        reynolds = cell_reynolds(y, tables, pipe, i)
+        reynolds = cell_reynolds(y, tables, k, i)
         for g in range(3):
             a, b = at_point(r, width, i, g), at_point(l, width, i, g)
             da, db = at_point(dr, width, i, g), at_point(dl, width, i, g)

@@ -1,8 +1,9 @@
 """Reactions of scalars in pipe cells, tanks and chambers: rates, changes of amounts, probes of the chemical port.
 
 At a place with the mass m [kg, or per length or area] and the values c of its scalars, a reaction with the rate
-r(c) [mol/m3/s] changes each amount m c at the rate nu m r, with the coefficient nu of the scalar in its unit. The
-product m r is computed once, so that sums that the coefficients keep are kept to round-off.
+r(c) [mol/m3/s] changes each amount at the rate nu m r, with the coefficient nu of the scalar in its unit. The product
+m r is computed once, so that sums that the coefficients keep are kept to round-off. m is the mass of fluid: what walls
+of pipes store does not react.
 
 Three numbers of each scalar of a reaction lie in `floats`: its orders in the forward and in the reverse rate, and nu.
 """
@@ -23,7 +24,7 @@ from fvsolve.kernels.dtypes import (
     REVERSE_ORDER,
 )  # fmt: skip
 from fvsolve.kernels.formula_programs import run_program
-from fvsolve.kernels.scalar_transport import DRY_DEPTH, cell_mass, has_storage, value_at_probe
+from fvsolve.kernels.scalar_transport import DRY_DEPTH, cell_mass, has_storage, value_at_probe, wall_mass
 from fvsolve.kernels.table_handle import open_tables
 
 DIFFERENCE = 1e-6  # of amounts, relative to the greatest: for slopes of rates, which limit steps
@@ -37,13 +38,14 @@ def scalar_stride(tables):
 
 
 @njit
-def read_amounts(tables, y, first, stride, mass):
+def read_amounts(tables, y, first, stride, mass, p):
     """Write the values of all scalars at a place to `stack`, those of amounts in mol/m3.
 
     first, stride : index in y of the first amount, and distance to the next; mass : mass there, as in the amounts
+    p : number of the pipe at whose wall the place is, pipes.size elsewhere
     """
     for q in range(tables.scalars.size):
-        tables.stack[q] = y[first + q * stride] / mass * tables.scalars[q]["molar"]
+        tables.stack[q] = y[first + q * stride] / (mass + wall_mass(tables, q, p)) * tables.scalars[q]["molar"]
 
 
 @njit(forceinline=True)
@@ -104,14 +106,14 @@ def greatest_rate(tables):
 
 
 @njit
-def react(y, dydt, out, tables, first, stride, mass, present, weight, entry):
+def react(y, dydt, out, tables, first, stride, mass, p, present, weight, entry):
     """Add the changes by all reactions at a place to its rates.
 
-    first, stride, mass : as for `read_amounts`; present : mass that reacts, less than `mass` in a thin film
+    first, stride, mass, p : as for `read_amounts`; present : mass that reacts, less than `mass` in a thin film
     weight : mass [kg] per `present`; entry : number of the place in the ledger of reactions
     """
     integers, floats = tables.integers, tables.floats
-    read_amounts(tables, y, first, stride, mass)
+    read_amounts(tables, y, first, stride, mass, p)
     for k in range(tables.reactions.size):
         reaction = tables.reactions[k]
         ahead, back = rates_both_ways(tables, k)
@@ -149,12 +151,12 @@ def limit_rates(t, y, dydt, out, handle):
     for p in range(tables.pipes.size):
         for i in range(tables.pipes[p]["cells"]):
             first = scalar["y"] + tables.pipes[p]["cell"] + i
-            read_amounts(tables, y, first, stride, cell_mass(y, tables, p, i))
+            read_amounts(tables, y, first, stride, cell_mass(y, tables, p, i), p)
             out[at] = max(out[at], greatest_rate(tables))
     for i in range(tables.nodes.size):
         mass = stored_mass(y, tables.nodes[i])
         if mass > 0.0:
-            read_amounts(tables, y, tables.integers[scalar["places"] + i], stride, mass)
+            read_amounts(tables, y, tables.integers[scalar["places"] + i], stride, mass, tables.pipes.size)
             out[at] = max(out[at], greatest_rate(tables))
 
 
@@ -170,12 +172,12 @@ def reaction_rates(t, y, dydt, out, handle):
         pipe = tables.pipes[p]
         for i in range(pipe["cells"]):
             mass, entry = cell_mass(y, tables, p, i), pipe["cell"] + i
-            react(y, dydt, out, tables, scalar["y"] + entry, stride, mass, mass, pipe["dx"], entry)
+            react(y, dydt, out, tables, scalar["y"] + entry, stride, mass, p, mass, pipe["dx"], entry)
     for i in range(tables.nodes.size):
         mass = stored_mass(y, tables.nodes[i])
         if mass > 0.0:
             first = tables.integers[scalar["places"] + i]
-            react(y, dydt, out, tables, first, stride, mass, mass, 1.0, first - scalar["y"])
+            react(y, dydt, out, tables, first, stride, mass, tables.pipes.size, mass, 1.0, first - scalar["y"])
 
 
 @njit(forceinline=True)
@@ -210,12 +212,12 @@ def sums_of_network(y, tables, k, sums):
         pipe = tables.pipes[p]
         for i in range(pipe["cells"]):
             mass = cell_mass(y, tables, p, i)
-            read_amounts(tables, y, scalar["y"] + pipe["cell"] + i, stride, mass)
+            read_amounts(tables, y, scalar["y"] + pipe["cell"] + i, stride, mass, p)
             add_observed(tables, k, pipe["dx"] * mass / rho, sums)
     for i in range(tables.nodes.size):
         mass = stored_mass(y, tables.nodes[i])
         if mass > 0.0:
-            read_amounts(tables, y, tables.integers[scalar["places"] + i], stride, mass)
+            read_amounts(tables, y, tables.integers[scalar["places"] + i], stride, mass, tables.pipes.size)
             add_observed(tables, k, mass / rho, sums)
 
 

@@ -5,10 +5,11 @@ it is the given value of inflow from outside, and elsewhere the mean of all infl
 amount g (c_cell - c_node) [kg/s] by diffusion, g = 2 D m / dx, with the values c_cell in the end cell and c_node at the
 node, diffusivity D [m2/s], mass per length m [kg/m] and cell length dx.
 
-State of a cell: amount per length s = m c [kg/m], with mass per length m and value c of the scalar. Its equation, with
-mass flow M [kg/s] and diffusivity D [m2/s], is
+State of a cell: amount per length s = (m + W) c [kg/m], with mass per length m and value c of the scalar. The wall has
+the value of the fluid and stores as much as the wall mass W of fluid per length, which is constant. The equation of a
+cell, with mass flow M [kg/s] and diffusivity D [m2/s], is
 
-    s_t + (M c - D m c_x)_x = -decay (s - m ambient)
+    s_t + (M c - D m c_x)_x = -decay m (c - ambient)
 
 Flows at faces are summed from the `from` end, M[i+1] = M[i] - dx dm[i]/dt, with dm/dt of the waves. So a uniform c
 remains uniform.
@@ -53,16 +54,23 @@ def end_flow(out, tables, p, right):
 
 @njit(forceinline=True)
 def cell_mass(y, tables, p, i):
-    """Mass per length in cell i of pipe p [kg/m]."""
+    """Mass of fluid per length in cell i of pipe p [kg/m]."""
     pipe = tables.pipes[p]
     waves = y[pipe["y"] + i] + y[pipe["y"] + pipe["cells"] + i]
     return tables.profile[pipe["center"] + i] + waves * (1.0 / pipe["speed"])
 
 
 @njit(forceinline=True)
+def wall_mass(tables, q, p):
+    """Mass of fluid per length that stores as much of scalar q as the wall of pipe p [kg/m]; 0 for p = pipes.size."""
+    return tables.floats[tables.scalars[q]["wall_masses"] + p]
+
+
+@njit(forceinline=True)
 def cell_value(y, tables, q, p, i):
     """Value of scalar q in cell i of pipe p."""
-    return y[tables.scalars[q]["y"] + tables.pipes[p]["cell"] + i] / cell_mass(y, tables, p, i)
+    amount = y[tables.scalars[q]["y"] + tables.pipes[p]["cell"] + i]
+    return amount / (cell_mass(y, tables, p, i) + wall_mass(tables, q, p))
 
 
 @njit(forceinline=True)
@@ -420,10 +428,10 @@ def face_flows(first, last, slowness, dr, dl, flow):
 
 
 @njit
-def concentrations(s, m, c):
-    """Write the values of a scalar in cells to c: amounts per length s over masses per length m."""
+def concentrations(s, m, wall, c):
+    """Write the values of a scalar in cells to c: amounts s over masses m, plus that of the wall; all per length."""
     for i in range(c.size):
-        c[i] = s[i] / m[i]
+        c[i] = s[i] / (m[i] + wall)
 
 
 @inline
@@ -461,30 +469,27 @@ def amount_rates(k, f, ds):
 
 
 @njit
-def subtract_decay(decay, ambient, s, m, ds):
-    """Subtract the decay of a scalar from the rates ds of its amounts per length; return its sum over cells [kg/m/s].
+def subtract_decay(decay, ambient, s, m, wall, c, ds):
+    """Subtract the decay of a scalar in the fluid from the rates ds of its amounts; return its sum [kg/m/s].
 
     decay : rate [1/s]; ambient : value to which it decays
-    s, m : amount and mass per length of cells [kg/m]
+    s, m, c : amount per length, mass of fluid per length [kg/m] and value in cells; wall : wall mass per length [kg/m]
     """
     lost = 0.0
     for i in range(s.size):
-        fades = decay * (s[i] - ambient * m[i])
+        fades = decay * ((s[i] - wall * c[i]) - ambient * m[i])
         ds[i] -= fades
         lost += fades
     return lost
 
 
 @njit
-def greatest_velocity(m, flow):
-    """Upper bound of velocity in a pipe [m/s]: greatest |mass flow| of faces over least mass per length of cells.
-
-    m : mass per length of cells [kg/m]; flow : mass flow at faces [kg/s]
-    """
+def extremes(m, flow):
+    """(least mass per length of cells [kg/m], greatest |mass flow| of faces [kg/s]); m, flow : in cells, at faces."""
     least, most = m[0], abs(flow[m.size])
     for i in range(m.size):
         least, most = min(least, m[i]), max(most, abs(flow[i]))
-    return most / least
+    return least, most
 
 
 @njit
@@ -503,13 +508,13 @@ def pipe_scalar_rates(y, dydt, out, tables, p):
     cell_masses(base, 1.0 / pipe["speed"], r, l, m)
     first, last = end_flow(out, tables, p, 0), end_flow(out, tables, p, 1)
     face_flows(first, last, dx / pipe["speed"], dydt[o : o + n], dydt[o + n : o + 2 * n], flow)
-    quick = greatest_velocity(m, flow) / dx
+    least, most = extremes(m, flow)
     nodes, limiter = tables.nodes.size, st["limiter"]
     for q in range(tables.scalars.size):
         scalar = tables.scalars[q]
         at, ends = scalar["y"] + pipe["cell"], 2 * (q * tables.pipes.size + p)
-        s, ds = y[at : at + n], dydt[at : at + n]
-        concentrations(s, m, c)
+        s, ds, wall = y[at : at + n], dydt[at : at + n], wall_mass(tables, q, p)
+        concentrations(s, m, wall, c)
         for i in range(n):
             d[i] = 0.0
         if st["scheme"] != UPWIND and limiter != FLAT:
@@ -526,13 +531,14 @@ def pipe_scalar_rates(y, dydt, out, tables, p):
         inner_fluxes(0.5 * scalar["diffusivity"] / dx, c, d, m, flow, f)
         f[0], f[n] = out[layout["carried"] + ends], out[layout["carried"] + ends + 1]
         amount_rates(1.0 / dx, f, ds)
-        lost = subtract_decay(scalar["decay"], scalar["ambient"], s, m, ds) if scalar["losses"] > 0 else 0.0
+        lost = subtract_decay(scalar["decay"], scalar["ambient"], s, m, wall, c, ds) if scalar["losses"] > 0 else 0.0
         if scalar["losses"] > 1:
             for i in range(n):
-                record_loss(out, tables, q, pipe["cell"] + i, dx * scalar["decay"] * (s[i] - scalar["ambient"] * m[i]))
+                fades = dx * scalar["decay"] * ((s[i] - wall * c[i]) - scalar["ambient"] * m[i])
+                record_loss(out, tables, q, pipe["cell"] + i, fades)
         else:
             record_loss(out, tables, q, 0, dx * lost)
-        rate = quick + 2.0 * scalar["diffusivity"] / (dx * dx) + 0.5 * change_rate(out, tables, q)
+        rate = most / (least + wall) / dx + 2.0 * scalar["diffusivity"] / (dx * dx) + 0.5 * change_rate(out, tables, q)
         out[RATE] = max(out[RATE], rate)
 
 
@@ -603,7 +609,7 @@ def value_at_probe(y, out, tables, probe, kind, i, q):
         w = y[pipes[i]["y"] + c] + y[pipes[i]["y"] + pipes[i]["cells"] + c]
         m = tables.profile[pipes[i]["center"] + c] + w / pipes[i]["speed"]
         s = y[tables.scalars[q]["y"] + pipes[i]["cell"] + c]
-        value += tables.floats[probe["weights"] + j] * s / m
+        value += tables.floats[probe["weights"] + j] * s / (m + wall_mass(tables, q, i))
     return value
 
 

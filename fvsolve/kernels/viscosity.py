@@ -25,13 +25,14 @@ def walther_viscosity(a, b, temperature):
 
 
 @njit
-def cell_reynolds(y, tables, pipe, i):
-    """Reynolds number per mass flow [s/kg] in cell i of a pipe, at the present temperature of the cell."""
-    st = tables.settings[0]
+def cell_reynolds(y, tables, p, i):
+    """Reynolds number per mass flow [s/kg] in cell i of pipe p, at the present temperature of the cell."""
+    st, pipe = tables.settings[0], tables.pipes[p]
     if st["walther_b"] == 0.0 or pipe["friction"] != FRICTION_ROUGH:
         return pipe["reynolds"]
     k, n = st["temperature"], pipe["cells"]
     mass = tables.profile[pipe["center"] + i] + (y[pipe["y"] + i] + y[pipe["y"] + n + i]) / pipe["speed"]
+    mass += tables.floats[tables.scalars[k]["wall_masses"] + p]
     temperature = y[tables.scalars[k]["y"] + pipe["cell"] + i] / mass + tables.scalars[k]["zero"]
     if abs(temperature - pipe["temperature"]) <= SAME * pipe["temperature"]:
         return pipe["reynolds"]
@@ -55,7 +56,7 @@ def viscous_friction(t, y, dydt, out, handle):
         spread, full = 0.0 if st["floor"] > 0.0 else spread, st["rho"] * pipe["area"]
         kind, loss, rough, roughness, before = FRICTION_ROUGH, 0.0, pipe["rough"], pipe["roughness"], pipe["reynolds"]
         for i in range(n):
-            now = cell_reynolds(y, tables, pipe, i)
+            now = cell_reynolds(y, tables, p, i)
             if now == before:
                 continue
             flow = pipe["flow"] + (y[o + i] - y[o + n + i])

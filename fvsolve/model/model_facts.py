@@ -13,7 +13,7 @@ from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.steady_friction import drag
 from fvsolve.model.reaction_tables import reaction_facts
-from fvsolve.parts.pipe.pipe_wall import Wall, materials, restraint_factor
+from fvsolve.parts.pipe.pipe_wall import HEAT_KEYS, Wall, materials, restraint_factor
 from fvsolve.steppers.automatic import first_method
 from fvsolve.steppers.tableau import AUTO, method_named
 
@@ -62,6 +62,8 @@ def checks(model) -> dict[str, Any]:
             **model.steady["lines"][mesh.name],
             **({"unsteady": unsteady[mesh.name]} if mesh.name in unsteady else {}),
             **({"creep": creeps[mesh.name]} if mesh.name in creeps else {}), **wall_facts(link),
+            **({"retardation": {key: model.case.retardation(mesh.name, key) for key in link.retardation}}
+               if link.retardation else {}),
         }  # fmt: skip
     step, set_by = step_and_reason(model)
     numerics = model.case.numerics
@@ -89,7 +91,7 @@ def wall_facts(link) -> dict[str, Any]:
     if link.material is not None:
         stated = vars(link.wall) | {"roughness": link.friction.roughness} if isinstance(link.wall, Wall) else {}
         unread = materials()[link.material].missing_keys
-        facts["unread"] = [key for key in unread if key != "density" and stated.get(key) is None]
+        facts["unread"] = [key for key in unread if key not in HEAT_KEYS and stated.get(key) is None]
     if link.restraint is not None and isinstance(link.wall, Wall):
         facts["restraint_factor"] = restraint_factor(link.restraint, link.diameter, link.wall)
     return facts

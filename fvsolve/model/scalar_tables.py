@@ -40,6 +40,9 @@ def lower_scalars(draft) -> None:
         if scalar.decay > 0.0:
             row["loss"] = sum(draft.scalar_table["losses"])
             row["losses"] = 1 if explicit(case.numerics.method) else draft.size - row["y"] + sum(basins["n"])
+        row["wall_masses"] = len(draft.floats)
+        draft.floats += [*(draft.fluid.density * pipe["area"] * (case.retardation(link, name) - 1.0)
+                           for link, pipe in zip(draft.pipe_names, pipes, strict=True)), 0.0]  # fmt: skip
         basins["lost"] = draft.size - row["y"] + np.cumsum(basins["n"]) - basins["n"]
         if scalar.heat:
             row["specific_heat"], row["zero"] = scalar.specific_heat, scalar.zero
@@ -130,9 +133,9 @@ def scale_scalars(draft) -> None:
     scale = np.array(draft.scale)
     for row, name in zip(draft.scalar_table, draft.case.scalars, strict=True):
         typical = typical_value(draft.case, name)
-        for pipe in draft.pipe_table:
+        for pipe, wall in zip(draft.pipe_table, wall_masses(draft.tables, row), strict=True):
             at = row["y"] + pipe["cell"]
-            scale[at : at + pipe["cells"]] = typical * rho * pipe["area"]
+            scale[at : at + pipe["cells"]] = typical * rho * pipe["area"] + typical * wall
         for node, place in zip(draft.node_table, indices_at_nodes(draft, row), strict=True):
             if node["kind"] in STORES:
                 scale[place] = typical * max(node["mass"], scale[node["y"]])
@@ -160,14 +163,22 @@ def start_amounts(draft, y: np.ndarray) -> None:
     """Write the amounts of all scalars in pipes, tanks and chambers at the start into the state vector y."""
     case, profile = draft.case, draft.tables.profile
     for row, (name, scalar) in zip(draft.scalar_table, case.scalars.items(), strict=True):
-        for pipe, mesh in zip(draft.pipe_table, draft.meshes, strict=True):
+        for pipe, mesh, wall in zip(draft.pipe_table, draft.meshes, wall_masses(draft.tables, row), strict=True):
             cells = np.arange(mesh.cells)
             value = case.links[mesh.name].scalars.get(name, scalar.initial)
-            y[row["y"] + pipe["cell"] + cells] = value * profile[pipe["center"] + cells]
+            y[row["y"] + pipe["cell"] + cells] = value * (profile[pipe["center"] + cells] + wall)
         for node, part, place in zip(draft.node_table, case.places.values(), indices_at_nodes(draft, row), strict=True):
             if node["kind"] in STORES:
                 value = part.scalars[name].first if name in part.scalars else scalar.initial
                 y[place] = value * node["mass"]
+
+
+def wall_masses(tables, row) -> np.ndarray:
+    """Mass of fluid per length that stores as much of a scalar as the wall of each pipe : float64[pipes], in kg/m.
+
+    row : row of the scalar in the table of scalars
+    """
+    return tables.floats[row["wall_masses"] :][: len(tables.pipes)]
 
 
 def amount_indices(model) -> np.ndarray:
@@ -185,7 +196,7 @@ def pipe_values(model, k: int, y: np.ndarray) -> dict[str, np.ndarray]:
     for row, name in zip(model.tables.scalars, model.case.scalars, strict=True):
         base, at = int(pipe["center"]), int(row["y"] + pipe["cell"])
         mass = model.tables.profile[base : base + n] + (y[o : o + n] + y[o + n : o + 2 * n]) / pipe["speed"]
-        values[name] = y[at : at + n] / mass
+        values[name] = y[at : at + n] / (mass + wall_masses(model.tables, row)[k])
     return values
 
 
@@ -207,9 +218,19 @@ def total_amount(model, q: int, y: np.ndarray) -> float:
     return total + float(sum(y[place] for place, kind in zip(places, nodes["kind"], strict=True) if kind in STORES))
 
 
+def wall_amount(model, q: int, y: np.ndarray) -> float:
+    """Amount of scalar q in the walls of all pipes [kg times the unit of the scalar]; `total_amount` includes it."""
+    name, total = list(model.case.scalars)[q], 0.0
+    for k, wall in enumerate(wall_masses(model.tables, model.tables.scalars[q])):
+        if wall > 0.0:
+            total += wall * model.tables.pipes[k]["dx"] * float(np.sum(pipe_values(model, k, y)[name]))
+    return float(total)
+
+
 def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[str, Any]]:
     """Balance of each scalar in a run : name -> initial, final, inflow, outflow, decayed, remainder [kg x its unit].
 
+    `initial` and `final` are the sums over fluid and walls; if walls store the scalar, `fluid` and `wall` have both.
     Further entries: net inflow (`by_node`), and inflow and outflow (`nodes`), of each node through which it flows; if
     reactions change it, what they form less what they consume (`reacted`). The temperature that heat changes also has
     `heated`, the sum of heat over specific heat, and `heat` [J] by part.
@@ -230,9 +251,12 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
         net = zip(model.node_names, flows.sum(axis=0), strict=True)
         turnover = float(np.sum(np.abs(flows))) + abs(decayed) + abs(heated) + abs(formed)
         turnover = max(abs(initial), abs(final), turnover)
+        in_wall = {key: wall_amount(model, q, state) for key, state in (("initial", model.start), ("final", y))}
+        in_fluid = {"initial": initial - in_wall["initial"], "final": final - in_wall["final"]}
         ledgers[name] = {
             "initial": initial, "final": final, "inflow": float(flows[0].sum()),
             "outflow": float(0.0 - flows[1].sum()), "decayed": decayed,
+            **({"fluid": in_fluid, "wall": in_wall} if wall_masses(model.tables, row).any() else {}),
             **({"reacted": formed} if name in reacting(model.case) else {}),
             "by_node": {node: float(x) for node, x in net if x != 0.0},
             "nodes": {node: {"inflow": float(x), "outflow": float(0.0 - y)}
@@ -324,16 +348,16 @@ def depths(model):
 def scalar_bounds(model, q: int):
     """Yield `bound_rows` of the amounts of scalar q: its least and greatest value, times the mass or depth there.
 
-    The mass per length in the cells of a pipe follows from both waves, the mass in a tank or chamber from its state. In
-    a basin it is the depth, or 1 without variable depth (`basin.deep` False).
+    The mass per length in the cells of a pipe follows from both waves, plus the wall mass. The mass in a tank or
+    chamber follows from its state. In a basin it is the depth, or 1 without variable depth (`basin.deep` False).
     """
     row, tables = model.tables.scalars[q], model.tables
     if np.isinf(row["least"]):
         return
     limits = row["least"], row["greatest"]
-    for pipe in tables.pipes:
+    for pipe, wall in zip(tables.pipes, wall_masses(tables, row), strict=True):
         n, k = int(pipe["cells"]), np.arange(pipe["cells"])
-        states, wave, masses = row["y"] + pipe["cell"] + k, pipe["y"] + k, tables.profile[pipe["center"] + k]
+        states, wave, masses = row["y"] + pipe["cell"] + k, pipe["y"] + k, tables.profile[pipe["center"] + k] + wall
         yield bound_rows(states, wave, wave + n, masses, 1.0 / pipe["speed"], *limits)
     places = tables.integers[row["places"] : row["places"] + len(tables.nodes)]
     for node, place in zip(tables.nodes, places, strict=True):

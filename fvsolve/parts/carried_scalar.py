@@ -82,7 +82,8 @@ class Scalar(Table):
     composition: Annotated[dict[str, float] | None, Composition()] = None
     heat: Annotated[bool, Flag("true for the temperature of the fluid, which heat changes")] = False
     specific_heat: Annotated[float | None, Quantity(
-        "specific_heat", positive, "specific heat of the fluid, with `heat` [J/kg/K]; that of the fluid if left out",
+        "specific_heat", positive,
+        "specific heat of the fluid, for `heat` and heat in walls of pipes [J/kg/K]; that of the fluid if left out",
         UsualRange(500.0, 15e3, "liquid metals to liquid hydrogen"),
     )] = None  # fmt: skip
     heat_from: Annotated[str | tuple[str, ...] | None, PartNames(
@@ -99,7 +100,7 @@ class Scalar(Table):
         if given.get("heat") is True and isinstance(unit := given.get("unit", "K"), str) and unit not in ZEROS:
             faults.append((("unit",), f"{show(unit)} is not a unit of a temperature with heat; expected K or degC"))
         if given.get("heat", False) is False:
-            faults += [((key,), "needs heat = true") for key in ("specific_heat", "heat_from") if key in given]
+            faults += [(("heat_from",), "needs heat = true")] if "heat_from" in given else []
         return faults
 
     @property

@@ -284,7 +284,7 @@ def pipe_scalar_modes(model) -> Modes:
         for mesh, row in zip(model.pipes, model.tables.pipes, strict=True):
             q = abs(float(row["flow"])) / (rho * row["area"] * row["dx"])
             s = -q * (1.0 - np.exp(-1j * PHASES)) - 2.0 * scalar.diffusivity / row["dx"] ** 2 * DIFFUSION - scalar.decay
-            modes.append((f"{mesh.name}.{name}", s))
+            modes.append((f"{mesh.name}.{name}", s / model.case.retardation(mesh.name, name)))
     return modes
 
 

@@ -250,7 +250,7 @@ HAMMER = {"lake": reservoir(5e5), "mid": junction(), "gate": junction(), "box": 
 def hammer(scheme: str, friction: dict, **dye) -> dict:
     links = {
         "a": pipe("lake", "mid", 60.0, 0.1, 1000.0, 30, friction=friction),
-        "b": pipe("gate", "mid", 40.0, 0.1, 1200.0, 17, friction=friction),
+        "b": pipe("gate", "mid", 40.0, 0.1, 1200.0, 17, friction=friction, retardation={"dye": 1.288}),
         "side": pipe("mid", "box", 10.0, 0.05, 1000.0, 4, friction=friction),
         "v": valve("gate", "sea", 0.003, opening=ramp(0.05, 0.1, 1.0, 0.0)),
     }

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from fvsolve.data import read_table
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.conduit import DARCY, KEYS_OF_MODEL, pipe_size
-from fvsolve.parts.pipe.pipe_wall import Material, materials
+from fvsolve.parts.pipe.pipe_wall import HEAT_KEYS, OF_WALL, Material, materials
 from fvsolve.parts.value import ValueFault
 from fvsolve.units import parse, show
 
@@ -137,8 +137,9 @@ def _add_size(table: dict[str, Any], bore: float, thickness: float) -> None:
 
 
 def _add_wall(table: dict[str, Any], sources: list[str], material: Material) -> None:
-    """Add Young's modulus and Poisson's ratio of the material to the wall of a pipe, if they are not given.
+    """Add elasticity of the material to the wall of a pipe, and density and specific heat for `retardation`.
 
+    Values that are given remain.
     sources : list to which the sources of these values are appended
     Do nothing if the wave speed is given; otherwise raise ValueFault if the wall thickness is missing.
     """
@@ -150,7 +151,9 @@ def _add_wall(table: dict[str, Any], sources: list[str], material: Material) -> 
                 'or wall = { thickness = "8 mm" }, or wave_speed')  # fmt: skip
         raise ValueFault([(("material",), text)])
     table["wall"] = {**wall}
-    for key in WALL_KEYS:
+    factors = table.get("retardation")
+    heat = HEAT_KEYS if isinstance(factors, dict) and OF_WALL in factors.values() else ()
+    for key in (*WALL_KEYS, *heat):
         if key not in wall and (figure := material.figures.get(key)) is not None:
             table["wall"][key] = figure.used
             sources.append(f"{material.name}: {figure.description}" if key == WALL_KEYS[0] else figure.description)

@@ -15,9 +15,11 @@ from fvsolve.parts.pipe.pipe_wall import (
     Lining,
     MaterialName,
     Restraint,
+    RetardationFactor,
     Wall,
     WallOrRigid,
     creep_elements,
+    retardation_faults,
     wall_faults,
 )
 from fvsolve.parts.table_model import CaseContext, Faults, Nested
@@ -114,6 +116,10 @@ class Pipe(Conduit, kind="pipe"):
         "follows its losses at once); numerics.pipe_model if left out",
     )] = None  # fmt: skip
     scalars: Annotated[dict[str, Any], ScalarValues("scalar values in the pipe at the start", Number())] = {}
+    retardation: Annotated[dict[str, Any], ScalarValues(
+        "retardation factor of each scalar: what fluid and wall store, over what the fluid stores; `\"wall\"` computes "
+        "that of a temperature from the wall; 1 if left out", RetardationFactor(),
+    )] = {}  # fmt: skip
 
     def __init_subclass__(cls, pipe_model: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)
@@ -160,6 +166,7 @@ class Pipe(Conduit, kind="pipe"):
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         yield from wall_faults(self)
+        yield from retardation_faults(self)
         yield from self.profile_faults(around)
 
     def profile_faults(self, around: CaseContext) -> Faults:

@@ -1,4 +1,4 @@
-"""Walls of pipes: elasticity, restraint, lining, and creep of plastics; materials with their sources.
+"""Walls of pipes: elasticity, restraint, lining, creep of plastics, stored heat; materials with their sources.
 
 The materials are in data/pipe_materials.toml. Numbers of materials without a source are left out; the user gives them.
 Of several sources, the greatest modulus is used (fastest wave, greatest pressure jump), and the mean of least and
@@ -6,9 +6,10 @@ greatest value of roughness and all other properties.
 """
 
 import functools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from fvsolve.data import read_table
 from fvsolve.errors import did_you_mean
@@ -16,10 +17,12 @@ from fvsolve.parts.table_model import ListTable, Table, check_table, keys_json, 
 from fvsolve.parts.value import (
     BY_CELLS,
     NEEDED,
+    PROFILE,
     SHAPE,
     VALUE,
     Number,
     Quantity,
+    Range,
     ReadContext,
     UsualRange,
     Value,
@@ -28,8 +31,10 @@ from fvsolve.parts.value import (
 )
 from fvsolve.units import parse, show
 
-SI = {"youngs_modulus": 1e9, "poisson_ratio": 1.0, "roughness": 1e-3, "density": 1.0}
-UNITS = {"youngs_modulus": " GPa", "poisson_ratio": "", "roughness": " mm", "density": " kg/m3"}
+SI = {"youngs_modulus": 1e9, "poisson_ratio": 1.0, "roughness": 1e-3, "density": 1.0, "specific_heat": 1.0}
+UNITS = {"youngs_modulus": " GPa", "poisson_ratio": "", "roughness": " mm", "density": " kg/m3",
+         "specific_heat": " J/kg/K"}  # fmt: skip
+HEAT_KEYS = ("density", "specific_heat")  # keys of a wall and a lining from which the heat that they store follows
 WITHOUT_SOURCE = ("PVC-O", "PEX", "hydraulic-hose")  # pipe materials without a source for their figures
 
 
@@ -158,8 +163,15 @@ class Elements(Value):
 MODULI = UsualRange(1e5, 1.2e12, "soft rubber to diamond")
 THICKNESS = UsualRange(1e-6, 2.0, "foils to lined rock")
 THIN_WALL = 25.0  # least bore over wall of a thin wall, Wylie, Streeter and Suo 1993
+DENSITY = Quantity(
+    "density", positive, "density, for `retardation` [kg/m3]", UsualRange(500.0, 2.3e4, "wood to tungsten")
+)
+SPECIFIC_HEAT = Quantity(
+    "specific_heat", positive, "specific heat, for `retardation` [J/kg/K]", UsualRange(100.0, 3e3, "lead to plastics")
+)
 RESTRAINTS = ("joints", "upstream", "anchored")
 POISSON = "poisson_ratio"
+OF_WALL = "wall"  # retardation factor that follows from the wall
 
 
 class Wall(Table):
@@ -176,6 +188,8 @@ class Wall(Table):
         float | None, Number(between(0.0, 0.5), "Poisson's ratio of the wall, for restraint", changes=BY_CELLS)
     ] = None
     creep: Annotated[Creep | None, Elements()] = None
+    density: Annotated[float | None, DENSITY] = None
+    specific_heat: Annotated[float | None, SPECIFIC_HEAT] = None
 
 
 class Lining(Table):
@@ -188,6 +202,8 @@ class Lining(Table):
         float, Quantity("modulus", positive, "Young's modulus of the lining [Pa]", MODULI, BY_CELLS)
     ]
     thickness: Annotated[float, Quantity("length", positive, "thickness of the lining [m]", THICKNESS, BY_CELLS)]
+    density: Annotated[float | None, DENSITY] = None
+    specific_heat: Annotated[float | None, SPECIFIC_HEAT] = None
 
 
 class MaterialName(Value):
@@ -223,7 +239,7 @@ class WallOrRigid(Value):
     """Value of a case file for the wall of a pipe: the text "rigid", or the table of an elastic wall."""
 
     about = 'wall, elastic or rigid; "rigid" if left out'
-    takes = '`"rigid"`, or `{ youngs_modulus, thickness, poisson_ratio, creep }`, Pa and m'
+    takes = '`"rigid"`, or `{ youngs_modulus, thickness, poisson_ratio, creep, density, specific_heat }`, SI'
     changes = BY_CELLS
 
     def read(self, given: Any, setting: ReadContext) -> Wall | str:
@@ -260,6 +276,23 @@ class Restraint(Value):
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [{"enum": list(RESTRAINTS)}, {"type": "number", "exclusiveMinimum": 0}]}
+
+
+class RetardationFactor(Value):
+    """Value of a case file for a retardation factor: a number of at least 1, or "wall"."""
+
+    changes = PROFILE
+    takes = '1 or more, or `"wall"`'
+    schema: ClassVar[dict[str, Any]] = {"anyOf": [{"const": OF_WALL}, {"type": "number", "minimum": 1}]}
+
+    def read(self, given: Any, setting: ReadContext) -> str | float:
+        if given == OF_WALL:
+            return OF_WALL
+        if isinstance(given, str):
+            raise ValueError(f'{show(given)} is not a number; expected a number of at least 1, or "{OF_WALL}"')
+        value = parse(given, "number")
+        Range(1.0).check(value, given)
+        return value
 
 
 def restraint_factor(restraint: str | float | None, bore: float, wall: Wall) -> float:
@@ -309,6 +342,39 @@ def elastic_compliance(pipe: Any) -> float:
     if pipe.restraint is None:
         return pipe.diameter / stiffness
     return restraint_factor(pipe.restraint, pipe.diameter, wall) * pipe.diameter / stiffness
+
+
+def heat_retardation(pipe: Any, density: float, specific_heat: float) -> float:
+    """Heat that fluid, lining and wall of a pipe store, over that of the fluid: 1 + sum of rho' c' A' / (rho c A).
+
+    rho', c', A' : density, specific heat and cross section of lining and wall; A : cross section of the bore
+    density, specific_heat : rho [kg/m3] and c [J/kg/K] of the fluid
+    """
+    bore, factor = pipe.diameter, 1.0
+    for layer in (pipe.lining, pipe.wall):
+        if layer is not None:
+            section = math.pi * (bore + layer.thickness) * layer.thickness
+            content = density * specific_heat * 0.25 * math.pi * pipe.diameter**2
+            factor += layer.density * layer.specific_heat * section / content
+            bore += 2.0 * layer.thickness
+    return factor
+
+
+def retardation_faults(pipe: Any) -> Iterator[tuple[tuple[Any, ...], str]]:
+    """Faults (keys, text) of retardation factors by the wall of a pipe: data of the wall or the lining are missing."""
+    for scalar, factor in pipe.retardation.items():
+        if factor != OF_WALL:
+            continue
+        layers = {"wall": pipe.wall, **({} if pipe.lining is None else {"lining": pipe.lining})}
+        for key, layer in layers.items():
+            missing = [name for name in HEAT_KEYS if getattr(layer, name, None) is None]
+            if not isinstance(layer, (Wall, Lining)):
+                text = '"wall" needs wall = { youngs_modulus, thickness, density, specific_heat }, or a material'
+                yield ("retardation", scalar), f"{text} with a wall thickness; or give the factor as a number"
+            elif missing:
+                source = f" (the catalogue has no value for {pipe.material})" if pipe.material and key == "wall" else ""
+                keys = " and ".join(f"{key}.{name}" for name in missing)
+                yield ("retardation", scalar), f'"wall" needs {keys}{source}; or give the factor as a number'
 
 
 def wall_faults(pipe: Any) -> Iterator[tuple[tuple[Any, ...], str]]:
