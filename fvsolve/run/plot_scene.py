@@ -31,6 +31,7 @@ def scene_of(case, title: str, field: str, frames: list[tuple[float, list[Path]]
     lengths = {name: case.links[name].length for name in pipes}
     bodies = any(node.kind == "body" for node in case.nodes.values())
     scene = DrawnScene(title, unit_of(case, field), *lengths_of(case), captions, names=pipes, contours=contours)
+    scene.over_run = any(field in case.nodes[name].physics_type.maxima for name in case.meshes)
     scene.plan = "given" if all(node.position is not None for node in case.nodes.values()) else "laid out"
     if not frames:
         none = np.zeros(0, int)
@@ -57,7 +58,7 @@ def unit_of(case, field: str) -> DrawnUnit:
         return DrawnUnit(field, case.scalars[field].unit)
     dimensions = {}
     for name in case.meshes:
-        dimensions |= case.nodes[name].physics_type.fields
+        dimensions |= case.nodes[name].physics_type.fields | case.nodes[name].physics_type.maxima
     dimension = (dimensions | DIMENSIONS).get(field)
     if dimension is None:
         return DrawnUnit(field, "")
