@@ -89,8 +89,11 @@ class BasinRows:
         """Output fields by name, with a value (a vector of three for the velocity) for each cell, in SI units."""
         return {}
 
-    def maxima(self, recorded: np.ndarray) -> dict[str, np.ndarray]:
-        """Quantities `maxima` of its physics by name : float64[n] in SI; recorded : array `maxima` of a run."""
+    def maxima(self, t: float, recorded: np.ndarray) -> dict[str, np.ndarray]:
+        """Quantities `maxima` of its physics up to time t [s] by name : float64[n] in SI.
+
+        recorded : array `maxima` of a run
+        """
         return {}
 
     def ground(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:

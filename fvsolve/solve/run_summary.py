@@ -224,9 +224,9 @@ def find_point_envelopes(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
     return points
 
 
-def find_maxima(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
-    """Greatest values in the cells of each basin that records them: basin -> quantity -> float64[n] in SI."""
-    return {basin.name: basin.maxima(run_data.maxima) for basin in run_data.model.basins if basin.records_maxima}
+def find_maxima(run_data: RunData, t: float) -> dict[str, dict[str, np.ndarray]]:
+    """Greatest values up to time t [s] in cells of each basin that records them: basin -> quantity -> float64[n]."""
+    return {basin.name: basin.maxima(t, run_data.maxima) for basin in run_data.model.basins if basin.records_maxima}
 
 
 def find_run_ups(model: Model, maxima: dict[str, dict[str, np.ndarray]]) -> dict[str, RunUpTable]:

@@ -215,7 +215,7 @@ class Run:
         """Pass the fields at time t [s] to the sink; the last frame also has the greatest values of basins."""
         self.check_basins(t, y)
         fields = self.run_data.fields(t, y, out)
-        for name, values in found.find_maxima(self.run_data).items() if last else ():
+        for name, values in found.find_maxima(self.run_data, t).items() if last else ():
             fields[name] |= values
         with postponed_interrupts():  # other ranks may be writing too
             self.sink.field(t, fields)
@@ -388,7 +388,7 @@ class Run:
             loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
             self.setup, [Event(t, *model.events[k]) for t, k in loop.switched],
             found.find_cavities(self.run_data), warnings, self.threads, self.invalid_from,
-            maxima := found.find_maxima(self.run_data), found.find_run_ups(model, maxima),
+            maxima := found.find_maxima(self.run_data, loop.t), found.find_run_ups(model, maxima),
         )  # fmt: skip
         self.sink.end(summary)
         return summary

@@ -328,7 +328,7 @@ class FreeSurfaceRows(BasinRows):
         if self.records_maxima:
             row["wet_depth"] = self.case.output.wet_depth
             rows = max(int(row["ny"]), 1)
-            row["maxima_row"] = surface_maxima.QUANTITIES * (self.n // rows) + 1
+            row["maxima_row"] = surface_maxima.QUANTITIES * (self.n // rows)
             row["maxima"] = draft.to_maxima(rows * int(row["maxima_row"]))
         if not (self.depth + self.start()[0]).max() > 0.0:
             amount = draft.case.amount
@@ -389,14 +389,14 @@ class FreeSurfaceRows(BasinRows):
         velocity = np.column_stack([share * y[1], share * y[2], np.zeros(self.n)])
         return {"depth": depth, "bed": bed, "surface": bed + depth, "velocity": velocity}
 
-    def maxima(self, recorded: np.ndarray) -> dict[str, np.ndarray]:
+    def maxima(self, t: float, recorded: np.ndarray) -> dict[str, np.ndarray]:
         at, size = int(self.row["maxima"]), int(self.row["maxima_row"])
-        rows = recorded[at : at + max(int(self.row["ny"]), 1) * size].reshape(-1, size)[:, 1:]
-        arrays = rows.reshape(len(rows), surface_maxima.QUANTITIES, -1).swapaxes(0, 1).reshape(-1, self.n)
-        depth, speed, hazard, arrival, _, duration = arrays
+        rows = recorded[at : at + surface_maxima.QUANTITIES * self.n].reshape(-1, size)
+        cells = rows.reshape(len(rows), surface_maxima.QUANTITIES, -1).swapaxes(0, 1).reshape(-1, self.n)
+        depth, speed, hazard, wet, arrival, duration = cells
         bed = self.bed + (self.part.elevation or 0.0)
         values = depth, bed + depth, np.sqrt(speed), np.sqrt(hazard), arrival
-        values = [*(np.where(depth > 0.0, array, np.nan) for array in values), duration.copy()]
+        values = [*(np.where(depth > 0.0, array, np.nan) for array in values), duration + t * wet]
         return dict(zip(self.part.physics_type.maxima, values, strict=True))
 
     def speeds(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
