@@ -34,8 +34,8 @@ from fvsolve.units import DIMENSIONS, show
 TABLES: dict[str, type[Table]] = {
     "every node": Node, "riding": PlaceOnBody, "every link": TwoPort, "friction": Friction, "connection": Connection,
     "compressor": Compressor, "dry friction": DryFriction,
-    "wall": Wall, "lining": Lining, "patch": Patch, "start": BasinStart, "line": OutputLine, "run-up": RunUp, "scalar": Scalar,
-    "reaction": Reaction,
+    "wall": Wall, "lining": Lining, "patch": Patch, "start": BasinStart, "line": OutputLine, "run-up": RunUp,
+    "scalar": Scalar, "reaction": Reaction,
     "fluid": FluidSpec, "numerics": Numerics, "output": Output, "route": Route, "joint": Joint, "attitude": Attitude,
 }  # fmt: skip
 # base class -> part whose table lists its keys in full

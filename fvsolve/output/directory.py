@@ -234,7 +234,7 @@ class RunDirectory:
 
 
 def read_directory(folder: Path) -> tuple:
-    """Read a finished run: its summary, functions for history.csv and envelope.csv, the folder, and a function for maxima.
+    """Read a finished run: summary, functions for history.csv and envelope.csv, folder, and function for maxima.
 
     The functions read the files when called. Raises RunError if the folder contains no finished run.
     """

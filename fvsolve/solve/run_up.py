@@ -29,7 +29,7 @@ class RunUpTable:
         return int(np.argmax(np.where(np.isnan(self.run_up), -np.inf, self.run_up)))
 
     def value(self, function: str, place: float | None) -> float:
-        """Value of the function `max`, `min` or `at` of `[expect]` [m]; place : angle [deg] or distance [m] for `at`."""
+        """Value of the function `max`, `min` or `at` of `[expect]` [m]; place : angle [deg] or distance [m], for `at`"""
         if function == "at":
             return float(self.run_up[sector_of(np.array(place), self.along == "angle", self.places)])
         known = self.run_up[~np.isnan(self.run_up)]
@@ -43,7 +43,7 @@ class RunUpTable:
 
 
 def sector_of(place: np.ndarray, turns: bool, places: np.ndarray) -> np.ndarray:
-    """Numbers of the sectors that contain angles [deg] (if `turns`) or distances [m]; places : middles of all sectors"""
+    """Numbers of the sectors with given angles [deg] (if `turns`) or distances [m]; places : middles of all sectors"""
     if turns:
         return np.floor(place * (places.size / TURN) + 0.5).astype(int) % places.size
     return np.clip(np.floor(place / (2.0 * places[0])).astype(int), 0, places.size - 1)
