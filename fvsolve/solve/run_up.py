@@ -29,7 +29,7 @@ class RunUpTable:
         return int(np.argmax(np.where(np.isnan(self.run_up), -np.inf, self.run_up)))
 
     def value(self, function: str, place: float | None) -> float:
-        """Value of the function `max`, `min` or `at` of `[expect]` [m]; place : angle [deg] or distance [m], for `at`"""
+        """Value of `max`, `min` or `at` in `[expect]` [m]; place : angle [deg] or distance [m], for `at`"""
         if function == "at":
             return float(self.run_up[sector_of(np.array(place), self.along == "angle", self.places)])
         known = self.run_up[~np.isnan(self.run_up)]
