@@ -125,10 +125,10 @@ def draw(result: Result, painter: PlotProcess) -> None:
     """Draw the pictures that are missing in a run directory; warns of pictures that cannot be drawn."""
     missing = None if result.directory is None else existing_pictures(result.directory)
     pictures, failed = [], {}
-    wanted = [("history.png", "history_figure", result.history_drawn),
+    requests = [("history.png", "history_figure", result.history_drawn),
               ("envelope.png", "envelope_figure", result.envelope_drawn)]  # fmt: skip
-    wanted += [(f"run_up-{name}.png", "run_up_figure", partial(result.run_up_drawn, name)) for name in result.run_up]
-    for name, function, drawn in wanted:
+    requests += [(f"run_up-{name}.png", "run_up_figure", partial(result.run_up_drawn, name)) for name in result.run_up]
+    for name, function, drawn in requests:
         if missing is None or name in missing:
             continue
         path = result.directory / name
