@@ -185,6 +185,7 @@ class ModelDraft:
     pieces_of_plane: list[np.ndarray] = field(default_factory=list)
     plane_size: int = 0
     work_size: int = 0
+    maxima_size: int = 0
 
     # states
     size: int = 0
@@ -341,9 +342,14 @@ class ModelDraft:
         self.work_size += size + -size % CACHE_LINE
         return self.work_size - size - -size % CACHE_LINE
 
+    def to_maxima(self, size: int) -> int:
+        """Reserve `size` numbers of the array `maxima`; return their offset."""
+        self.maxima_size += size
+        return self.maxima_size - size
+
     def used_size(self) -> int:
-        """Count of the numbers used so far in `plane`, `work` and `integers`."""
-        return self.plane_size + self.work_size + len(self.integers)
+        """Count of the numbers used so far in `plane`, `work`, `maxima` and `integers`."""
+        return self.plane_size + self.work_size + self.maxima_size + len(self.integers)
 
     def flags(self, name: str, events: tuple[str, ...]) -> int:
         """Reserve flags in `armed`, one for each event function of a part; return the offset of the first."""

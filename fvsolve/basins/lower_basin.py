@@ -24,6 +24,7 @@ from fvsolve.parts.formula import is_grid, means, samples
 from fvsolve.schemes import LIMITERS, SCHEMES
 from fvsolve.steppers.analysis.stability_properties import ssp_radius
 from fvsolve.steppers.tableau import METHODS
+from fvsolve.units import DIMENSIONS
 
 if TYPE_CHECKING:
     from fvsolve.kernels.rhs_assembly import RhsTerms
@@ -86,6 +87,13 @@ class BasinRows:
 
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
         """Output fields by name, with a value (a vector of three for the velocity) for each cell, in SI units."""
+        return {}
+
+    def maxima(self, t: float, recorded: np.ndarray) -> dict[str, np.ndarray]:
+        """Quantities `maxima` of its physics up to time t [s] by name : float64[n] in SI.
+
+        recorded : array `maxima` of a run
+        """
         return {}
 
     def ground(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -266,6 +274,16 @@ class BasinRows:
         return (self.states_of(y) - rest * (wide - 1.0)) / wide
 
     @property
+    def units_of_maxima(self) -> dict[str, str]:
+        """SI unit of each quantity of `maxima`, by name."""
+        return {name: DIMENSIONS[dimension].si for name, dimension in self.part.physics_type.maxima.items()}
+
+    @property
+    def records_maxima(self) -> bool:
+        """True if the greatest values of its cells are recorded."""
+        return self.name in self.case.output.basins_with_maxima
+
+    @property
     def walls(self) -> list[str]:
         """Names of the patches that are moving walls."""
         return [name for name, patch in self.part.patches.items() if patch.moves]
@@ -347,7 +365,7 @@ class BasinRows:
             from fvsolve.basins.lower_motion import lower_lines
 
             lower_lines(draft, self, row)
-        row["body"] = row["frame"] = -1
+        row["body"] = row["frame"] = row["maxima"] = -1
         self.lower(draft, row)
         if self.part.on is not None:
             from fvsolve.basins.lower_motion import lower_frame

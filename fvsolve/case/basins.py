@@ -20,7 +20,7 @@ from fvsolve.errors import MeshError, article, did_you_mean, listing
 from fvsolve.exact.solution import value
 from fvsolve.fluid.laws import law_names
 from fvsolve.parts import Basin
-from fvsolve.parts.basin import BasinStart, MovingWall, PatchNode
+from fvsolve.parts.basin import BasinStart, MovingWall, PatchNode, Physics
 from fvsolve.parts.formula import SpatialField, means, samples
 from fvsolve.parts.value import ReadContext, ValueFault
 from fvsolve.units import show
@@ -279,10 +279,15 @@ Faults = Iterator[tuple[tuple, str]]
 
 @dataclass(frozen=True)
 class BasinFields:
-    """Mesh of a basin, and its fields that probes can record (name -> dimension)."""
+    """Mesh of a basin, and its fields that probes can record (name -> dimension).
+
+    has_maxima : True if its greatest values in cells can be recorded; what : text about the basin, for messages
+    """
 
     fields: dict[str, str]
     mesh: Mesh
+    has_maxima: bool = False
+    what: str = ""
     kind: ClassVar[str] = "basin"
     quantities: ClassVar[dict[str, str]] = {}
 
@@ -327,10 +332,12 @@ def probe_kinds(name: str, basin: Basin, mesh: Mesh | None, lumped: Mesh | None,
     own = basin.physics_type
     if lumped is not None:
         fields = {"depth": own.fields["depth"]} if basin.sloshing == "modes" and own.has_modes else {}
-        return {name: BasinFields(fields, lumped) if own.has_modes else None}
+        what = f"the water of {name} has no cells (sloshing = {show(basin.sloshing)})"
+        return {name: BasinFields(fields, lumped, what=what) if own.has_modes else None}
     fields = own.fields | (dict.fromkeys(scalars, "number") if own.carries else {})
     patches = {f"{name}.{patch}": place_kind(basin, patch) for patch in patch_names(mesh)}
-    return {name: BasinFields(fields, mesh), **patches}
+    what = f"{name} has the physics {show(own.name)}"
+    return {name: BasinFields(fields, mesh, bool(own.maxima), what), **patches}
 
 
 def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
@@ -366,30 +373,52 @@ def fault_keys(place: str) -> tuple:
     return tuple(path) if path and path[0] in Basin.keys() else ()
 
 
-def line_faults(output: Output, nodes: dict[str, Any]) -> Faults:
-    """Faults (key path, message) of `[output.lines]`, the lines across basins.
+def output_faults(output: Output, nodes: dict[str, Any]) -> Faults:
+    """Faults (key path, message) of the tables of `[output]` for basins: `lines`, `maxima` and `run_up`.
 
     nodes : name -> class of the node, the `BasinFields` of a basin, or None for a faulty node
     """
-    for name, line in output.lines.items():
-        pool, key = nodes.get(line.basin), ("output", "lines", name)
-        yield from ((key, text) for text in name_faults(name))
-        if line.basin in nodes and pool is None:
-            continue  # the basin itself is faulty
-        if not isinstance(pool, BasinFields):
-            pools = [basin for basin, kind in nodes.items() if kind is None or isinstance(kind, BasinFields)]
-            near = did_you_mean(line.basin, pools) or f"; basins are {listing(pools) or 'none'}"
-            yield (*key, "basin"), f"no basin named {show(line.basin)}{near}"
-            continue
-        for end, point in (("from", line.from_), ("to", line.to)):
-            try:
-                pool.inside(*point)
-            except ValueError as error:
-                yield (*key, end), str(error)
-        if line.from_ == line.to:
-            yield (*key, "to"), "is also the start of the line; expected another point"
+    for group, named in (("lines", output.lines), ("run_up", output.run_up)):
+        for name, line in named.items():
+            key = "output", group, name
+            yield from ((key, text) for text in name_faults(name))
+            yield from _basin_faults((*key, "basin"), line.basin, nodes, group == "run_up")
+            for end, text in _end_faults(line, nodes.get(line.basin), group == "lines"):
+                yield (*key, end), text
+    for k, name in enumerate(output.maxima):
+        yield from _basin_faults(("output", "maxima", k), name, nodes, True)
     if output.lines and output.fields == 0:
         yield ("output", "lines"), "are written with every frame, but `fields` is 0; expected `fields = 1` or more"
+
+
+def _basin_faults(key: tuple, name: Any, nodes: dict[str, Any], recorded: bool) -> Faults:
+    """Yield a fault with the key path `key` if `name` is not a suitable basin; nodes : as for `output_faults`.
+
+    recorded : True if greatest values of the basin are recorded
+    """
+    pool = nodes.get(name, name) if isinstance(name, str) else name
+    if pool is not None and not isinstance(pool, BasinFields):
+        pools = [basin for basin, kind in nodes.items() if kind is None or isinstance(kind, BasinFields)]
+        near = did_you_mean(str(name), pools) or f"; basins are {listing(pools) or 'none'}"
+        yield key, f"no basin named {show(name)}{near}"
+    elif pool is not None and recorded and not pool.has_maxima:
+        able = listing(show(kind) for kind, physics in Physics.kinds.items() if physics.maxima)
+        yield key, f"{pool.what}; expected a basin with cells and the physics {able}"
+
+
+def _end_faults(line: Any, pool: Any, inside: bool) -> Iterator[tuple[str, str]]:
+    """Yield (key, message) for each fault of the ends of a line; pool : its basin, a `BasinFields` if it is valid.
+
+    inside : True if the ends must lie in the mesh
+    """
+    for key, point in (("from", line.from_), ("to", line.to)):
+        try:
+            if inside and isinstance(pool, BasinFields):
+                pool.inside(*point)
+        except ValueError as error:
+            yield key, str(error)
+    if line.from_ == line.to and line.to is not None:
+        yield "to", "is also the start of the line; expected another point"
 
 
 def patch_names(mesh: Mesh) -> tuple[str, ...]:

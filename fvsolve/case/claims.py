@@ -8,13 +8,13 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fvsolve.case.probe import ALL, OF_PRESSURE, Extent, Kinds, Probe, only_dimension, read_extent, read_probe
 from fvsolve.case.reading import Reading
-from fvsolve.errors import did_you_mean
+from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
 from fvsolve.parts.csv_rows import copy_name, find_file, read_columns
 from fvsolve.parts.table_model import check_table, read_keys
@@ -24,9 +24,19 @@ from fvsolve.units import show
 FUNCTIONS = ("max", "min", "mean", "final", "at")
 VACUUM, VAPOR = "vacuum", "vapor"
 NAMED = {"vacuum": VACUUM, "vapor": VAPOR, "vapour": VAPOR}
+RUN_UP = "run_up."  # begins the name of a run-up in an expectation
 BOUNDS = ("minimum", "maximum", "class_fraction")
 _CLAIM = re.compile(r"\s*(\w+)\s*\(\s*([^()]+?)\s*\)\s*")
 _BARE = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+
+
+@dataclass(frozen=True)
+class RunUpPlace:
+    """Run-up in an expectation: its name, and the angle [deg] or distance [m] of the function `at`, else None."""
+
+    name: str
+    place: float | None
+    dimension: ClassVar[str] = "length"
 
 
 @dataclass(frozen=True)
@@ -35,7 +45,7 @@ class Expect:
 
     function : max, min, mean, final or at; time : time of the function `at` [s], else None
     text : expectation as in the file, such as "max(gate.pressure)"
-    probe, extent : the probe, or the quantity with its parts (`Extent`); the other is None
+    probe, extent, run_up : the probe, the quantity with its parts (`Extent`), or the run-up; the others are None
     value : expected value [SI]; rtol, atol : relative and absolute [SI] tolerance
     """
 
@@ -47,6 +57,7 @@ class Expect:
     value: float
     rtol: float
     atol: float
+    run_up: RunUpPlace | None = None
 
     def table(self) -> dict[str, Any]:
         """Keys of the expectation as in a file."""
@@ -101,24 +112,29 @@ def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any],
         raise ValueFault(faults + faults_of(error)) from None
     if faults:
         raise ValueFault(faults)
+    if isinstance(extent, RunUpPlace):
+        return Expect(claim, function, None, None, None, **values, run_up=extent)
     return None if target is None else Expect(claim, function, probe, extent, time, **values)
 
 
 def read_claim(
     claim: str, kinds: Kinds, routes: Mapping[str, Any], setting: ReadContext
-) -> tuple[str, Probe | None, Extent | None, float | None]:
-    """Split the text `claim` of an expectation into (function, probe, extent, time [s]). Raises ValueError.
+) -> tuple[str, Probe | None, Extent | RunUpPlace | None, float | None]:
+    """Split the text `claim` of an expectation into (function, probe, extent or run-up, time [s]). Raises ValueError.
 
-    The probe or the extent is None; both are None if the part is faulty. The time is None except for the function `at`.
+    The probe or the extent is None; both are None if the part is faulty. The time is None except for the function `at`
+    of a probe.
     kinds : as for `read_probe`; routes : routes by name, None if faulty
     """
     match = _CLAIM.fullmatch(claim)
     if match is None or match[1] not in FUNCTIONS:
         hint = did_you_mean(match[1], FUNCTIONS) if match else ""
         forms = "max(PROBE), min(PROBE), mean(PROBE), final(PROBE), at(PROBE, TIME), max(PART.QUANTITY) or "
-        forms += "min(PART.QUANTITY)"
+        forms += f"min(PART.QUANTITY), max({RUN_UP}NAME) or at({RUN_UP}NAME, PLACE)"
         raise ValueError(f"is not a claim; expected {forms}{hint}")
     function, probe_text = match.groups()
+    if probe_text.startswith(RUN_UP) and "run_up" not in kinds["nodes"] | kinds["links"]:
+        return function, None, read_run_up(function, probe_text.removeprefix(RUN_UP), kinds["run_up"], setting), None
     when = None
     if function == "at":  # split at the last comma: a point in a basin contains a comma
         probe_text, comma, when = map(str.strip, probe_text.rpartition(","))
@@ -142,6 +158,27 @@ def read_claim(
             if on in routes or on in ALL:
                 raise
         raise  # the fault of the probe
+
+
+def read_run_up(function: str, text: str, run_ups: Mapping[str, Any], setting: ReadContext) -> RunUpPlace | None:
+    """Run-up in an expectation from its text, such as "shore, 90"; None if it is faulty. Raises ValueError.
+
+    run_ups : run-ups of `[output]` by name, None if `[output]` is faulty
+    """
+    if function not in (able := ("max", "min", "at")):
+        raise ValueError(f"a run-up has no {function}; expected {listing(able)}")
+    name, comma, place = map(str.strip, text.partition(","))
+    if (function == "at") != bool(comma):
+        raise ValueError(f"expected {f'at({RUN_UP}NAME, PLACE)' if function == 'at' else f'{function}({RUN_UP}NAME)'}")
+    if name not in run_ups:
+        known = f"; run-ups are {listing(run_ups)}" if run_ups else "; [output] has no run_up"
+        raise ValueError(f"no run-up named {show(name)}{did_you_mean(name, run_ups) or known}")
+    if (spec := run_ups[name]) is None or not comma:
+        return None if spec is None else RunUpPlace(name, None)
+    given = float(place) if _BARE.fullmatch(place) else place.strip("\"'")
+    if spec.about is not None:
+        return RunUpPlace(name, val.Number().read(given, setting))
+    return RunUpPlace(name, Quantity("length", val.between(0, spec.length)).read(given, setting))
 
 
 def expect_keys(dimension: str) -> dict[str, tuple[Any, Any]]:

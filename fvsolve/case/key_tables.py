@@ -11,7 +11,7 @@ from typing import Any
 
 from fvsolve.case.load import TOP
 from fvsolve.case.pipe_routes import Route
-from fvsolve.case.sections import FluidSpec, Numerics, Output, OutputLine
+from fvsolve.case.sections import FluidSpec, Numerics, Output, OutputLine, RunUp
 from fvsolve.case.text import inline
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.parts import KINDS, Friction, Node, Scalar
@@ -34,8 +34,8 @@ from fvsolve.units import DIMENSIONS, show
 TABLES: dict[str, type[Table]] = {
     "every node": Node, "riding": PlaceOnBody, "every link": TwoPort, "friction": Friction, "connection": Connection,
     "compressor": Compressor, "dry friction": DryFriction,
-    "wall": Wall, "lining": Lining, "patch": Patch, "start": BasinStart, "line": OutputLine, "scalar": Scalar,
-    "reaction": Reaction,
+    "wall": Wall, "lining": Lining, "patch": Patch, "start": BasinStart, "line": OutputLine, "run-up": RunUp,
+    "scalar": Scalar, "reaction": Reaction,
     "fluid": FluidSpec, "numerics": Numerics, "output": Output, "route": Route, "joint": Joint, "attitude": Attitude,
 }  # fmt: skip
 # base class -> part whose table lists its keys in full

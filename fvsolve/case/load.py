@@ -125,6 +125,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     kinds["reactions"] = reaction_kinds(reactions)
     blocks = read_controls(reading, kinds)
     output = read_output(reading, numerics, kinds)
+    kinds["run_up"] = run_up_kinds(reading, output)
     expect, compare = claims.read_expectations(reading, kinds, routes), claims.read_comparisons(reading, kinds)
     validation = read_validation(reading, kinds, routes)
     limits = claims.read_limits(reading, kinds, routes, parts.links, state, general["gravity"])
@@ -310,13 +311,22 @@ def read_output(reading: Reading, numerics: Numerics | None, kinds: dict[str, An
                 probe = read_probe(text, kinds)
                 named |= {} if probe is None else {probe.text: probe}
         probes = list(named.values())
-    reading.add(basins.line_faults(valid, kinds["nodes"]))
+    reading.add(basins.output_faults(valid, kinds["nodes"]))
     if output is None:
         return None
     changes: dict[str, Any] = {"probes": probes}
     if output.every is None and numerics is not None:
         changes["every"] = (numerics.end - numerics.start) / DEFAULT_ROWS
     return output.model_copy(update=changes)
+
+
+def run_up_kinds(reading: Reading, output: Output | None) -> dict[str, Any]:
+    """Run-ups of `[output]` by name, for the reading of expectations; None for each if `[output]` is faulty."""
+    if output is not None:
+        return output.run_up
+    given = reading.raw.table.get("output")
+    names = given.get("run_up") if isinstance(given, dict) else None
+    return dict.fromkeys(names) if isinstance(names, dict) else {}
 
 
 def valid_times(reading: Reading) -> Numerics | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -323,17 +324,27 @@ class OutputUnits(val.Value):
         }
 
 
-class ProbeNames(val.Value):
-    """Value of `probes` in `[output]`: a list of texts, which are read as probes later, when all parts are read."""
+@dataclass(frozen=True)
+class NameList(val.Value):
+    """Value of a key of `[output]`: a list of names, which are looked up later, when all parts are read.
 
-    about = "recorded quantities; those of all nodes and links if left out"
-    takes = "list of probes"
+    noun : noun of the names in plural; example : list for messages
+    """
+
+    noun: str
+    example: str
+    about: str = ""
+    changes: str = SHAPE
     schema = {"type": "array", "items": {"type": "string"}}
 
     def read(self, given: Any, setting: ReadContext) -> tuple[Any, ...]:
         if not isinstance(given, (list, tuple)):
-            raise ValueError(f'{show(given)} is not a list; expected for example ["gate.pressure"]')
+            raise ValueError(f"{show(given)} is not a list; expected for example {self.example}")
         return tuple(given)
+
+    @property
+    def takes(self) -> str:
+        return f"list of {self.noun}"
 
 
 class OutputLine(Table):
@@ -351,6 +362,48 @@ class OutputLine(Table):
     ] = 101
 
 
+class RunUp(Table):
+    """Table of the run-up in a basin, by direction about a point, or by distance along a line."""
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("about", "from"), ("about", "to"), ("about", "width"), ("radius", "from"), ("radius", "to"),
+    )  # fmt: skip
+    needs: ClassVar[tuple[tuple[str, ...], ...]] = (("about", "from", "to"),)
+
+    basin: Annotated[str, val.Text("name of the basin")]
+    about: Annotated[tuple[float, float] | None, val.Rows(
+        "length", length=2, about="x, y of the point [m]; the table is by angle, anticlockwise from the x axis",
+        changes=VALUE,
+    )] = None  # fmt: skip
+    radius: Annotated[float | None, Quantity(
+        "length", positive, "greatest distance of cells from the point [m]; no limit if left out", changes=VALUE,
+    )] = None  # fmt: skip
+    from_: Annotated[tuple[float, float] | None, val.Rows(
+        "length", length=2, about="x, y of the start of the line [m]; the table is by distance from it", changes=VALUE,
+    ), Field(alias="from")] = None  # fmt: skip
+    to: Annotated[
+        tuple[float, float] | None,
+        val.Rows("length", length=2, about="x, y of the end of the line [m]", changes=VALUE),
+    ] = None
+    width: Annotated[float | None, Quantity(
+        "length", positive, "greatest distance of cells from the line [m]; no limit if left out", changes=VALUE,
+    )] = None  # fmt: skip
+    sectors: Annotated[int, val.Whole(
+        val.between(1, 10**5), "number of equal sectors of the circle, or parts of the line", VALUE,
+    )] = 48  # fmt: skip
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
+        faults, ends = super().key_faults(given), {"from", "to"} - given.keys()
+        missing = len(ends) == 1 and "about" not in given
+        return [*faults, *(((), f"{key} is missing; a line has `from` and `to`") for key in ends if missing)]
+
+    @property
+    def length(self) -> float:
+        """Length of the line [m]; 0 for a point."""
+        return 0.0 if self.about is not None else math.dist(self.from_, self.to)
+
+
 class Output(Table):
     """Table `[output]`: recorded quantities, output times and units."""
 
@@ -361,16 +414,33 @@ class Output(Table):
     fields: Annotated[int, val.Whole(val.between(0, 10**6), "number of frames of the fields, 0 for none", VALUE)] = (
         DEFAULT_FRAMES
     )
-    probes: Annotated[Any, ProbeNames()] = None
+    probes: Annotated[Any, NameList(
+        "probes", '["gate.pressure"]', "recorded quantities; those of all nodes and links if left out",
+    )] = None  # fmt: skip
     lines: Annotated[
         Any, NamedTables(OutputLine, "named lines across basins: { centre = { basin, from, to, points } }")
     ] = {}
+    maxima: Annotated[Any, NameList(
+        "basins", '["reach"]', "basins whose greatest depths, speeds and times of arrival are recorded in every cell",
+    )] = ()  # fmt: skip
+    wet_depth: Annotated[float, Quantity(
+        "length", val.between(1e-6, 1e6), "depth above which a cell counts as wet in `maxima` and `run_up` [m]",
+        changes=VALUE,
+    )] = 0.01  # fmt: skip
+    run_up: Annotated[
+        Any, NamedTables(RunUp, "named run-ups: { shore = { basin, about } } or { beach = { basin, from, to } }")
+    ] = {}
     units: Annotated[dict[str, str], OutputUnits()] = {}
+
+    @property
+    def basins_with_maxima(self) -> tuple[str, ...]:
+        """Names of the basins whose greatest values are recorded: those of `maxima`, and those with a run-up."""
+        return tuple(dict.fromkeys([*self.maxima, *(spec.basin for spec in self.run_up.values())]))
 
     def table(self) -> dict[str, Any]:
         """Keys and values as in a case file."""
         values = {**super().table(), "probes": [probe.text for probe in self.probes]}
-        return {key: value for key, value in values.items() if value != {}}
+        return {key: value for key, value in values.items() if value != {} and (key, value) != ("maxima", [])}
 
 
 class ExactSpec(Table):

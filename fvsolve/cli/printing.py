@@ -83,6 +83,8 @@ def result_text(run) -> Iterator:
     if len(summary["events"]) > EVENTS_SHOWN:
         more = len(summary["events"]) - EVENTS_SHOWN
         yield f"and {more} more event{'s' if more > 1 else ''}; summary.json has all"
+    for name, table in summary.get("run_up", {}).items():
+        yield _run_up_text(name, table)
     for name, ledger in summary["ledgers"].items():
         relative = f", {_number(ledger['relative'])} of the largest term" if "relative" in ledger else ""
         yield f"{name} ledger: remainder {_number(ledger['remainder'])}{relative}"
@@ -320,6 +322,13 @@ def _extremes(run) -> Iterator:
     if len(rows) > ROWS:
         where = f"in {run.directory / 'summary.json'}" if run.directory else "in Result.extremes"
         yield f"... {len(rows) - ROWS} more {where}"
+
+
+def _run_up_text(name: str, table: dict) -> str:
+    along, unit = ("angle", "deg") if "angle" in table else ("distance", "m")
+    if table["greatest"] is None:
+        return f"run-up {name}: no cell was wet"
+    return f"run-up {name}: {_number(table['greatest'])} m at {along} {_number(table[f'greatest_{along}'])} {unit}"
 
 
 def _step_text(case, facts: dict) -> str:

@@ -238,6 +238,9 @@ def read_frame(file: str | Path, scene: DrawnScene) -> Any:
     import pyvista
 
     mesh, quantity = pyvista.read(file), scene.quantity
+    if scene.over_run and "max_depth" in mesh.cell_data:  # NaN in cells that were never wet
+        mesh.cell_data["depth"] = np.nan_to_num(mesh.cell_data["max_depth"])
+        mesh.cell_data["surface"] = mesh.cell_data["bed"] + mesh.cell_data["depth"]
     if Path(file).suffix == ".pvtu":  # its pieces have duplicate points at common edges
         mesh = mesh.clean()
     if quantity.name in mesh.cell_data:

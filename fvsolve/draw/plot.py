@@ -261,6 +261,22 @@ def _profile(axes, arrays, hilly: bool) -> None:
 
 
 @style.without_markup
+def run_up_figure(columns, name, title=""):
+    """Figure of a run-up over angle or distance. columns : "angle" [deg] or "distance" [m], and "run_up" [m]"""
+    figure, along = style.figure(4.2), next(iter(columns))
+    axes = figure.subplots()
+    style.style_axes(axes)
+    x, run_up = columns[along], columns["run_up"]
+    axes.plot(x, run_up, ".-", color=style.COLOURS[0], linewidth=1.0, markersize=4)
+    if along == "angle":
+        axes.set_xlim(0.0, 360.0)
+        axes.set_xticks(range(0, 361, 45))
+    style.name_axes(axes, f"{along} [{'deg' if along == 'angle' else 'm'}]", f"run-up {name} [m]")
+    style.title(figure, title)
+    return figure
+
+
+@style.without_markup
 def section_figure(section, window, units, title=""):
     """Figure of heads along a path, with pipe, vapour line, pressure class and limits; shaded where cavities formed.
 

@@ -54,7 +54,8 @@ class DrawnScene:
     frames : (caption, files) of each time
     pipes : for networks, (points float64[p, 3] [m], lines int[c, 2], values float64[c] in SI, pipe int[c]) of each time
     plan : source of plan positions: "given", "laid out" (by lengths), "own scale" or "schematic" (both not to scale)
-    contours : number of contour lines
+    contours : number of contour lines; over_run : True if the field is one of greatest values over the run, which are
+    drawn on the greatest depth
     """
 
     title: str
@@ -69,6 +70,7 @@ class DrawnScene:
     anchors: dict[str, tuple[float, float, float]] = field(default_factory=dict)  # positions of linked patches [m]
     plan: str = "given"
     contours: int = 0
+    over_run: bool = False
 
     def shown(self, points) -> np.ndarray:
         """Convert points float64[n, 3] [m] to the output units of lengths and heights."""

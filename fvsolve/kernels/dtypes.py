@@ -593,6 +593,9 @@ BASIN = record(
     places=i8,  # offset in `plane` of positions of corners, then of centres of cells, see `moving_meshes`
     sides=i8,  # offset in `plane` of normal speeds of sides, by block, side of four and cell [m/s]
     ends=i8,  # offset in `integers` of corners of sides and cells, see `moving_meshes`
+    maxima=i8,  # offset in `maxima` of greatest values of its cells, see `free_surface.surface_maxima`; -1 for none
+    maxima_row=i8,  # number of these for each row of cells; a mesh is one row
+    wet_depth=f8,  # depth above which a cell counts as wet there [m]
 )
 NO_DRAG, MANNING, DARCY = 0, 1, 2
 PATCHES = record(
@@ -724,7 +727,7 @@ RunArrays = namedtuple("RunArrays",
     (
         "clock", "work", "armed", "marks", "scratch", "spare", "seen", "bands", "joint", "sums", "envelope", "extremes",
         "past", "sharp", "applied", "readings", "sensing", "stack", "discrete", "histories",
-        "network_places", "network_factors",
+        "network_places", "network_factors", "maxima",
     ),
 )  # fmt: skip
 HandleTables = namedtuple("HandleTables", (*Tables._fields, *RunArrays._fields, "calls", "hooks"))

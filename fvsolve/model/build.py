@@ -351,6 +351,7 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         histories=histories_size(draft.control_table),
         network_places=0 if draft.network is None else 3 * draft.network.rows.count + draft.network.capacity,
         network_factors=0 if draft.network is None else draft.network.rows.count + draft.network.capacity,
+        maxima=draft.maxima_size,
     )  # fmt: skip
 
 

@@ -39,6 +39,7 @@ class RunData:
     envelope : float64[4, cells]  least sum of both waves in each cell [kg/s], its time [s], greatest sum, its time
     extremes : float64[4, probes]  least value, its time, greatest value and its time, of probes, then of watched
     quantities
+    maxima : greatest values of cells of basins over all accepted steps, see `basins.free_surface.surface_maxima`
     bands : for each basin, first row (of a mesh: first cell) that this thread computes, and the one after its last
     joint : see `kernels.band_exchange`, empty if one thread computes all; sums : see `kernels.stage_sums`
     """
@@ -54,6 +55,7 @@ class RunData:
         self.clock, self.full_at = self.written.clock[0], -np.inf  # number of history entries at which rings are full
         self.armed, self.marks = self.written.armed, self.written.marks
         self.envelope, self.extremes = self.written.envelope, self.written.extremes
+        self.maxima = self.written.maxima
         reset_history(self.written.past, model.tables.delays)
         input_histories.reset_histories(self.written.histories, model.tables.controls)
         self.clock["limit"], self.marks[:] = np.inf, np.nan

@@ -3,6 +3,7 @@
 import contextlib
 import shutil
 from collections.abc import Iterator
+from fnmatch import fnmatch
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -12,6 +13,14 @@ from fvsolve.errors import RunError
 from fvsolve.output import csv_files
 from fvsolve.output.csv_files import read_envelope, read_table
 from fvsolve.output.fields import FieldSeries, ParallelBasinWriter
+from fvsolve.output.maxima_files import (
+    MAXIMA_FILES,
+    RUN_UP_FILES,
+    RUN_UP_PICTURES,
+    read_maxima,
+    write_maxima,
+    write_run_up,
+)
 from fvsolve.output.restart import Restart, identity, read_restart, write_restart
 from fvsolve.output.summary_file import read_summary
 from fvsolve.output.unit_columns import probe_columns, time_column
@@ -102,8 +111,8 @@ class RunDirectory:
         Deletes summary.json, pictures and reports of earlier results. Raises RunError if the files do not fit the
         checkpoint.
         """
-        for name in (SUMMARY_FILE, *PICTURE_FILES):
-            (self.folder / name).unlink(missing_ok=True)
+        for path in (self.folder / SUMMARY_FILE, *picture_paths(self.folder), *maxima_paths(self.folder)):
+            path.unlink(missing_ok=True)
         clear_reports(self.folder)
         if self.restart is None:
             clear_run_files(self.folder)
@@ -152,9 +161,12 @@ class RunDirectory:
             write_restart(self.folder / "restart.npz", restart, self.identity)
 
     def end(self, summary) -> None:
-        """Close history.csv and write envelope.csv and routes.csv; the caller writes summary.json last."""
+        """Close history.csv and write the files of extremes; the caller writes summary.json last."""
         with self.report_write_errors():
             self.history.close()
+            write_maxima(self.folder, self.model, summary.maxima)
+            for name, table in summary.run_ups.items():
+                write_run_up(self.folder / f"run_up-{name}.csv", table, self.model.case)
             if summary.envelope:
                 case = self.model.case
                 envelope = csv_files.with_initial_heads(summary, self.model)
@@ -191,11 +203,15 @@ class RunDirectory:
         path = self.folder / "envelope.csv"
         return read_envelope(path) if path.is_file() else {}
 
+    def maxima(self) -> dict:
+        """Greatest values in the cells of basins: basin -> quantity -> float64[cells] in SI; {} without files."""
+        return read_maxima(self.folder)
+
     def files(self) -> list[str]:
         """Sorted names of the existing files of the run, with summary.json and without pictures."""
         names = [*RUN_FILES, *self.model.case.copies]
         existing = [name for name in dict.fromkeys(names) if (self.folder / name).is_file()]
-        return sorted([*existing, SUMMARY_FILE])
+        return sorted([*existing, *(path.name for path in maxima_paths(self.folder)), SUMMARY_FILE])
 
     def _checkpoint(self) -> Restart | None:
         path = self.folder / "restart.npz"
@@ -218,20 +234,24 @@ class RunDirectory:
 
 
 def read_directory(folder: Path) -> tuple:
-    """Read a finished run: its summary, functions for history.csv and envelope.csv, and the folder.
+    """Read a finished run: summary, functions for history.csv and envelope.csv, folder, and function for maxima.
 
     The functions read the files when called. Raises RunError if the folder contains no finished run.
     """
     summary = read_summary(folder / SUMMARY_FILE)
     envelope = folder / "envelope.csv"
     read = (lambda: read_envelope(envelope)) if envelope.name in summary["files"] else dict
-    return summary, lambda: read_table(folder / "history.csv"), read, folder
+    return summary, lambda: read_table(folder / "history.csv"), read, folder, lambda: read_maxima(folder)
 
 
 def clear_run_files(folder: Path) -> None:
     """Delete the files of an earlier run in `folder`; other files stay."""
-    for name in (SUMMARY_FILE, *RUN_FILES, *PICTURE_FILES):
-        (folder / name).unlink(missing_ok=True)
+    for path in (
+        *(folder / name for name in (SUMMARY_FILE, *RUN_FILES)),
+        *picture_paths(folder),
+        *maxima_paths(folder),
+    ):
+        path.unlink(missing_ok=True)
     for path in (folder / "fields").glob("*.*vtu"):
         path.unlink()
     csv_files.clear_lines(folder)
@@ -246,7 +266,9 @@ def clear_reports(folder: Path) -> None:
 
 def _refuse_reserved_names(case) -> None:
     for name, path in case.copies.items():
-        if name in (SUMMARY_FILE, *RUN_FILES, *PICTURE_FILES, *REPORT_FILES):
+        patterns = MAXIMA_FILES, RUN_UP_FILES, RUN_UP_PICTURES
+        reserved = name in (SUMMARY_FILE, *RUN_FILES, *PICTURE_FILES, *REPORT_FILES)
+        if reserved or any(fnmatch(name, pattern) for pattern in patterns):
             text = f"{path} has the name of a file that a run writes ({name})"
             raise RunError(f"{text}; rename your file, and correct the case")
 
@@ -258,9 +280,19 @@ def _refuse_full_disk(folder: Path, case) -> None:
         raise RunError(f"{text}. Expected a longer interval `output.every`, or another directory with --out DIR")
 
 
+def picture_paths(folder: Path) -> list[Path]:
+    """Paths of the pictures of a run in its directory; the first two may be missing."""
+    return [*(folder / name for name in PICTURE_FILES), *sorted(folder.glob(RUN_UP_PICTURES))]
+
+
+def maxima_paths(folder: Path) -> list[Path]:
+    """Paths of the existing files of greatest values in basins, and of run-ups, in a run directory."""
+    return sorted([*folder.glob(MAXIMA_FILES), *folder.glob(RUN_UP_FILES)])
+
+
 def existing_pictures(folder: Path) -> list[str]:
     """Names of the existing pictures of a run directory."""
-    return [name for name in PICTURE_FILES if (folder / name).is_file()]
+    return [path.name for path in picture_paths(folder) if path.is_file()]
 
 
 def _refuse_existing_run(folder: Path) -> None:

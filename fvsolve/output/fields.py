@@ -116,7 +116,8 @@ class FieldSeries:
         moving = {basin.name: np.zeros(2) for basin in model.basins if basin.part.on is not None}
         self.places = places | moving  # a basin on a body is drawn in world axes, as bodies are
         carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
-        units = {basin.name: basin.units | (carried if basin.scalars else {}) for basin in model.basins}
+        units = {basin.name: basin.units | basin.units_of_maxima | (carried if basin.scalars else {})
+                 for basin in model.basins}  # fmt: skip
         self.basins = {
             basin.name: (*basin_geometry(basin, self.places[basin.name]), units[basin.name]) for basin in model.basins
         }
@@ -207,7 +208,7 @@ def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, lis
 
     meshio.Mesh(points, cells, cell_data=data).write(path)
     text = path.read_bytes()
-    for name in units:
+    for name in units.keys() & data.keys():
         end = text.index(ARRAY_END, text.index(f' Name="{name}"'.encode()))
         text = text[:end] + unit_xml(units, name).encode() + text[end:]
     path.write_bytes(text)

@@ -51,6 +51,10 @@ class MemorySink:
         """Last row of the last block of rows : float64[1 + probes]."""
         return self._blocks[-1][-1]
 
+    def maxima(self) -> dict:
+        """Greatest values in the cells of basins: basin -> quantity -> float64[cells] in SI; {} before the end."""
+        return self._summary.maxima if self._summary else {}
+
     def envelope(self) -> dict:
         """Envelope: pipe -> quantity -> float64[cells] in the units of envelope.csv; {} before the end of the run."""
         if not self._summary:

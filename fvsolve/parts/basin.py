@@ -160,6 +160,7 @@ class Physics(Table):
     The module `lower.py` beside the declaration fills the rows of tables.
     states : quantity of cells -> its unit, the stored quantity first
     fields : quantity that can be probed at a point -> its dimension; starts : table with the keys of `start`
+    maxima : quantity of each cell over all steps, such as a greatest value -> its dimension; {} if there are none
     laws : supported density laws, all if empty; description : text for messages about unsupported laws
     joined : True if links may join its patches (False where the velocity is given); moves : True if walls may move
     on_bodies : True if the basin may be on a body; links_on_bodies : True if links may then join its patches
@@ -172,6 +173,7 @@ class Physics(Table):
     name: ClassVar[str] = ""
     states: ClassVar[dict[str, str]] = {}
     fields: ClassVar[dict[str, str]] = {}
+    maxima: ClassVar[dict[str, str]] = {}
     starts: ClassVar[type[Table]] = Table
     laws: ClassVar[tuple[str, ...]] = ()
     description: ClassVar[str] = "basins"

@@ -4,6 +4,7 @@ import contextlib
 import time
 import warnings
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 from fvsolve.argument_checks import COUNT_FROM_ONE, FLAG, FUNCTION, PATH, TABLE, validated
@@ -124,8 +125,10 @@ def draw(result: Result, painter: PlotProcess) -> None:
     """Draw the pictures that are missing in a run directory; warns of pictures that cannot be drawn."""
     missing = None if result.directory is None else existing_pictures(result.directory)
     pictures, failed = [], {}
-    for name, function, drawn in (("history.png", "history_figure", result.history_drawn),
-                                  ("envelope.png", "envelope_figure", result.envelope_drawn)):  # fmt: skip
+    requests = [("history.png", "history_figure", result.history_drawn),
+              ("envelope.png", "envelope_figure", result.envelope_drawn)]  # fmt: skip
+    requests += [(f"run_up-{name}.png", "run_up_figure", partial(result.run_up_drawn, name)) for name in result.run_up]
+    for name, function, drawn in requests:
         if missing is None or name in missing:
             continue
         path = result.directory / name
@@ -159,7 +162,7 @@ def _solve(model, sink, progress, threads, comm):
 
 def _result(model, summary, sink, begun: float) -> Result:
     facts = summary_data(summary, model)
-    result = Result(facts, sink.table, sink.envelope, sink.folder)
+    result = Result(facts, sink.table, sink.envelope, sink.folder, sink.maxima)
     result.case = model.case
     facts |= claims(model, summary, result)
     facts["versions"] = identity(model.case)

@@ -26,11 +26,14 @@ def scene_of(case, title: str, field: str, frames: list[tuple[float, list[Path]]
     the drawing raises it.
     """
     clock = column("t", "time", case)
-    captions = [(f"{field.replace('_', ' ')} at t = {clock.from_si(t):.6g} {clock.unit}", files) for t, files in frames]
+    over_run = any(field in case.nodes[name].physics_type.maxima for name in case.meshes)
+    caption = f"{field.replace('_', ' ')} {'up to' if over_run else 'at'} t = "
+    captions = [(f"{caption}{clock.from_si(t):.6g} {clock.unit}", files) for t, files in frames]
     pipes = [name for name, link in case.links.items() if link.kind == "pipe"]
     lengths = {name: case.links[name].length for name in pipes}
     bodies = any(node.kind == "body" for node in case.nodes.values())
     scene = DrawnScene(title, unit_of(case, field), *lengths_of(case), captions, names=pipes, contours=contours)
+    scene.over_run = over_run
     scene.plan = "given" if all(node.position is not None for node in case.nodes.values()) else "laid out"
     if not frames:
         none = np.zeros(0, int)
@@ -57,7 +60,7 @@ def unit_of(case, field: str) -> DrawnUnit:
         return DrawnUnit(field, case.scalars[field].unit)
     dimensions = {}
     for name in case.meshes:
-        dimensions |= case.nodes[name].physics_type.fields
+        dimensions |= case.nodes[name].physics_type.fields | case.nodes[name].physics_type.maxima
     dimension = (dimensions | DIMENSIONS).get(field)
     if dimension is None:
         return DrawnUnit(field, "")

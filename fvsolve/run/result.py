@@ -142,13 +142,14 @@ class Result(Displayable):
         table: Callable[[], np.ndarray],
         envelope: Callable[[], dict],
         directory: Path | None = None,
+        maxima: Callable[[], dict] = dict,
     ):
         self.summary = summary
         self.units = {name: probe["unit"] for name, probe in summary["probes"].items()}
         self.directory = directory
         self.places: list[list[dict]] | None = None  # rows of every limit (`verdicts.places`); None if read from files
         self._read_table = table
-        self._read_envelope = envelope
+        self._read_envelope, self._read_maxima = envelope, maxima
 
     @property
     def reason(self) -> str:
@@ -215,6 +216,18 @@ class Result(Displayable):
             for array in arrays.values():
                 array.flags.writeable = False
         return tables
+
+    @cached_property
+    def maxima(self) -> dict:
+        """Basin -> greatest value over all steps, time of arrival or duration of wetting -> float64[cells] in SI."""
+        return self._read_maxima()
+
+    @property
+    def run_up(self) -> dict:
+        """Run-up of `[output]` -> its columns in m and degrees : float64[sectors], NaN where nothing became wet."""
+        tables = self.summary.get("run_up", {})
+        return {name: {key: np.array(values, float) for key, values in table.items() if isinstance(values, list)}
+                for name, table in tables.items()}  # fmt: skip
 
     @cached_property
     def routes(self) -> dict:
@@ -301,6 +314,19 @@ class Result(Displayable):
         return {
             "envelope": self.envelope, "units": self.summary["envelope_units"], "title": self.summary["title"],
         }  # fmt: skip
+
+    @validated(name=TEXT, path=PATH)
+    def plot_run_up(self, name: str, path=None):
+        """Figure (matplotlib) of a run-up over angle or distance, also written to `path` if given."""
+        from fvsolve.draw.plot import run_up_figure
+
+        if name not in self.run_up:
+            raise FvsolveError(f"no run-up {show(name)}{did_you_mean(name, self.run_up)}; see Result.run_up")
+        return save_if_path(run_up_figure(**self.run_up_drawn(name)), path)
+
+    def run_up_drawn(self, name: str) -> dict[str, Any]:
+        """Arguments for the function `run_up_figure`; name : name of the run-up"""
+        return {"columns": self.run_up[name], "name": name, "title": self.summary["title"]}
 
     @validated(time=NUMBER, field=TEXT, path=PATH, contours=COUNT_FROM_ZERO)
     def view(self, time: float | None = None, field: str | None = None, path=None, contours: int = 0) -> Path:

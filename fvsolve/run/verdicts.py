@@ -404,7 +404,10 @@ def expectations(model, summary, result) -> list[dict]:
     first = min((mark.time for mark in summary.marks), default=math.inf)
     rows = []
     for text, expect in model.case.expect.items():
-        if expect.extent is None:
+        if expect.run_up is not None:
+            shown, time = column(text, expect.run_up.dimension, model.case), summary.t
+            value = summary.run_ups[expect.run_up.name].value(expect.function, expect.run_up.place)
+        elif expect.extent is None:
             shown = columns[expect.probe.text]
             value, time = _at_probe(expect, shown.name, summary, result)
         else:

@@ -67,6 +67,7 @@ class BandWorker:
         own[band_exchange.HEAD :] = np.concatenate([states, flows]).ravel()
         self.stepper.structure = blocked_sums(cut, k)
         self.own_arrays = {"bands": cut.bands(k), "joint": own, "sums": self.stepper.structure}
+        self.own_arrays["maxima"] = loop.run_data.maxima  # threads write their rows into one array
         self.call_tables = team.functions.calls, team.functions.hooks
         self.open()
         at, bounds = state_bounds(loop.model)
@@ -265,6 +266,7 @@ class MpiRanks:
         for _, _, first, count in self.member.stepper.row_blocks[common if comm.rank > 0 else 0 :]:
             self.others[first : first + count] = False
         self.rows = [[slice(*block[:2]) for block in cut.row_blocks(k)[common:].tolist()] for k in ranks]
+        self.maxima_rows = [cut.maxima_rows(k) for k in ranks]
         self.stale = True
 
     def exchange(self, request: int, address: int, size: int) -> None:
@@ -305,32 +307,38 @@ class MpiRanks:
         small = {name: getattr(loop.stepper, name) for name in COPIED}
         written = {name: getattr(loop.run_data.written, name) for name in WRITTEN}
         states = [loop.stepper.y[now, begin:stop] for begin, stop in runs]
+        maxima = loop.run_data.maxima if self.stale else None
         self.stale = False
         with postponed_interrupts():
-            self.comm.bcast((RUN_LOOP, (small, written, runs, states)))
+            self.comm.bcast((RUN_LOOP, (small, written, runs, states, maxima)))
             code = self.member.run_steps(functions, where)
-            self.gather("y", loop.progress["now"])
-            if code == loop_records.FIELD:
-                self.gather("y_out", ...)
+            self.gather_results(code)
             self.seconds += sum(self.comm.gather(0.0))  # CPU time of the other ranks
         return code
 
-    def gather(self, name: str, at) -> None:
-        """Send to rank 0 the entries of the bands of all ranks in row `at` of the integrator's array `name`."""
-        values = getattr(self.loop.stepper, name)[at]
+    def gather(self, values: np.ndarray, ranges: list[list[slice]]) -> None:
+        """Send to rank 0 the entries of an array that each rank has computed; ranges : those of each rank"""
         if self.comm.rank > 0:
-            for rows in self.rows[self.comm.rank]:
-                self.comm.Send(values[rows], 0)
+            for own in ranges[self.comm.rank]:
+                self.comm.Send(values[own], 0)
             return
         for k in range(1, self.comm.size):
-            for rows in self.rows[k]:
-                self.comm.Recv(values[rows], k)
+            for own in ranges[k]:
+                self.comm.Recv(values[own], k)
+
+    def gather_results(self, code: int) -> None:
+        """Send to rank 0 the state, greatest values and field of all ranks; code : result of the time loop"""
+        stepper = self.loop.stepper
+        self.gather(stepper.y[self.loop.progress["now"]], self.rows)
+        self.gather(self.loop.run_data.maxima, self.maxima_rows)
+        if code == loop_records.FIELD:
+            self.gather(stepper.y_out, self.rows)
 
     def gather_states(self, at: int) -> None:
         """Send to rank 0 the bands of all ranks of the stored state number `at`."""
         with postponed_interrupts():
             self.comm.bcast((SEND_STATES, int(at)))
-            self.gather("y", at)
+            self.gather(self.loop.stepper.y[at], self.rows)
 
     def close(self) -> None:
         """End the other ranks."""
@@ -348,9 +356,11 @@ class MpiRanks:
             if request == CLOSE:
                 return
             if request == SEND_STATES:
-                self.gather("y", argument)
+                self.gather(stepper.y[argument], self.rows)
                 continue
-            small, written, runs, states = argument
+            small, written, runs, states, maxima = argument
+            if maxima is not None:
+                self.loop.run_data.maxima[:] = maxima
             for name, array in small.items():
                 getattr(stepper, name)[...] = array
             for name, array in written.items():
@@ -359,7 +369,5 @@ class MpiRanks:
                 stepper.y[stepper.progress[0]["now"], begin:stop] = values
             start_time = time.thread_time()
             code = self.member.run_steps(functions, where)
-            self.gather("y", stepper.progress[0]["now"])
-            if code == loop_records.FIELD:
-                self.gather("y_out", ...)
+            self.gather_results(code)
             self.comm.gather(time.thread_time() - start_time)

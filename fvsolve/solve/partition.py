@@ -68,6 +68,15 @@ class Partition:
                 first += ny
         return np.array(blocks, dtype=np.int64)
 
+    def maxima_rows(self, k: int) -> list[slice]:
+        """Ranges of the array `maxima` that band k writes in the divided basins."""
+        ranges = []
+        for rows, b in zip(self.firsts, self.basins, strict=True):
+            basin, (begin, stop) = self.model.tables.basins[b], rows[k : k + 2].tolist()
+            at, size = int(basin["maxima"]), int(basin["maxima_row"])
+            ranges += [slice(at + size * begin, at + size * stop)] if at >= 0 else []
+        return ranges
+
     def bands(self, k: int) -> np.ndarray:
         """First row and last row + 1 of band k in each basin : int64[2 basins]; an undivided basin has all its rows."""
         table = self.model.tables.basins

@@ -8,6 +8,7 @@ import numpy as np
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model import Model, RunData
+from fvsolve.solve.run_up import RunUpTable, run_up_table
 
 DRIFT = 1e-6  # deviation of the length of Euler parameters from 1 above which a notice is given
 
@@ -79,6 +80,8 @@ class Summary:
     warnings: list[Notice] = field(default_factory=list)  # notices of the run, without those of the model
     threads: int = 1
     invalid_from: float = np.inf  # time from which results are invalid, because states have grown [s]
+    maxima: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)  # result of `find_maxima`
+    run_ups: dict[str, RunUpTable] = field(default_factory=dict)  # result of `find_run_ups`
 
     @property
     def finished(self) -> bool:
@@ -219,6 +222,18 @@ def find_point_envelopes(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
         points[pipe.name] = pressure_envelope(model, pipe, distance, pipe.height(distance), (low, t_low, high, t_high))
         points[pipe.name]["initial_pressure"] = model.watched_start[own]
     return points
+
+
+def find_maxima(run_data: RunData, t: float) -> dict[str, dict[str, np.ndarray]]:
+    """Greatest values up to time t [s] in cells of each basin that records them: basin -> quantity -> float64[n]."""
+    return {basin.name: basin.maxima(t, run_data.maxima) for basin in run_data.model.basins if basin.records_maxima}
+
+
+def find_run_ups(model: Model, maxima: dict[str, dict[str, np.ndarray]]) -> dict[str, RunUpTable]:
+    """Tables of the run-ups of a case by name; maxima : result of `find_maxima`"""
+    basins = {basin.name: basin for basin in model.basins}
+    return {name: run_up_table(spec, basins[spec.basin], maxima[spec.basin]["max_surface"])
+            for name, spec in model.case.output.run_up.items()}  # fmt: skip
 
 
 def find_envelope(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:

@@ -21,7 +21,7 @@ CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
 # steps between two checks by `RunChecks.check` where it is needed often
 FREQUENT_CHECK_STEPS = loop_records.GROWTH_CHECK_STEPS
-PERSISTENT = ("extremes", "envelope", "marks", "armed", "discrete")
+PERSISTENT = ("extremes", "envelope", "maxima", "marks", "armed", "discrete")
 HISTORIES = ("past", "histories")  # arrays that may grow during a run
 
 
@@ -211,10 +211,14 @@ class Run:
         for watch in self.watches:
             watch.check(t, y)
 
-    def frame(self, t: float, y: np.ndarray, out: np.ndarray) -> None:
+    def frame(self, t: float, y: np.ndarray, out: np.ndarray, last: bool = False) -> None:
+        """Pass the fields at time t [s] to the sink; the last frame also has the greatest values of basins."""
         self.check_basins(t, y)
+        fields = self.run_data.fields(t, y, out)
+        for name, values in found.find_maxima(self.run_data, t).items() if last else ():
+            fields[name] |= values
         with postponed_interrupts():  # other ranks may be writing too
-            self.sink.field(t, self.run_data.fields(t, y, out))
+            self.sink.field(t, fields)
 
     def pass_outputs(self, t: float, out: np.ndarray) -> None:
         """Count the rows due up to time t [s] as written, and write the field frame if one is due.
@@ -229,7 +233,7 @@ class Run:
         if control["field_every"] > 0 and state["next_field"] <= control["field_count"]:
             if start + state["next_field"] * control["field_every"] <= t + near:
                 state["next_field"] += 1
-                self.frame(t, self.loop.now, out)
+                self.frame(t, self.loop.now, out, state["next_field"] > control["field_count"])
 
     # the run ------------------------------------------------------------------------------------------------
 
@@ -384,6 +388,7 @@ class Run:
             loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
             self.setup, [Event(t, *model.events[k]) for t, k in loop.switched],
             found.find_cavities(self.run_data), warnings, self.threads, self.invalid_from,
+            maxima := found.find_maxima(self.run_data, loop.t), found.find_run_ups(model, maxima),
         )  # fmt: skip
         self.sink.end(summary)
         return summary

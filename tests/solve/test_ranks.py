@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-from solve.test_threads import SCENES, liquid, water
+from solve.test_threads import SCENES, liquid, water, with_maxima
 
 import fvsolve
 from fvsolve.draw.field_canvas import read_frame
@@ -29,7 +29,7 @@ cases, out, options = json.loads(sys.argv[1]), sys.argv[2], json.loads(sys.argv[
 for name, case in cases.items():
     fvsolve.run(case, out=f"{out}/{name}", **options)
 """
-NAMES = ("muscl, ssp-rk2", "a tolerance", "a pipe", "delay lines", "a liquid", "a dye in water")
+NAMES = ("muscl, ssp-rk2", "a tolerance", "a pipe", "delay lines", "a liquid", "a dye in water", "greatest values")
 
 
 def ranks(many: int, *command, timeout=300, **environment) -> subprocess.CompletedProcess:
@@ -45,6 +45,7 @@ def same(one: Path, other: Path) -> bool:
     frames = [[drawn(path) for _, path in read_series(run / "fields.pvd")] for run in (one, other)]
     history = [(run / "history.csv").read_bytes() for run in (one, other)]
     kept = all(said[key] == again[key] for key in keys)
+    kept &= all(path.read_bytes() == (other / path.name).read_bytes() for path in one.glob("maxima-*.vtu"))
     return kept and frames[0] == frames[1] != [] and history[0] == history[1]
 
 
@@ -100,7 +101,7 @@ def test_frames_that_ranks_write_are_those_of_one_process_to_who_reads_them(tmp_
 
 
 def test_a_run_of_three_ranks_is_resumed_by_two_and_by_one(tmp_path):
-    case = water(end=0.15, step=1e-4)
+    case = with_maxima(water(end=0.15, step=1e-4), "pool")
     whole = fvsolve.run(case, out=tmp_path / "whole")
     stopping = SCRIPT.replace("**options", "progress=stop").replace("import json", """
 import importlib

@@ -81,6 +81,11 @@ def lined(**numerics):
     return case
 
 
+def with_maxima(case, *basins):
+    """Case that records the greatest values in cells of the basins."""
+    return case | {"output": case["output"] | {"maxima": [*basins], "wet_depth": 0.02}}
+
+
 class Kept(MemorySink):
     """Sink in memory that also keeps field frames."""
 
@@ -98,7 +103,7 @@ def told(case, threads: int, state=None):
     summary = run.go()
     assert summary.reason == "finished", summary.reason
     loop = run.loop
-    cells = [np.asarray(array) for frame in sink.frames for name in ("pool", "sheet") if name in frame
+    cells = [np.asarray(array) for frame in sink.frames for name in ("pool", "sheet", "round", "other") if name in frame
              for array in frame[name].values()]  # fmt: skip
     kept = [loop.now, *loop.stepper.restart_arrays().values(), run.run_data.marks, run.run_data.extremes, sink.table()]
     kept += cells
@@ -127,6 +132,7 @@ SCENES = {
     "a liquid, log": liquid("log"),
     "a dye in water": dyed(),
     "a dye in water that spreads, upwind": dyed("upwind", diffusivity=1e-3),
+    "greatest values": with_maxima(water(), "pool"),
     "a dye": carried(),
     "a dye that spreads, upwind": carried("upwind", 1e-3),
 }
@@ -175,6 +181,7 @@ def test_two_basins_and_one_that_each_steps_whole():
                               "patches": {"near": {"side": "east"}}}  # fmt: skip
     for name in ("round", "other"):
         case["links"][name] = VALVE | {"from": f"{name}.near", "to": "pool.near"}
+    case = with_maxima(case, "pool", "round", "other")
     bits, _ = told(case, 1)
     found, summary = told(case, 3)
     assert found == bits
@@ -227,7 +234,7 @@ def test_bands_that_do_not_wait_for_each_other_are_seen():
 
 
 def test_a_run_is_resumed_by_another_number_of_threads_to_the_same_bits(tmp_path, monkeypatch):
-    case = water(end=0.2, step=1e-4)
+    case = with_maxima(water(end=0.2, step=1e-4), "pool")
     whole = fvsolve.run(case, out=tmp_path / "whole")
 
     for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):  # checkpoints after 1000, 1250, ... steps

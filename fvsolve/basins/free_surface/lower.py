@@ -17,7 +17,7 @@ import numpy as np
 
 from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
-from fvsolve.basins.free_surface import surface_grid, surface_mesh
+from fvsolve.basins.free_surface import surface_grid, surface_maxima, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import RATE_CAP, add_friction
 from fvsolve.basins.free_surface.surface_patches import DEPTH
 from fvsolve.basins.free_surface.surface_rows import THIN
@@ -294,6 +294,8 @@ class FreeSurfaceRows(BasinRows):
             yield RhsTerms(
                 package=PACKAGE, power="surface_energy: add_wall_power", stored="surface_energy: add_wall_stored"
             )
+        if self.records_maxima:
+            yield RhsTerms(package=PACKAGE, record="surface_maxima: record_maxima")
         yield SHORTAGES
         if valves:
             yield RhsTerms(package=PACKAGE, rate_limits="surface_patches: limit_inflow_rate")
@@ -323,6 +325,11 @@ class FreeSurfaceRows(BasinRows):
         else:
             row["work"] = draft.to_work(mesh_blocks.work_size(surface_mesh, self.integers))
         row["plan"] = draft.to_plane(plan)
+        if self.records_maxima:
+            row["wet_depth"] = self.case.output.wet_depth
+            rows = max(int(row["ny"]), 1)
+            row["maxima_row"] = surface_maxima.QUANTITIES * (self.n // rows)
+            row["maxima"] = draft.to_maxima(rows * int(row["maxima_row"]))
         if not (self.depth + self.start()[0]).max() > 0.0:
             amount = draft.case.amount
             text = f"basin {self.name} starts dry: level {amount(part.level, 'level')} is not above its bed, lowest at "
@@ -381,6 +388,16 @@ class FreeSurfaceRows(BasinRows):
         share = 2.0 * depth / (depth * depth + wet * wet)
         velocity = np.column_stack([share * y[1], share * y[2], np.zeros(self.n)])
         return {"depth": depth, "bed": bed, "surface": bed + depth, "velocity": velocity}
+
+    def maxima(self, t: float, recorded: np.ndarray) -> dict[str, np.ndarray]:
+        at, size = int(self.row["maxima"]), int(self.row["maxima_row"])
+        rows = recorded[at : at + surface_maxima.QUANTITIES * self.n].reshape(-1, size)
+        cells = rows.reshape(len(rows), surface_maxima.QUANTITIES, -1).swapaxes(0, 1).reshape(-1, self.n)
+        depth, speed, hazard, wet, arrival, duration = cells
+        bed = self.bed + (self.part.elevation or 0.0)
+        values = depth, bed + depth, np.sqrt(speed), np.sqrt(hazard), arrival
+        values = [*(np.where(depth > 0.0, array, np.nan) for array in values), duration + t * wet]
+        return dict(zip(self.part.physics_type.maxima, values, strict=True))
 
     def speeds(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self.fields(y)["velocity"], np.sqrt(self.case.gravity * self.depth_of(y))

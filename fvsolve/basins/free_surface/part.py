@@ -22,6 +22,10 @@ class FreeSurface(Physics, name="free-surface"):
 
     states: ClassVar[dict[str, str]] = {"depth": "m", "flow_x": "m2/s", "flow_y": "m2/s"}
     fields: ClassVar[dict[str, str]] = {"depth": "level", "surface": "level", "bed": "level", **VELOCITY_FIELDS}
+    maxima: ClassVar[dict[str, str]] = {
+        "max_depth": "level", "max_surface": "level", "max_speed": "velocity", "max_hazard": "unit_flow",
+        "arrival_time": "time", "wet_duration": "time",
+    }  # fmt: skip
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("manning", "factor"),)
     starts: ClassVar[type[VelocityStart]] = SurfaceStart
     laws: ClassVar[tuple[str, ...]] = ("linear",)

@@ -1,0 +1,54 @@
+"""Files of greatest values of a run: maxima-BASIN.vtu with the cells of a basin, run_up-NAME.csv with a run-up."""
+
+from pathlib import Path
+
+import numpy as np
+
+from fvsolve.errors import RunError
+from fvsolve.output.csv_files import csv_quoted
+from fvsolve.output.fields import basin_geometry, split_blocks, write_frame
+from fvsolve.output.unit_columns import UnitColumn, column, to_column_units
+
+MAXIMA_FILES, RUN_UP_FILES = "maxima-*.vtu", "run_up-*.csv"
+RUN_UP_PICTURES = "run_up-*.png"
+
+
+def write_maxima(folder: Path, model, maxima: dict[str, dict[str, np.ndarray]]) -> None:
+    """Write maxima-BASIN.vtu of each basin. maxima : basin -> quantity -> float64[n] in SI"""
+    for basin in model.basins:
+        if basin.name in maxima:
+            points, cells = basin_geometry(basin, np.array(basin.part.position or (0.0, 0.0)))
+            blocks = {key: split_blocks(values, cells) for key, values in maxima[basin.name].items()}
+            write_frame(folder / f"maxima-{basin.name}.vtu", points, cells, blocks, basin.units_of_maxima)
+
+
+def read_maxima(folder: Path) -> dict[str, dict[str, np.ndarray]]:
+    """Read all files maxima-BASIN.vtu of a folder: basin -> quantity -> float64[n]; raises RunError if unreadable."""
+    from meshio import vtu  # meshio.read would print and exit on a damaged file
+
+    maxima = {}
+    for path in sorted(folder.glob(MAXIMA_FILES)):
+        try:
+            data = vtu.read(str(path)).cell_data
+        except Exception as error:  # meshio and its parsers raise many types on a damaged file
+            text = f"{type(error).__name__}: {error}"
+            raise RunError(f"{path} cannot be read ({text}); run again with --force") from None
+        maxima[path.stem.removeprefix("maxima-")] = {key: np.concatenate(blocks) for key, blocks in data.items()}
+    return maxima
+
+
+def run_up_columns(table, case) -> list[UnitColumn]:
+    """Columns of run_up-NAME.csv: angle in degrees or distance, run-up, and position of the cell.
+
+    table : `RunUpTable`
+    """
+    first = UnitColumn("angle", "number", "deg") if table.along == "angle" else column("distance", "length", case)
+    return [first, column("run_up", "length", case), column("x", "position", case), column("y", "position", case)]
+
+
+def write_run_up(path: Path, table, case) -> None:
+    """Write run_up-NAME.csv with a row for each sector. table : `RunUpTable`"""
+    columns = run_up_columns(table, case)
+    rows = to_column_units(columns, np.column_stack([table.places, table.run_up, table.points])).tolist()
+    lines = [",".join(csv_quoted(item.header) for item in columns), *(",".join(map(repr, row)) for row in rows)]
+    path.write_bytes(("\n".join(lines) + "\n").encode())
