@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fvsolve.case.claims import FUNCTIONS, read_claim
+from fvsolve.case.claims import FUNCTIONS, RunUpPlace, read_claim
 from fvsolve.case.probe import Extent, Kinds, Probe, read_probe
 from fvsolve.case.reading import Reading
 from fvsolve.errors import did_you_mean, listing
@@ -31,7 +31,7 @@ class Measure:
     """Quantity that a row computes from a run.
 
     function : one of `MEASURES`; text : as in the file; dimension : of its values
-    probe, extent : as for `Expect`, None for a profile; argument : time or value of the function [SI], else None
+    probe, extent, run_up : as for `Expect`, all None for a profile; argument : time or value [SI], else None
     field : (basin, quantity) of a profile, else None
     """
 
@@ -42,6 +42,7 @@ class Measure:
     extent: Extent | None = None
     argument: float | None = None
     field: tuple[str, str] | None = None
+    run_up: RunUpPlace | None = None
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,7 @@ class Row:
 
     what : name of the row; measure : what is computed; None in a validation by a program
     from_, to : first and last time that count [s], None for start and end; set : overrides of the case for this row
+    curves : name -> CSV file with run-up over angle or distance, for the figure of a run-up
     measured : {value, spread, source}; others : tuple of {code, value, source}; exact : {value, source, resolution}
     gate : {of, rtol, atol, reason}; because : why the model differs from the measurement; unit : of a program's value
     """
@@ -64,6 +66,7 @@ class Row:
     because: str
     unit: str
     set: dict[str, Any]
+    curves: dict[str, str]
     from_: float | None
     to: float | None
 
@@ -199,6 +202,7 @@ def row_keys(dimension: str) -> dict[str, tuple[val.Value, Any]]:
         "from": (Quantity("time", about="first time that counts [s]", changes=VALUE), None),
         "to": (Quantity("time", about="last time that counts [s]", changes=VALUE), None),
         "set": (ByName(val.Anything(), "overrides of the case, for example { KEY = VALUE }"), {}),
+        "curves": (ByName(val.Text(changes=VALUE), "{ NAME = FILE }, run-up over angle or distance"), {}),
         "measured": (Subtable(measured, "for example { value, spread, source }"), None),
         "others": (Sequence(Subtable(other, "for example { code, value }"), "results of other programs"), ()),
         "exact": (Subtable(exact, "for example { value, source }"), None),
@@ -321,6 +325,8 @@ def read_measure(given: Any, kinds: Kinds, routes: Mapping[str, Any], reading: R
     if function in FUNCTIONS:
         _, probe, extent, when = read_claim(given, kinds, routes, reading.setting)
         target = probe or extent
+        if isinstance(target, RunUpPlace):
+            return Measure(given, function, target.dimension, run_up=target)
         return None if target is None else Measure(given, function, target.dimension, probe, extent, when)
     argument = None
     if function == CROSSING:

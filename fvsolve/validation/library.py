@@ -93,8 +93,7 @@ class RowResult:
 
 @dataclass(frozen=True)
 class ValidationResult:
-    """Result of a validation: rows, seconds of stepping, texts on data that lack, and message of a faulty case.
-    """
+    """Result of a validation: rows, seconds of stepping, texts on data that lack, and message of a faulty case."""
 
     name: str
     title: str

@@ -2,15 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fvsolve import exact as exact_solutions
-from fvsolve.case.validation_table import CROSSING, DIFFERENCE, ERRORS, OF_SERIES, PROFILE, Row
+from fvsolve.case.validation_table import CROSSING, DIFFERENCE, ERRORS, OF_SERIES, PROFILE, Measure, Row
 from fvsolve.errors import FvsolveError
 from fvsolve.exact import shallow_water
 from fvsolve.output.unit_columns import UnitColumn, column
+from fvsolve.parts.csv_rows import read_rows
 from fvsolve.run import model_of
 from fvsolve.studies.reference import initial_values
 
@@ -38,6 +40,8 @@ def value_of(row: Row, run: Any) -> float:
         return profile_error(run, measure.field)
     if measure.function in OF_SERIES:
         return difference(series_of(row, run), measure.function)
+    if measure.run_up is not None:
+        return run_up(measure, run)
     if measure.extent is not None or (measure.function in ("max", "min") and row.from_ is None and row.to is None):
         return extreme(row, run)
     t, values = window(row, run.seconds, run.si(measure.probe.text))
@@ -50,6 +54,17 @@ def value_of(row: Row, run: Any) -> float:
     if measure.function == "mean":
         return float(np.trapezoid(values, t) / (t[-1] - t[0])) if t[-1] > t[0] else float(values[-1])
     return {"max": values.max, "min": values.min, "final": lambda: values[-1]}[measure.function]()
+
+
+def run_up(measure: Measure, run: Any) -> float:
+    """Greatest or least run-up, or that of the sector at an angle [deg] or distance [m] [m]."""
+    table = run.run_up[measure.run_up.name]
+    if measure.function != "at":
+        return float({"max": np.nanmax, "min": np.nanmin}[measure.function](table["run_up"]))
+    along = next(values for key, values in table.items() if key in ("angle", "distance"))
+    gap = np.abs(along - measure.run_up.place)
+    gap = np.minimum(gap, 360.0 - gap) if "angle" in table else gap
+    return float(table["run_up"][int(np.argmin(gap))])
 
 
 def extreme(row: Row, run: Any) -> float:
@@ -143,6 +158,12 @@ def lines_of(row: Row, run: Any) -> dict[str, np.ndarray]:
         computed = np.column_stack([run.seconds, shown.from_si(run.si(measure.probe.text))])[inside]
         name = "exact" if series is None else "measured"
         return {name: np.column_stack([pair.t, shown.from_si(pair.measured)]), "computed": computed}
+    if measure.run_up is not None:
+        table = run.run_up[measure.run_up.name]
+        along = next(values for key, values in table.items() if key in ("angle", "distance"))
+        return {"computed": np.column_stack([along, table["run_up"]])} | {
+            name: curve_of(run.case.folder / file) for name, file in row.curves.items()
+        }
     if measure.function != PROFILE:
         return {}
     basin, quantity = measure.field
@@ -151,6 +172,13 @@ def lines_of(row: Row, run: Any) -> dict[str, np.ndarray]:
     exact = exact_field(run, x[line], quantity)
     computed = end_field(run.last_frame[basin], quantity)[line]
     return {"exact": np.column_stack([x[line], exact]), "computed": np.column_stack([x[line], computed])}
+
+
+def curve_of(path: Path) -> np.ndarray:
+    """Places and values of a CSV file with two columns, by rising places : float64[n, 2]."""
+    rows = read_rows(path)
+    table = np.column_stack([rows.plain(0), rows.plain(1)])
+    return table[np.argsort(table[:, 0])]
 
 
 def profile_error(run: Any, field: tuple[str, str]) -> float:
@@ -191,7 +219,7 @@ def end_field(frame: Mapping[str, np.ndarray], quantity: str) -> np.ndarray:
 def shown_in(row: Row, case: Any) -> UnitColumn:
     """Unit in which tables show the values of a row: that of `[output]`; none for a ratio."""
     measure = row.measure
-    target = measure.probe or measure.extent
+    target = measure.probe or measure.extent or measure.run_up
     if target is None or measure.function in ERRORS:
         return UnitColumn("", "number", "")
     if measure.function == CROSSING:

@@ -100,6 +100,8 @@ def panels_of(result: ValidationResult) -> list[LinePanel]:
                 "CPU time [s]; error of the end state",
                 True,
             )
+        elif measure.run_up is not None:
+            title, label, logarithmic = f"run-up {measure.run_up.name} [m]", "angle [deg] or distance [m]", False
         elif measure.field is not None:
             title, label, logarithmic = f"{'.'.join(measure.field)} [SI]", "x [m]", False
         else:
