@@ -10,7 +10,9 @@ Three rules make a site of the pages of the repository, so that no text is store
 
 import os
 import re
+import shutil
 import sys
+import tempfile
 from pathlib import Path
 
 import latex2mathml.converter
@@ -21,6 +23,10 @@ sys.path.insert(0, str(DOCS))  # for generated_pages
 from generated_pages import GENERATED  # noqa: E402
 
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])  # tutorials run `fvsolve`
+os.environ["IPYTHONDIR"] = tempfile.mkdtemp(prefix="fvsolve-site-")
+PROFILE = Path(os.environ["IPYTHONDIR"], "profile_default", "startup")
+PROFILE.mkdir(parents=True)
+shutil.copy(DOCS / "kernel_start.py", PROFILE)
 
 project = author = "fvsolve"
 project_copyright = "fvsolve maintainers"
@@ -99,12 +105,12 @@ def target(link: str, folder: Path, page: str) -> str:
 
 
 def shell_cells(app, document) -> None:
-    """Show shell cells of tutorials as shell commands, without their first line `%%sh -e`."""
+    """Show the cells of tutorials whose lines begin with `!` as shell commands."""
     for block in document.findall(nodes.literal_block):
-        first, _, commands = block.astext().partition("\n")
-        if first.startswith("%%sh"):
-            block.children = [nodes.Text(commands)]
-            block.rawsource, block["language"] = commands, "sh"
+        lines = block.astext().splitlines()
+        if lines and all(line.startswith("!") for line in lines):
+            block.rawsource = "\n".join(line[1:] for line in lines)
+            block.children, block["language"] = [nodes.Text(block.rawsource)], "sh"
 
 
 def formula(display: str, before: str = "", after: str = ""):
@@ -120,5 +126,6 @@ def formula(display: str, before: str = "", after: str = ""):
 def setup(app) -> None:
     app.connect("source-read", read_page)
     app.connect("doctree-read", shell_cells)
+    app.connect("build-finished", lambda *_: shutil.rmtree(os.environ["IPYTHONDIR"], ignore_errors=True))
     block = formula("block", '<div class="formula">', "</div>\n")
     app.add_html_math_renderer("mathml", (formula("inline"), None), (block, None))

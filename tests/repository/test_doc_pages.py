@@ -1,7 +1,7 @@
 """Pages of the documentation: their files, names, links, commands, Python and output are as they state.
 
-The pages are docs/start, docs/how-to, CONTRIBUTING.md, docs/developing.md, docs/attitudes.md, and docs/course.md,
-which covers the course.
+The pages are docs/index.md, docs/start, docs/how-to, CONTRIBUTING.md, docs/developing.md, docs/attitudes.md, and
+docs/course.md, which covers the course.
 """
 
 import ast
@@ -36,6 +36,7 @@ def test_every_file_of_tests_that_is_named_is_there():
 
 HOW_TO_PAGES = sorted(path for path in (DOCS / "how-to").glob("*.md") if path.stem != "index")
 START = DOCS / "start"
+RUN_PAGES = [*HOW_TO_PAGES, START / "first-questions.md", DOCS / "index.md"]
 BLOCK = re.compile(r"^```(\w*)[ ]?(\S*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 LIBRARIES = {"epanet-to-report": ("wntr", "plotly", "xlsxwriter"), "plastic-main": ("rainflow",)}  # optional libraries
 FAILS = (0, 1)  # exit status 1: some pages show a limit that fails
@@ -51,7 +52,7 @@ def test_every_page_is_in_the_index():
     assert linked == {path.stem for path in HOW_TO_PAGES} and len(HOW_TO_PAGES) == 6
 
 
-@pytest.mark.parametrize("page", [*HOW_TO_PAGES, START / "first-questions.md"], ids=lambda path: path.stem)
+@pytest.mark.parametrize("page", RUN_PAGES, ids=lambda path: path.stem)
 def test_a_page_does_what_it_says(page, fvs, tmp_path, monkeypatch):
     """Append blocks with a file name to the file, run the commands in order, and compare their output with the page."""
     for library in LIBRARIES.get(page.stem, ()):
