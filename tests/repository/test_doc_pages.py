@@ -1,7 +1,7 @@
 """Pages of the documentation: their files, names, links, commands, Python and output are as they state.
 
-The pages are docs/how-to, CONTRIBUTING.md, docs/developing.md, docs/attitudes.md, and docs/course.md, which covers the
-course.
+The pages are docs/index.md, docs/start, docs/how-to, CONTRIBUTING.md, docs/developing.md, docs/attitudes.md, and
+docs/course.md, which covers the course.
 """
 
 import ast
@@ -35,6 +35,8 @@ def test_every_file_of_tests_that_is_named_is_there():
 
 
 HOW_TO_PAGES = sorted(path for path in (DOCS / "how-to").glob("*.md") if path.stem != "index")
+START = DOCS / "start"
+RUN_PAGES = [*HOW_TO_PAGES, START / "first-questions.md", DOCS / "index.md"]
 BLOCK = re.compile(r"^```(\w*)[ ]?(\S*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 LIBRARIES = {"epanet-to-report": ("wntr", "plotly", "xlsxwriter"), "plastic-main": ("rainflow",)}  # optional libraries
 FAILS = (0, 1)  # exit status 1: some pages show a limit that fails
@@ -46,11 +48,11 @@ def plain(text: str) -> str:
 
 
 def test_every_page_is_in_the_index():
-    linked = set(re.findall(r"\((\S+)\.md\)", (DOCS / "how-to/index.md").read_text(encoding="utf-8")))
+    linked = set(re.findall(r"\(([\w-]+)\.md\)", (DOCS / "how-to/index.md").read_text(encoding="utf-8")))
     assert linked == {path.stem for path in HOW_TO_PAGES} and len(HOW_TO_PAGES) == 6
 
 
-@pytest.mark.parametrize("page", HOW_TO_PAGES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("page", RUN_PAGES, ids=lambda path: path.stem)
 def test_a_page_does_what_it_says(page, fvs, tmp_path, monkeypatch):
     """Append blocks with a file name to the file, run the commands in order, and compare their output with the page."""
     for library in LIBRARIES.get(page.stem, ()):
@@ -72,6 +74,13 @@ def test_a_page_does_what_it_says(page, fvs, tmp_path, monkeypatch):
             for line in text.splitlines():
                 assert plain(line) in said, line
     assert shown
+
+
+def test_the_first_page_has_the_command_of_the_readme_and_its_output():
+    """README's commands run in a fresh clone; the first page of the site shows the first of them."""
+    texts = [path.read_text(encoding="utf-8") for path in (START / "index.md", TOP / "README.md")]
+    (ours, shown), (readme, output) = [[text for *_, text in BLOCK.findall(one)[:2]] for one in texts]
+    assert ours == readme and shown == output
 
 
 CONTRIBUTOR_PAGES = {
@@ -133,7 +142,11 @@ def test_two_tanks_without_jit_are_the_same_bytes(beside):
 def test_files_and_names_of_the_pages_are_there(page):
     """Each `.py` or `.json` file in backquotes is the end of a path, except summary.json, which a run writes."""
     text = re.sub(r"```.*?```", "", CONTRIBUTOR_PAGES[page], flags=re.DOTALL)
-    there = [f"/{path.as_posix()}" for folder in ("fvsolve", "tests", "cases") for path in (TOP / folder).rglob("*.*")]
+    there = [
+        f"/{path.as_posix()}"
+        for folder in ("fvsolve", "tests", "cases", "docs")
+        for path in (TOP / folder).rglob("*.*")
+    ]
     said = {*re.findall(r"`([\w/]+\.(?:py|json))`", text)} - {"summary.json"}
     assert [name for name in said if "NAME" not in name and not any(one.endswith(f"/{name}") for one in there)] == []
 

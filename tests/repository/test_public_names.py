@@ -103,7 +103,16 @@ def test_the_package_refuses_an_older_python():
     assert "numba" not in found.stderr
 
 
-@pytest.mark.skipif(not (TOP / ".ci/run").exists() or os.name == "nt", reason="no .ci/run here")
+NO_CI = pytest.mark.skipif(not (TOP / ".ci/run").exists() or os.name == "nt", reason="no .ci/run here")
+
+
+@NO_CI
+def test_ci_refuses_an_unknown_option():
+    found = subprocess.run([TOP / ".ci/run", "--sites"], capture_output=True, text=True)
+    assert found.returncode == 2 and "unknown option --sites; expected --site" in found.stdout
+
+
+@NO_CI
 def test_ci_refuses_an_older_python(tmp_path):
     older = tmp_path / "python3.10"
     older.write_text('#!/bin/sh\nif [ "$1" = --version ]; then echo Python 3.10.13; else exit 1; fi\n')

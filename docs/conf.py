@@ -1,0 +1,131 @@
+"""Settings of the site: `sphinx-build -W -n --keep-going docs build/site`, with the extra `docs`.
+
+The site needs no network: formulas become MathML in the pages; fonts, styles and search are files of the site.
+Three rules make a site of the pages of the repository, so that no text is stored twice:
+
+- `<!-- page: PATH -->` on a page stands for a Markdown file outside docs, such as benchmarks/README.md.
+- `<!-- generated: NAME -->` stands for the text of `generated_pages.GENERATED[NAME]`.
+- The pages that the tables of an `index.md` link, in this order, are the contents of its section.
+"""
+
+import os
+import re
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import latex2mathml.converter
+from docutils import nodes
+
+DOCS = Path(__file__).parent
+sys.path.insert(0, str(DOCS))  # for generated_pages
+from generated_pages import GENERATED  # noqa: E402
+
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])  # tutorials run `fvsolve`
+os.environ["IPYTHONDIR"] = tempfile.mkdtemp(prefix="fvsolve-site-")
+PROFILE = Path(os.environ["IPYTHONDIR"], "profile_default", "startup")
+PROFILE.mkdir(parents=True)
+shutil.copy(DOCS / "kernel_start.py", PROFILE)
+
+project = author = "fvsolve"
+project_copyright = "fvsolve maintainers"
+extensions = ["myst_nb", "sphinx_copybutton"]
+exclude_patterns = ["**/.*"]
+smartquotes = False
+highlight_language = "none"  # of blocks without a language: formulas and output
+myst_enable_extensions = ["colon_fence", "dollarmath"]
+myst_heading_anchors = 6  # links such as results.md#fields
+nb_execution_mode = "cache"
+nb_execution_timeout = 60  # seconds for a cell
+nb_execution_raise_on_error = True
+nb_execution_in_temp = nb_execution_show_tb = True
+nb_merge_streams = True
+nitpick_ignore_regex = [("py:.*", ".*")]  # default values in signatures
+
+html_theme = "pydata_sphinx_theme"
+html_title = "fvsolve"
+html_math_renderer = "mathml"
+html_static_path = ["site.css"]
+html_css_files = ["site.css"]
+html_copy_source = html_show_sourcelink = False
+html_sidebars = {"index": []}
+html_context = {"default_mode": "auto"}  # light or dark as the system
+html_theme_options = {
+    "header_links_before_dropdown": 7,
+    "navigation_with_keys": False,
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "secondary_sidebar_items": ["page-toc"],
+    "pygments_light_style": "default",
+    "pygments_dark_style": "github-dark",
+}
+
+NAMED = re.compile(r"\[([\w-]+)\.md\]\(")  # a link whose text is the name of its file
+LINK = re.compile(r"(?<=\]\()([^)\s:#]+)(#[^)\s]*)?(?=\))")
+ELSEWHERE = re.compile(r"<!-- page: (\S+) -->\n.*", re.DOTALL)
+MARK = re.compile(r"<!-- generated: (\S+) -->\n")
+
+
+def pages_outside() -> dict[Path, str]:
+    """Markdown files outside docs that are pages of the site : file -> name of the page."""
+    found = {}
+    for path in DOCS.rglob("*.md"):
+        if mark := ELSEWHERE.search(path.read_text(encoding="utf-8")):
+            found[(path.parent / mark[1]).resolve()] = path.relative_to(DOCS).with_suffix("").as_posix()
+    return found
+
+
+OUTSIDE = pages_outside()
+
+
+def read_page(app, page: str, source: list[str]) -> None:
+    """Replace the marks of a page, point its links to pages of the site or to files, and add its contents."""
+    file, text = DOCS / f"{page}.md", source[0]
+    if mark := ELSEWHERE.search(text):
+        file = (file.parent / mark[1]).resolve()
+        text = ELSEWHERE.sub("", text) + file.read_text(encoding="utf-8")
+        app.env.note_dependency(str(file))
+    text = MARK.sub(lambda mark: GENERATED[mark[1]](), text)
+    text = LINK.sub(lambda link: target(link[1], file.parent, page) + (link[2] or ""), text)
+    text = NAMED.sub(r"[\1](", text)
+    if file.name == "index.md":
+        rows = "\n".join(line for line in text.splitlines() if line.startswith("|"))
+        linked = dict.fromkeys(name for name, heading in LINK.findall(rows) if name.endswith(".md") and not heading)
+        text += "\n```{toctree}\n:hidden:\n\n" + "\n".join(linked) + "\n```\n"
+    source[0] = text
+
+
+def target(link: str, folder: Path, page: str) -> str:
+    """Path from a page of the site to the page or file that a link in a file of `folder` names."""
+    path = (folder / link).resolve()
+    if path in OUTSIDE:
+        path = DOCS / f"{OUTSIDE[path]}.md"
+    return os.path.relpath(path, (DOCS / page).parent).replace(os.sep, "/") if path.exists() else link
+
+
+def shell_cells(app, document) -> None:
+    """Show the cells of tutorials whose lines begin with `!` as shell commands."""
+    for block in document.findall(nodes.literal_block):
+        lines = block.astext().splitlines()
+        if lines and all(line.startswith("!") for line in lines):
+            block.rawsource = "\n".join(line[1:] for line in lines)
+            block.children, block["language"] = [nodes.Text(block.rawsource)], "sh"
+
+
+def formula(display: str, before: str = "", after: str = ""):
+    """Visitor of formula nodes, which writes them as MathML."""
+
+    def visit(writer, node) -> None:
+        writer.body.append(before + latex2mathml.converter.convert(node.astext(), display=display) + after)
+        raise nodes.SkipNode
+
+    return visit
+
+
+def setup(app) -> None:
+    app.connect("source-read", read_page)
+    app.connect("doctree-read", shell_cells)
+    app.connect("build-finished", lambda *_: shutil.rmtree(os.environ["IPYTHONDIR"], ignore_errors=True))
+    block = formula("block", '<div class="formula">', "</div>\n")
+    app.add_html_math_renderer("mathml", (formula("inline"), None), (block, None))

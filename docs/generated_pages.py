@@ -1,0 +1,129 @@
+"""Reference pages made from the program: commands with their options, units, public names with their docstrings."""
+
+import inspect
+import re
+from importlib import import_module
+from pathlib import Path
+
+import fvsolve
+import fvsolve.steppers
+import fvsolve.studies
+from fvsolve.units import DIMENSIONS, NEAR_MISSES, UNITS, Unit
+
+PYTHON_PAGE = (Path(__file__).parent / "python.md").read_text(encoding="utf-8")
+ARGUMENT = re.compile(r"([^\s,]+(?:, [^\s,]+)*) : ")  # beginning of a line of a docstring about arguments or fields
+CODE = re.compile(r"(`[^`]*`)")
+
+
+def commands() -> str:
+    """Sections of all commands: usage, purpose, arguments and options, from the application itself."""
+    from typer.main import get_command
+
+    from fvsolve.cli import application
+
+    group = get_command(application())
+    with group.context_class(group, info_name="fvsolve") as top:
+        return "\n".join(command_section(group.get_command(top, name), name, top) for name in group.list_commands(top))
+
+
+def command_section(command, name: str, top) -> str:
+    """Section of a command; `top` : context of the application."""
+    with command.context_class(command, info_name=name, parent=top) as context:
+        usage = " ".join(["fvsolve", name, *command.collect_usage_pieces(context)])
+        records = filter(None, (one.get_help_record(context) for one in command.get_params(context)))
+        rows = [(f"`{names}`", text) for names, text in records if names != "--help"]
+    options = table(("argument or option", "meaning"), rows) if rows else ""
+    return f"## fvsolve {name}\n\n```text\n{usage}\n```\n\n{prose(command.help)}\n\n{options}"
+
+
+def units() -> str:
+    """Tables of the quantities of a case file, with all their units, and of the spellings that are refused."""
+    rows = {}  # by words, because some dimensions differ only in their use
+    for name, one in DIMENSIONS.items():
+        own = ", ".join(f"`{unit}` {size(found)}" for unit, found in UNITS.items() if found.dimension == name)
+        as_other = f"those of {DIMENSIONS[one.base].words}" if one.base else own
+        rows.setdefault(one.words, (one.words, f"`{one.si}`", f'`"{one.example}"`', as_other))
+    refused = [(f"`{given}`", f"`{proposal}`") for given, proposal in NEAR_MISSES.items() if proposal]
+    return (
+        "## Units of each quantity\n\n"
+        f"{table(('quantity', 'SI', 'example', 'units, with their size in SI'), rows.values())}\n"
+        f"## Spellings that are refused\n\n{table(('spelling', 'proposal of the message'), refused)}"
+    )
+
+
+def size(unit: Unit) -> str:
+    """Size of a unit in SI; of a unit with an offset, the formula of a number in it."""
+    factor = f"{unit.numerator / unit.denominator:.10g}"
+    return f"(number + {unit.offset:g}) × {factor}" if unit.offset else factor + " gauge" * unit.gauge
+
+
+def names() -> str:
+    """Sections of all public names: those of `fvsolve`, and those of studies and of methods that python.md names."""
+    said = {*re.findall(r"`(\w+)[`(]", PYTHON_PAGE)} - {*fvsolve.__all__}
+    studies = sorted(said & {*fvsolve.studies.__all__})
+    steppers = sorted((said & {*fvsolve.steppers.__all__}) - {*studies})
+    modules = {"fvsolve": fvsolve.__all__, "fvsolve.studies": studies, "fvsolve.steppers": steppers}
+    return "\n".join(
+        f"## {module}\n\n" + "".join(entry(module, one) for one in all_) for module, all_ in modules.items()
+    )
+
+
+def entry(module: str, name: str) -> str:
+    """Directive of a public name; a class contains its members that python.md names."""
+    found, text = getattr(import_module(module), name), ""
+    if not inspect.isclass(found):
+        return directive("function", f"{module}.{name}{arguments(found)}", docstring(found, f"{module}.{name}"))
+    for member in dict.fromkeys(re.findall(r"[.`](\w+)", PYTHON_PAGE)):
+        value = vars(found).get(member)
+        kind = "method" if inspect.isfunction(value) else "property"
+        if inspect.isfunction(value) or isinstance(value, property) or hasattr(value, "func"):
+            head = member + (arguments(value) if kind == "method" else "")
+            text += directive(kind, head, docstring(value, f"{name}.{member}"))
+    kind = "exception" if issubclass(found, Exception) else "class"
+    return directive(kind, f"{module}.{name}", f"{docstring(found, f'{module}.{name}')}\n\n{text}", "::::")
+
+
+def directive(kind: str, head: str, text: str, fence: str = ":::") -> str:
+    return f"{fence}{{py:{kind}}} {head}\n{text}\n{fence}\n\n"
+
+
+def arguments(found) -> str:
+    """Arguments of a function with their default values, without types and without `self`."""
+    given = inspect.signature(found)
+    kept = [one.replace(annotation=one.empty) for key, one in given.parameters.items() if key != "self"]
+    return str(given.replace(parameters=kept, return_annotation=given.empty))
+
+
+def docstring(found, name: str) -> str:
+    """Docstring as Markdown. Raises ValueError for a public name without docstring."""
+    if not (text := inspect.getdoc(found)):
+        raise ValueError(f"{name} has no docstring. Expected a sentence, because the site lists all public names")
+    return prose(text)
+
+
+def prose(text: str) -> str:
+    """Text of a docstring as Markdown. A line `NAME : TEXT` begins an item of a list."""
+    lines: list[str] = []
+    inside = False
+    for line in inspect.cleandoc(text).splitlines():
+        if found := ARGUMENT.match(line):
+            line = f"{'' if inside else chr(10)}- {found[1]}: {line[found.end() :]}"
+        elif inside and line:
+            line = f"\n{line}" if line[0].isupper() else f"  {line}"
+        inside = line.lstrip("\n").startswith(("- ", "  "))
+        lines.append(line)
+    return escaped("\n".join(lines))
+
+
+def escaped(text: str) -> str:
+    """Text in which characters with a meaning in Markdown, outside of code, stand for themselves."""
+    return "".join(one if one.startswith("`") else re.sub(r"[*<$|]", r"\\\g<0>", one) for one in CODE.split(text))
+
+
+def table(head, rows) -> str:
+    """Markdown table."""
+    lines = (" | ".join(escaped(cell) for cell in cells) for cells in (head, ("---",) * len(head), *rows))
+    return "".join(f"| {line} |\n" for line in lines)
+
+
+GENERATED = {"commands": commands, "units": units, "names": names}
