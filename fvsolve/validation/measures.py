@@ -161,6 +161,8 @@ def lines_of(row: Row, run: Any) -> dict[str, np.ndarray]:
     if measure.run_up is not None:
         table = run.run_up[measure.run_up.name]
         along = next(values for key, values in table.items() if key in ("angle", "distance"))
+        if len(along) == 1:
+            return {}
         return {"computed": np.column_stack([along, table["run_up"]])} | {
             name: curve_of(run.case.folder / file) for name, file in row.curves.items()
         }

@@ -10,9 +10,7 @@ import fvsolve
 
 wntr = pytest.importorskip("wntr", reason="WNTR, the extra `epanet`, is not installed")
 
-from reference import epanet_day  # noqa: E402
-
-from fvsolve.epanet import import_network  # noqa: E402
+from fvsolve.epanet import import_network, toolkit_run  # noqa: E402
 
 SHIPPED = Path(wntr.__file__).parent / "library" / "networks"
 SAME, SOON = 1e-3, 2.0  # levels [m] and times of switches [s] agree to within these
@@ -43,7 +41,7 @@ def in_order(switches):
 def agree(path, imported, run, links, step=2, scheduled=()):
     """Assert that levels and switches agree with EPANET; scheduled : links that switch by the time alone"""
     network = wntr.network.WaterNetworkModel(str(path))
-    day = epanet_day.run(path, list(network.tank_name_list), list(links), step, round(run.t[-1]))
+    day = toolkit_run.run(path, list(network.tank_name_list), list(links), step, round(run.t[-1]))
     for tank in network.tank_name_list:
         place = imported.nodes[tank]
         level = run[f"nodes.{place}.level"]

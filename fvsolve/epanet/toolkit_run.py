@@ -1,7 +1,6 @@
 """EPANET 2.2 over a day with short steps: levels of tanks and switches of links, step by step by its toolkit."""
 
 import ctypes
-import sys
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
@@ -59,22 +58,3 @@ def run(path: Path, tanks: list[str], links: list[str], step: int = 2, end: int 
         own = np.array([state[k] for state in states])
         switches += [(times[i + 1], name, bool(own[i + 1])) for i in np.flatnonzero(own[1:] != own[:-1])]
     return Day(np.array(times), dict(zip(tanks, levels.T, strict=True)), sorted(switches))
-
-
-if __name__ == "__main__":  # errors of EPANET's own steps: python tests/reference/epanet_day.py
-    import time
-
-    import wntr
-
-    folder = Path(wntr.__file__).parent / "library" / "networks"
-    for name in sys.argv[1:] or ("Net1", "Net2", "Net3"):
-        own = list(wntr.network.WaterNetworkModel(str(folder / f"{name}.inp")).tank_name_list)
-        exact = run(folder / f"{name}.inp", own, [], 1)
-        for step in (3600, 600, 60, 10, 2):
-            before = time.process_time()
-            found = run(folder / f"{name}.inp", own, [], step)
-            cpu, common = time.process_time() - before, np.isin(exact.time, found.time)
-            worst = max(
-                float(np.abs(found.level(tank, exact.time[common]) - exact.levels[tank][common]).max()) for tank in own
-            )
-            print(f"{name} {step} s: {1e3 * worst:.3g} mm, {cpu:.2f} s")
