@@ -33,5 +33,5 @@ _MODULES = {
     "vary": "model",
 }
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = lazy_names(__name__, _MODULES)  # noqa: PLE0605

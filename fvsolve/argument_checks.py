@@ -6,12 +6,14 @@ import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral, Real
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.units import show
+
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 class Kind(NamedTuple):
@@ -23,7 +25,7 @@ class Kind(NamedTuple):
 
 def is_number(value: Any) -> bool:
     """True if the argument is a finite real number and not a bool."""
-    return isinstance(value, Real) and not isinstance(value, (bool, np.bool_)) and math.isfinite(value)
+    return not isinstance(value, (bool, np.bool_)) and isinstance(value, Real) and math.isfinite(value)
 
 
 def is_row(value: Any, holds: Callable[[Any], bool]) -> bool:
@@ -78,18 +80,18 @@ NAME = Kind(is_name, "a name")
 NAMES = Kind(lambda value: is_name(value) or is_row(value, is_name), "a name or a list of names")
 
 
-def validated(**kinds: Kind) -> Callable:
+def validated(**kinds: Kind) -> Callable[[Function], Function]:
     """Decorate a function so that it checks its arguments, and raises FvsolveError for an invalid argument.
 
     kinds : name of an argument -> `Kind` that it must have; its default value is also valid
     """
 
-    def decorate(function: Callable) -> Callable:
+    def decorate(function: Function) -> Function:
         signature = inspect.signature(function)
         order, defaults = [*signature.parameters], {name: p.default for name, p in signature.parameters.items()}
 
         @functools.wraps(function)
-        def checked(*arguments, **keywords):
+        def checked(*arguments: Any, **keywords: Any) -> Any:
             if len(arguments) > len(order) or not keywords.keys() <= defaults.keys():
                 signature.bind(*arguments, **keywords)  # raises a TypeError with the reason
             for name, value in (*zip(order, arguments, strict=False), *keywords.items()):
@@ -99,6 +101,6 @@ def validated(**kinds: Kind) -> Callable:
                     raise FvsolveError(f"{text}; expected {kind.expected}")
             return function(*arguments, **keywords)
 
-        return checked
+        return cast(Function, checked)
 
     return decorate

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 LONGEST_NAME = 200  # length of a name above which it is not compared with others
 # Control characters, direction marks, line ends other than "\n", halves of surrogate pairs.
@@ -49,7 +50,7 @@ class Notice:
     def __str__(self) -> str:
         return self.text
 
-    def plain(self) -> dict:
+    def plain(self) -> dict[str, Any]:
         """Fields of the notice as a dictionary, for JSON."""
         return {"kind": self.kind, "place": self.place, "key": self.key, "value": self.value, "limit": self.limit,
                 "ok": self.ok, "text": self.text}  # fmt: skip

@@ -64,7 +64,6 @@ def full_schema() -> dict[str, Any]:
         "type": "object",
         "properties": properties,
         "anyOf": [
-            {"required": ["validation"], "not": {"required": ["numerics"]}},
             {"required": ["numerics", "fluid", "nodes"]},
             {
                 "required": ["numerics", "nodes", "links"],
@@ -76,6 +75,7 @@ def full_schema() -> dict[str, Any]:
                 "required": ["numerics", "controls"],
                 "not": {"anyOf": [{"required": ["nodes"]}, {"required": ["links"]}]},
             },
+            {"required": ["validation"]},  # the rest is that of another case, or of a program
         ],  # fmt: skip
         "if": {
             "required": ["nodes"],

@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,10 @@ REMEDY = (
     "PyVista found no OpenGL library to draw without a screen; on Debian or Ubuntu "
     "run `apt install libegl1 libgl1-mesa-dri`, or `apt install libosmesa6`"
 )
+NO_PYVISTA = (
+    "PyVista draws basins and bodies, and it cannot be imported ({}). Install it: pip install pyvista. "
+    "The run directory is complete without it; ParaView opens its fields.pvd"
+)
 ANIMATION_FORMATS = "a .gif needs no extra package; .mp4 needs imageio with ffmpeg: pip install imageio imageio-ffmpeg"
 
 
@@ -22,7 +27,7 @@ def view(scene: DrawnScene, out: Path) -> None:
     Matplotlib draws networks in this process. PyVista draws basins and bodies in a second process, because VTK ends its
     process without an OpenGL library.
     Raises FvsolveError for an unknown field, for an animation in a file that is not a .gif or .mp4, for an .mp4 without
-    the packages that write it, and for a picture that cannot be drawn.
+    the packages that write it, without PyVista if it is needed, and for a picture that cannot be drawn.
     """
     animated = len(scene.frames) > 1
     if animated and out.suffix not in (".gif", ".mp4"):
@@ -49,6 +54,8 @@ def _draw_in_process(scene: DrawnScene, out: Path) -> None:
     done = subprocess.run([sys.executable, "-m", "fvsolve.draw.field_canvas"], env=environment, input=request,
                           capture_output=True)  # fmt: skip
     output = done.stderr.decode(errors="replace")
+    if lost := re.search(r"No module named '(?:pyvista|vtk).*'", output):
+        raise FvsolveError(NO_PYVISTA.format(lost[0]))
     if done.returncode < 0 or "OSMesa" in output or "EGL" in output:
         raise FvsolveError(REMEDY)
     if done.returncode:

@@ -168,7 +168,7 @@ def changed_links(before: Case, case: Case) -> list[str] | None:
     return changed if all(type(case.links[name]) is type(before.links[name]) for name in changed) else None
 
 
-def build(case) -> Model:
+def build(case: Case) -> Model:
     """Build the model of a case, with its initial steady state.
 
     Raises CaseError if the case has faults in its model, for example no steady state: a frictionless pipe between

@@ -24,11 +24,15 @@ from fvsolve.model.scalar_tables import node_values, pipe_values
 from fvsolve.units import DIMENSIONS, show
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from fvsolve.assembly.model_draft import PipeMesh
     from fvsolve.assembly.state_names import StateNames
     from fvsolve.basins.lower_basin import BasinRows
     from fvsolve.case import Case
     from fvsolve.case.probe import Probe
+    from fvsolve.kernels.compiled_functions import Functions
+    from fvsolve.steppers.structure import Structure
 
 
 @dataclass(repr=False)
@@ -226,7 +230,7 @@ class Model(Displayable):
         return addresses_of(self.tables)
 
     @cached_property
-    def functions(self):
+    def functions(self) -> Functions:
         """Compiled functions (`kernels.compiled_functions.Functions`) for the density law and parts of this model."""
         from fvsolve.basins.basin_terms import terms_of_basins, terms_of_scalars
         from fvsolve.kernels.compiled_functions import functions
@@ -256,12 +260,12 @@ class Model(Displayable):
         return bool(self.tables.basins["damped"].any())
 
     @property
-    def layout(self):
+    def layout(self) -> np.void:
         """Record of offsets in `out`, the array that the right-hand side writes in addition to dydt."""
         return self.tables.layout[0]
 
     @cached_property
-    def structure(self):
+    def structure(self) -> Structure:
         """Sparsity pattern of the Jacobian, with the linear algebra chosen for it or by `numerics.linear_algebra`."""
         from fvsolve.model.jacobian_pattern import jacobian_pattern, lumped_states
         from fvsolve.steppers.structure import Structure
@@ -389,7 +393,7 @@ class Model(Displayable):
                                f"the pipe, and a pipe number less than {len(self.pipes)}")  # fmt: skip
         return self.case.law.cell_pressure(self.tables.pipes[k], self.profiles[k], self.tables.profile, waves)
 
-    def head(self, pressure: np.ndarray, elevation) -> np.ndarray:
+    def head(self, pressure: ArrayLike, elevation: ArrayLike) -> np.ndarray:
         """Head [m] of the case's fluid above datum: 0 at ambient pressure and datum level."""
         pressure, elevation = as_numbers("pressure", pressure), as_numbers("elevation", elevation)
         return self.case.law.head(pressure, elevation)

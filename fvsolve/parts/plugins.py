@@ -20,7 +20,7 @@ PLUGIN_PACKAGE = "fvsolve_parts"  # package in which registered folders appear
 
 
 @validated(folder=PATH)
-def register_part(folder: str | os.PathLike) -> None:
+def register_part(folder: str | os.PathLike[str]) -> None:
     """Register the part in a folder: `part.py`, and `lower.py` and `law.py` if the part has a compiled law.
 
     Modules of the folder use relative imports. Their sources belong to the key of the compilation cache, so they are

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from fvsolve.argument_checks import COUNT_FROM_ONE, FLAG, FUNCTION, PATH, TABLE, validated
 from fvsolve.draw.plot_process import Picture, PlotProcess
@@ -18,13 +19,17 @@ from fvsolve.run import mpi_run
 from fvsolve.run.result import Result, check_summary
 from fvsolve.run.verdicts import claims
 
+if TYPE_CHECKING:
+    from fvsolve.case import Case
+    from fvsolve.model import Model
+
 __all__ = ["Result", "open_run", "run"]
 
 
 @validated(set=TABLE, out=PATH, force=FLAG, resume=FLAG, progress=FUNCTION, threads=COUNT_FROM_ONE, pictures=FLAG)
 def run(
-    case,
-    set: Mapping | None = None,
+    case: "str | Path | Mapping[str, Any] | Case | Model",
+    set: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
     force: bool = False,
     resume: bool = False,

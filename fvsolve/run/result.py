@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean, listing
 from fvsolve.output.fields import read_series
 from fvsolve.output.unit_columns import UnitColumn
 from fvsolve.units import show
+
+if TYPE_CHECKING:
+    from fvsolve.case import Case
 
 KINDS_WITH_FIELDS = frozenset(("pipe", "basin", "body"))  # kinds of parts that frames show
 
@@ -199,7 +202,7 @@ class Result(Displayable):
         return [Comparison(**row) for row in self.summary["comparisons"]]
 
     @cached_property
-    def case(self):
+    def case(self) -> "Case":
         """Case of the run, with all defaults filled in; read from the run directory if necessary."""
         from fvsolve.case import load
 
@@ -272,7 +275,7 @@ class Result(Displayable):
             raise FvsolveError(f"no probe {show(probe)}{did_you_mean(str(probe), self.units)}; see Result.probes")
         return probe
 
-    def frame(self):
+    def frame(self) -> Any:
         """Table as a pandas DataFrame, time as index. Raises FvsolveError if pandas is not installed."""
         try:
             import pandas
@@ -283,7 +286,7 @@ class Result(Displayable):
         return pandas.DataFrame(self._table[:, 1:].copy(), index=index, columns=headers)
 
     @validated(path=PATH)
-    def plot(self, path=None):
+    def plot(self, path: str | Path | None = None) -> Any:
         """Figure (matplotlib) of the probes over time, also written to `path` if given."""
         from fvsolve.draw.plot import history_figure
 
@@ -301,7 +304,7 @@ class Result(Displayable):
         }  # fmt: skip
 
     @validated(path=PATH)
-    def plot_envelope(self, path=None):
+    def plot_envelope(self, path: str | Path | None = None) -> Any:
         """Figure (matplotlib) of least and greatest head along the pipes, also written to `path` if given."""
         from fvsolve.draw.plot import envelope_figure
 
@@ -329,7 +332,9 @@ class Result(Displayable):
         return {"columns": self.run_up[name], "name": name, "title": self.summary["title"]}
 
     @validated(time=NUMBER, field=TEXT, path=PATH, contours=COUNT_FROM_ZERO)
-    def view(self, time: float | None = None, field: str | None = None, path=None, contours: int = 0) -> Path:
+    def view(
+        self, time: float | None = None, field: str | None = None, path: str | Path | None = None, contours: int = 0
+    ) -> Path:
         """Draw the quantity `field` at the frame nearest to `time` [s] (default: last); return the path of the picture.
 
         Matplotlib draws cases without basins and bodies, PyVista draws the others.
@@ -345,7 +350,7 @@ class Result(Displayable):
         return self._draw([t], field, path, ".png", contours)
 
     @validated(path=PATH, field=TEXT, contours=COUNT_FROM_ZERO)
-    def animate(self, path=None, field: str | None = None, contours: int = 0) -> Path:
+    def animate(self, path: str | Path | None = None, field: str | None = None, contours: int = 0) -> Path:
         """Draw all frames as `view` does into an animation, a .gif or .mp4 file; return the path."""
         return self._draw(list(dict.fromkeys(t for t, _ in self._frames())), field, path, ".gif", contours)
 

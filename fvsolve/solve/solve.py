@@ -1,6 +1,8 @@
 """Run of a model from its start to its end, in segments between jumps and kinks of schedules."""
 
 import time
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -36,7 +38,10 @@ def initial_state(model: Model) -> State:
     return State(model.case.numerics.start, model.start.copy())
 
 
-def solve(model: Model, state: State, sink, progress=None, threads: int = 1, comm=None) -> Summary:
+def solve(
+    model: Model, state: State, sink: Any, progress: Callable[[float, float, int], None] | None = None,
+    threads: int = 1, comm: Any = None,
+) -> Summary:  # fmt: skip
     """Run a model from `state` to the end time of its case; returns the summary of the run.
 
     sink : object that receives the output rows, field frames and checkpoints

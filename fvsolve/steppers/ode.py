@@ -5,10 +5,12 @@ import inspect
 import itertools
 from collections.abc import Callable
 from numbers import Real
+from typing import Any
 
 import numba
 import numpy as np
 from numba import objmode
+from numpy.typing import ArrayLike
 
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import COMPILING, DeclaredFunction, compile_once, compile_signature
@@ -24,8 +26,9 @@ NO_LIMIT = 1e308
 
 
 def integrate(
-    f: Callable, y0, t, method: str | Method = "dormand-prince", rtol: float | None = None,
-    step: float | None = None, atol=None, counts: dict | None = None,
+    f: Callable[..., Any], y0: ArrayLike, t: ArrayLike, method: str | Method = "dormand-prince",
+    rtol: float | None = None, step: float | None = None, atol: ArrayLike | None = None,
+    counts: dict[str, int] | None = None,
 ) -> np.ndarray:  # fmt: skip
     """Integrate y' = f(t, y), y(t[0]) = y0; returns y at the times t : float64[len(t), n].
 

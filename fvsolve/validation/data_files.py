@@ -58,7 +58,7 @@ def prepare(validation: Validation, data: Path | None, folder: Path) -> None:
     if validation.profile is not None:
         write_profile(validation.profile, folder)
     for name, table in ((name, dict(table)) for name, table in validation.tables.items()):
-        write_table(folder / name, made_table(folder / table.pop("of"), **table))
+        write_table(folder / name, derived_table(folder / table.pop("of"), **table))
 
 
 def write_profile(given: Mapping[str, Any], folder: Path) -> None:
@@ -76,7 +76,7 @@ def write_profile(given: Mapping[str, Any], folder: Path) -> None:
         write_table(folder / f"exact-{name}.csv", rows)
 
 
-def made_table(
+def derived_table(
     path: Path, skip: int, columns: Mapping[str, str], matrix: bool, every: int, where: str
 ) -> dict[str, np.ndarray]:
     """Columns of a table made from a text file : header -> float64[n].

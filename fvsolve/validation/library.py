@@ -4,7 +4,7 @@ import importlib
 import tempfile
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -219,12 +219,11 @@ def program_rows(validation: Validation, folder: Path) -> list[RowResult]:
         if row.computed not in found:
             near = did_you_mean(row.computed, found)
             raise FvsolveError(f"validation.compare: {name} computes no {row.computed}{near}")
-        made = found[row.computed]
-        judged = judge(row, made.value, made.error, known_values(row, [value for _, value in made.others]))
-        text = "; ".join(filter(None, (judged.text, made.text)))
+        value, error, others, further, lines = astuple(found[row.computed])
+        judged = judge(row, value, error, known_values(row, [number for _, number in others]))
+        text = "; ".join(filter(None, (judged.text, further)))
         shown, (verdict, tolerance, _) = UnitColumn("", "number", row.unit), judged
-        rows.append(RowResult(row, shown, made.value, made.error, verdict, tolerance, text, others=made.others,
-                              lines=made.lines))  # fmt: skip
+        rows.append(RowResult(row, shown, value, error, verdict, tolerance, text, others=others, lines=lines))
     return rows
 
 

@@ -22,7 +22,7 @@ PLACE_KEYS = ("solution", "length", "from", "to")  # keys of a profile that are 
 SHIFTS = 401  # number of shifts that are tried
 
 
-class Series(NamedTuple):
+class SeriesPair(NamedTuple):
     """Measured and computed series of a row over the times that count : float64[n] each; t [s], values in SI."""
 
     t: np.ndarray
@@ -96,20 +96,20 @@ def crossing_time(t: np.ndarray, values: np.ndarray, level: float) -> float:
     return float(t[k] + share * (t[k + 1] - t[k]))
 
 
-def series_of(row: Row, run: Any) -> Series:
+def series_of(row: Row, run: Any) -> SeriesPair:
     """Measured and computed series of a row at the measured times. Raises FvsolveError if no measured time counts."""
     name, computed_t = row.measure.probe.text, run.seconds
     series = measured_series(run.case, row.measure.probe)
     if series is None:
         exact = exact_solutions.solution(run.case, initial_values(model_of(run.case)))
         t, computed = window(row, computed_t, run.si(name))
-        return Series(t, exact.probe(row.measure.probe, t), computed)
+        return SeriesPair(t, exact.probe(row.measure.probe, t), computed)
     t, measured = window(row, series.t + series.shift, series.v)
     inside = (t >= computed_t[0]) & (t <= computed_t[-1])
     if inside.sum() < 2:
         raise FvsolveError(f"{row.what}: {series.file} has no two rows between the times that count")
     t, measured = t[inside], measured[inside]
-    return Series(t, measured, np.interp(t, computed_t, run.si(name)))
+    return SeriesPair(t, measured, np.interp(t, computed_t, run.si(name)))
 
 
 def measured_series(case: Any, probe: Any) -> Any:
@@ -117,7 +117,7 @@ def measured_series(case: Any, probe: Any) -> Any:
     return next((item for item in case.compare.values() if item.probe.text == probe.text), None)
 
 
-def difference(series: Series, function: str) -> float:
+def difference(series: SeriesPair, function: str) -> float:
     """Difference of two series: `rms_difference` in SI, the others relative to the range of the measured series."""
     gap = np.abs(series.computed - series.measured)
     if function == DIFFERENCE:

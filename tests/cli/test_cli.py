@@ -1,8 +1,10 @@
 """Command line: tables for readers, JSON for programs, messages and exit codes, never a traceback."""
 
 import contextlib
+import importlib.util
 import io
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -229,12 +231,48 @@ def test_a_warm_run_imports_neither_numba_nor_coolprop_nor_pyvista_nor_pint(case
         "sys.argv = ['fvsolve', 'run', 'shut.toml', '--force']\n"
         "try: main()\n"
         "except SystemExit as left: assert not left.code\n"
-        "heavy = ('numba', 'CoolProp', 'pyvista', 'vtk', 'pint', 'scipy', 'pandas', 'matplotlib')\n"
+        "heavy = ('numba', 'CoolProp', 'pyvista', 'vtkmodules', 'pint', 'scipy', 'pandas', 'matplotlib')\n"
         "print(*[name for name in heavy if name in sys.modules], file=sys.stderr)"
     )
     Path("warm.py").write_text(code)
     done = subprocess.run([sys.executable, "warm.py"], capture_output=True, text=True, check=True)
     assert done.stderr.strip() == ""
+
+
+LOST = "raise ModuleNotFoundError(f'No module named {__name__!r}', name=__name__)\n"
+WITHOUT_PYVISTA = """
+import contextlib, io, json, sys
+from fvsolve.cli import main
+results = []
+for line in sys.argv[1:]:
+    sys.argv, out, err = ["fvsolve", *line.split()], io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try: main()
+        except SystemExit as left: code = left.code or 0
+        else: code = 0
+    results.append((code, out.getvalue(), err.getvalue()))
+print(json.dumps(results))
+"""
+
+
+def test_only_pictures_of_basins_and_bodies_need_pyvista(case, tmp_path):
+    """Modules that cannot be imported take the place of PyVista and VTK, also in processes that draw."""
+    for name in ("pyvista", "vtk", "vtkmodules"):
+        (tmp_path / f"{name}.py").write_text(LOST)
+    commands = [f"run {case} --set output.fields=2", "view runs/shut --field head",
+                f"order {case} --levels 3 --out order",
+                "run dam-break --set nodes.tank.cells=[20,5] --set output.fields=1", "view runs/dam-break"]  # fmt: skip
+    commands += ["report runs/shut"] if importlib.util.find_spec("plotly") else []
+    search = os.pathsep.join([str(tmp_path), str(Path(fvsolve.__file__).parents[1])])
+    done = subprocess.run([sys.executable, "-c", WITHOUT_PYVISTA, *commands], capture_output=True, text=True,
+                          check=True, env=os.environ | {"PYTHONPATH": search})  # fmt: skip
+    results = json.loads(done.stdout)
+    assert [code for code, _, _ in results] == [0, 0, 0, 1, 2, 0][: len(commands)], results  # 1: few cells miss claims
+    message = results[4][2]
+    assert message.count("\n") == 1 and "No module named 'pyvista'" in message and "pip install pyvista" in message
+    for name in ("shut/view-head.png", "shut/history.png", "shut/envelope.csv", "dam-break/history.png"):
+        assert Path("runs", name).stat().st_size
+    assert len(list(Path("runs/dam-break/fields").glob("*.vtu"))) == 2 and Path("order/order.png").exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C cannot be sent to one process there")

@@ -167,6 +167,17 @@ def test_links_of_every_page_lead_to_files_and_headings(page):
             assert heading in {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}, link
 
 
+def test_the_paper_has_the_form_of_the_journal_and_cites_its_bibliography():
+    """Sections and length (750 to 1750 words) of the Journal of Open Source Software; every entry is cited."""
+    _, head, text = (DOCS / "paper" / "paper.md").read_text(encoding="utf-8").split("---\n", 2)
+    entries = re.findall(r"^@\w+\{([^,]+),", (DOCS / "paper" / "paper.bib").read_text(encoding="utf-8"), re.MULTILINE)
+    assert {*re.findall(r"@(\w+:\d{4})", text)} == {*entries} and "bibliography: paper.bib" in head
+    assert re.findall(r"^# (.*)$", text, re.MULTILINE) == [
+        "Summary", "Statement of need", "State of the field", "Software design", "Research impact statement",
+        "AI usage disclosure", "Acknowledgements", "References"]  # fmt: skip
+    assert 750 <= len(text.split()) <= 1750 and text.count("\\label{fig:") == text.count("\\autoref{fig:") == 2
+
+
 def test_the_changelog_has_the_form_of_keep_a_changelog():
     """Form of https://keepachangelog.com/en/1.1.0/: unreleased changes first, six kinds of change, a list for each."""
     text = (TOP / "CHANGELOG.md").read_text(encoding="utf-8")
