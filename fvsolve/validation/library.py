@@ -50,8 +50,9 @@ class Computed:
 class RowResult:
     """Row of a validation with its computed value and its verdict, in SI; shown : unit in which tables show it.
 
-    error : numerical error; tolerance : of the gate; text : reason, or what is wrong; shift : shift in time [s] with
-    which the computed series fits much better, 0 without; lines : name -> float64[n, 2], for the figure
+    error : numerical error; coarser : value at half the resolution, None if unknown; tolerance : of the gate
+    text : reason, or what is wrong; shift : shift in time [s] with which the computed series fits much better, or 0
+    lines : name -> float64[n, 2], for the figure, in the unit `unit_of_lines`
     """
 
     row: Row
@@ -64,6 +65,7 @@ class RowResult:
     converged: float | None = None
     others: tuple[tuple[str, float], ...] = ()
     shift: float = 0.0
+    coarser: float | None = None
     lines: dict[str, np.ndarray] = field(default_factory=dict)
     unit_of_lines: str = "-"
 
@@ -88,7 +90,7 @@ class RowResult:
                 "numerical_error": self.error, "measured": row.measured, "others": [*row.others, *others],
                 "exact": row.exact if self.converged is None else {**(row.exact or {}), "value": self.converged},
                 "gate": row.gate, "tolerance": self.tolerance, "verdict": self.verdict, "reason": self.text,
-                "shift": self.shift, "because": row.because}  # fmt: skip
+                "shift": self.shift, "because": row.because, "coarser": self.coarser}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -290,7 +292,7 @@ def scene_row(row: Row, runs: Runs) -> RowResult:
     error = float(abs(value - second)) if np.isfinite(second) else None
     if error is not None and finer is None and row.gate["of"] == EXACT and row.measure.function in OF_ERROR:
         error = max(value, second)  # the value is the numerical error itself
-    converged = second if finer else None
+    converged, coarser = (second, None) if finer else (None, float(second) if np.isfinite(second) else None)
     judged = judge(row, value, error, known_values(row, converged=converged))
     lines, shift, text = measures.lines_of(row, runs.own), 0.0, judged.text
     if row.measure.function in OF_SERIES:
@@ -299,17 +301,5 @@ def scene_row(row: Row, runs: Runs) -> RowResult:
             text += f"; arrival: the computed series is {abs(shift):.3g} s {'early' if shift > 0 else 'late'}"
             text += f", and differs by {left:.3g} without that"
     shown = measures.shown_in(row, runs.own.case)
-    return RowResult(
-        row,
-        shown,
-        value,
-        error,
-        judged.verdict,
-        judged.tolerance,
-        text,
-        converged,
-        (),
-        shift,
-        lines,
-        measures.unit_of_lines(row, runs.own.case),
-    )
+    return RowResult(row, shown, value, error, judged.verdict, judged.tolerance, text, converged, shift=shift,
+                     coarser=coarser, lines=lines, unit_of_lines=measures.unit_of_lines(row, runs.own.case))  # fmt: skip

@@ -57,12 +57,21 @@ def section(result: ValidationResult, figures: list[str]) -> str:
     lines += ["", *(f"![{result.title}, {theme}]({name}){{.only-{theme}}}\n"
                     for theme, name in zip(THEMES, figures, strict=False))]  # fmt: skip
     lines += [
-        "| quantity | measured | computed | error | other programs | unit | verdict |",
+        "| quantity | measured | computed | half resolution | error | other programs | unit | verdict |",
         "|---|---|---|---|---|---|---|",
     ]
     for row in result.rows:
         texts = amounts(row)
-        cells = [row.row.what, texts.reference, texts.value, texts.error, texts.others, row.unit, row.verdict]
+        cells = [
+            row.row.what,
+            texts.reference,
+            texts.value,
+            texts.coarser,
+            texts.error,
+            texts.others,
+            row.unit,
+            row.verdict,
+        ]
         lines.append(f"| {' | '.join(map(cell, cells))} |")
     notes = [f"- {row.row.what}: {row.text}" for row in result.rows if row.text]
     notes += [f"- {row.row.what}: gate: {row.row.gate['reason']}" for row in result.rows if row.row.gate["reason"]]

@@ -12,6 +12,7 @@ class Amounts(NamedTuple):
 
     reference: str
     value: str
+    coarser: str
     error: str
     others: str
 
@@ -35,6 +36,7 @@ def amounts(row: RowResult) -> Amounts:
     return Amounts(
         reference,
         text(row.value),
+        "-" if row.coarser is None else text(row.coarser),
         "-" if row.error is None else f"{row.shown.span_from_si(row.error):.1e}",
         "; ".join(f"{code} {text(value)}" for code, value in others) or "-",
     )
