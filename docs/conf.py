@@ -31,10 +31,10 @@ shutil.copy(DOCS / "kernel_start.py", PROFILE)
 project = author = "fvsolve"
 project_copyright = "fvsolve maintainers"
 extensions = ["myst_nb", "sphinx_copybutton"]
-exclude_patterns = ["**/.*"]
+exclude_patterns = ["**/.*", "validation/results"]
 smartquotes = False
 highlight_language = "none"  # of blocks without a language: formulas and output
-myst_enable_extensions = ["colon_fence", "dollarmath"]
+myst_enable_extensions = ["attrs_inline", "colon_fence", "dollarmath"]
 myst_heading_anchors = 6  # links such as results.md#fields
 nb_execution_mode = "cache"
 nb_execution_timeout = 60  # seconds for a cell

@@ -126,4 +126,13 @@ def table(head, rows) -> str:
     return "".join(f"| {line} |\n" for line in lines)
 
 
-GENERATED = {"commands": commands, "units": units, "names": names}
+def validation() -> str:
+    """Page that `fvsolve validate --page docs/validation/results` has written, with paths from the folder above it."""
+    folder = Path(__file__).parent / "validation" / "results"
+    if not (folder / "index.md").is_file():
+        return "This build has no results. `fvsolve validate --data DIR --page docs/validation/results` makes them.\n"
+    text = (folder / "index.md").read_text(encoding="utf-8").partition("\n")[2]
+    return re.sub(r"(?<=\]\()([\w-]+\.png)", r"results/\1", text)
+
+
+GENERATED = {"commands": commands, "units": units, "names": names, "validation": validation}

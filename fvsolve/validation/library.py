@@ -302,4 +302,5 @@ def scene_row(row: Row, runs: Runs) -> RowResult:
             text += f", and differs by {left:.3g} without that"
     shown = measures.shown_in(row, runs.own.case)
     return RowResult(row, shown, value, error, judged.verdict, judged.tolerance, text, converged, shift=shift,
-                     coarser=coarser, lines=lines, unit_of_lines=measures.unit_of_lines(row, runs.own.case))  # fmt: skip
+                     coarser=coarser, lines=lines,
+                     unit_of_lines=measures.unit_of_lines(row, runs.own.case))  # fmt: skip

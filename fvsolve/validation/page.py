@@ -22,7 +22,7 @@ with the measurement; the reason stands beside it. `outside` means that the valu
 error, from a run at half the resolution, or at a finer one. This page is made by
 
 ```sh
-fvsolve validate --data DIR --page docs/validation
+fvsolve validate --data DIR --page FOLDER
 ```
 """
 
