@@ -58,7 +58,7 @@ def section(result: ValidationResult, figures: list[str]) -> str:
                     for theme, name in zip(THEMES, figures, strict=False))]  # fmt: skip
     lines += [
         "| quantity | measured | computed | half resolution | error | other programs | unit | verdict |",
-        "|---|---|---|---|---|---|---|",
+        "|" + "---|" * 8,
     ]
     for row in result.rows:
         texts = amounts(row)
