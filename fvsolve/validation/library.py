@@ -29,6 +29,7 @@ CODES = {FAULTY: 2, OUTSIDE: 1, LACKING: 3, DIFFERS: 0, WITHIN: 0}  # exit codes
 PROGRAMS = {  # name in a case file -> module of this package with the function `compute`
     "ode-problems": "ode_problems",
     "epanet-networks": "epanet_networks",
+    "riemann-problems": "riemann_problems",
 }
 
 

@@ -104,11 +104,9 @@ def panels_of(result: ValidationResult) -> list[LinePanel]:
             continue
         measure = row.row.measure
         if measure is None:
-            title, label, logarithmic = (
-                row.row.computed.rpartition(".")[0],
-                "CPU time [s]; error of the end state",
-                True,
-            )
+            title, label, logarithmic = row.row.computed, "x [m]", "exact" not in row.lines
+            if logarithmic:
+                title, label = f"{title.rpartition('.')[0]}: error of the end state", "CPU time [s]"
         elif measure.run_up is not None:
             title, label, logarithmic = f"run-up {measure.run_up.name} [m]", "angle [deg] or distance [m]", False
         elif measure.field is not None:

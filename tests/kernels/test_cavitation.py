@@ -8,12 +8,12 @@ from pytest import approx
 from reference import cavities, scenes
 from reference.cavities import cavity
 from reference.folders import CASES
-from reference.mixture import Mixture, Riemann
 from reference.orders import observed_order
 from reference.scenes import AMBIENT, junction, lake, pipe, reservoir, scene, stiff_pipe, valve
 
 import fvsolve
 from fvsolve.errors import CaseError
+from fvsolve.exact.mixture_riemann import Mixture, RiemannProblem
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.riemann import face_flux, star_state, state_at
 from fvsolve.model.jacobian_pattern import jacobian_pattern
@@ -430,7 +430,7 @@ def test_the_state_between_the_waves_is_the_exact_one(fluid, speed, near):
     assert (pipe["compliance"] > 1e-10) == (speed is not None)
     law = Mixture(fluid["density"], fluid["bulk_modulus"], AMBIENT, FLOOR, gas, float(pipe["compliance"]), EXACT.area)
     for left, right in random_states(np.random.default_rng(5), law, 200):
-        p, v = Riemann(law, left, right).middle()
+        p, v = RiemannProblem(law, left, right).middle()
         sides = state_at(st, floats, pipe, left[0]), state_at(st, floats, pipe, right[0])
         middle, after, ahead = star_state(st, floats, pipe, sides[0], left[1], sides[1], right[1])
         assert middle[0] - FLOOR == pytest.approx(p - FLOOR, rel=10.0 * near)
@@ -441,7 +441,7 @@ def test_the_flux_at_a_face_is_that_of_the_exact_solution_on_its_ray():
     tables = resting_pipe(4, scheme="upwind", method="euler").tables
     st, floats, pipe = tables.settings[0], tables.floats, tables.pipes[0]
     for left, right in random_states(np.random.default_rng(6), EXACT, 60):
-        p, v = (float(x) for x in Riemann(EXACT, left, right).solution()(np.array(0.0)))
+        p, v = (float(x) for x in RiemannProblem(EXACT, left, right).solution()(np.array(0.0)))
         m = EXACT.m(p)
         scale = max(EXACT.m(q) * (abs(u) + EXACT.c(q)) for q, u in (left, right))
         found = face_flux(st, floats, pipe, left[0], left[1], right[0], right[1])
@@ -463,7 +463,7 @@ def riemann_run(name: str, cells: int, scheme: str, end: float):
     state = fvsolve.advance(model, state, end)
     found = base + (state.y[:cells] + state.y[cells:]) / row["speed"]
     x = (np.arange(cells) + 0.5) * LENGTH / cells - LENGTH / 2
-    at, exact = Riemann(EXACT, left, right).solution(), np.zeros(cells)
+    at, exact = RiemannProblem(EXACT, left, right).solution(), np.zeros(cells)
     for s in (np.arange(16) + 0.5) / 16 - 0.5:
         exact += EXACT.m(at((x + s * LENGTH / cells) / end)[0]) / 16
     inner = np.abs(x) < 25

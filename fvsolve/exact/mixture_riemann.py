@@ -73,7 +73,7 @@ class Mixture:
 
 
 @dataclass(frozen=True)
-class Riemann:
+class RiemannProblem:
     """Riemann problem of two uniform states that touch at x = 0 at t = 0."""
 
     law: Mixture
