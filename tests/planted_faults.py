@@ -67,6 +67,7 @@ FAULTS = [
     Fault("steppers/analysis/trees.py", "return nodes * math.prod(", "return (nodes + 1) * math.prod("),
     Fault("steppers/numbers/polynomial.py", "x - ratio * y for x, y", "x + ratio * y for x, y"),
     Fault("report/cycles.py", "return self.cycles * (", "return 1.01 * self.cycles * ("),
+    Fault("validation/row_verdicts.py", "max(pair[0] - value, value - pair[1], 0.0)", "max(pair[0] - value, 0.0)"),
     Fault("kernels/pipes.py", "dl[i] = k * (fl[i + 1] - fl[i])", "dl[i] = 1.01 * k * (fl[i + 1] - fl[i])"),
     Fault("kernels/steady_friction.py", "force = loss * (size * flow)", "force = 1.01 * loss * (size * flow)"),
     Fault(

@@ -319,7 +319,7 @@ class Result(Displayable):
         }  # fmt: skip
 
     @validated(name=TEXT, path=PATH)
-    def plot_run_up(self, name: str, path=None):
+    def plot_run_up(self, name: str, path: str | Path | None = None) -> Any:
         """Figure (matplotlib) of a run-up over angle or distance, also written to `path` if given."""
         from fvsolve.draw.plot import run_up_figure
 

@@ -100,7 +100,7 @@ def compute(validation: Validation, folder: Path) -> dict[str, Computed]:
         result |= compared(name, PROBLEMS[name], start, end, times)
     start, times = cylinder.start(), (0.0, cylinder.END)
     tight = {"method": "Radau", "rtol": REFERENCE_TOLERANCE, "atol": REFERENCE_TOLERANCE}
-    end = solve_ivp(numba.njit(stiff_cylinder), times, start, **tight).y[:, -1]
+    end = solve_ivp(numba.jit(stiff_cylinder), times, start, **tight).y[:, -1]
     return result | compared("stiff-cylinder", PROBLEMS["stiff-cylinder"], start, end, times)
 
 
@@ -118,7 +118,7 @@ def compared(
     name: str, problem: Problem, start: np.ndarray, end: np.ndarray, times: tuple[float, float]
 ) -> dict[str, Computed]:
     """Errors of the methods of a problem at several tolerances, with the peer's; start, end : states at `times` [s]"""
-    rhs = numba.njit(problem.rhs)
+    rhs = numba.jit(problem.rhs)
     rhs(times[0], start)  # compiled before the clock starts
     points = {f"SciPy {problem.peer}": [], **{method: [] for method in problem.methods}}
     for rtol in (1e2 * problem.rtol, 1e1 * problem.rtol, problem.rtol, 0.1 * problem.rtol):

@@ -30,19 +30,19 @@ START = 0.02  # position at which the spring has no force [m]
 P_A = 5e6  # pressure of A at the start, which that of B balances [Pa]
 
 
-@numba.njit(error_model="numpy")
+@numba.jit(error_model="numpy")
 def orifice(c, dp):
     """Flow [m3/s] through an orifice with coefficient c at a pressure drop dp [Pa]."""
     return c * dp / sqrt(sqrt(dp * dp + SOFT * SOFT))
 
 
-@numba.njit(error_model="numpy")
+@numba.jit(error_model="numpy")
 def edge(s):
     """Opening of a metering edge at spool position s: nearly s if positive, nearly 0 if negative, smooth between."""
     return 0.5 * (s + sqrt(s * s + UNDERLAP * UNDERLAP))
 
 
-@numba.njit(error_model="numpy")
+@numba.jit(error_model="numpy")
 def rhs(t, y, dydt):
     """Rates dydt = f(t, y) of the states in UNITS."""
     a, b, p_a, p_b = 1e7 * y[0], 1e7 * y[1], 1e7 * y[2], 1e7 * y[3]

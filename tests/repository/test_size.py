@@ -18,7 +18,7 @@ MAX_LINES = 60
 # folder -> (lines, files), with its subfolders
 FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve": (1642, 11),
-    "tests": (929, 7),
+    "tests": (930, 7),
     "benchmarks": (6431, 48),
     "fvsolve/assembly": (1927, 10),
     "fvsolve/basins": (9257, 46),
@@ -60,7 +60,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/parts": (17105, 46),
     "tests/reference": (3302, 32),
     "tests/report": (850, 4),
-    "tests/repository": (2901, 17),
+    "tests/repository": (2902, 17),
     "tests/schemes": (254, 1),
     "tests/solve": (1922, 8),
     "tests/step_limits": (1022, 4),
