@@ -105,7 +105,7 @@ def target(link: str, folder: Path, page: str) -> str:
 
 
 def plain_cells(app, document) -> None:
-    """Show cells of tutorials whose lines begin with `!` as shell commands, and cells `%%writefile [-a] NAME` as files."""
+    """Show cells of tutorials of lines with `!` as shell commands, and cells `%%writefile [-a] NAME` as files."""
     for block in document.findall(nodes.literal_block):
         first, *rest = lines = block.astext().splitlines() or [""]
         if all(line.startswith("!") for line in lines):
