@@ -104,13 +104,19 @@ def target(link: str, folder: Path, page: str) -> str:
     return os.path.relpath(path, (DOCS / page).parent).replace(os.sep, "/") if path.exists() else link
 
 
-def shell_cells(app, document) -> None:
-    """Show the cells of tutorials whose lines begin with `!` as shell commands."""
+def plain_cells(app, document) -> None:
+    """Show cells of tutorials of lines with `!` as shell commands, and cells `%%writefile [-a] NAME` as files."""
     for block in document.findall(nodes.literal_block):
-        lines = block.astext().splitlines()
-        if lines and all(line.startswith("!") for line in lines):
-            block.rawsource = "\n".join(line[1:] for line in lines)
-            block.children, block["language"] = [nodes.Text(block.rawsource)], "sh"
+        first, *rest = lines = block.astext().splitlines() or [""]
+        if all(line.startswith("!") for line in lines):
+            lines, language = [line[1:] for line in lines], "sh"
+        elif first.startswith("%%writefile"):
+            place = "at the end of " if " -a " in first else ""
+            lines, language = [f"# {place}{first.split()[-1]}", *rest], "toml"
+        else:
+            continue
+        block.rawsource = "\n".join(lines)
+        block.children, block["language"] = [nodes.Text(block.rawsource)], language
 
 
 def formula(display: str, before: str = "", after: str = ""):
@@ -125,7 +131,7 @@ def formula(display: str, before: str = "", after: str = ""):
 
 def setup(app) -> None:
     app.connect("source-read", read_page)
-    app.connect("doctree-read", shell_cells)
+    app.connect("doctree-read", plain_cells)
     app.connect("build-finished", lambda *_: shutil.rmtree(os.environ["IPYTHONDIR"], ignore_errors=True))
     block = formula("block", '<div class="formula">', "</div>\n")
     app.add_html_math_renderer("mathml", (formula("inline"), None), (block, None))

@@ -20,3 +20,4 @@ def system(command: str) -> None:
 get_ipython().system = system
 for name in ("FORCE_COLOR", "CLICOLOR_FORCE"):  # set by ipykernel
     os.environ.pop(name, None)
+os.environ["MPLBACKEND"] = "module://matplotlib_inline.backend_inline"  # figures are output of cells, in .ci/run too

@@ -52,6 +52,22 @@ def test_every_page_is_in_the_index():
     assert linked == {path.stem for path in HOW_TO_PAGES} and len(HOW_TO_PAGES) == 6
 
 
+TUTORIALS = sorted(path for path in (DOCS / "tutorials").glob("*.md") if path.stem != "index")
+SECTIONS = ["The question", "The physics", "The check", "Now change this"]  # of each tutorial, in this order
+
+
+@pytest.mark.parametrize("page", TUTORIALS, ids=lambda path: path.stem)
+def test_a_tutorial_asserts_its_check_and_the_answer_to_its_change(page):
+    """The site runs the cells; a row of the index leads to the page."""
+    text = page.read_text(encoding="utf-8")
+    assert f"({page.name})" in (DOCS / "tutorials/index.md").read_text(encoding="utf-8")
+    assert [one for one in re.findall(r"^## (.*)$", text, re.MULTILINE) if one in SECTIONS] == SECTIONS
+    check, change = text.split("## The check\n")[1].split("## Now change this\n")
+    answer = change.split("**Answer.**")[1]
+    assert "\nassert " in check and "\nassert " in answer
+    assert "!fvsolve " in text.split("## The check")[0] and "!fvsolve " in change
+
+
 @pytest.mark.parametrize("page", RUN_PAGES, ids=lambda path: path.stem)
 def test_a_page_does_what_it_says(page, fvs, tmp_path, monkeypatch):
     """Append blocks with a file name to the file, run the commands in order, and compare their output with the page."""

@@ -17,7 +17,7 @@ import pytest
 from reference.browser import browser
 from reference.folders import DOCS
 
-for module in ("sphinx", "myst_nb", "pydata_sphinx_theme", "sphinx_copybutton", "latex2mathml"):
+for module in ("sphinx", "myst_nb", "pydata_sphinx_theme", "sphinx_copybutton", "latex2mathml", "wntr", "plotly"):
     pytest.importorskip(module, reason="the extra `docs` is not installed")
 
 PAGES = sorted(path.relative_to(DOCS).with_suffix("").as_posix() for path in DOCS.rglob("*.md"))
@@ -123,7 +123,9 @@ def test_headings_and_code_of_a_page_are_in_its_html(page, site):
     if mark := re.match(r"<!-- page: (\S+) -->", text):
         text = (DOCS / f"{page}.md").parent.joinpath(mark[1]).read_text(encoding="utf-8")
     shown = re.sub(r"\s", "", read(site / f"{page}.html").text)
-    blocks = re.findall(r"^```[^\n]*\n(.*?)^```", text.replace("\n!", "\n"), re.DOTALL | re.MULTILINE)
+    blocks = re.findall(
+        r"^```[^\n]*\n(?:%%writefile[^\n]*)?(.*?)^```", text.replace("\n!", "\n"), re.DOTALL | re.MULTILINE
+    )
     prose = re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE)
     headings = [re.sub(r"[*`]|\]\(.*?\)|\[", "", one) for one in re.findall(r"^#+ (.*)$", prose, re.MULTILINE)]
     assert headings and [one for one in [*headings, *blocks] if re.sub(r"\s", "", one) not in shown] == []
@@ -142,6 +144,13 @@ def test_cells_of_a_tutorial_have_run_and_commands_are_shown_as_for_a_shell(site
     assert "rise 5.26" in text and "holds: max(gate.pressure)" in text and "!fvsolve" not in text
     assert "gate.pressure Pa 27352.5 3.99638" in text and "\x1b" not in text
     assert len(re.findall(r"<img[^>]*_images/[0-9a-f]{32,}\.png", page)) == 2
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.startswith("tutorials/") and "index" not in page])
+def test_every_tutorial_has_run_and_shows_pictures_and_plain_commands_and_files(page, site):
+    shown = re.sub(r"\s", "", read(site / f"{page}.html").text)
+    assert "!fvsolve" not in shown and "%%writefile" not in shown and "\x1b" not in shown
+    assert len(re.findall(r"<img[^>]*_images/[0-9a-f]{32,}\.png", (site / f"{page}.html").read_text("utf-8"))) >= 1
 
 
 def test_a_failing_cell_a_lost_link_and_a_page_without_section_stop_the_build(tmp_path):
