@@ -157,6 +157,8 @@ def outcome_figure(sweep, name: str, heads: Mapping[str, str]):
         axes.margins(x=0.04)
         if words:
             axes.set_xticks(range(len(words)), words, fontsize=7, rotation=30, ha="right")
+        else:
+            axes.locator_params(axis="x", nbins=4)  # long numbers such as 0.0012 need the width
         style.name_axes(axes, heads[key])
         if k % across == 0:
             style.name_axes(axes, y=name)

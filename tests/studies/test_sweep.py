@@ -311,6 +311,19 @@ def test_a_file_that_a_value_names_is_part_of_what_is_reused(line, tmp_path, mon
     assert sweep(line, vary, out=tmp_path / "o").reused == 1
 
 
+def test_numbers_on_the_axes_of_a_sweep_over_four_keys_do_not_overlap():
+    keys = ("a.b", "c.d", "e.f", "g.h")
+    rows = [dict.fromkeys(keys, x) | {"ok": True, "reason": "finished", "max(x) [m]": x} for x in (0.0008, 0.0014)]
+    figure = outcome_figure(Sweep(keys, rows, 0), "max(x) [m]", {key: key for key in keys})
+    figure.canvas.draw()
+    for axes in figure.axes[: len(keys)]:
+        low, high = axes.get_xlim()
+        boxes = [
+            tick.label1.get_window_extent() for tick in axes.xaxis.get_major_ticks() if low <= tick.get_loc() <= high
+        ]
+        assert len(boxes) > 1 and all(left.x1 < right.x0 for left, right in zip(boxes, boxes[1:], strict=False))
+
+
 def mapped(rows: list[dict]):
     """Axes of the picture of a sweep over two keys."""
     made = Sweep(("a.b", "c.d"), [{"ok": True, "reason": "finished"} | row for row in rows], 0)
