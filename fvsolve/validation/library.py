@@ -158,11 +158,11 @@ def validate(
     out : folder for the files of the runs, each below its name; None for none
     Raises FvsolveError for unknown names, CaseError for faults of a table [validation].
     """
-    chosen = find(names)
-    for path in chosen.values():  # faults before the first run
-        read_table(read_raw(path))
+    tables = {path: read_table(read_raw(path)) for path in find(names).values()}  # faults before the first run
+    short = [path for path, table in tables.items() if not table.files and table.program is None]
+    first = short[:1]  # compiles in this process; then long cases, so that no process ends with several of them
     with TaskPool(CaseWork(data, out), jobs) as pool:
-        for _, result in pool.run(list(chosen.values())):
+        for _, result in pool.run([*first, *(path for path in tables if path not in short), *short[1:]]):
             yield result
 
 

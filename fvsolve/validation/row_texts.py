@@ -3,7 +3,6 @@
 import math
 from typing import NamedTuple
 
-from fvsolve.case.validation_table import OF_ERROR
 from fvsolve.validation.library import RowResult
 
 
@@ -20,7 +19,6 @@ class Amounts(NamedTuple):
 def amounts(row: RowResult) -> Amounts:
     """Texts of the values of a row, in its unit."""
     measured, exact = row.row.measured or {}, row.row.exact or {}
-    is_error = row.row.measure is not None and row.row.measure.function in OF_ERROR
 
     def text(value: float) -> str:
         return number(row.in_unit(value))
@@ -31,7 +29,7 @@ def amounts(row: RowResult) -> Amounts:
         reference = text(measured["value"])
     else:
         value = row.converged if row.converged is not None else exact.get("value")
-        reference = f"exact {text(value)}" if value is not None else "0" if is_error else "-"
+        reference = f"exact {text(value)}" if value is not None else "-"
     others = [*((item["code"], item["value"]) for item in row.row.others), *row.others]
     return Amounts(
         reference,
