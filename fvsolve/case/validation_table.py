@@ -22,6 +22,7 @@ PROFILE = "profile_error"  # mean error of a field at the end, relative to the m
 MEASURES = (*FUNCTIONS, CROSSING, *ERRORS, DIFFERENCE, PROFILE)
 OF_SERIES = (*ERRORS, DIFFERENCE)
 OF_ERROR = (*OF_SERIES, PROFILE)  # their reference value is 0
+FINER = val.between(1.0, 16.0, open=True)  # a run at the same resolution would agree with itself
 _MEASURE = re.compile(r"\s*(\w+)\s*\(\s*(.*?)\s*\)\s*")
 _SUM = re.compile(r"sha256:[0-9a-f]{64}(?:, \d+ bytes)?")
 
@@ -188,7 +189,7 @@ def row_keys(dimension: str) -> dict[str, tuple[val.Value, Any]]:
     exact = {
         "value": (quantity, None),
         "source": source,
-        "resolution": (val.Number(val.positive, "times the resolution of the case, for a converged answer"), None),
+        "resolution": (val.Number(FINER, "times the resolution of the case, for a converged answer"), None),
     }
     gate = {
         "of": (val.Choice("gate", GATES, "value that decides", changes=VALUE), NEEDED),

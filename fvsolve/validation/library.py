@@ -289,6 +289,10 @@ def scene_row(row: Row, runs: Runs) -> RowResult:
     value = measures.value_of(row, runs.own)
     finer = (row.exact or {}).get("resolution")
     other = runs.at(finer or COARSER)
+    if finer and other is None:
+        raise FvsolveError(
+            f"{row.what}: the case has no run at {finer:g} times its resolution: its cells come from a file"
+        )
     second = np.nan if other is None else measures.value_of(row, other)
     error = float(abs(value - second)) if np.isfinite(second) else None
     if error is not None and finer is None and row.gate["of"] == EXACT and row.measure.function in OF_ERROR:

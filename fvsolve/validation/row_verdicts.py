@@ -29,9 +29,10 @@ class Known(NamedTuple):
     others: tuple[float, float] | None
     exact: tuple[float, float] | None
 
-    def span(self) -> float:
-        """Difference of the greatest and the least of all values."""
-        values = [value for pair in self if pair is not None for value in pair]
+    def span(self, of: str) -> float:
+        """Difference of the greatest and the least value that may widen a gate; a measurement widens no exact gate."""
+        pairs = (self.others, self.exact) if of == EXACT else self
+        values = [value for pair in pairs if pair is not None for value in pair]
         return max(values) - min(values) if values else 0.0
 
 
@@ -64,7 +65,7 @@ def judge(row: Row, value: float, error: float | None, known: Known) -> Judged:
     if not math.isfinite(value):
         return Judged(OUTSIDE, 0.0, "the computed value does not exist")
     tolerance = tolerance_of(gate, reference)
-    allowed = known.span() + SAFETY * (error or 0.0)
+    allowed = known.span(of) + SAFETY * (error or 0.0)
     if tolerance > allowed * (1.0 + 1e-9) + ROUNDING and not gate["reason"]:
         text = (f"the gate, {tolerance:.3g}, is wider than the spread of measurement, codes and numerical error "
                 f"together, {allowed:.3g}; narrow it, or write gate.reason")  # fmt: skip

@@ -95,6 +95,15 @@ def test_a_gate_wider_than_all_spreads_needs_a_reason(tmp_path):
     assert validated(tmp_path, scene(final(LEVEL, "rtol = 0.19", more=others))).verdict == WITHIN
 
 
+def test_a_far_measurement_widens_no_exact_gate_and_no_run_converges_to_itself(tmp_path):
+    """The value is exact to 1e-8; the measurement is off by a half, the gate by a fifth."""
+    measured = f"measured = {{ value = {1.5 * LEVEL} }}"
+    found = validated(tmp_path, scene(final(LEVEL, "rtol = 0.2", more=measured)))
+    assert found.verdict == OUTSIDE and "gate.reason" in found.rows[0].text
+    same = 'computed = "final(tank.level)"\nexact = { resolution = 1 }\ngate = { of = "exact", rtol = 0.1 }'
+    assert "expected a value above 1" in validated(tmp_path, scene(same)).fault
+
+
 @pytest.mark.parametrize("because, verdict", [('because = "no waves"', DIFFERS), ("", OUTSIDE)])
 def test_what_agrees_with_codes_and_not_with_the_measurement_differs_for_a_written_reason(tmp_path, because, verdict):
     others = f'others = [{{ code = "a", value = {LEVEL} }}]\n{because}'
