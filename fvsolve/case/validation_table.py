@@ -3,8 +3,10 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from fvsolve.case.basins import BasinFields
 from fvsolve.case.claims import FUNCTIONS, RunUpPlace, read_claim
 from fvsolve.case.probe import Extent, Kinds, Probe, read_probe
 from fvsolve.case.reading import Reading
@@ -19,6 +21,8 @@ ERRORS = ("mean_error", "rms_error", "greatest_error")  # relative to the range 
 DIFFERENCE = "rms_difference"  # from the measured series, in the unit of the probe
 CROSSING = "time"  # first time at which a probe passes a value
 PROFILE = "profile_error"  # mean error of a field at the end, relative to the mean of the exact field
+PROFILES = ("depth", "surface", "u", "discharge")  # quantities of exact fields
+PROFILE_KEYS = ("length", "from", "to")  # keys of a profile that are not data of its solution
 MEASURES = (*FUNCTIONS, CROSSING, *ERRORS, DIFFERENCE, PROFILE)
 OF_SERIES = (*ERRORS, DIFFERENCE)
 OF_ERROR = (*OF_SERIES, PROFILE)  # their reference value is 0
@@ -143,6 +147,18 @@ class ByName(val.Value):
         return {"type": "object", "additionalProperties": self.item.json()}
 
 
+class Below(ByName):
+    """Value that is a table by paths below a folder."""
+
+    def read(self, given: Any, setting: ReadContext) -> dict[str, Any]:
+        check_table(given, self.about)
+        faults = [((name,), "leads out of its folder; expected a path below it") for name in given
+                  if Path(name).is_absolute() or ".." in Path(name).parts]  # fmt: skip
+        if faults:
+            raise ValueFault(faults)
+        return super().read(given, setting)
+
+
 class FileSum(val.Text):
     """Value that is the sum of a file, for example "sha256:...", "sha256:..., 9000 bytes"."""
 
@@ -223,7 +239,7 @@ TABLE_KEYS = {
 }
 NETWORK_KEYS = {
     "inp": text("EPANET file of the data folder, or name of a network of WNTR", NEEDED),
-    "hour": (val.Anything(), None),
+    "hour": (val.Number(nonnegative, "hour of EPANET's run [h]"), None),
     "wave_speed": (Quantity("velocity", val.positive, changes=VALUE), None),
 }
 KEYS = {
@@ -231,8 +247,8 @@ KEYS = {
     "licence": text("licence of the data"),
     "get": text("how to get the files"),
     "note": text("what a reader must know about the case"),
-    "files": (ByName(FileSum(changes=VALUE), "{ PATH = SUM }, files of the data folder"), {}),
-    "tables": (ByName(Subtable(TABLE_KEYS, "{ of, skip, columns }"), "CSV files to make, by name"), {}),
+    "files": (Below(FileSum(changes=VALUE), "{ PATH = SUM }, files of the data folder"), {}),
+    "tables": (Below(Subtable(TABLE_KEYS, "{ of, skip, columns }"), "CSV files to make, by name"), {}),
     "case": text("shipped case that this file completes", None),
     "network": (Subtable(NETWORK_KEYS, '{ inp = "town.inp" }'), None),
     "program": text("program of fvsolve that computes the values, in place of a scene", None),
@@ -259,6 +275,8 @@ def read_validation(reading: Reading, kinds: Kinds | None, routes: Mapping[str, 
     with reading.catch("validation"):
         check_table(given, "source, files, compare")
         values = read_keys(given, KEYS, reading.setting)
+        if values["profile"] is not None:
+            check_profile(values["profile"])
     listed = given.get("compare") if isinstance(given, dict) else None
     if not isinstance(listed, list) or not listed:
         if listed is not None:
@@ -271,6 +289,23 @@ def read_validation(reading: Reading, kinds: Kinds | None, routes: Mapping[str, 
     if not values or None in rows or (len(rows) < len(listed) and not by_scene):
         return None
     return Validation(**{key: values[key] for key in KEYS if key != "compare"}, compare=tuple(rows))
+
+
+def check_profile(given: Mapping[str, Any]) -> None:
+    """Raise ValueFault for an unknown solution, for unknown data, and for data that are not numbers."""
+    from fvsolve.exact.shallow_water import SOLUTIONS, data_of  # SciPy is imported only for a profile
+
+    name = given.get("solution")
+    if name not in SOLUTIONS:
+        text = f"{show(name)} is unknown{did_you_mean(str(name), SOLUTIONS)}; solutions are {listing(SOLUTIONS)}"
+        raise ValueFault([(("profile", "solution"), text)])
+    known = (*data_of(name), *PROFILE_KEYS)
+    faults = [(("profile", key), f"unknown key{did_you_mean(key, known)}; keys are {', '.join(known)}")
+              for key in given if key not in ("solution", *known)]  # fmt: skip
+    faults += [(("profile", key), f"{show(value)} is not a number") for key, value in given.items()
+               if key in known and (isinstance(value, bool) or not isinstance(value, (int, float)))]  # fmt: skip
+    if faults:
+        raise ValueFault(faults)
 
 
 def read_row(given: Any, kinds: Kinds | None, routes: Mapping[str, Any], reading: Reading) -> Row | None:
@@ -322,6 +357,10 @@ def read_measure(given: Any, kinds: Kinds, routes: Mapping[str, Any], reading: R
     function, inner = match.groups()
     if function == PROFILE:
         basin, _, quantity = inner.rpartition(".")
+        if quantity not in PROFILES:
+            raise ValueError(f"{show(quantity)} has no exact profile; expected {listing(PROFILES)}")
+        if not isinstance(kinds["nodes"].get(basin), BasinFields):
+            raise ValueError(f"{show(basin)} is not a basin; expected {PROFILE}(BASIN.{quantity})")
         return Measure(given, function, "number", field=(basin, quantity))
     if function in FUNCTIONS:
         _, probe, extent, when = read_claim(given, kinds, routes, reading.setting)

@@ -86,7 +86,7 @@ def load_case(name: str, overrides: list[str], scheme: str | None = None, method
     from fvsolve.case import load, shipped
 
     path = shipped.find(name)
-    _announce_compilation()
+    announce_compilation()
     settings, faults = _overrides(overrides)
     try:
         case = load(path, settings)
@@ -105,7 +105,7 @@ def load_case(name: str, overrides: list[str], scheme: str | None = None, method
 
 
 @functools.cache
-def _announce_compilation() -> None:
+def announce_compilation() -> None:
     from fvsolve.jit import is_cold, other_caches
 
     if is_cold():

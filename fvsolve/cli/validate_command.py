@@ -7,7 +7,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from fvsolve.cli.app import Jobs, Json, _announce_compilation, app
+from fvsolve.cli.app import Jobs, Json, announce_compilation, app
 from fvsolve.cli.terminal import TextTable, present
 
 STYLES = {"within": "green", "outside": "bold red"}
@@ -32,7 +32,7 @@ def validate(
 
     if list_names:
         return present(as_json, *listed(library.find(names or [])))
-    _announce_compilation()
+    announce_compilation()
     results = []
     for result in library.validate(names or [], data, jobs, out):
         print(f"{result.name}: {result.verdict}, {result.seconds:.1f} s", file=sys.stderr, flush=True)

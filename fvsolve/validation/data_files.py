@@ -139,8 +139,8 @@ def in_order(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def read_lines(path: Path) -> list[str]:
     """Lines of a text file, also of one packed by gzip. Raises FvsolveError if it is not text."""
-    content = path.read_bytes()
     try:
+        content = path.read_bytes()
         return (gzip.decompress(content) if path.suffix == ".gz" else content).decode("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise FvsolveError(f"{path.name} cannot be read: {error}") from None
@@ -166,7 +166,7 @@ def completed(table: dict[str, Any], validation: Validation, folder: Path) -> di
     from fvsolve.epanet import import_network
 
     given = validation.network
-    keys = {key: given[key] for key in ("hour", "wave_speed", "day") if given.get(key) is not None}
+    keys = {key: given[key] for key in ("hour", "wave_speed") if given.get(key) is not None}
     imported = tomllib.loads(import_network(network_path(given["inp"], folder), **keys).text)
     return merged(imported, table)
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case import load, shipped
+from fvsolve.case import text as toml
 from fvsolve.case.reading import Raw, Reading, read_raw
 from fvsolve.case.validation_table import DIFFERENCE, EXACT, OF_ERROR, OF_SERIES, Row, Validation, read_validation
 from fvsolve.errors import FvsolveError, did_you_mean, listing
@@ -137,13 +138,13 @@ def find(names: Iterable[str]) -> dict[str, Path]:
     """Case files by name; all shipped ones without names. Raises FvsolveError for each unknown name."""
     known, chosen, unknown = paths(), {}, []
     for name in names:
-        path = Path(name)
-        if path.is_file():
-            chosen[path.stem] = path
-        elif name in known:
-            chosen[name] = known[name]
-        else:
+        path = Path(name) if Path(name).is_file() else known.get(name)
+        if path is None:
             unknown.append(f"{name}{did_you_mean(name, known)}")
+        elif path.stem in chosen:
+            raise FvsolveError(f"{chosen[path.stem]} and {path} have the same name. Run each in a command of its own")
+        else:
+            chosen[path.stem] = path
     if unknown:
         raise FvsolveError(f"no file and no shipped validation {', '.join(unknown)}; validations are {listing(known)}")
     return chosen or known
@@ -232,8 +233,9 @@ def program_rows(validation: Validation, folder: Path) -> list[RowResult]:
 
 def scene_rows(raw: Raw, validation: Validation, folder: Path) -> tuple[Validation, list[RowResult], float]:
     """(validation with its measures, rows, seconds of stepping) of a scene; rows with equal overrides share runs."""
-    table = data_files.completed({key: raw.table[key] for key in raw.table}, validation, folder)
+    table = data_files.completed(raw.table, validation, folder)
     raw = Raw(table, raw.name, raw.path, folder, raw.text)
+    (folder / "case.toml").write_text(toml.write(table), encoding="utf-8")
     results: dict[int, RowResult] = {}
     whole = load(raw)
     groups: dict[str, list[int]] = {}

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from fvsolve import exact as exact_solutions
-from fvsolve.case.validation_table import CROSSING, DIFFERENCE, ERRORS, OF_SERIES, PROFILE, Measure, Row
+from fvsolve.case.validation_table import CROSSING, DIFFERENCE, ERRORS, OF_SERIES, PROFILE, PROFILE_KEYS, Measure, Row
 from fvsolve.errors import FvsolveError
 from fvsolve.exact import shallow_water
 from fvsolve.output.unit_columns import UnitColumn, column
@@ -18,7 +19,6 @@ from fvsolve.studies.reference import initial_values
 
 SHIFT_SHARE = 0.5  # a shift in time that leaves at most this share of the difference is named
 MAX_SHIFT = 0.25  # greatest shift that is tried, as a fraction of the compared time
-PLACE_KEYS = ("solution", "length", "from", "to")  # keys of a profile that are not data of its solution
 SHIFTS = 401  # number of shifts that are tried
 
 
@@ -52,7 +52,7 @@ def value_of(row: Row, run: Any) -> float:
     if measure.function == "at":
         return float(np.interp(measure.argument, t, values)) if t[0] <= measure.argument <= t[-1] else np.nan
     if measure.function == "mean":
-        return float(np.trapezoid(values, t) / (t[-1] - t[0])) if t[-1] > t[0] else float(values[-1])
+        return float(trapezoid(values, t) / (t[-1] - t[0])) if t[-1] > t[0] else float(values[-1])
     return {"max": values.max, "min": values.min, "final": lambda: values[-1]}[measure.function]()
 
 
@@ -178,8 +178,11 @@ def lines_of(row: Row, run: Any) -> dict[str, np.ndarray]:
 
 def curve_of(path: Path) -> np.ndarray:
     """Places and values of a CSV file with two columns, by rising places : float64[n, 2]."""
-    rows = read_rows(path)
-    table = np.column_stack([rows.plain(0), rows.plain(1)])
+    try:
+        rows = read_rows(path)
+        table = np.column_stack([rows.plain(0), rows.plain(rows.column(None, 1))])
+    except ValueError as error:
+        raise FvsolveError(f"validation.compare.curves: {error}") from None
     return table[np.argsort(table[:, 0])]
 
 
@@ -206,7 +209,7 @@ def exact_field(run: Any, x: np.ndarray, quantity: str) -> np.ndarray:
 
 def profile(given: Mapping[str, Any], x: np.ndarray, t: float) -> shallow_water.Flow:
     """Exact fields at places x [m] and time t [s]; given : table `profile` of a validation"""
-    data = {key: float(value) for key, value in given.items() if key not in PLACE_KEYS}
+    data = {key: float(value) for key, value in given.items() if key not in ("solution", *PROFILE_KEYS)}
     return shallow_water.SOLUTIONS[given["solution"]](x, t, **data)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from reference import folders
 
+import fvsolve
 from fvsolve.case.reading import read_raw
 from fvsolve.cli import main
 from fvsolve.errors import CaseError, FvsolveError
@@ -188,6 +189,45 @@ def test_all_faults_of_the_table_are_found_at_once(tmp_path):
         "nonsense",
     ):
         assert part in message, part
+
+
+PROFILE = 'profile = {{ solution = "{}", {} = 1 }}\n'
+
+
+@pytest.mark.parametrize("table, row, told", [
+    ('files = { "../a.csv" = "sha256:' + 64 * "0" + '" }\n', final(LEVEL), "leads out of its folder"),
+    ('tables."/tmp/a.csv" = { of = "a", columns = { "t" = "c1" } }\n', final(LEVEL), "leads out of its folder"),
+    (PROFILE.format("bumb", "flow"), final(LEVEL), 'did you mean "bump"'),
+    (PROFILE.format("bump", "flows"), final(LEVEL), 'did you mean "flow"'),
+    ("", 'computed = "profile_error(tank.depth)"\ngate = { of = "exact", atol = 1 }', "is not a basin"),
+    ("", 'computed = "profile_error(tank.mass)"\ngate = { of = "exact", atol = 1 }', "no exact profile"),
+    ('tables."a.csv" = { of = "b.csv", columns = { "t" = "c1" } }\n', final(LEVEL), "b.csv cannot be read"),
+    ('network = { inp = "a.inp", hour = "noon" }\n', final(LEVEL), "noon"),
+])  # fmt: skip
+def test_faults_of_files_profiles_and_networks_are_messages(tmp_path, table, row, told):
+    try:
+        message = validated(tmp_path, scene(row, table=table)).fault
+    except CaseError as error:
+        message = str(error)
+    assert told in message, message
+
+
+def test_two_files_of_one_name_are_refused_and_a_kept_case_runs(tmp_path):
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "case.toml").write_text(scene(final(LEVEL, REASON)))
+    with pytest.raises(FvsolveError, match="have the same name"):
+        library.find([str(tmp_path / folder / "case.toml") for folder in ("a", "b")])
+    library.validate_file(tmp_path / "a" / "case.toml", out=tmp_path / "kept")
+    assert fvsolve.run(tmp_path / "kept" / "case" / "case.toml").ok
+
+
+def test_a_value_that_is_never_reached_is_outside_and_prints(tmp_path, capsys):
+    row = 'computed = "time(tank.level, 9 m)"\nmeasured = { value = 1 }\ngate = { of = "measured" }'
+    (tmp_path / "case.toml").write_text(scene(row))
+    assert exit_code(str(tmp_path / "case.toml"), "--json") == 1
+    printed = json.loads(capsys.readouterr().out.splitlines()[-1])["validations"][0]["rows"][0]
+    assert printed["value"] is None and "does not exist" in printed["reason"]
 
 
 def test_a_scene_that_another_row_changes_runs_again(tmp_path):
