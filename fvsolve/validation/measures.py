@@ -9,7 +9,17 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 from fvsolve import exact as exact_solutions
-from fvsolve.case.validation_table import CROSSING, DIFFERENCE, ERRORS, OF_SERIES, PROFILE, PROFILE_KEYS, Measure, Row
+from fvsolve.case.validation_table import (
+    CROSSING,
+    DIFFERENCE,
+    ERRORS,
+    EXACT,
+    OF_SERIES,
+    PROFILE,
+    PROFILE_KEYS,
+    Measure,
+    Row,
+)
 from fvsolve.errors import FvsolveError
 from fvsolve.exact import shallow_water
 from fvsolve.output.unit_columns import UnitColumn, column
@@ -156,7 +166,8 @@ def lines_of(row: Row, run: Any) -> dict[str, np.ndarray]:
         shown = column("", measure.probe.dimension, run.case, measure.probe.unit)
         inside = (run.seconds >= pair.t[0]) & (run.seconds <= pair.t[-1])
         computed = np.column_stack([run.seconds, shown.from_si(run.si(measure.probe.text))])[inside]
-        name = "exact" if series is None else "measured"
+        published = row.gate["of"] == EXACT and (row.exact or {}).get("resolution") is None
+        name = "exact" if series is None or published else "measured"
         return {name: np.column_stack([pair.t, shown.from_si(pair.measured)]), "computed": computed}
     if measure.run_up is not None:
         table = run.run_up[measure.run_up.name]

@@ -22,7 +22,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "benchmarks": (6431, 48),
     "fvsolve/assembly": (1927, 10),
     "fvsolve/basins": (9257, 46),
-    "fvsolve/case": (7323, 25),
+    "fvsolve/case": (7363, 25),
     "fvsolve/cli": (3421, 16),
     "fvsolve/compile": (1050, 6),
     "fvsolve/data": (12, 1),
@@ -42,7 +42,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/step_limits": (1597, 7),
     "fvsolve/steppers": (6574, 31),
     "fvsolve/studies": (14517, 49),
-    "fvsolve/validation": (1404, 11),
+    "fvsolve/validation": (1425, 11),
     "tests/attitude": (447, 2),
     "tests/basins": (6811, 22),
     "tests/case": (4452, 15),
@@ -53,7 +53,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/fluid": (1061, 4),
     "tests/fmi": (396, 2),
     "tests/invariance": (2026, 12),
-    "tests/kernels": (1262, 8),
+    "tests/kernels": (1239, 8),
     "tests/mesh": (411, 1),
     "tests/model": (2827, 9),
     "tests/output": (518, 2),
@@ -67,7 +67,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/steppers": (2114, 12),
     "tests/studies": (7982, 22),
     "tests/units": (267, 1),
-    "tests/validation": (253, 1),
+    "tests/validation": (302, 1),
 }
 # functions that exceed a limit: "path: function" -> (arguments, lines). Commands and studies are excepted by rule.
 LONG: dict[str, tuple[int, int]] = {}
