@@ -54,8 +54,8 @@ def add(name: str, data: str) -> None:
     phi = unpacked(data, name)
     values = np.array([value_at(phi, name, float(r)) for r in RATIOS])
     LIMITERS[name] = limiter(phi, values, data)
-    kept = [entry for entry in entries() if not entry.startswith(f"{name}=")]
-    os.environ[VARIABLE] = SEPARATOR.join([*kept, f"{name}={data}"])
+    others = [entry for entry in entries() if not entry.startswith(f"{name}=")]
+    os.environ[VARIABLE] = SEPARATOR.join([*others, f"{name}={data}"])
 
 
 def entries() -> list[str]:
@@ -127,8 +127,8 @@ def departures(values: np.ndarray) -> Iterator[str]:
 
 def order_cost(phi: Callable) -> list[str]:
     """Text about a limiter with phi(1) other than 1; an empty list if phi(1) = 1."""
-    one = phi(1.0)
-    return [] if abs(one - 1.0) <= ROUNDING else [f"phi(1) = {one:.3g} is not 1, so the order is 1 in smooth flow"]
+    value = phi(1.0)
+    return [] if abs(value - 1.0) <= ROUNDING else [f"phi(1) = {value:.3g} is not 1, so the order is 1 in smooth flow"]
 
 
 def asymmetry(phi: Callable) -> list[str]:

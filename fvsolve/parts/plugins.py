@@ -65,7 +65,10 @@ def declare_installed() -> None:
     """Declare parts and limiters of installed packages and of environment variables; warn of unreadable ones."""
     installed = entry_points()
     offered = [
-        *((f"{one.name} of the entry points {GROUP}", declare, one.value) for one in installed.select(group=GROUP)),
+        *(
+            (f"{entry.name} of the entry points {GROUP}", declare, entry.value)
+            for entry in installed.select(group=GROUP)
+        ),
         *((VARIABLE, register_part, folder) for folder in registered_folders()),
         *((f"entry points {LIMITERS}", register_installed, entry) for entry in installed.select(group=LIMITERS)),
         *((own_limiters.VARIABLE, own_limiters.read_entry, entry) for entry in own_limiters.entries()),

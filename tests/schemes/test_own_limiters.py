@@ -203,7 +203,7 @@ def test_another_function_under_the_name_replaces_it():
 RESTART = """
 import sys, fvsolve, mine
 fvsolve.register_limiter("mine", mine.phi)
-print(float(fvsolve.run(%r)["a.pressure"].min()), "numba" in sys.modules)
+print(float(fvsolve.run(%r)["a.pressure"].sum()), "numba" in sys.modules)
 """
 
 
@@ -215,7 +215,7 @@ def test_an_edited_file_counts_in_the_next_process_and_an_unchanged_one_compiles
         value, compiled = run_python(tmp_path, code).split()
         found.append((float(value), compiled))
     assert found[1] == found[3] == (found[0][0], "False")
-    assert abs(found[2][0] - found[0][0]) > 1e-4 * found[0][0]
+    assert abs(found[2][0] - found[0][0]) > 1e-6 * found[0][0]
 
 
 def test_other_processes_of_a_sweep_have_it():
