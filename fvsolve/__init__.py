@@ -26,6 +26,7 @@ _MODULES = {
     "integrate": "steppers.ode",
     "load": "case",
     "open_run": "run",
+    "register_limiter": "parts.own_limiters",
     "register_part": "parts.plugins",
     "run": "run",
     "solve": "solve",

@@ -10,6 +10,7 @@ from fvsolve.model.build import build as build
 from fvsolve.model.build import vary as vary
 from fvsolve.model.model import Model as Model
 from fvsolve.model.model import State as State
+from fvsolve.parts.own_limiters import register_limiter as register_limiter
 from fvsolve.parts.plugins import register_part as register_part
 from fvsolve.run import Result as Result
 from fvsolve.run import open_run as open_run

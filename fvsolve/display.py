@@ -1,5 +1,7 @@
 """Display of results at a prompt and in a notebook: a line, a table, a plot."""
 
+import io
+from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from html import escape
 from importlib import import_module
@@ -8,6 +10,7 @@ from typing import Any, ClassVar
 from fvsolve.argument_checks import PATH, validated
 
 TABLE_ROWS = 12  # rows of a table in a notebook; `.frame()` contains all rows
+PICTURE_DPI = 72  # resolution of a plot in a notebook; `.plot()` returns the figure itself
 
 
 class Displayable:
@@ -56,7 +59,16 @@ class Displayable:
             "<tr>" + "".join(f"<td>{escape(_cell(x))}</td>" for x in row) + "</tr>" for row in rows[:TABLE_ROWS]
         )
         more = f"<p>{len(rows) - TABLE_ROWS} more rows in .frame()</p>" if len(rows) > TABLE_ROWS else ""
-        return f"<p>{escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>{more}"
+        return f"<p>{escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>{more}{self._picture_html()}"
+
+    def _picture_html(self) -> str:
+        """Plot as HTML that contains the picture; "" if it cannot be drawn, for example without matplotlib."""
+        try:
+            self.plot().savefig(data := io.BytesIO(), format="png", dpi=PICTURE_DPI)
+        except Exception:  # a notebook then shows the table alone; `.plot()` raises the error
+            return ""
+        text = escape(self.summary_line(), quote=True)
+        return f'<img alt="{text}" src="data:image/png;base64,{b64encode(data.getvalue()).decode()}">'
 
 
 def save(figure, path) -> None:

@@ -6,6 +6,7 @@ scheme has a kernel too (`kernels.reconstruction`); in smooth solutions it equal
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -165,18 +166,36 @@ def end_rate_factor(scheme: str, cells: int) -> float:
     return factors[cells - 1] if cells <= len(factors) else 1.0
 
 
+class OwnLimiter(NamedTuple):
+    """Function phi(r) of a user's limiter, and results of its tests, see `parts.own_limiters`.
+
+    symmetric : True if phi(r) / r = phi(1 / r); digest : hash of the function
+    departures : texts about where it leaves the region of Sweby (1984); costs : texts about a lost order or symmetry
+    steepest : see `Limiter.steepest`
+    """
+
+    phi: Callable[[float], float]
+    symmetric: bool
+    digest: str
+    departures: tuple[str, ...]
+    costs: tuple[str, ...]
+    steepest: Fraction
+
+
 class Limiter(NamedTuple):
-    """Limiter of slopes; its code in `kernels.reconstruction` is its position in `LIMITERS`.
+    """Limiter of slopes; the code of a built-in limiter in `kernels.reconstruction` is its position in `LIMITERS`.
 
     tangents : (a, b) for each branch in which the limited slope is not zero but a d + b e; d and e are the differences
     of values to the cells behind and ahead. The slope of van Leer's limiter is smooth: its branches are the tangents at
     d = e, at d = 0 and at e = 0
     overshoot : factor on the range of the neighbouring cells, which bounds the values at the sides of a cell of an
     unstructured mesh. It is 1 without overshoot; linear fields on distorted meshes need more than 1.
+    own : function of a user's limiter; its tangents are samples of its slope
     """
 
     tangents: tuple[tuple[Fraction, Fraction], ...]
     overshoot: float
+    own: OwnLimiter | None = None
 
     @property
     def branches(self) -> dict[str, Weights]:
@@ -184,17 +203,26 @@ class Limiter(NamedTuple):
 
         They include upwind, for a slope of zero. With van Leer's limiter muscl equals the others only at the points of
         `tangents`.
-        The branches with twice the difference to a neighbour as slope are named "twice behind" and "twice ahead".
+        The branches with twice the difference to a neighbour as slope are named "twice behind" and "twice ahead",
+        other slopes a d + b e of users' limiters "a behind, b ahead".
         """
-        half = [(Fraction(), Fraction()), *((a / 2, b / 2) for a, b in self.tangents)]
-        schemes = [(ZERO, -a, 1 + a - b, b, ZERO) for a, b in half]
-        known = {scheme.weights: name for name, scheme in LINEAR.items()}
-        return {known.get(w, "twice behind" if w[1] else "twice ahead"): w for w in schemes}
+        names = {(DOUBLE, ZERO): "twice behind", (ZERO, DOUBLE): "twice ahead"}
+        known, found = {scheme.weights: name for name, scheme in LINEAR.items()}, {}
+        for a, b in [(ZERO, ZERO), *self.tangents]:
+            weights = (ZERO, -a / 2, 1 + a / 2 - b / 2, b / 2, ZERO)
+            name = names.get((a, b), f"{float(a):.3g} behind, {float(b):.3g} ahead")
+            found[known.get(weights, name)] = weights
+        return found
 
     @property
     def steepest(self) -> Fraction:
         """Greatest ratio of the limited slope to the smaller of the differences to the cells behind and ahead."""
-        return max(max(pair) for pair in self.tangents)
+        return self.own.steepest if self.own else max(max(pair) for pair in self.tangents)
+
+    @property
+    def monotone(self) -> bool:
+        """True if the total variation cannot grow with short steps."""
+        return not (self.own and self.own.departures)
 
 
 UNITY, DOUBLE, HALF, ZERO = Fraction(1), Fraction(2), Fraction(1, 2), Fraction(0)

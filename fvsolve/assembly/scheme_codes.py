@@ -4,12 +4,15 @@ import functools
 
 import numpy as np
 
+from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.ghost_cells import difference_rows
+from fvsolve.kernels.own_limiters import limiter_code
 from fvsolve.schemes import LIMITERS, SCHEMES
 
 FAMILIES = {"upwind": rec.UPWIND, "linear": rec.LINEAR, "muscl": rec.MUSCL, "weno5": rec.WENO5}
-CODES = {name: code for code, name in enumerate(LIMITERS)}  # codes of limiters
+# Codes of built-in limiters.
+CODES = {name: code for code, (name, limiter) in enumerate(LIMITERS.items()) if limiter.own is None}
 
 
 def family(scheme: str) -> int:
@@ -17,12 +20,46 @@ def family(scheme: str) -> int:
     return FAMILIES[SCHEMES[scheme].family]
 
 
+def code_of_limiter(limiter: str, basins: bool) -> int:
+    """Code of a limiter for kernels; that of a user is compiled here if no code is stored.
+
+    basins : True for the limiter of a basin. Raises FvsolveError if the function of a user cannot be compiled.
+    """
+    own = LIMITERS[limiter].own
+    if own is None:
+        return CODES[limiter]
+    if basins and not own.symmetric:  # flows through walls would not be zero
+        raise FvsolveError(f"numerics.limiter: {limiter} is not symmetric: {own.costs[-1]}. Expected a limiter with "
+                           "phi(r) / r = phi(1 / r) for basins on grids")  # fmt: skip
+    try:
+        return limiter_code(own.phi, own.symmetric, own.digest, basins)
+    except Exception as error:
+        if not type(error).__module__.startswith("numba."):
+            raise
+        reason = next((line.strip() for line in str(error).splitlines()[1:] if line.strip()), str(error))
+        raise FvsolveError(
+            f"numerics.limiter: the function of {limiter} cannot be compiled: {reason} Expected a function of a "
+            "float that returns a float, and uses numbers, math and numpy only"
+        ) from error
+
+
+def limiter_notices(scheme: str, limiter: str) -> list[Notice]:
+    """Notice of a user's limiter outside the region of total variation diminishing limiters, without order 2, ..."""
+    own = LIMITERS[limiter].own if scheme == "muscl" else None
+    if own is None or not own.departures + own.costs:
+        return []
+    region = "; ".join(own.departures)
+    head = f"it leaves the region 0 <= phi <= min(2, 2 r) of Sweby (1984), so total variation may grow: {region}"
+    texts = [head] * bool(region) + list(own.costs)
+    return [Notice("limiter", "numerics", f"limiter {limiter}: {'; '.join(texts)}", "limiter")]
+
+
 def scheme_settings(settings, scheme: str, limiter: str) -> None:
     """Write the code and degree of a scheme, the weights of a linear scheme, and the code of a limiter to `settings`.
 
     settings : record of the type `kernels.dtypes.SETTINGS`
     """
-    row, settings["limiter"] = SCHEMES[scheme], CODES[limiter]
+    row, settings["limiter"] = SCHEMES[scheme], code_of_limiter(limiter, basins=False)
     settings["scheme"], settings["degree"] = family(scheme), row.degree
     if settings["scheme"] == rec.LINEAR:
         for k, weight in enumerate(row.weights):

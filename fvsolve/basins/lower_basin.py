@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.assembly.scheme_codes import CODES, family
+from fvsolve.assembly.scheme_codes import code_of_limiter, family
 from fvsolve.assembly.state_names import Numbered
 from fvsolve.basins import advection_faces
 from fvsolve.basins.advection import THIN, advection_work, diffusion_work
@@ -340,7 +340,8 @@ class BasinRows:
         row["kind"] = physics_code(type(self).__module__.rpartition(".")[0])
         row["deep"], row["given"] = self.deep, self.given
         row["scheme"] = family(self.scheme)
-        row["limiter"], row["wide"] = CODES[numerics.limiter], LIMITERS[numerics.limiter].overshoot
+        row["limiter"] = code_of_limiter(numerics.limiter, basins=self.is_grid)
+        row["wide"] = LIMITERS[numerics.limiter].overshoot
         row["area"] = row["drawn"] = draft.to_plane(mesh.area)
         if self.is_grid:
             grid = mesh.grid

@@ -216,7 +216,7 @@ class Numerics(Table):
         "scheme", tuple(SCHEMES),
         f"reconstruction scheme of the cells; {DEFAULT_SCHEME} (with cavitation {CAVITY_SCHEME}) if left out",
     )] = None  # fmt: skip
-    limiter: Annotated[str, Choice("limiter", tuple(LIMITERS), "slope limiter of the scheme muscl")] = DEFAULT_LIMITER
+    limiter: Annotated[str, Choice("limiter", LIMITERS, "slope limiter of the scheme muscl")] = DEFAULT_LIMITER
     method: Annotated[str | None, MethodChoice(
         "method", MethodNames(),
         f"Runge-Kutta method; {DEFAULT_METHOD} (with rtol {DEFAULT_METHOD_RTOL}, with cavitation {CAVITY_METHOD}, "

@@ -8,7 +8,7 @@ its arguments as values of LLVM.
 from collections.abc import Callable
 
 from llvmlite import ir
-from numba.core import cgutils, types
+from numba.core import cgutils, errors, types
 from numba.core.datamodel import register_default
 from numba.core.datamodel.models import ArrayModel
 from numba.core.imputils import lower_cast, lower_getattr_generic
@@ -138,6 +138,36 @@ def call_by_address(kinds: tuple, results: tuple):
         return value if results else context.get_dummy_value()
 
     return result(types.int64, *kinds), generate
+
+
+def call_in_table(loop, given, row: int, kinds: tuple, results: tuple):
+    """Signature and code generator of a call of a function whose address is an entry of a table in memory.
+
+    loop, given : types of a function, which is not used, and of the tuple of arguments; functions in it are left out
+    row : row of the table, whose address is the second argument; kinds, results : as for `call_by_address`
+    Raises TypingError if the arguments cannot be passed as `kinds`.
+    """
+    places = [k for k, kind in enumerate(given.types) if not isinstance(kind, types.Dispatcher)]
+    if tuple(_passed(given.types[k]) for k in places) != kinds:
+        raise errors.TypingError(f"{loop} is called with {given}; its entry in the table has {kinds}")
+    signature, call = call_by_address(kinds, results)
+
+    def generate(context, builder, kind, args):
+        word = context.get_value_type(types.int64)
+        table = builder.inttoptr(args[1], word.as_pointer())
+        address = builder.load(cgutils.gep_inbounds(builder, table, row))
+        return call(context, builder, None, [address, *(builder.extract_value(args[2], k) for k in places)])
+
+    return signature.return_type(loop, types.int64, given), generate
+
+
+def _passed(kind):
+    """Type by which an argument of a numba type is passed: vectors as two words; literal numbers as numbers."""
+    if isinstance(kind, types.BaseTuple):
+        return types.UniTuple(_passed(kind.types[0]), len(kind))
+    if isinstance(kind, Array) and kind.ndim == 1 and kind.layout == "C":
+        return Vector(kind.dtype)
+    return types.unliteral(kind)
 
 
 def c_call(arguments: int, bits: int = 0):

@@ -123,6 +123,8 @@ class Function:
     `.py_func` is the plain function, `.numba` its numba dispatcher.
     """
 
+    numba_caches = True  # False for a function that only the store keeps
+
     def __init__(self, function: Callable, options: dict[str, Any]) -> None:
         functools.update_wrapper(self, function)
         self.py_func, self.options = function, options
@@ -150,7 +152,8 @@ class Function:
     def numba(self):
         """Numba dispatcher of this function."""
         with COMPILE_LOCK:
-            return dispatcher_class()(self.py_func, self.folder is not None, self.folder or "", **self.targetoptions)
+            cached = self.folder is not None and self.numba_caches
+            return dispatcher_class()(self.py_func, cached, self.folder or "", **self.targetoptions)
 
     @property
     def _numba_type_(self):

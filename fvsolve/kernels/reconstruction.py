@@ -11,6 +11,7 @@ from math import nan
 
 from fvsolve.jit import inline, njit
 from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.own_limiters import FIRST_ADDRESS, call_own
 from fvsolve.kernels.table_handle import open_tables
 
 # A slope is zero for products of differences below this, so that the product of two denominators does not underflow.
@@ -72,6 +73,8 @@ def half_slopes(limiter, a, b, c, d):
 def by_limiter(work, code, *given):
     """Call `work` with the limiter function of a code; each limiter gives vectorised code of its own.
 
+    A work that is called with limiters of users needs an entry in `own_limiters.LOOPS`.
+
     given : further arguments of `work`
     """
     if code == rec.MINMOD:
@@ -80,6 +83,8 @@ def by_limiter(work, code, *given):
         return work(van_leer, *given)
     if code == rec.MONOTONIZED_CENTRAL:
         return work(monotonized_central, *given)
+    if code >= FIRST_ADDRESS:
+        return call_own(work, code, given)
     return work(unknown_limiter, *given)
 
 

@@ -11,7 +11,7 @@ from fvsolve.argument_checks import TABLE, instance_of, validated
 from fvsolve.assembly.lowering import lower_devices, lowering_of
 from fvsolve.assembly.model_draft import ModelDraft
 from fvsolve.assembly.pipe_terms import MAX_TERMS, add_terms, limit_creep_step
-from fvsolve.assembly.scheme_codes import scheme_settings
+from fvsolve.assembly.scheme_codes import limiter_notices, scheme_settings
 from fvsolve.basins.lower import basin_start, lower_basins
 from fvsolve.case import load, locate_faults
 from fvsolve.case.case import Case
@@ -453,6 +453,7 @@ def model_of(draft: ModelDraft) -> Model:
     inside = sorted((t, jump) for t, jump in draft.schedules.breaks.items() if first <= t <= last)
     basin_notices = [notice for basin in draft.basins for notice in basin.notices(basin.deviations(start))]
     draft.warnings += [*basin_notices, *coarse_for_cavities(draft), *flow_notices(draft), *too_few_cells(draft)]
+    draft.warnings += limiter_notices(draft.case.numerics.scheme, draft.case.numerics.limiter)
     return Model(
         case, draft.tables, draft.shapes, draft.state_names, np.array(draft.scale), inside, draft.schedules.spacing,
         draft.meshes, list(case.places), list(case.links), draft.valve_names, draft.column_names, draft.piston_names,

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.errors import RunError, listing
+from fvsolve.schemes import LIMITERS
 
 # Keys of the resolved case that change the report of a run, not its numbers.
 UNCHECKED_KEYS = ("title", "expect", "compare", "validation")
@@ -46,8 +47,9 @@ def identity(case) -> dict[str, str]:
 
 
 def versions(case) -> dict[str, str]:
-    """Versions on which the numbers of a run depend: programs, source of fluid data, and target processor."""
-    return program_versions() | {"fluid": case.properties.source}
+    """Versions on which the numbers of a run depend: programs, source of fluid data, target processor, own limiter."""
+    own = LIMITERS[case.numerics.limiter].own
+    return program_versions() | {"fluid": case.properties.source} | ({"limiter": own.digest} if own else {})
 
 
 def program_versions() -> dict[str, str]:

@@ -1,20 +1,21 @@
-"""Part plugins: parts declared in a folder, or in an installed package."""
+"""Plugins: parts in a folder or an installed package, and limiters of installed packages."""
 
 import os
 import sys
 import warnings
 from importlib import import_module
 from importlib.machinery import ModuleSpec
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from importlib.util import module_from_spec
 from pathlib import Path
 
 from fvsolve.argument_checks import PATH, validated
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import add_sources
+from fvsolve.parts import own_limiters
 from fvsolve.units import show
 
-GROUP = "fvsolve.parts"
+GROUP, LIMITERS = "fvsolve.parts", "fvsolve.limiters"  # entry points
 VARIABLE = "FVSOLVE_PARTS"  # environment variable with the folders of registered parts, for other processes
 PLUGIN_PACKAGE = "fvsolve_parts"  # package in which registered folders appear
 
@@ -55,14 +56,26 @@ def declare(package: str) -> None:
     import_module(f"{package}.part")
 
 
+def register_installed(entry: EntryPoint) -> None:
+    """Register the limiter of an installed package, under the name of its entry point."""
+    own_limiters.register_limiter(entry.name, entry.load())
+
+
 def declare_installed() -> None:
-    """Declare parts of installed packages and of the variable FVSOLVE_PARTS; warn of unreadable parts."""
+    """Declare parts and limiters of installed packages and of environment variables; warn of unreadable ones."""
+    installed = entry_points()
     offered = [
-        (f"{entry.name} of the entry points {GROUP}", declare, entry.value) for entry in entry_points(group=GROUP)
+        *(
+            (f"{entry.name} of the entry points {GROUP}", declare, entry.value)
+            for entry in installed.select(group=GROUP)
+        ),
+        *((VARIABLE, register_part, folder) for folder in registered_folders()),
+        *((f"entry points {LIMITERS}", register_installed, entry) for entry in installed.select(group=LIMITERS)),
+        *((own_limiters.VARIABLE, own_limiters.read_entry, entry) for entry in own_limiters.entries()),
     ]
-    for source, read, place in [*offered, *((VARIABLE, register_part, folder) for folder in registered_folders())]:
+    for source, read, place in offered:
         try:
             read(place)
         except Exception as error:
-            text = f"{source}: the part {place} cannot be read: {error}; correct or remove this part"
+            text = f"{source}: {place} cannot be read: {error}; correct or remove it"
             warnings.warn(text, RuntimeWarning, stacklevel=2)

@@ -16,6 +16,7 @@ from fvsolve.errors import RunError
 from fvsolve.output.directory import lock_folder, release
 from fvsolve.output.restart import identity
 from fvsolve.output.summary_file import plain
+from fvsolve.schemes import LIMITERS
 from fvsolve.steppers.tableau import BUILT_IN, METHODS
 
 
@@ -123,13 +124,14 @@ def package_hash() -> str:
 
 
 def digest_of(who: dict) -> str:
-    """Hash of the values `who`, the sources of fvsolve and plugins, and user-defined methods that `who` names.
+    """Hash of the values `who`, the sources of fvsolve and plugins, and methods and limiters of users in `who`.
 
     The result of a point of a study depends on these alone.
     """
     who = who | {"package": package_hash(), "outside": sorted(EXTRA_FOLDERS.values())}
     text = json.dumps(who, sort_keys=True, default=str)
     arrays = [method.text for name, method in METHODS.items() if name not in BUILT_IN and f'"{name}"' in text]
+    arrays += [row.own.digest for name, row in LIMITERS.items() if row.own and f'"{name}"' in text]
     return hashlib.sha256("\n".join([text, *arrays]).encode()).hexdigest()[:24]
 
 

@@ -1,5 +1,7 @@
 """Objects as text, notebook table, frame and picture; shipped cases by name; tableaus from arrays and files."""
 
+import base64
+import importlib
 import json
 import subprocess
 import sys
@@ -41,10 +43,19 @@ def test_every_object_has_a_line_a_table_and_a_picture(objects, kind, tmp_path):
     line, page = repr(one), one._repr_html_()
     assert line.startswith(f"<{kind} ") and len(line) < 160 and "\n" not in line
     assert "<table>" in page and line.replace("<", "&lt;").partition(" ")[0] in page
+    data = base64.b64decode(page.partition("data:image/png;base64,")[2].partition('"')[0])
+    assert data.startswith(b"\x89PNG") and 2000 < len(data) < 150_000
     frame = one.frame()
     assert len(frame) > 0 and len(frame.columns) > 0
     one.plot(tmp_path / "picture.png")
     assert (tmp_path / "picture.png").stat().st_size > 5000
+
+
+def test_a_notebook_shows_the_table_alone_if_nothing_can_be_drawn(objects, monkeypatch):
+    for kind in KINDS:
+        monkeypatch.setattr(type(objects[kind]), "plot", lambda *_: importlib.import_module("no_matplotlib"))
+        page = objects[kind]._repr_html_()
+        assert "<table>" in page and "<img" not in page
 
 
 def test_tables_hold_the_numbers(objects):
@@ -125,7 +136,7 @@ def test_the_first_run_on_a_machine_says_that_it_compiles(fvs, tmp_path, monkeyp
     from fvsolve import jit
     from fvsolve.cli import app
 
-    app._announce_compilation.cache_clear()
+    app.announce_compilation.cache_clear()
     monkeypatch.setattr(jit, "is_cold", lambda: True)
     assert "compiles" in fvs("check", CASE)[2]
     assert "compiles" not in fvs("check", CASE)[2]

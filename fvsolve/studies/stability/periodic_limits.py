@@ -268,8 +268,8 @@ def limited_limit(
 
 def monotone_limit(limiter: str, method: str) -> float | None:
     """Courant number up to which total variation cannot grow with a slope limiter and a method; None if unknown."""
-    radius = analyse(method).ssp_radius
-    return radius / (1 + LIMITERS[limiter].steepest / 2) if limiter in LIMITERS and radius > 0 else None
+    radius, own = analyse(method).ssp_radius, LIMITERS.get(limiter)
+    return radius / (1 + own.steepest / 2) if own and own.monotone and radius > 0 else None
 
 
 def start_fields(cells: int) -> dict[str, np.ndarray]:
