@@ -228,6 +228,21 @@ def atomic_load():
     return types.int64(types.int64), generate
 
 
+def estimated_cube_root_reciprocal():
+    """Signature and code generator of an estimate of x^(-1/3) for x > 0, within 4 %, from the bits of x.
+
+    A third of the upper half of the bits divides exponent and mantissa by about 3. Loops with it vectorise.
+    """
+
+    def generate(context, builder, kind, args):
+        word = ir.IntType(64)
+        upper = builder.lshr(builder.bitcast(args[0], word), word(32))
+        third = builder.lshr(builder.mul(upper, word(0xAAAAAAAB)), word(33))
+        return builder.bitcast(builder.shl(builder.sub(word(0x553EF0FF), third), word(32)), ir.DoubleType())
+
+    return types.float64(types.float64), generate
+
+
 def no_inlining():
     """Signature and code generator of a mark that LLVM does not inline the function that contains it."""
 

@@ -3,11 +3,13 @@
 import os
 import sys
 import warnings
+from collections.abc import Callable
 from importlib import import_module
 from importlib.machinery import ModuleSpec
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import module_from_spec
 from pathlib import Path
+from typing import Any
 
 from fvsolve.argument_checks import PATH, validated
 from fvsolve.errors import FvsolveError
@@ -64,7 +66,7 @@ def register_installed(entry: EntryPoint) -> None:
 def declare_installed() -> None:
     """Declare parts and limiters of installed packages and of environment variables; warn of unreadable ones."""
     installed = entry_points()
-    offered = [
+    offered: list[tuple[str, Callable[[Any], None], Any]] = [
         *(
             (f"{entry.name} of the entry points {GROUP}", declare, entry.value)
             for entry in installed.select(group=GROUP)

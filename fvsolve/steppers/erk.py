@@ -16,6 +16,8 @@ from fvsolve.steppers.coefficients import nodes_of, row_of, weights_of
 from fvsolve.steppers.run_handle import evaluate, open_run, stage_rates, store_ledger_rates
 from fvsolve.steppers.step_operations import BEGIN, STOP, combine, copy, error_of_bands
 
+CHUNK = 512  # number of states of a vector loop whose operands stay in the cache
+
 
 @njit
 def quotient(f_new, f, y_new, y, scale):
@@ -82,19 +84,44 @@ def attempt(handle, run, t, h, now, new):
 
 
 @njit
-def second_order_correction(begin, end, b, damping, k):
+def any_nonzero(values):
+    """True if a value is not zero."""
+    for value in values:
+        if value != 0.0:
+            return True
+    return False
+
+
+@njit
+def second_order_correction(begin, end, b, damping, k, means):
     """Correct k of the last stage so that y + h sum b_j k_j is second order in h, for states from `begin` to `end` - 1.
 
     The correction is an Euler step of length h (h R) from the end of the step, implicit in the decay. Its rate f + G y
     is that of the stage at the end of the step, k[2] (1 + h R). f + G y are the rates, with a fast decay G = -r.
     b : weights of the stages; damping : float64[n]  h R with the rate R of each state
+    means : float64[n], work space
     """
     last = b.size - 1
-    for i in range(begin, end):
-        q, mean = damping[i], 0.0
-        for j in range(1, b.size):
-            mean += b[j] * k[j, i]
-        k[last, i] += q * (k[2, i] * (1.0 + q) + q * (k[1, i] - mean)) / ((1.0 + q * q) * b[last])
+    for first in range(begin, end, CHUNK):
+        stop = min(first + CHUNK, end)
+        q, mean, early, late, final = (
+            damping[first:stop],
+            means[first:stop],
+            k[1, first:stop],
+            k[2, first:stop],
+            k[last, first:stop],
+        )
+        if not any_nonzero(q):
+            continue
+        for i in range(mean.size):
+            mean[i] = b[1] * early[i]
+        for j in range(2, b.size):
+            stage = k[j, first:stop]
+            for i in range(mean.size):
+                mean[i] += b[j] * stage[i]
+        for i in range(mean.size):
+            rate = late[i] * (1.0 + q[i]) + q[i] * (early[i] - mean[i])
+            final[i] += q[i] * rate / ((1.0 + q[i] * q[i]) * b[last])
 
 
 @njit
@@ -119,6 +146,6 @@ def damped_attempt(handle, run, t, h, now, new):
         store_ledger_rates(r, i)
         damp_in_turn(h, r.y[3], k[i], early if i == 2 else late, handle)
     for m in range(row_blocks.shape[0] if s > 2 else 0):
-        second_order_correction(row_blocks[m, BEGIN], row_blocks[m, STOP], b, early, k)
+        second_order_correction(row_blocks[m, BEGIN], row_blocks[m, STOP], b, early, k, r.y[3])
     form_sum(r, h, b, s, now, r.y[new])
     return 0.0

@@ -131,6 +131,9 @@ class Unresolved:
             return self.unknown.get(part) or stopped_runs_text(self.case, self.runs)
         if error <= WIDE_ERROR * span:
             return None
+        if error > span:
+            causes = "; ".join(self.shared) or difference_text(triple, error, unit, self.case)
+            return f"this estimate exceeds the range of the signal, so the peak is not known; {causes}"
         return "; ".join(self.shared) or difference_text(triple, error, unit, self.case)
 
 

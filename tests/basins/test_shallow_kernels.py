@@ -7,9 +7,10 @@ import pytest
 from pytest import approx
 from scipy.optimize import brentq
 
-from fvsolve.basins.free_surface.bed_friction import add_capped_friction
+from fvsolve.basins.free_surface.bed_friction import add_capped_friction, cube_root_reciprocal, estimate
 from fvsolve.basins.free_surface.surface_grid import PLANS, WORK, FaceFlows, WaterGrid, grid_rates
 from fvsolve.basins.free_surface.surface_rows import SURFACE, put_push
+from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import DARCY, LINEAR, MANNING, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
 
 G = 9.80665
@@ -327,3 +328,16 @@ def test_a_wave_leaves_by_an_open_side_and_comes_back_from_a_wall():
     assert np.array_equal(left["wall"], left["ones"])
     assert abs(left["wall"][0]).max() > 4e-3
     assert abs(left["open"][0]).max() < 2e-5
+
+
+def test_the_cube_root_of_friction_is_exact_to_rounding_for_films_and_oceans():
+    @njit
+    def of_all(x, roughly, exactly):
+        for i in range(x.size):
+            roughly[i], exactly[i] = estimate(x[i]), cube_root_reciprocal(x[i])
+
+    depths = np.logspace(-8, 5, 40001)
+    roughly, exactly = np.zeros_like(depths), np.zeros_like(depths)
+    of_all(depths, roughly, exactly)
+    assert np.abs(roughly * np.cbrt(depths) - 1.0).max() < 0.04
+    assert np.abs(exactly * np.cbrt(depths) - 1.0).max() < 1e-15

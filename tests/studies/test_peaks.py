@@ -161,6 +161,7 @@ def test_every_peak_whose_error_is_wide_or_not_known_says_why() -> None:
     assert "links.main-1.cells = 4" in found["out.pressure"]["maximum"]["reason"]
     wide = found["flap.flow"]["minimum"]
     assert wide["error"] > 0.05 * (found["flap.flow"]["maximum"]["value"] - wide["value"])
+    assert wide["reason"].startswith("this estimate exceeds the range of the signal")
     assert "flap (2, 2, " in wide["reason"] and "main-1 has 1 cell beside flap, vessel" in wide["reason"]
     assert found["main.pressure@0.5"]["maximum"]["reason"] is None
     row = said["verdicts"][0]
