@@ -57,6 +57,7 @@ class Row:
     what : name of the row; measure : what is computed; None in a validation by a program
     from_, to : first and last time that count [s], None for start and end; set : overrides of the case for this row
     curves : name -> CSV file with run-up over angle or distance, for the figure of a run-up
+    series : name of the compared series in the figure; "" for a measurement or an exact solution
     measured : {value, spread, source}; others : tuple of {code, value, source}; exact : {value, source, resolution}
     gate : {of, rtol, atol, reason}; because : why the model differs from the measurement; unit : of a program's value
     """
@@ -72,6 +73,7 @@ class Row:
     unit: str
     set: dict[str, Any]
     curves: dict[str, str]
+    series: str
     from_: float | None
     to: float | None
 
@@ -220,6 +222,7 @@ def row_keys(dimension: str) -> dict[str, tuple[val.Value, Any]]:
         "to": (Quantity("time", about="last time that counts [s]", changes=VALUE), None),
         "set": (ByName(val.Anything(), "overrides of the case, for example { KEY = VALUE }"), {}),
         "curves": (ByName(val.Text(changes=VALUE), "{ NAME = FILE }, run-up over angle or distance"), {}),
+        "series": text("name of the compared series in the picture, for example of a program"),
         "measured": (Subtable(measured, "for example { value, spread, source }"), None),
         "others": (Sequence(Subtable(other, "for example { code, value }"), "results of other programs"), ()),
         "exact": (Subtable(exact, "for example { value, source }"), None),

@@ -49,8 +49,12 @@ class Scenarios:
 
 
 def read_scenarios(path: str | Path) -> Scenarios:
-    """Read a study from a TOML file. Raises CaseError with all faults of the file and its runs, with line numbers."""
-    path = Path(path)
+    """Read a study from a TOML file, or a shipped study by its name.
+
+    Raises CaseError with all faults of the file and its runs, with line numbers.
+    """
+    path, shipped_file = Path(path), shipped.folder() / "studies" / f"{path}.toml"
+    path = shipped_file if not path.exists() and shipped_file.is_file() else path
     data, lines = read_text(path)
     faults: dict[tuple, Fault] = {}
 

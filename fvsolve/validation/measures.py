@@ -157,7 +157,7 @@ def best_shift(row: Row, run: Any) -> tuple[float, float]:
 def lines_of(row: Row, run: Any) -> dict[str, np.ndarray]:
     """Lines for a figure of a row : name -> float64[n, 2], times [s] or places [m] and values in units of `[output]`.
 
-    Names are "measured" or "exact", and "computed"; the result is {} for a probe without measured series.
+    Names are that of the row, "measured" or "exact", and "computed"; the result is {} for a probe without measured series.
     """
     measure = row.measure
     series = None if measure.probe is None else measured_series(run.case, measure.probe)
@@ -167,7 +167,7 @@ def lines_of(row: Row, run: Any) -> dict[str, np.ndarray]:
         inside = (run.seconds >= pair.t[0]) & (run.seconds <= pair.t[-1])
         computed = np.column_stack([run.seconds, shown.from_si(run.si(measure.probe.text))])[inside]
         published = row.gate["of"] == EXACT and (row.exact or {}).get("resolution") is None
-        name = "exact" if series is None or published else "measured"
+        name = row.series or ("exact" if series is None or published else "measured")
         return {name: np.column_stack([pair.t, shown.from_si(pair.measured)]), "computed": computed}
     if measure.run_up is not None:
         table = run.run_up[measure.run_up.name]
@@ -245,5 +245,7 @@ def shown_in(row: Row, case: Any) -> UnitColumn:
 
 def unit_of_lines(row: Row, case: Any) -> str:
     """Unit of the values in `lines_of`; "-" for a number without unit."""
-    probe = row.measure.probe
+    probe, field = row.measure.probe, row.measure.field
+    if field is not None:
+        return {"u": "m/s", "discharge": "m2/s"}.get(field[1], "m")
     return "-" if probe is None else column("", probe.dimension, case, probe.unit).unit or "-"

@@ -110,7 +110,7 @@ def panels_of(result: ValidationResult) -> list[LinePanel]:
         elif measure.run_up is not None:
             title, label, logarithmic = f"run-up {measure.run_up.name} [m]", "angle [deg] or distance [m]", False
         elif measure.field is not None:
-            title, label, logarithmic = f"{'.'.join(measure.field)} [SI]", "x [m]", False
+            title, label, logarithmic = f"{'.'.join(measure.field)} [{row.unit_of_lines}]", "x [m]", False
         else:
             title, label, logarithmic = f"{measure.probe.text} [{row.unit_of_lines}]", "t [s]", False
         key = title + repr(row.row.set)

@@ -341,3 +341,14 @@ def test_the_cube_root_of_friction_is_exact_to_rounding_for_films_and_oceans():
     of_all(depths, roughly, exactly)
     assert np.abs(roughly * np.cbrt(depths) - 1.0).max() < 0.04
     assert np.abs(exactly * np.cbrt(depths) - 1.0).max() < 1e-15
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
+def test_no_water_flows_through_a_wall_to_the_last_bit(scheme):
+    rng = np.random.default_rng(4)
+    water = Water(even(9, 3.0), even(7, 2.0), rng.uniform(-1.0, -0.5, (7, 9)), scheme=scheme)
+    y = water.state(rng.uniform(0.5, 1.0, (7, 9)), *rng.uniform(-0.7, 0.7, (2, 7, 9)))
+    water.rates(y, np.zeros_like(y))
+    along, across = water.flow_x.reshape(7, 10), water.flow_y.reshape(8, 9)
+    assert not along[:, [0, -1]].any() and not across[[0, -1]].any()
+    assert np.abs(along[:, 1:-1]).min() > 0.0
