@@ -31,7 +31,7 @@ shutil.copy(DOCS / "kernel_start.py", PROFILE)
 project = author = "fvsolve"
 project_copyright = "fvsolve maintainers"
 extensions = ["myst_nb", "sphinx_copybutton"]
-exclude_patterns = ["**/.*", "validation/results"]
+exclude_patterns = ["**/.*", "validation/results", "views"]
 smartquotes = False
 highlight_language = "none"  # of blocks without a language: formulas and output
 myst_enable_extensions = ["attrs_inline", "colon_fence", "dollarmath"]
@@ -46,7 +46,8 @@ nitpick_ignore_regex = [("py:.*", ".*")]  # default values in signatures
 html_theme = "pydata_sphinx_theme"
 html_title = "fvsolve"
 html_math_renderer = "mathml"
-html_static_path = ["site.css"]
+html_static_path = ["site.css", "views"]
+(DOCS / "views").mkdir(exist_ok=True)  # filled by `generated_pages.views`
 html_css_files = ["site.css"]
 html_copy_source = html_show_sourcelink = False
 html_sidebars = {"index": []}

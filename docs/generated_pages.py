@@ -2,6 +2,7 @@
 
 import inspect
 import re
+import shutil
 from importlib import import_module
 from pathlib import Path
 
@@ -135,4 +136,19 @@ def validation() -> str:
     return re.sub(r"(?<=\]\()([\w-]+\.png)", r"results/\1", text)
 
 
-GENERATED = {"commands": commands, "units": units, "names": names, "validation": validation}
+VIEWS = {"flooding": "40 s", "tanker-braking": "3 s"}  # shipped cases that can be turned by hand: time of the frame
+
+
+def views() -> str:
+    """Frames of `VIEWS` as pages beside this file, each in a window that can be turned; runs the cases."""
+    folder, text = Path(__file__).parent / "views", ""
+    folder.mkdir(exist_ok=True)
+    for name, time in VIEWS.items():
+        result = fvsolve.run(name, out=folder / "runs" / name, force=True, pictures=False)
+        page = result.view(time=float(time.split()[0]), path=folder / f"{name}.html")
+        text += f'<iframe class="view" src="_static/{page.name}" title="{name} after {time}" loading="lazy"></iframe>\n'
+    shutil.rmtree(folder / "runs")
+    return f"```{{raw}} html\n{text}```\n"
+
+
+GENERATED = {"commands": commands, "units": units, "names": names, "validation": validation, "views": views}

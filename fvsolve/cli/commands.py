@@ -325,8 +325,8 @@ def view(
     contours: Annotated[int, Option(metavar="N", min=0, max=100, help="number of contour lines on the surfaces of "
         "basins")] = 0,
     animate: Annotated[Path | None, Option(metavar="FILE", help="animation of all frames, a .gif or .mp4 file")] = None,
-    out: Annotated[Path | None, Option(metavar="FILE", help="picture file (default RUN/view-FIELD.png, with the name "
-        "of the field)")] = None,
+    out: Annotated[Path | None, Option(metavar="FILE", help="picture file, or a page .html in which the scene can be "
+        "turned (default RUN/view-FIELD.png, with the name of the field)")] = None,
 ) -> None:  # fmt: skip
     """Draw a quantity in all parts at one time, or an animation of all stored times, into a file."""
     from fvsolve.run import open_run

@@ -34,7 +34,7 @@ class FieldCanvas:
     def __init__(self, scene: DrawnScene, film: bool) -> None:
         import pyvista
 
-        self.scene, self.half, self.texts = scene, HALF_SYMBOL, []
+        self.scene, self.half, self.texts, self.colours = scene, HALF_SYMBOL, [], None
         self._measure()
         self.sheet = PictureSheet(film, ruled=self.aspect.kind != "aslant")
         self.axes = axes = self.sheet.axes
@@ -72,6 +72,16 @@ class FieldCanvas:
         rise = self.aspect.rise / self.scene.height_ratio
         notes = [] if abs(rise - 1.0) < 1e-9 else [f"heights drawn {rise:.3g} times"]
         self.sheet.caption(self.scene.title, "; ".join([caption, *notes]))
+
+    def write_page(self, out: str) -> None:
+        """Write the first frame as an HTML page without network, in which the scene can be turned (PyVista, trame)."""
+        self.show(0)
+        if self.colours is not None:
+            self.plotter.add_scalar_bar(self.scene.quantity.label, color=style.INK, mapper=self.colours)
+        self.plotter.set_background("white")
+        self.plotter.disable_parallel_projection()
+        self.plotter.reset_camera()
+        self.plotter.export_html(out)
 
     def _measure(self) -> None:
         """Find the range of the field and the bounding box, and choose the projection."""
@@ -187,9 +197,11 @@ class FieldCanvas:
     def _coloured(self, shape: Any, plane: bool) -> None:
         """Draw a shape in the colours of the field; plane : True for a surface, which then also has contour lines."""
         (low, high), field, count = self.limits, self.scene.quantity.name, self.scene.contours
-        self.plotter.add_mesh(shape, scalars=field, cmap=COLOUR_MAP, clim=self.limits, smooth_shading=True,
-                              show_scalar_bar=False, lighting=not plane or self.wet,
-                              ambient=0.0 if plane else AMBIENT_LIGHT)  # fmt: skip
+        actor = self.plotter.add_mesh(
+            shape, scalars=field, cmap=COLOUR_MAP, clim=self.limits, smooth_shading=True, show_scalar_bar=False,
+            lighting=not plane or self.wet, ambient=0.0 if plane else AMBIENT_LIGHT,
+        )  # fmt: skip
+        self.colours = actor.mapper
         if plane and count and field in shape.point_data:
             levels = [low + (high - low) * (k + 1) / (count + 1) for k in range(count)]
             lines = shape.contour(levels, scalars=field)
@@ -441,7 +453,10 @@ def boundary_edges(mesh: Any) -> Any:
 def main() -> None:
     """Read a pickled (scene, path) from standard input and write its picture or animation."""
     scene, out = pickle.load(sys.stdin.buffer)
-    write_animation(FieldCanvas(scene, len(scene.frames) > 1), len(scene.frames), Path(out))
+    canvas = FieldCanvas(scene, len(scene.frames) > 1)
+    if Path(out).suffix == ".html":
+        return canvas.write_page(out)
+    return write_animation(canvas, len(scene.frames), Path(out))
 
 
 if __name__ == "__main__":

@@ -22,16 +22,19 @@ ANIMATION_FORMATS = "a .gif needs no extra package; .mp4 needs imageio with ffmp
 
 
 def view(scene: DrawnScene, out: Path) -> None:
-    """Write a single frame as a picture, several as an animation (.gif or .mp4), to the file `out`.
+    """Write a single frame as a picture or a page (.html), several as an animation (.gif or .mp4), to the file `out`.
 
     Matplotlib draws networks in this process. PyVista draws basins and bodies in a second process, because VTK ends its
     process without an OpenGL library.
     Raises FvsolveError for an unknown field, for an animation in a file that is not a .gif or .mp4, for an .mp4 without
-    the packages that write it, without PyVista if it is needed, and for a picture that cannot be drawn.
+    the packages that write it, without PyVista if it is needed, for a page of a network, and for a picture that cannot
+    be drawn.
     """
     animated = len(scene.frames) > 1
     if animated and out.suffix not in (".gif", ".mp4"):
         raise FvsolveError(f"{out.name} is not an animation. Expected a file name that ends in .gif or .mp4")
+    if out.suffix == ".html" and scene.pipes:
+        raise FvsolveError(f"{out.name}: only basins and bodies are drawn as a page. Expected .png, .svg or .pdf")
     if out.suffix == ".mp4" and animated:
         _need_imageio()
     if scene.pipes:

@@ -57,7 +57,7 @@ def ordered_limiter(a, b):
 
 def argument_kinds(letters: str) -> tuple:
     """Numba types of the arguments of a loop after the limiter, without functions."""
-    from numba.core import types
+    from numba import types
 
     found = []
     for letter, count in re.findall(r"([a-zA-Z])(\d?)", letters.replace("F", "")):
@@ -131,7 +131,7 @@ if COMPILING:
     @Intrinsic
     def call_own(typingctx, loop, code, given):
         """Call the loop with the limiter of a user; given : its other arguments."""
-        from numba.core import errors
+        from numba import errors
 
         from fvsolve.compile.code_generation import call_in_table
 

@@ -157,7 +157,7 @@ def best_shift(row: Row, run: Any) -> tuple[float, float]:
 def lines_of(row: Row, run: Any) -> dict[str, np.ndarray]:
     """Lines for a figure of a row : name -> float64[n, 2], times [s] or places [m] and values in units of `[output]`.
 
-    Names are that of the row, "measured" or "exact", and "computed"; the result is {} for a probe without measured series.
+    Names are "measured", "exact" or that of the row, and "computed"; the result is {} for a probe without measurement.
     """
     measure = row.measure
     series = None if measure.probe is None else measured_series(run.case, measure.probe)

@@ -1,6 +1,7 @@
 """Output of basins: probes at points, lines, flows through patches, frames, pictures, and the command `check`."""
 
 import csv
+import importlib.util
 import json
 import re
 
@@ -391,6 +392,14 @@ def test_view_animates_all_frames(dam, fvs):
     assert code == 2 and "Expected a file name that ends in .gif or .mp4" in err
     code, _, err = fvs("view", dam, "--animate", "dam.gif", "--time", "0 s")
     assert code == 2 and "--animate draws all times" in err
+
+
+def test_view_writes_a_page_to_turn_or_says_what_to_install(dam, fvs, tmp_path):
+    code, _, err = fvs("view", dam, "--out", tmp_path / "dam.html")
+    if importlib.util.find_spec("trame_pyvista"):
+        assert code == 0 and "vtk" in (tmp_path / "dam.html").read_text(encoding="utf-8")
+    else:
+        assert code == 2 and "pip install trame-pyvista" in err
 
 
 def test_an_mp4_without_imageio_says_what_to_install(dam, monkeypatch):
