@@ -123,6 +123,19 @@ def cluster():
         yield local
 
 
+@pytest.fixture
+def own_limiters_removed(monkeypatch):
+    """Limiters that a test registers are removed at its end."""
+    from fvsolve.parts import own_limiters
+    from fvsolve.schemes import LIMITERS
+
+    before = dict(LIMITERS)
+    monkeypatch.setenv(own_limiters.VARIABLE, "")
+    yield
+    LIMITERS.clear()
+    LIMITERS.update(before)
+
+
 @pytest.fixture(autouse=True)
 def alone(request):
     """Remove methods that a test adds; fail a test that changes folder, environment or tables of its module."""

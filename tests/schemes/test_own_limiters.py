@@ -17,7 +17,6 @@ import fvsolve
 from fvsolve.case import load
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.kernels.own_limiters import LOOPS
-from fvsolve.parts import own_limiters
 from fvsolve.schemes import LIMITERS
 from fvsolve.studies import order, sweep
 from fvsolve.studies.stability.periodic_limits import limited_limit, monotone_limit
@@ -55,14 +54,7 @@ def koren(r):
 SAME = {"van-leer": van_leer, "minmod": minmod, "monotonized-central": monotonized_central}
 
 
-@pytest.fixture(autouse=True)
-def registry(monkeypatch):
-    """Registrations of a test end with it."""
-    before = dict(LIMITERS)
-    monkeypatch.setenv(own_limiters.VARIABLE, "")
-    yield
-    LIMITERS.clear()
-    LIMITERS.update(before)
+pytestmark = pytest.mark.usefixtures("own_limiters_removed")
 
 
 def main(limiter: str, **numerics) -> dict:
