@@ -1,6 +1,7 @@
 """Library of validations: names, runs of their cases, and results with verdicts."""
 
 import importlib
+import math
 import tempfile
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -159,12 +160,31 @@ def validate(
     out : folder for the files of the runs, each below its name; None for none
     Raises FvsolveError for unknown names, CaseError for faults of a table [validation].
     """
-    tables = {path: read_table(read_raw(path)) for path in find(names).values()}  # faults before the first run
-    short = [path for path, table in tables.items() if not table.files and table.program is None]
-    first = short[:1]  # compiles in this process; then long cases, so that no process ends with several of them
+    raws = {path: read_raw(path) for path in find(names).values()}
+    for raw in raws.values():
+        read_table(raw)  # faults before the first run
+    order = sorted(raws, key=lambda path: -cell_steps(raws[path].table))  # long cases first
     with TaskPool(CaseWork(data, out), jobs) as pool:
-        for _, result in pool.run([*first, *(path for path in tables if path not in short), *short[1:]]):
+        for _, result in pool.run(order):
             yield result
+
+
+def cell_steps(table: dict[str, Any]) -> float:
+    """Measure of the computing time of a case: cells times steps of its largest grid in the finest run."""
+    listed = [cells for cells in values_of(table, "cells") if isinstance(cells, list)]
+    grids = [math.prod(cells) for cells in listed if all(isinstance(count, int) for count in cells)]
+    finer = [times for times in values_of(table, "resolution") if isinstance(times, (int, float))]
+    return max(grids, default=0) ** 1.5 * max(finer, default=1.0) ** 3
+
+
+def values_of(table: Any, key: str) -> Iterator[Any]:
+    """Yield the values of a key in a table and in all tables below it."""
+    if isinstance(table, list):
+        table = dict(enumerate(table))
+    for name, value in table.items() if isinstance(table, dict) else ():
+        if name == key:
+            yield value
+        yield from values_of(value, key)
 
 
 @dataclass(frozen=True)

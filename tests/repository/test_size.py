@@ -42,7 +42,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/step_limits": (1597, 7),
     "fvsolve/steppers": (6601, 31),
     "fvsolve/studies": (14526, 49),
-    "fvsolve/validation": (1427, 11),
+    "fvsolve/validation": (1447, 11),
     "tests/attitude": (447, 2),
     "tests/basins": (6846, 22),
     "tests/case": (4453, 15),
