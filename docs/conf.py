@@ -62,6 +62,7 @@ html_theme_options = {
     "pygments_dark_style": "github-dark",
 }
 
+LANGUAGES = {".toml": "toml", ".py": "python"}
 NAMED = re.compile(r"\[([\w-]+)\.md\]\(")  # a link whose text is the name of its file
 LINK = re.compile(r"(?<=\]\()([^)\s:#]+)(#[^)\s]*)?(?=\))")
 ELSEWHERE = re.compile(r"<!-- page: (\S+) -->\n.*", re.DOTALL)
@@ -113,7 +114,8 @@ def plain_cells(app, document) -> None:
             lines, language = [line[1:] for line in lines], "sh"
         elif first.startswith("%%writefile"):
             place = "at the end of " if " -a " in first else ""
-            lines, language = [f"# {place}{first.split()[-1]}", *rest], "toml"
+            name = first.split()[-1]
+            lines, language = [f"# {place}{name}", *rest], LANGUAGES.get(Path(name).suffix, "none")
         else:
             continue
         block.rawsource = "\n".join(lines)
