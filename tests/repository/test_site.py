@@ -20,7 +20,8 @@ from reference.folders import DOCS
 for module in ("sphinx", "myst_nb", "pydata_sphinx_theme", "sphinx_copybutton", "latex2mathml", "wntr", "plotly"):
     pytest.importorskip(module, reason="the extra `docs` is not installed")
 
-PAGES = sorted(path.relative_to(DOCS).with_suffix("").as_posix() for path in DOCS.rglob("*.md"))
+FILES = (path.relative_to(DOCS).with_suffix("").as_posix() for path in DOCS.rglob("*.md"))
+PAGES = sorted(page for page in FILES if not page.startswith("validation/results/"))  # part of validation/cases
 FORMS = [(width, scheme) for width in (1280, 390) for scheme in ("light", "dark")]
 LOADED = {"script": "src", "img": "src", "iframe": "src", "source": "src", "video": "src", "embed": "src"}
 VOID = {"script", "style", "template", "noscript"}  # elements whose text is not shown
@@ -189,8 +190,9 @@ def test_pages_fit_their_window_without_a_message_of_the_browser(width, scheme, 
             wide.append(page)
         assert view.evaluate("document.documentElement.dataset.theme") == scheme
     view.close()
+    said = [text for text in said if "GL Driver Message" not in text]  # speed of a browser without a graphics card
     assert (said, wide) == ([], [])
-    assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
+    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
 
 
 def test_text_and_formulas_are_shown_without_javascript(site, chromium):
