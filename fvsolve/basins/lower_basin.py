@@ -165,6 +165,10 @@ class BasinRows:
         """
         return 0.0
 
+    def filling_step(self) -> float:
+        """Longest explicit step while no wave limits steps, at Courant number 1 [s]."""
+        return np.inf
+
     def notices(self, y: np.ndarray) -> list[Notice]:
         """Notices on the deviations y of cells at the start of a run."""
         return []

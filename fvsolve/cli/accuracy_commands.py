@@ -13,6 +13,7 @@ from fvsolve.studies.accuracy.fit import NO_ERROR
 from fvsolve.studies.accuracy.order_study import NORMS, SHOWN_VARIABLES, study_title, variable_unit
 from fvsolve.studies.result_table import Column, ResultTable, columns
 
+STEP_KEYS = {f"numerics.{key}" for key in ("courant", "rtol", "step", "cell_time")}  # set by a chart itself
 ORDER_FILE = columns(
     scheme="scheme", method="method", reference="reference", variable="variable", unit="unit", norm="norm",
     cells="cells", size="size", step="step [s]", error="error", pairwise="order", mark="mark", order="fitted order",
@@ -47,6 +48,9 @@ def chart(
     from fvsolve.studies.accuracy.work_precision import write_chart
 
     loaded = cli.load_case(case, set, scheme, method)
+    for key in sorted({text.partition("=")[0].strip() for text in set} & STEP_KEYS):
+        text = f"--set {key} has no effect, because a chart sets the steps: Courant number 0.9, or --rtol, or --step"
+        raise FvsolveError(f"{text}. Remove it")
     if target is not None and not 0.0 < target < 1.0:
         text = f"--target: {target:g} is not a valid error"
         raise FvsolveError(f"{text}. Expected a fraction of the range, between 0 and 1")

@@ -193,7 +193,9 @@ def find_file(name: str, setting: ReadContext) -> Path:
         if not path.is_file():
             near = did_you_mean(path.name, _neighbours(path))
             state = "is a directory, not a file" if path.is_dir() else "there is no such file"
-            raise ValueError(f"{show(name)}: {state}{near}; a relative path starts at the folder of the case file")
+            raise ValueError(
+                f"{show(name)}: {state}{near}; a relative path starts at the folder of the case file, {path.parent}"
+            )
     except OSError as error:
         raise ValueError(f"{show(name)}: {error.strerror}") from None
     setting.files.setdefault(copy_name(path, setting), path)

@@ -94,6 +94,8 @@ class RunLoop:
         self.state, self.control, self.progress = stepper.state[0], stepper.control[0], stepper.progress[0]
         self.out, control = stepper.out, self.control
         control["step_max"] = min(model.step_max, longest_step(model)) if numerics.rtol is not None else NO_LIMIT
+        if numerics.courant is not None:
+            control["step_max"] = min([NO_LIMIT, *(numerics.courant * basin.filling_step() for basin in model.basins)])
         control["stop_at"], control["allow_fused"] = NO_LIMIT, fused_allowed
         for mode, key in enumerate(("courant", "step", "rtol")):  # COURANT, FIXED_STEP, TOLERANCE of `loop_records`
             if getattr(numerics, key) is not None:

@@ -123,7 +123,7 @@ def _failure(method, code, state) -> str:
     when = f"{method.name} stopped at t = {state['t']:.6g}: "
     if code == loop_records.NEWTON_STUCK:
         return when + f"Newton did not converge, worst in y[{int(state['worst'])}]; try another rtol, step or method"
-    return when + "the solution is not finite or the step became too small; try a smaller step or a larger rtol"
+    return when + "the solution is not finite or the step became too small; set a smaller step, or rtol without step"
 
 
 def _numbers(name, given) -> np.ndarray:

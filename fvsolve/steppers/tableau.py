@@ -287,6 +287,8 @@ def method_named(name: str | Method) -> Method:
     if name in METHODS:
         return METHODS[name]
     near = nearest(name, METHODS)
+    if Path(name).suffix:
+        raise FvsolveError(f'no method named "{name}". For a file: fvsolve.tableau(NAME, Path("{name}").read_text())')
     hint = f'; did you mean "{near}"?' if near else f"; methods are {', '.join(METHODS)}"
     raise FvsolveError(f'no method named "{name}"{hint}')
 
@@ -373,7 +375,9 @@ def _faults(head: list, weights: list, rounding: Fraction) -> list[str]:
         elif differs(row, c):
             faults.append(f"row {i} adds up to {_show(sum(row, Fraction(0)))}; expected c = {_show(c)}")
     if not 1 <= len(weights) <= 2 or any(len(row) != s for row in weights):
-        faults.append(f"wrong rows of weights below the line. Expected one or two rows of {s} numbers")
+        text = f"wrong rows of weights below the line. Expected one or two rows of {s} numbers"
+        longer = [len(row) for row in weights] == [s + 1]
+        faults.append(f"{text}; is the first row `0 |` missing?" if longer else text)
     else:
         for row in weights:
             if differs(row, 1):

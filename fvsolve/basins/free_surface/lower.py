@@ -66,6 +66,9 @@ class ErrorWatch:
         return [self.notice(self.basin, error, f" at {self.basin.case.amount(t, 'time')}")]
 
 
+FILLING_DEPTH = 0.1  # [m]
+
+
 class SurfaceWaves(NamedTuple):
     """Properties of the waves on the free surface of a basin, see `surface_waves`.
 
@@ -438,6 +441,17 @@ class FreeSurfaceRows(BasinRows):
         wet = np.maximum(depth, THIN)
         moves = depth / (depth**2 + wet**2) * (y[1] ** 2 + y[2] ** 2)
         return float(self.case.properties.density * np.sum(self.mesh.area * (height + moves)))
+
+    def filling_step(self) -> float:
+        """As in `BasinRows`; infinite if some cell is deep at the start.
+
+        It is the time in which a wave in `FILLING_DEPTH`, or in a tenth of the cell size, crosses the smallest cell.
+        Water that flows into dry cells thus forms waves, which limit the next steps.
+        """
+        size = math.sqrt(float(self.mesh.area.min()))
+        depth = min(FILLING_DEPTH, 0.1 * size)
+        deep = float((self.depth + self.start()[0]).max()) > depth
+        return math.inf if deep else size / math.sqrt(self.case.gravity * depth)
 
     def notices(self, y: np.ndarray) -> list[Notice]:
         films = [notice(self, error) for look, notice in film_checks(self) if (error := look(self, y))[0] > FILM_ERROR]
