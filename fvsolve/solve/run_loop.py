@@ -93,9 +93,7 @@ class RunLoop:
         stepper.rows = np.zeros((ROW_CAPACITY, 1 + len(model.tables.probes)))
         self.state, self.control, self.progress = stepper.state[0], stepper.control[0], stepper.progress[0]
         self.out, control = stepper.out, self.control
-        control["step_max"] = min(model.step_max, longest_step(model)) if numerics.rtol is not None else NO_LIMIT
-        if numerics.courant is not None:
-            control["step_max"] = min([NO_LIMIT, *(numerics.courant * basin.filling_step() for basin in model.basins)])
+        control["step_max"] = longest_step(model)
         control["stop_at"], control["allow_fused"] = NO_LIMIT, fused_allowed
         for mode, key in enumerate(("courant", "step", "rtol")):  # COURANT, FIXED_STEP, TOLERANCE of `loop_records`
             if getattr(numerics, key) is not None:
@@ -361,9 +359,18 @@ class RunLoop:
 
 
 def longest_step(model: Model) -> float:
-    """Longest step that suits the delay lines [s]: the inverse of their greatest wave rate; infinity without them."""
+    """Longest step [s]; infinite if waves, or a given step, set all steps.
+
+    Under error control it resolves schedules and delay lines (the inverse of their greatest wave rate). With a Courant
+    number it is that of basins that start dry, see `filling_step`.
+    """
+    numerics = model.case.numerics
+    if numerics.courant is not None:
+        return min([NO_LIMIT, *(numerics.courant * basin.filling_step() for basin in model.basins)])
+    if numerics.rtol is None:
+        return NO_LIMIT
     delay_lines = model.tables.pipes["delay"] >= 0
-    return float(1.0 / model.wave_rates[delay_lines].max()) if delay_lines.any() else np.inf
+    return min(model.step_max, 1.0 / model.wave_rates[delay_lines].max() if delay_lines.any() else NO_LIMIT)
 
 
 def step_within_delays(model: Model) -> float:

@@ -443,7 +443,7 @@ class FreeSurfaceRows(BasinRows):
         return float(self.case.properties.density * np.sum(self.mesh.area * (height + moves)))
 
     def filling_step(self) -> float:
-        """As in `BasinRows`; infinite if some cell is deep at the start.
+        """Longest explicit step while no wave limits steps, at Courant number 1 [s]; infinite with a deep cell.
 
         It is the time in which a wave in `FILLING_DEPTH`, or in a tenth of the cell size, crosses the smallest cell.
         Water that flows into dry cells thus forms waves, which limit the next steps.
