@@ -102,7 +102,7 @@ class RunLoop:
             automatic.watch(stepper, structure())
         # of waves only: implicit steps are stable for the rest
         if numerics.courant is not None and not method.explicit:
-            control["mode"], control["size"] = loop_records.FIXED_STEP, numerics.courant / model.wave_rate
+            control["mode"], control["size"] = loop_records.FIXED_STEP, step_of_waves(model)
         longest = step_within_delays(model)
         control["step_max"] = min(control["step_max"], longest / (STEPS_IN_DELAY if numerics.rtol is not None else 1))
         if control["mode"] == loop_records.FIXED_STEP:
@@ -356,6 +356,12 @@ class RunLoop:
         verbs = "change their states" if len(names) > 1 else "changes its state"
         remedy = ", or ".join(remedies) or "put a chamber at the node of this part"
         return f"{parts_text} {verbs} without end at {when}; {remedy}"
+
+
+def step_of_waves(model: Model) -> float:
+    """Given step of an implicit method with a Courant number [s]: that of the fastest wave at the start."""
+    rate = model.wave_rate
+    return model.case.numerics.courant / rate if rate > 0.0 else longest_step(model)
 
 
 def longest_step(model: Model) -> float:
