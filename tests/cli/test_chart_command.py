@@ -64,6 +64,7 @@ def test_the_lines_that_are_printed_reach_the_target_when_run(fvs, folder, tmp_p
         (["--cells", "10"], "no pipe"),
         (["--rtol", "1e-3,x"], "--rtol: x is not a number above 0"),
         (["--method", "dormand-prinse"], 'did you mean "dormand-prince"'),
+        (["--set", "numerics.rtol=1e-4"], "--set numerics.rtol has no effect"),
         (["--target", "2"], "--target: 2 is not a valid error"),
         (["--target", "-1e-3"], "--target: -0.001 is not a valid error"),
     ],

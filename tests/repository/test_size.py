@@ -46,7 +46,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/attitude": (447, 2),
     "tests/basins": (6881, 22),
     "tests/case": (4453, 15),
-    "tests/cli": (1035, 7),
+    "tests/cli": (1036, 7),
     "tests/draw": (217, 2),
     "tests/epanet": (643, 2),
     "tests/exact": (475, 2),
@@ -64,10 +64,10 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/schemes": (565, 2),
     "tests/solve": (1922, 8),
     "tests/step_limits": (1022, 4),
-    "tests/steppers": (2114, 12),
-    "tests/studies": (7983, 22),
+    "tests/steppers": (2121, 12),
+    "tests/studies": (7989, 22),
     "tests/units": (267, 1),
-    "tests/validation": (302, 1),
+    "tests/validation": (310, 1),
 }
 # functions that exceed a limit: "path: function" -> (arguments, lines). Commands and studies are excepted by rule.
 LONG: dict[str, tuple[int, int]] = {}

@@ -209,3 +209,10 @@ def test_a_named_number_is_the_root_that_was_asked_for():
 def test_a_named_number_that_is_none_is_refused(polynomial, near, wanted):
     with pytest.raises(FvsolveError, match=wanted.replace("(", r"\(")):
         tableau("user", "g | g\n--+--\n | 1", numbers={"g": (polynomial, near)})
+
+
+def test_a_missing_first_row_and_a_file_in_place_of_a_name_have_a_remedy():
+    with pytest.raises(FvsolveError, match="is the first row `0 |` missing"):
+        tableau("wrong", "1/2 | 1/2\n--+--\n | 0 1")
+    with pytest.raises(FvsolveError, match="For a file: fvsolve.tableau"):
+        method_named("heun3.txt")

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from reference.folders import DOCS
+from reference.folders import CASES, DOCS
 from reference.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
@@ -344,3 +344,9 @@ def test_what_cannot_be_minimised_is_named() -> None:
         optimise(column(), "links.tap.opening", "max(gaet.pressure)")
     with pytest.raises(FvsolveError, match="Expected 15 or more"):
         optimise(column(), "links.tap.opening", "max(gate.pressure)", runs=4)
+
+
+def test_a_shipped_study_is_found_by_its_name():
+    assert scenarios.read_scenarios("pumping-main-design").path == CASES / "studies" / "pumping-main-design.toml"
+    with pytest.raises(CaseError, match="no-such-study"):
+        scenarios.read_scenarios("no-such-study")

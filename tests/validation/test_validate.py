@@ -296,6 +296,14 @@ def test_the_page_has_a_figure_of_each_case_in_both_themes(tmp_path):
     assert "Stoker 1957" in page and "within" in page and "| depth, mean error over mean depth |" in page
 
 
+def test_long_cases_begin_first():
+    grids = {"few": [10, 10], "many": [20, 20], "finer": [10, 10]}
+    tables = {name: {"nodes": {"pool": {"cells": cells}}} for name, cells in grids.items()}
+    tables["finer"]["validation"] = {"compare": [{"exact": {"resolution": 4}}]}
+    assert sorted(tables, key=lambda name: -library.cell_steps(tables[name])) == ["finer", "many", "few"]
+    assert library.cell_steps({"nodes": {"main": {"cells": 100}}}) == 0.0
+
+
 def test_an_unknown_name_is_named_with_the_nearest():
     with pytest.raises(FvsolveError, match='did you mean "stoker"'):
         library.find(["stokes"])
