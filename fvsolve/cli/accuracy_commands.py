@@ -48,7 +48,8 @@ def chart(
     from fvsolve.studies.accuracy.work_precision import write_chart
 
     loaded = cli.load_case(case, set, scheme, method)
-    for key in sorted({text.partition("=")[0].strip() for text in set} & STEP_KEYS):
+    keys_of_the_chart = STEP_KEYS - {"numerics.step"} if models else STEP_KEYS
+    for key in sorted({text.partition("=")[0].strip() for text in set} & keys_of_the_chart):
         text = f"--set {key} has no effect, because a chart sets the steps: Courant number 0.9, or --rtol, or --step"
         raise FvsolveError(f"{text}. Remove it")
     if target is not None and not 0.0 < target < 1.0:
