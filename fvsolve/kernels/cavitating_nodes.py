@@ -9,7 +9,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.barotropic_nodes import add_end_inflow, clear_inflows, given_flows, node_beyond, write_end_waves
 from fvsolve.kernels.density import pressure_of_mass
 from fvsolve.kernels.density.mixture_law import enthalpy, relative_volume
-from fvsolve.kernels.dtypes import JUNCTION, NOT_CONVERGED, STATUS, WHERE
+from fvsolve.kernels.dtypes import JUNCTION, NO_LIQUID, NOT_CONVERGED, STATUS, WHERE
 from fvsolve.kernels.node_clusters import (
     BAR,
     MAX_SWEEPS,
@@ -26,6 +26,7 @@ from fvsolve.kernels.table_handle import open_tables
 ROUNDING = 1e-12  # least gas pressure of a node, relative to its pressure
 BALANCE_ERROR = 1e-7  # greatest imbalance by rounding, relative to the flow that the whole pressure of the node drives
 NARROW = 1e-9  # relative width of bounds: if they are narrower and Newton steps out of them, they have lost the root
+SHORTAGE = 0.01  # greatest part of a demand that a cavity may not supply
 BISECTION_START = 30  # sweeps after which Newton steps are replaced by bisection or halved
 
 
@@ -202,7 +203,8 @@ def balance_junctions(t, y, dydt, out, handle):
     """Distribute the flow imbalance of each junction over its pipe ends in proportion to their mass: mass is conserved.
 
     The waves at the ends, in `out`, are changed. An imbalance above rounding is a failure at a junction full of liquid.
-    Where a cavity lies, the demand may exceed the inflow: no flow towards the junction can be faster than sound.
+    Where a cavity lies, the demand may exceed the inflow: no flow towards the junction can be faster than sound. A
+    difference above SHORTAGE times the demand ends the run: the cells would lose mass that they do not have.
     """
     tables = open_tables(handle)
     layout, nodes, pipes, profile = tables.layout[0], tables.nodes, tables.pipes, tables.profile
@@ -215,6 +217,8 @@ def balance_junctions(t, y, dydt, out, handle):
             out[layout["net"] + i] -= imbalance[i]
             unbalanced = unbalanced or imbalance[i] != 0.0
             p = nodes[i]["pressure"] + out[layout["pressure"] + i]
+            if p - floor <= BAR and -imbalance[i] > SHORTAGE * -out[layout["supply"] + i] > 0.0:
+                out[STATUS], out[WHERE] = NO_LIQUID, i
             if p - floor > BAR and abs(imbalance[i]) > BALANCE_ERROR * nodes[i]["admittance"] * (BAR + abs(p)):
                 out[STATUS], out[WHERE] = NOT_CONVERGED, i
     for sweep in range(2 if unbalanced else 0):

@@ -25,6 +25,7 @@ OK, NO_SOLUTION, NOT_CONVERGED, NOT_FINITE, NO_VOLUME, NO_WIDTH, NO_WEIGHT = 0, 
 AMENDED = 7  # no fault: a record function has corrected the accepted state; evaluate it again
 ARRIVED = 8  # no fault: record functions must let the jumps arrive that end the step
 NO_COOLANT = 9  # too little fluid flows through a junction for the heat of a part
+NO_LIQUID = 10  # more is drawn from a junction than its pipes supply past a cavity
 
 i8, f8 = "i8", "f8"
 

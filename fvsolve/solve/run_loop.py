@@ -42,6 +42,7 @@ FAILURES = {  # reason for the return of the loop -> text
     loop_records.BAD_VALUE: "a value is not finite{place} at {when}; the step is too long for the method: "
     "halve the step",
 }
+NEAR_VAPOR = 5e3  # [Pa]; at a junction whose pressure is less above the vapour pressure there is a cavity
 STATUS_FAILURES = {  # status of the right-hand side -> text
     rec.NO_SOLUTION: "the demand{place} cannot be supplied at {when}; all connections to its node are shut, or pass "
     "a flow that its pressure does not change: open one, give a machine a leakage, or replace the node by a chamber",
@@ -49,6 +50,8 @@ STATUS_FAILURES = {  # status of the right-hand side -> text
     rec.NO_WIDTH: "the wall has no space left{place} at {when}; give its mass an end-stop, or a wider zone",
     rec.NO_COOLANT: f"{{part}} heats {{name}} by more than {GREATEST_RISE:g} K at {{when}}: too little fluid flows "
     "through this junction to take up the heat; make it a chamber, or leave the part out of `heat_from`",
+    rec.NO_LIQUID: "a cavity{place} cannot supply the flow that is drawn from it at {when}; give a demand the key "
+    "`required_pressure`, so that it falls with the pressure; a pump would lose its suction there: trip it earlier",
     rec.NO_WEIGHT: "the water in {name} has no weight left at {when}; reduce the downward acceleration of its body",
 }
 
@@ -315,6 +318,8 @@ class RunLoop:
             self.step_back()
         elif code == loop_records.BAD_STATUS:
             index, status = int(self.out[rec.WHERE]), int(self.out[rec.STATUS])
+            if status == rec.NOT_CONVERGED and (cavity := self.cavity_of_cluster(index)) >= 0:
+                index, status = cavity, rec.NO_LIQUID
             text = STATUS_FAILURES.get(status, "Newton did not converge{place} at {when}; try a smaller step")
             if status == rec.NO_WEIGHT:
                 bodies = [*(basin.name for basin in model.basins), *model.node_names]
@@ -329,6 +334,19 @@ class RunLoop:
         if block := self.block_without_output():
             return f"the output of {block} is not a finite number at {names['when']}; check its formula and its inputs"
         return text.format(**names)
+
+    def cavity_of_cluster(self, index: int) -> int:
+        """Number of a junction with a cavity in the cluster of node `index`, which is solved at once; -1 for none."""
+        tables = self.model.tables
+        if not self.model.cavitates or index < 0:
+            return -1
+        for cluster in tables.clusters:
+            nodes = tables.integers[cluster["first_node"] : cluster["first_node"] + cluster["nodes"]]
+            p = tables.nodes["pressure"][nodes] + self.out[self.model.layout["pressure"] + nodes]
+            low = nodes[p < tables.settings[0]["floor"] + NEAR_VAPOR]
+            if index in nodes and low.size:
+                return int(low[0])
+        return -1
 
     def block_without_output(self) -> str:
         """Name of a control whose output was not finite in a step from the present time on; "" for none.

@@ -189,6 +189,45 @@ def test_a_node_whose_balance_has_a_kink_is_closed_at_every_resolution(cell_time
     assert abs(result.ledger["mass"]["relative"]) < 1e-13
 
 
+@pytest.mark.parametrize("method", ["ssp-rk2", "dormand-prince"])
+@pytest.mark.parametrize("reverse", [False, True])
+def test_a_demand_that_a_cavity_cannot_supply_ends_the_run_and_one_that_falls_with_the_pressure_does_not(
+    method, reverse
+):
+    """The valve before a summit shuts: the column beyond flows on, stops, and returns; the demand continues."""
+    ends = ("hill", "far") if reverse else ("far", "hill")
+    nodes = {"lake": lake(30.0, elevation=0.0), "gate": junction(elevation=0.0), "far": lake(25.0, elevation=0.0)}
+    nodes["hill"] = junction(elevation=20.0) | {"demand": 1e-3}
+    links = {
+        "tap": valve("lake", "gate", 2e-3, scenes.ramp(0.1, 0.1, 1.0, 0.0)),
+        "rise": pipe("gate", "hill", 60.0, 0.1, 1000.0, 12),
+        "fall": pipe(*ends[::-1], 100.0, 0.1, 1000.0, 20),
+    }
+    case = scene(nodes, links, 6.0, PLAIN | {"method": method}, ["hill.gauge_pressure"], 0.01, fluid=WATER)
+    if method != "ssp-rk2":
+        case["numerics"] = {"rtol": 1e-5} | {key: one for key, one in case["numerics"].items() if key != "courant"}
+    result = fvsolve.run(case)
+    assert not result.ok and "a cavity at hill cannot supply" in result.reason and "required_pressure" in result.reason
+    assert result["hill.gauge_pressure"].max() < 1e6 and result.summary["invalid_from"] is None
+    case["nodes"]["hill"]["required_pressure"] = 1.5e5
+    result = fvsolve.run(case)
+    assert result.ok and abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+def test_a_pump_at_a_cavity_is_told_by_the_place_of_the_cavity():
+    curve = {"flow": [0.0, 0.03, 0.06], "head": [60.0, 50.0, 30.0]}
+    nodes = {"low": lake(3.0, elevation=0.0), "high": lake(40.0, elevation=0.0)}
+    nodes |= {name: junction(elevation=z) for name, z in (("foot", 0.0), ("eye", 2.0), ("out", 2.0))}
+    links = {
+        "gate": valve("low", "foot", 2e-2, scenes.ramp(0.5, 1.5, 1.0, 0.0)),
+        "suction": pipe("foot", "eye", 100.0, 0.2, 1000.0, 20),
+        "pump": {"type": "pump", "from": "eye", "to": "out", "curve": curve},
+        "main": pipe("out", "high", 400.0, 0.2, 1000.0, 40),
+    }
+    result = fvsolve.run(scene(nodes, links, 10.0, PLAIN, ["eye.gauge_pressure"], 0.01, fluid=WATER))
+    assert not result.ok and "a cavity at eye cannot supply" in result.reason and "suction" in result.reason
+
+
 def test_a_chamber_that_empties_into_a_cavity_keeps_all_mass():
     case = network(end=0.4)
     case["nodes"]["pot"] = {"type": "chamber", "volume": 2e-3, "elevation": 15.0}
