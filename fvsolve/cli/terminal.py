@@ -1,6 +1,7 @@
 """Presentation of results on the terminal (JSON, or lines and tables), progress on standard error, and Ctrl-C."""
 
 import json
+import math
 import signal
 import sys
 import threading
@@ -88,14 +89,16 @@ def run_progress(case=None) -> Iterator[Callable[[float, float, int], None]]:
     """Context manager that yields a `progress` function for a run, which ends the run at Ctrl-C.
 
     The first Ctrl-C ends the run after a complete step; the second interrupts it at once.
-    case : case whose progress is drawn as a bar on a terminal; None for no bar
+    case : case whose progress is drawn as a bar on a terminal, else told in a line every `PROGRESS_INTERVAL`; None for
+    neither
     """
     stop = threading.Event()
     bar = RunBar(case) if case is not None and sys.stderr.isatty() else None
+    show = bar or (RunLines(case) if case is not None else None)
 
     def progress(t: float, seconds: float, steps: int) -> None:
-        if bar:
-            bar(t, seconds)
+        if show:
+            show(t, seconds, steps)
         if stop.is_set():
             raise KeyboardInterrupt
 
@@ -177,6 +180,24 @@ def progress_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
         )
 
 
+class RunLines:
+    """Lines of progress of a run whose output is not a terminal: simulated time, steps, and time left at this pace."""
+
+    def __init__(self, case):
+        self.end, self.format_amount = case.numerics.end, case.amount
+        self.last: tuple[float, float] | None = None
+
+    def __call__(self, t: float, seconds: float, steps: int) -> None:
+        self.last = self.last or (t, seconds)
+        passed = seconds - self.last[1]
+        if passed < PROGRESS_INTERVAL:
+            return
+        left = (self.end - t) * passed / (t - self.last[0]) if t > self.last[0] else math.inf
+        times = f"t = {self.format_amount(t, 'time', 6)} of {self.format_amount(self.end, 'time', 6)}"
+        print(f"{times}, {steps} steps; about {left:.2g} s left at this pace", file=sys.stderr, flush=True)
+        self.last = t, seconds
+
+
 class RunBar:
     """Progress bar of a run with simulated time, speed and remaining time."""
 
@@ -188,7 +209,7 @@ class RunBar:
         self.shown = _bar(TextColumn("{task.fields[now]}"))
         self.task = self.shown.add_task(visible(case.name), total=self.end - self.start, now="")
 
-    def __call__(self, t: float, seconds: float) -> None:
+    def __call__(self, t: float, seconds: float, steps: int) -> None:
         self.first = self.first or (t, seconds)
         spent = seconds - self.first[1]
         speed = f", {(t - self.first[0]) / spent:.3g} s per s" if spent > 0.0 else ""

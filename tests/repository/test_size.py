@@ -23,7 +23,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/assembly": (1964, 10),
     "fvsolve/basins": (9258, 46),
     "fvsolve/case": (7366, 25),
-    "fvsolve/cli": (3426, 16),
+    "fvsolve/cli": (3447, 16),
     "fvsolve/compile": (1098, 6),
     "fvsolve/data": (12, 1),
     "fvsolve/draw": (2993, 14),
@@ -65,7 +65,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/solve": (1922, 8),
     "tests/step_limits": (1022, 4),
     "tests/steppers": (2121, 12),
-    "tests/studies": (7989, 22),
+    "tests/studies": (8000, 22),
     "tests/units": (267, 1),
     "tests/validation": (310, 1),
 }

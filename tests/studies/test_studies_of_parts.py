@@ -458,6 +458,17 @@ def test_without_a_terminal_a_study_says_now_and_then_where_it_is(monkeypatch, c
     assert said.splitlines()[0] == "3 of 9: upwind with rk4"
 
 
+def test_without_a_terminal_a_run_says_now_and_then_where_it_is_and_how_long_the_rest_takes(path, capsys):
+    with terminal.run_progress(fvsolve.load(path)) as progress:
+        for t, seconds, steps in ((0.0, 0.0, 0), (1.0, 9.0, 40), (2.0, 20.0, 80), (2.5, 31.0, 700), (2.5, 50.0, 900)):
+            progress(t, seconds, steps)
+    lines = [line.partition(" of ")[0::2] for line in capsys.readouterr().err.splitlines()]
+    end = fvsolve.load(path).numerics.end
+    left = [(end - 2.0) * 10.0, (end - 2.5) * 22.0, math.inf]
+    assert [at for at, _ in lines] == ["t = 2 s", "t = 2.5 s", "t = 2.5 s"]
+    assert [rest.partition("; ")[2] for _, rest in lines] == [f"about {one:.2g} s left at this pace" for one in left]
+
+
 def test_a_line_of_progress_is_not_repeated_unchanged(monkeypatch, capsys):
     monkeypatch.setattr(terminal, "PROGRESS_INTERVAL", 1e-3)
     with terminal.progress_line() as progress:
