@@ -30,7 +30,7 @@ BODY = {
 }  # fmt: skip
 PIPE = {
     "length": ("length", "length"), "cells": ("cells", "number"), "wave_speed": ("wave speed", "velocity"),
-    "velocity": ("velocity", "velocity"), "reynolds": ("Reynolds", "number"),
+    "flow": ("flow", "flow"), "velocity": ("velocity", "velocity"), "reynolds": ("Reynolds", "number"),
     "friction_factor": ("friction factor", "number"), "from_head": ("head at from", "head"),
     "to_head": ("head at to", "head"),
 }  # fmt: skip

@@ -55,7 +55,7 @@ def checks(model) -> dict[str, Any]:
         has_friction = dynamic > 0 and link.friction.model != "none"
         pipes[mesh.name] = {
             "length": mesh.length, "cells": mesh.cells, "wave_speed": speed,
-            "travel_time": mesh.length / speed, "velocity": float(velocity),
+            "travel_time": mesh.length / speed, "flow": float(row["flow"] / rho), "velocity": float(velocity),
             "reynolds": float(rho * abs(velocity) * mesh.diameter / viscosity) if viscosity else None,
             "friction_factor": float(wall_loss / dynamic) if has_friction else None,
             "from_head": nodes[mesh.from_]["head"], "to_head": nodes[mesh.to]["head"],

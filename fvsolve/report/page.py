@@ -173,8 +173,9 @@ def study_sentences(study: dict[str, Any], runs: list) -> list[Sentence]:
         text = "The study shows what happens, but not whether this is allowed."
         return [*sentences, Sentence("none", "No limits were stated.", text)]
     names = [visible(name) or "the unchanged case" for name in study["holds"]]
+    without = "" if all("resolution" in row for row, _ in runs) else tables.WITHOUT_ERROR
     if names:
-        sentences.append(Sentence("good", f"All limits hold in all events with {', '.join(names)}.", ""))
+        sentences.append(Sentence("good", f"All limits hold in all events with {', '.join(names)}.", without))
     else:
         sentences.append(Sentence("bad", "No protection holds all limits in all events.", ""))
     if failed := [item for item in runs if run_state(item[1]) == FAILS]:

@@ -377,6 +377,9 @@ def _mark_sentences(result) -> list[Sentence]:
     return [Sentence("doubt", f"Results from {when[0]} on are not to be trusted.", text)]
 
 
+WITHOUT_ERROR = "Numerical errors were not estimated (run --estimate-error)."
+
+
 def verdict_sentence(result) -> Sentence:
     """Sentence on the limits of the case: some are violated, some are open, all hold, or none is stated."""
     verdicts = result.verdicts
@@ -394,7 +397,7 @@ def verdict_sentence(result) -> Sentence:
                     f"{', '.join(unsure)}: {open_reason(result)}.")  # fmt: skip
     summary = f"All {len(verdicts)} limits hold" if len(verdicts) > 1 else "The limit holds"
     if result.reason == "finished" and result.ok and not result.marks:
-        return Sentence("good", f"{summary}.", "")
+        return Sentence("good", f"{summary}.", "" if "resolution" in result.summary else WITHOUT_ERROR)
     return Sentence("doubt", f"{summary}, as far as results are reliable.", "")
 
 

@@ -282,6 +282,7 @@ def test_a_study_is_reported_with_all_its_runs(tmp_path, fvs) -> None:
     said = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     page = Read(said)
     assert "All limits hold in all events with vessel." in page.text and "fast with none" in page.text
+    assert "Numerical errors were not estimated" in page.text
     assert WICKED[:20] in page.text and "<script>alert" not in said
     assert len(said) < 6e6
     figures = page.figures
