@@ -5,10 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fvsolve.case.validation_table import OF_ERROR
 from fvsolve.draw.validation_pictures import LinePanel, ValueRow, validation_figure
 from fvsolve.validation.library import RowResult, ValidationResult
-from fvsolve.validation.row_texts import amounts
+from fvsolve.validation.row_texts import amounts, is_error, limits_of
 from fvsolve.validation.row_verdicts import WITHIN, known_values
 
 THEMES = ("light", "dark")
@@ -16,10 +15,11 @@ PAGE = "index.md"
 INTRODUCTION = """# Validation
 
 Each row compares a computed value with a measurement, with published results of other programs, or with an exact
-solution. The gate of a row says with which. `within` means that the value passes its gate. `equations solved, model
-differs` means that the value agrees with other programs of the same equations, or with a converged solution, but not
-with the measurement; the reason stands beside it. `outside` means that the value fails. The error is the numerical
-error, from a run at half the resolution, or at a finer one. This page is made by
+solution. The gate of a row says with which; the limits are the least and the greatest value that pass. `within` means
+that the value passes its gate. `equations solved, model differs` means that the value agrees with other programs of the
+same equations, or with a converged solution, but not with the measurement; the reason stands beside it. `outside` means
+that the value fails. The error is the numerical error, from a run at half the resolution, or at a finer one. This page
+is made by
 
 ```sh
 fvsolve validate --data DIR --page FOLDER
@@ -57,8 +57,8 @@ def section(result: ValidationResult, figures: list[str]) -> str:
     lines += ["", *(f"![{result.title}, {theme}]({name}){{.only-{theme}}}\n"
                     for theme, name in zip(THEMES, figures, strict=False))]  # fmt: skip
     lines += [
-        "| quantity | measured | computed | half resolution | error | other programs | unit | verdict |",
-        "|" + "---|" * 8,
+        "| quantity | measured | computed | half resolution | error | other programs | limits | unit | verdict |",
+        "|" + "---|" * 9,
     ]
     for row in result.rows:
         texts = amounts(row)
@@ -69,6 +69,7 @@ def section(result: ValidationResult, figures: list[str]) -> str:
             texts.coarser,
             texts.error,
             texts.others,
+            texts.limits,
             row.unit,
             row.verdict,
         ]
@@ -121,22 +122,17 @@ def panels_of(result: ValidationResult) -> list[LinePanel]:
 def value_row(row: RowResult) -> ValueRow:
     """Row of the panel of values."""
     known = known_values(row.row, [value for _, value in row.others], row.converged)
-    reference = getattr(known, row.row.gate["of"]) or (row.value, row.value)
-    gate = reference[0] - row.tolerance, reference[1] + row.tolerance
+    gate, shown = limits_of(row), row.in_unit
     codes = [*(item["value"] for item in row.row.others), *(value for _, value in row.others)]
-    is_error = row.row.measure is None or row.row.measure.function in OF_ERROR
-    error = row.error if row.error is not None and math.isfinite(row.error) and not is_error else 0.0
-    gate = (0.0, gate[1]) if is_error else gate
-    measured = None if is_error else known.measured
-    value = row.value if np.isfinite(row.value) else gate[0]
-    shown = row.in_unit
-    gate, measured = tuple(map(shown, gate)), measured and tuple(map(shown, measured))
+    error = row.error if row.error is not None and math.isfinite(row.error) and not is_error(row) else 0.0
+    measured = None if is_error(row) or known.measured is None else tuple(map(shown, known.measured))
+    value = shown(row.value) if np.isfinite(row.value) else gate[0]
     unit = "" if row.unit == "-" else row.unit
     passes = row.verdict == WITHIN
     return ValueRow(
         row.row.what,
         unit,
-        shown(value),
+        value,
         row.shown.span_from_si(error),
         measured,
         tuple(map(shown, codes)),

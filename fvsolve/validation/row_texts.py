@@ -3,17 +3,20 @@
 import math
 from typing import NamedTuple
 
+from fvsolve.case.validation_table import OF_ERROR
 from fvsolve.validation.library import RowResult
+from fvsolve.validation.row_verdicts import known_values
 
 
 class Amounts(NamedTuple):
-    """Texts of the values of a row, "-" for none."""
+    """Texts of the values of a row, "-" for none; limits : least and greatest value that pass the gate."""
 
     reference: str
     value: str
     coarser: str
     error: str
     others: str
+    limits: str
 
 
 def amounts(row: RowResult) -> Amounts:
@@ -37,7 +40,21 @@ def amounts(row: RowResult) -> Amounts:
         "-" if row.coarser is None else text(row.coarser),
         "-" if row.error is None else f"{row.shown.span_from_si(row.error):.1e}",
         "; ".join(f"{code} {text(value)}" for code, value in others) or "-",
+        " to ".join(number(limit) for limit in limits_of(row)),
     )
+
+
+def is_error(row: RowResult) -> bool:
+    """True if the value of a row is an error, which is 0 in a perfect agreement."""
+    return row.row.measure is None or row.row.measure.function in OF_ERROR
+
+
+def limits_of(row: RowResult) -> tuple[float, float]:
+    """Least and greatest value that pass the gate of a row, in its unit; the least error is 0."""
+    known = known_values(row.row, [value for _, value in row.others], row.converged)
+    least, greatest = getattr(known, row.row.gate["of"]) or (row.value, row.value)
+    least = 0.0 if is_error(row) else least - row.tolerance
+    return row.in_unit(least), row.in_unit(greatest + row.tolerance)
 
 
 def number(value: float) -> str:

@@ -42,7 +42,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/step_limits": (1597, 7),
     "fvsolve/steppers": (6605, 31),
     "fvsolve/studies": (14526, 49),
-    "fvsolve/validation": (1447, 11),
+    "fvsolve/validation": (1460, 11),
     "tests/attitude": (447, 2),
     "tests/basins": (6881, 22),
     "tests/case": (4453, 15),
