@@ -151,6 +151,8 @@ class Translation:
         return part
 
     def reservoir(self, name: str, node: Any) -> part_tables.Part:
+        text = "EPANET has no elevation of a reservoir; that of the other end of its pipe or pump is used"
+        self.note(f"{text}: state `elevation` if vacuum near it matters", name)
         return part_tables.reservoir(node.head_timeseries.at(self.clock), self.position(node))
 
     def tank(self, name: str, node: Any) -> part_tables.Part:
