@@ -26,7 +26,8 @@ from fvsolve.kernels.table_handle import open_tables
 ROUNDING = 1e-12  # least gas pressure of a node, relative to its pressure
 BALANCE_ERROR = 1e-7  # greatest imbalance by rounding, relative to the flow that the whole pressure of the node drives
 NARROW = 1e-9  # relative width of bounds: if they are narrower and Newton steps out of them, they have lost the root
-SHORTAGE = 0.01  # greatest part of a demand that a cavity may not supply
+SHORTAGE = 0.01  # part of a demand that may be drawn from any state of the pipe ends
+EMPTY = 0.3  # fraction of liquid at a pipe end below which nothing can be drawn from it
 BISECTION_START = 30  # sweeps after which Newton steps are replaced by bisection or halved
 
 
@@ -203,8 +204,9 @@ def balance_junctions(t, y, dydt, out, handle):
     """Distribute the flow imbalance of each junction over its pipe ends in proportion to their mass: mass is conserved.
 
     The waves at the ends, in `out`, are changed. An imbalance above rounding is a failure at a junction full of liquid.
-    Where a cavity lies, the demand may exceed the inflow: no flow towards the junction can be faster than sound. A
-    difference above SHORTAGE times the demand ends the run: the cells would lose mass that they do not have.
+    Where a cavity lies, the demand may exceed the inflow, because no flow towards the junction can be faster than
+    sound. The difference is drawn from the ends. If they hold too little liquid, the run ends: its velocity would grow
+    without bound.
     """
     tables = open_tables(handle)
     layout, nodes, pipes, profile = tables.layout[0], tables.nodes, tables.pipes, tables.profile
@@ -217,8 +219,6 @@ def balance_junctions(t, y, dydt, out, handle):
             out[layout["net"] + i] -= imbalance[i]
             unbalanced = unbalanced or imbalance[i] != 0.0
             p = nodes[i]["pressure"] + out[layout["pressure"] + i]
-            if p - floor <= BAR and -imbalance[i] > SHORTAGE * -out[layout["supply"] + i] > 0.0:
-                out[STATUS], out[WHERE] = NO_LIQUID, i
             if p - floor > BAR and abs(imbalance[i]) > BALANCE_ERROR * nodes[i]["admittance"] * (BAR + abs(p)):
                 out[STATUS], out[WHERE] = NOT_CONVERGED, i
     for sweep in range(2 if unbalanced else 0):
@@ -231,6 +231,9 @@ def balance_junctions(t, y, dydt, out, handle):
                 if sweep == 0:
                     content[i] += m
                 elif imbalance[i] != 0.0:
+                    short = -imbalance[i] > SHORTAGE * -out[layout["supply"] + i] > 0.0
+                    if short and content[i] < EMPTY * tables.settings[0]["rho"] * pipes[k]["area"]:
+                        out[STATUS], out[WHERE] = NO_LIQUID, i
                     change = (0.5 - side) * imbalance[i] * (m / content[i])
                     out[at] += change
                     out[at + 1] -= change

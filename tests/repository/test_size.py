@@ -31,7 +31,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/exact": (1462, 7),
     "fvsolve/fluid": (1075, 4),
     "fvsolve/fmi": (439, 5),
-    "fvsolve/kernels": (15879, 66),
+    "fvsolve/kernels": (15882, 66),
     "fvsolve/mesh": (1077, 4),
     "fvsolve/model": (9149, 27),
     "fvsolve/output": (1629, 10),
