@@ -67,7 +67,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/steppers": (2121, 12),
     "tests/studies": (8000, 22),
     "tests/units": (267, 1),
-    "tests/validation": (310, 1),
+    "tests/validation": (319, 1),
 }
 # functions that exceed a limit: "path: function" -> (arguments, lines). Commands and studies are excepted by rule.
 LONG: dict[str, tuple[int, int]] = {}

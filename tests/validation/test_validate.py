@@ -15,6 +15,7 @@ from fvsolve.case.reading import read_raw
 from fvsolve.cli import main
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.validation import data_files, library
+from fvsolve.validation.row_texts import limits_of
 from fvsolve.validation.row_verdicts import DIFFERS, OUTSIDE, WITHIN
 
 DATA = Path(os.environ.get("FVSOLVE_DATA") or Path(__file__).parents[3] / "shared" / "data")  # measured data, if here
@@ -294,6 +295,14 @@ def test_the_page_has_a_figure_of_each_case_in_both_themes(tmp_path):
     for theme in ("light", "dark"):
         assert f"(stoker-{theme}.png)" in page and (tmp_path / "page" / f"stoker-{theme}.png").stat().st_size > 5000
     assert "Stoker 1957" in page and "within" in page and "| depth, mean error over mean depth |" in page
+    assert "| - | 0 to 0.004 | - | within |" in page  # the gate of the case: at most 0.004
+
+
+def test_limits_lie_about_the_measured_value_and_hold_what_is_within():
+    row = library.validate_file(SHIPPED["adelaide-moderate"]).rows[0]
+    low, high = limits_of(row)
+    assert low < row.in_unit(row.row.measured["value"]) < high and low < row.in_unit(row.value) < high
+    assert low + high == pytest.approx(2.0 * row.in_unit(row.row.measured["value"]), rel=1e-12)
 
 
 def test_long_cases_begin_first():
