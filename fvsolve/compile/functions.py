@@ -218,6 +218,7 @@ class Function:
         compiler = self.numba if wrappers else self.numba.within
         compiler.compile(kinds)
         compiled = compiler.overloads[kinds]
+        code = code_of(compiled, wrappers)
         if (path := self._path(key)) is not None:
             try:
                 loaded = LOADED_CODE.pop(compiled.fndesc.llvm_func_name, None)
@@ -226,7 +227,7 @@ class Function:
                 )
             except OSError as error:
                 folders.warn_not_cached(error.strerror or str(error))
-        return code_of(compiled, wrappers)
+        return code
 
     def _path(self, key: str) -> Path | None:
         """Path of the file for the machine code of a signature; None for a function whose code is not stored.
