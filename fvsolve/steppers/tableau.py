@@ -171,15 +171,15 @@ class Method:
 
 @validated(name=TEXT, dense=ROW, start_weight=TEXT, numbers=TABLE, digits=COUNT, source=TEXT)
 def tableau(
-    name: str, text: str | Sequence, b: Sequence | None = None, c: Sequence | None = None, *, source: str = "user",
-    dense: Sequence = (), start_weight: str | None = None, numbers: Mapping[str, tuple[str, float]] | None = None,
-    digits: int | None = None,
+    name: str, text: str | Sequence | None = None, b: Sequence | None = None, c: Sequence | None = None, *,
+    A: Sequence | None = None, source: str = "user", dense: Sequence = (), start_weight: str | None = None,
+    numbers: Mapping[str, tuple[str, float]] | None = None, digits: int | None = None,
 ) -> Method:  # fmt: skip
     """Define a method by its Butcher array, as text or as A, b, c; afterwards it can be used by its name.
 
     text : rows `c | a1 a2 ...`, a ruled line, `| b1 b2 ...` and, for an embedded solution, a second row of weights.
     Entries have no blanks: `1/3`, `0.161`, `(88-7sqrt(6))/360`, or expressions with the names in `numbers`.
-    In place of the text: the matrix A, s x s, with b and c as numbers
+    In its place, or as A: the matrix A, s x s, with b and c as numbers
     b : s weights, or two rows of weights, the second for the embedded solution
     c : s times of the stages; default: the sums of the rows of A. Integers and fractions are exact; floating-point
     numbers count as their shortest decimals, see `digits`
@@ -195,6 +195,9 @@ def tableau(
     if name in BUILT_IN or name == "auto" or not name.strip() or name != name.strip():
         raise FvsolveError(f'method name "{name}" is not free: it is empty, has blanks at an end or names a built-in '
                            "method. Choose another name")  # fmt: skip
+    if (text is None) == (A is None):
+        raise FvsolveError(f'method "{name}": expected either text or A, as in tableau(name, A=A, b=b)')
+    text = A if text is None else text
     if b is not None:
         if isinstance(text, str):
             raise FvsolveError("b is given twice: as an argument and in the text. Expected A, b, c in numbers, or only "

@@ -88,7 +88,7 @@ def test_a_tableau_from_arrays_is_that_of_its_text():
         made = tableau("shown-array", a, [Fraction(1, 2), Fraction(1, 2)], [0, 1])
         assert np.array_equal(made.a, text.a) and np.array_equal(made.b, text.b) and np.array_equal(made.c, text.c)
         assert (made.order, made.stages) == (text.order, text.stages) == (2, 2)
-    assert tableau("shown-array", [[0, 0], [0.5, 0]], [0.0, 1.0]).order == 2  # c defaults to the row sums
+    assert tableau("shown-array", A=[[0, 0], [0.5, 0]], b=[0.0, 1.0]).order == 2  # c defaults to the row sums
     pair = tableau("shown-array", [[0, 0], [1, 0]], [[0.5, 0.5], [1.0, 0.0]], [0.0, 1.0])
     assert pair.adaptive and (pair.order, pair.error_order) == (2, 1)
 
@@ -104,6 +104,9 @@ def test_arrays_of_another_shape_are_refused(a, b, c):
         tableau("shown-wrong", a, b, c)
     with pytest.raises(FvsolveError, match="b is missing"):
         tableau("shown-wrong", a)
+    for given in ({}, {"text": ROW, "A": a}):
+        with pytest.raises(FvsolveError, match="either text or A"):
+            tableau("shown-wrong", **given)
 
 
 def test_a_file_of_a_printed_tableau_is_a_method_on_the_command_line(fvs, tmp_path):

@@ -139,6 +139,7 @@ def test_its_order_is_two_in_smooth_flow_and_one_if_phi_of_one_is_not_one():
     for name, expected in (("mine", 2.0), ("half", 1.0)):
         found = order(pulses.case(40, points=pulses.FEW, limiter=name), schemes="muscl", levels=4)
         assert found.fits["pressure"]["L1"].order == approx(expected, abs=0.35), name
+        assert any(note.startswith(f"limiter {name}: ") for note in found.notes) == (expected < 2), name
 
 
 def test_a_limiter_outside_of_the_region_runs_with_a_single_notice():

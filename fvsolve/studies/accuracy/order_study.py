@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from fvsolve.assembly.scheme_codes import limiter_notices
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
@@ -332,8 +333,9 @@ class OrderStudy:
                    if name not in ("pressure", "flow") and sizes[name] > 0.0]  # fmt: skip
         exact = bool(delay_lines(self.case)) and max(largest, default=1.0) <= EXACT_ERROR
         notes += row_notes(rows, [] if exact else doubtful)
-        notes += [*self.order_notes(exact), *self.step_error_note(fits)]
         numerics = self.case.numerics
+        notes += [*self.order_notes(exact), *self.step_error_note(fits)]
+        notes += [notice.text for notice in limiter_notices(numerics.scheme, numerics.limiter)]
         units = {name: unit for name in fits if (unit := unit_of(self.case, name)) is not None}
         scales = {name: error_scale(self.case, name) for name in [*fits, "length"] if name not in units}
         return Order(self.case.name, numerics.scheme, numerics.method, self.plan, kind, words, tuple(rows), fits, own,
