@@ -92,7 +92,11 @@ def placed(table: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
     for group in ("nodes", "links"):
         parts = table.get(group)
         for name, part in parts.items() if isinstance(parts, dict) else ():
-            if not isinstance(part, dict) or isinstance(part.get("at"), (list, tuple)):
+            if (
+                not isinstance(part, dict)
+                or isinstance(part.get("at"), (list, tuple))
+                or not part.keys() & {"at", "on"}
+            ):
                 continue
             kind = KINDS[group].get(str(part.get("type")))
             own = group == "links" and kind is not None and "at" in kind.keys()

@@ -1,5 +1,6 @@
 """Effect of a changed key on the model: other numbers, another initial state, or a new model."""
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +23,7 @@ from fvsolve.units import show
 
 TABLES = {"fluid": FluidSpec, "numerics": Numerics, "output": Output, "exact": ExactSpec}
 CLASSES = (VALUE, PROFILE, SHAPE)
+CHAINAGE = {"on": Text(), "at": Quantity("length", changes=SHAPE)}  # keys of a part on a route
 
 
 def changes(case: Case, key: str) -> str:
@@ -94,21 +96,29 @@ def declarations(raw: dict[str, Any]) -> dict[str, Value]:
     result = {**values_of(TOP), "ambient_pressure": Quantity("pressure"), "signals": signals}
     result |= {name: Nested(model) for name, model in TABLES.items()}
     for group, kinds in KINDS.items():
-        parts = raw.get(group, {}).items()
-        result[group] = Keys({name: Keys({"type": Value(), **kinds[entry["type"]].values()}) for name, entry in parts})
+        result[group] = Keys({name: part_keys(kinds[entry["type"]]) for name, entry in raw.get(group, {}).items()})
     blocks = raw.get("controls", {}).items()
-    result["controls"] = Keys(
-        {name: Keys({"type": Value(), **Control.kinds[item["type"]].values()}) for name, item in blocks}
-    )
+    result["controls"] = Keys({name: part_keys(Control.kinds[entry["type"]]) for name, entry in blocks})
     result["defaults"] = Keys({kind: Keys(default_values(kind)) for kind in WITH_DEFAULTS})
     for group, name, _ in placed(raw):
-        where = {"on": Text(), "at": Quantity("length", changes=SHAPE)}
-        result[group] = Keys({**result[group].values, name: Keys({**result[group].values[name].values, **where})})
+        result[group] = Keys({**result[group].values, name: Keys({**result[group].values[name].values, **CHAINAGE})})
+    result["validation"] = Keys(values_of(VALIDATION_KEYS))
+    return result | {group: Keys(dict.fromkeys(raw.get(group, {}), entry)) for group, entry in named_tables().items()}
+
+
+@functools.cache
+def part_keys(model: type) -> Keys:
+    """Declarations of the keys of a part; model : its class."""
+    return Keys({"type": Value(), **model.values()})
+
+
+@functools.cache
+def named_tables() -> dict[str, Keys]:
+    """Declarations of the tables with names that are no parts : group -> declaration of each of its tables."""
     named = {"expect": values_of(expect_keys("number")), "compare": values_of(COMPARE_KEYS), "scalars": Scalar.values()}
     named |= {"reactions": Reaction.values(), "routes": Route.values()}
     named |= {"limits": values_of(limit_keys("pressure", "pressure"))}
-    result["validation"] = Keys(values_of(VALIDATION_KEYS))
-    return result | {group: Keys(dict.fromkeys(raw.get(group, {}), Keys(entry))) for group, entry in named.items()}
+    return {group: Keys(values) for group, values in named.items()}
 
 
 def values_of(keys: dict[str, tuple[Value, Any]]) -> dict[str, Value]:

@@ -1,5 +1,6 @@
 """Tables of a case file: base class, keys, faults of incompatible keys, and context of a part in its case."""
 
+import functools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
@@ -179,6 +180,7 @@ class Table(BaseModel):
         return [info.alias or name for name, info in cls.model_fields.items()]
 
     @classmethod
+    @functools.cache
     def values(cls) -> dict[str, Value]:
         """Declaration of each key: name in a case file -> declaration."""
         declared = {info.alias or name: (info.metadata, info.annotation) for name, info in cls.model_fields.items()}

@@ -237,7 +237,8 @@ def _functions(f, t0, y0):
                 _python(t, y, dydt, int(handle[0]))
 
         return _no_fused_step, _row, _nothing, _no_events, plain
-    return *observers(), _compile(numba.njit(_rhs(f, t0, y0)), RHS)
+    rates = _rhs(f, t0, y0)
+    return *observers(), _compile(numba.njit(rates), RHS) if rates else python_rates()
 
 
 def _compile(function, letters: str) -> DeclaredFunction:
@@ -252,17 +253,23 @@ def observers() -> tuple:
     return tuple(_compile(numba.njit(function), letters) for function, letters in functions)
 
 
-def _rhs(f, t0, y0):
+@compile_once
+def python_rates() -> DeclaredFunction:
+    """Rates in the time loop of a system whose f is called as a Python function."""
+    return _compile(numba.njit(_call_python), RHS)
+
+
+def _rhs(f, t0, y0) -> Callable | None:
     """Function for the rates in the time loop, made from f; it sets NaN where f raises an exception.
 
-    f is called as a Python function if numba cannot compile it. t0, y0 : arguments of a trial call
+    None if numba cannot compile f. t0, y0 : arguments of a trial call
     """
     fills = in_place(f)
     try:
         inner = f if hasattr(f, "py_func") else numba.njit(f)
         inner(t0, y0, np.empty_like(y0)) if fills else inner(t0, y0)
     except (numba.NumbaError, numba.UnsupportedBytecodeError, TypeError, NotImplementedError):
-        return _call_python
+        return None
 
     def rhs(t, y, dydt, out, handle):
         out[0], out[1], out[2] = 0.0, 0.0, -1.0
