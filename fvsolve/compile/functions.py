@@ -221,7 +221,7 @@ class Function:
         code = code_of(compiled, wrappers)
         if (path := self._path(key)) is not None:
             try:
-                loaded = LOADED_CODE.pop(compiled.fndesc.llvm_func_name, None)
+                loaded = LOADED_CODE.get(compiled.fndesc.llvm_func_name)
                 store.write(
                     path, self._identity(key), compiled, loaded or compiled.library._get_compiled_object(), wrappers
                 )

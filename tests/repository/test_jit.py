@@ -163,6 +163,28 @@ print(loop(4), len(law.numba.overloads), len(law.numba.within.overloads), law(1.
     assert python(package, code) == ["12.0", "0", "0", "2.0", "0"]
 
 
+def test_two_signatures_of_the_same_types_for_numba_may_both_come_from_its_cache(package):
+    """An array with a single row is contiguous in both orders, which is another signature and the same type."""
+    code = """
+import sys
+import numpy as np
+from fvsolve.kernels.corner import corner
+for rows in (1, 2):
+    table = np.full((rows, 3), 7.0)
+    table.flags.writeable = False
+    print(corner(table))
+print('numba' in sys.modules)
+"""
+    (package / "kernels" / "corner.py").write_text(
+        "from fvsolve.jit import njit\n\n@njit\ndef corner(table):\n    return table[0, 0]\n"
+    )
+    assert python(package, code) == ["7.0", "7.0", "True"]
+    for kept in (package.parent / "cache" / "code").rglob(f"*{store.SUFFIX}"):
+        kept.unlink()
+    assert python(package, code) == ["7.0", "7.0", "True"]
+    assert python(package, code) == ["7.0", "7.0", "False"]
+
+
 def test_specialisations_of_one_template_are_stored_each_under_its_own_name(package):
     """The second process loads both without numba; without the store they come from numba's own cache."""
     (package / "kernels" / "powers.py").write_text(POWERS)
