@@ -82,9 +82,13 @@ def shortest_cell_time(links: Mapping[str, Any], meshes: Mapping[str, Any], flui
     return min([*times, *(float(mesh.area.min()) ** 0.5 for mesh in meshes.values())], default=math.inf)
 
 
-@functools.lru_cache(maxsize=4)
-def alternatives_of(models: tuple) -> list[tuple[str, ...]]:
-    """Groups of alternative keys of classes of tables; a table may have at most one key of a group."""
+def alternatives_of(table: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """Groups of alternative keys of the tables of a case; a table may have at most one key of a group."""
+    models, groups = [Numerics, Friction], KINDS | {"controls": Control.kinds}
+    for group, kinds in groups.items():
+        parts = table[group].values() if isinstance(table.get(group), Mapping) else ()
+        types = [str(part.get("type")) for part in parts if isinstance(part, Mapping)]
+        models += [kinds[kind] for kind in dict.fromkeys(types) if kind in kinds]
     return list(dict.fromkeys(keys for model in models for keys in model.alternatives))
 
 
@@ -93,8 +97,8 @@ def read_case(raw: Raw, settings: Mapping[str, Any], previous: Case | None = Non
 
     settings : overrides, see `load`. Raises CaseError with all faults.
     """
-    models = (Numerics, Friction, *Control.kinds.values(), *KINDS["nodes"].values(), *KINDS["links"].values())
-    refused = override(raw, chainage.settings(raw.table, settings), alternatives_of(models))
+    alternatives = alternatives_of(raw.table) if settings else []
+    refused = override(raw, chainage.settings(raw.table, settings), alternatives)
     if previous is not None and not refused:
         case = update_values(Reading(raw), previous)
         if case is not None:

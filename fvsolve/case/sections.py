@@ -1,7 +1,5 @@
 """Tables `[fluid]`, `[numerics]`, `[output]` and `[exact]` of a case: keys and defaults."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
@@ -254,7 +252,7 @@ class Numerics(Table):
         "action at pressures below vapour pressure: mark the results and continue, or stop",
     )] = "continue"  # fmt: skip
 
-    def filled(self, has_cells: bool, carries: bool, rubs: bool, parts: bool) -> Numerics:
+    def filled(self, has_cells: bool, carries: bool, rubs: bool, parts: bool) -> "Numerics":
         """Copy with the default scheme, step control and method filled in.
 
         has_cells : True if the case has pipes or basins; carries : True if basins carry scalars

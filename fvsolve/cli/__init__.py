@@ -43,6 +43,11 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # false if a caller has replaced the stream by another file object
             stream.reconfigure(errors="backslashreplace")  # a terminal with a small character set must not end a run
+    if sys.argv[1:] == ["--version"]:  # without the imports of any command
+        import fvsolve
+
+        print(f"fvsolve {fvsolve.__version__}")
+        sys.exit(0)
     before, warnings.formatwarning = warnings.formatwarning, lambda message, *_, **__: f"{visible(str(message))}\n"
     try:
         application(*sys.argv[1:2])(prog_name="fvsolve")

@@ -8,8 +8,10 @@ Under MPI each rank writes a .vtu file of its rows of a basin, rank 0 also the .
 cells. The other ranks wait for a broadcast of a function to call and its arguments (`solve.parallel_bands`).
 """
 
+import base64
 import html
 import re
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +26,15 @@ FIELD_UNITS = {
     "pressure": "Pa", "head": "m", "velocity": "m/s", "flow": "m3/s", "min_pressure": "Pa", "max_pressure": "Pa",
 }  # fmt: skip
 UNIT_XML = '<InformationKey name="UNITS_LABEL" location="vtkDataArray">{}</InformationKey>\n'
-ARRAY_END = b"</DataArray>"
+CELL_TYPES = {"line": 3, "triangle": 5, "quad": 9}  # type -> its number in VTK
+ZLIB_LEVEL = 1  # higher levels take several times as long, for files that are little smaller
+VTU_HEAD = """<?xml version="1.0"?>
+<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian" header_type="UInt32" \
+compressor="vtkZLibDataCompressor">
+<UnstructuredGrid>
+<Piece NumberOfPoints="{points}" NumberOfCells="{cells}">
+"""
+VTU_TAIL = "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
 FILE_ATTRIBUTE = re.compile('file="([^"]+)"')
 PVD_HEAD = """<?xml version="1.0"?>
 <VTKFile type="Collection" version="0.1" byte_order="LittleEndian">
@@ -200,18 +210,39 @@ class FieldSeries:
 
 
 def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, list], units: dict[str, str]) -> None:
-    """Write a .vtu file. data : name -> list of arrays, one for each block of cells; units : name -> unit
+    """Write a .vtu file: unstructured grid in XML, arrays compressed by zlib, of which each carries its unit.
 
-    meshio has no units, so UNITS_LABEL is inserted into the file afterwards.
+    points : float64[p, 3]; cells : blocks (type of `CELL_TYPES`, int[cells, corners])
+    data : name -> list of arrays, one for each block of cells; units : name -> unit
     """
-    import meshio
+    corners = [np.asarray(block, dtype=np.int64) for _, block in cells]
+    ends = np.cumsum(np.concatenate([np.full(len(block), block.shape[1], dtype=np.int64) for block in corners]))
+    types = np.concatenate([np.full(len(block), CELL_TYPES[kind], dtype=np.int32) for kind, block in cells])
+    groups = {
+        "Points": [("Points", np.asarray(points, dtype=float))],
+        "Cells": [("connectivity", np.concatenate([block.ravel() for block in corners])), ("offsets", ends),
+                  ("types", types)],
+        "CellData": [(name, np.concatenate([np.asarray(block) for block in blocks])) for name, blocks in data.items()],
+    }  # fmt: skip
+    text = VTU_HEAD.format(points=len(points), cells=len(types))
+    for group, arrays in groups.items():
+        text += f"<{group}>\n{''.join(array_xml(name, values, units) for name, values in arrays)}</{group}>\n"
+    path.write_text(text + VTU_TAIL, encoding="utf-8")
 
-    meshio.Mesh(points, cells, cell_data=data).write(path)
-    text = path.read_bytes()
-    for name in units.keys() & data.keys():
-        end = text.index(ARRAY_END, text.index(f' Name="{name}"'.encode()))
-        text = text[:end] + unit_xml(units, name).encode() + text[end:]
-    path.write_bytes(text)
+
+def array_xml(name: str, values: np.ndarray, units: dict[str, str]) -> str:
+    """XML text of an array: the sizes and the bytes of a single block compressed by zlib, in base 64.
+
+    values : float64[n], int32[n] or int64[n], or with a second axis for components
+    """
+    values = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
+    block = zlib.compress(values.tobytes(), ZLIB_LEVEL)
+    sizes = np.array([1, values.nbytes, 0, len(block)] if values.nbytes else [0, 0, 0], dtype="<u4").tobytes()
+    content = base64.b64encode(sizes) + base64.b64encode(block if values.nbytes else b"")
+    kind = f"{'Float' if values.dtype.kind == 'f' else 'Int'}{8 * values.itemsize}"
+    shape = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""
+    head = f'<DataArray type="{kind}" Name="{html.escape(name)}"{shape} format="binary">'
+    return f"{head}{content.decode()}\n{unit_xml(units, name)}</DataArray>\n"
 
 
 def unit_xml(units: dict[str, str], name: str) -> str:

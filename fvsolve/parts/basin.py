@@ -1,7 +1,5 @@
 """Basins, their patches, and the base class for the equations of basins (`Physics`)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from copy import copy
 from typing import Annotated, Any, ClassVar
@@ -16,6 +14,7 @@ from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.carried_scalar import ScalarValues
 from fvsolve.parts.csv_rows import copy_name, find_file
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey, uniform
+from fvsolve.parts.kinds import Kinds
 from fvsolve.parts.nodes_and_links import Node, PlaceOnBody
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import NamedTables, Nested, Table
@@ -169,7 +168,7 @@ class Physics(Table):
     has_shocks : True if waves steepen into lasting shocks; schemes then have at most second order in smooth plane flow
     """
 
-    kinds: ClassVar[dict[str, type[Physics]]] = {}
+    kinds: ClassVar[Kinds] = Kinds()
     name: ClassVar[str] = ""
     states: ClassVar[dict[str, str]] = {}
     fields: ClassVar[dict[str, str]] = {}
@@ -188,9 +187,8 @@ class Physics(Table):
 
     def __init_subclass__(cls, name: str, **rest: Any) -> None:
         super().__init_subclass__(**rest)
-        if name in Physics.kinds:
-            raise FvsolveError(f"physics {show(name)} exists already; choose another name")
         cls.name = name
+        Physics.kinds.declare(name, cls, "physics")
 
     @classmethod
     def __pydantic_init_subclass__(cls, **rest: Any) -> None:
@@ -199,23 +197,23 @@ class Physics(Table):
             for key in (key for key in keys if key in table.model_fields):
                 own, known = keys[key], table.model_fields[key]
                 if (own.metadata, own.default) != (known.metadata, known.default):
+                    del Physics.kinds[cls.name]
                     text = f"physics {show(cls.name)} declares {key} differently from the existing key of a basin"
                     raise FvsolveError(f"{text}; declare it identically in both, or choose another name")
         for table, keys in both:
             table.model_fields.update(keys)
             if table.__pydantic_complete__:  # otherwise it is built when a case first has a basin
                 table.model_rebuild(force=True)
-        Physics.kinds[cls.name] = cls
-        Basin.__doc__ = "\n".join([BASIN_DOC, "", *(f"{name}: {kind.__doc__}" for name, kind in Physics.kinds.items())])
+        Basin.__doc__ = "\n".join([Basin.__doc__ or "", f"{cls.name}: {cls.__doc__}"])
 
     @classmethod
-    def has_friction(cls, basin: Basin) -> bool:
+    def has_friction(cls, basin: "Basin") -> bool:
         """True if friction of the bed or of walls acts on the flow of a basin."""
         return False
 
     @classmethod
     def rest(
-        cls, basin: Basin, mean: Callable[[Any], np.ndarray], cells: np.ndarray, area: np.ndarray
+        cls, basin: "Basin", mean: Callable[[Any], np.ndarray], cells: np.ndarray, area: np.ndarray
     ) -> dict[str, Any]:
         """State of a patch at rest: "elevation" [m], "depth" of water [m] and "pressure" [Pa] -> value.
 
@@ -227,7 +225,7 @@ class Physics(Table):
         return {"elevation": basin.elevation, "depth": None, "pressure": None}
 
     @classmethod
-    def formulas(cls, basin: Basin, mesh: Any) -> Iterator[tuple[tuple[str, ...], Any, np.ndarray | None]]:
+    def formulas(cls, basin: "Basin", mesh: Any) -> Iterator[tuple[tuple[str, ...], Any, np.ndarray | None]]:
         """Yield (key path, formula, points) for each field over the plane that the keys of these equations contain.
 
         points : float64[n, 2]  points at which the formula is evaluated; None if its means over the cells are used
@@ -338,7 +336,7 @@ class Basin(PlaceOnBody, kind="basin"):
         return (*(entry for entry in stated if isinstance(entry, str)), *super().bodies(given))
 
 
-BASIN_DOC = Basin.__doc__  # docstring of Basin before every physics adds a line
+Basin.__doc__ = f"{Basin.__doc__}\n"  # every physics adds a line
 
 
 def optional_keys(table: type[Table]) -> dict[str, FieldInfo]:

@@ -1,17 +1,14 @@
 """Blocks of `controls`: base class of their types, keys that all have, and values in units of their input or output."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from fvsolve import units
-from fvsolve.errors import FvsolveError
+from fvsolve.parts.kinds import Kinds
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import PROFILE, VALUE, Quantity, ReadContext, Rows, Text, Value, nonnegative, positive
-from fvsolve.units import show
 
 PREFIX = "controls."  # of a block in the key `input` of another block
 UNKNOWN = ""  # dimension of an input or output that is not known because of a fault elsewhere
@@ -128,7 +125,7 @@ class Control(Table):
     """
 
     kind: ClassVar[str] = ""
-    kinds: ClassVar[dict[str, type[Control]]] = {}
+    kinds: ClassVar[Kinds] = Kinds()
     same_unit: ClassVar[bool] = False
 
     filter: Annotated[
@@ -149,10 +146,8 @@ class Control(Table):
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)
         if kind:
-            if kind in cls.kinds:
-                raise FvsolveError(f"a control of type {show(kind)} exists already; expected another name")
             cls.kind = kind
-            cls.kinds[kind] = cls
+            cls.kinds.declare(kind, cls, "a control of type")
 
     @classmethod
     def inputs_of(cls, given: dict[str, Any]) -> dict[tuple[str, ...], Any]:

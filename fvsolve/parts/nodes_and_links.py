@@ -1,17 +1,14 @@
 """Base classes of nodes and of links."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.errors import FvsolveError
 from fvsolve.parts.carried_scalar import ScalarValues
+from fvsolve.parts.kinds import Kinds
 from fvsolve.parts.table_model import Table, check_table, keys_json, read_keys
 from fvsolve.parts.value import NEEDED, VALUE, Quantity, ReadContext, Rows, Text, UsualRange, Value
-from fvsolve.units import show
 
 NETWORK_DOMAINS = ("rotational", "electrical", "thermal")  # of nodes in networks of potential and flow
 USUAL_ELEVATIONS = UsualRange(-12e3, 9e3, "boreholes to mountains")
@@ -26,7 +23,7 @@ class Part(Table):
 
     noun: ClassVar[str] = ""
     kind: ClassVar[str] = ""
-    kinds: ClassVar[dict[str, type[Part]]] = {}
+    kinds: ClassVar[Kinds] = Kinds()
     no_scalars: ClassVar[str] = ""  # reason why a case with scalars cannot have this part yet
     own_scalars: ClassVar[str] = ""
     type_in_file: ClassVar[str] = ""  # type in the case file of a variant with a kind of its own
@@ -34,13 +31,11 @@ class Part(Table):
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)
         if kind:
-            if kind in cls.kinds:
-                raise FvsolveError(f"a {cls.noun} of type {show(kind)} exists already; expected another name")
             cls.kind = kind
-            cls.kinds[kind] = cls
+            cls.kinds.declare(kind, cls, f"a {cls.noun} of type")
 
     @classmethod
-    def variant(cls, given: dict[str, Any]) -> type[Part]:
+    def variant(cls, given: dict[str, Any]) -> "type[Part]":
         """Class of a part with the given keys: this class, or a subclass with other ports or quantities."""
         return cls
 
@@ -55,7 +50,7 @@ class Node(Part):
     """
 
     noun: ClassVar[str] = "node"
-    kinds: ClassVar[dict[str, type[Node]]] = {}
+    kinds: ClassVar[Kinds] = Kinds()
     quantities: ClassVar[dict[str, str]] = {
         "pressure": "pressure", "gauge_pressure": "gauge_pressure", "head": "head"
     }  # fmt: skip
@@ -86,7 +81,7 @@ class Node(Part):
         """Names of the bodies that carry the node or move its walls, as in the case file."""
         return ()
 
-    def inner(self, name: str) -> tuple[dict[str, Node], dict[str, Any]]:
+    def inner(self, name: str) -> tuple[dict[str, "Node"], dict[str, Any]]:
         """(places, links) of the solved network for this node, each by name.
 
         They contain the node itself, and its own places `NAME.PLACE`.
@@ -127,7 +122,7 @@ class Link(Part):
     """
 
     noun: ClassVar[str] = "link"
-    kinds: ClassVar[dict[str, type[Link]]] = {}
+    kinds: ClassVar[Kinds] = Kinds()
     quantities: ClassVar[dict[str, str]] = {"flow": "flow"}
     on_request: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded only by explicit probes
     along: ClassVar[dict[str, str]] = {}  # quantities that also exist at a fraction of the length
@@ -145,7 +140,7 @@ class Link(Part):
         return tuple(place for port, place in self.ports.items() if port in self.network_ports
                      or self.in_network and self.joins.get(port) != "hydraulic")  # fmt: skip
 
-    def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
+    def inner(self, name: str) -> tuple[dict[str, Any], dict[str, "Link"]]:
         """(places, links) of the solved network for this link, each by name.
 
         They contain the link itself, and its own places `NAME.PLACE`.

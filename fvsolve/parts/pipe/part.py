@@ -1,7 +1,5 @@
 """Pipes: keys, faults, and names of catalogue entries turned into numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -66,7 +64,7 @@ class Pipe(Conduit, kind="pipe"):
     pressure p above ambient and elevation z. Dissipated power: friction and minor loss, pressure drop times flow [W].
     """
 
-    models: ClassVar[dict[str, type[Pipe]]] = {}  # pipe model -> class of pipes with keys and rows of their own
+    models: ClassVar[dict[str, type["Pipe"]]] = {}  # pipe model -> class of pipes with keys and rows of their own
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "force": "force"}
     on_request: ClassVar[tuple[str, ...]] = ("force",)
     own_scalars: ClassVar[str] = "along"
@@ -127,7 +125,7 @@ class Pipe(Conduit, kind="pipe"):
             Pipe.models[pipe_model] = cls
 
     @classmethod
-    def variant(cls, given: dict[str, Any]) -> type[Pipe]:
+    def variant(cls, given: dict[str, Any]) -> "type[Pipe]":
         return Pipe.models.get(str(given.get("pipe_model")), Pipe)
 
     @property
