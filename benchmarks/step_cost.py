@@ -30,7 +30,7 @@ for line in sys.stdin:
     least, spent, steps, runs = float("inf"), 0.0, 1, 0
     try:
         with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
-            case = load(line.strip(), {{"output.fields": 0}})
+            case = load(line.strip(), {{"output.fields": 0, "output.lines": {{}}}})
             first = run(case).summary
             while not runs or (spent < {SPAN} and runs < {MOST_RUNS}):
                 summary = first if not runs and first["seconds"] > {LONGEST} else run(case).summary
