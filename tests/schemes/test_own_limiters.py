@@ -85,6 +85,7 @@ def final(case: dict) -> np.ndarray:
 def run_python(folder: Path, code: str, **more: str) -> str:
     """Output of another process."""
     paths = {"PYTHONPATH": str(Path(fvsolve.__file__).parents[1])}
+    paths["PYTHONDONTWRITEBYTECODE"] = "1"  # bytecode files do not show an edit within a second
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=folder, env=os.environ | paths | more, capture_output=True, text=True
     )
