@@ -45,9 +45,9 @@ class Kinds(dict[str, Any]):
         """Import the modules that declare these types."""
         for kind in kinds:
             if isinstance(kind, str) and kind not in self.imported:
-                self.imported.add(kind)
                 for module in modules_of_types().get(kind, ()):
                     import_module(module)
+                self.imported.add(kind)  # last, so that another thread waits for the import
 
     def declare(self, kind: str, model: type, noun: str) -> None:
         """Add the class of a type; noun : of the type, for messages. Raises FvsolveError if the type exists already."""
