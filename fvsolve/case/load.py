@@ -97,8 +97,7 @@ def read_case(raw: Raw, settings: Mapping[str, Any], previous: Case | None = Non
 
     settings : overrides, see `load`. Raises CaseError with all faults.
     """
-    alternatives = alternatives_of(raw.table) if settings else []
-    refused = override(raw, chainage.settings(raw.table, settings), alternatives)
+    refused = override(raw, chainage.settings(raw.table, settings), alternatives_of)
     if previous is not None and not refused:
         case = update_values(Reading(raw), previous)
         if case is not None:

@@ -112,13 +112,13 @@ def copy_paths(table: dict[str, Any], paths: list[tuple[str, ...]]) -> dict[str,
     return copy
 
 
-def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str, ...]]) -> list[Fault]:
+def override(raw: Raw, settings: Mapping[str, Any], alternatives_of: Callable) -> list[Fault]:
     """Override values in the table of `raw`; returns the faults of overrides that cannot be applied.
 
     The key paths are added to `raw.overridden`.
     settings : dotted key -> value; a text is parsed as TOML where possible
-    alternatives : groups of keys of which a table may have at most one; an override removes the other keys of its group
-    that are not overridden too
+    alternatives_of : function from the table to groups of keys of which a table in it may have at most one; an override
+    removes the other keys of its group that are not overridden too
     """
     faults = []
     groups = {group: raw.get((group,)) for group in ("nodes", "links")}
@@ -128,12 +128,13 @@ def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str
         try:
             _put(raw.table, keys, _copy(parsed(value)))
             raw.overridden.append(keys)
-            for others in alternatives:
-                for other in others if keys[-1] in others else ():
-                    if (*keys[:-1], other) not in raw.overridden:
-                        raw.get(keys[:-1]).pop(other, None)
         except ValueError as error:
             faults.append(Fault(str(key), str(error), override=True))
+    alternatives = alternatives_of(raw.table) if settings else []
+    for keys in raw.overridden:
+        for other in (other for others in alternatives if keys[-1] in others for other in others):
+            if (*keys[:-1], other) not in raw.overridden and isinstance(table := raw.get(keys[:-1]), dict):
+                table.pop(other, None)
     for keys in raw.overridden:
         group, name = (*keys, "", "")[:2]
         if name and name not in before.get(group, [name]):

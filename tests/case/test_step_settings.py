@@ -284,3 +284,13 @@ def test_the_picture_of_a_method_has_its_name(tmp_path, fvs, monkeypatch):
     Path("ssp43.txt").write_text(SSP43)
     fvs("methods", "ssp43.txt")
     assert Path("ssp43.png").is_file() and not Path("ssp43.txt.png").exists()
+
+
+def test_keys_of_a_part_that_settings_add_replace_their_alternatives():
+    """The type of the part is in no table of the file."""
+    nodes = {"lake": {"type": "reservoir", "head": 20.0}, "low": {"type": "reservoir", "head": 10.0}}
+    main = {"type": "pipe", "from": "lake", "to": "low", "length": 100.0, "diameter": 0.1, "wave_speed": 1000.0}
+    case = {"schema": 1, "fluid": {"name": "Water"}, "nodes": nodes, "links": {"main": main}, "numerics": {"end": 1.0}}
+    added = {"type": "orifice", "from": "lake", "to": "low", "diameter": 0.1}
+    loaded = fvsolve.load(case, {"links.bypass": added, "links.bypass.area": 0.002})
+    assert loaded.links["bypass"].area == 0.002 and "diameter" not in loaded.raw["links"]["bypass"]
