@@ -107,7 +107,7 @@ class Trial:
     """Trial of changed keys in cases: wrong classes, and for each key of class `shape` if it changed the shape."""
 
     def __init__(self, every: bool) -> None:
-        # every : a ninth of the kinds of keys in two cases, others in one; in large cases only kinds of no other case
+        # every : a third of the kinds of keys in two cases, others in one; in large cases only kinds of no other case
         self.every, self.wrong, self.done = every, [], set()
         self.cases: Counter = Counter()  # number of cases for each kind of key
         self.told: dict[int, bool] = {}
@@ -126,7 +126,7 @@ class Trial:
             self.values.append(value)
             often[id(value)] += 1
             several = self.every and name not in LARGE and often[id(value)] == 1 and self.cases[id(value)] < 2
-            several = several and len(self.done) % 9 == 0
+            several = several and len(self.done) % 3 == 0
             new = name not in LARGE or not self.cases[id(value)]
             if several or (id(value) not in self.done and new):
                 self.cases[id(value)] += 1

@@ -51,7 +51,7 @@ def near(method: str) -> float:
     return {"rodas-4": BY_DIFFERENCES, "dormand-prince": 1e-5}.get(method, ROUND)
 
 
-@pytest.mark.parametrize("name, method", in_turn(SCENES, 2))
+@pytest.mark.parametrize("name, method", MIXED)
 def test_run_again_and_with_frames(name, method):
     """Field frames and earlier runs of the model do not change a bit."""
     case = SCENES[name](method)
