@@ -23,7 +23,7 @@ from fvsolve.units import show
 
 TABLES = {"fluid": FluidSpec, "numerics": Numerics, "output": Output, "exact": ExactSpec}
 CLASSES = (VALUE, PROFILE, SHAPE)
-CHAINAGE = {"on": Text(), "at": Quantity("length", changes=SHAPE)}  # keys of a part on a route
+CHAINAGE = {"on": Text(), "at": Quantity("length", changes=SHAPE)}  # keys of a part that is placed on a pipe
 
 
 def changes(case: Case, key: str) -> str:
@@ -114,7 +114,7 @@ def part_keys(model: type) -> Keys:
 
 @functools.cache
 def named_tables() -> dict[str, Keys]:
-    """Declarations of the tables with names that are no parts : group -> declaration of each of its tables."""
+    """Declarations of `expect`, `limits` and other groups of named tables : group -> keys of each of its tables."""
     named = {"expect": values_of(expect_keys("number")), "compare": values_of(COMPARE_KEYS), "scalars": Scalar.values()}
     named |= {"reactions": Reaction.values(), "routes": Route.values()}
     named |= {"limits": values_of(limit_keys("pressure", "pressure"))}

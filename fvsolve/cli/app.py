@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
+from fvsolve.cli import print_version
 from fvsolve.errors import CaseError, Fault, FvsolveError
 
 app = typer.Typer(
@@ -62,9 +63,7 @@ LinearScheme = Annotated[
 
 def _version(requested: bool) -> None:
     if requested:
-        import fvsolve
-
-        print(f"fvsolve {fvsolve.__version__}")
+        print_version()
         raise typer.Exit
 
 

@@ -26,10 +26,11 @@ FIELD_UNITS = {
     "pressure": "Pa", "head": "m", "velocity": "m/s", "flow": "m3/s", "min_pressure": "Pa", "max_pressure": "Pa",
 }  # fmt: skip
 UNIT_XML = '<InformationKey name="UNITS_LABEL" location="vtkDataArray">{}</InformationKey>\n'
+VTK_TYPES = {"f": "Float", "i": "Int", "u": "UInt"}
 CELL_TYPES = {"line": 3, "triangle": 5, "quad": 9}  # type -> its number in VTK
 ZLIB_LEVEL = 1  # higher levels take several times as long, for files that are little smaller
 VTU_HEAD = """<?xml version="1.0"?>
-<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian" header_type="UInt32" \
+<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian" header_type="UInt64" \
 compressor="vtkZLibDataCompressor">
 <UnstructuredGrid>
 <Piece NumberOfPoints="{points}" NumberOfCells="{cells}">
@@ -237,9 +238,9 @@ def array_xml(name: str, values: np.ndarray, units: dict[str, str]) -> str:
     """
     values = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
     block = zlib.compress(values.tobytes(), ZLIB_LEVEL)
-    sizes = np.array([1, values.nbytes, 0, len(block)] if values.nbytes else [0, 0, 0], dtype="<u4").tobytes()
+    sizes = np.array([1, values.nbytes, 0, len(block)] if values.nbytes else [0, 0, 0], dtype="<u8").tobytes()
     content = base64.b64encode(sizes) + base64.b64encode(block if values.nbytes else b"")
-    kind = f"{'Float' if values.dtype.kind == 'f' else 'Int'}{8 * values.itemsize}"
+    kind = f"{VTK_TYPES[values.dtype.kind]}{8 * values.itemsize}"
     shape = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""
     head = f'<DataArray type="{kind}" Name="{html.escape(name)}"{shape} format="binary">'
     return f"{head}{content.decode()}\n{unit_xml(units, name)}</DataArray>\n"
@@ -355,9 +356,6 @@ def read_pipe_lines(path: Path, quantity: str) -> tuple[np.ndarray, np.ndarray, 
     except Exception as error:  # meshio and its parsers raise many types on a damaged file
         text = f"{type(error).__name__}: {error}"
         raise RunError(f"{path} cannot be read ({text}); run again with --force") from None
-
-
-VTK_TYPES = {"f": "Float", "i": "Int", "u": "UInt"}
 
 
 class ParallelBasinWriter:

@@ -25,6 +25,7 @@ SEPARATOR = ";"  # of its entries NAME=FILE.py:FUNCTION or NAME=DATA
 BUILT_IN = tuple(LIMITERS)
 MODULES = {"math": math, "numpy": np}  # modules that a limiter may use
 LARGEST = 15  # exponent of the greatest ratio r: kernels bound r by the rounding of a difference
+# as from np.unique, which would import numpy.ma at every start
 POSITIVE = np.array(sorted({*np.logspace(-LARGEST, LARGEST, 241), *np.linspace(0.0, 4.0, 161)[1:]}))
 RATIOS = np.concatenate([-POSITIVE[::-1], [0.0], POSITIVE])  # r at which a limiter is tested
 ROUNDING = 1e-9  # tolerance of the tests
