@@ -44,7 +44,9 @@ def main() -> None:
         if hasattr(stream, "reconfigure"):  # false if a caller has replaced the stream by another file object
             stream.reconfigure(errors="backslashreplace")  # a terminal with a small character set must not end a run
     if sys.argv[1:] == ["--version"]:  # without the imports of any command
-        print_version()
+        import fvsolve
+
+        print(f"fvsolve {fvsolve.__version__}")
         sys.exit(0)
     before, warnings.formatwarning = warnings.formatwarning, lambda message, *_, **__: f"{visible(str(message))}\n"
     try:
@@ -64,12 +66,6 @@ def main() -> None:
         _exit_with(f"internal error in {_location(error)}: {type(error).__name__}: {error}; please report it", 1)
     finally:
         warnings.formatwarning = before
-
-
-def print_version() -> None:
-    import fvsolve
-
-    print(f"fvsolve {fvsolve.__version__}")
 
 
 def application(command: str = ""):

@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from fvsolve.cli import print_version
 from fvsolve.errors import CaseError, Fault, FvsolveError
 
 app = typer.Typer(
@@ -63,7 +62,9 @@ LinearScheme = Annotated[
 
 def _version(requested: bool) -> None:
     if requested:
-        print_version()
+        import fvsolve
+
+        print(f"fvsolve {fvsolve.__version__}")
         raise typer.Exit
 
 

@@ -23,7 +23,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/assembly": (1964, 10),
     "fvsolve/basins": (9258, 46),
     "fvsolve/case": (7382, 25),
-    "fvsolve/cli": (3455, 16),
+    "fvsolve/cli": (3452, 16),
     "fvsolve/compile": (1163, 6),
     "fvsolve/data": (12, 1),
     "fvsolve/draw": (2993, 14),
