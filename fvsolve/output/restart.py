@@ -92,7 +92,7 @@ def read_restart(path: Path, who: dict[str, str]) -> Restart:
     who : expected result of `identity`
     """
     try:
-        with np.load(path) as file:
+        with path.open("rb") as stream, np.load(stream) as file:  # np.load alone leaves a damaged file open
             arrays = {name: file[name] for name in file.files}
         stored = json.loads(str(arrays.pop("identity")))
         t, y, counts = (arrays.pop(name) for name in ("t", "y", "counts"))

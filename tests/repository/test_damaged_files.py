@@ -1,10 +1,12 @@
 """Files that are damaged, or do not fit on the disk, are written again or named in an error of the program."""
 
+import gc
 import json
 import os
 import shutil
 import subprocess
 import sys
+import warnings
 from importlib import import_module
 
 import numpy as np
@@ -171,6 +173,10 @@ def test_a_checkpoint_cut_short_is_refused(part, stopped, tmp_path):
     (out / "restart.npz").write_bytes(data[: int(part * len(data))])
     with pytest.raises(RunError, match=r"restart\.npz cannot be read"):
         fvsolve.run(case, out=out, resume=True)
+    with warnings.catch_warnings(record=True) as caught:  # such as of a file that is left open
+        warnings.simplefilter("always")
+        gc.collect()
+    assert not [one for one in caught if "restart.npz" in str(one.message)]
 
 
 def test_fields_that_are_gone_are_named_and_foreign_files_left_alone(stopped, tmp_path):

@@ -60,7 +60,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/parts": (17107, 46),
     "tests/reference": (3302, 32),
     "tests/report": (851, 4),
-    "tests/repository": (2965, 17),
+    "tests/repository": (2971, 17),
     "tests/schemes": (567, 2),
     "tests/solve": (1922, 8),
     "tests/step_limits": (1022, 4),
