@@ -11,13 +11,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 import threading
 from pathlib import Path
 from time import perf_counter, process_time
 
 import numpy as np
 from measure import against, agree, machine, parser, peer_module
-from planes_scenes import BASINS, scene, square
+from planes_scenes import BASINS, of_triangles, scene, square
 
 from fvsolve.assembly.model_draft import aligned_zeros
 from fvsolve.case import load
@@ -33,6 +34,7 @@ END = 1e6  # end that no run here reaches [s]
 WATER = "free surface with bed"
 SIZES, GOAL_TWO, GOAL_SIXTEEN, GOAL_WEAK = (256, 512, 1024), 1.8, 12.0, 0.85
 WEAK, MODELLED, BY_SIZE = 512, (512, 1024), (64, 128, 256, 512, 1024)  # cells along a side
+GOAL_TRIANGLES = 1.7
 FLAT = {"advection": 1.25, "liquid": 1.25, WATER: 1.2}
 CHUNK, ROUNDS = 0.02, 60  # time of a call [s], number of calls of each loop
 
@@ -135,6 +137,17 @@ def two_threads(sizes, rounds: int) -> None:
         print(row, flush=True)
         if 512 in ups:
             print(f"  {name} at 512^2: {ups[512]:.2f}, {against(GOAL_TWO, ups[512])}", flush=True)
+
+
+def on_triangles(size: int, rounds: int) -> None:
+    """Print the speed-up of two threads on about size^2 triangles."""
+    with tempfile.TemporaryDirectory() as folder:
+        basin = of_triangles(Path(folder) / "triangles.msh", size) | BASINS[WATER]
+        model = build(load(scene(basin, END)))
+        agree("states of one thread beside those of two", apart(model), 0.0)
+        (one, cpu), (two, both) = by_threads([model, model], (1, 2), rounds)
+        print(f"{WATER}, {model.all_cells} triangles: {1e6 * one:.0f} us, {1e6 * two:.0f} us by two: {one / two:.2f}, "
+              f"{against(GOAL_TRIANGLES, one / two)}; by CPU time {2.0 * cpu / both:.2f}", flush=True)  # fmt: skip
 
 
 def weak(rounds: int) -> None:
@@ -258,6 +271,7 @@ def main() -> None:
     wait = waiting(*((200, 5) if given.quick else ()))
     print(f"least time of a barrier of two threads {1e9 * wait:.0f} ns")
     two_threads(sizes, rounds)
+    on_triangles(64 if given.quick else 256, rounds)
     weak(rounds)
     two_ranks(sizes, rounds)
     print()

@@ -137,9 +137,15 @@ _WX, _WY, _DX, _DY, _SIDE = WX * BLOCK, WY * BLOCK, DX * BLOCK, DY * BLOCK, MEAS
 
 
 @njit
+def blocks_of(cells):
+    """Number of blocks of BLOCK cells that contain a number of cells."""
+    return (cells + BLOCK - 1) // BLOCK
+
+
+@njit
 def blocks(integers):
     """Number of blocks of BLOCK cells of a mesh. integers : see `cell_sides`"""
-    return (integers[1] + BLOCK - 1) // BLOCK
+    return blocks_of(integers[1])
 
 
 @njit(forceinline=True)

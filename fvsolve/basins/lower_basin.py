@@ -14,6 +14,7 @@ from fvsolve.basins import advection_faces
 from fvsolve.basins.advection import THIN, advection_work, diffusion_work
 from fvsolve.basins.basin_output import SPEED, U, V
 from fvsolve.basins.basin_patches import physics_code
+from fvsolve.basins.cell_sides import BLOCK, HEAD, INDICES
 from fvsolve.basins.fifth_order import fifth_order_work
 from fvsolve.basins.lower_motion import lower_mesh
 from fvsolve.case.basins import boundary_cells
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from fvsolve.mesh.mesh import MeshPoints
 
 ROUNDING = 1e-12  # relative error of rates
+LEAST_CELLS_DIVIDED = 8 * BLOCK  # cells of a mesh below which threads do not share them
 VELOCITIES = {"u": U, "v": V, "speed": SPEED}
 
 
@@ -48,6 +50,7 @@ class BasinRows:
     given: ClassVar[bool] = False  # True if flows through its faces are those of a given velocity
     has_wide_closure: ClassVar[bool] = True  # True if outgoing waves are extrapolated by a polynomial of five cells
     banded: ClassVar[bool] = False  # True if threads can step bands of rows of a grid
+    banded_mesh: ClassVar[bool] = False  # True if threads can step bands of blocks of cells of another mesh
     max_divergence: float = 0.0  # greatest divergence of a given velocity [1/s]
 
     def __init_subclass__(cls) -> None:
@@ -186,9 +189,14 @@ class BasinRows:
 
     @property
     def undivided_reason(self) -> str:
-        """Reason why the rows of cells cannot be distributed over threads; "" if they can."""
-        if not self.is_grid:
-            return "its mesh is not a full rectangle"
+        """Reason why the rows of cells cannot be distributed over threads; "" if they can.
+
+        A row of a mesh that is not a full rectangle is a block of cells (`cell_sides.BLOCK`).
+        """
+        if not self.is_grid and (self.scalars or not self.banded_mesh):
+            return "its mesh is not a full rectangle" + " and carries scalars" * (len(self.scalars) > 0)
+        if not self.is_grid and self.n < LEAST_CELLS_DIVIDED:
+            return f"its mesh is not a full rectangle and has fewer than {LEAST_CELLS_DIVIDED} cells"
         if self.moves:
             return "its walls move"
         if self.part.on is not None:
@@ -202,6 +210,13 @@ class BasinRows:
         if self.scalars and self.case.reactions:
             return "its scalars react"
         return "" if self.banded else f"its physics {self.part.physics} cannot be distributed over threads"
+
+    @property
+    def blocks_needed(self) -> np.ndarray:
+        """Array `need` of `cell_sides` of a mesh that is not a grid : int64[blocks]."""
+        slots, count = self.integers[0], -(-self.n // BLOCK)
+        at = HEAD + INDICES * count * slots * BLOCK // 2
+        return self.integers[at : at + count]
 
     @property
     def forms_stages(self) -> bool:

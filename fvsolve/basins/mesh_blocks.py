@@ -22,8 +22,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fvsolve.basins import cell_sides
-from fvsolve.basins.cell_sides import BLOCK, HEAD, INDICES, MEASURES, blocks, edges_before, stretch_rates
-from fvsolve.jit import inline
+from fvsolve.basins.cell_sides import BLOCK, HEAD, INDICES, MEASURES, blocks, blocks_of, edges_before, stretch_rates
+from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import UPWIND
 
 EQUATION = None  # of the template
@@ -79,6 +79,15 @@ def own_sides(fluid, mesh, j, k):
     return at if fluid.scheme == UPWIND else 4 * at + k * BLOCK
 
 
+@njit
+def first_read(need, block):
+    """First block that `block` reads. need : number of the last block that each block reads plus 1, in rising order"""
+    first = 0
+    while need[first] <= block:
+        first += 1
+    return first
+
+
 @inline
 def put_flow(where, flux, length, flow):
     """Write the flows [m3/s] through one side of each cell of a block to `flow`, by the numbers of faces.
@@ -91,20 +100,25 @@ def put_flow(where, flux, length, flow):
             flow[where[i]] = flux[i] * length[where[i]]
 
 
-def mesh_rates(fluid, floats, integers, reflect, states, flow, through, work, rates, moves, phi):
-    """Write the rates of all cells of a mesh; return the greatest rate that limits the time step [1/s].
+def mesh_rates(fluid, floats, integers, reflect, states, flow, through, work, rates, band, moves, phi):
+    """Write the rates of a range of cells of a mesh; return the greatest rate that limits the time step [1/s].
 
     floats, integers : geometry and neighbours, see `cell_sides`; work : float64[work_size(EQUATION, integers)]
+    band : first of these cells, at the start of a block, and one beyond the last, at the end of a block
     """
     mesh, fields, near = open_mesh(floats, integers), EQUATION.FIELDS, integers[4] * BLOCK
     cells, rest = work[: (fields + 1) * near].reshape((fields + 1, near)), work[(fields + 1) * near :]
     sides, rest = rest[: 4 * fields * near].reshape((fields, 4 * near)), rest[4 * fields * near :]
     shown, w = rest[: EQUATION.SHOWN * mesh.edges.size], rest[EQUATION.SHOWN * mesh.edges.size :]
-    first_order, cells_done, sides_done, wall, edge, most = fluid.scheme == UPWIND, 0, 0, 0, 0, 0.0
+    begin, stop, first_order, most = band[0] // BLOCK, blocks_of(band[1]), fluid.scheme == UPWIND, 0.0
+    sides_done = first_read(mesh.need, begin)
+    cells_done = first_read(mesh.need, sides_done)
+    wall = edges_before(mesh.edges, 0, 4 * sides_done * BLOCK)
+    edge = edges_before(mesh.edges, wall, 4 * begin * BLOCK)
     if first_order:
         sides = cells
     EQUATION.begin(w)
-    for j in range(mesh.count):
+    for j in range(begin, stop):
         while sides_done < mesh.need[j]:
             while cells_done < mesh.need[sides_done]:
                 EQUATION.put_cells(fluid, mesh, cells_done, states, cells, phi)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -27,6 +28,8 @@ from fvsolve.parts.reaction import Reaction
 from fvsolve.parts.table_model import plain_value
 from fvsolve.schemes import SCHEMES
 from fvsolve.units import show
+
+REPORT_KEYS = ("title", "expect", "compare", "validation")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -330,6 +333,13 @@ class Case(Displayable):
             "validation": self.raw.get("validation", {}),
         }
         return {key: value for key, value in result.items() if value not in ("", {})}
+
+    @cached_property
+    def identity_text(self) -> str:
+        """JSON of `table` without the end time and the keys that change the report of a run, not its numbers."""
+        table = {key: value for key, value in self.table().items() if key not in REPORT_KEYS}
+        table["numerics"].pop("end")
+        return json.dumps(table, sort_keys=True, default=str)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Case):

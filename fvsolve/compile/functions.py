@@ -10,6 +10,7 @@ import os
 import subprocess
 import sys
 import threading
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from types import FunctionType
@@ -261,15 +262,26 @@ class DeclaredFunction:
 
     def __init__(self, function: Any, letters: str, code: Code) -> None:
         self.function, self.code, self.address, self.python = function, code, code.pointer, code.python
-        self.arrays = [(i, letter) for i, letter in enumerate(letters.lower()) if letter in ARRAYS]
+        self.letters = letters.lower()
+        self.arrays = [i for i, letter in enumerate(self.letters) if letter in ARRAYS]
+        # array of the last call at each of these places, by weak reference: it is not checked again
+        self.checked: list[Callable[[], Any]] = [lambda: None] * len(letters)
 
     def __call__(self, *arguments: Any) -> Any:
-        for i, letter in self.arrays:  # machine code does not check them
-            actual = signature_of(arguments[i]) if type(arguments[i]) is np.ndarray else type(arguments[i]).__name__
-            if actual != letter:
-                expected = "{} with {} dimension(s)".format(*ARRAYS[letter])
-                raise TypeError(f"argument {i} is {actual}; expected a writable C-contiguous array of {expected}")
+        checked = self.checked
+        for i in self.arrays:
+            if checked[i]() is not arguments[i]:
+                self.check(i, arguments[i])
         return self.python(*arguments)
+
+    def check(self, i: int, array: Any) -> None:
+        """Raise TypeError if an argument is not an array of the type of place i, which machine code does not check."""
+        letter = self.letters[i]
+        actual = signature_of(array) if type(array) is np.ndarray else type(array).__name__
+        if actual != letter:
+            expected = "{} with {} dimension(s)".format(*ARRAYS[letter])
+            raise TypeError(f"argument {i} is {actual}; expected a writable C-contiguous array of {expected}")
+        self.checked[i] = weakref.ref(array)
 
 
 @functools.cache

@@ -237,6 +237,15 @@ class LinearLaw(Law, name="linear"):
         """
         return start + waves / row["admittance"]
 
+    def cell_pressures(self, pipes, starts: list[np.ndarray], profile: np.ndarray, waves: np.ndarray) -> np.ndarray:
+        """Pressure [Pa] in the cells of all pipes, one pipe after the other : float64[cells].
+
+        pipes : table of pipes of the model; starts : for each pipe pressures at the start [Pa]
+        waves, profile : as for `cell_pressure`, for all pipes
+        """
+        sizes = [len(start) for start in starts]
+        return np.concatenate([np.zeros(0), *starts]) + waves / np.repeat(pipes["admittance"], sizes)
+
     def mass_in_pipe(self, row, start: np.ndarray, profile: np.ndarray) -> float:
         """Mass [kg] in a pipe at the steady start.
 
@@ -302,6 +311,13 @@ class DenseLaw(Law):
     def cell_pressure(self, row, start: np.ndarray, profile: np.ndarray, waves: np.ndarray) -> np.ndarray:
         masses = profile[row["center"] + np.arange(len(waves))] + waves / row["speed"]
         return self.for_each(self.kernels.pressure_of_mass, row, masses)
+
+    def cell_pressures(self, pipes, starts: list[np.ndarray], profile: np.ndarray, waves: np.ndarray) -> np.ndarray:
+        parts, at = [np.zeros(0)], 0
+        for row, start in zip(pipes, starts, strict=True):
+            parts.append(self.cell_pressure(row, start, profile, waves[at : at + len(start)]))
+            at += len(start)
+        return np.concatenate(parts)
 
     def mass_in_pipe(self, row, start: np.ndarray, profile: np.ndarray) -> float:
         return float(np.sum(profile[row["center"] + np.arange(len(start))])) * row["dx"]

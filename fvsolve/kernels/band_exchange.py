@@ -184,7 +184,7 @@ def gather_sums(sums, spans, handle):
     """Copy partial sums between bands, so that each band has all entries of `sums`.
 
     A band is a part of the states, which one thread or process steps.
-    spans : int64[q, 4]  blocks of states of this band (`row_blocks` in `steppers.step_operations`); columns 2 and 3 are
+    spans : int64[q, 5]  blocks of states of this band (`row_blocks` in `steppers.step_operations`); columns 2 and 3 are
         the first entry of the block in `sums` and its number of entries. The first `joint[COMMON_SPANS]` blocks are the
         same in all bands and are written by band 0.
     """

@@ -63,9 +63,15 @@ def jump_capacity(count: int) -> int:
 
 def reset_history(past: np.ndarray, delays: np.ndarray) -> None:
     """Clear the history array and write its sizes."""
+    past[:] = 0.0
+    begin_history(past, delays)
+
+
+def begin_history(past: np.ndarray, delays: np.ndarray) -> None:
+    """Write the sizes of a history to an array of zeros."""
     if not len(delays):
         return
-    past[:], count = 0.0, int(delays["stretches"].sum())
+    count = int(delays["stretches"].sum())
     sizes = [at.CAPACITY, at.JUMP_CAPACITY, at.STRETCHES, at.RING_FACTOR, at.ARRIVALS_TIME, at.CORRECTED_TIME]
     wider = 1 if past.size == history_size(delays) else ring_factor(past, delays)
     past[sizes] = wider * int(delays["ring_size"].max()), jump_capacity(count), count, wider, math.nan, -math.inf

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -107,6 +107,24 @@ def as_time(t: Any) -> float:
     return float(value)
 
 
+def once_per_model(function: Callable) -> Callable:
+    """Decorate a function of a model and further arguments, so that a model keeps its results.
+
+    The results depend on the model only and must not be changed; arrays become read-only.
+    """
+
+    @functools.wraps(function)
+    def once(model: Model, *arguments: Any) -> Any:
+        key = function, arguments
+        if key not in model.computed:
+            result = model.computed[key] = function(model, *arguments)
+            if isinstance(result, np.ndarray):
+                result.flags.writeable = False
+        return model.computed[key]
+
+    return once
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Model(Displayable):
     """Compiled case. It is frozen, so that several runs can share it: each run writes to its own `RunData`.
@@ -154,6 +172,7 @@ class Model(Displayable):
     idle_run_data: deque[RunData] = field(default_factory=deque, init=False)
     tables_before_start: list = field(default_factory=list, init=False)
     idle_loops: deque = field(default_factory=deque, init=False)  # loops of `advance` that no call uses
+    computed: dict = field(default_factory=dict, init=False)  # results of functions, see `once_per_model`
 
     picture = "fvsolve.draw.object_pictures:model_figure"
 
@@ -193,7 +212,7 @@ class Model(Displayable):
         """Number of cells of all pipes (see `PipeMesh`) and basins."""
         return self.cells + sum(basin.n for basin in self.basins)
 
-    @cached_property
+    @functools.cached_property
     def wave_rates(self) -> np.ndarray:
         """Cells that a wave crosses per second in each pipe : float64[pipes] [1/s].
 
@@ -222,14 +241,14 @@ class Model(Displayable):
         """True if the wall of any pipe creeps."""
         return bool(self.tables.pipes["elements"].any())
 
-    @cached_property
+    @functools.cached_property
     def places(self) -> tuple:
         """Memory addresses of the tables, by which compiled functions read them."""
         from fvsolve.kernels.table_handle import addresses_of
 
         return addresses_of(self.tables)
 
-    @cached_property
+    @functools.cached_property
     def functions(self) -> Functions:
         """Compiled functions (`kernels.compiled_functions.Functions`) for the density law and parts of this model."""
         from fvsolve.basins.basin_terms import terms_of_basins, terms_of_scalars
@@ -264,7 +283,7 @@ class Model(Displayable):
         """Record of offsets in `out`, the array that the right-hand side writes in addition to dydt."""
         return self.tables.layout[0]
 
-    @cached_property
+    @functools.cached_property
     def structure(self) -> Structure:
         """Sparsity pattern of the Jacobian, with the linear algebra chosen for it or by `numerics.linear_algebra`."""
         from fvsolve.model.jacobian_pattern import jacobian_pattern, lumped_states
@@ -393,6 +412,18 @@ class Model(Displayable):
                                f"the pipe, and a pipe number less than {len(self.pipes)}")  # fmt: skip
         return self.case.law.cell_pressure(self.tables.pipes[k], self.profiles[k], self.tables.profile, waves)
 
+    def cell_pressures(self, waves: np.ndarray) -> np.ndarray:
+        """Pressure [Pa] in the cells of all pipes from the sum of both waves [kg/s] : float64[cells]."""
+        starts = list(self.profiles.values())
+        return self.case.law.cell_pressures(self.tables.pipes, starts, self.tables.profile, waves)
+
+    @functools.cached_property
+    def cell_elevations(self) -> np.ndarray:
+        """Elevation of the centres of the cells of all pipes : float64[cells] [m]."""
+        elevations = np.concatenate([np.zeros(0), *(pipe.elevation for pipe in self.pipes)])
+        elevations.flags.writeable = False
+        return elevations
+
     def head(self, pressure: ArrayLike, elevation: ArrayLike) -> np.ndarray:
         """Head [m] of the case's fluid above datum: 0 at ambient pressure and datum level."""
         pressure, elevation = as_numbers("pressure", pressure), as_numbers("elevation", elevation)
@@ -443,17 +474,15 @@ class Model(Displayable):
     def contents(self, y: np.ndarray) -> tuple[float, float]:
         """Mass stored at the start, and its change from the start to state y [kg]."""
         y = self.checked_size(y)
-        initial, change = 0.0, 0.0
-        for k, row in enumerate(self.tables.pipes):
-            o, n = row["y"], int(row["cells"])
-            initial += self.case.law.mass_in_pipe(row, self.profiles[k], self.tables.profile)
-            change += float(np.sum(y[o : o + 2 * n])) * row["dx"] / row["speed"]
-            change += float(y[o]) if row["delay"] >= 0 else 0.0
-            change += mass_in_creep(self.tables.floats, row, y)
-        for row in self.tables.nodes:
-            if row["y"] >= 0:
-                initial += float(row["mass"])
-                change += float(y[row["y"]])
+        initial, change = self.initial_mass, 0.0
+        pipes = self.tables.pipes
+        columns = (pipes[name].tolist() for name in ("y", "cells", "dx", "speed", "delay", "elements"))
+        for row, o, n, dx, speed, delay, elements in zip(pipes, *columns, strict=True):
+            change += float(np.sum(y[o : o + 2 * n])) * dx / speed if n else 0.0
+            change += float(y[o]) if delay >= 0 else 0.0
+            change += mass_in_creep(self.tables.floats, row, y) if elements else 0.0
+        for at in self.tables.nodes["y"].tolist():
+            change += float(y[at]) if at >= 0 else 0.0
         for basin in self.basins:
             rest, per = basin.mass()
             for own, start in zip(basin.states_of(y)[:1], basin.states_of(self.start)[:1], strict=True):
@@ -466,6 +495,16 @@ class Model(Displayable):
             back, forth = (float(y[place]) if place >= 0 else 0.0 for place in places)
             change += float(row["sweep_a"] + row["sweep_b"]) * (forth - back)
         return initial, change
+
+    @functools.cached_property
+    def initial_mass(self) -> float:
+        """Mass stored in pipes and nodes at the start [kg], without basins."""
+        mass, nodes = 0.0, self.tables.nodes
+        for k, row in enumerate(self.tables.pipes):
+            mass += self.case.law.mass_in_pipe(row, self.profiles[k], self.tables.profile)
+        for stored in nodes["mass"][nodes["y"] >= 0].tolist():
+            mass += stored
+        return mass
 
     @property
     def checks(self) -> dict[str, Any]:

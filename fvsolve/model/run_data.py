@@ -11,7 +11,14 @@ from fvsolve.assembly.model_draft import aligned_zeros
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.delay_lines.wave_history import COUNT
 from fvsolve.model import input_histories
-from fvsolve.model.delay_lines import LEAST_STEPS, reset_history, steps_left, stored_history, with_doubled_rings
+from fvsolve.model.delay_lines import (
+    LEAST_STEPS,
+    begin_history,
+    reset_history,
+    steps_left,
+    stored_history,
+    with_doubled_rings,
+)
 from fvsolve.model.network_elimination import NetworkError
 
 if TYPE_CHECKING:
@@ -56,7 +63,7 @@ class RunData:
         self.armed, self.marks = self.written.armed, self.written.marks
         self.envelope, self.extremes = self.written.envelope, self.written.extremes
         self.maxima = self.written.maxima
-        reset_history(self.written.past, model.tables.delays)
+        begin_history(self.written.past, model.tables.delays)
         input_histories.reset_histories(self.written.histories, model.tables.controls)
         self.clock["limit"], self.marks[:] = np.inf, np.nan
         self.armed[:], self.discrete[:] = model.flags, model.discrete
@@ -94,7 +101,8 @@ class RunData:
         self.discrete[:] = self.model.discrete
         self.update_network()
         reset_history(self.past, self.model.tables.delays)
-        input_histories.reset_histories(self.written.histories, self.model.tables.controls)
+        if self.histories.size:
+            input_histories.reset_histories(self.histories, self.model.tables.controls)
 
     @property
     def discrete(self) -> np.ndarray:
@@ -260,12 +268,12 @@ class RunData:
         out : result of `evaluate`, which is also the value of this key
         """
         fields = self.model.fields(y, out, self.along(t, out))
-        fields["out"] = out
-        for k, (pipe, row) in enumerate(zip(self.model.pipes, self.model.tables.pipes, strict=True)):
-            own, cells = fields[pipe.name], row["cell"] + np.arange(pipe.cells)
-            least, greatest = (self.model.cell_pressure(k, self.envelope[i, cells]) for i in (0, 2))
-            own["min_pressure"] = np.minimum(least, own["pressure"])
-            own["max_pressure"] = np.maximum(greatest, own["pressure"])
+        fields["out"], at = out, 0
+        least, greatest = (self.model.cell_pressures(self.envelope[i]) for i in (0, 2))
+        for pipe in self.model.pipes:
+            own, cells = fields[pipe.name], slice(at, at := at + pipe.cells)
+            own["min_pressure"] = np.minimum(least[cells], own["pressure"])
+            own["max_pressure"] = np.maximum(greatest[cells], own["pressure"])
         return fields
 
     def observe(self, t: float, y: np.ndarray, out: np.ndarray) -> np.ndarray:

@@ -13,9 +13,6 @@ import numpy as np
 from fvsolve.errors import RunError, listing
 from fvsolve.schemes import LIMITERS
 
-# Keys of the resolved case that change the report of a run, not its numbers.
-UNCHECKED_KEYS = ("title", "expect", "compare", "validation")
-
 
 @dataclass(frozen=True)
 class Restart:
@@ -36,11 +33,9 @@ class Restart:
 def identity(case) -> dict[str, str]:
     """Hash of the case and of its files, and `versions`; a run can only continue if all are equal.
 
-    The hash leaves out the end time and the keys that change only the report, `UNCHECKED_KEYS`.
+    The hash leaves out the end time and the keys that change only the report, see `Case.identity_text`.
     """
-    table = {key: value for key, value in case.table().items() if key not in UNCHECKED_KEYS}
-    table["numerics"].pop("end")
-    digest = hashlib.sha256(json.dumps(table, sort_keys=True, default=str).encode())
+    digest = hashlib.sha256(case.identity_text.encode())
     for path in case.files:
         digest.update(Path(path).read_bytes())
     return {"case": digest.hexdigest()[:16]} | versions(case)

@@ -43,6 +43,10 @@ def plain(value):
     Numpy numbers and arrays become Python numbers and lists, dataclasses dicts, complex numbers [re, im], NaN and
     infinity None, and other objects their text.
     """
+    if type(value) is float:
+        return value if math.isfinite(value) else None
+    if type(value) in (str, int, bool):
+        return value
     if is_dataclass(value) and not isinstance(value, type):
         return plain(value.plain() if hasattr(value, "plain") else vars(value))
     if isinstance(value, dict):
@@ -88,12 +92,10 @@ def _extremes(summary, model) -> dict:
     """
     extremes = {}
     for col in probe_columns(model):
-        least, t_min, greatest, t_max = (*summary.extremes[col.name],)
-        sides = {"minimum": (least, t_min), "maximum": (greatest, t_max)}
-        row: dict = {"unit": col.unit}
-        for side, (value, t) in sides.items():
+        least, t_min, greatest, t_max = summary.extremes[col.name]
+        row = extremes[col.name] = {"unit": col.unit}
+        for side, value, time, t in (("minimum", least, "t_min", t_min), ("maximum", greatest, "t_max", t_max)):
             valid = not t >= summary.invalid_from
-            row |= {side: plain(float(col.from_si(value))) if valid else None,
-                    f"t_{side[:3]}": plain(float(t)) if valid else None}  # fmt: skip
-        extremes[col.name] = row
+            row[side] = plain(float(col.from_si(value))) if valid else None
+            row[time] = plain(float(t)) if valid else None
     return extremes

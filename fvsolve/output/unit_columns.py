@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve import units
+from fvsolve.model.model import once_per_model
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ def time_column(case) -> UnitColumn:
     return column("t", "time", case)
 
 
+@once_per_model
 def probe_columns(model) -> list[UnitColumn]:
     """Columns of the probes of a model, in the order of the probes."""
     return [column(probe.text, probe.dimension, model.case, probe.unit) for probe in model.probes]

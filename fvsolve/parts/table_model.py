@@ -205,11 +205,13 @@ class Table(BaseModel):
 
         Keys without a value are left out.
         """
-        result = {}
-        for name, info in type(self).model_fields.items():
-            value = plain_value(getattr(self, name))
+        values, result = vars(self), {}
+        for name, key in keys_of(type(self)):
+            value = values[name]
+            if type(value) not in PLAIN:
+                value = plain_value(value)
             if value is not None:
-                result[info.alias or name] = value
+                result[key] = value
         return result
 
 
@@ -261,8 +263,19 @@ class NamedTables(Value):
         return f"`{{ NAME = {{ {', '.join(self.model.keys())} }} }}`"
 
 
+PLAIN = {float, int, str, bool, type(None)}
+
+
+@functools.cache
+def keys_of(model: type[Table]) -> list[tuple[str, str]]:
+    """Names of the attributes of a table and their keys in a case file."""
+    return [(name, info.alias or name) for name, info in model.model_fields.items()]
+
+
 def plain_value(value: Any) -> Any:
     """Value of a key as in a case file: number, text, list or table."""
+    if type(value) in PLAIN:
+        return value
     if hasattr(value, "table"):
         return value.table()
     if isinstance(value, (list, tuple)):

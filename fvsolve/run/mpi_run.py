@@ -82,12 +82,13 @@ def all_ranks_ready(comm, model):
 
 
 def rows_of(model, count: int) -> dict:
-    """Rows of cells of each rank, for each distributed basin: name -> first row of each rank, then the number of rows.
+    """Rows of cells of each rank, for each distributed grid: name -> first row of each rank, then the number of rows.
 
     count : number of ranks; the values are int64[count + 1]
     """
     partition = make_partition(model, count)
-    return {model.basins[b].name: rows for b, rows in zip(partition.basins, partition.firsts, strict=True)}
+    divided = zip(partition.basins, partition.firsts, strict=True)
+    return {model.basins[b].name: rows for b, rows in divided if model.basins[b].is_grid}
 
 
 def serve_rank(make: Callable) -> None:

@@ -263,7 +263,7 @@ class MpiRanks:
         ranks = range(comm.size)
         self.exchanges = Exchange(comm, [cut.states(k) for k in ranks]), Exchange(comm, [cut.flows(k) for k in ranks])
         self.others, common = np.ones(cut.sum_count, dtype=bool), len(cut.common_states())
-        for _, _, first, count in self.member.stepper.row_blocks[common if comm.rank > 0 else 0 :]:
+        for _, _, first, count, _ in self.member.stepper.row_blocks[common if comm.rank > 0 else 0 :]:
             self.others[first : first + count] = False
         self.rows = [[slice(*block[:2]) for block in cut.row_blocks(k)[common:].tolist()] for k in ranks]
         self.maxima_rows = [cut.maxima_rows(k) for k in ranks]

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.basins.boundary_cells import BAND_MARGIN
+from fvsolve.basins.cell_sides import BLOCK
 from fvsolve.errors import FvsolveError, Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import stage_sums
@@ -38,8 +39,8 @@ class Partition:
 
         There is one for each range of `common_states`, and one for each row of each quantity of the divided basins.
         """
-        rows = self.model.tables.basins["ny"][[*self.basins]] * [quantities(self.model, b) for b in self.basins]
-        return len(self.common_states()) + int(sum(rows))
+        rows = [row_count(self.model, b) * quantities(self.model, b) for b in self.basins]
+        return len(self.common_states()) + sum(rows)
 
     def common_states(self) -> list[tuple[int, int]]:
         """Ranges (first, last + 1) of the states that every band steps."""
@@ -52,20 +53,18 @@ class Partition:
         return [run for run in runs if run[1] > run[0]] or [(0, 0)]
 
     def row_blocks(self, k: int) -> np.ndarray:
-        """Blocks of states that band k steps : int64[q, 4]; blocks that every band steps come first.
+        """Blocks of states that band k steps : int64[q, 5]; blocks that every band steps come first.
 
         Each row: first state, last state + 1, index of its first partial sum of the error norm (see `sum_count`), count
-        of its partial sums.
+        of its partial sums, number of states of each (the last may have fewer).
         """
         alike = self.common_states()
-        blocks, first = [(*run, m, 1) for m, run in enumerate(alike)], len(alike)
+        blocks, first = [(*run, m, 1, run[1] - run[0]) for m, run in enumerate(alike)], len(alike)
         for rows, b in zip(self.firsts, self.basins, strict=True):
-            basin = self.model.tables.basins[b]
-            n, nx, ny, y = (int(basin[key]) for key in ("n", "nx", "ny", "y"))
             for q in range(quantities(self.model, b)):
-                begin, stop = (y + q * n + nx * int(row) for row in rows[k : k + 2])
-                blocks.append((begin, stop, first + int(rows[k]), int(rows[k + 1] - rows[k])))
-                first += ny
+                states = states_of_rows(self.model, b, q, int(rows[k]), int(rows[k + 1]))
+                blocks.append((*states, first + int(rows[k]), int(rows[k + 1] - rows[k]), row_size(self.model, b)))
+                first += row_count(self.model, b)
         return np.array(blocks, dtype=np.int64)
 
     def maxima_rows(self, k: int) -> list[slice]:
@@ -73,17 +72,25 @@ class Partition:
         ranges = []
         for rows, b in zip(self.firsts, self.basins, strict=True):
             basin, (begin, stop) = self.model.tables.basins[b], rows[k : k + 2].tolist()
-            at, size = int(basin["maxima"]), int(basin["maxima_row"])
-            ranges += [slice(at + size * begin, at + size * stop)] if at >= 0 else []
+            at, size, n = int(basin["maxima"]), int(basin["maxima_row"]), int(basin["n"])
+            if at >= 0 and basin["nx"] > 0:
+                ranges.append(slice(at + size * begin, at + size * stop))
+            elif at >= 0:  # a row of each quantity
+                begin, stop = cells_of_rows(self.model, b, begin, stop)
+                ranges += [slice(at + q * n + begin, at + q * n + stop) for q in range(size // n)]
         return ranges
 
     def bands(self, k: int) -> np.ndarray:
-        """First row and last row + 1 of band k in each basin : int64[2 basins]; an undivided basin has all its rows."""
+        """First row and last row + 1 of band k in each basin, cells for meshes that are not grids : int64[2 basins].
+
+        An undivided basin has all its rows.
+        """
         table = self.model.tables.basins
         rows_of = np.zeros((len(table), 2), dtype=np.int64)
         rows_of[:, 1] = np.where(table["nx"] > 0, table["ny"], table["n"])
         for rows, b in zip(self.firsts, self.basins, strict=True):
-            rows_of[b] = rows[k : k + 2]
+            own = int(rows[k]), int(rows[k + 1])
+            rows_of[b] = own if table[b]["nx"] > 0 else cells_of_rows(self.model, b, *own)
         return rows_of.ravel()
 
     def states(self, k: int) -> np.ndarray:
@@ -91,11 +98,10 @@ class Partition:
         parts = []
         for rows, b in zip(self.firsts, self.basins, strict=True):
             basin = self.model.tables.basins[b]
-            nx, ny = int(basin["nx"]), int(basin["ny"])
-            near = np.arange(max(rows[k] - BAND_MARGIN, 0), min(rows[k + 1] + BAND_MARGIN, ny))
-            cells = [(nx * near[:, None] + np.arange(nx)).ravel(), *common_cells(self.model, b)]
+            near = np.arange(*cells_of_rows(self.model, b, *rows_read(self.model, b, int(rows[k]), int(rows[k + 1]))))
+            cells, size = np.concatenate([near, *common_cells(self.model, b)]), row_size(self.model, b)
             for q in range(quantities(self.model, b)):
-                parts.append(runs(np.concatenate(cells), nx, rows, k, int(basin["y"] + q * basin["n"])))
+                parts.append(runs(cells, size, rows, k, int(basin["y"] + q * basin["n"])))
         return np.concatenate(parts)
 
     def flows(self, k: int) -> np.ndarray:
@@ -109,7 +115,11 @@ class Partition:
             nx, ny, at = int(basin["nx"]), int(basin["ny"]), int(basin["through"])
             if at < 0:
                 continue
-            row = np.concatenate([np.arange(ny), np.arange(ny), np.zeros(nx, int), np.full(nx, ny - 1)])
+            if nx > 0:
+                row = np.concatenate([np.arange(ny), np.arange(ny), np.zeros(nx, int), np.full(nx, ny - 1)])
+            else:
+                mesh = self.model.basins[b].mesh
+                row = mesh.left[mesh.inner :] // BLOCK
             owner = np.searchsorted(rows, row, "right") - 1
             parts.append(merged_runs(np.arange(row.size), owner, k, at))
         return np.concatenate(parts)
@@ -125,6 +135,31 @@ def quantities(model: Model, b: int) -> int:
     return len(model.basins[b].quantities) + len(model.basins[b].scalars)
 
 
+def row_size(model: Model, b: int) -> int:
+    """Number of cells of a row of basin b; a row of a mesh that is not a grid is a block of cells, see `cell_sides`."""
+    return int(model.tables.basins[b]["nx"]) or BLOCK
+
+
+def row_count(model: Model, b: int) -> int:
+    """Number of rows of basin b, see `row_size`."""
+    return -(-int(model.tables.basins[b]["n"]) // row_size(model, b))
+
+
+def cells_of_rows(model: Model, b: int, first: int, stop: int) -> tuple[int, int]:
+    """(first, last + 1) of the cells of the rows from `first` to `stop` - 1 of basin b."""
+    size, n = row_size(model, b), int(model.tables.basins[b]["n"])
+    return min(first * size, n), min(stop * size, n)
+
+
+def rows_read(model: Model, b: int, first: int, stop: int) -> tuple[int, int]:
+    """(first, last + 1) of the rows of basin b whose values the rates of the rows from `first` to `stop` - 1 read."""
+    if model.tables.basins[b]["nx"] > 0:
+        return max(first - BAND_MARGIN, 0), min(stop + BAND_MARGIN, row_count(model, b))
+    need = model.basins[b].blocks_needed  # rates read values at sides, and these read the cells next to them
+    sides = int(np.searchsorted(need, first, "right")), int(need[stop - 1])
+    return int(np.searchsorted(need, sides[0], "right")), int(need[sides[1] - 1])
+
+
 def common_cells(model: Model, b: int):
     """Yield the numbers of the cells of basin b that all bands read: an array for each patch and probe in cells."""
     integers = model.tables.integers
@@ -135,13 +170,13 @@ def common_cells(model: Model, b: int):
         yield integers[probe["cell"] : probe["cell"] + probe["count"]]
 
 
-def runs(cells: np.ndarray, nx: int, rows: np.ndarray, k: int, at: int) -> np.ndarray:
+def runs(cells: np.ndarray, size: int, rows: np.ndarray, k: int, at: int) -> np.ndarray:
     """Ranges of states of the cells outside band k : int64[r, 3], as `merged_runs` returns them.
 
-    cells : numbers of cells of a basin; nx : cells in a row; rows : first row of each band; at : state of cell 0
+    cells : numbers of cells of a basin; size : cells in a row; rows : first row of each band; at : state of cell 0
     """
     cells = np.unique(cells)
-    return merged_runs(cells, np.searchsorted(rows, cells // nx, "right") - 1, k, at)
+    return merged_runs(cells, np.searchsorted(rows, cells // size, "right") - 1, k, at)
 
 
 def merged_runs(places: np.ndarray, owner: np.ndarray, k: int, at: int) -> np.ndarray:
@@ -161,7 +196,7 @@ def merged_runs(places: np.ndarray, owner: np.ndarray, k: int, at: int) -> np.nd
 def make_partition(model: Model, count: int) -> Partition:
     """Partition of the divisible basins of a model into `count` bands of about equal numbers of rows."""
     basins = tuple(b for b, basin in enumerate(model.basins) if not basin.undivided_reason)
-    rows = model.tables.basins["ny"][[*basins]] if basins else np.zeros(0, dtype=np.int64)
+    rows = np.array([row_count(model, b) for b in basins], dtype=np.int64)
     return Partition(model, count, basins, np.arange(count + 1) * rows[:, None] // count)
 
 
@@ -196,7 +231,8 @@ def divisible_rows(model: Model) -> dict:
     why : reason why only one thread is possible, or ""
     """
     reason = single_thread_reason(model)
-    rows = {} if reason else {basin.name: int(basin.row["ny"]) for basin in model.basins if not basin.undivided_reason}
+    divided = [b for b, basin in enumerate(model.basins) if not basin.undivided_reason]
+    rows = {} if reason else {model.basins[b].name: row_count(model, b) for b in divided}
     undivided = {basin.name: basin.undivided_reason for basin in model.basins if basin.undivided_reason}
     return {"rows": rows, "whole": undivided, "most": min(rows.values(), default=1), "why": reason}
 
@@ -220,7 +256,8 @@ def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
     return threads, [Notice("threads", "numerics", text, "threads")] if divisible["whole"] else []
 
 
-BLOCK = 4096  # cells of a block: their arrays and the work arrays of the rates fit into a second-level cache
+# Cells of a block of `stage_sums`: their arrays and the work arrays of the rates fit into a second-level cache.
+CACHED_CELLS = 4096
 LEAST_STATES = 2**17  # least number of states of a basin: smaller basins stay in the second-level cache during a step
 
 
@@ -239,23 +276,23 @@ def blocked_sums(cut: Partition, k: int) -> np.ndarray:
         first, stop = (int(row) for row in rows[k : k + 2])
         for q in range(quantities(model, b)):
             if b not in blocked_basins:
-                others.append(rows_at(model, b, q, first, stop))
+                others.append(states_of_rows(model, b, q, first, stop))
                 continue
-            edges.append(rows_at(model, b, q, first, min(first + BAND_MARGIN, stop)))
-            edges.append(rows_at(model, b, q, max(stop - BAND_MARGIN, first), stop))
+            edges.append(states_of_rows(model, b, q, first, min(first + BAND_MARGIN, stop)))
+            edges.append(states_of_rows(model, b, q, max(stop - BAND_MARGIN, first), stop))
             common_cells += cells_at(model, b, q, first, stop)
     head = np.zeros(stage_sums.HEAD + len(model.basins), dtype=np.int64)
     head[[stage_sums.OTHERS, stage_sums.CHECKED, stage_sums.EDGES]] = len(others), len(common_cells), len(edges)
-    head[stage_sums.BASINS], head[stage_sums.CELLS] = len(model.basins), BLOCK
+    head[stage_sums.BASINS], head[stage_sums.CELLS] = len(model.basins), CACHED_CELLS
     head[[stage_sums.HEAD + b for b in blocked_basins]] = 1
     return np.concatenate([head, np.array([*others, *common_cells, *edges], dtype=np.int64).ravel()])
 
 
-def rows_at(model, b: int, q: int, first: int, stop: int) -> tuple[int, int]:
+def states_of_rows(model, b: int, q: int, first: int, stop: int) -> tuple[int, int]:
     """(first state, last state + 1) of the rows from `first` to `stop` - 1 of quantity q of basin b."""
-    basin = model.tables.basins[b]
-    at, nx = int(basin["y"] + q * basin["n"]), int(basin["nx"])
-    return at + nx * first, at + nx * stop
+    basin, (begin, end) = model.tables.basins[b], cells_of_rows(model, b, first, stop)
+    at = int(basin["y"] + q * basin["n"])
+    return at + begin, at + end
 
 
 def cells_at(model, b: int, q: int, first: int, stop: int) -> list[tuple[int, int]]:
@@ -263,7 +300,7 @@ def cells_at(model, b: int, q: int, first: int, stop: int) -> list[tuple[int, in
 
     b : number of the basin; q : number of the quantity
     """
-    begin, end = rows_at(model, b, q, first, stop)
+    begin, end = states_of_rows(model, b, q, first, stop)
     at = begin - int(model.tables.basins[b]["nx"]) * first
     cells = at + np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *common_cells(model, b)]))
     cells = cells[(cells >= begin) & (cells < end)]

@@ -18,7 +18,7 @@ from fvsolve.kernels.delay_lines.wave_history import CORRECTED_TIME
 from fvsolve.model.delay_lines import jump_overflow_notices
 from fvsolve.solve.run_loop import STATUS_FAILURES
 from fvsolve.step_limits.growing_modes import forcing_sizes, state_ranges, states_outside_cells
-from fvsolve.step_limits.step_notices import DOUBTFUL, WRONG, step_limits
+from fvsolve.step_limits.step_notices import DOUBTFUL, WRONG, initial_step_limits, step_limits
 from fvsolve.steppers import automatic
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.tableau import method_named
@@ -41,7 +41,7 @@ class RunChecks:
         model = self.model
         self.moving = model.basins if model.case.numerics.step is not None else []
         self.rates: dict[str, float] = {}
-        self.predicted = step_limits(model, run_data=run_data)
+        self.predicted = initial_step_limits(model, run_data)
         self.step_doubling = StepDoubling(run_data)
         self.sloshing = SloshingCheck(model)
         self.largest = GROWTH_LIMIT * forcing_sizes(model)
@@ -291,8 +291,10 @@ class StepDoubling:
         full_step = self.step if loop.t < end else min(self.step, end - memory["t_mark"])
         # A step in which a jump in a delay line corrected masses of storing nodes or flows of columns is not checked,
         # because half steps have no such correction. The mark is removed when the corrected state is recorded again.
+        # Neither is a step that ends at an event, because half steps would follow the equations after it.
         past = loop.run_data.past
-        if h < FULL_STEP * full_step or (past.size > 0 and past[CORRECTED_TIME] == loop.t):
+        corrected = past.size > 0 and past[CORRECTED_TIME] == loop.t
+        if h < FULL_STEP * full_step or corrected or loop.last_switch == loop.t:
             return
         before, now = loop.before[self.states], loop.now[self.states]
         t = loop.t - h

@@ -132,10 +132,11 @@ def find_marks(run_data: RunData) -> list[Mark]:
         ),
         "dry": "no water is left for the outflow; the missing water is added (`made_up` in the mass balance)",
     }
+    found = [(*kinds[k], float(marks[k])) for k in np.flatnonzero(np.isfinite(marks[: len(kinds)]))]
     return [
-        Mark(kind, place, float(time), f"{place.split('.', 1)[1]}: {texts[kind]}")
-        for (kind, place), time in zip(kinds, marks[: len(kinds)], strict=True)
-        if np.isfinite(time) and kind in texts and not (kind == "below vapor pressure" and model.cavitates)
+        Mark(kind, place, time, f"{place.split('.', 1)[1]}: {texts[kind]}")
+        for kind, place, time in found
+        if kind in texts and not (kind == "below vapor pressure" and model.cavitates)
     ]
 
 
@@ -219,7 +220,7 @@ def find_point_envelopes(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
             continue
         distance = np.array([model.watched[k].fraction * pipe.length for k in own])
         low, t_low, high, t_high = run_data.extremes[:, probe_count + np.array(own)]
-        points[pipe.name] = pressure_envelope(model, pipe, distance, pipe.height(distance), (low, t_low, high, t_high))
+        points[pipe.name] = pressure_envelope(model, distance, pipe.height(distance), (low, t_low, high, t_high))
         points[pipe.name]["initial_pressure"] = model.watched_start[own]
     return points
 
@@ -238,17 +239,18 @@ def find_run_ups(model: Model, maxima: dict[str, dict[str, np.ndarray]]) -> dict
 
 def find_envelope(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
     """Envelope of each pipe over its cells: name of the pipe -> dict of `pressure_envelope`."""
-    model, envelope, result = run_data.model, run_data.envelope, {}
-    for k, pipe in enumerate(model.pipes):
-        cells = model.tables.pipes[k]["cell"] + np.arange(pipe.cells)
-        least, greatest = (model.cell_pressure(k, envelope[row, cells]) for row in (0, 2))
-        extremes = least, envelope[1, cells], greatest, envelope[3, cells]
-        result[pipe.name] = pressure_envelope(model, pipe, pipe.x, pipe.elevation, extremes)
+    model, (low, t_low, high, t_high) = run_data.model, run_data.envelope
+    extremes = model.cell_pressures(low), t_low, model.cell_pressures(high), t_high
+    distances = np.concatenate([np.zeros(0), *(pipe.x for pipe in model.pipes)])
+    envelope, result, at = pressure_envelope(model, distances, model.cell_elevations, extremes), {}, 0
+    for pipe in model.pipes:
+        cells = slice(at, at := at + pipe.cells)
+        result[pipe.name] = {name: values[cells] for name, values in envelope.items()}
     return result
 
 
-def pressure_envelope(model: Model, pipe, distance, elevation, extremes) -> dict[str, np.ndarray]:
-    """Envelope of a pipe as a dict of float64[points]: least and greatest pressure [Pa] and head [m], and their times.
+def pressure_envelope(model: Model, distance, elevation, extremes) -> dict[str, np.ndarray]:
+    """Envelope of pipes as a dict of float64[points]: least and greatest pressure [Pa] and head [m], and their times.
 
     distance, elevation : chainage and height of the points [m]
     extremes : least pressures [Pa], their times [s], greatest pressures [Pa], their times [s]

@@ -44,7 +44,8 @@ def solve(
 ) -> Summary:  # fmt: skip
     """Run a model from `state` to the end time of its case; returns the summary of the run.
 
-    sink : object that receives the output rows, field frames and checkpoints
+    sink : object that receives the output rows, field frames and checkpoints; frames are not computed for a sink with
+    `takes_fields` False
     progress : function of (simulated time [s], elapsed time [s], steps), called about ten times a second
     threads : number of threads
     comm : MPI communicator, whose other ranks follow this rank, in place of threads
@@ -94,16 +95,17 @@ class Run:
         jumps = {t: jump for t, jump in model.breaks if self.start <= t <= self.end}
         self.starts_with_jump, self.ends_with_jump = jumps.pop(self.start, False), jumps.pop(self.end, False)
         self.bounds = [(t, jump) for t, jump in sorted(jumps.items())] + [(self.end, True)]
+        self.watches = [watch for basin in model.basins for watch in basin.watches(basin.deviations(model.start))]
+        fields = output.fields if self.watches or getattr(sink, "takes_fields", True) else 0
         self.loop.stepper.set_control(
-            start=self.start, every=output.every or (self.end - self.start) / 1000, field_count=output.fields,
-            field_every=(self.end - self.start) / output.fields if output.fields else 0.0,
+            start=self.start, every=output.every or (self.end - self.start) / 1000, field_count=fields,
+            field_every=(self.end - self.start) / fields if fields else 0.0,
         )  # fmt: skip
         self.segment, self.fresh = 0, not state.memory
         self.changes: list[tuple[float, float, float]] = []  # changes of the method under `auto`
         self.loop.now[:] = state.y
         self.loop.state["t"] = state.t
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
-        self.watches = [watch for basin in model.basins for watch in basin.watches(basin.deviations(model.start))]
         self.checks = RunChecks(self.run_data)
         self.loop.stepper.largest = self.checks.largest_if_needed
         if self.checks.needs_frequent_checks:

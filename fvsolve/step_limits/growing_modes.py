@@ -24,6 +24,7 @@ import numpy as np
 from fvsolve.assembly.pipe_terms import elements
 from fvsolve.errors import Notice
 from fvsolve.kernels.steady_friction import drag_slope
+from fvsolve.model.model import once_per_model
 from fvsolve.model.reaction_tables import reaction_modes
 from fvsolve.schemes import SCHEMES
 from fvsolve.step_limits.grid_limits import bisected
@@ -36,6 +37,7 @@ OTHER_STATES = 1e3  # further factor for states driven by more than waves: conte
 FORCING_KEYS = {"pressure": "pressure", "head": "head", "demand": "flow", "flow": "flow"}  # scheduled keys of nodes
 
 
+@once_per_model
 def forcing_sizes(model) -> np.ndarray:
     """Largest size that schedules and initial values can give to each state : float64[n].
 
@@ -62,6 +64,7 @@ def forcing_sizes(model) -> np.ndarray:
     return largest
 
 
+@once_per_model
 def pressure_and_flow_range(model) -> tuple[float, float]:
     """Greatest range of pressures [Pa] and greatest magnitude of mass flow [kg/s] that the forcing of nodes gives.
 
@@ -83,6 +86,7 @@ def pressure_and_flow_range(model) -> tuple[float, float]:
     return max(pressures), flow
 
 
+@once_per_model
 def states_outside_cells(model) -> np.ndarray:
     """Numbers of the states outside cells and delay lines: storing nodes, columns, bodies, devices : int64[k]."""
     pipes = model.tables.pipes
@@ -91,6 +95,7 @@ def states_outside_cells(model) -> np.ndarray:
     return np.array([i for i, name in names if "[" not in name and i not in lines], dtype=np.int64)
 
 
+@once_per_model
 def state_ranges(model, share: float = 1.0) -> np.ndarray:
     """Range of each state : float64[n].
 

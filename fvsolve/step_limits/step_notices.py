@@ -82,6 +82,14 @@ def step_limits(
     return notices + growing + lines
 
 
+def initial_step_limits(model, run_data: RunData) -> list[Notice]:
+    """Notices of `step_limits` before a run, which a model keeps for its next runs."""
+    key = initial_step_limits
+    if key not in model.computed:
+        model.computed[key] = step_limits(model, run_data=run_data)
+    return model.computed[key]
+
+
 def first_step(model, run_data: RunData | None = None) -> float:
     """Given step of a run, or its first step under a given Courant number [s]; 0 if the step is unknown.
 

@@ -51,7 +51,7 @@ class Integrator:
         self.g = self.g_new = self.armed = self.no_floats
         self.y_out, self.rows = np.zeros(n), np.zeros((1, 1))
         self.bounded_states, self.bounds = self.no_integers, np.zeros((0, 4))
-        self.join, self.row_blocks, self.sums = no_exchange(), np.array([[0, n, 0, 1]]), np.zeros(1)
+        self.join, self.row_blocks, self.sums = no_exchange(), np.array([[0, n, 0, 1, n]]), np.zeros(1)
         self.use(method)
 
     def use(self, method: Method) -> None:

@@ -9,10 +9,10 @@ from fvsolve.steppers.run_handle import BANDS, call_join
 
 __all__ = ["combine", "copy"]
 
-# Columns of `row_blocks`, int64[q, 4], the states of a band: first, one beyond the last, number of the first partial
-# sum, number of partial sums. Errors are summed by rows, and the rows are added in the order of their numbers, so that
-# the result does not depend on the bands.
-BEGIN, STOP, FIRST, SUMS = range(4)
+# Columns of `row_blocks`, int64[q, 5], the states of a band: first, one beyond the last, number of the first partial
+# sum, number of partial sums, number of states of each (the last may have fewer). Errors are summed by rows, and the
+# rows are added in the order of their numbers, so that the result does not depend on the bands.
+BEGIN, STOP, FIRST, SUMS, LENGTH = range(5)
 
 
 @njit(forceinline=True)
@@ -64,11 +64,10 @@ def error_of_bands(handle, r, h, now, new):
     error, k, y, y_new, scale = error_of(r.coefficients, r.k.shape[0]), r.k, r.y[now], r.y[new], r.scale
     row_blocks, sums, tolerance = r.row_blocks, r.sums, r.control[0]["size"]
     for m in range(row_blocks.shape[0]):
-        begin, count = row_blocks[m, BEGIN], row_blocks[m, SUMS]
-        length = (row_blocks[m, STOP] - begin) // count
-        for row in range(count):
-            at = begin + row * length
-            sums[row_blocks[m, FIRST] + row] = squares(at, at + length, h, error, k, y, y_new, scale, tolerance)
+        begin, stop, length = row_blocks[m, BEGIN], row_blocks[m, STOP], row_blocks[m, LENGTH]
+        for row in range(row_blocks[m, SUMS]):
+            at, end = begin + row * length, min(begin + (row + 1) * length, stop)
+            sums[row_blocks[m, FIRST] + row] = squares(at, end, h, error, k, y, y_new, scale, tolerance)
     call_join(r.calls[BANDS], sums, row_blocks, handle)
     total = 0.0
     for row in range(sums.size):

@@ -73,6 +73,8 @@ class Outcome:
 class RowSink:
     """Receiver of the output of a run; stores only the rows of probes, in SI."""
 
+    takes_fields = False  # field frames need not be computed
+
     def __init__(self) -> None:
         self.blocks: list[np.ndarray] = []
 

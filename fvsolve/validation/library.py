@@ -289,6 +289,7 @@ class Runs:
 class FrameSink(MemorySink):
     """Receiver of a run in memory that keeps the last frame of fields."""
 
+    takes_fields = True
     last_frame: dict[str, Any]
 
     def field(self, t: float, frame: dict[str, Any]) -> None:

@@ -37,6 +37,7 @@ class Field:
         self.floats, self.integers = lower_mesh(self.mesh)
         self.centre, self.area = self.mesh.centre, self.mesh.area
         self.edge = self.mesh.middle[self.mesh.inner :]
+        self.band = 0, len(self.area)
 
     def lake(self, bed) -> np.ndarray:
         """Return (depth, dry height) of a lake at level 0 over a bed."""
@@ -47,7 +48,7 @@ class Field:
         work, found = np.full(work_size(surface_mesh, self.integers), np.nan), np.full_like(y, np.nan)
         water, states = surface_mesh.MeshWater(G, scheme, wide, plan), tuple(np.ascontiguousarray(y))
         rate = water_mesh_rates(
-            water, self.floats, self.integers, reflect, states, flow, NONE, work, tuple(found), None, None
+            water, self.floats, self.integers, reflect, states, flow, NONE, work, tuple(found), self.band, None, None
         )
         return found, rate
 
@@ -56,7 +57,7 @@ class Field:
         fluid = LiquidScheme(C, RHO, table, table is not None or law == LAW_LOG, scheme, 0, 0.0, wide)
         states = tuple(np.ascontiguousarray(y))
         return found, mesh_rates(
-            fluid, self.floats, self.integers, reflect, states, NONE, NONE, work, tuple(found), None, None
+            fluid, self.floats, self.integers, reflect, states, NONE, NONE, work, tuple(found), self.band, None, None
         )
 
     def advection(self, scheme, flow, s, outside=None, depth=NONE, diffusivity=0.0, wide=2.0, bounds=FREE):

@@ -29,7 +29,8 @@ cases, out, options = json.loads(sys.argv[1]), sys.argv[2], json.loads(sys.argv[
 for name, case in cases.items():
     fvsolve.run(case, out=f"{out}/{name}", **options)
 """
-NAMES = ("muscl, ssp-rk2", "a tolerance", "a pipe", "delay lines", "a liquid", "a dye in water", "greatest values")
+NAMES = ("muscl, ssp-rk2", "a tolerance", "a pipe", "delay lines", "a liquid", "a dye in water", "greatest values",
+         "a mesh", "a liquid on a mesh")  # fmt: skip
 
 
 def ranks(many: int, *command, timeout=300, **environment) -> subprocess.CompletedProcess:

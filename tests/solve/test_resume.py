@@ -193,7 +193,9 @@ def test_what_was_seen_of_a_basin_before_is_known_after(tmp_path):
 
 
 class Keeping(MemorySink):
-    """Sink in memory that also keeps all checkpoints."""
+    """Sink in memory that also keeps all checkpoints; its field frames are computed."""
+
+    takes_fields = True
 
     def __init__(self, model) -> None:
         super().__init__(model)

@@ -278,7 +278,7 @@ class FreeSurfaceRows(BasinRows):
     """Rows of the tables of a model for shallow water; states are deviation of depth [m] and flows per width [m2/s]."""
 
     units = {"depth": "m", "surface": "m", "bed": "m", "velocity": "m/s"}
-    deep, has_wide_closure, banded = True, False, True
+    deep, has_wide_closure, banded, banded_mesh = True, False, True, True
 
     def __init__(self, case, name: str) -> None:
         super().__init__(case, name)
@@ -305,7 +305,7 @@ class FreeSurfaceRows(BasinRows):
 
     @property
     def forms_stages(self) -> bool:
-        return not (self.undivided_reason or self.scalars)
+        return self.is_grid and not (self.undivided_reason or self.scalars)
 
     def scales(self) -> list[float]:
         flow = DEPTH_SCALE * np.sqrt(self.case.gravity * DEPTH_SCALE)

@@ -13,6 +13,7 @@ their bands into one array.
 """
 
 from fvsolve.basins.basin_patches import physics_code
+from fvsolve.basins.boundary_cells import band_cells
 from fvsolve.jit import njit
 from fvsolve.kernels.band_exchange import BAND
 from fvsolve.kernels.table_handle import open_tables
@@ -23,16 +24,16 @@ TINY = 1e-300
 
 
 @njit
-def update_row(t, least, depths, dh, qx, qy, row):
-    """Update the values of a row of cells at time t [s], without a branch.
+def update_row(t, least, depths, dh, qx, qy, row, n):
+    """Update the values of a row of cells, or of the first cells of a row, at time t [s], without a branch.
 
     least : depth above which cells are wet [m]; depths : depths at rest [m]
-    dh, qx, qy : deviations of depth [m], unit flows [m2/s]; row : numbers of the cells in `maxima`
+    dh, qx, qy : deviations of depth [m], unit flows [m2/s]
+    row : numbers of the cells in `maxima`; n : number of all cells of the row
     """
-    n = dh.size
     depth, speed, hazard = row[:n], row[n : 2 * n], row[2 * n : 3 * n]
     wet, arrival, duration = row[3 * n : 4 * n], row[4 * n : 5 * n], row[5 * n : 6 * n]
-    for i in range(n):
+    for i in range(dh.size):
         h, square = depths[i] + dh[i], qx[i] * qx[i] + qy[i] * qy[i]
         now = 1.0 if h > least else 0.0
         h, square = (h if h > least else 0.0), (square if h > least else 0.0)
@@ -53,18 +54,16 @@ def record_maxima(t, y, out, handle, values):
     """
     tables = open_tables(handle)
     for b in range(tables.basins.size):
-        basin, begin, stop = tables.basins[b], tables.bands[2 * b], tables.bands[2 * b + 1]
+        basin = tables.basins[b]
         if basin["kind"] != OWN_CODE or basin["maxima"] < 0:
             continue
         n, o, size = basin["n"], basin["y"], basin["maxima_row"]
-        wide = size // QUANTITIES
-        if stop * wide > n:  # of a mesh, `stop` is a number of cells
-            stop = begin + 1
-        whole = (stop - begin) * wide == n
-        if whole and tables.joint.size > 0 and tables.joint[BAND] > 0:
+        wide, (first, end) = size // QUANTITIES, band_cells(tables, b)
+        if end - first == n and tables.joint.size > 0 and tables.joint[BAND] > 0:
             continue
-        for j in range(begin, stop):
-            a, z, at = j * wide, (j + 1) * wide, basin["maxima"] + j * size
+        for j in range(first // wide, (end + wide - 1) // wide):
+            a, z = max(j * wide, first), min((j + 1) * wide, end)
+            at = basin["maxima"] + j * size
             depths, row = tables.plane[basin["plan"] + a : basin["plan"] + z], tables.maxima[at : at + size]
             dh, qx, qy = y[o + a : o + z], y[o + n + a : o + n + z], y[o + 2 * n + a : o + 2 * n + z]
-            update_row(t, basin["wet_depth"], depths, dh, qx, qy, row)
+            update_row(t, basin["wet_depth"], depths, dh, qx, qy, row[a - j * wide :], wide)

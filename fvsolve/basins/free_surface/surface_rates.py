@@ -196,9 +196,10 @@ def mesh_rates(tables, b, y, rates, out, moves):
     floats, integers = tables.plane[basin["mesh"] :], tables.integers[basin["links"] :]
     states = seen[o : o + n], seen[o + n : o + 2 * n], seen[o + 2 * n : o + 3 * n]
     passing, scratch = work[through : through + basin["outer_given"]], work[basin["work"] :]
-    rate = water_mesh_rates(water, floats, integers, grid.reflect, states, flow, passing, scratch, rates, moves, None)
+    band, reflect = band_cells(tables, b), grid.reflect
+    rate = water_mesh_rates(water, floats, integers, reflect, states, flow, passing, scratch, rates, band, moves, None)
     if basin["friction"] != NO_DRAG:
-        a, z = band_cells(tables, b)
+        a, z = band
         add_bed_friction(tables, b, a, z, y, rates, out)
     return rate
 

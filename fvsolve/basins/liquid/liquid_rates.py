@@ -10,6 +10,7 @@ side the liquid rests in the same axes, with its pressure at rest at their origi
 from fvsolve.basins import basin_frames as frames
 from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_patches import needs_rates, physics_code, put_open_flows
+from fvsolve.basins.boundary_cells import band_cells
 from fvsolve.basins.cell_sides import BLOCK, blocks, deviations_of
 from fvsolve.basins.liquid import liquid_grid, liquid_mesh
 from fvsolve.basins.liquid.liquid_sides import LiquidGrid, LiquidScheme, Potentials, side_kinds
@@ -141,7 +142,7 @@ def linear_mesh(tables, b, y, dydt, table, moves, raised):
     r, mx, my = states_of(tables, tables.basins[b], y)
     if raised is not None:
         r = raised[0]
-    return mesh_rates_of(tables, tables.basins[b], (r, mx, my), dydt, False, table, moves, None)
+    return mesh_rates_of(tables, b, (r, mx, my), dydt, False, table, moves, None)
 
 
 @njit
@@ -151,19 +152,20 @@ def nonlinear_mesh(tables, b, y, dydt, table, moves, phi):
     moves, phi : None, or `MeshMotion`; None, or see `mesh_blocks`
     """
     states = states_of(tables, tables.basins[b], y)
-    return mesh_rates_of(tables, tables.basins[b], states, dydt, True, table, moves, phi)
+    return mesh_rates_of(tables, b, states, dydt, True, table, moves, phi)
 
 
 @njit(forceinline=True)
-def mesh_rates_of(tables, basin, states, dydt, full, table, moves, phi):
-    """Write the rates of a basin on a mesh of any cells; return the rate that limits the step [1/s].
+def mesh_rates_of(tables, b, states, dydt, full, table, moves, phi):
+    """Write the rates of basin b on a mesh of any cells; return the rate that limits the step [1/s].
 
     full : True with the full momentum flux; other arguments as for `nonlinear_mesh`
     """
+    basin, band = tables.basins[b], band_cells(tables, b)
     reflect, through, work = boundary_arrays(tables, basin)
     floats, integers, no_flow = tables.plane[basin["mesh"] :], tables.integers[basin["links"] :], tables.work[:0]
     liquid, rates = liquid_of(basin, full, table), rates_of(tables, basin, dydt)
-    return mesh_rates(liquid, floats, integers, reflect, states, no_flow, through, work, rates, moves, phi)
+    return mesh_rates(liquid, floats, integers, reflect, states, no_flow, through, work, rates, band, moves, phi)
 
 
 @njit

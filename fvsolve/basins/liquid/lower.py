@@ -157,7 +157,7 @@ class LiquidRows(BasinRows):
     """
 
     units = {"pressure": "Pa", "velocity": "m/s"}
-    banded = True
+    banded = banded_mesh = True
 
     def __init__(self, case, name: str) -> None:
         super().__init__(case, name)
@@ -203,7 +203,7 @@ class LiquidRows(BasinRows):
 
     @property
     def forms_stages(self) -> bool:
-        return self.linear and not self.undivided_reason
+        return self.is_grid and self.linear and not self.undivided_reason
 
     def scales(self) -> list[float]:
         return [PRESSURE_SCALE / self.speed**2, PRESSURE_SCALE / self.speed, PRESSURE_SCALE / self.speed]
