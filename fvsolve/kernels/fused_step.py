@@ -38,17 +38,35 @@ def fused_cells(h, k, flow, half, base, r, l, r_new, l_new, least, greatest):
     return low, high
 
 
-@njit
-def fused_block(t, h, pipe, index, at, r, l, r_new, l_new, tables):
-    """Advance cells of pipe number `index` from cell `at` on and update their envelope; return 0 if all are finite.
+@njit(forceinline=True)
+def fused_cell(t, h, terms, index, at, i, before, behind, r, l, r_new, l_new, tables):
+    """Advance cell i of pipe number `index` and update its envelope; return 0 if its waves are finite.
 
-    t : time after the step [s]; h : step [s]
-    r, l, r_new, l_new : waves before and after the step, see `fused_cells`
+    before, behind : forward wave before the cell, and backward wave behind it [kg/s]; other arguments: `fused_block`
     """
-    e, a, b = tables.envelope, pipe["cell"] + at, pipe["cell"] + at + r_new.size
-    k, half, base = pipe["speed"] / pipe["dx"], 0.5 * pipe["loss"], 0.5 * pipe["drag"]
-    low, high = fused_cells(h, k, pipe["flow"], half, base, r, l, r_new, l_new, e[0, a:b], e[2, a:b])
-    return update_envelope(t, r_new, l_new, a, low, high, index, tables) if low + high > 0 else 0
+    (k, flow, half, base), e = terms, tables.envelope
+    m = flow + (r[i] - l[i])
+    s = half * (abs(m) * m) - base
+    a, b = r[i] + h * (-k * (r[i] - before) - s), l[i] + h * (k * (behind - l[i]) + s)
+    r_new[i], l_new[i] = a, b
+    low, high = not a + b >= e[0, at + i], not a + b <= e[2, at + i]
+    if not (low or high):
+        return 0
+    return update_envelope(t, r_new[i : i + 1], l_new[i : i + 1], at + i, int(low), int(high), index, tables)
+
+
+@njit(forceinline=True)
+def fused_block(t, h, terms, index, at, i, j, r, l, r_new, l_new, tables):
+    """Advance the inner cells i .. j - 1 of pipe number `index` and update their envelope; return 0 if all are finite.
+
+    t : time after the step [s]; h : step [s]; terms : k, flow, half, base of `fused_cells`
+    at : first cell of the pipe in per-cell arrays; r, l, r_new, l_new : waves in all its cells before and after the step
+    """
+    (k, flow, half, base), e = terms, tables.envelope
+    ahead, behind, r_new, l_new = r[i - 1 : j], l[i : j + 1], r_new[i:j], l_new[i:j]
+    least, greatest = e[0, at + i : at + j], e[2, at + i : at + j]
+    low, high = fused_cells(h, k, flow, half, base, ahead, behind, r_new, l_new, least, greatest)
+    return update_envelope(t, r_new, l_new, at + i, low, high, index, tables) if low + high > 0 else 0
 
 
 @njit
@@ -60,19 +78,18 @@ def fused_step_linear(t, h, y, y_new, out, handle, values):
     NOT_FINITE if a value is not finite.
     """
     tables = open_tables(handle)
-    pipes, pad, bad = tables.pipes, tables.scratch[:4], 0
+    pipes, bad = tables.pipes, 0
     for index in range(pipes.size):
         pipe = pipes[index]
-        n, o, ends = pipe["cells"], pipe["y"], tables.layout[0]["ends"] + 4 * index
+        n, o, at, ends = pipe["cells"], pipe["y"], pipe["cell"], tables.layout[0]["ends"] + 4 * index
         r, l, r_new, l_new = y[o : o + n], y[o + n : o + 2 * n], y_new[o : o + n], y_new[o + n : o + 2 * n]
+        terms = pipe["speed"] / pipe["dx"], pipe["flow"], 0.5 * pipe["loss"], 0.5 * pipe["drag"]
         for side in range(2):  # the cells at the ends, whose neighbours are nodes
             i = side * (n - 1)
-            pad[0], pad[1] = out[ends] if i == 0 else r[i - 1], r[i]
-            pad[2], pad[3] = l[i], out[ends + 3] if i == n - 1 else l[i + 1]
-            bad += fused_block(t, h, pipe, index, i, pad[:2], pad[2:], r_new[i : i + 1], l_new[i : i + 1], tables)
+            before, behind = out[ends] if i == 0 else r[i - 1], out[ends + 3] if i == n - 1 else l[i + 1]
+            bad += fused_cell(t, h, terms, index, at, i, before, behind, r, l, r_new, l_new, tables)
         for i in range(1, n - 1, BLOCK):
-            j = min(i + BLOCK, n - 1)
-            bad += fused_block(t, h, pipe, index, i, r[i - 1 : j], l[i : j + 1], r_new[i:j], l_new[i:j], tables)
+            bad += fused_block(t, h, terms, index, at, i, min(i + BLOCK, n - 1), r, l, r_new, l_new, tables)
     run_job(RHS, t, y_new, y_new[:0], out, handle)
     observe_linear(t, y_new, out, handle, values)
     record_nodes(t, y_new, out, handle, values)

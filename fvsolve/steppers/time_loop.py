@@ -285,11 +285,7 @@ def take_step(handle, run, r):
         full = step_control.closing_step(state, r.out[rec.CLOSING_RATE], full, step_control.shortest(control, state))
     h = step_control.arriving_step(control, state, r.out[rec.JUMP_TIME], full)
     if can_use_fused_step(r, h):
-        state["calls"] += 1.0
-        t_new, address = state["t_mark"] + (state["n_mark"] + 1.0) * h, r.calls[run_handle.FUSED_CALL]
-        run_handle.call_fused_step(address, t_new, h, r.y[now], r.y[new], r.out, handle, r.values)
-        accept(handle, r, h, False, NEVER)
-        progress["phase"] = rec.FUSED
+        take_fused_steps(handle, r, h)
         return rec.DONE
     if progress["phase"] == rec.FUSED:  # fused steps do not compute k[0], which the next step needs
         progress["phase"] = rec.FRESH
@@ -301,6 +297,28 @@ def take_step(handle, run, r):
         accept(handle, r, h, last, due)
         progress["phase"] = rec.FRESH
     return status
+
+
+@inline
+def take_fused_steps(handle, r, h):
+    """Take fused steps of length h until something is due, or the length of the next step may change."""
+    state, control, progress, out = r.state[0], r.control[0], r.progress[0], r.out
+    address, due, full = r.calls[run_handle.FUSED_CALL], next_due(r), 1.0 - 1e-9
+    rate, closing, jump = out[rec.RATE], out[rec.CLOSING_RATE], out[rec.JUMP_TIME]
+    progress["phase"] = rec.FUSED
+    while True:
+        now, new = progress["now"], 3 - progress["now"] - progress["old"]
+        state["calls"] += 1.0
+        t_new = state["t_mark"] + (state["n_mark"] + 1.0) * h
+        run_handle.call_fused_step(address, t_new, h, r.y[now], r.y[new], out, handle, r.values)
+        accept(handle, r, h, False, NEVER)
+        same = out[rec.RATE] == rate and out[rec.CLOSING_RATE] == closing and out[rec.JUMP_TIME] == jump
+        due_soon = due <= state["t_mark"] + (state["n_mark"] + 1.0) * h
+        if not same or due_soon or h >= (control["end"] - t_new) * full or check_state(r) != rec.DONE:
+            return
+        store_ledger_rates(r, 0)
+        if reason_to_stop(r) != rec.DONE:
+            return
 
 
 @inline

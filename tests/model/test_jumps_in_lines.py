@@ -24,6 +24,12 @@ from reference.scenes import (
 from scipy.integrate import solve_ivp
 
 import fvsolve
+from fvsolve.kernels.delay_lines import wave_history as history
+from fvsolve.kernels.delay_lines.history_update import wave_bounds
+from fvsolve.kernels.delay_lines.line_rates import sent_wave_linear
+from fvsolve.solve import initial_state
+from fvsolve.solve.solve import Run
+from fvsolve.studies.outcome import RowSink
 
 SPEED = 1000.0
 METHODS = {
@@ -310,3 +316,27 @@ def test_a_store_that_fills_in_less_than_a_step_takes_no_more_than_there_is(h):
     found = fvsolve.run(scene(nodes, links, 30.0, numerics, ["v.pressure"], 0.05))
     risen = np.max(np.abs(found["v.pressure"] - found["v.pressure"][0]))
     assert volume * risen**2 / (2.0 * WATER["bulk_modulus"]) < RHO * flow**2 * long / (2.0 * area(BORE))
+
+
+@pytest.mark.parametrize("method", ["euler", "rodas-5p"])
+def test_bounds_by_which_cells_are_left_out_contain_all_waves(method):
+    """The bounds of the waves sent within a time contain each wave at any moment of it, beside its jumps too."""
+    model = fvsolve.build(fvsolve.load(stub(130.0, METHODS[method])))
+    run = Run(model, initial_state(model), RowSink(), None)
+    assert run.go().finished
+    past, random, checked = run.run_data.past, np.random.default_rng(7), 0
+    places, clock = history.offsets_of(past), history.reading_data(past, int(past[history.COUNT]) - 1)
+    for line, wave in ((model.tables.delays[k].copy(), wave) for k in range(2) for wave in range(2)):
+        (ring, mask), head = history.ring_of(places, line, 0), history.jump_head(places, int(line["stretch"]), wave)
+        jumps = int(past[head + history.JUMP_COUNT])
+        for _ in range(50):
+            begin, end = np.sort(clock[1] - line["tau"] * random.uniform(0.0, 1.0, 2))
+            least, greatest = wave_bounds(past, places, clock, line, 0, wave, begin, end)
+            sent = [past[history.jump_place(past, places, head, i)] for i in range(jumps)]
+            sent = [t for t in sent if begin <= t <= end]
+            times = np.array([*np.linspace(begin, end, 20), *sent, *(np.array(sent) - 1e-6)])
+            found = [sent_wave_linear(past, places, clock, ring, mask, head, wave, t) for t in times[times >= begin]]
+            assert least <= min(found) and max(found) <= greatest
+            assert greatest - least <= 2.0 * np.ptp(found) + 1.0
+            checked += len(sent)
+    assert checked > 100

@@ -131,44 +131,93 @@ def line_extremes_at_jumps(past, places, clock, line, q, x, sign, before, t):
     return least, t_least, greatest, t_greatest
 
 
+BOUND_ROUNDING = 1e-12  # of sums of waves, relative to their bounds
+SLACK = 1e-9  # by which cells count as longer, as fraction of a stretch
+
+
 @njit
-def envelope_where_jumps_cross(past, places, clock, tables, line, q, before, t):
-    """Update the pressure envelope at each point of stretch q where two jumps cross between times `before` and t.
+def wave_bounds(past, places, clock, line, q, wave, begin, end):
+    """Bounds (least, greatest) of a wave of stretch q that was sent between two times, on both sides of its jumps.
+
+    They are the sum of bounds of its smooth part and of its jumps, infinite if two jumps have times that count as equal.
+    """
+    at, queue, same = history.jump_head(places, line["stretch"] + q, wave), int(past[history.JUMP_CAPACITY]), clock[4]
+    first = history.first_after(past, places, at, begin - same)
+    low = high = history.sum_of_first(past, places, at, first)
+    earlier = -history.INFINITE
+    for i in range(first, int(past[at + history.JUMP_COUNT])):
+        place = history.jump_place(past, places, at, i)
+        sent, total = past[place], past[place + 2 * queue]
+        if sent > end + same:
+            break
+        if sent <= earlier + 2.0 * same:
+            return -history.INFINITE, history.INFINITE
+        low, high, earlier = min(low, total), max(high, total), sent
+    (ring, mask), steps = history.ring_of(places, line, q), (begin - clock[1]) * clock[2]
+    k = clock[0] + int(steps) - 1
+    if steps <= -clock[3]:
+        k, _ = history.find_interval(past, clock[0], begin)
+    least = greatest = past[ring + 2 * (k & mask) + wave]
+    while k < clock[0] and history.time_of(past, k) < end:
+        k += 1
+        value = past[ring + 2 * (k & mask) + wave]
+        least, greatest = min(least, value), max(greatest, value)
+    rounding = BOUND_ROUNDING * (abs(low) + abs(high) + abs(least) + abs(greatest))
+    return low + least - rounding, high + greatest + rounding
+
+
+@njit
+def envelope_where_jumps_cross(past, places, clock, tables, line, q, x, back, before, t):
+    """Update the pressure envelope at each point of a cell where two jumps cross between the times `before` and t.
 
     All four combinations of values before and after both jumps are used.
+    x : both ends of the cell as fractions of stretch q; back : bounds of the backward wave there, see `wave_bounds`
     """
     queue, tau, s, same = int(past[history.JUMP_CAPACITY]), line["tau"], line["stretch"] + q, clock[4]
     first_cell, (ring, mask) = tables.pipes[line["pipe"]]["cell"], history.ring_of(places, line, q)
-    forward, backward = history.jump_head(places, s, 0), history.jump_head(places, s, 1)
+    forward, backward, envelope = history.jump_head(places, s, 0), history.jump_head(places, s, 1), tables.envelope
     delta, n = past[places[0] + history.ARRIVALS_SIZE * s + 2], line["places"]
-    for i in range(int(past[forward + history.JUMP_COUNT])):
+    at = first_cell + min(int((q + 0.5 * (x[0] + x[1])) * n / line["stretches"]), n - 1)
+    for i in range(history.first_after(past, places, forward, before - x[1] * tau - same),
+                   int(past[forward + history.JUMP_COUNT])):  # fmt: skip
         place = history.jump_place(past, places, forward, i)
         sent, size = past[place], past[place + queue]
-        begin = history.first_after(past, places, backward, max(2.0 * before - tau - sent, sent - tau) + same)
-        for j in range(begin, int(past[backward + history.JUMP_COUNT])):
+        if sent > t - x[0] * tau + same:
+            break
+        r = sent_wave_linear(past, places, clock, ring, mask, forward, 0, sent)
+        more = abs(delta) + BOUND_ROUNDING * (abs(r) + abs(size))
+        if (
+            min(r, r - size) + back[0] - more >= envelope[0, at]
+            and max(r, r - size) + back[1] + more <= envelope[2, at]
+        ):
+            continue
+        opens, ends = max(2.0 * before - tau - sent, sent - tau), min(2.0 * t - tau - sent, sent + tau)
+        opens, ends = max(opens, sent - tau + 2.0 * tau * x[0]), min(ends, sent - tau + 2.0 * tau * x[1])
+        for j in range(history.first_after(past, places, backward, opens + same),
+                       int(past[backward + history.JUMP_COUNT])):  # fmt: skip
             other = history.jump_place(past, places, backward, j)
             opposite = past[other]
-            if opposite > min(2.0 * t - tau - sent, sent + tau) + same:
+            if opposite > ends + same:
                 break
-            x, time = 0.5 * (tau + opposite - sent) / tau, 0.5 * (tau + opposite + sent)
-            r = sent_wave_linear(past, places, clock, ring, mask, forward, 0, sent)
+            where, time = 0.5 * (tau + opposite - sent) / tau, 0.5 * (tau + opposite + sent)
             l = sent_wave_linear(past, places, clock, ring, mask, backward, 1, opposite)
-            cell = first_cell + min(int((q + x) * n / line["stretches"]), n - 1)
+            cell = first_cell + min(int((q + where) * n / line["stretches"]), n - 1)
             for side in range(4):
                 value = r - (side % 2) * size + l - (side // 2) * past[other + queue]
-                update_extremes(tables.envelope, cell, time, value + (1.0 - 2.0 * x) * delta)
+                update_extremes(envelope, cell, time, value + (1.0 - 2.0 * where) * delta)
 
 
 @njit
 def update_line_extremes(past, places, tables, before, t):
     """Update envelopes and extremes within delay lines by the values beside jumps that pass between `before` and t.
 
-    The first times below vapour pressure along the lines are updated too.
+    The first times below vapour pressure along the lines are updated too. Cells are left out where the waves that pass
+    are too small to extend the envelope.
     """
-    clock, marks = history.reading_data(past, int(past[history.COUNT]) - 1), tables.marks
+    clock = history.reading_data(past, int(past[history.COUNT]) - 1)
     for number in range(tables.delays.size):
         line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
-        stretches, n = line["stretches"], line["places"]
+        stretches, n, tau = line["stretches"], line["places"], line["tau"]
         for q in range(stretches):
             head = history.jump_head(places, line["stretch"] + q, 0)
             forward, backward = past[head + history.JUMP_COUNT], past[head + history.HEAD_SIZE + history.JUMP_COUNT]
@@ -176,19 +225,32 @@ def update_line_extremes(past, places, tables, before, t):
                 continue
             delta = past[places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q) + 2]
             for j in range((q * n) // stretches, min(n, ((q + 1) * n) // stretches + 1)):
-                x = (j + 0.5) / n * stretches - q
-                if 0.0 <= x < 1.0:
-                    found = line_extremes_at_jumps(past, places, clock, line, q, x, 1.0, before, t)
-                    least, greatest = found[0] + (1.0 - 2.0 * x) * delta, found[2] + (1.0 - 2.0 * x) * delta
-                    if found[0] < history.INFINITE:
-                        cell, mark = pipe["cell"] + j, line["pipe"]
-                        if least < tables.profile[cell] and marks[mark] != marks[mark]:
-                            marks[mark] = found[1]
-                        update_extremes(tables.envelope, cell, found[1], least)
-                        update_extremes(tables.envelope, cell, found[3], greatest)
-            if forward > 0.0 and backward > 0.0:
-                envelope_where_jumps_cross(past, places, clock, tables, line, q, before, t)
+                low, high = max(j / n * stretches - q, 0.0) - SLACK, min((j + 1) / n * stretches - q, 1.0) + SLACK
+                ahead = wave_bounds(past, places, clock, line, q, 0, before - high * tau, t - low * tau)
+                back = wave_bounds(past, places, clock, line, q, 1, before - (1.0 - low) * tau, t - (1.0 - high) * tau)
+                cell, most = pipe["cell"] + j, abs(delta)
+                least, greatest = ahead[0] + back[0] - most, ahead[1] + back[1] + most
+                if high > low and not (least >= tables.envelope[0, cell] and greatest <= tables.envelope[2, cell]):
+                    x = (j + 0.5) / n * stretches - q
+                    if 0.0 <= x < 1.0:
+                        extend_envelope(past, places, clock, tables, line, q, j, x, before, t)
+                    if forward > 0.0 and backward > 0.0:
+                        envelope_where_jumps_cross(past, places, clock, tables, line, q, (low, high), back, before, t)
     update_probe_extremes(past, places, clock, tables, before, t)
+
+
+@njit
+def extend_envelope(past, places, clock, tables, line, q, j, x, before, t):
+    """Extend the envelope of cell j of a delay line by the values beside jumps that pass its centre, x of stretch q."""
+    found = line_extremes_at_jumps(past, places, clock, line, q, x, 1.0, before, t)
+    if found[0] == history.INFINITE:
+        return
+    pipe, mark = tables.pipes[line["pipe"]], line["pipe"]
+    cell, more = pipe["cell"] + j, (1.0 - 2.0 * x) * past[places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q) + 2]
+    if found[0] + more < tables.profile[cell] and tables.marks[mark] != tables.marks[mark]:
+        tables.marks[mark] = found[1]
+    update_extremes(tables.envelope, cell, found[1], found[0] + more)
+    update_extremes(tables.envelope, cell, found[3], found[2] + more)
 
 
 @njit
