@@ -1,11 +1,12 @@
-"""Cost of a step of every shipped case at two commits, as a ratio.
+"""Cost of a step of every shipped case at two commits, and of the rest of a run, as ratios.
 
     python benchmarks/step_cost.py OLD NEW [--cases a,b] [--rounds 3] [--quick]
 
 Both commits are extracted to a temporary folder (compare_commits.py) and run by a process each, with the user's cache
 of compiled code. In every round the processes take turns: each runs the case for about `SPAN` seconds and gives its
-least time of the loop over steps, divided by the number of steps. The first run of a case, which may compile, is not
-counted. Prints the least time per step of each commit, the ratio NEW / OLD, and the range of the ratio over rounds.
+least time of the loop over steps, divided by the number of steps, and its least CPU time of `run(model)` outside this
+loop. The first run of a case, which may compile, is not counted. Prints the least time per step of each commit, the ratio
+NEW / OLD and its range over rounds, then steps and the rest of each commit.
 """
 
 from __future__ import annotations
@@ -25,18 +26,26 @@ LONGEST = 6.0  # a case whose run takes longer is run once a round [s]
 
 WORKER = f"""
 import contextlib, json, os, sys, time
-from fvsolve import load, run
+from fvsolve import build, load, run
+def loaded(path):
+    try:
+        return load(path, {{"output.fields": 0, "output.lines": {{}}}})
+    except Exception:  # an older commit without lines
+        return load(path, {{"output.fields": 0}})
 for line in sys.stdin:
-    least, spent, steps, runs = float("inf"), 0.0, 1, 0
+    least, whole, spent, steps, runs = float("inf"), float("inf"), 0.0, 1, 0
     try:
         with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
-            case = load(line.strip(), {{"output.fields": 0, "output.lines": {{}}}})
-            first = run(case).summary
-            while not runs or (spent < {SPAN} and runs < {MOST_RUNS}):
-                summary = first if not runs and first["seconds"] > {LONGEST} else run(case).summary
-                least, spent = min(least, summary["seconds"]), spent + summary["seconds_setup"] + summary["seconds"]
+            model = build(loaded(line.strip()))
+            summary = run(model).summary
+            long = summary["seconds"] > {LONGEST}
+            while not runs or (spent < {SPAN} and runs < {MOST_RUNS} and not long):
+                begun = time.process_time()
+                summary = run(model).summary
+                took = time.process_time() - begun
+                least, whole, spent = min(least, summary["seconds"]), min(whole, took), spent + took
                 steps, runs = max(summary["steps"], 1), runs + 1
-        print(json.dumps([least / steps, steps]), flush=True)
+        print(json.dumps([least / steps, steps, whole - least]), flush=True)
     except Exception as error:
         print(json.dumps([None, f"{{type(error).__name__}}: {{error}}"[:100]]), flush=True)
 """
@@ -53,7 +62,7 @@ def worker(commit: str, folder: Path) -> subprocess.Popen:
 
 
 def timed(process: subprocess.Popen, path: Path) -> list:
-    """(time of a step [s], number of steps), or (None, text of the error)."""
+    """(time of a step [s], number of steps, CPU time of the rest of a run [s]), or (None, text of the error)."""
     print(path, file=process.stdin, flush=True)
     return json.loads(process.stdout.readline())
 
@@ -84,8 +93,10 @@ def main() -> int:
             old, new = (min(pair[k][0] for pair in rounds) for k in (0, 1))
             spread = [pair[1][0] / pair[0][0] for pair in rounds]
             ratios.append(new / old)
+            rest, steps = [min(pair[k][2] for pair in rounds) for k in (0, 1)], [rounds[0][k][1] for k in (0, 1)]
             print(f"{name:28s} {1e9 * old:12.1f} ns {1e9 * new:12.1f} ns   ratio {new / old:.3f}"
-                  f"   rounds {min(spread):.3f} to {max(spread):.3f}, {rounds[0][1][1]} steps", flush=True)  # fmt: skip
+                  f"   rounds {min(spread):.3f} to {max(spread):.3f}, steps {steps[0]} and {steps[1]}, rest "
+                  f"{1e3 * rest[0]:.2f} and {1e3 * rest[1]:.2f} ms", flush=True)  # fmt: skip
         for process in workers:
             process.stdin.close()
             process.wait()

@@ -60,7 +60,7 @@ def fused_block(t, h, terms, index, at, i, j, r, l, r_new, l_new, tables):
     """Advance the inner cells i .. j - 1 of pipe number `index` and update their envelope; return 0 if all are finite.
 
     t : time after the step [s]; h : step [s]; terms : k, flow, half, base of `fused_cells`
-    at : first cell of the pipe in per-cell arrays; r, l, r_new, l_new : waves in all its cells before and after the step
+    at : first cell of the pipe in per-cell arrays; r, l, r_new, l_new : waves in its cells before and after the step
     """
     (k, flow, half, base), e = terms, tables.envelope
     ahead, behind, r_new, l_new = r[i - 1 : j], l[i : j + 1], r_new[i:j], l_new[i:j]

@@ -277,8 +277,7 @@ def reason_to_stop(r):
 def take_step(handle, run, r):
     """Take the next step; returns DONE, REPEAT if the rates at its start are missing, or a reason to return."""
     state, control, progress = r.state[0], r.control[0], r.progress[0]
-    now, new = progress["now"], 3 - progress["now"] - progress["old"]
-    full = state["split_remainder"]
+    new, full = 3 - progress["now"] - progress["old"], state["split_remainder"]
     if not full > 0.0:
         full = step_control.next_step(control, state, r.out[rec.RATE], r.out[rec.LONGEST_STEP], r.k, r.scale)
     if control["mode"] != rec.TOLERANCE:

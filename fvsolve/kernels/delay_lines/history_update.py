@@ -139,7 +139,7 @@ SLACK = 1e-9  # by which cells count as longer, as fraction of a stretch
 def wave_bounds(past, places, clock, line, q, wave, begin, end):
     """Bounds (least, greatest) of a wave of stretch q that was sent between two times, on both sides of its jumps.
 
-    They are the sum of bounds of its smooth part and of its jumps, infinite if two jumps have times that count as equal.
+    They are sums of bounds of its smooth part and of its jumps, infinite if two jumps have times that count as equal.
     """
     at, queue, same = history.jump_head(places, line["stretch"] + q, wave), int(past[history.JUMP_CAPACITY]), clock[4]
     first = history.first_after(past, places, at, begin - same)
@@ -186,10 +186,8 @@ def envelope_where_jumps_cross(past, places, clock, tables, line, q, x, back, be
             break
         r = sent_wave_linear(past, places, clock, ring, mask, forward, 0, sent)
         more = abs(delta) + BOUND_ROUNDING * (abs(r) + abs(size))
-        if (
-            min(r, r - size) + back[0] - more >= envelope[0, at]
-            and max(r, r - size) + back[1] + more <= envelope[2, at]
-        ):
+        low, high = min(r, r - size) + back[0] - more, max(r, r - size) + back[1] + more
+        if low >= envelope[0, at] and high <= envelope[2, at]:
             continue
         opens, ends = max(2.0 * before - tau - sent, sent - tau), min(2.0 * t - tau - sent, sent + tau)
         opens, ends = max(opens, sent - tau + 2.0 * tau * x[0]), min(ends, sent - tau + 2.0 * tau * x[1])
