@@ -5,8 +5,8 @@
 Both commits are extracted to a temporary folder (compare_commits.py) and run by a process each, with the user's cache
 of compiled code. In every round the processes take turns: each runs the case for about `SPAN` seconds and gives its
 least time of the loop over steps, divided by the number of steps, and its least CPU time of `run(model)` outside this
-loop. The first run of a case, which may compile, is not counted. Prints the least time per step of each commit, the ratio
-NEW / OLD and its range over rounds, then steps and the rest of each commit.
+loop. The first run of a case, which may compile, is not counted. Prints the least time per step of each commit, the
+ratio NEW / OLD and its range over rounds, then the steps and the rest of each commit.
 """
 
 from __future__ import annotations
