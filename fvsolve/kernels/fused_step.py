@@ -39,12 +39,12 @@ def fused_cells(h, k, flow, half, base, r, l, r_new, l_new, least, greatest):
 
 
 @njit(forceinline=True)
-def fused_cell(t, h, terms, index, at, i, before, behind, r, l, r_new, l_new, tables):
+def fused_cell(t, h, terms, index, at, i, outer_waves, r, l, r_new, l_new, tables):
     """Advance cell i of pipe number `index` and update its envelope; return 0 if its waves are finite.
 
-    before, behind : forward wave before the cell, and backward wave behind it [kg/s]; other arguments: `fused_block`
+    outer_waves : forward wave before the cell, and backward wave behind it [kg/s]; other arguments: `fused_block`
     """
-    (k, flow, half, base), e = terms, tables.envelope
+    (k, flow, half, base), (before, behind), e = terms, outer_waves, tables.envelope
     m = flow + (r[i] - l[i])
     s = half * (abs(m) * m) - base
     a, b = r[i] + h * (-k * (r[i] - before) - s), l[i] + h * (k * (behind - l[i]) + s)
@@ -86,8 +86,8 @@ def fused_step_linear(t, h, y, y_new, out, handle, values):
         terms = pipe["speed"] / pipe["dx"], pipe["flow"], 0.5 * pipe["loss"], 0.5 * pipe["drag"]
         for side in range(2):  # the cells at the ends, whose neighbours are nodes
             i = side * (n - 1)
-            before, behind = out[ends] if i == 0 else r[i - 1], out[ends + 3] if i == n - 1 else l[i + 1]
-            bad += fused_cell(t, h, terms, index, at, i, before, behind, r, l, r_new, l_new, tables)
+            outer_waves = out[ends] if i == 0 else r[i - 1], out[ends + 3] if i == n - 1 else l[i + 1]
+            bad += fused_cell(t, h, terms, index, at, i, outer_waves, r, l, r_new, l_new, tables)
         for i in range(1, n - 1, BLOCK):
             bad += fused_block(t, h, terms, index, at, i, min(i + BLOCK, n - 1), r, l, r_new, l_new, tables)
     run_job(RHS, t, y_new, y_new[:0], out, handle)

@@ -413,7 +413,13 @@ class Model(Displayable):
         return self.case.law.cell_pressure(self.tables.pipes[k], self.profiles[k], self.tables.profile, waves)
 
     def cell_pressures(self, waves: np.ndarray) -> np.ndarray:
-        """Pressure [Pa] in the cells of all pipes from the sum of both waves [kg/s] : float64[cells]."""
+        """Pressure [Pa] in the cells of all pipes from the sum of both waves [kg/s] : float64[cells].
+
+        Raises FvsolveError if `waves` does not have a number for each cell.
+        """
+        waves = as_numbers("waves", waves)
+        if waves.shape != (self.cells,):
+            raise FvsolveError(f"waves has shape {waves.shape}; expected a number for each of the {self.cells} cells")
         starts = list(self.profiles.values())
         return self.case.law.cell_pressures(self.tables.pipes, starts, self.tables.profile, waves)
 

@@ -181,10 +181,11 @@ def exceeded(handle, r, y):
 
     Arguments as for `all_finite`.
     """
-    beyond, row_blocks, largest = 0, r.row_blocks, r.largest
+    beyond, row_blocks = 0, r.row_blocks
     for m in range(row_blocks.shape[0]):
-        for i in range(row_blocks[m, BEGIN], row_blocks[m, STOP]):
-            beyond += not abs(y[i]) <= largest[i]
+        own, largest = y[row_blocks[m, BEGIN] : row_blocks[m, STOP]], r.largest[row_blocks[m, BEGIN] :]
+        for i in range(own.size):
+            beyond += not abs(own[i]) <= largest[i]
     return sum_of_bands(beyond, handle, r) > 0.0
 
 
