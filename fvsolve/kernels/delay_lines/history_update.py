@@ -23,7 +23,13 @@ from fvsolve.kernels.calls import CLOSE, observe_in_turn, run_job
 from fvsolve.kernels.delay_lines import jumps
 from fvsolve.kernels.delay_lines import wave_history as history
 from fvsolve.kernels.delay_lines.jumps import first_waiting_jump, least_jump, store_jump, store_large_jump
-from fvsolve.kernels.delay_lines.line_rates import has_friction, sent_wave_linear, waves_at_linear
+from fvsolve.kernels.delay_lines.line_rates import (
+    BEFORE_ALL,
+    entry_before,
+    has_friction,
+    sent_wave_linear,
+    waves_at_linear,
+)
 from fvsolve.kernels.dtypes import ALONE, AMENDED, ARRIVES, JUNCTION, NEVER, PIPE_FLOW, PIPE_PRESSURE, STATUS
 from fvsolve.kernels.dtypes import ARRIVED as LET_ARRIVE
 from fvsolve.kernels.observation import update_envelope, update_extremes
@@ -153,13 +159,10 @@ def wave_bounds(past, places, clock, line, q, wave, begin, end):
         if sent <= earlier + 2.0 * same:
             return -history.INFINITE, history.INFINITE
         low, high, earlier = min(low, total), max(high, total), sent
-    (ring, mask), steps = history.ring_of(places, line, q), (begin - clock[1]) * clock[2]
-    k = clock[0] + int(steps) - 1
-    if steps <= -clock[3]:
-        k, _ = history.find_interval(past, clock[0], begin)
-    least = greatest = past[ring + 2 * (k & mask) + wave]
-    while k < clock[0] and history.time_of(past, k) < end:
-        k += 1
+    (ring, mask), (oldest, _) = history.ring_of(places, line, q), entry_before(past, clock, begin)
+    newest, _ = entry_before(past, clock, end)
+    least = greatest = 0.0 if oldest == BEFORE_ALL else past[ring + 2 * (oldest & mask) + wave]
+    for k in range(history.PROFILE_ENTRIES if oldest == BEFORE_ALL else oldest, newest + 2):
         value = past[ring + 2 * (k & mask) + wave]
         least, greatest = min(least, value), max(greatest, value)
     rounding = BOUND_ROUNDING * (abs(low) + abs(high) + abs(least) + abs(greatest))

@@ -26,6 +26,7 @@ from fvsolve.kernels.table_handle import open_tables
 FLOW_TOLERANCE = 1e-6  # relative error of the flow at which Newton stops
 SLOPE_ERROR = 0.2  # relative error of the slope where the friction factor depends on the flow
 MAX_ITERATIONS = 60  # of Newton's method
+BEFORE_ALL = -(1 << 62)  # in place of the number of an entry: before all entries, where smooth parts are zero
 
 
 @njit(forceinline=True)
@@ -251,21 +252,29 @@ def waves_along_line(t, out, handle, number, r, l):
         r[j], l[j] = waves_at(t, out, tables, number, (j + 0.5) / n)
 
 
+@njit(forceinline=True)
+def entry_before(past, clock, t):
+    """(entry k, fraction of the way to entry k + 1) at the time t, for linear interpolation.
+
+    Before all entries k is BEFORE_ALL.
+    """
+    place = (t - clock[1]) * clock[2]
+    if place > -clock[3]:
+        back = int(place)
+        return clock[0] + back - 1, place - back + 1.0
+    k, x = history.find_interval(past, clock[0], t)
+    return (BEFORE_ALL, 0.0) if k < history.PROFILE_ENTRIES and x == 0.0 else (k, x)
+
+
 @njit
 def sent_wave_linear(past, places, clock, ring, mask, jumps, wave, t):
     """Wave sent into a stretch at t [kg/s], by linear interpolation between entries, with its jumps.
 
     ring, mask : result of `ring_of`; jumps : offset of the head of its jumps
     """
-    last, latest, often, even = clock[0], clock[1], clock[2], clock[3]
-    place = (t - latest) * often
-    if place > -even:
-        back = int(place)
-        k, x = last + back - 1, place - back + 1.0
-    else:
-        k, x = history.find_interval(past, last, t)
-        if k < history.PROFILE_ENTRIES and x == 0.0:  # before the first entry
-            return history.jumps_until(past, places, jumps, t + clock[4])
+    k, x = entry_before(past, clock, t)
+    if k == BEFORE_ALL:
+        return history.jumps_until(past, places, jumps, t + clock[4])
     a, b = ring + 2 * (k & mask) + wave, ring + 2 * ((k + 1) & mask) + wave
     return past[a] + x * (past[b] - past[a]) + history.jumps_until(past, places, jumps, t + clock[4])
 
