@@ -1,6 +1,7 @@
 """Outcomes of runs for the comparison of equivalent cases, and their differences."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,6 +50,19 @@ def told(source, **more) -> Told:
         return Told("refused", np.empty(0), {})
     ended = result.reason.split(" at ")[0]
     return Told(ended, np.array(result.t), {str(p): np.array(result[str(p)]) for p in result.probes}, result)
+
+
+@contextmanager
+def with_frames() -> Iterator[None]:
+    """Context in which runs in memory compute field frames, as runs with a directory do; there must be frames."""
+    times: list[float] = []
+    before = MemorySink.takes_fields, MemorySink.field
+    MemorySink.takes_fields, MemorySink.field = True, lambda self, t, frame: times.append(t)
+    try:
+        yield
+    finally:
+        MemorySink.takes_fields, MemorySink.field = before
+    assert times
 
 
 def broken_off_and_whole(case: dict, share: float) -> tuple[Run, Run]:

@@ -17,7 +17,7 @@ import fvsolve
 from fvsolve.case.text import write
 from invariance import equivalent_networks as equivalent
 from invariance.random_scenes import IMPLICIT, SEEDS, networks, shuffled
-from invariance.result_comparison import IN_PARTS, alike, told
+from invariance.result_comparison import IN_PARTS, alike, told, with_frames
 
 EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # warning of numba while it compiles
 pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings fail, such as of NaN values
@@ -64,7 +64,11 @@ def test_other_rows(case):
 @examples(6)
 @given(case=networks(), frames=st.integers(1, 9))
 def test_other_frames(case, frames):
-    alike(told(case), told(equivalent.changed(case, "output", fields=frames)))
+    one = told(case)
+    if one.ended == "refused":
+        return
+    with with_frames():
+        alike(one, told(equivalent.changed(case, "output", fields=frames)))
 
 
 @examples(6)

@@ -4,12 +4,13 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from invariance.result_comparison import with_frames
 from reference.folders import CASES
 from reference.scenes import AMBIENT, SHARP, junction, lake, pipe, ramp, reservoir, scene, tank, valve
 
 import fvsolve
 from fvsolve.case import load
-from fvsolve.model import build
+from fvsolve.model import RunData, build
 from fvsolve.steppers.tableau import method_named
 
 LOOP, SOLVE = import_module("fvsolve.solve.run_loop"), import_module("fvsolve.solve.solve")
@@ -60,9 +61,22 @@ SCENES = {
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_bits_are_those_of_the_general_path(name, monkeypatch):
-    leapt = fvsolve.run(SCENES[name])
+    """Fused steps agree with general steps, with field frames and without."""
+    alone = fvsolve.run(SCENES[name])
+    with with_frames():
+        leapt = fvsolve.run(SCENES[name])
+    assert_same(alone, leapt)
     step_by_step(monkeypatch)
-    assert_same(leapt, fvsolve.run(SCENES[name]))
+    with with_frames():
+        assert_same(leapt, fvsolve.run(SCENES[name]))
+
+
+def test_a_run_in_memory_computes_no_frames(monkeypatch):
+    def refuse(*arguments):
+        raise AssertionError("a frame was computed")
+
+    monkeypatch.setattr(RunData, "fields", refuse)
+    assert fvsolve.run(fork(fields=5)).reason == "finished"
 
 
 def test_a_run_interrupted_and_resumed_is_the_unbroken_one_of_the_general_path(tmp_path, monkeypatch):
