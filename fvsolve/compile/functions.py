@@ -256,7 +256,7 @@ class DeclaredFunction:
     """Compiled function of a single signature, for calls from Python, and by address from compiled code.
 
     `.address` is its address for C. Calls from Python raise TypeError for an array of another type, or one that is
-    read-only or not C-contiguous.
+    read-only or not C-contiguous; the same array at the same place as in the last call is not checked again.
     Exceptions are lost in calls by address: these functions report errors in their output.
     """
 
@@ -264,13 +264,14 @@ class DeclaredFunction:
         self.function, self.code, self.address, self.python = function, code, code.pointer, code.python
         self.letters = letters.lower()
         self.arrays = [i for i, letter in enumerate(self.letters) if letter in ARRAYS]
-        # array of the last call at each of these places, by weak reference: it is not checked again
+        # weak reference to the array of the last call at each place, or a function that returns None
         self.checked: list[Callable[[], Any]] = [lambda: None] * len(letters)
 
     def __call__(self, *arguments: Any) -> Any:
         checked = self.checked
         for i in self.arrays:
-            if checked[i]() is not arguments[i]:
+            known = checked[i]()
+            if known is None or known is not arguments[i]:
                 self.check(i, arguments[i])
         return self.python(*arguments)
 

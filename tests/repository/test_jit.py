@@ -340,7 +340,8 @@ def test_a_compiled_function_of_declared_arguments_takes_no_others():
     frozen = numbers.copy()
     frozen.flags.writeable = False
     for wrong in (whole, numbers.astype(np.float32), numbers[::2], frozen, np.zeros((3, 1)), [0.0], None):
-        with pytest.raises(TypeError):
+        solve(whole, numbers.copy(), numbers)  # an array that does not exist any more
+        with pytest.raises(TypeError, match="argument 1 is .*; expected a writable C-contiguous array"):
             solve(whole, wrong, numbers)
 
 
