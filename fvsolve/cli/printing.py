@@ -226,13 +226,13 @@ def _wall_text(case, pipe: dict) -> str:
 
 
 def _thread_text(facts: dict) -> str:
-    """Text on threads: rows of basins that threads share, or the reason for a single thread.
+    """Text on threads: rows or blocks of cells of basins that threads share, or the reason for a single thread.
 
     facts : result of `divisible_rows`
     """
     if facts["why"]:
         return f"threads: 1; {facts['why']}"
-    rows = ", ".join(f"{count} rows of {name}" for name, count in facts["rows"].items())
+    rows = ", ".join(f"{text} of {name}" for name, text in facts["texts"].items())
     undivided = "; ".join(f"{name}: {reason}" for name, reason in facts["whole"].items())
     whole = f"; each thread computes all of {undivided}" if undivided else ""
     return f"threads: up to {facts['most']} share {rows}{whole}"

@@ -3,12 +3,12 @@
 import hashlib
 import os
 import signal
-import sys
 from collections.abc import Callable
 from contextlib import contextmanager
 from functools import cache
 
 from fvsolve.errors import FvsolveError
+from fvsolve.solve.parallel_bands import abort_ranks
 from fvsolve.solve.partition import make_partition, threads_of
 from fvsolve.solve.run_checks import RunChecks
 from fvsolve.solve.run_loop import RunLoop
@@ -113,5 +113,4 @@ def serve_rank(make: Callable) -> None:
         loop.stepper.largest = RunChecks(loop.run_data).largest_if_needed
         loop.team.serve(*loop.functions)
     except BaseException as error:  # the other ranks wait for this rank
-        print(f"fvsolve: rank {comm.rank}: {type(error).__name__}: {error}", file=sys.stderr, flush=True)
-        comm.Abort(1)
+        abort_ranks(comm, f"fvsolve: rank {comm.rank}: {type(error).__name__}: {error}")

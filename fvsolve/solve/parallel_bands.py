@@ -13,6 +13,7 @@ import ctypes
 import math
 import os
 import signal
+import sys
 import threading
 import time
 import traceback
@@ -35,6 +36,7 @@ from fvsolve.steppers.run_handle import JOIN
 
 COPIED = ("state", "control", "progress", "ledger", "carry", "g", "g_new", "out", "out_row", "values", "ledger_rates")
 WRITTEN = ("clock", "armed", "marks", "scratch", "spare", "envelope", "extremes", "past")
+ABORT_DELAY = 0.5  # seconds between a message and the end of all ranks: `mpiexec` loses what it has not yet forwarded
 
 
 def yield_address() -> int:
@@ -42,6 +44,13 @@ def yield_address() -> int:
     name = "SwitchToThread" if os.name == "nt" else "sched_yield"
     library = ctypes.windll.kernel32 if os.name == "nt" else ctypes.CDLL(None)
     return ctypes.cast(getattr(library, name), ctypes.c_void_p).value
+
+
+def abort_ranks(comm, text: str) -> None:
+    """Print a text on stderr, then end the processes of all ranks."""
+    print(text, file=sys.stderr, flush=True)
+    time.sleep(ABORT_DELAY)
+    comm.Abort(1)
 
 
 class BandWorker:
@@ -287,8 +296,7 @@ class MpiRanks:
 
                 self.comm.Allreduce(MPI.IN_PLACE, values, MPI.SUM)
         except BaseException:
-            traceback.print_exc()
-            self.comm.Abort(1)
+            abort_ranks(self.comm, traceback.format_exc())
 
     def greatest(self, rate: float) -> float:
         """Greatest of the values `rate` of all ranks [1/s]; infinity if a rank has NaN."""

@@ -227,30 +227,35 @@ def undivided_basins(model: Model) -> str:
 def divisible_rows(model: Model) -> dict:
     """Data of the command `check` on threads, as a dict.
 
-    rows : rows of each divisible basin; whole : reason for each undivided basin; most : greatest number of threads
+    rows : rows of each divisible basin, see `row_size`; texts : these with their unit, such as "50 rows"
+    whole : reason for each undivided basin; most : greatest number of threads
     why : reason why only one thread is possible, or ""
     """
     reason = single_thread_reason(model)
     divided = [b for b, basin in enumerate(model.basins) if not basin.undivided_reason]
     rows = {} if reason else {model.basins[b].name: row_count(model, b) for b in divided}
+    units = {
+        model.basins[b].name: "row{}" if model.basins[b].is_grid else f"block{{}} of {BLOCK} cells" for b in divided
+    }
+    texts = {name: f"{count} {units[name].format('s' * (count > 1))}" for name, count in rows.items()}
     undivided = {basin.name: basin.undivided_reason for basin in model.basins if basin.undivided_reason}
-    return {"rows": rows, "whole": undivided, "most": min(rows.values(), default=1), "why": reason}
+    return {"rows": rows, "texts": texts, "whole": undivided, "most": min(rows.values(), default=1), "why": reason}
 
 
 def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
     """Number of threads that can step a model, at most `threads`, and notices on threads.
 
-    Raises FvsolveError if a divisible basin has fewer rows than threads.
+    Raises FvsolveError if a divisible basin has fewer rows (or blocks of cells of a mesh) than threads.
     """
     if threads == 1:
         return 1, []
     divisible = divisible_rows(model)
     if reason := divisible["why"]:
         return 1, [Notice("threads", "numerics", f"threads = {threads}, but one thread is used: {reason}", "threads")]
-    few = {name: rows for name, rows in divisible["rows"].items() if rows < threads}
+    few = [name for name, rows in divisible["rows"].items() if rows < threads]
     if few:
-        counts = listing(f"{name} has {rows} row{'' if rows == 1 else 's'}" for name, rows in few.items())
-        text = f"threads = {threads}: {counts}, and each thread needs a row of cells"
+        counts = listing(f"{name} has {divisible['texts'][name]}" for name in few)
+        text = f"threads = {threads}: {counts}, and each thread needs at least one"
         raise FvsolveError(f"{text}. Expected at most {divisible['most']}")
     text = f"each thread computes all rows of these basins: {undivided_basins(model)}"
     return threads, [Notice("threads", "numerics", text, "threads")] if divisible["whole"] else []

@@ -312,10 +312,11 @@ def test_a_number_of_threads_that_is_none_is_named(threads):
 
 
 def test_more_threads_than_rows_are_named():
-    with pytest.raises(
-        FvsolveError, match="pool has 12 rows, and each thread needs a row of cells. Expected at most 12"
-    ):
+    with pytest.raises(FvsolveError, match="pool has 12 rows, and each thread needs at least one. Expected at most 12"):
         fvsolve.run(water(), threads=13)
+    text = "pool has 12 blocks of 256 cells, and each thread needs at least one. Expected at most 12"
+    with pytest.raises(FvsolveError, match=text):
+        fvsolve.run(water(basin=MESH), threads=13)
 
 
 def test_check_says_what_can_be_shared_out(fvs):
