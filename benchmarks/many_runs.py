@@ -1,4 +1,4 @@
-"""Scenarios per second and core, with errors: fresh runs, models varied in place, rows of sweeps, workers of Dask.
+"""Scenarios per second and core, with errors: fresh, varied in place, rows of sweeps alone and in batches, on Dask.
 
 python benchmarks/many_runs.py [--quick]  valve-closure, 10 s, results at 20 places; CPU time, mean of the faster half
 python benchmarks/many_runs.py --dask     rows of a sweep in this process and on one process of a LocalCluster
@@ -13,7 +13,8 @@ from measure import agree, parser, peer_module
 
 from fvsolve import build, load, run, vary
 from fvsolve.studies.parallel import TaskPool
-from fvsolve.studies.sweep import RowMaker
+from fvsolve.studies.sweep_batches import BatchedRows
+from fvsolve.studies.sweep_row import RowMaker
 
 CASE, KEY, GOAL, SHARE = "valve-closure", "links.valve.area", 500.0, 0.9
 CELLS = {"links.main.cells": 20, "numerics.scheme": "upwind5", "numerics.method": "rk4", "output.fields": 0}
@@ -23,7 +24,7 @@ FINE, PROBE = 2000, "gate.pressure"  # cells of the reference run, and probe of 
 TIMES, RUNS, REPEATS = 200, 2000, 20
 
 
-def area(k: int) -> dict[str, float]:
+def area(k: float) -> dict[str, float]:
     """Override with an area of the valve that no earlier run used."""
     return {KEY: 0.0017 + 1e-7 * k}
 
@@ -37,6 +38,17 @@ def cost(one) -> float:
         spent.append(time.process_time() - began)
     quick = sorted(spent[5:])[: TIMES // 2]
     return sum(quick) / len(quick)
+
+
+def cost_in_batches(base: dict) -> float:
+    """CPU time of a row in a sweep of TIMES rows [s], least of REPEATS sweeps after the first."""
+    spent, rows = [], BatchedRows(RowMaker(CASE, base))
+    for repeat in range(REPEATS + 1):
+        began = time.process_time()
+        for _ in rows.results([area(k + 0.1 * repeat) for k in range(TIMES)]):
+            pass
+        spent.append((time.process_time() - began) / TIMES)
+    return min(spent[1:])
 
 
 def told(name: str, seconds: float, goal: float | None = None) -> None:
@@ -64,7 +76,8 @@ def by(base: dict, name: str, goal: float | None, fine) -> None:
     told("  fresh: run(case, set)", cost(lambda values: run(CASE, base | values)))
     told("  in place: run(vary(model, set))", cost(lambda values: run(vary(model, values))))
     told("  of which vary(model, set)", cost(lambda values: vary(model, values)))
-    told("  a row of a sweep", cost(rows), goal)
+    told("  a row of a sweep, alone", cost(rows))
+    told("  a row of a sweep, in batches", cost_in_batches(base), goal)
 
 
 def dask() -> None:

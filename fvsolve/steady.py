@@ -5,16 +5,18 @@ along an edge (link) the potential decreases by drop(M). All edges and nodes are
 (Todini and Pilati 1988). In a loop without friction the flows are those of least norm.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
+from fvsolve.kernels.steady_edges import LAW_SIZE, fill_systems, take_changes
+
 DENSE_LIMIT = 150  # number of unknowns up to which a dense solver is faster
 DAMPING = 1e-12  # weight of |x|^2 in the least-squares solution of a singular system
-ROUNDING = 1e-13  # Newton change below which only rounding is left, relative to the scales
 SMALL_DROP = 1e-12  # relative difference of potentials that counts as rounding
 SMALL = 1e-9  # relative residual below which a node counts as balanced
+LEAST_SCALE = 1e-9  # least typical mass flow of a piece [kg/s]
 
 
 @dataclass
@@ -23,7 +25,8 @@ class Edge:
 
     The equation is alpha dM - beta d(drop) = gamma, for changes of the mass flow M [kg/s] and of the potential drop
     [Pa], positive from i to j.
-    row : function (flow, drop) -> (alpha, beta, gamma); None for a fixed flow
+    row : function (flow, drop) -> (alpha, beta, gamma), or a law of `kernels.steady_edges` as an array; None for a
+        fixed flow
     flow : fixed mass flow, or first value of the iteration [kg/s]
     shut : True for a link without flow; potentials of nodes behind it may be estimated from its other side
     drop : function of the flow [kg/s] that gives the potential drop [Pa] of an edge with a fixed flow; None if unknown
@@ -35,13 +38,21 @@ class Edge:
 
     i: int
     j: int
-    row: Callable[[float, float], tuple[float, float, float]] | None
+    row: Any
     flow: float = 0.0
     shut: bool = False
-    drop: Callable[[float], float] | None = None
+    drop: Any = None
     sensed_nodes: tuple[int, ...] = ()
     held_potential: tuple[int, float] | None = None
     drives: bool = False
+
+    def numbered(self, number: dict[int, int]) -> "Edge":
+        """This edge with other numbers of nodes; number : number of a node -> its other number."""
+        held = self.held_potential
+        return replace(
+            self, i=number[self.i], j=number[self.j], sensed_nodes=tuple(number[i] for i in self.sensed_nodes),
+            held_potential=None if held is None else (number[held[0]], held[1]),
+        )  # fmt: skip
 
 
 @dataclass
@@ -49,49 +60,116 @@ class SteadyState:
     """Solution of a steady problem: potentials of nodes [Pa] and mass flows of edges [kg/s].
 
     converged : True if Newton's method converged
-    no_solution : nodes in sets that have no known potential and whose demands do not add up to zero
     split : True if the flows of a loop are not unique; then they are those of least norm
+    no_solution : nodes in sets that have no known potential and whose demands do not add up to zero
+    pieces : for each piece of the network its nodes, its edges and its typical mass flow [kg/s]
     """
 
     potential: np.ndarray
     flow: np.ndarray
-    converged: bool
+    converged: bool = True
     split: bool = False
     no_solution: list[int] = field(default_factory=list)
+    pieces: list[tuple[np.ndarray, np.ndarray, float]] = field(default_factory=list)
 
 
-def solve_steady(held: np.ndarray, demand: np.ndarray, edges: list[Edge], scale: tuple[float, float]) -> SteadyState:
+def solve_steady(held: np.ndarray, demand: np.ndarray, edges: list[Edge], scale: tuple[float, Any]) -> SteadyState:
     """Solve for the flows of edges that balance the demands of nodes, and for the potentials of these nodes.
 
+    Pieces of the network that no edge connects do not affect each other: each has the bits of its own problem.
     held : float64[n]  given potential [Pa], nan for nodes to be solved
     demand : float64[n]  mass flow out of each node [kg/s], ignored at nodes of given potential
-    scale : typical pressure [Pa] and mass flow [kg/s]
+    scale : typical pressure [Pa]; float64[edges], typical mass flow of each edge [kg/s]
     A problem without solution raises no error, see `SteadyState`.
     """
-    quiet = _quiet(held, demand, edges)
-    edges = [
-        replace(edge, row=None, flow=0.0, drop=lambda flow: 0.0) if e in quiet else edge for e, edge in enumerate(edges)
-    ]
-    parts, free_sets = _components(held, edges)
-    missing = np.isnan(held)
-    given = held.size - np.count_nonzero(missing)
-    potential = np.where(missing, np.where(missing, 0.0, held).sum() / given if given else 0.0, held)
-    flow = np.array([edge.flow for edge in edges])
-    dropped, entries = _references(held, demand, edges, parts, free_sets)
-    floating = {i for group in free_sets if group not in entries.values() for i in group}
-    result = SteadyState(potential, flow, True)
-    result.no_solution = [
-        i for i in floating if abs(sum(demand[k] for k in _group_of(free_sets, i))) > SMALL * scale[1]
-    ]
-    active = [e for e, edge in enumerate(edges) if edge.row is not None and not edge.shut]
-    rows = active + [e for e in entries]
-    nodes = [i for i in range(held.size) if np.isnan(held[i])]
-    balances = [i for i in nodes if i not in dropped and i not in floating]
-    anchors = sorted({min(_group_of(free_sets, i)) for i in floating})
-    balances += [i for i in floating if i not in anchors]
-    _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors)
-    _through_shut(result, held, edges, free_sets, floating)
+    sizes, average = np.asarray(scale[1]), mean_of(held, 0.0)
+    result = SteadyState(np.zeros(held.size), np.zeros(len(edges)))
+    problems: dict[tuple, list[_Problem]] = {}
+    for nodes, own in _pieces(held.size, edges):
+        typical = max([LEAST_SCALE, *sizes[own]])
+        result.pieces.append((nodes, own, typical))
+        given, piece = held[nodes], edges
+        if nodes.size < held.size:
+            number = {i: k for k, i in enumerate(nodes.tolist())}
+            piece = [edges[e].numbered(number) for e in own]
+        first = np.where(np.isnan(given), mean_of(given, average), given)
+        problem = _Problem(given, demand[nodes], piece, (scale[0], typical), first)
+        problems.setdefault(problem.pattern(), []).append(problem)
+        result.no_solution += [int(nodes[i]) for i in problem.no_solution]
+        problem.nodes, problem.own = nodes, own
+    for alike in problems.values():
+        _newton(alike)
+        for problem in alike:
+            _through_shut(problem)
+            result.potential[problem.nodes], result.flow[problem.own] = problem.potential, problem.flow
+            result.converged &= problem.converged
+            result.split |= problem.split
     return result
+
+
+def mean_of(held: np.ndarray, otherwise: float) -> float:
+    """Mean of the numbers in an array that are not nan; `otherwise` if there are none."""
+    missing = np.isnan(held)
+    count = held.size - np.count_nonzero(missing)
+    return float(np.where(missing, 0.0, held).sum() / count) if count else otherwise
+
+
+def _pieces(count: int, edges: list[Edge]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Nodes and edges of each piece of a network, in order; edges connect the nodes that they join, sense or hold."""
+    joined = [(edge.i, edge.j) for edge in edges]
+    joined += [(edge.i, i) for edge in edges for i in edge.sensed_nodes]
+    joined += [(edge.i, edge.held_potential[0]) for edge in edges if edge.held_potential is not None]
+    nodes: dict[int, list[int]] = {}
+    links: dict[int, list[int]] = {}
+    labels = union(count, joined)
+    for i, label in enumerate(labels):
+        nodes.setdefault(label, []).append(i)
+    for e, edge in enumerate(edges):
+        links.setdefault(labels[edge.i], []).append(e)
+    return [(np.array(own), np.array(links.get(label, []), dtype=int)) for label, own in nodes.items()]
+
+
+class _Problem:
+    """Steady problem of one piece of a network, with its unknowns and equations, and its solution so far.
+
+    Unknowns are the flows of the edges `active` and the potentials of the nodes `unknown`. The system has a row for
+    each edge in `rows`, for the balance of each node in `balances`, and for each node in `anchors`, whose potential is
+    kept because nothing determines it. All are lists of indices.
+    held, demand, edges : as for `solve_steady`; scale : typical pressure [Pa] and mass flow [kg/s]
+    potential : float64[n]  first potentials of the iteration [Pa]
+    """
+
+    def __init__(self, held, demand, edges, scale, potential) -> None:
+        self.held, self.demand, self.scale, self.potential = held, demand, scale, potential
+        self.converged, self.split = True, False
+        quiet = _quiet(held, demand, edges)
+        self.edges = [
+            replace(edge, row=None, flow=0.0, drop=lambda flow: 0.0) if e in quiet else edge
+            for e, edge in enumerate(edges)
+        ]
+        self.flow = np.array([edge.flow for edge in self.edges])
+        parts, self.free_sets = _components(held, self.edges)
+        dropped, entries = _references(held, demand, self.edges, parts, self.free_sets)
+        self.floating = {i for group in self.free_sets if group not in entries.values() for i in group}
+        self.no_solution = [
+            i for i in self.floating if abs(sum(demand[k] for k in _group_of(self.free_sets, i))) > SMALL * scale[1]
+        ]
+        self.active = [e for e, edge in enumerate(self.edges) if edge.row is not None and not edge.shut]
+        self.rows = self.active + [e for e in entries]
+        self.unknown = [i for i in range(held.size) if np.isnan(held[i])]
+        self.balances = [i for i in self.unknown if i not in dropped and i not in self.floating]
+        self.anchors = sorted({min(_group_of(self.free_sets, i)) for i in self.floating})
+        self.balances += [i for i in self.floating if i not in self.anchors]
+
+        self.column = {("flow", e): k for k, e in enumerate(self.active)}
+        self.column |= {("node", i): len(self.active) + k for k, i in enumerate(self.unknown)}
+        self.columns = [_columns(self.column, e, self.edges[e]) for e in self.rows]
+
+    def pattern(self) -> tuple:
+        """Structure of the system: equal for problems that one call of `_newton` solves together."""
+        ends = tuple((edge.i, edge.j, edge.shut, isinstance(edge.row, np.ndarray)) for edge in self.edges)
+        lists = (self.active, self.rows, self.unknown, self.balances, self.anchors, self.columns)
+        return ends, *map(tuple, lists)
 
 
 def _quiet(held, demand, edges) -> set[int]:
@@ -188,48 +266,79 @@ def _dead_end(group, demand, edges):
     return min(sorted(group), key=lambda i: (demand[i] != 0.0, count[i]))
 
 
-def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors):
-    """Solve for the flows of `active` edges and the potentials of `nodes` by Newton's method; write them to `result`.
-
-    The system has a row for each edge in `rows`, for the balance of each node in `balances`, and for each node in
-    `anchors`, whose potential is kept because nothing determines it.
-    active, rows : lists of indices of edges; nodes, balances, anchors : lists of indices of nodes
-    result : `SteadyState`; edges, demand, scale : as for `solve_steady`
-    """
-    column = {("flow", e): k for k, e in enumerate(active)}
-    column |= {("node", i): len(active) + k for k, i in enumerate(nodes)}
-    if not column:
+def _newton(problems: list[_Problem]) -> None:
+    """Solve problems of equal pattern by Newton's method, all in one loop; each ends with its own iteration."""
+    first = problems[0]
+    if not first.column:
         return
-    p_scale, f_scale = scale
-    size, change, at = np.inf, np.zeros(0), {i: k for k, i in enumerate(balances, start=len(rows))}
-    columns = [_columns(column, e, edges[e]) for e in rows]
-    ends = [(at[i], e, sign, column.get(("flow", e), -1)) for e, edge in enumerate(edges)
-            for i, sign in ((edge.i, -1.0), (edge.j, 1.0)) if i in at and not edge.shut]  # fmt: skip
-    to, of, signs = (np.array([end[k] for end in ends], kind) for k, kind in enumerate((int, int, float)))
-    last = enumerate(anchors, start=len(rows) + len(balances))
-    entries = [(k, c) for k, row in enumerate(columns) for c in row if c >= 0]
-    entries += [(k, own) for k, _, _, own in ends if own >= 0] + [(k, column["node", anchor]) for k, anchor in last]
-    places = np.array([k * len(column) + c for k, c in entries], dtype=int)
-    constant = [sign for _, _, sign, own in ends if own >= 0] + [1.0] * len(anchors)
-    drawn = demand[balances] / f_scale
+    system = _System(problems)
+    active, unknown = np.array(first.active, dtype=int), np.array(first.unknown, dtype=int)
+    sizes, ended = np.full(len(problems), np.inf), np.zeros(len(problems), dtype=int)
+    waiting = np.arange(len(problems))
     for sweep in range(200):
-        values, right = [], np.zeros(len(rows) + len(balances) + len(anchors))
-        for k, e in enumerate(rows):
-            right[k] = _edge_row(values, columns[k], e, edges[e], result, scale)
-        right[len(rows) : len(rows) + len(balances)] = drawn
-        np.subtract.at(right, to, signs * result.flow[of] / f_scale)
-        change = _solve(places, np.array(values + constant), right, len(column), result)
-        if not np.isfinite(change).all():  # the last values are the best available
-            result.converged = False
-            return
-        result.flow[active] += change[: len(active)] * f_scale
-        result.potential[nodes] += change[len(active) :] * p_scale
-        before, size = size, float(np.abs(change).max())
-        if size <= 1e-15 * (1.0 + np.abs(result.flow).max(initial=0.0) / f_scale) or (sweep > 20 and size < 1e-12):
-            return
-        if before <= 2.0 * size < ROUNDING:  # no further decrease: only rounding is left
-            return
-    result.converged = bool(np.max(np.abs(change), initial=0.0) < 1e-9)
+        take_changes(waiting, system.changes(waiting), active, unknown, system.scales, system.flow, system.potential,
+                     sizes, sweep, ended)  # fmt: skip
+        waiting = np.flatnonzero(ended == 0)
+        if not waiting.size:
+            break
+    for k, problem in enumerate(problems):
+        problem.flow, problem.potential = system.flow[k], system.potential[k]
+        problem.converged = bool(ended[k] == 1 or (ended[k] == 0 and sizes[k] < 1e-9))
+
+
+class _System:
+    """Newton systems of problems of equal pattern, in scaled unknowns.
+
+    flow, potential : mass flows [kg/s] and potentials [Pa] of the edges and nodes of each problem
+    scales : typical pressure [Pa] and mass flow [kg/s] of each problem
+    """
+
+    def __init__(self, problems: list[_Problem]) -> None:
+        first = problems[0]
+        self.problems, self.width = problems, len(first.column)
+        self.flow = np.array([problem.flow for problem in problems])
+        self.potential = np.array([problem.potential for problem in problems])
+        self.scales = np.array([problem.scale for problem in problems])
+        begin = np.cumsum([0, *(sum(c >= 0 for c in row) for row in first.columns)]).tolist()
+        at = {i: k for k, i in enumerate(first.balances, start=len(first.rows))}
+        height = len(first.rows) + len(first.balances) + len(first.anchors)
+        ends = [(at[i], e, sign, first.column.get(("flow", e), -1)) for e, edge in enumerate(first.edges)
+                for i, sign in ((edge.i, -1), (edge.j, 1)) if i in at and not edge.shut]  # fmt: skip
+        self.terms = np.array([end[:3] for end in ends], dtype=int).reshape(-1, 3)
+        entries = [(k, c) for k, row in enumerate(first.columns) for c in row if c >= 0]
+        entries += [(k, own) for k, _, _, own in ends if own >= 0]
+        last = enumerate(first.anchors, start=len(first.rows) + len(first.balances))
+        entries += [(k, first.column["node", i]) for k, i in last]
+        self.places = np.array([k * self.width + c for k, c in entries], dtype=int)
+        constant = [float(sign) for _, _, sign, own in ends if own >= 0] + [1.0] * len(first.anchors)
+        self.values, self.drawn = np.zeros((len(problems), len(entries))), np.zeros((len(problems), height))
+        self.values[:, begin[-1] :] = constant
+        for k, problem in enumerate(problems):
+            self.drawn[k, len(first.rows) :][: len(first.balances)] = problem.demand[first.balances] / problem.scale[1]
+        self.right = self.drawn.copy()
+        dense = max(height, self.width) <= DENSE_LIMIT
+        self.matrices = np.zeros((len(problems), height * self.width if dense else 0))
+        lawful = [k for k, e in enumerate(first.rows) if isinstance(first.edges[e].row, np.ndarray)]
+        edges = [first.rows[k] for k in lawful]
+        rows = [(k, begin[k], e, first.edges[e].i, first.edges[e].j, *(c >= 0 for c in first.columns[k][1:]))
+                for k, e in zip(lawful, edges, strict=True)]  # fmt: skip
+        self.law_rows = np.array(rows, dtype=int).reshape(-1, 7)
+        laws = [problem.edges[e].row for problem in problems for e in edges]
+        self.laws = np.array(laws, dtype=float).reshape(len(problems), len(edges), LAW_SIZE)
+        # numbers of the other rows, with their values
+        self.others = [(k, slice(begin[k], begin[k + 1])) for k in range(len(first.rows)) if k not in {*lawful}]
+
+    def changes(self, numbers: np.ndarray) -> np.ndarray:
+        """Changes of the unknowns of some problems in the next iteration; NaN where a number is not finite."""
+        for row, own in self.others:
+            for k in numbers:
+                found = _edge_row(self.problems[k], row, self.flow[k], self.potential[k])
+                self.values[k, own], self.right[k, row] = found
+        fill_systems(numbers, self.law_rows, self.laws, self.terms, self.places, self.drawn, self.scales, self.flow,
+                     self.potential, self.values, self.right, self.matrices)  # fmt: skip
+        matrices = self.matrices[numbers].reshape(numbers.size, -1, self.width) if self.matrices.size else None
+        return _solve(self.places, self.values[numbers], self.right[numbers], matrices, self.width,
+                      [self.problems[k] for k in numbers])  # fmt: skip
 
 
 def _columns(column, e, edge) -> tuple[int, ...]:
@@ -244,54 +353,63 @@ def _columns(column, e, edge) -> tuple[int, ...]:
     return *sensed, flow, column.get(("node", edge.i), -1), column.get(("node", edge.j), -1)
 
 
-def _edge_row(values, columns, e, edge, result, scale) -> float:
-    """Append the values of the Newton row of edge e in scaled unknowns to `values`; return its right-hand side.
+def _edge_row(problem, row, flow, potential) -> tuple[list[float], float]:
+    """Values of a Newton row of a problem in scaled unknowns, and its right-hand side.
 
-    columns : as from `_columns`; result : `SteadyState` of the last iteration; scale : as for `solve_steady`
+    row : index in `problem.rows`; flow, potential : mass flows [kg/s] and potentials [Pa] of the last iteration
     """
+    e, scale = problem.rows[row], problem.scale
+    edge = problem.edges[e]
     if edge.held_potential is not None:
-        values.append(1.0)
-        return (edge.held_potential[1] - result.potential[edge.held_potential[0]]) / scale[0]
-    flow, drop = result.flow[e], result.potential[edge.i] - result.potential[edge.j]
-    *sensed, own, start, end = columns
+        return [1.0], (edge.held_potential[1] - potential[edge.held_potential[0]]) / scale[0]
+    drop, values = potential[edge.i] - potential[edge.j], []
+    *sensed, own, start, end = problem.columns[row]
     if own >= 0:
-        potentials = (result.potential[i] for i in edge.sensed_nodes)
-        alpha, beta, gamma, *lifts = edge.row(flow, drop, *potentials)
-        values += [-lift for lift, at in zip(lifts, sensed, strict=True) if at >= 0]
-        values.append(alpha * scale[1] / scale[0])
+        alpha, beta, gamma, *lifts = edge.row(flow[e], drop, *(potential[i] for i in edge.sensed_nodes))
+        values = [-lift for lift, at in zip(lifts, sensed, strict=True) if at >= 0] + [alpha * scale[1] / scale[0]]
     else:
-        beta, gamma = 1.0, drop - edge.drop(flow)
-    if start >= 0:
-        values.append(-beta)
-    if end >= 0:
-        values.append(beta)
-    return gamma / scale[0]
+        beta, gamma = 1.0, drop - edge.drop(flow[e])
+    values += [-beta] * (start >= 0) + [beta] * (end >= 0)
+    return values, gamma / scale[0]
 
 
-def _solve(places, values, right, size, result):
-    """Solution of the Newton system; if it is singular or not square, the least-squares solution of least norm.
+def _solve(places, values, right, matrices, size, problems) -> np.ndarray:
+    """Solutions of the Newton systems of n problems; the least-squares solution of least norm where one is singular.
 
-    `result.split` is set to True for a singular system, and for a large system also if it is not square.
-    places : index of each of the `values` in the matrix, row * size + column; right : right-hand side
-    size : number of unknowns. The solution is NaN if a number in `values` or `right` is not finite.
+    `split` of a problem is set to True for a singular system, and for a large system also if it is not square.
+    places : index of each of the `values` in a matrix, row * size + column; values : float64[n, entries]
+    right : float64[n, rows]  right-hand sides; matrices : float64[n, rows, size], None for large systems
+    size : number of unknowns. A solution is NaN if a number in its values or right-hand side is not finite.
     """
-    if not (np.isfinite(values).all() and np.isfinite(right).all()):
-        return np.full(size, np.nan)
-    if max(len(right), size) > DENSE_LIMIT:
-        solution, singular = _solve_sparse(values, places // size, places % size, right, size)
-        result.split = result.split or singular
-        return solution
-    matrix = np.bincount(places, values, len(right) * size).reshape(len(right), size)
-    if len(right) == size:
+    finite = np.isfinite(values).all(axis=1) & np.isfinite(right).all(axis=1)
+    if matrices is not None and right.shape[1] == size and finite.all():
+        try:
+            solutions = np.linalg.solve(matrices, right[:, :, None])[:, :, 0]
+            if np.abs(np.matmul(matrices, solutions[:, :, None])[:, :, 0] - right).max() < 1e-6:  # False for NaN
+                return solutions
+        except np.linalg.LinAlgError:
+            pass
+    solutions = np.full((len(problems), size), np.nan)
+    for k in np.flatnonzero(finite):
+        if matrices is not None:
+            solutions[k], singular = _solve_dense(matrices[k], right[k])
+        else:
+            solutions[k], singular = _solve_sparse(values[k], places // size, places % size, right[k], size)
+        problems[k].split |= singular
+    return solutions
+
+
+def _solve_dense(matrix, right):
+    """Solution of a small system A x = b : (x, True if the system is singular); the result is that of least norm."""
+    if len(right) == matrix.shape[1]:
         try:
             solution = np.linalg.solve(matrix, right)
             if np.isfinite(solution).all() and np.abs(matrix @ solution - right).max() < 1e-6:
-                return solution
+                return solution, False
         except np.linalg.LinAlgError:
             pass
     solution, _, rank, _ = np.linalg.lstsq(matrix, right, rcond=1e-12)
-    result.split = result.split or rank < size
-    return solution
+    return solution, bool(rank < matrix.shape[1])
 
 
 def _solve_sparse(values, i, j, right, size):
@@ -317,18 +435,17 @@ def _solve_sparse(values, i, j, right, size):
     return splu(system).solve(np.concatenate((right, np.zeros(size))))[len(right) :], True
 
 
-def _through_shut(result, held, edges, free_sets, floating):
+def _through_shut(problem) -> None:
     """Set the potentials of sets of nodes behind shut links, in which nothing else determines them.
 
     They are the limit of equal small leaks through these links, with zero sum of the flows sign(dP) sqrt|dP|.
-    held, edges : as for `solve_steady`; free_sets : as from `_components`
-    floating : nodes whose potential nothing determines
     """
-    groups = [group for group in free_sets if group & floating]
+    edges, potential = problem.edges, problem.potential
+    groups = [group for group in problem.free_sets if group & problem.floating]
     for _ in range(60):
         moved = 0.0
         for group in groups:
-            around = [result.potential[edge.j if edge.i in group else edge.i] for edge in edges
+            around = [potential[edge.j if edge.i in group else edge.i] for edge in edges
                       if edge.shut and ((edge.i in group) != (edge.j in group))]  # fmt: skip
             if not around:
                 continue
@@ -337,10 +454,9 @@ def _through_shut(result, held, edges, free_sets, floating):
                 middle = 0.5 * (low + high)
                 total = sum(np.sign(p - middle) * np.sqrt(abs(p - middle)) for p in around)
                 low, high = (middle, high) if total > 0 else (low, middle)
-            first = min(group)
-            shift = 0.5 * (low + high) - result.potential[first]
+            shift = 0.5 * (low + high) - potential[min(group)]
             for i in group:
-                result.potential[i] += shift
+                potential[i] += shift
             moved = max(moved, abs(shift))
         if moved <= 1e-9:
             return

@@ -1,7 +1,7 @@
 """Assembly of the model of a case."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import fields, replace
 from typing import Any
 
@@ -15,7 +15,7 @@ from fvsolve.assembly.scheme_codes import limiter_notices, scheme_settings
 from fvsolve.basins.lower import basin_start, lower_basins
 from fvsolve.case import load, locate_faults
 from fvsolve.case.case import Case
-from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.errors import CaseError, FvsolveError, Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tanks
 from fvsolve.model.cluster_tables import classify_nodes
@@ -51,7 +51,7 @@ from fvsolve.model.network_tables import lower_networks, network_rate
 from fvsolve.model.probe_tables import lower_probes, probe_offsets
 from fvsolve.model.reaction_tables import lower_reactions
 from fvsolve.model.scalar_tables import lower_scalars, scale_scalars, start_amounts
-from fvsolve.model.start_notices import coarse_for_cavities, flow_notices, too_few_cells
+from fvsolve.model.start_notices import start_notices
 from fvsolve.model.steady_start import SteadyStart
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named
@@ -442,8 +442,8 @@ def scratch_size(draft: ModelDraft) -> int:
     return int(max(spatial, (5 if scalars else 4) * most + 64, system, 2 * len(draft.mass_table), 4 * scalars * nodes))
 
 
-def model_of(draft: ModelDraft) -> Model:
-    """Build the model of a complete draft.
+def model_of(draft: ModelDraft, notices: Callable[[ModelDraft], list[Notice]] = start_notices) -> Model:
+    """Build the model of a complete draft, with `notices` on its start.
 
     The state at the start is zero except in basins that deviate from the initial steady state, and for scalar amounts.
     """
@@ -452,7 +452,7 @@ def model_of(draft: ModelDraft) -> Model:
     first, last = case.numerics.start, case.numerics.end
     inside = sorted((t, jump) for t, jump in draft.schedules.breaks.items() if first <= t <= last)
     basin_notices = [notice for basin in draft.basins for notice in basin.notices(basin.deviations(start))]
-    draft.warnings += [*basin_notices, *coarse_for_cavities(draft), *flow_notices(draft), *too_few_cells(draft)]
+    draft.warnings += [*basin_notices, *notices(draft)]
     draft.warnings += limiter_notices(draft.case.numerics.scheme, draft.case.numerics.limiter)
     return Model(
         case, draft.tables, draft.shapes, draft.state_names, np.array(draft.scale), inside, draft.schedules.spacing,

@@ -20,6 +20,11 @@ LEAST_CELLS = 3  # least cells of a piece next to a check valve or vessel
 COSTLY_RATIO = 10.0  # steps shorter by this factor than those of other pieces of a pipe are reported
 
 
+def start_notices(draft: Any) -> list[Notice]:
+    """All notices of this module on the start of a model."""
+    return [*coarse_for_cavities(draft), *flow_notices(draft), *too_few_cells(draft)]
+
+
 def too_few_cells(draft: Any) -> list[Notice]:
     """Notices of pipes with too few cells for waves of an event, or next to a check valve or accumulator.
 

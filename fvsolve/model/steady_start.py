@@ -12,7 +12,8 @@ from fvsolve.assembly.lowering import lowering_of
 from fvsolve.assembly.schedule_tables import value_at
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.restrictions import conductance_of, flow_at_drop, flow_slope, transition_of
+from fvsolve.kernels.restrictions import conductance_of, flow_at_drop, transition_of
+from fvsolve.kernels.steady_edges import FRICTION, LEAK, RESTRICTION, friction_drop, law_of
 from fvsolve.kernels.steady_friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.table_handle import make_handle
 from fvsolve.model.mechanics_tables import driven_at_start, start_masses
@@ -46,6 +47,8 @@ class SteadyStart:
         sizes = [1e-9, *(draft.fluid.density * self.pipes["area"]), *(draft.fluid.density * self.columns["area"])]
         sizes += list(np.sqrt(self.valves["conductance"] * PRESSURE_SCALE))
         self.flow_scale = max(sizes)
+        # typical mass flows of pipes, columns and restrictions [kg/s]
+        self.flow_scales = np.array([*sizes[1:], *np.zeros(len(self.pistons))])
         self.extra: dict[str, float] = {}  # pressure drop in addition to the law's [Pa], for laws with changing density
         # of pipes: loss of the flow that leaves at each end, per M^2 [Pa s2/kg2]
         self.exit_losses: dict[str, tuple[float, float]] = {}
@@ -150,15 +153,18 @@ class SteadyStart:
         valves = [self.valve_edge(k) for k in range(len(self.valves))]
         leaks = [self.leak_edge(k) for k in range(len(self.pistons)) if self.pistons[k]["leakage"] > 0.0]
         self.edges = [*pipes, *columns, *valves, *leaks]
-        self.answer = solve_steady(held, self.demand, self.edges, (PRESSURE_SCALE, self.flow_scale))
+        sizes = self.flow_scales[: len(self.edges)]
+        self.answer = solve_steady(held, self.demand, self.edges, (PRESSURE_SCALE, sizes))
         flow = self.answer.flow
-        flow[np.abs(flow) <= ROUNDING_SHARE * self.flow_scale] = 0.0
-        self.tolerance = ROUNDING_SHARE * (self.flow_scale + np.max(np.abs(flow), initial=0.0))
+        for _, own, typical in self.answer.pieces:
+            flow[own] = np.where(np.abs(flow[own]) <= ROUNDING_SHARE * typical, 0.0, flow[own])
         self.inflow = -self.demand.copy()
         for edge, value in zip(self.edges, flow, strict=True):
             self.inflow[edge.i] -= value
             self.inflow[edge.j] += value
-        self.inflow[np.abs(self.inflow) <= 10.0 * self.tolerance] = 0.0
+        for nodes, own, typical in self.answer.pieces:
+            tolerance = 10.0 * ROUNDING_SHARE * (typical + np.max(np.abs(flow[own]), initial=0.0))
+            self.inflow[nodes] = np.where(np.abs(self.inflow[nodes]) <= tolerance, 0.0, self.inflow[nodes])
         n, m = len(pipes), len(pipes) + len(columns)
         self.pipe_flow, self.column_flow, self.valve_flow = flow[:n], flow[n:m], flow[m : m + len(valves)]
 
@@ -194,29 +200,21 @@ class SteadyStart:
         times its loss coefficient in `exit_losses` for the end at which the mass flow M leaves. The drag [kg/s2] is the
         friction of the mass flow, see `kernels.steady_friction.drag`. A stated `initial_flow` is a fixed flow.
         """
-        law = tuple(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds"))
-        per = length / row["area"]
-        least = drag_slope(*law, 1e-6 * self.draft.fluid.density * float(row["area"]))
-        link = self.case.links[name]
-
-        extra, (back, ahead) = self.extra.get(name, 0.0), self.exit_losses.get(name, (0.0, 0.0))
-
-        def drop(flow):
-            return per * drag(*law, flow) + extra + (ahead if flow > 0.0 else back) * abs(flow) * flow
-
-        def newton(flow, present):
-            jet = 2.0 * (ahead if flow > 0.0 else back) * abs(flow)
-            return per * max(drag_slope(*law, flow), least) + jet, 1.0, present - drop(flow)
-
+        numbers = tuple(float(row[key]) for key in ("friction", "loss", "rough", "roughness", "reynolds"))
+        least = drag_slope(*numbers, 1e-6 * self.draft.fluid.density * float(row["area"]))
+        extra, losses = self.extra.get(name, 0.0), self.exit_losses.get(name, (0.0, 0.0))
+        law = law_of(FRICTION, float(length / row["area"]), *numbers, least, extra, *losses)
         i, j = int(row["from_node"]), int(row["to_node"])
         if self.rest:
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
+        link = self.case.links[name]
         if link.initial_flow is not None:
-            return Edge(i, j, None, link.initial_flow * self.draft.fluid.density, drop=drop)
+            given = link.initial_flow * self.draft.fluid.density
+            return Edge(i, j, None, given, drop=lambda flow: friction_drop(law, flow))
         free = row["friction"] == rec.FRICTION_NONE
         # so that loops without friction get the solution of least norm
         first = 0.0 if free else self.draft.fluid.density * row["area"]
-        return Edge(i, j, newton, first, drop=drop)
+        return Edge(i, j, law, first)
 
     def valve_edge(self, k: int) -> Edge:
         """Edge of a valve in the steady problem, with the square-root law M |M| = G dP or the valve's own law.
@@ -236,18 +234,8 @@ class SteadyStart:
             return Edge(i, j, None, 0.0, shut=True)
         if self.rest:
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
-        ahead, behind = transition_of(row, g), transition_of(row, g * back) if back != 1.0 else None
-
-        def newton(flow, present):
-            here, transition = (g, ahead) if behind is None or not present < 0.0 else (g * back, behind)
-            target = flow_at_drop(here, transition, present)
-            if transition > 0.0 and abs(target) < transition:
-                slope = flow_slope(here, transition, present)
-                return 1.0 / slope, 1.0, (target - flow) / slope
-            chord = max(abs(target) + abs(flow), 1e-6 * math.sqrt(g))
-            return chord / here, 1.0, present - abs(flow) * flow / here
-
-        return Edge(i, j, newton, math.sqrt(g * PRESSURE_SCALE))
+        law = law_of(RESTRICTION, g, back, transition_of(row, g), transition_of(row, g * back))
+        return Edge(i, j, law, math.sqrt(g * PRESSURE_SCALE))
 
     def valve_lowering(self, k: int):
         """Conversion object that sets the state of valve k: that of its device, or of the valve itself."""
@@ -277,7 +265,7 @@ class SteadyStart:
         i, j = int(row["a"]), int(row["b"])
         if self.rest:
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
-        return Edge(i, j, lambda flow, present: (1.0 / g, 1.0, present - flow / g))
+        return Edge(i, j, law_of(LEAK, g))
 
     def leak_flow(self, row, p_a: float, p_b: float) -> float:
         """Leakage past a piston from chamber A to B [kg/s], as `kernels.mass_dynamics.leak_flow`.

@@ -113,11 +113,19 @@ def end_with_parent() -> None:
     os._exit(1)
 
 
+def results_of(work: Any, tasks: list) -> Iterator:
+    """Results of all tasks, in order.
+
+    work : function of a task; it may have a method `results` that computes many tasks together
+    """
+    return work.results(tasks) if hasattr(work, "results") else map(work, tasks)
+
+
 def compute(work: Any, tasks: list) -> tuple[Any, float]:
     """Apply `work` to all tasks : (list of answers, duration [s]); (exception, 0) if a task raises one."""
     began = time.perf_counter()
     try:
-        answers = [work(task) for task in tasks]
+        answers = list(results_of(work, tasks))
     except Exception as error:  # any exception is returned to the parent process
         return error, 0.0
     return answers, time.perf_counter() - began

@@ -344,14 +344,14 @@ def interpolated(t: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.nda
     Beyond the rows they are those of the first and last row.
     """
     times = np.asarray(times, float)
-    after = np.clip(np.searchsorted(t, times, side="right"), 1, max(len(t) - 1, 1))
     if len(t) == 1:
         return np.full(times.shape, values[0])
+    after = np.minimum(np.maximum(t.searchsorted(times, side="right"), 1), len(t) - 1)
     before = after - 1
-    gap = t[after] - t[before]
+    start, gap = values[before], t[after] - t[before]
     part = np.where(gap > 0.0, (times - t[before]) / np.where(gap > 0.0, gap, 1.0), 1.0)
-    exact = values[before] + part * (values[after] - values[before])
-    return np.where(part >= 1.0, values[after], np.where(part <= 0.0, values[before], exact))
+    exact = start + part * (values[after] - start)
+    return np.where(part >= 1.0, values[after], np.where(part <= 0.0, start, exact))
 
 
 def differences(a, b) -> dict:

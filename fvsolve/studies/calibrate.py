@@ -14,7 +14,8 @@ from fvsolve.studies.outcome import end_if_interrupted, refusal_text
 from fvsolve.studies.parallel import TaskPool
 from fvsolve.studies.result_table import Column, PlainData, ResultTable
 from fvsolve.studies.sampling import key_ranges, sample_points
-from fvsolve.studies.sweep import VARY, RowMaker
+from fvsolve.studies.sweep import VARY
+from fvsolve.studies.sweep_row import RowMaker
 
 SAMPLE_PER_KEY = 16  # sample points per key; the minimisations start at the best of them
 DESCENTS = 3  # number of minimisations

@@ -18,7 +18,7 @@ from fvsolve.case.load import find_source
 from fvsolve.case.reading import Raw, read_raw
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.output.restart import program_versions
-from fvsolve.run.process_pool import ProcessPool, compute
+from fvsolve.run.process_pool import ProcessPool, compute, results_of
 from fvsolve.steppers.tableau import BUILT_IN, METHODS
 from fvsolve.studies.outcome import Outcome, study_model
 
@@ -67,9 +67,8 @@ class TaskPool:
     def run(self, tasks: Sequence) -> Iterator[tuple[int, Any]]:
         """Compute tasks; yields (index, answer) of each task when it is finished."""
         local = len(tasks) if self.in_process else min(len(tasks), int(not self.has_started))
-        for number in range(local):
-            self.has_started = True
-            yield number, self.work(tasks[number])
+        self.has_started |= local > 0
+        yield from enumerate(results_of(self.work, tasks[:local]))
         if local < len(tasks):
             if self.workers is None:
                 local_pool = self.dask is None

@@ -5,122 +5,29 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from fvsolve.argument_checks import COUNT_FROM_ZERO, PATH, ROW, SERIES, TABLE, TEXT, Kind, validated
 from fvsolve.case import Case, load
 from fvsolve.case.load import find_source
-from fvsolve.case.reading import read_raw, split_key
+from fvsolve.case.reading import read_raw
 from fvsolve.case.text import inline
 from fvsolve.display import Displayable
-from fvsolve.errors import CaseError, FvsolveError, RunError, did_you_mean, listing
+from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing
 from fvsolve.fluid.coolprop import coolprop_version
 from fvsolve.output.restart import program_versions
-from fvsolve.output.summary_file import plain
-from fvsolve.studies.outcome import NO_FIELDS, STUDY_ARGUMENTS, end_if_interrupted, has_diverged, refusal_text
-from fvsolve.studies.parallel import PickledCase, TaskPool
+from fvsolve.studies.outcome import STUDY_ARGUMENTS
+from fvsolve.studies.parallel import TaskPool
 from fvsolve.studies.result_cache import ResultCache, digest_of, write_errors
 from fvsolve.studies.result_table import Column, ResultTable
 from fvsolve.studies.sampling import grid, points_from_file, refuse_unknown, sample_points
+from fvsolve.studies.sweep_batches import BatchedRows
+from fvsolve.studies.sweep_row import RowMaker
 from fvsolve.units import show
 
 REFUSED = "refused: "
-LOST_REASON = "lost: the process of this run was killed repeatedly. Is there enough memory?"
-
-
-@dataclass
-class RowMaker:
-    """Callable that runs a case with values of keys and returns the row of results.
-
-    source : case as for `load`; base : overrides of all runs
-    case, model : case and model of the first run, from which the cases and models of later runs are derived
-    """
-
-    source: Any
-    base: dict[str, Any]
-    case: Case | None = field(default=None, compare=False)
-    model: Any = field(default=None, compare=False)
-
-    def __call__(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Row of the run with these values of keys; a refused case gives a row with its reason."""
-        from fvsolve.output.memory_sink import MemorySink
-        from fvsolve.run import model_of
-        from fvsolve.solve import initial_state, solve
-
-        try:
-            model = model_of(self.read(values), like=self.model)
-        except CaseError as error:
-            return {"ok": False, "reason": refusal_text(error)}
-        self.model, sink = self.model or model, MemorySink(model)
-        summary = solve(model, initial_state(model), sink)
-        end_if_interrupted(summary.reason)
-        return row_of(model, summary, sink)
-
-    def read(self, values: Mapping[str, Any]) -> Case:
-        """Case with these values; later cases are derived from the first."""
-        if self.case is None:
-            self.case = load(self.source, {**self.base, **values, **NO_FIELDS})
-            return self.case
-        return load(self.case, {**self.base_for(values), **values})
-
-    def base_for(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Overrides of `base` in those tables of the case in which `values` change a key, and in the table [exact].
-
-        They are set again together with `values`, because keys of a table may conflict.
-        """
-        tables = {("exact",), *(split_key(key)[:2] for key in values)}
-        return {key: value for key, value in self.base.items() if {split_key(key)[:1], split_key(key)[:2]} & tables}
-
-    def __getstate__(self) -> dict[str, Any]:
-        """State for pickling; the other process reads the case again."""
-        return {"sent": PickledCase(self.case or self.source), "base": self.base}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.source, self.base, self.case, self.model = state["sent"].source, state["base"], None, None
-
-    def lost_result(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Row of a run that crashed its process."""
-        return {"ok": False, "reason": LOST_REASON}
-
-
-def row_of(model, summary, sink) -> dict[str, Any]:
-    """Row of a run: column -> value as in `summary.json`; see `Sweep` for the columns.
-
-    None replaces values that are not finite, and all values of probes if the run diverged.
-    sink : `MemorySink` with the output of the run
-    """
-    from fvsolve.run.verdicts import verdicts
-
-    row = {"ok": bool(summary.ok), "reason": summary.reason, "t [s]": plain(float(summary.t))}
-    row["marks"] = min(summary.marks, key=lambda mark: mark.time).text if summary.marks else ""
-    row["warnings"] = [plain(column.plain()) for column in (*model.warnings, *summary.warnings)]
-    row["fluid"] = plain(model.case.properties.plain())
-    blown, last = has_diverged(summary.reason), sink.last  # values of a diverged run are meaningless
-    for k, column in enumerate(sink.columns):
-        least, t_min, greatest, t_max = summary.extremes[column.name]
-        name, unit = column.name, f"[{column.unit}]"
-        entries = {f"min({name}) {unit}": column.from_si(least), f"t_min({name}) [s]": t_min}
-        entries |= {f"max({name}) {unit}": column.from_si(greatest), f"t_max({name}) [s]": t_max}
-        entries[f"final({name}) {unit}"] = last[1 + k]
-        row |= {key: None if blown else plain(float(x)) for key, x in entries.items()}
-    expectations = expectations_of(model, summary, sink)
-    row["expectations"] = all(claim["ok"] for claim in expectations) if expectations else None
-    row["verdicts"] = all(column["ok"] for column in verdicts(model, summary)) if model.case.limits else None
-    return row | {"steps": summary.steps, "seconds": plain(float(summary.seconds))}
-
-
-def expectations_of(model, summary, sink) -> list[dict[str, Any]]:
-    """Expectations of the case with their results, as in the summary of a run; sink : output of the run."""
-    from fvsolve.run import Result
-    from fvsolve.run.verdicts import expectations
-
-    columns = {column.name: column for column in sink.columns}
-    probes = {name: {"dimension": column.dimension, "unit": column.unit} for name, column in columns.items()}
-    summary_data = {"probes": probes, "time_unit": sink.time.unit, "ambient_pressure": model.case.ambient_pressure}
-    result = Result(summary_data, sink.table, sink.envelope)
-    return expectations(model, summary, result)
 
 
 FIRST_COLUMNS = ("ok", "reason", "t [s]", "marks", "warnings", "fluid")
@@ -290,7 +197,7 @@ class SweepRun:
 
     def __init__(self, source, raw: dict, base: dict, runs: list[dict], cache: ResultCache, progress) -> None:
         self.runs, self.cache, self.progress = runs, cache, progress or (lambda done, total, text: None)
-        self.source, self.base = source, base
+        self.source, self.base, self.folder = source, base, folder_of(source)
         self.rows: dict[int, dict] = {}
         self.digests: dict[str, str] = {}  # name of a file -> hash of its content
         relevant = {key: value for key, value in raw.items() if key not in TEXT_KEYS}
@@ -319,7 +226,7 @@ class SweepRun:
         waiting = [index for index in range(len(keys)) if index not in self.rows]
         self.report_progress(waiting[:1])
         tasks = [self.runs[index] for index in waiting]
-        with TaskPool(RowMaker(self.source, self.base), jobs, dask) as pool:
+        with TaskPool(BatchedRows(RowMaker(self.source, self.base)), jobs, dask) as pool:
             for number, row in pool.run(tasks):
                 index = waiting[number]
                 self.rows[index] = self.runs[index] | self.cache.store(keys[index], ROW_VERSION, row)
@@ -359,7 +266,7 @@ class SweepRun:
 
     def digest(self, name: str) -> list[str]:
         if name not in self.digests:
-            path = folder_of(self.source) / name
+            path = self.folder / name
             try:
                 self.digests[name] = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
             except (OSError, ValueError):
