@@ -47,9 +47,9 @@ class Fault:
 
 FAULTS = [
     Fault(
-        "steady.py",
-        "result.potential[edge.i] - result.potential[edge.j]",
-        "result.potential[edge.j] - result.potential[edge.i]",
+        "kernels/steady_edges.py",
+        "potential[k, i] - potential[k, j]",
+        "potential[k, j] - potential[k, i]",
     ),
     Fault("step_limits/grid_limits.py", "face[:-1] - face[1:]", "1.01 * face[:-1] - face[1:]"),
     Fault(
