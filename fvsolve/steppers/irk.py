@@ -30,8 +30,6 @@ from fvsolve.steppers.step_operations import combine, copy, error_norm, error_sc
 from fvsolve.steppers.tableau import Method
 
 MOST_SWEEPS = 40
-# Longest step that sweeps solve under error control, in units of the last step: short steps cost less than sweeps.
-LONGEST_SWEPT = 0.01
 # Ratio of successive changes above which K is extrapolated; greatest extrapolation, in changes.
 SLOW, GREATEST_EXTRAPOLATION = 0.4, 10.0
 
@@ -471,8 +469,8 @@ def step_error(handle, r, t, h, now, new, retry):
 def attempt(handle, run, t, h, now, new):
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    The error is 0 unless the step is under error control. It is NEWTON_FAILED if Newton with a fresh Jacobian fails and
-    then sweeps fail or, under error control, the step is longer than LONGEST_SWEPT. Arguments as for `erk.attempt`.
+    The error is 0 unless the step is under error control, and NEWTON_FAILED if Newton with a fresh Jacobian and the
+    sweeps of `irk` fail. Arguments as for `erk.attempt`.
     """
     r = open_run(run)
     y, state, newton, s = r.y[now], r.state[0], r.newton[0], r.k.shape[0]
@@ -488,8 +486,6 @@ def attempt(handle, run, t, h, now, new):
             finish(r, h)
             break
         if newton["jacobian_step"] == state["steps"]:
-            if r.control[0]["mode"] == rec.TOLERANCE and 0.0 < LONGEST_SWEPT * state["last"] < h:
-                return rec.NEWTON_FAILED
             status = sweep(handle, r, matrix(r.coefficients, s, CROUT), t, h, now)
             newton["shift"] = 0.0  # the factors are those of a stage
             if status == iterations.FAILED:

@@ -159,7 +159,7 @@ def sucked_dry(**numerics) -> dict:
 
 @pytest.mark.parametrize(
     "numerics",
-    [{"method": "radau-iia-5", "step": 1e-3}, {"method": "esdirk-4"}, {"method": "trapezoid", "step": 1e-3}],
+    [{"method": "radau-iia-5"}, {"method": "esdirk-4"}, {"method": "trapezoid", "step": 1e-3}],
     ids=lambda numerics: numerics["method"],
 )
 def test_a_run_says_when_and_in_what_newton_failed_and_keeps_everything_up_to_there(numerics, tmp_path):
@@ -172,13 +172,6 @@ def test_a_run_says_when_and_in_what_newton_failed_and_keeps_everything_up_to_th
     kept = fvsolve.open_run(tmp_path / "run")
     assert kept.reason == result.reason and kept.t == pytest.approx(0.005 * np.arange(21))
     assert np.all(np.isfinite(kept["pot.pressure"]))
-
-
-def test_radau_under_error_control_reaches_the_state_without_supply_and_names_it():
-    for rtol in (1e-3, 1e-6):
-        result = fvsolve.run(sucked_dry(method="radau-iia-5", rtol=rtol))
-        assert result.reason.startswith("stopped: the demand at drain cannot be supplied at t = 0.10")
-        assert result.summary["newton_failures"] > 10 and result.t[-1] < 0.1003
 
 
 def test_a_summary_counts_what_newton_did():
