@@ -1,8 +1,9 @@
 """Steady state of a network of resistances: pressures and flows.
 
 Potentials are P = p + rho g z [Pa], flows are mass flows M [kg/s]. A node has a given potential or balances its flows;
-along an edge (link) the potential decreases by drop(M). All edges and nodes are solved together by Newton's method
-(Todini and Pilati 1988). In a loop without friction the flows are those of least norm.
+along an edge (link) the potential decreases by drop(M). The edges and nodes of each connected piece of a network are
+solved together by Newton's method (Todini and Pilati 1988). In a loop without friction the flows are those of least
+norm.
 """
 
 from dataclasses import dataclass, field, replace
@@ -160,7 +161,6 @@ class _Problem:
         self.balances = [i for i in self.unknown if i not in dropped and i not in self.floating]
         self.anchors = sorted({min(_group_of(self.free_sets, i)) for i in self.floating})
         self.balances += [i for i in self.floating if i not in self.anchors]
-
         self.column = {("flow", e): k for k, e in enumerate(self.active)}
         self.column |= {("node", i): len(self.active) + k for k, i in enumerate(self.unknown)}
         self.columns = [_columns(self.column, e, self.edges[e]) for e in self.rows]

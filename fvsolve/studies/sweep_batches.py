@@ -25,7 +25,6 @@ from fvsolve.output.memory_sink import MemorySink
 from fvsolve.parts.schedule import Schedule
 from fvsolve.parts.table_model import Table
 from fvsolve.solve import initial_state, solve
-from fvsolve.steady import union
 from fvsolve.step_limits.growing_modes import states_outside_cells
 from fvsolve.steppers.tableau import method_named
 from fvsolve.studies.outcome import end_if_interrupted
@@ -38,7 +37,7 @@ KINDS = {"nodes": {"reservoir", "junction"}, "links": {"pipe", "valve", "orifice
 UNSUITED = ("signals", "scalars", "controls", "reactions", "meshes", "lumped", "routes", "limits", "compare")
 KINKED = ("constant", "linear", "smooth", "ramp", "step")  # schedules that `break_times` describes
 UNCHANGED = [field.name for field in fields(Case) if field.name not in CHANGING_FIELDS]
-COPY = re.compile(r"~\d+~")  # ending of the names of the parts of a copy
+COPY = re.compile(r"~\d+~")  # ending of the names of the parts of a copy; names in a case file have no ~
 
 
 def ending(k: int) -> str:
@@ -56,10 +55,10 @@ def is_suited(model: Any) -> bool:
         return False
     parts = [(group, name, part) for group in KINDS for name, part in getattr(case, group).items()]
     names = {name for _, name, _ in parts}
-    kinds = all(part.kind in KINDS[group] and "~" not in name for group, name, part in parts)
+    kinds = all(part.kind in KINDS[group] for group, _, part in parts)
     kinds = kinds and all(probe.name in names for probe in case.probes)
     kinds = kinds and "auto" not in {numerics.pipe_model, *(getattr(part, "pipe_model", "") for _, _, part in parts)}
-    return kinds and is_connected(case) and steps_without_states(model)
+    return kinds and steps_without_states(model)
 
 
 def steps_without_states(model: Any) -> bool:
@@ -75,12 +74,12 @@ def steps_alike(case: Case, other: Case) -> bool:
     pairs = [(getattr(case, name), getattr(other, name)) for name in UNCHANGED]
     same = all(before is now or before == now for before, now in pairs)
     return same and all(
-        before.keys() == now.keys() and all(numbers_differ(part, now[name]) for name, part in before.items())
+        before.keys() == now.keys() and all(only_numbers_differ(part, now[name]) for name, part in before.items())
         for before, now in ((case.nodes, other.nodes), (case.links, other.links))
     )
 
 
-def numbers_differ(before: Any, now: Any) -> bool:
+def only_numbers_differ(before: Any, now: Any) -> bool:
     """True if two values of keys, or two parts, are equal or differ only as for `steps_alike`."""
     if before is now:
         return True
@@ -90,15 +89,8 @@ def numbers_differ(before: Any, now: Any) -> bool:
         kinked = before.kind == now.kind and before.kind in KINKED
         return before == now or (kinked and break_times(before) == break_times(now))
     if isinstance(before, Table):
-        return all(numbers_differ(getattr(before, name), getattr(now, name)) for name in type(before).model_fields)
+        return all(only_numbers_differ(getattr(before, name), getattr(now, name)) for name in type(before).model_fields)
     return isinstance(before, float) or (not isinstance(before, np.ndarray) and bool(before == now))
-
-
-def is_connected(case: Case) -> bool:
-    """True if links connect all nodes of a case."""
-    number = {name: i for i, name in enumerate(case.nodes)}
-    ends = [(number[link.from_], number[link.to]) for link in case.links.values()]
-    return len({*union(len(number), ends)}) == 1
 
 
 @dataclass
@@ -229,9 +221,7 @@ class Batch:
         """
         probes = self.case.probes
         extremes = {probe.text: summary.extremes[probe_text(probe, k)] for probe in probes}
-        own = replace(
-            summary, extremes=extremes, seconds=summary.seconds / SIZE, marks=notices[1]
-        )  # fmt: skip
+        own = replace(summary, extremes=extremes, seconds=summary.seconds / SIZE, marks=notices[1])
         model = VariantModel(case, probes, self.computed, [*case.notices, *notices[0]])
         rows = np.concatenate((values[:1], values[1 + k * len(probes) :][: len(probes)])).T
         return row_of(model, own, VariantSink(self.columns, time, rows))

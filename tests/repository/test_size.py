@@ -41,7 +41,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/solve": (2635, 11),
     "fvsolve/step_limits": (1610, 7),
     "fvsolve/steppers": (6632, 31),
-    "fvsolve/studies": (14861, 51),
+    "fvsolve/studies": (14851, 51),
     "fvsolve/validation": (1461, 11),
     "tests/attitude": (447, 2),
     "tests/basins": (6882, 22),
@@ -65,7 +65,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/solve": (1941, 8),
     "tests/step_limits": (1022, 4),
     "tests/steppers": (2105, 12),
-    "tests/studies": (8167, 23),
+    "tests/studies": (8211, 23),
     "tests/units": (267, 1),
     "tests/validation": (319, 1),
 }

@@ -81,6 +81,50 @@ def test_rows_of_batches_have_the_bits_of_rows_alone(name, varied):
     assert len({row["max(gate.pressure) [Pa]"] for row in one}) == len(tasks)
 
 
+def restated(how: str) -> dict:
+    """Case of `network` with another order, direction, start or unit."""
+    case = network(METHODS["upwind5"])
+    links = case["links"]
+    if how == "order":
+        case["links"], case["nodes"] = dict(reversed(links.items())), dict(reversed(case["nodes"].items()))
+    elif how == "ends":
+        for link in links.values():
+            link["from"], link["to"] = link["to"], link["from"]
+    elif how == "elevations":
+        for node, height in zip(case["nodes"].values(), (3.0, 1.0, 2.0, 0.0, 1.5), strict=True):
+            node["elevation"] = height
+    elif how == "no pipes":
+        case["links"] = {"valve": valve("lake", "out", 0.004, CLOSING)}
+        case["nodes"] = {name: case["nodes"][name] for name in ("lake", "out")}
+        case["numerics"] = {"end": 1.0, "method": "euler", "step": 0.01}
+        case["output"]["probes"] = ["valve.flow"]
+    elif how == "wave":
+        links["valve"]["opening"] = {"mean": 0.5, "amplitude": 0.4, "period": 0.3}
+    elif how == "units":
+        links["main"]["length"], case["output"]["units"] = "0.12 km", {"pressure": "bar", "flow": "l/s"}
+    elif how == "no probes":
+        del case["output"]["probes"]
+    else:
+        case["numerics"] |= {"rest": {"initial": "rest"}, "early": {"start": -0.5}}[how]
+    return case
+
+
+@pytest.mark.parametrize(
+    "how", ["order", "ends", "elevations", "no pipes", "wave", "units", "no probes", "rest", "early"]
+)
+def test_rows_of_restated_cases_have_the_bits_of_rows_alone(how):
+    case, tasks = restated(how), tasks_of("area", 20)
+    one, other = untimed(alone(case, tasks)), untimed(batched(case, tasks))
+    assert one == other and all(row["reason"] == "finished" for row in one)
+
+
+def test_variants_that_grow_are_stopped_as_alone():
+    case, tasks = network(METHODS["muscl"] | {"courant": 3.0}), tasks_of("area", 20)
+    rows = batched(case, tasks, failed=1)
+    assert untimed(rows) == untimed(alone(case, tasks))
+    assert not any(row["ok"] for row in rows) and all(row["reason"].startswith("stopped") for row in rows)
+
+
 def test_rows_do_not_depend_on_order_and_size_of_batches(monkeypatch):
     case, tasks = network(METHODS["upwind5"]), tasks_of("area", 45)
     forward, backward = untimed(batched(case, tasks)), untimed(batched(case, tasks[::-1]))
