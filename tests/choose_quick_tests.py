@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from reference.pairs import is_in_turn
 
 LIST = Path(__file__).parent / "durations.json"
 FOLDER = "FVSOLVE_RECORDING"  # variable that names the folder in which worker processes record
@@ -135,10 +136,18 @@ def pytest_configure(config) -> None:
     config.pluginmanager.register(Recorder(Path(os.environ[FOLDER]) / f"{worker}.json"))
 
 
+def pytest_collection_modifyitems(items) -> None:
+    items[:] = [item for item in items if is_in_turn(item)]
+
+
 def record(folder: Path) -> None:
     """Run all tests with an empty cache, and record each."""
     with tempfile.TemporaryDirectory(prefix="fvsolve-cache-") as cache:
-        environment = os.environ | {FOLDER: str(folder), "FVSOLVE_CACHE": cache, "PYTHONPATH": str(LIST.parent)}
+        environment = os.environ | {
+            FOLDER: str(folder),
+            "FVSOLVE_CACHE": cache,
+            "PYTHONPATH": f"{LIST.parent}:{LIST.parents[1]}",
+        }
         command = [
             sys.executable,
             "-m",

@@ -14,6 +14,7 @@ from pathlib import Path
 import hypothesis
 import pytest
 from hypothesis_profiles import NEW, fix_constants
+from reference.pairs import is_in_turn
 from tally import Tally, unknown_names
 
 from fvsolve.steppers.tableau import METHODS
@@ -62,6 +63,8 @@ def pytest_collection_modifyitems(config, items):
     if config.stash[TIER] != "full":
         config.stash[TALLY].names["unknown"] = unknown_names(SLOW, [item.nodeid for item in items])
     chosen = {"quick": quick, "rest": {*items} - quick | drawing, "full": {*items}}[config.stash[TIER]]
+    if config.stash[TIER] != "full":
+        chosen = {item for item in chosen if is_in_turn(item)}
     config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
     items[:] = [item for item in items if item in chosen]
 
@@ -115,9 +118,9 @@ def fvs(monkeypatch, capsys):
     return call
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def cluster():
-    """Cluster of two processes of Dask."""
+    """Cluster of two processes of Dask, which takes a seventh of a processor even while it waits."""
     distributed = pytest.importorskip("distributed", reason="Dask is an extra")
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as local:
         yield local

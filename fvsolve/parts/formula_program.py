@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -182,6 +182,7 @@ def is_formula(text: Any) -> bool:
     return isinstance(text, str) and TIME_FORMULA.search(text) is not None and not units.is_number_with_unit(text)
 
 
+@lru_cache(maxsize=256)
 def program_in(unit: str, dimension: str, text: str, names: tuple[str, ...], ambient: float) -> Program:
     """Formula whose value has a unit; "" for SI. ambient : ambient pressure [Pa]
 

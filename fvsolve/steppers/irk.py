@@ -486,6 +486,8 @@ def attempt(handle, run, t, h, now, new):
             finish(r, h)
             break
         if newton["jacobian_step"] == state["steps"]:
+            if r.progress[0]["no_sweeps"] == 1:
+                return rec.NEWTON_FAILED
             status = sweep(handle, r, matrix(r.coefficients, s, CROUT), t, h, now)
             newton["shift"] = 0.0  # the factors are those of a stage
             if status == iterations.FAILED:

@@ -41,6 +41,8 @@ from fvsolve.steppers.step_operations import (
 
 EVENT_TOLERANCE = 1e-13
 SECANT_TURNS = 40  # turns of the Illinois rule, which is slow where an event function is nearly zero at the start
+# attempts of an implicit step by Newton alone, at loose and at tight tolerances: shorter steps cost less than sweeps
+UNSWEPT_LOOSE, UNSWEPT_TIGHT, LOOSE = 5, 1, 1e-5
 JUMP = 1e-6  # fraction of an event function, and of a given step; smaller changes do not count as a jump
 
 
@@ -96,6 +98,7 @@ def locate(handle, run, r, h, now, new, e):
     g, g_new = r.g, r.g_new
     t, low, high, at_low, past = r.state[0]["t"], 0.0, h, 1.0, event_ratio(g, g_new)
     guess, at_high, side = h, past, 0
+    r.progress[0]["no_sweeps"] = 0
     for turn in range(101):
         done = turn == 100 or past >= -EVENT_TOLERANCE or high - low <= 4e-16 * max(abs(t), high)
         if done and guess == high:
@@ -336,7 +339,9 @@ def find_step(handle, run, r, h, full, due, new):
     full : length of the step without regard to due times and jumps [s]
     """
     state, control, now = r.state[0], r.control[0], r.progress[0]["now"]
-    failure, rate, last = rec.TINY_STEP, r.out[rec.RATE], False
+    failure, rate, last, failures = rec.TINY_STEP, r.out[rec.RATE], False, 0
+    unswept = UNSWEPT_LOOSE if control["size"] > LOOSE else UNSWEPT_TIGHT
+    unswept = unswept if control["mode"] == rec.TOLERANCE else 0
     for _ in range(1 << 62):
         rest = control["end"] - state["t"]
         last = h >= rest * (1.0 - 1e-9)
@@ -347,9 +352,11 @@ def find_step(handle, run, r, h, full, due, new):
         if too_short(control, state, h) and (not last or failure == rec.NEWTON_STUCK):
             return failure, h, last
         near_kink = rest <= 1e3 * step_control.shortest(control, state)
+        r.progress[0]["no_sweeps"] = 1 if state["last"] > 0.0 and failures < unswept and not near_kink else 0
         e, length, last = try_step(handle, run, r, h, last, due, now, new, near_kink)
         if e == rec.NEWTON_FAILED:
             failure = rec.NEWTON_STUCK
+            failures += 1
             h = full = step_control.after_failure(control, state, h)
         elif acceptable(e, near_kink):
             if control["mode"] == rec.TOLERANCE:

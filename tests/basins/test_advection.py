@@ -255,6 +255,7 @@ def test_mirrored_and_turned_grids_have_mirrored_and_turned_rates_to_the_bit(sch
         assert np.array_equal(turned.reshape(nx, ny), rate.T)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("cells", [(1, 1), (2, 1), (1, 3), (3, 2), (4, 4), (5, 5), (7, 2)])
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_grids_of_few_cells_fill_from_their_inlet(scheme, cells):

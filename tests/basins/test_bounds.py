@@ -45,6 +45,7 @@ WAYS = {  # numerics without a notice of bounds
 }  # fmt: skip
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("way", WAYS)
 def test_what_no_notice_warns_of_stays_in_its_bounds(way, shape, tmp_path):

@@ -149,6 +149,7 @@ def test_a_rectangle_agrees_with_its_formula_at_first_order():
     assert found == approx((rates / mesh.area[:, None]).T, abs=1e-12 * np.abs(found).max())
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("kind", ["triangles", "quads", "mixed"])
 @pytest.mark.parametrize("scheme", [UPWIND, MUSCL], ids=["upwind", "muscl"])
 def test_a_lake_with_dry_islands_rests_to_the_bit_and_no_water_is_lost(tmp_path, kind, scheme):
@@ -320,6 +321,7 @@ KEEPS = {  # scheme, `wide` of the limiter, bounds, greatest Courant number of E
 }  # fmt: skip
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("quads", [False, True], ids=["triangles", "quadrilaterals"])
 @pytest.mark.parametrize("name", KEEPS)
 def test_a_slotted_disk_stays_between_its_bounds(tmp_path, name, quads):

@@ -37,6 +37,7 @@ def kinds(found):
     return {one["kind"] for one in found.summary["warnings"]}
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("begins", [0.0, 0.5, 3.0])
 @pytest.mark.parametrize("depth", [0.002, 0.005])
 @pytest.mark.parametrize("n", [0.02, 0.1])
@@ -179,6 +180,7 @@ def test_upwind_says_nothing_of_a_lake_and_its_shore():
     assert "film" not in kinds(fvsolve.run(scene({"lake": lake}, {}, 1.0, {"scheme": "upwind"}, every=0.5)))
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize(
     "numerics", [{"method": "rk4"}, {"method": "dormand-prince", "rtol": 1e-6}], ids=["rk4", "rtol"]
 )
@@ -238,6 +240,7 @@ FILLED = {
 }  # fmt: skip
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("order", [1, -1])
 @pytest.mark.parametrize("way", FILLED)
 def test_a_dry_basin_that_a_hydrograph_fills_has_short_steps_from_the_start(way, order):

@@ -30,6 +30,7 @@ def moved(body, basin, until, numerics=None, **nodes):
 # water at rest ----------
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("axis", [[0, 0, 1], [0, 0, -1]])
 def test_water_that_turns_with_its_box_rests_as_a_paraboloid_wherever_the_axis_is(method, axis):

@@ -226,6 +226,7 @@ def test_no_mode_grows_whatever_the_sides_send_back(scheme):
     assert max(worst) < 1e-12
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("log", [False, True], ids=["linear", "log"])
 def test_noise_between_any_sides_dies_away(scheme, log):
@@ -375,6 +376,7 @@ STATES = {
 }
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["muscl", "weno5"])
 @pytest.mark.parametrize("name", STATES)
 def test_exact_riemann_problems_of_the_log_law(name, scheme):
@@ -407,6 +409,7 @@ def test_a_stream_is_stopped_by_a_wall_at_the_exact_pressure(scheme):
     assert found.mean() == approx(FLUID.stopped(0.0, u), rel=2e-3 if scheme == "upwind" else 2e-5)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("size", [0.05, 0.5])
 def test_a_simple_wave_steepens_as_the_exact_one(size, scheme):

@@ -50,6 +50,7 @@ STATES = {
 }
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["muscl", "weno5"])
 @pytest.mark.parametrize("name", STATES)
 def test_exact_riemann_problems_of_the_isentrope(name, scheme):
@@ -125,6 +126,7 @@ def of_log(rest: float, rho: float = RHO, c: float = C) -> np.ndarray:
     return RiemannInvariants(Fluid("x", "table", 300.0, rest, rho, bulk, None, p[0], table, ""), rest).table()
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("reflect", [1.0, 0.3, -1.0])
 def test_a_table_of_the_log_law_is_the_log_law(scheme, reflect):

@@ -54,6 +54,7 @@ def as_it_is(mesh, points):
 # geometry -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("kind", ["triangles", "quads", "mixed"])
 @pytest.mark.parametrize("many", [(12, 4), (40, 9)])
 def test_what_is_known_of_sides_is_that_of_the_mesh_with_corners_where_they_are(tmp_path, kind, many):
@@ -76,6 +77,7 @@ def test_what_is_known_of_sides_is_that_of_the_mesh_with_corners_where_they_are(
 # water ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", [*EXACT, "rodas-4"])
 @pytest.mark.parametrize("kind", ["triangles", "mixed"])
 def test_homologous_expansion_is_exact_to_round_off_under_every_method(tmp_path, kind, method):
@@ -95,6 +97,7 @@ def test_homologous_expansion_is_exact_to_round_off_under_every_method(tmp_path,
         assert abs(model.contents(state.y)[1]) < 1e-12 * model.contents(state.y)[0]
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["upwind", "muscl"])
 @pytest.mark.parametrize("method", EXACT)
 def test_between_walls_that_swing_a_lake_of_uniform_content_is_wherever_lines_are_and_mass_is_kept(
@@ -129,6 +132,7 @@ def test_where_no_wave_has_come_yet_lines_that_swing_leave_a_lake_as_it_is(tmp_p
     assert np.abs(basin.deviations(state.y)[0]).max() > 1e-4
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize("scheme", ["upwind", "muscl"])
 def test_a_wall_that_is_pushed_in_sends_out_the_exact_shock_and_does_its_work(tmp_path, side, scheme):
@@ -235,6 +239,7 @@ def law_of(basin, law, ratio):
     return basin.density * basin.speed**2 * (ratio - 1.0 if law == "linear" else math.log(ratio))
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log", "table"])
 @pytest.mark.parametrize("method", ["ssp-rk3", "rodas-4"])
 def test_a_liquid_that_is_compressed_evenly_follows_its_law_as_a_chamber_of_the_same_length_does(tmp_path, law, method):
@@ -259,6 +264,7 @@ def test_a_liquid_that_is_compressed_evenly_follows_its_law_as_a_chamber_of_the_
         assert force[-1] - rest == pytest.approx(wanted * 0.1 * 0.05, rel=3e-3)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize("speed", [1.0, -1.0])
@@ -279,6 +285,7 @@ def test_a_piston_that_starts_at_once_makes_a_water_hammer(tmp_path, law, side, 
         assert result[f"b.{side}.power"][-1] == pytest.approx(force[-1] * speed, rel=1e-15)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log", "table"])
 @pytest.mark.parametrize("method", [*EXACT[:3]])
 def test_where_no_wave_has_come_yet_lines_that_swing_leave_a_liquid_as_it_is(tmp_path, law, method):
@@ -325,6 +332,7 @@ def test_a_mass_on_a_spring_beside_a_column_of_liquid_swings_at_the_root_of_the_
         assert errors[1] < 0.35 * errors[0] and errors[1] < 0.02
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["log", "linear"])
 @pytest.mark.parametrize("method", ["ssp-rk3", "rodas-4"])
 def test_a_box_and_a_chamber_of_one_length_that_one_mass_compresses_have_one_pressure(law, method):
@@ -345,6 +353,7 @@ def test_a_box_and_a_chamber_of_one_length_that_one_mass_compresses_have_one_pre
     assert np.mean(box - result["cyl.B.pressure"]) == pytest.approx(0.0, abs=0.02 * box.max())
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log", "table", "water"])
 @pytest.mark.parametrize("scheme", ["upwind", "muscl"])
 def test_momentum_changes_by_the_forces_of_both_walls_alone(tmp_path, law, scheme):
@@ -372,6 +381,7 @@ def test_momentum_changes_by_the_forces_of_both_walls_alone(tmp_path, law, schem
     assert abs(mass) < 1e-12 * np.abs(basin.mesh.area * basin.states_of(dydt)[0]).sum()
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("method", ["ssp-rk3", "implicit-midpoint", "rodas-4"])
 def test_a_liquid_that_is_turned_or_seen_from_behind_says_the_same(law, method):
@@ -390,6 +400,7 @@ def test_a_liquid_that_is_turned_or_seen_from_behind_says_the_same(law, method):
         assert other == pytest.approx(found[0], rel=close, abs=close * np.abs(found[0]).max())
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log", "table"])
 @pytest.mark.parametrize("ways", [("west", "east"), ("south", "north")])
 def test_a_grid_and_a_mesh_of_the_same_rectangles_find_the_same_rates(tmp_path, law, ways):
@@ -425,6 +436,7 @@ def test_a_grid_and_a_mesh_of_the_same_rectangles_find_the_same_rates(tmp_path, 
 # energy ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("physics", ["free-surface", "liquid"])
 @pytest.mark.parametrize("body", [False, True])
 def test_the_ledger_of_energy_has_the_work_of_the_wall_and_its_step_part_falls_with_the_step(tmp_path, physics, body):

@@ -27,6 +27,7 @@ def flume(patches, cells=50, wide=2, length=2.0, side="east", level=1.0, physics
 # closed forms ----------
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["euler", "ssp-rk2", "rk4", "implicit-midpoint", "gauss-4", "rodas-4"])
 @pytest.mark.parametrize("side", ["east", "north"])
 def test_homologous_expansion_is_exact_to_round_off_under_every_method(method, side):
@@ -44,6 +45,7 @@ def test_homologous_expansion_is_exact_to_round_off_under_every_method(method, s
     assert abs(model.contents(state.y)[1]) < 1e-12 * model.contents(state.y)[0]
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize("scheme", ["upwind", "muscl"])
 def test_a_wall_that_is_pushed_in_sends_out_the_exact_shock_and_does_its_work(side, scheme):
@@ -129,6 +131,7 @@ def test_what_is_even_stays_even_and_amounts_and_mass_are_kept_between_walls_tha
     assert np.ptp(values["patchy"]) > 0.5
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("cells", [(8, 1), (8, 2), (2, 8), (1, 8), (2, 2)])
 @pytest.mark.parametrize("scheme", ["upwind5", "weno5"])
 @pytest.mark.parametrize("method", ["ssp-rk3", "radau-iia-3"])
@@ -306,6 +309,7 @@ def test_the_ledger_of_energy_has_the_work_of_the_wall_and_its_step_part_falls_w
     assert parts[1] < 1e-3
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize("toward", [1.0, -1.0])
 def test_a_body_on_a_prismatic_joint_takes_a_wall_along_as_a_mass_does(side, toward):

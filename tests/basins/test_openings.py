@@ -99,6 +99,7 @@ def test_a_stream_through_two_open_sides_shows_at_both(path, tmp_path):
     assert abs(mass["relative"]) < 1e-13 and result.marks == []
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log", "table"])
 @pytest.mark.parametrize("path", PATHS)
 def test_a_wave_that_meets_nothing_beyond_leaves_half_its_flow_at_either_end(path, law, tmp_path):
@@ -116,6 +117,7 @@ def test_a_wave_that_meets_nothing_beyond_leaves_half_its_flow_at_either_end(pat
     assert booked[model.node_names.index("pool.east")] == approx(-half, rel=rel)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["water", "linear", "log"])
 @pytest.mark.parametrize("path", ["graded", "triangles"])
 def test_ledgers_with_four_open_sides_close(path, law, tmp_path):
@@ -150,6 +152,7 @@ def test_a_given_velocity_shows_at_the_patches_that_it_passes(path, tmp_path):
     assert abs(result.ledger["dye"]["relative"]) < 1e-13
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["water", "linear", "log"])
 @pytest.mark.parametrize(("path", "scheme"), [("grid", s) for s in schemes("grid")] + [("triangles", "muscl")])
 def test_what_passes_open_sides_keeps_to_its_pattern(path, scheme, law, tmp_path):

@@ -45,6 +45,7 @@ def triangulated(tmp_path, spacing: float = 0.25) -> dict:
     return {"type": "basin", "mesh": {"file": str(tmp_path / "t.msh")}}
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
 @pytest.mark.parametrize("path", ["grid", "graded", "holes", "triangles"])
 def test_a_uniform_scalar_stays_uniform_in_sloshing_water(scheme, path, tmp_path):
@@ -103,6 +104,7 @@ def test_a_plane_wave_of_a_liquid_is_that_of_a_pipe():
     assert there["tap.flow"][-1] == approx(here["tap.flow"][-1], rel=1e-9)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize(("boundary", "left"), [({"boundary": "open"}, 0.0), ({"impedance": 3.0 * RHO * SPEED}, 0.5)])
 @pytest.mark.parametrize("holes", [None, [[3.9, 0.0, 4.0, 0.2]]], ids=["grid", "faces"])
 def test_what_a_boundary_sends_back_of_a_wave(boundary, left, holes):

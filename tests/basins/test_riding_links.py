@@ -95,6 +95,7 @@ def rests(case, loose=1e-13):
     return model
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("frame", FRAMES)
 def test_basins_that_a_riding_column_joins_rest_where_a_surface_rests_in_their_frame(frame, way, tmp_path):
@@ -105,6 +106,7 @@ def test_basins_that_a_riding_column_joins_rest_where_a_surface_rests_in_their_f
     assert all(np.ptp(one.deviations(model.start)[0]) > 0.01 for one in model.basins)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("link", [COLUMN, PIPE], ids=["column", "pipe"])
 @pytest.mark.parametrize("way", [{}, {"swap": True}, {"turned": True}, {"folder": True}, {"held": False}])
 def test_basins_that_a_riding_link_joins_rest_on_one_level_in_the_world(way, link, tmp_path):
@@ -196,6 +198,7 @@ DRAWN = {"as drawn": {}, "the duct to port": {"swap": True}, "turned": {"turned"
 QUICK = {"of many cells": {"grid": (2, 4)}, "a pipe": {"type": "pipe", "wave_speed": 200.0, "cells": 8}}
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("drawn", [*DRAWN, *QUICK])
 @pytest.mark.parametrize("joint", JOINTS)
 def test_a_basin_and_a_tank_swing_as_one_column_of_water_does(joint, drawn):

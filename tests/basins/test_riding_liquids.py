@@ -56,6 +56,7 @@ def resting(law, phi):
 # at rest ----------
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", FLUIDS)
 @pytest.mark.parametrize("cells", ["even", "graded", "mesh"])
 def test_a_leaning_box_holds_its_liquid_at_rest_and_pressure_grows_with_depth(law, cells, tmp_path):
@@ -76,6 +77,7 @@ def test_a_leaning_box_holds_its_liquid_at_rest_and_pressure_grows_with_depth(la
         assert pressure == pytest.approx(resting(law, GRAVITY * height), abs=1e-6)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("cells", ["grid", "mesh"])
 @pytest.mark.parametrize("how", ["turns", "slows", "leans and turns"])
@@ -173,6 +175,7 @@ def test_a_ring_of_pressure_seen_from_axes_that_turn_is_the_ring_that_stands_sti
 # pushed ----------
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("along", ["x", "y"])
 def test_a_full_box_that_is_pushed_at_once_rings_as_a_closed_pipe(along, law):
@@ -327,6 +330,7 @@ def test_implicit_methods_agree_on_a_box_that_is_free_to_turn(method):
 # open ----------
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("side", [{"boundary": "open"}, {"impedance": 0.0}])
 def test_what_lies_beyond_an_open_side_rests_in_the_same_axes(side, law):

@@ -180,6 +180,7 @@ def bump(x):
     return 0.2 * np.exp(-(((x - 15.0) / 1.5) ** 2))
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize(("scheme", "low"), [("upwind", 0.9), ("muscl", 1.9), ("upwind5", 4.5), ("weno5", 4.5)])
 @pytest.mark.parametrize("way", ["east", "north"])
 def test_smooth_flow_over_a_bed_keeps_the_order_of_the_scheme(scheme, low, way):
@@ -275,6 +276,7 @@ def thacker(kind, x, y, t):
     return h, h * u, h * v, 2.0 * math.pi / w
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["muscl", "weno5"])
 @pytest.mark.parametrize("kind", ["planar", "curved"])
 def test_water_swings_in_thackers_bowls_for_three_periods(kind, scheme):

@@ -60,6 +60,7 @@ def frequencies(case):
 # potential theory ----------
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("outline", [BOX, CYLINDER], ids=["box", "cylinder"])
 @pytest.mark.parametrize("depth", [0.2, 1.0, 3.0])
 @pytest.mark.parametrize("turns", [False, True], ids=["sway", "roll"])
@@ -93,6 +94,7 @@ def test_water_that_is_held_is_a_disc_of_ice_when_thin_and_a_rod_when_slender():
 # through the case file ----------
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("low", [0.3, -1.5], ids=["tank above the axis", "tank below it"])
 @pytest.mark.parametrize("shape", ["box", "box turned", "cylinder"])
 def test_a_hull_rolls_at_the_frequencies_of_potential_flow(shape, low, tmp_path):

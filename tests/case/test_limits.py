@@ -163,6 +163,7 @@ def test_a_limit_that_is_just_met_holds_and_every_one_of_two_bounds_counts() -> 
         assert bound in (None, one.bound)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["rk4", "gauss-4", "rodas-4"])
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_no_row_is_needed_to_find_it(method: str, law: str) -> None:
@@ -394,6 +395,7 @@ def parting(limits: dict, turned: bool = False, opening: float = 0.1, **more) ->
     return case | {"fluid": {**case["fluid"], "law": "mixture", "air_fraction": 1e-7, "cavitation": True}}
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("quantity", [*LEAST])
 def test_a_limit_at_vapour_pressure_fails_where_a_cavity_opens(quantity: str, turned: bool) -> None:

@@ -133,6 +133,7 @@ def still(made):
 LINES = [("auto", 0.0), ("finite-volume", 3.0)]  # numerics.pipe_model, and shortest pipe for steps of cells [m]
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("line, shortest", LINES)
 @pytest.mark.parametrize("name", ["Net2", "Net3"])
 def test_without_an_event_nothing_moves_by_one_bit_and_a_closure_moves_it(name, line, shortest):
@@ -231,6 +232,7 @@ def written(tmp_path, changes, options=""):
     return path
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("weight", [1.0, 0.8, 1.3])
 @pytest.mark.parametrize("leaks", [{}, {"[VALVES]": LEAKY}], ids=["alone", "emitters"])
 @pytest.mark.parametrize("units, required, least", [("LPS", 40, 5), ("GPM", 66, 8)])
@@ -264,6 +266,7 @@ def test_a_demand_behind_a_valve_gets_what_its_pressure_allows(way, demand, tmp_
         build(load(tomllib.loads(import_network(path).text)))
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("weight", [0.8, 1.0, 1.3])
 @pytest.mark.parametrize("units, power", [("LPS", 3), ("GPM", 4)])
 def test_a_pump_of_constant_power_lifts_as_in_epanet_whatever_the_fluid_weighs(weight, units, power, tmp_path):
@@ -272,6 +275,7 @@ def test_a_pump_of_constant_power_lifts_as_in_epanet_whatever_the_fluid_weighs(w
     assert lost < 2e-3 and off < 1e-3
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("weight, setting", [(0.8, 28), (0.8, 33.6), (0.8, 41), (1.3, 54.6), (1.3, 58), (1.3, 68)])
 @pytest.mark.parametrize("kind", ["PRV", "PSV"])
 def test_a_set_pressure_is_one_of_water_whatever_the_fluid_weighs(kind, weight, setting, tmp_path):

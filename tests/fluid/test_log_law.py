@@ -72,6 +72,7 @@ def riemann_run(name: str, cells: int, scheme: str, method: str = "ssp-rk3"):
     return x[inner] - LENGTH / 2, found, exact, riemann
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
 @pytest.mark.parametrize("name", STATES)
 def test_riemann_problem_reaches_the_exact_middle_state(name, scheme):
@@ -286,6 +287,7 @@ def test_flows_that_are_given_are_volumes_at_the_reference_density(where):
     assert result["line.flow@1"][-1] == pytest.approx(flow / np.exp(2e8 / 2.2e9), rel=1e-6)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["log", "table"])
 @pytest.mark.parametrize("heads", [(60.0, 58.0), (58.0, 60.0), (60.0, 59.99)])
 @pytest.mark.parametrize("length, diameter", [(30.0, 0.5), (2.0, 2.0), (1.0, 0.05), (500.0, 1.5)])

@@ -42,6 +42,7 @@ def test_order_of_parts_and_blocks_and_direction_of_links(name):
     assert difference(plain, fvsolve.run(turned)) < 1e-13
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("rtol", [1e-8, 1e-9])
 @pytest.mark.parametrize("name", TURNED)
 def test_methods_agree_within_five_tolerances(name, rtol):

@@ -29,6 +29,7 @@ def handles(slate: RunData, cuts: list[int]) -> list[np.ndarray]:
     return found
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("cuts", [[0, 4, 9], [0, 1, 2, 9]])
 def test_bands_of_pipes_give_the_bits_of_all(law, cuts):

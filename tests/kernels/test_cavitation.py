@@ -189,6 +189,7 @@ def test_a_node_whose_balance_has_a_kink_is_closed_at_every_resolution(cell_time
     assert abs(result.ledger["mass"]["relative"]) < 1e-13
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["ssp-rk2", "dormand-prince"])
 @pytest.mark.parametrize("reverse", [False, True])
 def test_a_demand_that_a_cavity_cannot_supply_ends_the_run_and_one_that_falls_with_the_pressure_does_not(

@@ -35,6 +35,7 @@ def leaks(x: float, *around: float) -> float:
     return sum(math.copysign(math.sqrt(abs(h - x)), h - x) for h in around)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("ends", [None, [1.1, 1.2, 1.3], [1.0, 1.0, 1.0]], ids=["together", "in turn", "at once"])
 def test_a_junction_between_shut_valves_floats_where_equal_leaks_balance(ends, law):
@@ -97,6 +98,7 @@ def test_a_valve_shuts_on_a_rigid_column_at_the_head_that_stops_it(numerics):
     assert result["X.head"][late] == pytest.approx(50.0, rel=1e-12)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("method", ["dormand-prince", "rodas-5p", "radau-iia-5"])
@@ -121,6 +123,7 @@ def test_a_valve_does_so_beside_an_ideal_check_valve_that_is_shut(method, law, t
     assert np.all(result["main.flow"][result.t > 1.001] == 0.0)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])
 @pytest.mark.parametrize("ends", [(1.0, 0.0), (0.0, 1.0), (1.0, 1e-6)], ids=["shuts", "opens", "all but shuts"])
 def test_no_ramp_of_a_valve_on_a_rigid_column_stalls_the_run(ends, exponent):

@@ -51,6 +51,7 @@ def system_of(case, method, at=None, steps=1000):
     return DenseGrowth(method_named(method), energy_form(state.model, state.y).seen(linearise_at(state).a), steps)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("stiffness, hold", [(1e6, 0.0), (1e7, 0.1)])
 @pytest.mark.parametrize("method", ["rk4", "ssp-rk3"])
 def test_two_masses_on_a_spring_fail_where_their_relative_motion_does(stiffness, hold, method):

@@ -299,6 +299,7 @@ SCENES = {"arm": lambda: arm_on_springs(), "chain": lambda: four_bar(),
 METHODS = {"dormand-prince": {"rtol": 1e-8}, "radau-iia-5": {"rtol": 1e-6}, "rodas-4": {"rtol": 1e-6}}
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("scene", SCENES)
 def test_what_stands_in_balance_stays(scene, method):
@@ -322,6 +323,7 @@ def by_hand(nodes: dict, model) -> dict:
     return again
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("initial", ["steady", "equilibrium"])
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_balance_is_the_same_scene_with_the_found_places_written_by_hand(scene, initial):

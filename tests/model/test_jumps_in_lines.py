@@ -66,6 +66,7 @@ def stub(length: float, numerics: dict, end: float = 4.0) -> dict:
     return scene(nodes, links, end, {"pipe_model": "delay-line", **numerics}, ["gate.head", "j.head", "v.flow"], 0.05)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("length", [2.0, 8.0])
 def test_a_jump_takes_its_time_in_a_line_shorter_than_a_step(method, length):
@@ -109,6 +110,7 @@ def beside(device: str, numerics: dict, before: float, after: float) -> dict:
     )
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("method", METHODS)
 def test_a_device_acts_before_what_a_jump_brings_it_is_noted(device, method):

@@ -215,6 +215,7 @@ def test_a_place_is_read_with_the_same_weights_from_either_end(degree, n):
         assert averages @ there[1] == pytest.approx((k / (4 * n)) ** power[:, 0], rel=1e-9)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_pipe_drawn_the_other_way_reads_the_same(scheme, law):

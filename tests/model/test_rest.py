@@ -78,6 +78,7 @@ def still_probes(result) -> tuple[list[str], list[str]]:
     return pipes, [n for n in names if n not in pipes]
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize(
     "friction", [ROUGH, {"model": "quasi-steady", "roughness": 2.6e-4}], ids=["steady", "quasi-steady"]
@@ -94,6 +95,7 @@ def test_a_looped_network_without_an_event_does_not_move_by_one_bit(scheme, fric
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["muscl", "upwind5"])
 @pytest.mark.parametrize(
     "friction", [{"model": "hazen-williams", "coefficient": 110.0}, {"model": "steady", "factor": 0.02}]
@@ -180,6 +182,7 @@ def busy(law: str, scheme: str) -> dict:
     return case
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
 def test_the_mass_ledger_of_a_busy_network_closes(law, scheme):
@@ -259,6 +262,7 @@ def test_a_jump_at_the_very_end_has_two_rows():
     assert result["tap.flow"][-1] < 0.5 * result["tap.flow"][-2]
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5"])
 def test_from_rest_a_pipe_between_two_lakes_starts_as_one_body_whichever_way_it_is_drawn(law, scheme):
@@ -306,6 +310,7 @@ def held(case: dict) -> tuple[dict[str, float], float]:
     return {side: run[f"lift.{side}.pressure"][0] for side in "AB"}, float(np.ptp(run["load.position"]))
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("initial", ["steady", "equilibrium"])
 @pytest.mark.parametrize(
     ("load", "more", "pressures"),

@@ -54,6 +54,7 @@ def stray(model, t: float, y: np.ndarray) -> float:
     return float(np.max(np.max(change * ~pattern, axis=1) / np.maximum(known, rounding)))
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme, law):
@@ -76,6 +77,7 @@ def test_what_is_carried_keeps_to_its_pattern_beside_sides_and_corners_too(schem
     assert stray(model, 0.2, model.scale * rng.normal(size=model.y_size)) < 1e-7
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
 @pytest.mark.parametrize("physics", ["free-surface", "transport"])
 def test_scalars_that_decay_spread_and_pass_the_boundary_keep_to_their_pattern(physics, scheme):
@@ -155,6 +157,7 @@ def test_differences_by_color_are_those_state_by_state(law, scheme):
         assert np.all(np.abs(one - other) <= 1e-5 * np.max(np.abs(other), axis=1, keepdims=True) + 1e-9)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["upwind", "upwind5", "muscl"])
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_what_slopes_store_is_what_they_supply(law, scheme):

@@ -131,6 +131,7 @@ def hard(name, law, numerics, head=FALL_AND_RISE, end=3.0):
     return scene(nodes, {**ways, **links}, end, numerics, probes, 0.01, fluid={**WATER, "law": law})
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("name", HARD)
 @pytest.mark.parametrize("law, numerics", WAYS, ids=["explicit", "rosenbrock", "log"])
 def test_hard_scenes_end_with_few_events_and_no_flow_backwards(name, law, numerics):
@@ -292,6 +293,7 @@ def assert_leaves(case, name, disc, felt):
     assert result[f"{name}.flow"][at] * RHO == pytest.approx(flow, rel=1e-3)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("disc", [LAG, SWING])
 @pytest.mark.parametrize("method", METHODS)
 def test_a_disc_and_the_column_that_it_holds_leave_its_seat_as_their_equations_say(method, disc):
@@ -299,6 +301,7 @@ def test_a_disc_and_the_column_that_it_holds_leave_its_seat_as_their_equations_s
     assert_leaves(*held_column("check-valve", False, disc, METHODS[method]), disc, "drop")
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("disc", [LAG, SWING])
 @pytest.mark.parametrize("kind, after, felt", [("check-valve", True, "drop"), ("relief-valve", True, "drop"),
                                                ("relief-valve", False, "source")])  # fmt: skip
@@ -372,6 +375,7 @@ def slammed(disc, law, numerics, end):
     return fvsolve.run(case), name
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["log", "table"])
 @pytest.mark.parametrize("disc", [LAG, SWING])
 @pytest.mark.parametrize("numerics", [METHODS["auto"], METHODS["radau"], METHODS["explicit"],
@@ -444,6 +448,7 @@ DEAD_ENDS = {
 }  # fmt: skip
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("twice", [False, True])
@@ -536,6 +541,7 @@ CURVE_WAYS = [("linear", {"method": "radau-iia-5", "rtol": 1e-8}), ("linear", {"
         ("linear", {"method": "rk4", "step": 0.01}), ("log", TIGHT), ("mixture", TIGHT)]  # fmt: skip
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("against", [False, True], ids=["along", "against"])
 @pytest.mark.parametrize("law, numerics", CURVE_WAYS)
 def test_so_it_does_by_every_method_and_law_however_the_column_is_drawn(law, numerics, against):

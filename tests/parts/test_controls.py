@@ -199,6 +199,7 @@ def moving_case(law):
                  fluid=law, controls=controls)  # fmt: skip
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", LAWS, ids=["linear", "log", "table"])
 @pytest.mark.parametrize("method", ["ssp-rk3", *METHODS])
 def test_a_loop_at_rest_does_not_move_by_one_bit(method, law):
@@ -350,6 +351,7 @@ def test_restated_loops_have_the_same_result(method):
     assert final(tower({"control": "hold"}, 0.5, controls={"hold": centimetres}), method)[0] == found
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(
     "formula, schedule",

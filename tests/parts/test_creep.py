@@ -111,6 +111,7 @@ def test_a_wall_that_creeps_shrinks_about_a_cavity_and_no_liquid_is_lost():
     assert taken[-1] > 0.0 and np.all(np.diff(taken) >= 0.0)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("scheme", ["upwind", "upwind5", "muscl"])
 def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme, law):

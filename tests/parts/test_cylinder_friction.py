@@ -200,6 +200,7 @@ def test_a_cylinder_between_two_masses_sticks_them_together():
     assert load[joined] == pytest.approx(200.0 * t[joined] ** 2 / 2.0 / 20.0, abs=1e-6)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("method", METHODS)
 def test_a_held_load_does_not_move_by_a_bit(law, method):

@@ -315,6 +315,7 @@ def load_sensing_by_hand(start, limit=True, sense=True):
     return y
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("limit, sense", [(True, True), (True, False), (False, True)])
 def test_a_compensated_pump_is_that_of_scipy(method, limit, sense):

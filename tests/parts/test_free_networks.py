@@ -350,6 +350,7 @@ def drift(case):
     return most, first
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("tanks", [False, True])
 def test_a_rig_on_rails_keeps_its_momentum_while_a_valve_shuts_between_its_pipes(tanks, law):
@@ -369,6 +370,7 @@ def test_a_rig_in_free_flight_keeps_all_momenta_to_the_order_of_steps_and_cells(
     assert spun[2] < 0.4 * spun[1] < 1e-8 * size  # fluxes of faces equal momenta of cells to second order
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("tanks", [False, True])
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_the_energy_of_a_rig_in_free_flight_closes_but_for_steps_cells_and_valves(law, tanks):

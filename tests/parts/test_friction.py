@@ -551,6 +551,7 @@ def test_without_an_event_no_bit_moves():
     assert np.all(run["gate.pressure"] == run["gate.pressure"][0])
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["upwind", "upwind5", "muscl"])
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme, law):

@@ -65,6 +65,7 @@ def test_a_throttle_heats_the_oil_by_its_power(numerics):
     assert book["heated"] == approx(1e3 * power / CP, rel=1e-9)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("numerics", METHODS, ids=lambda item: item["method"])
 @pytest.mark.parametrize("cooler", [{"conductance": "0.4 kW/K"}, {"effectiveness": 0.35}], ids=["G", "e"])
 def test_a_cooled_tank_follows_its_exponential(cooler, numerics):
@@ -249,6 +250,7 @@ def test_a_uniform_temperature_stays_uniform_under_every_density_law(law):
         assert np.array(result[probe]) == approx(50.0, rel=1e-13)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize(
     "friction", [LINE["friction"], {"model": "unsteady", "roughness": 1e-5}], ids=lambda f: f["model"]
 )
@@ -303,6 +305,7 @@ def test_units_order_and_direction_do_not_matter():
     assert books[0]["heat"] == approx(books[1]["heat"], rel=1e-7) and max(b["relative"] for b in books) < 1e-13
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("method", ["rk4", "radau-iia-5", "rodas-5p"])
 def test_a_scene_at_rest_does_not_move(law, method):
@@ -321,6 +324,7 @@ def test_a_scene_at_rest_does_not_move(law, method):
     assert result.ledger["temperature"]["heated"] == 0.0
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("method", ["rk4", "radau-iia-5"])
 def test_no_rate_depends_on_a_state_that_its_pattern_has_not(law, method):
@@ -432,6 +436,7 @@ SEVERAL = {
 }
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("name", SEVERAL)
 @pytest.mark.parametrize("heat_from", ["all", ["several"]], ids=["all", "name"])
 def test_all_restrictions_of_a_link_heat_the_fluid(name, heat_from):
@@ -465,6 +470,7 @@ def circuit(kind, drive, **more):
                   fluid=OIL | {"law": "linear"})  # fmt: skip
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("drive", ["speed", "housing", "inertia"])
 @pytest.mark.parametrize("kind", ["pump", "motor"])
 def test_all_losses_of_a_displacement_machine_heat_the_fluid(kind, drive):

@@ -96,6 +96,7 @@ def edge_flows(jack: Jack, area: float, cuts=CUTS):
     return flows
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method, rtol", [("dormand-prince", 1e-11), ("radau-iia-5", 1e-10)])
 @pytest.mark.parametrize("law", LAWS)
 def test_a_servo_cylinder_follows_the_trajectory_of_scipy(law, method, rtol):

@@ -261,6 +261,7 @@ def by_events(excess, end, ohm):
     return lambda time: next(sol(time)[0] for begin, stop, sol in reversed(parts) if begin <= time <= stop)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("bridge", [False, True])
 @pytest.mark.parametrize("method", ["dormand-prince", "rodas-5p"])
 def test_rectifiers_are_those_of_scipy_with_events(bridge, method):

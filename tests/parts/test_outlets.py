@@ -120,6 +120,7 @@ def test_a_way_out_of_a_soft_place_takes_nothing_in_and_lets_out_what_its_law_sa
     assert abs(result.ledger["mass"]["relative"]) < 1e-10  # bound of Rosenbrock methods, with slopes by differences
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["auto", "radau-iia-5", "rodas-4", "rk4"])
 @pytest.mark.parametrize("outlet", LAWS)
 def test_so_it_is_with_a_fluid_whose_density_follows_the_pressure(outlet, method):
@@ -357,6 +358,7 @@ METHODS = [{"method": "dormand-prince", "rtol": 1e-10}, {"method": "radau-iia-5"
            {"method": "rodas-5p", "rtol": 1e-9}, {"method": "rk4", "step": 0.1}]  # fmt: skip
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("more", [{}, {"to": "sump"}], ids=["ambient", "place"])
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("numerics", METHODS, ids=lambda one: one["method"])
@@ -377,6 +379,7 @@ def test_it_bursts_when_the_level_says_and_lets_out_what_the_root_says(numerics,
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log", "mixture"])
 @pytest.mark.parametrize("turned", [False, True], ids=["along", "against"])
 def test_a_wave_bursts_it_as_it_arrives_and_the_line_gives_what_its_impedance_says(law, turned):

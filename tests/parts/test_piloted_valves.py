@@ -425,6 +425,7 @@ def test_it_dissipates_only_and_the_ledgers_close(name):
             assert np.all(np.diff(values) >= -1e-9 * max(values[-1], 1.0))
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", METHODS[1:])
 @pytest.mark.parametrize("name", SCENES)
 def test_methods_agree(name, method):
@@ -436,6 +437,7 @@ def test_methods_agree(name, method):
             assert other[probe] == pytest.approx(first[probe], abs=2e-6 * 2.4e7)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("name", SCENES)
 def test_the_pattern_of_the_jacobian_is_complete(name, law):
@@ -446,6 +448,7 @@ def test_the_pattern_of_the_jacobian_is_complete(name, law):
     assert max(stray(model, t, model.scale * rng.normal(scale=0.1, size=model.y_size)) for t in (0.0, 1.0)) < 1e-7
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["dormand-prince", "rodas-5p"])
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("name", SCENES)

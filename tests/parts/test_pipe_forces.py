@@ -55,6 +55,7 @@ def throttled(law: str, friction: dict, **numerics) -> dict:
     return case
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["rk4", "gauss-4", "rodas-4"])
 @pytest.mark.parametrize(("law", "friction"), [("linear", ROUGH), ("linear", UNSTEADY), ("log", ROUGH)])
 def test_the_ledger_of_momentum_closes(law: str, friction: dict, method: str) -> None:

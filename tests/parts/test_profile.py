@@ -87,6 +87,7 @@ def test_it_is_the_chain_of_300_pipes(law: str, scheme: str) -> None:
         assert off_chain(law, scheme, hills) <= 1.5 * straight + 1e-12
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("scheme", ["upwind", "weno5"])
 @pytest.mark.parametrize("method", ["rk4", "gauss-4", "rodas-4"])

@@ -106,6 +106,7 @@ def test_pump_between_two_lakes_alone():
         assert result["p.flow"] == approx(q, rel=1e-12 if law == "linear" else 1e-4)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log", "table"])
 @pytest.mark.parametrize("curve", [ONE, FOUR], ids=["one", "four"])
 def test_nothing_moves_by_a_bit_while_nothing_changes(law, curve):
@@ -206,6 +207,7 @@ def random_scene(seed: int) -> dict:
     return scene(nodes, links, 2.5, {}, probes, 0.02)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("seed", range(12))
 def test_flows_and_heads_lie_on_the_curves(seed, law):

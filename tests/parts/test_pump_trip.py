@@ -188,6 +188,7 @@ def test_given_torques_turn_the_shaft():
     assert result["pump.speed"][after] == approx(truth.sol(result.t[after])[0], rel=1e-8)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("check", [False, True])
 def test_energy_ledger_of_a_trip_closes(law, check):

@@ -244,6 +244,7 @@ def test_a_pipe_with_waves_comes_to_the_same_flow():
 # rest, energy, pattern, resume --------------------------------------------------------------------------------------
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("friction", [HAZEN, FRICTIONS[-1]], ids=lambda one: one["model"])

@@ -159,6 +159,7 @@ def line(kind, given, **more):
     return scene(nodes, links, 0.5, SMOOTH, ["v.flow", "v.opening"])
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize(
     "kind, given", [("pressure-reducing", 4e5), ("pressure-sustaining", 7e5), ("flow-control", 0.1)]
@@ -258,6 +259,7 @@ def shutting_ends(kind):
     return far_ends(kind, *((6e5, 2e5) if kind == "pressure-sustaining" else (3e5, 7e5)))
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("numerics", [{"rtol": 1e-6}, {"method": "dormand-prince", "rtol": 1e-6},
                                       {"method": "rodas-5p", "rtol": 1e-9}, {"method": "radau-iia-5", "rtol": 1e-6},
@@ -277,6 +279,7 @@ def test_it_leaves_its_seat_with_the_column_that_it_holds_as_their_equations_say
     assert result[f"{name}.flow"][rows] * RHO == pytest.approx(flow, rel=near)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("numerics", [{"rtol": 1e-6}, {"method": "dormand-prince", "rtol": 1e-6},
                                       {"method": "rodas-5p", "rtol": 1e-9}, {"method": "radau-iia-5", "rtol": 1e-6},
                                       {"method": "rk4", "step": 1e-3}])  # fmt: skip
@@ -351,6 +354,7 @@ def vessel(numerics: dict, law: str = "linear", end: float = 6.0, fill: float = 
     return scene(nodes, links, end, numerics, probes, 0.1, fluid=WATER | {"law": law})
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("numerics", LUMPED, ids=lambda one: one["method"])
 def test_tripped_it_drains_a_tank_by_the_integral_of_its_opening(numerics, law):

@@ -160,6 +160,7 @@ def seen(flow_area):
     return [falling(full), falling(max(shut, full)), rising(empty), rising(min(empty, full))]
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law, near", [("linear", 1e-3), ("log", 3e-3), ("mixture", 3e-3)])
 @pytest.mark.parametrize("flow_area", [1e-5, 2e-5, 4e-5])
 def test_flow_that_comes_back_holds_it_open_until_it_falls_shut(flow_area, law, near):

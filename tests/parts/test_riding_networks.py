@@ -134,6 +134,7 @@ def line(near, far, joint, law="linear", from_="open", cells=40, length=LONG, **
     return case
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("from_", ["open", "shut"])
 @pytest.mark.parametrize(("law", "scheme"), [("linear", "upwind5"), ("linear", "muscl"), ("log", "upwind5")])
 def test_a_pipe_that_slows_down_has_the_wave_of_the_closed_form_at_its_dead_end(law, scheme, from_):
@@ -148,6 +149,7 @@ def test_a_pipe_that_slows_down_has_the_wave_of_the_closed_form_at_its_dead_end(
     assert np.max(off[beats < 1.5]) < (1e-7 if law == "linear" else 2.5e-4)  # density rises by p / K
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("from_", ["open", "shut"])
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("inner", [0.0, 5.0])

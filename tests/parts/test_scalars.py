@@ -258,6 +258,7 @@ def hammer(scheme: str, friction: dict, **dye) -> dict:
     return case
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5", "upwind5", "central"])
 @pytest.mark.parametrize("model", ["quasi-steady", "unsteady"])
 def test_a_uniform_value_stays_uniform_through_water_hammer(scheme, model):

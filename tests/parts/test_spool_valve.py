@@ -256,6 +256,7 @@ def test_slow_commands_leave_half_the_hysteresis_on_each_side(dead):
         )
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("overlap", [0.0, 0.05, -0.05])
 @pytest.mark.parametrize("command", [{"mean": 0.05, "amplitude": 0.5, "period": 0.04},
                                      "0.05 + 0.5*sin(50*pi*t)", SLOW_AND_QUICK])  # fmt: skip
@@ -280,6 +281,7 @@ FORMULA = "0.1 + 0.5*sin(50*pi*t)"
 RAMP = {"start": 0.01, "duration": 0.05, "value": [0.6, -0.4]}
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("overlap", [0.0, 0.1, -0.1])
 @pytest.mark.parametrize("position, twin", [
     (WAVE, FORMULA), (RAMP, table((0.01, 0.6), (0.06, -0.4))), (RAMP, "0.6 - 20*min(0.05, max(0, t - 0.01))"),
@@ -311,6 +313,7 @@ def test_one_overlap_for_all_edges_is_a_table_of_equal_ones_to_the_bit():
         assert np.array_equal(found[0]["A.pressure"], found[1]["A.pressure"])
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("overlap", [0.0, 0.1, -0.1])
 @pytest.mark.parametrize("reverse", [False, True])
 def test_a_spool_valve_is_four_valves(overlap, reverse):
@@ -370,6 +373,7 @@ RESTING = [(0.0, {}), (0.05, {"overlap": -0.1}), (-0.1, {"dead_band": 0.1})]  # 
 HELD = [(0.3, {"dead_band": 0.1}), (1.0, {}), (-1.0, {"hysteresis": 0.1})]  # chambers at equal pressures
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law, command, keys", [(law, *rest) for law in ("linear", "log") for rest in RESTING] +
                          [("linear", *rest) for rest in HELD])  # fmt: skip
 @pytest.mark.parametrize("method", ["rk4", "dormand-prince", "radau-iia-5", "rodas-5p", "auto"])

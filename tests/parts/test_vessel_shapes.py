@@ -97,6 +97,7 @@ def test_a_cylinder_that_barely_slopes_or_leans_is_that_which_lies_or_stands():
         assert found[0] == pytest.approx(found[1], rel=1e-5)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law, near", [("linear", 1e-8), ("log", 5e-4), ("mixture", 5e-4)])
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_small_oscillation_has_its_closed_period(shape, law, near):
@@ -149,6 +150,7 @@ def test_under_a_compressible_law_it_differs_by_the_first_order_of_its_compressi
     assert off[0] < 1e-3 and off[0] / off[1] == pytest.approx(4.0, rel=0.05)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log", "mixture"])
 @pytest.mark.parametrize("more", [{}, {"shape": "table", "exponent": 1.0}])
 def test_its_energy_closes_and_its_compressor_supplies(law, more):

@@ -1,6 +1,8 @@
-"""Pairwise combinations: few rows that contain every pair of values of two lists, instead of a full product."""
+"""Combinations of parameters that contain every pair of values, or every value, instead of a full product."""
 
 from itertools import combinations, product
+
+from _pytest.mark import ParameterSet
 
 
 def pairs(*lists) -> list[tuple]:
@@ -22,3 +24,25 @@ def indices(values) -> range:
 
 def met(row: tuple) -> set:
     return set(combinations(enumerate(row), 2))
+
+
+def is_in_turn(item) -> bool:
+    """False for the combinations of parameters that the mark `in_turn` leaves out.
+
+    The k-th value of the longest list is combined with value k of each other list, which begins again at its end. So
+    each value of each list occurs at least once.
+    """
+    if not item.get_closest_marker("in_turn"):
+        return True
+    axes = [place_in_list(mark, item.callspec.params) for mark in item.iter_markers("parametrize")]
+    _, k = max(axes, key=lambda axis: axis[0])
+    return all(index == k % size for size, index in axes)
+
+
+def place_in_list(mark, values: dict) -> tuple[int, int]:
+    """Length of the list of a mark `parametrize`, and the index of the values of a test in it."""
+    names, rows = mark.args[0], list(mark.args[1])
+    names = [name.strip() for name in names.split(",")] if isinstance(names, str) else names
+    rows = [row.values if isinstance(row, ParameterSet) else (row,) if len(names) == 1 else row for row in rows]
+    same = [all(own is values[name] for name, own in zip(names, row, strict=True)) for row in rows]
+    return len(rows), same.index(True)

@@ -1,6 +1,7 @@
 """Files that are damaged, or do not fit on the disk, are written again or named in an error of the program."""
 
 import gc
+import itertools
 import json
 import os
 import shutil
@@ -44,20 +45,21 @@ def compiled(folder, *arguments):
     return done.stdout.split(maxsplit=1), done.stderr
 
 
-@pytest.mark.parametrize("ending", ["code", "nbi", "nbc"])
-@pytest.mark.parametrize("harm", ["cut to nothing", "cut short", "zeros in the middle"])
-def test_compiled_code_that_is_damaged_is_compiled_anew(ending, harm, tmp_path):
+def test_compiled_code_that_is_damaged_is_compiled_anew(tmp_path):
     assert compiled(tmp_path)[0] == ["42.0", "0\n"] and compiled(tmp_path)[0] == ["42.0", "without numba\n"]
-    (path,) = tmp_path.rglob(f"*.{ending}")
-    data = path.read_bytes()
-    half = len(data) // 2
-    harmed = {"cut to nothing": b"", "cut short": data[:half],
-              "zeros in the middle": data[:half] + bytes(len(data) - half)}  # fmt: skip
-    path.write_bytes(harmed[harm])
-    if ending != "code":
-        next(tmp_path.rglob("*.code")).unlink()
-    assert compiled(tmp_path)[0] == ["42.0", "1\n" if ending == "code" else "0\n"]
-    assert compiled(tmp_path)[0] == ["42.0", "without numba\n"]
+    for ending, harm in itertools.product(
+        ("code", "nbi", "nbc"), ("cut to nothing", "cut short", "zeros in the middle")
+    ):
+        (path,) = tmp_path.rglob(f"*.{ending}")
+        data = path.read_bytes()
+        half = len(data) // 2
+        harmed = {"cut to nothing": b"", "cut short": data[:half],
+                  "zeros in the middle": data[:half] + bytes(len(data) - half)}  # fmt: skip
+        path.write_bytes(harmed[harm])
+        if ending != "code":
+            next(tmp_path.rglob("*.code")).unlink()
+        assert compiled(tmp_path)[0] == ["42.0", "1\n" if ending == "code" else "0\n"], (ending, harm)
+        assert compiled(tmp_path)[0] == ["42.0", "without numba\n"], (ending, harm)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of file sizes to play a full disk")

@@ -19,6 +19,7 @@ from hypothesis.internal import constants_ast
 from hypothesis.internal.conjecture import providers
 from hypothesis_profiles import examples
 from reference import folders
+from reference.pairs import is_in_turn
 from reference.scenes import lake, pipe, reservoir, scene
 from tally import Tally, expected, unknown_names
 
@@ -46,6 +47,16 @@ def test_a_listed_test_that_is_not_there_is_named():
     tally = Tally()
     tally.add({kind: sorted(names) for kind, names in expected().items()} | {"unknown": ["tests/a.py::test_gone"]})
     assert tally.missing() == ["tests/durations.json: tests/a.py::test_gone is not a test"]
+
+
+@pytest.mark.in_turn
+@pytest.mark.parametrize("first, second", [(0, 0), (1, 1), (2, 4), (3, 9)])
+@pytest.mark.parametrize("letter", ["a", "b"])
+@pytest.mark.parametrize("word", ("x", "y", "z"))
+def test_combinations_in_turn_contain_each_value(request, first, second, letter, word):
+    assert second == first**2
+    chosen = [(0, "a", "x"), (1, "b", "y"), (2, "a", "z"), (3, "b", "x")]
+    assert is_in_turn(request.node) == ((first, letter, word) in chosen)
 
 
 def test_only_tests_that_cannot_be_missing_for_want_of_a_library_are_unknown():

@@ -96,6 +96,7 @@ def run_python(folder: Path, code: str, **more: str) -> str:
 STEPS = {"explicit": {}, "implicit": {"method": "implicit-midpoint", "courant": 1.5}}
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("steps", STEPS)
 @pytest.mark.parametrize("name", SAME)
 def test_a_built_in_limiter_written_again_gives_the_same_run_of_a_pipe(name, steps):
@@ -108,6 +109,7 @@ def test_a_built_in_limiter_written_again_gives_the_same_run_of_a_pipe(name, ste
     assert min(other for limiter, other in apart.items() if limiter != "mine") > 1e-5, apart
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("kind", POOLS)
 @pytest.mark.parametrize("steps", STEPS)
 def test_and_the_same_run_of_a_basin(kind, steps):

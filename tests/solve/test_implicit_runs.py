@@ -65,6 +65,7 @@ def agrees(result, wanted, near: float) -> None:
     assert result.ledger["mass"]["relative"] < 1e-13
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("build", [harbour, jack])
 @pytest.mark.parametrize("numerics", RTOL + AUTO, ids=said)
 def test_error_control_ends_where_the_explicit_run_does(build, numerics, explicit):
@@ -297,6 +298,7 @@ def set_free() -> tuple[float, float]:
     return tuple(found.y[2:4, -1] * scale[2:4])
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["radau-iia-5", "radau-iia-9"])
 @pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-8, 1e-9, 1e-10])
 def test_no_step_passes_what_a_valve_sets_free_as_it_shuts(method, rtol, set_free):

@@ -192,6 +192,7 @@ def sucked(method: str, scheme: str = "muscl", rtol: float = 1e-6, **more):
 ISLAND = [[1.0, 1.0, 2.0, 2.0]]
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["dormand-prince", "auto", "rodas-5p", "radau-iia-5", "tr-bdf2", "esdirk-4"])
 @pytest.mark.parametrize("more", [{}, {"holes": ISLAND}], ids=["grid", "faces"])
 def test_a_patch_that_runs_dry_books_what_it_has_and_what_is_made_up(method, more):

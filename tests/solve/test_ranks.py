@@ -64,7 +64,8 @@ def drawn(path: Path) -> dict[str, bytes]:
 
 @pytest.mark.parametrize("many", [2, 3])
 def test_ranks_give_the_bits_of_one_process(tmp_path, many):
-    cases = {name: SCENES[name] | {"output": SCENES[name]["output"] | {"fields": 2}} for name in NAMES}
+    names = NAMES if many == 3 else NAMES[::3]
+    cases = {name: SCENES[name] | {"output": SCENES[name]["output"] | {"fields": 2}} for name in names}
     alone = {name: fvsolve.run(case, out=tmp_path / "one" / name) for name, case in cases.items()}  # also compiles
     found = ranks(many, sys.executable, "-c", SCRIPT, json.dumps(cases), tmp_path / "ranks", "{}")
     assert found.returncode == 0, found.stderr

@@ -86,6 +86,7 @@ def excess(result) -> float:
     return float(np.max(found))
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scene_name", SCENES)
 @pytest.mark.parametrize("how", SETTINGS)
 def test_steps_do_not_hang_on_rows_and_no_row_lies_beyond_the_extremes(how, scene_name):
@@ -145,6 +146,7 @@ def filling(at: float, kind: str, numerics: dict) -> dict:
     return scene(nodes, links, 0.02, numerics, ["c.pressure"], 0.005)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("kind", ["kink", "jump"])
 @pytest.mark.parametrize("numerics", WAYS, ids=lambda way: " ".join(map(str, way.values())))
 def test_a_break_beside_a_boundary_is_as_good_as_on_it(kind, numerics):

@@ -167,6 +167,7 @@ FORMED = ("muscl, ssp-rk2", "muscl, a limiter of its own, rk4", "upwind5, ssp-rk
           "walls all around")  # fmt: skip
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("name", FORMED)
 @pytest.mark.parametrize("cells", [1, 20, 10**6])
 def test_stages_formed_beside_rates_have_the_bits_of_those_formed_after_all(name, cells, monkeypatch):

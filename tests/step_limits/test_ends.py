@@ -135,6 +135,7 @@ def test_upwind_keeps_its_step_so_that_courant_one_stays_exact():
     assert all(end_rate_factor("upwind", cells) == 1.0 for cells in range(1, 20))
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["ssp-rk3", "rk4"])
 @pytest.mark.parametrize("scheme", ["muscl", "weno5", "upwind5", "upwind3"])
 def test_noise_in_short_pipes_does_not_grow_at_courant_nine_tenths(scheme, method):

@@ -129,6 +129,7 @@ def stepped(weights, method, courant: Fraction, u: Fraction) -> Fraction:
     return y[0] ** 2 + y[1] ** 2
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", DISTINCT)
 @pytest.mark.parametrize("scheme", WEIGHTS)
 def test_exact_steps_of_exact_waves_do_not_grow_below_the_limit_and_one_does_above(scheme, method):

@@ -50,6 +50,7 @@ def energy(case: dict) -> tuple[float, list]:
     return total, [one for one in warnings if "waves between this part and the delay lines grow" in one.text]
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["euler", "implicit-midpoint", "rk4", "ssp-rk2", "trapezoid", "ssp-rk3"])
 @pytest.mark.parametrize("volume", [0.6, 0.15])
 def test_what_is_told_to_grow_grows(method, volume):

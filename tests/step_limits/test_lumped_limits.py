@@ -293,6 +293,7 @@ def test_growth_that_a_run_is_too_short_to_show_is_no_growth():
     assert math.log(mode.growth) == pytest.approx(1e6 * 0.01**2 / 2, rel=1e-2) and mode.outside_cells and mode.resolved
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("implicit", [False, True])
 @pytest.mark.parametrize("seeds", [range(0, 12), range(12, 24), range(24, 36)])
 def test_the_verdict_is_that_of_the_truth_in_scenes_at_random(seeds, implicit):

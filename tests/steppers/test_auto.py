@@ -83,6 +83,7 @@ def test_it_ends_where_a_single_method_does(rtol, implicit):
         assert auto[name] == pytest.approx(fixed[name], rel=max(1e-6, 10 * rtol))
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("end", [0.6, 2.5])
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
 def test_a_servo_arm_takes_about_the_steps_of_radau(end, rtol):

@@ -37,6 +37,7 @@ def solved(structure: Structure, values: np.ndarray, shift, b: np.ndarray) -> np
     return x
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("n, m", [(1, 0), (2, 1), (5, 0), (12, 3), (40, 2)])
 @pytest.mark.parametrize("shift", [30.0, 20.0 + 25.0j])
@@ -148,6 +149,7 @@ def test_the_kind_is_chosen_by_size_and_crowding():
     assert Structure(pipe_pattern(40, 3), "banded").kind == "banded"
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("number", [float, complex])
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

@@ -12,6 +12,7 @@ import fvsolve
 from fvsolve.errors import FvsolveError
 from fvsolve.solve.run_loop import RunLoop
 from fvsolve.steppers import METHODS, integrate, loop_records
+from fvsolve.validation import valve_controlled_cylinder as cylinder
 
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 IMPLICIT = [name for name in NAMES if not METHODS[name].explicit]
@@ -172,6 +173,25 @@ def test_a_run_says_when_and_in_what_newton_failed_and_keeps_everything_up_to_th
     kept = fvsolve.open_run(tmp_path / "run")
     assert kept.reason == result.reason and kept.t == pytest.approx(0.005 * np.arange(21))
     assert np.all(np.isfinite(kept["pot.pressure"]))
+
+
+@njit
+def cylinder_rates(t, y):
+    rates = np.empty_like(y)
+    cylinder.rhs(t, y, rates)
+    return rates
+
+
+@pytest.mark.parametrize(("name", "ratio", "error"), [("radau-iia-5", 1.0, 2e-3), ("radau-iia-9", 1.6, 1e-2)])
+def test_loose_tolerances_of_radau_do_not_cost_more_calls_than_tight_ones(name, ratio, error):
+    t, calls, found = np.linspace(0.0, cylinder.END, 21), {}, {}
+    for rtol in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7):
+        counts: dict = {}
+        found[rtol] = integrate(cylinder_rates, cylinder.start(), t, name, rtol=rtol, counts=counts)
+        calls[rtol] = counts["rhs"]
+    assert all(calls[rtol] <= ratio * calls[1e-7] for rtol in calls)
+    sizes = np.abs(found[1e-7]).max(axis=0)
+    assert np.abs((found[1e-3] - found[1e-7]) / sizes).max() < error
 
 
 def test_a_summary_counts_what_newton_did():

@@ -183,6 +183,7 @@ def in_decimals(name: str, digits: int) -> Method:
     return user(f"{text}\n-\n| {' '.join(said[-1])}")
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("name", [name for name in NAMES if METHODS[name].kind != "linear"])
 @pytest.mark.parametrize("digits", [16, 10])
 def test_decimals_lead_to_the_same_decisions(name, digits):

@@ -70,6 +70,7 @@ def test_error_control_keeps_near_its_tolerance(name, truth):
         assert 1e-4 * rtol < error < 3.0 * rtol ** (q / (q + 1))
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("name", ["rk4", "ssp-rk3", "implicit-midpoint", "trapezoid", "gauss-4", "lobatto-iiia-6"])
 @pytest.mark.parametrize("fast", [1.5, 40.0, 1000.0])
 def test_a_fast_oscillation_is_seen_at_the_predicted_frequency(name, fast):

@@ -138,6 +138,7 @@ def test_a_column_between_tanks_trades_height_for_speed():
     assert found.at_start["a"] == pytest.approx(0.5 * RHO * GRAVITY * 2.0 * 5.0**2)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["gauss-2", "gauss-4", "gauss-6"])
 @pytest.mark.parametrize("friction", [NO_FRICTION, FRICTION], ids=["free", "rough"])
 def test_gauss_methods_leave_no_remainder(method, friction):
@@ -306,6 +307,7 @@ def orders(remainders: list[float]) -> np.ndarray:
     return np.log2(np.array(remainders[:-1]) / np.array(remainders[1:]))
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize(
     "scheme, method, order",
     [
@@ -521,6 +523,7 @@ def chain(h: float, method: str = "rk4", law=STEADY) -> dict:
     return scene(nodes, links, 4.0, {"pipe_model": "delay-line", "method": method, "step": h})
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["euler", "rk4", "trapezoid", "rodas-4"])
 @pytest.mark.parametrize("share", [0.5, 1.5, 2.5, 4.0])
 def test_the_ledger_of_an_instant_closure_is_exact(method, share):

@@ -136,6 +136,7 @@ def test_what_a_source_raises_is_the_cause_that_is_said(numerics):
     assert isinstance(error.value.__cause__, ZeroDivisionError)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize(
     "wrong",
     [lambda *_: None, lambda *_: 1.0, lambda *_: (1.0, 2.0, 3.0), lambda *_: (np.zeros(3), 0.0), lambda *_: "ab"],

@@ -164,6 +164,7 @@ def test_upwind_and_euler_are_passive_up_to_courant_one():
     assert courant_limit("fromm", "euler") == 0.0
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["upwind", "fromm"])
 @pytest.mark.parametrize("method", ["implicit-euler", "gauss-4", "radau-iia-3", "trapezoid"])
 def test_a_stable_methods_with_a_passive_scheme_never_gain_energy(scheme, method):

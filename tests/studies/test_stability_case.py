@@ -301,6 +301,7 @@ def real_end(method, low, high):
     return brentq(lambda x: abs(r(-x)) - 1.0, low, high)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize(("method", "low", "high"), [("euler", 1.5, 2.5), ("rk4", 2.0, 3.5)])
 @pytest.mark.parametrize("quick", [{"decay": 800.0}, {"diffusivity": 30000.0}])
 def test_scalars_of_pipes_bound_the_step_in_powers_eigenvalues_and_real_runs(method, low, high, quick):
@@ -313,6 +314,7 @@ def test_scalars_of_pipes_bound_the_step_in_powers_eigenvalues_and_real_runs(met
     assert row.measured == pytest.approx(row.predicted, rel=2e-3)
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["upwind", "upwind5"])
 @pytest.mark.parametrize("ends", [("lake", "vessel"), ("vessel", "end"), ("end", "vessel")])
 def test_a_vessel_that_starts_without_a_scalar_is_no_kink(scheme, ends):

@@ -72,6 +72,7 @@ def untimed(rows: list[dict]) -> list[dict]:
     return [{key: value for key, value in row.items() if key != "seconds"} for row in rows]
 
 
+@pytest.mark.in_turn
 @pytest.mark.parametrize("varied", VARIED)
 @pytest.mark.parametrize("name", METHODS)
 def test_rows_of_batches_have_the_bits_of_rows_alone(name, varied):
