@@ -3,8 +3,10 @@
 import functools
 import inspect
 import itertools
+import math
 from collections.abc import Callable
 from numbers import Real
+from types import CodeType, FunctionType
 from typing import Any
 
 import numba
@@ -100,18 +102,53 @@ def _solve_steps(stepper: Integrator, functions: tuple, key: int, t, y0) -> np.n
 
 
 def _prepare(f, t0, y0) -> tuple:
-    """(functions of the time loop for f, f as a Python function of (t, y, dydt)); cached if f is a compiled function.
+    """(functions of the time loop for f, f as a Python function of (t, y, dydt)).
 
-    A plain Python function is not cached, because compiled code does not notice changes of its global variables.
-    t0, y0 : arguments of a trial call
+    The functions are compiled once for a compiled function, and once for all plain functions of the same code and
+    values. t0, y0 : arguments of a trial call
     """
-    if f not in _COMPILED:
-        _check_rates(f, t0, y0)
-        functions = _functions(f, t0, y0), f if in_place(f) else lambda t, y, dydt: np.copyto(dydt, f(t, y))
-        if not hasattr(f, "py_func"):
-            return functions
-        _COMPILED[f] = functions
-    return _COMPILED[f]
+    python, key = f if in_place(f) else lambda t, y, dydt: np.copyto(dydt, f(t, y)), f
+    if not hasattr(f, "py_func"):
+        key = frozen_values(f)
+    _check_rates(f, t0, y0)
+    if key is None or key not in _COMPILED:
+        functions = _functions(f, t0, y0)
+        if key is None:
+            return functions, python
+        if len(_COMPILED) == MOST_COMPILED:
+            del _COMPILED[next(iter(_COMPILED))]
+        _COMPILED[key] = functions
+    return _COMPILED[key], python
+
+
+def frozen_values(f: Callable) -> tuple | None:
+    """Code of a plain function and all values from outside that its compiled form contains, as a dictionary key.
+
+    None if one of these values may change in place, such as a list, or is not known, such as an object.
+    """
+    if not isinstance(f, FunctionType) or f.__kwdefaults__:
+        return None
+    if any(isinstance(constant, CodeType) for constant in f.__code__.co_consts):
+        return None
+    outer = inspect.getclosurevars(f)
+    values = [(name, frozen_value(value)) for name, value in (*outer.nonlocals.items(), *outer.globals.items())]
+    values.append(("", frozen_value(f.__defaults__ or ())))
+    return None if any(value is None for _, value in values) else (f.__code__, *values)
+
+
+def frozen_value(value: Any) -> tuple | None:
+    """A value of a variable from outside a function as part of a dictionary key; None if it may change in place."""
+    if isinstance(value, tuple):
+        parts = tuple(map(frozen_value, value))
+        return None if None in parts else ("tuple", *parts)
+    if isinstance(value, np.ndarray) and value.dtype.kind in "biufc":
+        return "array", value.dtype.str, value.shape, value.strides, value.tobytes()
+    if isinstance(value, (bool, int, float, complex, str, np.number)):
+        return type(value).__name__, repr(value)
+    known = value is None or value is np or value is math or hasattr(value, "py_func")
+    if not known and callable(value):
+        known = str(getattr(value, "__module__", "")).partition(".")[0] in ("builtins", "math", "numpy")
+    return ("object", value) if known else None
 
 
 @functools.cache
@@ -178,7 +215,8 @@ def _check(method, t, rtol, step) -> None:
         raise FvsolveError(f"rtol = {rtol:g} is below rounding errors. Expected {LEAST_TOLERANCE:g} or more")
 
 
-_COMPILED: dict[Callable, tuple] = {}  # results of `_prepare` for functions that are already compiled
+_COMPILED: dict[Any, tuple] = {}  # functions of the time loop, by compiled function or by `frozen_values`
+MOST_COMPILED = 100
 _KEYS = itertools.count()  # keys of the next two dicts, one for each call: threads may integrate at the same time
 _PYTHON: dict[int, Callable] = {}  # Python functions, by the number in their handle
 _EXCEPTIONS: dict[int, BaseException] = {}  # exceptions that they raised

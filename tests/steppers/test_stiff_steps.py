@@ -9,7 +9,7 @@ from numba import njit
 from reference import folders
 
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers import METHODS, analyse, integrate
+from fvsolve.steppers import METHODS, analyse, integrate, ode
 from fvsolve.steppers.coefficients import coefficients, start_slope_correction
 
 NAMES = [name for name, method in METHODS.items() if name == method.name]
@@ -179,3 +179,57 @@ def test_what_a_plain_function_reads_may_change_between_two_calls(monkeypatch):
     assert integrate(f, [1.0], [0.0, 1.0], rtol=1e-9)[-1, 0] == pytest.approx(np.exp(-1.0), rel=1e-7)
     monkeypatch.setitem(globals(), "RATE", 2.0)
     assert integrate(f, [1.0], [0.0, 1.0], rtol=1e-9)[-1, 0] == pytest.approx(np.exp(-2.0), rel=1e-7)
+
+
+def decaying(rate):
+    """Rates of the same code with another value from outside."""
+    return lambda t, y: -rate * y
+
+
+def faster(t, y):
+    return -(RATE + 1.0) * y
+
+
+def one_rate(t, y):
+    return np.array([-y[0]])
+
+
+FOLLOWED = {
+    "number": (lambda: 1.0, lambda rate: 2.0), "whole number": (lambda: 1, lambda rate: 2),
+    "array": (lambda: np.array([1.0]), lambda rate: np.array([2.0])),
+    "array in place": (lambda: np.array([1.0]), lambda rate: np.add(rate, 1.0, out=rate)),
+    "number of numpy": (lambda: np.float64(1.0), lambda rate: np.float64(2.0)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", FOLLOWED)
+def test_functions_of_equal_code_have_their_own_values(kind):
+    first, other = FOLLOWED[kind]
+    rate = first()
+    found = [integrate(decaying(rate), [1.0], [0.0, 1.0], rtol=1e-9)[-1, 0]]
+    rate = other(rate)
+    found.append(integrate(decaying(rate), [1.0], [0.0, 1.0], rtol=1e-9)[-1, 0])
+    assert found == pytest.approx(np.exp([-1.0, -2.0]), rel=1e-7)
+
+
+def test_a_plain_function_is_compiled_once_while_its_values_are_the_same(monkeypatch):
+    y = np.ones(1)
+    assert ode._prepare(faster, 0.0, y)[0] is ode._prepare(faster, 1.0, y)[0]
+    assert ode._prepare(decaying(3.0), 0.0, y)[0] is ode._prepare(decaying(3.0), 0.0, y)[0]
+    assert ode._prepare(decaying(3), 0.0, y)[0] is not ode._prepare(decaying(3.0), 0.0, y)[0]
+    assert ode.frozen_values(lambda t, y: FOLLOWED["number"]) is None  # a dictionary may change
+    assert ode.frozen_values(lambda t, y: [v for v in y]) is None  # a function within, whose values are not read
+    before = ode._prepare(faster, 0.0, y)[0]
+    monkeypatch.setitem(globals(), "RATE", 5.0)
+    assert ode._prepare(faster, 0.0, y)[0] is not before
+    integrate(one_rate, [1.0], [0.0, 1.0], rtol=1e-3)
+    with pytest.raises(FvsolveError, match="gives 1 rates for 2 states"):
+        integrate(one_rate, [1.0, 2.0], [0.0, 1.0], rtol=1e-3)
+
+
+def test_compiled_functions_are_kept_up_to_a_number(monkeypatch):
+    monkeypatch.setattr(ode, "_COMPILED", {})
+    monkeypatch.setattr(ode, "MOST_COMPILED", 2)
+    for rate in (1.0, 2.0, 3.0):
+        assert integrate(decaying(rate), [1.0], [0.0, 1.0], rtol=1e-9)[-1, 0] == pytest.approx(np.exp(-rate), rel=1e-7)
+    assert len(ode._COMPILED) == 2
