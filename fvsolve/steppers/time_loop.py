@@ -41,8 +41,8 @@ from fvsolve.steppers.step_operations import (
 
 EVENT_TOLERANCE = 1e-13
 SECANT_TURNS = 40  # turns of the Illinois rule, which is slow where an event function is nearly zero at the start
-# attempts of an implicit step by Newton alone, at loose and at tight tolerances: shorter steps cost less than sweeps
-UNSWEPT_LOOSE, UNSWEPT_TIGHT, LOOSE = 5, 1, 1e-5
+# attempts of an implicit step by Newton alone at tolerances above LOOSE: shorter steps cost less than sweeps
+UNSWEPT, LOOSE = 5, 3e-6
 JUMP = 1e-6  # fraction of an event function, and of a given step; smaller changes do not count as a jump
 
 
@@ -340,8 +340,7 @@ def find_step(handle, run, r, h, full, due, new):
     """
     state, control, now = r.state[0], r.control[0], r.progress[0]["now"]
     failure, rate, last, failures = rec.TINY_STEP, r.out[rec.RATE], False, 0
-    unswept = UNSWEPT_LOOSE if control["size"] > LOOSE else UNSWEPT_TIGHT
-    unswept = unswept if control["mode"] == rec.TOLERANCE else 0
+    unswept = UNSWEPT if control["mode"] == rec.TOLERANCE and control["size"] > LOOSE else 0
     for _ in range(1 << 62):
         rest = control["end"] - state["t"]
         last = h >= rest * (1.0 - 1e-9)

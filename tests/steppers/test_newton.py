@@ -185,7 +185,7 @@ def cylinder_rates(t, y):
 @pytest.mark.parametrize(("name", "ratio", "error"), [("radau-iia-5", 1.0, 2e-3), ("radau-iia-9", 1.6, 1e-2)])
 def test_loose_tolerances_of_radau_do_not_cost_more_calls_than_tight_ones(name, ratio, error):
     t, calls, found = np.linspace(0.0, cylinder.END, 21), {}, {}
-    for rtol in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7):
+    for rtol in (1e-3, 1e-4, 1e-5, 1e-7):
         counts: dict = {}
         found[rtol] = integrate(cylinder_rates, cylinder.start(), t, name, rtol=rtol, counts=counts)
         calls[rtol] = counts["rhs"]
