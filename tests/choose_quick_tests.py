@@ -146,7 +146,7 @@ def record(folder: Path) -> None:
         environment = os.environ | {
             FOLDER: str(folder),
             "FVSOLVE_CACHE": cache,
-            "PYTHONPATH": f"{LIST.parent}:{LIST.parents[1]}",
+            "PYTHONPATH": os.pathsep.join(map(str, LIST.parents[:2])),
         }
         command = [
             sys.executable,

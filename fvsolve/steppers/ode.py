@@ -130,7 +130,10 @@ def frozen_values(f: Callable) -> tuple | None:
         return None
     if any(isinstance(constant, CodeType) for constant in f.__code__.co_consts):
         return None
-    outer = inspect.getclosurevars(f)
+    try:
+        outer = inspect.getclosurevars(f)
+    except ValueError:  # a variable from outside has no value yet
+        return None
     values = [(name, frozen_value(value)) for name, value in (*outer.nonlocals.items(), *outer.globals.items())]
     values.append(("", frozen_value(f.__defaults__ or ())))
     return None if any(value is None for _, value in values) else (f.__code__, *values)
@@ -144,7 +147,7 @@ def frozen_value(value: Any) -> tuple | None:
     if isinstance(value, np.ndarray) and value.dtype.kind in "biufc":
         return "array", value.dtype.str, value.shape, value.strides, value.tobytes()
     if isinstance(value, (bool, int, float, complex, str, np.number)):
-        return type(value).__name__, repr(value)
+        return type(value), repr(value)
     known = value is None or value is np or value is math or hasattr(value, "py_func")
     if not known and callable(value):
         known = str(getattr(value, "__module__", "")).partition(".")[0] in ("builtins", "math", "numpy")
@@ -216,7 +219,7 @@ def _check(method, t, rtol, step) -> None:
 
 
 _COMPILED: dict[Any, tuple] = {}  # functions of the time loop, by compiled function or by `frozen_values`
-MOST_COMPILED = 100
+MOST_COMPILED = 100  # number of systems whose functions are kept; then the oldest is dropped
 _KEYS = itertools.count()  # keys of the next two dicts, one for each call: threads may integrate at the same time
 _PYTHON: dict[int, Callable] = {}  # Python functions, by the number in their handle
 _EXCEPTIONS: dict[int, BaseException] = {}  # exceptions that they raised

@@ -233,3 +233,13 @@ def test_compiled_functions_are_kept_up_to_a_number(monkeypatch):
     for rate in (1.0, 2.0, 3.0):
         assert integrate(decaying(rate), [1.0], [0.0, 1.0], rtol=1e-9)[-1, 0] == pytest.approx(np.exp(-rate), rel=1e-7)
     assert len(ode._COMPILED) == 2
+
+
+def test_a_variable_without_a_value_in_a_branch_that_is_not_taken_is_no_fault():
+    def f(t, y):
+        return -y if t < 10.0 else missing * y
+
+    assert ode.frozen_values(f) is None
+    assert integrate(f, [1.0], [0.0, 1.0], rtol=1e-9)[-1, 0] == pytest.approx(np.exp(-1.0), rel=1e-7)
+    if f is None:
+        missing = 1.0
