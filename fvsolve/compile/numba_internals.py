@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.compile.cache_folders import code_folder, warn_not_cached
+from fvsolve.compile.shorter_compilation import shorten_compilation
 from fvsolve.compile.store import IN_USE, Code
 
 DIGEST = hashlib.sha256().digest_size
@@ -25,88 +26,9 @@ def numba_module():
     import numba
     from numba.core.errors import NumbaExperimentalFeatureWarning
 
-    generate_code_on_request()
-    compare_flags_quickly()
+    shorten_compilation()
     warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
     return numba
-
-
-def compare_flags_quickly() -> None:
-    """Let numba compare its compiler flags by their dictionaries, which saves a tenth of the compile time.
-
-    Numba compares them at each look-up of a function, by a list of all options of both.
-    """
-    from numba.core.targetconfig import TargetConfig
-
-    in_full = TargetConfig.__eq__
-
-    def equal(flags: TargetConfig, others: Any) -> bool:
-        known = isinstance(others, TargetConfig) and flags._values == others._values
-        return (known and type(flags) is type(others)) or in_full(flags, others)
-
-    TargetConfig.__eq__, TargetConfig.__hash__ = equal, lambda flags: hash(type(flags))
-
-
-def generate_code_on_request() -> None:
-    """Let numba generate the machine code of a function when its address is requested.
-
-    Numba generates it for every function. A function that only compiled code calls does not need it, because its
-    optimised intermediate code is linked into its callers. This saves a fifth of the compile time.
-    """
-    from llvmlite.binding import parse_bitcode
-    from numba.core.codegen import JITCodeLibrary
-    from numba.core.compiler_lock import global_compiler_lock
-    from numba.core.registry import cpu_target
-
-    codegen, environments = cpu_target.target_context.codegen(), {}
-    set_environment_now = codegen.set_env
-
-    def set_environment(name: str, environment: Any) -> None:
-        environments[name] = environment
-        if codegen._engine.get_global_value_address(name):
-            set_environment_now(name, environment)
-
-    class CodeLibrary(JITCodeLibrary):
-        generated = False
-
-        def _finalize_final_module(self) -> None:
-            self._finalize_dynamic_globals()
-            self._verify_declare_only_symbols()
-            self._finalized = True
-            if self._object_caching_enabled and self._compiled_object is not None:  # from a cache file
-                self.generate()
-
-        @global_compiler_lock
-        def generate(self) -> None:
-            """Generate and load the machine code of the functions of this library."""
-            if not self.generated:
-                self.generated, self._dynamic_globals = True, []
-                super()._finalize_final_module()
-                for variable in self._final_module.global_variables:
-                    if variable.name in environments:
-                        set_environment(variable.name, environments[variable.name])
-
-        def get_pointer_to_function(self, name: str) -> int:
-            self._ensure_finalized()
-            if not self.generated and name in {function.name for function in self.get_defined_functions()}:
-                self.generate()
-            return super().get_pointer_to_function(name) if self.generated else 0
-
-        @classmethod
-        def _unserialize(cls, codegen: Any, state: tuple) -> Any:
-            name, kind, data = state
-            if kind == "object":
-                return super()._unserialize(codegen, state)
-            library = codegen.create_library(name)
-            library.enable_object_caching()
-            library._final_module = parse_bitcode(data)
-            library._finalize_final_module()
-            return library
-
-        def serialize_using_object_code(self) -> tuple:  # for cache files
-            return super().serialize_using_object_code() if self.generated else self.serialize_using_bitcode()
-
-    codegen.set_env, codegen._library_class = set_environment, CodeLibrary
 
 
 @functools.cache
