@@ -6,7 +6,6 @@ Without any of them all functions compile as well, in more time.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 LARGE = 300  # instructions; LLVM does not inline functions of more than about 50
@@ -179,7 +178,7 @@ def list_variables_quickly() -> None:
 
 
 def remember_operators() -> None:
-    """Let numba remember the signature of each operator for numbers and arrays, which saves a tenth of the compile time.
+    """Let numba remember the signature of each operator for numbers and arrays, a tenth of the compile time.
 
     Numba resolves each operation some ten times, and tries all versions of the operator each time.
     """
