@@ -1,7 +1,7 @@
-"""Changes to numba that halve the time of compilation: less machine code, less repeated optimisation, quicker Python.
+"""Changes to numba that shorten compilation: less machine code, no repeated optimisation, quicker Python.
 
-None changes the instructions that a function is compiled to, except that large functions are optimised by themselves.
-Without any of them all functions compile as well, in more time.
+Large functions are optimised by themselves. Nothing else changes the instructions that a function is compiled to.
+Without these changes all functions compile as well, in more time.
 """
 
 from __future__ import annotations
@@ -52,11 +52,11 @@ def generate_code_on_request() -> None:
 
         def finalize(self) -> None:
             for library in self._linking_libraries:
-                self.large |= library.large
+                self.large |= getattr(library, "large", {})  # a library from before this change has none
             linked = []
             for library in dict.fromkeys(self._linking_libraries):
                 names = exported_names(library)
-                if all(is_large(library._final_module.get_function(name)) for name in names):
+                if names and all(is_large(library._final_module.get_function(name)) for name in names):
                     self.large[names[0]] = library._get_module_for_linking()
                     self._reload_init.update(library._reload_init)
                 else:

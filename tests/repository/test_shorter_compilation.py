@@ -1,0 +1,147 @@
+"""What is changed in numba to compile in less time gives what numba itself gives."""
+
+import operator
+from itertools import product
+
+import numba
+import numpy as np
+import pytest
+from numba.core.compiler import Flags, run_frontend
+from numba.core.ir import Inst, Var
+from numba.core.registry import cpu_target
+from numba.core.targetconfig import TargetConfig
+from repository.test_jit import package, python  # noqa: F401
+
+from fvsolve.compile.numba_internals import numba_module
+from fvsolve.kernels import network_balance, schedule_pieces
+from fvsolve.steppers import erk
+
+CHAIN = """
+from fvsolve.compile import shorter_compilation
+from fvsolve.compile.numba_internals import numba_module
+numba_module()
+shorter_compilation.LARGE = {large}
+from fvsolve.jit import njit
+from fvsolve.kernels.chain import above, both, top
+import numpy as np
+values = np.array([1.0, 2.0, 4.0])
+found = above(values, 3), both(values), top(values)
+print(*found, sum(sum(one.numba.stats.cache_misses.values()) for one in (above, both, top)))
+library = [*top.numba.overloads.values()][0].library
+print(len(library.large), *(name for name in ("above", "below", "both") if name in str(library.large.keys())))
+"""
+FUNCTIONS = """from fvsolve.jit import njit
+
+@njit
+def below(values):
+    total = 0.0
+    for one in values:
+        if one < 0.0:
+            raise ValueError("below zero")
+        total += one * one
+    return total
+
+@njit
+def above(values, k):
+    total = below(values)
+    for _ in range(k):
+        total += below(values) / 2.0
+    return total
+
+@njit
+def both(values):
+    return above(values, 1) - below(values)
+
+@njit
+def top(values):
+    return both(values) + below(values) + above(values, 2)
+"""
+
+
+@pytest.mark.parametrize("large", [0, 10**9])
+def test_functions_that_are_optimised_alone_give_the_same(package, large):  # noqa: F811
+    """Also where one calls another directly and through a third, and from the cache in a second process."""
+    (package / "kernels" / "chain.py").write_text(FUNCTIONS)
+    code = CHAIN.format(large=large)
+    total = 1.0 + 4.0 + 16.0
+    wanted = [str(2.5 * total), str(0.5 * total), str(0.5 * total + total + 2.0 * total)]
+    for misses in ("3", "0"):
+        told = python(package, code, FVSOLVE_STORE="0")
+        assert told[:4] == [*wanted, misses]
+        if misses == "3":
+            assert told[4] == "0" if large else {"above", "below", "both"} <= {*told[5:]}
+    stored = python(package, code.partition("library =")[0].replace("sum(sum", "0 and sum(sum"))
+    assert stored[:3] == wanted
+
+
+def test_functions_that_were_compiled_before_are_called(package):  # noqa: F811
+    code = """
+import numba
+first = numba.njit(lambda x: x + 1.0)
+first(1.0)
+from fvsolve.jit import njit
+print(njit(lambda x: 2.0 * first(x))(1.0))
+"""
+    assert python(package, code) == ["4.0"]
+
+
+def test_variables_of_statements_are_those_that_numba_lists():
+    def listed(member) -> list:
+        if isinstance(member, Var):
+            return [member]
+        if isinstance(member, Inst):
+            return member.list_vars()
+        members = member.values() if isinstance(member, dict) else member if isinstance(member, list | tuple) else ()
+        return [one for each in members for one in listed(each)]
+
+    numba_module()
+    statements = 0
+    for function in (network_balance.valve_rate_limit, schedule_pieces.piece_value, erk.attempt):
+        for block in run_frontend(function.py_func).blocks.values():
+            for one in block.body:
+                statements += 1
+                assert one.list_vars() == listed(one.__dict__)
+                value = getattr(one, "value", None)
+                if isinstance(value, Inst) and hasattr(value, "_kws"):
+                    assert value.list_vars() == listed(value._kws)
+    assert statements > 300
+
+
+def test_flags_are_equal_where_all_options_are():
+    numba_module()
+    sets = [{}, {"nrt": True}, {"nrt": False}, {"fastmath": True}, {"nrt": True, "fastmath": True},
+            {"no_cpython_wrapper": False}, {"error_model": "numpy"}]  # fmt: skip
+    all_flags = []
+    for options in sets:
+        all_flags.append(Flags())
+        for name, value in options.items():
+            setattr(all_flags[-1], name, value)
+    found = [(one == other) for one, other in product(all_flags, all_flags)]
+    assert found == [one.values() == other.values() for one, other in product(all_flags, all_flags)]
+    assert len(sets) < sum(found) < len(found)
+    assert all(hash(one) == hash(other) for one, other in product(all_flags, all_flags) if one == other)
+    assert Flags() != TargetConfig() and Flags() != 1
+
+
+def test_a_remembered_operator_has_the_signature_that_numba_resolves():
+    numba_module()
+    context, types = cpu_target.typing_context, numba.types
+    context.refresh()
+    kinds = [types.int64, types.int32, types.uint8, types.float64, types.complex128, types.boolean, types.literal(2),
+             types.float64[::1], types.int64[:, ::1]]  # fmt: skip
+    resolved = 0
+    for name, one, other in product(("add", "truediv", "lt", "pow", "getitem", "and_", "sub"), kinds, kinds):
+        function = context.resolve_value_type(getattr(operator, name))
+        fresh = types.Function(function.templates)
+        try:
+            wanted = fresh.get_call_type(context, (one, other), {})
+        except numba.core.errors.TypingError:
+            with pytest.raises(numba.core.errors.TypingError):
+                function.get_call_type(context, (one, other), {})
+            continue
+        resolved += 1
+        for _ in range(2):
+            assert function.get_call_type(context, (one, other), {}) == wanted
+        assert function.get_impl_key(wanted) == fresh.get_impl_key(wanted)
+    assert resolved > 200
+    assert np.all(numba.njit(lambda x, y: x / y)(np.arange(1, 4), 2) == [0.5, 1.0, 1.5])
