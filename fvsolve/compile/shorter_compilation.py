@@ -6,6 +6,7 @@ Without these changes all functions compile as well, in more time.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 LARGE = 800  # instructions; LLVM inlines functions of less than about 50
@@ -30,9 +31,6 @@ def generate_code_on_request() -> None:
     what is linked again, with each of the callers. Large functions, which LLVM does not inline, are linked into the
     machine code alone, which saves another sixth for basins.
     """
-    from llvmlite.binding import parse_bitcode
-    from numba.core.codegen import JITCodeLibrary
-    from numba.core.compiler_lock import global_compiler_lock
     from numba.core.registry import cpu_target
 
     codegen, environments = cpu_target.target_context.codegen(), {}
@@ -43,26 +41,17 @@ def generate_code_on_request() -> None:
         if codegen._engine.get_global_value_address(name):
             set_environment_now(name, environment)
 
-    class CodeLibrary(JITCodeLibrary):
+    codegen.set_env, codegen._library_class = set_environment, library_class(environments, set_environment)
+
+
+def library_class(environments: dict[str, Any], set_environment: Callable) -> type:
+    """Code library of numba that generates machine code on request and links large functions into it alone."""
+    from llvmlite.binding import parse_bitcode
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler_lock import global_compiler_lock
+
+    class CodeLibrary(LargeFunctions, JITCodeLibrary):
         generated = False
-
-        def __init__(self, *given: Any) -> None:
-            super().__init__(*given)
-            self.large: dict[str, Any] = {}  # modules of large functions that these call, by name, callers last
-
-        def finalize(self) -> None:
-            for library in self._linking_libraries:
-                self.large |= getattr(library, "large", {})  # a library from before this change has none
-            linked = []
-            for library in dict.fromkeys(self._linking_libraries):
-                names = exported_names(library)
-                if names and all(is_large(library._final_module.get_function(name)) for name in names):
-                    self.large[names[0]] = library._get_module_for_linking()
-                    self._reload_init.update(library._reload_init)
-                else:
-                    linked.append(library)
-            self._linking_libraries = linked
-            super().finalize()
 
         def _finalize_final_module(self) -> None:
             self._finalize_dynamic_globals()
@@ -75,16 +64,14 @@ def generate_code_on_request() -> None:
         @global_compiler_lock
         def generate(self) -> None:
             """Generate and load the machine code of the functions of this library."""
-            if not self.generated:
-                self.generated, self._dynamic_globals = True, []
-                if self.large:
-                    self._get_module_for_linking()  # kept for later callers, without the large functions
-                    for module in reversed(self.large.values()):  # callers first: LLVM links what is already used
-                        self._final_module.link_in(module, preserve=True)
-                super()._finalize_final_module()
-                for variable in self._final_module.global_variables:
-                    if variable.name in environments:
-                        set_environment(variable.name, environments[variable.name])
+            if self.generated:
+                return
+            self.generated, self._dynamic_globals = True, []
+            self.link_large()
+            super()._finalize_final_module()
+            for variable in self._final_module.global_variables:
+                if variable.name in environments:
+                    set_environment(variable.name, environments[variable.name])
 
         def get_pointer_to_function(self, name: str) -> int:
             self._ensure_finalized()
@@ -97,11 +84,10 @@ def generate_code_on_request() -> None:
             name, kind, data = state
             if kind == "object":
                 return super()._unserialize(codegen, state)
-            data, large = data
             library = codegen.create_library(name)
             library.enable_object_caching()
-            library._final_module = parse_bitcode(data)
-            library.large = {name: parse_bitcode(one) for name, one in large.items()}
+            library._final_module = parse_bitcode(data[0])
+            library.large = {name: parse_bitcode(code) for name, code in data[1].items()}
             library._finalize_final_module()
             return library
 
@@ -112,19 +98,51 @@ def generate_code_on_request() -> None:
             large = {name: module.as_bitcode() for name, module in self.large.items()}
             return self.name, "bitcode", (self._final_module.as_bitcode(), large)
 
-    codegen.set_env, codegen._library_class = set_environment, CodeLibrary
+    return CodeLibrary
+
+
+class LargeFunctions:
+    """Part of a code library of numba: large functions are left out while it is optimised.
+
+    large : modules of the large functions that are called, by name, callers last
+    """
+
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self.large: dict[str, Any] = {}
+
+    def finalize(self: Any) -> None:
+        for library in self._linking_libraries:
+            self.large |= getattr(library, "large", {})  # a library from before this change has none
+        linked = []
+        for library in dict.fromkeys(self._linking_libraries):
+            names = exported_names(library)
+            if names and all(is_large(library._final_module.get_function(name)) for name in names):
+                self.large[names[0]] = library._get_module_for_linking()
+                self._reload_init.update(library._reload_init)
+            else:
+                linked.append(library)
+        self._linking_libraries = linked
+        super().finalize()
+
+    def link_large(self: Any) -> None:
+        """Link the large functions, before the machine code is generated."""
+        if self.large:
+            self._get_module_for_linking()  # kept for later callers, without the large functions
+            for module in reversed(self.large.values()):  # callers first: LLVM links what is already used
+                self._final_module.link_in(module, preserve=True)
 
 
 def exported_names(library: Any) -> list[str]:
     """Names of the functions of a code library of numba that others call."""
     library._ensure_finalized()
     functions = library._final_module.functions
-    return [one.name for one in functions if one.linkage.name == "external" and not one.is_declaration]
+    return [each.name for each in functions if each.linkage.name == "external" and not each.is_declaration]
 
 
 def is_large(function: Any) -> bool:
     """True if LLVM does not inline a function."""
-    instructions = (one for block in function.blocks for one in block.instructions)
+    instructions = (line for block in function.blocks for line in block.instructions)
     return any(k >= LARGE for k, _ in enumerate(instructions)) and b"alwaysinline" not in [*function.attributes]
 
 
@@ -158,7 +176,7 @@ def list_variables_quickly() -> None:
     def kind_of(member: Any) -> int:
         kind = type(member)
         if kind not in kinds:
-            found = [issubclass(kind, one) for one in (Var, Inst, (list, tuple), dict)]
+            found = [issubclass(kind, known) for known in (Var, Inst, (list, tuple), dict)]
             kinds[kind] = found.index(True) + 1 if any(found) else 0
         return kinds[kind]
 
@@ -170,8 +188,8 @@ def list_variables_quickly() -> None:
             return member.list_vars()
         found: list = []
         if kind:
-            for one in member if kind == 3 else member.values():
-                found.extend(variables(statement, one))
+            for part in member if kind == 3 else member.values():
+                found.extend(variables(statement, part))
         return found
 
     Inst._rec_list_vars = variables

@@ -24,7 +24,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/basins": (9295, 46),
     "fvsolve/case": (7392, 25),
     "fvsolve/cli": (3452, 16),
-    "fvsolve/compile": (1322, 7),
+    "fvsolve/compile": (1340, 7),
     "fvsolve/data": (12, 1),
     "fvsolve/draw": (2993, 14),
     "fvsolve/epanet": (1382, 8),
