@@ -28,7 +28,7 @@ IN_SPACE = ["machine", "machine log", "machine table", "machine mixture", "loop"
             "modes", "full", "full log", "full free", "full table free", "u-tube free", "u-tube driven"]  # fmt: skip
 
 
-def in_turn(names: list[str], first: int) -> list[tuple[str, str]]:
+def with_methods(names: list[str], first: int) -> list[tuple[str, str]]:
     """Each scene with one method of `EACH`, in turn; tests begin at different methods."""
     return [(name, EACH[k % len(EACH)]) for k, name in enumerate(names, start=first)]
 
@@ -81,7 +81,7 @@ def test_parts_in_the_reverse_order(name, method):
     alike(first(name, method), told(equivalent.otherwise(SCENES[name](method))), near(method))
 
 
-@pytest.mark.parametrize("name, method", in_turn(SCENES, 0))
+@pytest.mark.parametrize("name, method", with_methods(SCENES, 0))
 def test_at_a_later_time(name, method):
     """A delay changes results by rounding of times only, which enters differences of driven joints."""
     alike(first(name, method), told(equivalent.at_a_later_time(SCENES[name](method), 64.0)), near(method), later=64.0)
@@ -98,7 +98,7 @@ def test_other_rows(name):
         assert [found[t] for t in few.t] == values.tolist()
 
 
-@pytest.mark.parametrize("name, method", in_turn(SCENES, 1))
+@pytest.mark.parametrize("name, method", with_methods(SCENES, 1))
 def test_other_units(name, method):
     """Conversion of units changes results by rounding only."""
     case = SCENES[name](method)
@@ -108,13 +108,13 @@ def test_other_units(name, method):
 
 
 @pytest.mark.parametrize(
-    "name, method", in_turn([name for name in IN_SPACE if not name.startswith(("carried", "full", "u-tube"))], 2)
+    "name, method", with_methods([name for name in IN_SPACE if not name.startswith(("carried", "full", "u-tube"))], 2)
 )
 def test_ends_of_links_swapped(name, method):
     alike(first(name, method), told(equivalent.swapped(SCENES[name](method))), near(method))
 
 
-@pytest.mark.parametrize("name, method", in_turn(IN_SPACE, 0))
+@pytest.mark.parametrize("name, method", with_methods(IN_SPACE, 0))
 def test_axes_the_other_way(name, method):
     def change(probe, values):
         return -values if probe.endswith(SWINGS) else values
@@ -122,7 +122,7 @@ def test_axes_the_other_way(name, method):
     alike(first(name, method), told(equivalent.reversed_axes(SCENES[name](method))), near(method), change=change)
 
 
-@pytest.mark.parametrize("name, method", in_turn(IN_SPACE, 1))
+@pytest.mark.parametrize("name, method", with_methods(IN_SPACE, 1))
 def test_turned_about_the_vertical(name, method):
     one = spatial(first(name, method))
     alike(one, told(equivalent.turned(SCENES[name](method), 0.7)), near(method), change=equivalent.as_turned(one, 0.7))
@@ -136,7 +136,7 @@ def spatial(one: Told) -> Told:
 
 
 @pytest.mark.parametrize("axis", [0, 1])
-@pytest.mark.parametrize("name, method", in_turn(IN_SPACE, 2))
+@pytest.mark.parametrize("name, method", with_methods(IN_SPACE, 2))
 def test_in_a_mirror(name, method, axis):
     """A mirrored case gives mirrored results; a basin is then drawn from another corner."""
     case = SCENES[name](method)
