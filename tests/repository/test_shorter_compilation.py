@@ -21,14 +21,20 @@ from fvsolve.compile import shorter_compilation
 from fvsolve.compile.numba_internals import numba_module
 numba_module()
 shorter_compilation.LARGE = {large}
-from fvsolve.jit import njit
 from fvsolve.kernels.chain import above, both, top
 import numpy as np
-values = np.array([1.0, 2.0, 4.0])
-found = above(values, 3), both(values), top(values)
-print(*found, sum(sum(one.numba.stats.cache_misses.values()) for one in (above, both, top)))
-library = [*top.numba.overloads.values()][0].library
-print(len(library.large), *(name for name in ("above", "below", "both") if name in str(library.large.keys())))
+values, counts = np.array([1.0, 2.0, 4.0]), np.array([1, 2])
+found = above(values, 3), both(values), top(values, counts)
+try:
+    top(-values, counts)
+    fault = "none"
+except ValueError as error:
+    fault = str(error)
+print(*found, fault)
+if {compiled}:
+    print(sum(sum(one.numba.stats.cache_misses.values()) for one in (above, both, top)))
+    library = [*top.numba.overloads.values()][0].library
+    print(len(library.large), *(name for name in ("above", "below", "both") if name in str(library.large.keys())))
 """
 FUNCTIONS = """from fvsolve.jit import njit
 
@@ -37,7 +43,7 @@ def below(values):
     total = 0.0
     for one in values:
         if one < 0.0:
-            raise ValueError("below zero")
+            raise ValueError("negative")
         total += one * one
     return total
 
@@ -53,25 +59,23 @@ def both(values):
     return above(values, 1) - below(values)
 
 @njit
-def top(values):
-    return both(values) + below(values) + above(values, 2)
+def top(values, counts):
+    return both(values) + below(values) + above(values, 2) + below(counts)
 """
 
 
 @pytest.mark.parametrize("large", [0, 10**9])
 def test_functions_that_are_optimised_alone_give_the_same(package, large):  # noqa: F811
-    """Also where one calls another directly and through a third, and from the cache in a second process."""
+    """Also where one calls another directly and through a third, for two types, from the cache and from the store."""
     (package / "kernels" / "chain.py").write_text(FUNCTIONS)
-    code = CHAIN.format(large=large)
     total = 1.0 + 4.0 + 16.0
-    wanted = [str(2.5 * total), str(0.5 * total), str(0.5 * total + total + 2.0 * total)]
-    for misses in ("3", "0"):
-        told = python(package, code, FVSOLVE_STORE="0")
-        assert told[:4] == [*wanted, misses]
-        if misses == "3":
-            assert told[4] == "0" if large else {"above", "below", "both"} <= {*told[5:]}
-    stored = python(package, code.partition("library =")[0].replace("sum(sum", "0 and sum(sum"))
-    assert stored[:3] == wanted
+    wanted = [str(2.5 * total), str(0.5 * total), str(0.5 * total + total + 2.0 * total + 5.0), "negative"]
+    code = CHAIN.format(large=large, compiled=True)
+    first, second = [python(package, code, FVSOLVE_STORE="0") for _ in range(2)]
+    assert first[:5] == [*wanted, "3"] and second[:5] == [*wanted, "0"]
+    assert first[5] == "0" if large else {"above", "below", "both"} <= {*first[6:]}
+    for _ in range(2):  # the first process fills the store
+        assert python(package, CHAIN.format(large=large, compiled=False)) == wanted
 
 
 def test_functions_that_were_compiled_before_are_called(package):  # noqa: F811

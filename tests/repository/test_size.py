@@ -60,7 +60,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/parts": (17155, 46),
     "tests/reference": (3326, 32),
     "tests/report": (851, 4),
-    "tests/repository": (3132, 18),
+    "tests/repository": (3136, 18),
     "tests/schemes": (569, 2),
     "tests/solve": (1948, 8),
     "tests/step_limits": (1026, 4),
