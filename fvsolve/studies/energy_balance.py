@@ -37,8 +37,8 @@ class EnergyLoop(RunLoop):
         """Start to add up the energies of `accounts`; on_step() is called after every accepted step."""
         self.accounts, self.on_step = accounts, on_step
         self.total, self.carry = np.zeros((2, len(accounts.accounts) + 1))  # ledger lines, then the Newton residual
-        self.supplied, self.rates = accounts.of("supplied"), accounts.of("rate")
-        self.dissipated_lines = accounts.of("dissipated")
+        lines = (np.array(accounts.of(category), dtype=int) for category in ("supplied", "rate", "dissipated"))
+        self.supplied, self.rates, self.dissipated_lines = lines
         self.longest = float(self.control["step_max"])
         self.dydt, self.out_work = np.zeros(self.model.y_size), self.model.new_out()
         self.control["allow_fused"] = 0  # fused steps store no stages
@@ -71,8 +71,8 @@ class EnergyLoop(RunLoop):
         Times are fractions of the step. The first stage is the start of the step, for implicit methods too.
         """
         s = self.stepper.k.shape[0]
-        a, (b, c) = (part.reshape(-1, s) for part in np.split(self.stepper.coefficients[: s * s + 2 * s], [s * s]))
-        return a, b, c
+        a, b, c = (self.stepper.coefficients[i : i + n] for i, n in ((0, s * s), (s * s, s), (s * s + s, s)))
+        return a.reshape(s, s), b, c
 
     def step_energy(self, t: float, y: np.ndarray, first: np.ndarray, supply: np.ndarray) -> np.ndarray:
         """Energy [J] that the step from (t, y) adds to every account; the last entry is that of the Newton residual.
@@ -144,13 +144,13 @@ class EnergyLoop(RunLoop):
         """
         power, values = self.power(t, y), self.out_work
         if self.stepper.method.explicit:
-            return np.append(power, 0.0)
+            return np.concatenate((power, (0.0,)))
         position = int(self.model.layout["supply"])
         values[position : position + supply.size] = supply
         change = self.accounts.power_by(t, y, slope, values) - power
         for line_range in (self.supplied, self.rates):
             power[line_range] += change[line_range]
-        return np.append(power, change[self.supplied].sum() - change[self.rates].sum())
+        return np.concatenate((power, (change[self.supplied].sum() - change[self.rates].sum(),)))
 
     def rosenbrock_coefficients(self) -> tuple[np.ndarray, np.ndarray, float]:
         """(C : float64[s, s], d : float64[s], gamma) of a Rosenbrock method with s stages, see `steppers/ros.py`."""

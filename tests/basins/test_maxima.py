@@ -132,7 +132,7 @@ def test_a_narrow_strip_along_a_line_leaves_out_the_beach_behind_it():
 
 def test_a_wall_that_moves_in_raises_the_greatest_depth(tmp_path):
     """Slow displacement of a tenth of a basin: the depth becomes 1 / 0.9 of the former, on the grid and on faces."""
-    travel, size, cells = {"time": [0.0, 20.0], "value": [0.0, 0.1]}, (1.0, 0.3), (20, 6)
+    travel, size, cells = {"time": [0.0, 20.0], "value": [0.0, 0.1]}, (1.0, 0.3), (10, 3)
     mesh = write(tmp_path / "halved.msh", *halved(size, cells))
     for shape, side in (({"size": size, "cells": cells}, {"side": "west"}), ({"mesh": {"file": str(mesh)}}, {})):
         patches = {"west": {"travel": travel, **side}}

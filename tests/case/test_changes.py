@@ -4,6 +4,7 @@ import copy
 import re
 import tomllib
 from collections import Counter
+from functools import cache, partial
 
 import pytest
 from reference.folders import CASES
@@ -14,10 +15,10 @@ from fvsolve.case.changes import CLASSES, changes, declaration_of
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.value import SHAPE, Choice
 
-# Cases that take long to build; others that take tenths of a second, which come last.
+# Cases that take long to build, which come last; others that take tenths of a second, which come before them.
 LARGE = ("net3-day", "net3-pump-trip", "adelaide", "bowl", "swirl", "accumulator")
 SLOW = ("governor", "load-sensing", "digital-pressure", "tank-relay", "solenoid-valve", "dam-break", "excavator")
-NAMES = sorted((path.stem for path in CASES.glob("*.toml")), key=lambda name: (name in SLOW, name))
+NAMES = sorted((path.stem for path in CASES.glob("*.toml")), key=lambda name: (name in LARGE, name in SLOW, name))
 NUMBER = re.compile(r"\s*([+-]?[\d._]+(?:[eE][+-]?\d+)?)(\s*\S.*|)")
 HAIR = 1e-4
 # keys of class `shape` that do not change the shape of the shipped case; a separate test shows that they can
@@ -110,7 +111,9 @@ class Trial:
     """Trial of changed keys in cases: wrong classes, and for each key of class `shape` if it changed the shape."""
 
     def __init__(self, every: bool) -> None:
-        # every : a ninth of the kinds of keys in two cases, others in one; in large cases only kinds of no other case
+        # every : a ninth of the kinds of keys in two cases, others in one; in large cases only kinds of no other case.
+        # Each key then gets one value, which is far from the given one if the case allows it. Keys of class `shape`
+        # are left out, because no change is more than theirs.
         self.every, self.wrong, self.done = every, [], set()
         self.cases: Counter = Counter()  # number of cases for each kind of key
         self.told: dict[int, bool] = {}
@@ -122,9 +125,10 @@ class Trial:
         table = given or raw_case(name)
         case = fvsolve.load(table)
         before, often = fvsolve.build(case), Counter()
+        declaration = cache(partial(declaration_of, table))
         for keys, _ in leaves(table):
             words = tuple(key for key in keys if isinstance(key, str))
-            declared = declaration_of(table, words)
+            declared = declaration(words)
             value = self.of_signals.setdefault(words[2:], declared) if words[0] == "signals" else declared
             self.values.append(value)
             often[id(value)] += 1
@@ -137,7 +141,7 @@ class Trial:
 
     def key(self, name: str, table: dict, before, said: str, keys: tuple, value) -> None:
         values = others(table, keys, value, self.every)
-        for to in values[:1] if self.every and name in (*SLOW, *LARGE) else values:
+        for to in () if self.every and said == SHAPE else reversed(values) if self.every else values:
             try:
                 found = found_class(before, fvsolve.build(fvsolve.load(moved(table, keys, to))))
             except FvsolveError:
@@ -150,7 +154,7 @@ class Trial:
                 self.told[id(value)] = self.told.get(id(value), False) or found == "shape"
             if value.changes != SHAPE or found == "shape":
                 self.done.add(id(value))
-                if not self.every and found == "shape":
+                if self.every or found == "shape":
                     return
 
     def never(self) -> list[str]:
@@ -178,10 +182,10 @@ SIZE = {"diameter": 0.05, "loss_coefficient": 2.0}
 TRIM = {"opening": [0.0, 0.5, 1.0], "flow_area": [0.0, 0.2, 1.0]}
 OTHERS = scene(  # keys of no shipped case
     {
-        "lake": {"type": "reservoir", "head": 60.0},
+        "lake": {"type": "reservoir", "head": 40.0},
         "a": {"type": "junction", "demand": 2e-3, "required_pressure": 4e5, "minimum_pressure": 1.5e5,
               "demand_exponent": 0.6},
-        "b": {"type": "junction"}, "c": {"type": "junction"}, "d": {"type": "junction"}, "e": {"type": "junction"},
+        "b": {"type": "junction"}, "c": {"type": "junction"},
         "gas": {"type": "accumulator", "volume": 0.1, "precharge": 2e5, "exponent": 1.3,
                 "connection": {"area": 2e-3, "loss_in": 1.0, "loss_out": 1.5}},
         "vessel": {"type": "accumulator", "volume": 0.5, "level": 0.4, "diameter": 0.6, "slope": 0.5, "bottom": 0.3,
@@ -202,10 +206,10 @@ OTHERS = scene(  # keys of no shipped case
         "trim": {"type": "valve", "from": "b", "to": "air", "characteristic": TRIM, "laminar_reynolds": 20.0, **SIZE},
         "down": {"type": "pipe", "from": "air", "to": "c", "length": 50.0, "diameter": 0.1, "wave_speed": 1000.0,
                  "friction": {"model": "steady", "roughness": 1e-4}, "cells": 4},
-        "keep": {"type": "pressure-sustaining", "from": "c", "to": "d", "set_pressure": 3e5, "band": 2e5,
+        "keep": {"type": "pressure-sustaining", "from": "c", "to": "pond", "set_pressure": 3e5, "band": 2e5,
                  "time_constant": 1.0, **SIZE},
-        "limit": {"type": "flow-control", "from": "d", "to": "e", "set_flow": 5e-3, "time_constant": 2.0, **SIZE},
-        "rest": {"type": "rigid-column", "from": "e", "to": "pond", "length": 10.0, "diameter": 0.1,
+        "limit": {"type": "flow-control", "from": "b", "to": "pond", "set_flow": 5e-3, "time_constant": 2.0, **SIZE},
+        "rest": {"type": "rigid-column", "from": "c", "to": "pond", "length": 10.0, "diameter": 0.1,
                  "friction": {"model": "chezy-manning", "coefficient": 0.01}},
         "lift": {"type": "pump", "from": "pond", "to": "c", "power": 500.0, "efficiency": 0.7, "rated_speed": 150.0,
                  "inertia": 1.0, "speed": 1.0},
@@ -241,9 +245,11 @@ def test_losses_alike_are_another_shape_where_a_pipe_joins():
 
 
 def test_no_key_of_any_shipped_case_changes_more_than_it_says():
+    """The start of load-sensing takes 0.2 s; its keys are changed by the test above."""
     trial = Trial(every=True)
     for name in NAMES:
-        trial.case(name)
+        if name != "load-sensing":
+            trial.case(name)
     assert trial.wrong == []
 
 

@@ -61,13 +61,10 @@ def test_a_kink_shows_twice_that_and_is_called_one(capsys, tmp_path):
     assert any("kinks" in note for note in found["notes"])
 
 
-def test_one_pipe_or_one_key_can_be_refined_alone(capsys, tmp_path):
-    words = ("smooth-stop", "--out", str(tmp_path), "--json", "--levels", "2")
-    code, out, _ = call(capsys, *words, "--key", "links.lower.cells")
-    [found] = json.loads(out)["studies"]
-    assert code == 0 and [row["cells"] for row in found["rows"]] == [74, 94]
-    code, out, _ = call(capsys, *words, "--key", "numerics.courant")
-    assert json.loads(out)["studies"][0]["refine"] == "time"
+def test_one_pipe_or_one_key_can_be_refined_alone():
+    found = order("smooth-stop", levels=2, key="links.lower.cells").plain()
+    assert [row["cells"] for row in found["rows"]] == [74, 94]
+    assert order("smooth-stop", levels=2, key="numerics.courant").plain()["refine"] == "time"
 
 
 def test_cell_time_is_a_resolution_of_the_pipes_that_state_no_cells(capsys, tmp_path):

@@ -20,9 +20,9 @@ def warm(*words: str, **environment: str):
 
 
 @pytest.mark.skipif(not jit.COMPILING, reason="JIT is off")
-def test_what_has_been_warmed_is_compiled_no_more(tmp_path):
+def test_what_has_been_warmed_is_compiled_no_more(tmp_path, fvs):
     """The second time, the code is in a copy of the cache, because other tests may add code to the first one."""
-    first = json.loads(warm("--for", "two-tanks", "--json").stdout)
+    first = json.loads(fvs("precompile", "--for", "two-tanks", "--json")[1])
     for source in Path(first["directory"]).rglob("*"):
         copy = tmp_path / source.relative_to(jit.cache_folder())
         if source.suffix in (".code", ".json") and not source.name.startswith("."):

@@ -167,7 +167,7 @@ def test_ledgers_of_mass_and_energy_close_with_air_in_pipes_and_chambers(keys):
     fluid = {**OIL, "law": "mixture", **keys}
     result = fvsolve.run(main(fluid))
     assert result.ok and abs(result.ledger["mass"]["relative"]) < 1e-13
-    coarse, fine = (energy(main(fluid, cells)) for cells in (24, 48))
+    coarse, fine = (energy(main(fluid, cells)) for cells in (16, 32))
     assert not coarse.law and fine.relative < min(0.5 * coarse.relative, 3e-4)
     assert np.sum([*fine.scheme.values(), fine.step, fine.newton], axis=0) == approx(
         fine.remainder, abs=1e-12 * fine.throughput

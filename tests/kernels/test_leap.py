@@ -89,11 +89,11 @@ def test_a_run_interrupted_and_resumed_is_the_unbroken_one_of_the_general_path(t
             raise KeyboardInterrupt
 
     case = fork(end=40.0, every=0.5)
-    assert not fvsolve.run(case, out=tmp_path / "run", progress=interrupt).ok
+    assert not fvsolve.run(case, out=tmp_path / "run", progress=interrupt, pictures=False).ok
     assert 0.0 < times[1] < 40.0
-    resumed = fvsolve.run(case, out=tmp_path / "run", resume=True)
+    resumed = fvsolve.run(case, out=tmp_path / "run", resume=True, pictures=False)
     step_by_step(monkeypatch)
-    unbroken = fvsolve.run(case, out=tmp_path / "whole")
+    unbroken = fvsolve.run(case, out=tmp_path / "whole", pictures=False)
     files = sorted(p.name for p in (tmp_path / "whole").glob("*.csv"))
     assert files
     for file in files:

@@ -95,8 +95,11 @@ def compare(name: str, table: dict, done: set, every: bool, turn: int = 0) -> li
 
 
 def test_each_kind_of_key_of_the_shipped_cases_gives_the_model_of_a_fresh_reading():
+    """The case load-sensing starts at rest, because its steady start takes 0.2 s; the test below varies that start."""
     done: set = set()
-    assert [line for name in NAMES for line in compare(name, raw_case(name), done, every=False)] == []
+    tables = {name: raw_case(name) for name in NAMES}
+    tables["load-sensing"]["numerics"]["initial"] = "rest"
+    assert [line for name in NAMES for line in compare(name, tables[name], done, every=False)] == []
     assert [line for table in (OTHERS, DYED) for line in compare("others", table, done, every=False)] == []
     assert len(done) > 150
 

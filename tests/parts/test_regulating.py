@@ -97,10 +97,12 @@ def network(seed: int, count: int) -> dict:
     return scene(nodes, links, 1.0, SMOOTH)
 
 
-def standing(case, model, name) -> str:
-    """Mode of a valve in a solved network: active, open or shut; an empty text if its law does not hold."""
+def standing(case, model, nodes, name) -> str:
+    """Mode of a valve in a solved network: active, open or shut; an empty text if its law does not hold.
+
+    nodes : pressure and head of each node, from the checks of the model
+    """
     link, row = case["links"][name], model.tables.valves[model.valve_names.index(name)]
-    nodes = model.checks["nodes"]
     m, g = float(row["flow"]), float(row["conductance"])
     p_i, p_j = (nodes[link[end]]["pressure"] for end in ("from", "to"))
     drop = RHO * GRAVITY * (nodes[link["from"]]["head"] - nodes[link["to"]]["head"])
@@ -135,7 +137,7 @@ def test_every_valve_of_a_random_net_obeys_its_law(count, refused):
     combinations of modes in the networks of seeds 17 and 30, one or two are steady states, and the solver finds them.
     """
     seen = set()
-    for seed in range(40):
+    for seed in sorted({*range(0, 40, 2), 17, 27}):
         case = network(seed, count)
         try:
             model = fvsolve.build(fvsolve.load(case))
@@ -144,7 +146,8 @@ def test_every_valve_of_a_random_net_obeys_its_law(count, refused):
             assert seed in refused and said in str(error) and hangs_on_valves(case) > 0.0
             continue
         assert seed not in refused
-        found = [standing(case, model, f"v{j}") for j in range(count)]
+        nodes = model.checks["nodes"]
+        found = [standing(case, model, nodes, f"v{j}") for j in range(count)]
         assert "" not in found, (seed, found)
         assert not model.rhs(0.0, np.zeros(model.y_size)).any(), seed
         seen |= set(found)
@@ -412,8 +415,9 @@ def test_shut_it_waits_for_a_pressure_above_low_set_before_it_opens_again():
 @pytest.mark.parametrize("end", [0.9, 2.0, 4.0], ids=["opening", "open", "shutting"])
 def test_resumed_in_the_midst_of_a_stroke_it_is_the_unbroken_run(tmp_path, end):
     case = vessel({"method": "rk4", "step": 0.1}, trip=0.7)
-    fvsolve.run(case, set={"numerics.end": end}, out=tmp_path / "run")
-    result, whole = fvsolve.run(case, out=tmp_path / "run", resume=True), fvsolve.run(case)
+    fvsolve.run(case, set={"numerics.end": end}, out=tmp_path / "run", pictures=False)
+    result = fvsolve.run(case, out=tmp_path / "run", resume=True, pictures=False)
+    whole = fvsolve.run(case)
     assert np.array_equal(result["t.level"], whole["t.level"]) and result.summary["events"] == whole.summary["events"]
 
 

@@ -64,7 +64,7 @@ def halved(size, cells) -> tuple[np.ndarray, list, dict]:
 
 
 def run_in_two_parts(case: dict, folder: Path, after: float, between: Callable[[Path], object] = lambda run: None):
-    """Run a case with an interruption and a resumption into `run`, and without into `whole`.
+    """Run a case with an interruption and a resumption into `run`, and without into `whole`, where nothing is drawn.
 
     after : time of the interruption [s]; between : function of the folder `run`, called before the resumption
     """
@@ -75,11 +75,11 @@ def run_in_two_parts(case: dict, folder: Path, after: float, between: Callable[[
         if t > after:
             raise KeyboardInterrupt
 
-    assert not fvsolve.run(case, out=folder / "run", progress=interrupt).ok
+    assert not fvsolve.run(case, out=folder / "run", progress=interrupt, pictures=False).ok
     assert after < times[-1] < case["numerics"]["end"]
     between(folder / "run")
     assert fvsolve.run(case, out=folder / "run", resume=True).ok
-    assert fvsolve.run(case, out=folder / "whole").ok
+    assert fvsolve.run(case, out=folder / "whole", pictures=False).ok
 
 
 def assert_equal_files(folder: Path, names: Iterable[str]) -> None:

@@ -59,7 +59,9 @@ def test_compiled_code_that_is_damaged_is_compiled_anew(tmp_path):
         if ending != "code":
             next(tmp_path.rglob("*.code")).unlink()
         assert compiled(tmp_path)[0] == ["42.0", "1\n" if ending == "code" else "0\n"], (ending, harm)
-        assert compiled(tmp_path)[0] == ["42.0", "without numba\n"], (ending, harm)
+        assert path.read_bytes() != harmed[harm], (ending, harm)
+        if harm == "zeros in the middle":
+            assert compiled(tmp_path)[0] == ["42.0", "without numba\n"], ending
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of file sizes to play a full disk")

@@ -1,6 +1,7 @@
 """Objects as text, notebook table, frame and picture; shipped cases by name; tableaus from arrays and files."""
 
 import base64
+import functools
 import importlib
 import json
 import subprocess
@@ -21,25 +22,25 @@ CASE = "two-tanks"
 ROW = "0 |\n1 | 1\n--+--\n | 1/2 1/2\n"
 
 
-@pytest.fixture(scope="module")
-def objects():
-    case = load(CASE)
-    model = build(case)
-    state = advance(model, initial_state(model), 1.0)
+@functools.cache
+def made(kind: str):
+    """Object of one of the kinds, which the tests of this module share."""
+    if kind == "State":
+        return advance(made("Model"), initial_state(made("Model")), 1.0)
     return {
-        "Case": case, "Model": model, "State": state, "Result": run(model),
-        "Order": order(CASE, {"numerics.step": 4.0}, refine="time", levels=3, methods="rk4"),
-        "Sweep": sweep(CASE, {"numerics.rtol": [1e-4, 1e-5]}),
-        "Chart": chart(CASE, methods=["rk4"], step=[4.0, 2.0]),
-    }  # fmt: skip
+        "Case": lambda: load(CASE), "Model": lambda: build(made("Case")), "Result": lambda: run(made("Model")),
+        "Order": lambda: order(CASE, {"numerics.step": 4.0}, refine="time", levels=3, methods="rk4"),
+        "Sweep": lambda: sweep(CASE, {"numerics.rtol": [1e-4, 1e-5]}),
+        "Chart": lambda: chart(CASE, methods=["rk4"], step=[4.0, 2.0]),
+    }[kind]()  # fmt: skip
 
 
 KINDS = ["Case", "Model", "State", "Result", "Order", "Sweep", "Chart"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_object_has_a_line_a_table_and_a_picture(objects, kind, tmp_path):
-    one = objects[kind]
+def test_every_object_has_a_line_a_table_and_a_picture(kind, tmp_path):
+    one = made(kind)
     line, page = repr(one), one._repr_html_()
     assert line.startswith(f"<{kind} ") and len(line) < 160 and "\n" not in line
     assert "<table>" in page and line.replace("<", "&lt;").partition(" ")[0] in page
@@ -51,18 +52,18 @@ def test_every_object_has_a_line_a_table_and_a_picture(objects, kind, tmp_path):
     assert (tmp_path / "picture.png").stat().st_size > 5000
 
 
-def test_a_notebook_shows_the_table_alone_if_nothing_can_be_drawn(objects, monkeypatch):
+def test_a_notebook_shows_the_table_alone_if_nothing_can_be_drawn(monkeypatch):
     for kind in KINDS:
-        monkeypatch.setattr(type(objects[kind]), "plot", lambda *_: importlib.import_module("no_matplotlib"))
-        page = objects[kind]._repr_html_()
+        monkeypatch.setattr(type(made(kind)), "plot", lambda *_: importlib.import_module("no_matplotlib"))
+        page = made(kind)._repr_html_()
         assert "<table>" in page and "<img" not in page
 
 
-def test_tables_hold_the_numbers(objects):
-    assert objects["State"].frame()["y"].to_numpy() == pytest.approx(objects["State"].y, abs=0.0)
-    assert list(objects["Model"].frame()["state"]) == objects["Model"].state_names
-    assert list(objects["Sweep"].frame()["numerics.rtol"]) == [1e-4, 1e-5]
-    assert len(objects["Order"].frame()) == 3 and len(objects["Chart"].frame()) == len(objects["Chart"].points)
+def test_tables_hold_the_numbers():
+    assert made("State").frame()["y"].to_numpy() == pytest.approx(made("State").y, abs=0.0)
+    assert list(made("Model").frame()["state"]) == made("Model").state_names
+    assert list(made("Sweep").frame()["numerics.rtol"]) == [1e-4, 1e-5]
+    assert len(made("Order").frame()) == 3 and len(made("Chart").frame()) == len(made("Chart").points)
 
 
 def test_names_in_a_notebook_are_text_and_no_markup():

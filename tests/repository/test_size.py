@@ -15,6 +15,7 @@ TOP = Path(__file__).parents[2]
 SLACK = 0.03  # greatest unused share of a limit
 MAX_ARGUMENTS = 12
 MAX_LINES = 60
+BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")  # fields of statements that hold statements
 # folder -> (lines, files), with its subfolders
 FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve": (1799, 11),
@@ -44,28 +45,28 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/studies": (14851, 51),
     "fvsolve/validation": (1461, 11),
     "tests/attitude": (447, 2),
-    "tests/basins": (6927, 22),
-    "tests/case": (4469, 15),
-    "tests/cli": (1042, 7),
+    "tests/basins": (6928, 22),
+    "tests/case": (4475, 15),
+    "tests/cli": (1039, 7),
     "tests/draw": (217, 2),
     "tests/epanet": (645, 2),
     "tests/exact": (475, 2),
     "tests/fluid": (1063, 4),
     "tests/fmi": (396, 2),
-    "tests/invariance": (2057, 12),
+    "tests/invariance": (2058, 12),
     "tests/kernels": (1297, 8),
     "tests/mesh": (411, 1),
-    "tests/model": (2976, 10),
+    "tests/model": (2979, 10),
     "tests/output": (518, 2),
-    "tests/parts": (17155, 46),
+    "tests/parts": (17195, 46),
     "tests/reference": (3326, 32),
     "tests/report": (851, 4),
-    "tests/repository": (3136, 18),
+    "tests/repository": (3152, 18),
     "tests/schemes": (569, 2),
-    "tests/solve": (1948, 8),
+    "tests/solve": (1980, 8),
     "tests/step_limits": (1026, 4),
     "tests/steppers": (2194, 12),
-    "tests/studies": (8219, 23),
+    "tests/studies": (8245, 23),
     "tests/units": (267, 1),
     "tests/validation": (319, 1),
 }
@@ -96,7 +97,9 @@ def size_of(paths: list[Path]) -> tuple[int, int]:
 def long_functions(source: str) -> dict[str, tuple[int, int]]:
     """Functions of a text of Python that exceed a limit : name -> (arguments, lines with docstring)."""
     found = {}
-    for node in ast.walk(ast.parse(source)):
+    nodes: list[ast.AST] = [ast.parse(source)]
+    for node in nodes:  # statements, which grow in the loop; expressions contain no function with a name
+        nodes += [one for part in BLOCKS for one in getattr(node, part, ())]
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             own = node.args
             size = len(own.posonlyargs) + len(own.args) + len(own.kwonlyargs), node.end_lineno - node.lineno + 1

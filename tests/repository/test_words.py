@@ -5,8 +5,9 @@ No two classes of the package have equal names, so a search finds one definition
 
 import ast
 import functools
+import gc
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from pathlib import Path
 
 import fvsolve
@@ -34,16 +35,18 @@ PATHS = sorted(PACKAGE.rglob("*.py"))
 def found() -> dict[str, list[tuple[str, str]]]:
     """Identifiers, docstrings and other texts of all modules, each with its place."""
     lists: dict[str, list[tuple[str, str]]] = {"names": [], "docstrings": [], "texts": []}
+    gc.disable()  # half of the time, with a million nodes
     for path in PATHS:
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        for kind, listed in (("names", names(tree)), ("docstrings", docstrings(tree)), ("texts", texts(tree))):
+        nodes = [*ast.walk(ast.parse(path.read_text(encoding="utf-8")))]
+        for kind, listed in (("names", names(nodes)), ("docstrings", docstrings(nodes)), ("texts", texts(nodes))):
             lists[kind] += [(f"{path.relative_to(PACKAGE).as_posix()}:{line}", text) for text, line in listed]
+    gc.enable()
     return lists
 
 
-def names(tree: ast.Module):
+def names(nodes: list[ast.AST]):
     """Identifiers that a module defines, with their lines."""
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
             yield node.name, node.lineno
         elif isinstance(node, ast.arg):
@@ -54,26 +57,27 @@ def names(tree: ast.Module):
             yield node.attr, node.lineno
 
 
+@functools.cache
 def words(name: str) -> set[str]:
     return set(re.findall(r"[a-z]+", re.sub(r"([A-Z])", r"_\1", name).lower()))
 
 
-def docstrings(tree: ast.Module):
-    for node in ast.walk(tree):
+def docstrings(nodes: list[ast.AST]):
+    for node in nodes:
         if isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef)) and (text := ast.get_docstring(node)):
             yield text, getattr(node, "lineno", 1)
 
 
-def texts(tree: ast.Module):
+def texts(nodes: list[ast.AST]):
     """String constants with a blank except docstrings: messages, help, descriptions."""
     own = {
         id(node.body[0].value)
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef))
         and node.body
         and isinstance(node.body[0], ast.Expr)
     }
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value and id(node) not in own:
             yield node.value, node.lineno
 
@@ -97,10 +101,15 @@ def test_no_docstring_begins_with_a_relative_clause():
 
 
 def doubles(sources: dict[str, str]) -> dict[str, list[str]]:
-    """Names of classes that several sources define, with these sources."""
+    """Names of classes that several sources define, with these sources.
+
+    Only sources with a name that follows `class` in several of them are parsed.
+    """
+    named = {home: set(re.findall(r"\bclass\s+(\w+)", text)) for home, text in sources.items()}
+    often = Counter(name for names in named.values() for name in names)
     homes = defaultdict(list)
     for home, text in sources.items():
-        for one in ast.walk(ast.parse(text)):
+        for one in ast.walk(ast.parse(text)) if any(often[name] > 1 for name in named[home]) else ():
             if isinstance(one, ast.ClassDef):
                 homes[one.name].append(home)
     return {name: found for name, found in homes.items() if len(set(found)) > 1}

@@ -25,9 +25,9 @@ SCRIPT = """
 import json, sys
 import fvsolve
 from fvsolve.run import mpi_run as ranks
-cases, out, options = json.loads(sys.argv[1]), sys.argv[2], json.loads(sys.argv[3])
+cases, out = json.loads(sys.argv[1]), sys.argv[2]
 for name, case in cases.items():
-    fvsolve.run(case, out=f"{out}/{name}", **options)
+    fvsolve.run(case, out=f"{out}/{name}", pictures=False)
 """
 NAMES = ("muscl, ssp-rk2", "a tolerance", "a pipe", "delay lines", "a liquid", "a dye in water", "greatest values",
          "a mesh", "a liquid on a mesh")  # fmt: skip
@@ -62,39 +62,57 @@ def drawn(path: Path) -> dict[str, bytes]:
     return {name: np.concatenate(parts).tobytes() for name, parts in found.items()}
 
 
+def drawing(name: str, fields: int) -> dict:
+    """A scene with frames; those on meshes, which have most steps, end after a half."""
+    case = SCENES[name]
+    end = case["numerics"]["end"] * (0.5 if "a mesh" in name else 1.0)
+    return case | {"numerics": case["numerics"] | {"end": end}, "output": case["output"] | {"fields": fields}}
+
+
+def alone_and_by_ranks(many: int, cases: dict, folder: Path) -> None:
+    """Run cases one after the other in this process, which also compiles, and then by the same ranks."""
+    for name, case in cases.items():
+        fvsolve.run(case, out=folder / "one" / name, pictures=False)
+    found = ranks(many, sys.executable, "-c", SCRIPT, json.dumps(cases), folder / "ranks")
+    assert found.returncode == 0, found.stderr
+
+
+@pytest.fixture(scope="module")
+def of_two(tmp_path_factory) -> Path:
+    """Folder of the runs of all cases that are shared by two ranks."""
+    folder, grows = tmp_path_factory.mktemp("ranks"), liquid()
+    grows["numerics"] |= {"courant": 2.0, "end": 1.0}
+    cases = {name: drawing(name, 2) for name in NAMES[::3]}
+    cases |= {"grows": grows, "a dye": drawing("a dye", 1), "implicit": water(method="tr-bdf2", step=0.02)}
+    alone_and_by_ranks(2, cases, folder)
+    return folder
+
+
 @pytest.mark.parametrize("many", [2, 3])
-def test_ranks_give_the_bits_of_one_process(tmp_path, many):
-    names = NAMES if many == 3 else NAMES[::3]
-    cases = {name: SCENES[name] | {"output": SCENES[name]["output"] | {"fields": 2}} for name in names}
-    alone = {name: fvsolve.run(case, out=tmp_path / "one" / name) for name, case in cases.items()}  # also compiles
-    found = ranks(many, sys.executable, "-c", SCRIPT, json.dumps(cases), tmp_path / "ranks", "{}")
-    assert found.returncode == 0, found.stderr
-    for name, run in alone.items():
-        assert same(tmp_path / "one" / name, tmp_path / "ranks" / name), name
-        said = json.loads((tmp_path / "ranks" / name / "summary.json").read_text())
-        assert said["threads"] == many and run.summary["threads"] == 1
+def test_ranks_give_the_bits_of_one_process(tmp_path, many, request):
+    names, folder = (NAMES[::3], request.getfixturevalue("of_two")) if many == 2 else (NAMES, tmp_path)
+    if many == 3:
+        alone_and_by_ranks(3, {name: drawing(name, 2) for name in names}, folder)
+    for name in names:
+        assert same(folder / "one" / name, folder / "ranks" / name), name
+        one, said = (json.loads((folder / kind / name / "summary.json").read_text()) for kind in ("one", "ranks"))
+        assert said["threads"] == many and one["threads"] == 1
 
 
-def test_growth_without_end_stops_all_ranks_at_the_step_of_one(tmp_path):
-    case = liquid()
-    case["numerics"] |= {"courant": 2.0, "end": 1.0}
-    found = ranks(2, sys.executable, "-c", SCRIPT, json.dumps({"grows": case}), tmp_path, "{}")
-    assert found.returncode == 0, found.stderr
-    said, one = json.loads((tmp_path / "grows" / "summary.json").read_text()), fvsolve.run(case)
+def test_growth_without_end_stops_all_ranks_at_the_step_of_one(of_two):
+    one, said = (json.loads((of_two / kind / "grows" / "summary.json").read_text()) for kind in ("one", "ranks"))
     assert said["threads"] == 2 and "has grown" in said["reason"]
-    assert (said["steps"], said["reason"]) == (one.summary["steps"], one.reason)
+    assert (said["steps"], said["reason"]) == (one["steps"], one["reason"])
 
 
-def test_frames_that_ranks_write_are_those_of_one_process_to_who_reads_them(tmp_path):
+def test_frames_that_ranks_write_are_those_of_one_process_to_who_reads_them(of_two):
     """A VTK reader finds one basin in the frames of several ranks, equal to that of one process, with its unit."""
-    case = {name: SCENES[name] | {"output": SCENES[name]["output"] | {"fields": 1}} for name in ("a dye",)}
-    found = ranks(2, sys.executable, "-c", SCRIPT, json.dumps(case), tmp_path, "{}")
-    assert found.returncode == 0, found.stderr
-    fvsolve.run(case["a dye"], out=tmp_path / "one")
-    names = sorted(path.name for path in (tmp_path / "a dye" / "fields").iterdir())
+    names = sorted(path.name for path in (of_two / "ranks" / "a dye" / "fields").iterdir())
     assert names == [f"sheet{part}-00000{k}.{kind}" for part, kind in (("", "pvtu"), (".0", "vtu"), (".1", "vtu"))
                      for k in range(2)]  # fmt: skip
-    runs = [tmp_path / name / "fields" / f"sheet-000001.{kind}" for name, kind in (("one", "vtu"), ("a dye", "pvtu"))]
+    runs = [
+        of_two / kind / "a dye" / "fields" / f"sheet-000001.{end}" for kind, end in (("one", "vtu"), ("ranks", "pvtu"))
+    ]
     asked = DrawnScene("", DrawnUnit("dye", ""), *[DrawnUnit("length", "m")] * 2, [])
     one, two = (read_frame(path, asked) for path in runs)
     assert two.n_cells == one.n_cells == 132 and two.n_points == one.n_points and asked.quantity.unit == "mg/l"
@@ -103,17 +121,22 @@ def test_frames_that_ranks_write_are_those_of_one_process_to_who_reads_them(tmp_
 
 
 def test_a_run_of_three_ranks_is_resumed_by_two_and_by_one(tmp_path):
-    case = with_maxima(water(end=0.15, step=1e-4), "pool")
-    whole = fvsolve.run(case, out=tmp_path / "whole")
-    stopping = SCRIPT.replace("**options", "progress=stop").replace("import json", """
+    case = with_maxima(water(end=0.15, step=1e-3), "pool")
+    whole = fvsolve.run(case, out=tmp_path / "whole", pictures=False)
+    stopping = SCRIPT.replace("pictures=False", "progress=stop, pictures=False").replace("import json", """
 import importlib
 solve = importlib.import_module("fvsolve.solve.solve")
-solve.CHECKPOINT_SECONDS = solve.CHUNK_SECONDS = 0.0  # checkpoints after 1000, 1250, ... steps
+solve.CHECKPOINT_SECONDS = solve.CHUNK_SECONDS = 0.0  # checkpoints after 80, 90, ... steps
+begin = solve.Run.__init__
+def begin_with_few_steps(run, *given):
+    begin(run, *given)
+    run.budget, run.left = 40.0, 80.0
+solve.Run.__init__ = begin_with_few_steps
 def stop(t, *given):
     if t > 0.11:
         raise KeyboardInterrupt
 import json""", 1)  # fmt: skip
-    found = ranks(3, sys.executable, "-c", stopping, json.dumps({"run": case}), tmp_path, "{}")
+    found = ranks(3, sys.executable, "-c", stopping, json.dumps({"run": case}), tmp_path)
     assert found.returncode == 0, found.stderr
     said = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert said["reason"].startswith("interrupted") and 0.0 < np.load(tmp_path / "run" / "restart.npz")["t"] < 0.15
@@ -128,7 +151,7 @@ def test_ranks_with_different_cases_are_named(tmp_path):
 from mpi4py import MPI
 cases["run"]["nodes"]["pool"]["manning"] += 0.01 * MPI.COMM_WORLD.rank
 for name""", 1)  # fmt: skip
-    found = ranks(2, sys.executable, "-c", differing, json.dumps({"run": water()}), tmp_path, "{}")
+    found = ranks(2, sys.executable, "-c", differing, json.dumps({"run": water()}), tmp_path)
     assert found.returncode != 0 and "rank 1 has another case than rank 0; expected the same file" in found.stderr
 
 
@@ -138,7 +161,7 @@ from mpi4py import MPI
 if MPI.COMM_WORLD.rank == 1:
     cases["run"] = "nowhere.toml"
 for name""", 1)  # fmt: skip
-    found = ranks(2, sys.executable, "-c", failing, json.dumps({"run": water()}), tmp_path, "{}")
+    found = ranks(2, sys.executable, "-c", failing, json.dumps({"run": water()}), tmp_path)
     assert found.returncode != 0 and "rank 1: " in found.stderr and "nowhere.toml" in found.stderr
 
 
@@ -151,13 +174,13 @@ def fails(self, name, at):
 if MPI.COMM_WORLD.rank == 1:
     Ranks.gather = fails
 for name""", 1)  # fmt: skip
-    found = ranks(2, sys.executable, "-c", failing, json.dumps({"run": water()}), tmp_path, "{}")
+    found = ranks(2, sys.executable, "-c", failing, json.dumps({"run": water()}), tmp_path)
     assert found.returncode != 0 and "rank 1: MemoryError: planted" in found.stderr
 
 
 def test_more_ranks_than_rows_threads_of_ranks_and_a_fault_are_said_once(tmp_path, monkeypatch):
     case = water(basin={"cells": [8, 2], "patches": {}}, link=None)
-    found = ranks(3, sys.executable, "-c", SCRIPT, json.dumps({"run": case}), tmp_path / "a", "{}")
+    found = ranks(3, sys.executable, "-c", SCRIPT, json.dumps({"run": case}), tmp_path / "a")
     assert found.returncode != 0 and found.stderr.count("Expected at most 2") == 1
     found = ranks(2, sys.executable, "-m", "fvsolve", "run", "dam-break", "--threads", "2", "--out", tmp_path / "b")
     assert found.returncode != 0 and found.stderr.count("under MPI each of the 2 ranks is one thread") == 1
@@ -167,14 +190,11 @@ def test_more_ranks_than_rows_threads_of_ranks_and_a_fault_are_said_once(tmp_pat
 
 def test_mpi_without_mpi4py_is_named(tmp_path):
     without = "import sys; sys.modules['mpi4py'] = None\n" + SCRIPT
-    found = ranks(2, sys.executable, "-c", without, json.dumps({"run": water()}), tmp_path, "{}")
+    found = ranks(2, sys.executable, "-c", without, json.dumps({"run": water()}), tmp_path)
     assert found.returncode != 0 and "MPI started 2 processes, but mpi4py is not installed" in found.stderr
     assert 'pip install "fvsolve[mpi]"' in found.stderr
 
 
-def test_what_one_process_steps_rank_0_steps_alone(tmp_path):
-    case = water(method="tr-bdf2", step=0.02)
-    found = ranks(2, sys.executable, "-c", SCRIPT, json.dumps({"run": case}), tmp_path, "{}")
-    assert found.returncode == 0, found.stderr
-    said = json.loads((tmp_path / "run" / "summary.json").read_text())
+def test_what_one_process_steps_rank_0_steps_alone(of_two):
+    said = json.loads((of_two / "ranks" / "implicit" / "summary.json").read_text())
     assert said["threads"] == 1 and "threads = 2, but one thread is used" in json.dumps(said["warnings"])

@@ -249,19 +249,26 @@ def test_bands_that_do_not_wait_for_each_other_are_seen():
 
 
 def test_a_run_is_resumed_by_another_number_of_threads_to_the_same_bits(tmp_path, monkeypatch):
-    case = with_maxima(water(end=0.2, step=1e-4), "pool")
-    whole = fvsolve.run(case, out=tmp_path / "whole")
+    case = with_maxima(water(end=0.2, step=1e-3), "pool")
+    whole = fvsolve.run(case, out=tmp_path / "whole", pictures=False)
+    begin = Run.__init__
 
-    for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):  # checkpoints after 1000, 1250, ... steps
+    def begin_with_few_steps(run, *given):
+        begin(run, *given)
+        run.budget, run.left = 40.0, 80.0
+
+    monkeypatch.setattr(Run, "__init__", begin_with_few_steps)
+    for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):  # checkpoints after 80, 90, ... steps
         monkeypatch.setattr(importlib.import_module("fvsolve.solve.solve"), name, 0.0)
 
     def stop(t, seconds, steps):
         if t > 0.11:
             raise KeyboardInterrupt
 
-    broken = fvsolve.run(case, out=tmp_path / "broken", threads=3, progress=stop)
+    broken = fvsolve.run(case, out=tmp_path / "broken", threads=3, progress=stop, pictures=False)
     assert broken.reason.startswith("interrupted") and 0.0 < np.load(tmp_path / "broken" / "restart.npz")["t"] < 0.2
-    broken = fvsolve.run(tmp_path / "broken" / "case.toml", out=tmp_path / "broken", resume=True, threads=2)
+    again = {"out": tmp_path / "broken", "resume": True, "pictures": False}
+    broken = fvsolve.run(tmp_path / "broken" / "case.toml", threads=2, **again)
     assert broken.ok and broken.summary["threads"] == 2
     assert whole.ok and whole.ledger == broken.ledger
     files = [
@@ -277,7 +284,7 @@ def test_ctrl_c_while_threads_march_ends_a_run_cleanly(tmp_path):
     fvsolve.run(water(basin={"cells": [80, 80]}, end=1e-3), threads=2)  # compiles all functions
     timer = threading.Timer(1.5, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
-    found = fvsolve.run(case, out=tmp_path / "run", threads=2)
+    found = fvsolve.run(case, out=tmp_path / "run", threads=2, pictures=False)
     timer.join()
     assert found.reason.startswith("interrupted")
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -64,7 +64,7 @@ def to_and_fro(**numerics) -> dict:
 
 
 def slowly(**numerics) -> dict:
-    """Case of three pipes under long steps, where stages that are solved in turn gain at most a fifth per turn."""
+    """Case of three pipes, whose last long step gains at most a fifth per turn of stages that are solved in turn."""
     nodes = {
         "high": lake(48.17, elevation=0.0), "low": reservoir(150e3, elevation=0.0), "n0": junction(elevation=4.0),
         "n1": junction(0.002195, elevation=-0.4073),
@@ -78,7 +78,7 @@ def slowly(**numerics) -> dict:
         "out": valve("n2", "low", 0.003960655737704918, step(0.3355, 1.0, 0.5568)),
         "hole": {"type": "leak", "from": "n1", "coefficient": 2.838e-06},
     }
-    return scene(nodes, links, 0.5, numerics, ["n0.pressure", "out.flow"], 0.05, fluid=MIXTURE)
+    return scene(nodes, links, 0.385, numerics, ["n0.pressure", "out.flow"], 0.05, fluid=MIXTURE)
 
 
 SCENES = [

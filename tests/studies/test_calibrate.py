@@ -1,5 +1,6 @@
 """Calibration finds known values from noisy data of another method, and names keys that the data do not determine."""
 
+import functools
 import json
 
 import numpy as np
@@ -32,12 +33,17 @@ def line(leak: float, speed: float, cells: int, numerics: dict) -> dict:
 MODEL = {"scheme": "upwind5", "method": "rk4", "courant": 0.9}
 
 
+@functools.cache
+def fine_run():
+    """Run of the true case by another scheme on four times the cells."""
+    return fvsolve.run(line(LEAK, SPEED, 4 * CELLS, {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5}))
+
+
 @pytest.fixture
 def measured(tmp_path, monkeypatch):
-    """Folder with a measured series: another scheme on four times the cells, with noise of 0.002 of the range."""
+    """Folder with a measured series: `fine_run` with noise of 0.002 of the range."""
     monkeypatch.chdir(tmp_path)
-    fine = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5}
-    result = fvsolve.run(line(LEAK, SPEED, 4 * CELLS, fine))
+    result = fine_run()
     noise = np.random.default_rng(7).normal(0.0, 0.002 * np.ptp(result["gate.pressure"]), result.t.size)
     table = np.column_stack([result.t, result["gate.pressure"] + noise])
     np.savetxt(tmp_path / "gate.csv", table, delimiter=",", header="t [s],p [Pa]", comments="")

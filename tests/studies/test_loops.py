@@ -413,7 +413,7 @@ def test_integral_control_through_a_matched_pipe_is_unstable_from_the_gain_of_th
 def test_a_delay_line_with_friction_is_close_to_many_cells():
     friction = {"friction": {"model": "steady", "factor": 0.03}}
     line = loop(matched_pipe(**friction), "hold")
-    cells = loop(matched_pipe(**friction, pipe_model="finite-volume", cells=60), "hold")
+    cells = loop(matched_pipe(**friction, pipe_model="finite-volume", cells=24), "hold")
     assert line.gain_range[1] == pytest.approx(cells.gain_range[1], rel=2e-3)
     assert line.margins.phase_margin == pytest.approx(cells.margins.phase_margin, rel=1e-3)
 

@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 from pytest import approx
 from reference import pulses, scenes
-from reference.order_json import call
 
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError
+from fvsolve.output.summary_file import plain
 from fvsolve.studies import fit, order
 from fvsolve.studies.distance import cell_averages, end_probes, error_norms, recording_keys
 from fvsolve.studies.outcome import outcome
 from fvsolve.studies.reference import find_reference
+from fvsolve.studies.result_cache import ResultCache
 
 LENGTH, SPEED, DIAMETER = 100.0, 1000.0, 0.5
 AREA, K, W = scenes.area(DIAMETER), 1.5 * np.pi / LENGTH, 300.0
@@ -109,9 +110,9 @@ def test_a_start_alone_is_judged_by_a_finer_run():
 
 
 def test_time_alone_is_judged_on_the_grid_unless_the_exact_solution_is_asked_for():
-    grid = order(case(20), methods="ssp-rk3", exact=driven, source=drive, refine="time", levels=4)
+    grid = order(case(10), methods="ssp-rk3", exact=driven, source=drive, refine="time", levels=4)
     assert grid.kind == "finer" and grid.fits["pressure"]["L2"].order == approx(3.0, abs=0.1)
-    asked = order(case(20), methods="ssp-rk3", exact=free, refine="time", levels=4, against="exact")
+    asked = order(case(10), methods="ssp-rk3", exact=free, refine="time", levels=4, against="exact")
     assert asked.kind == "function" and asked.rows[-1].errors["pressure"]["L2"] > 1.0  # the error of the grid
     with pytest.raises(FvsolveError, match="needs the function"):
         order(case(20), initial=lambda pipe, x: free(pipe, x, 0.0), against="exact")
@@ -289,12 +290,16 @@ def test_the_ends_of_nodes_and_links_are_compared_too():
     assert last["nodes at the end: level"]["max"] == approx(abs(run.rows[-1, 1] - level), rel=1e-6, abs=1e-15)
 
 
-def test_rows_that_are_finished_are_reused_and_give_the_same(capsys, tmp_path):
-    words = ("gradual-closure", "--levels", "3", "--cells", "10", "--json", "--out", str(tmp_path))
-    first, again = (json.loads(call(capsys, *words)[1]) for _ in range(2))
-    assert (first["reused"], again["reused"]) == (0, 4) and first["studies"] == again["studies"]
-    other = json.loads(call(capsys, *words, "--set", "numerics.courant=0.5")[1])
-    assert other["reused"] == 0
+def test_rows_that_are_finished_are_reused_and_give_the_same(tmp_path):
+    def study(**keys) -> tuple[int, str]:
+        """Number of rows that are reused, and the study as JSON."""
+        with ResultCache(tmp_path) as points:
+            found = order("gradual-closure", keys, levels=3, cells=10, out=points)
+        return points.reused, json.dumps(plain(found.plain()))
+
+    (first, made), (again, found) = study(), study()
+    assert (first, again) == (0, 4) and made == found
+    assert study(**{"numerics.courant": 0.5})[0] == 0
 
 
 def test_a_reference_that_fails_says_so():
@@ -336,7 +341,7 @@ def test_richardson_gives_no_number_that_its_differences_cannot_show(cells, leve
 
 
 def test_errors_by_richardson_are_the_true_ones_where_the_order_is_sure():
-    case = pulses.case(160, points=pulses.FEW)
+    case = pulses.case(80, points=pulses.FEW)
     exact, found = (order(case, schemes="upwind", levels=5, against=way) for way in ("exact", "richardson"))
     assert abs(found.fits["pressure"]["L1"].order - 1.0) <= found.fits["pressure"]["L1"].spread
     for a, b in zip(exact.rows[:-1], found.rows[:-1], strict=True):

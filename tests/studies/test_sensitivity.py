@@ -62,7 +62,7 @@ def test_of_joukowskys_rise_speed_and_opening_have_the_shares_that_a_product_has
     bounds = {"links.main.wave_speed": [900.0, 1300.0], "links.valve.area": [0.001, 0.002]}
     a, s = ((sum(one) / 2, (one[1] - one[0]) ** 2 / 12) for one in bounds.values())
     terms = a[1] * s[0] ** 2, s[1] * a[0] ** 2, a[1] * s[1]
-    found = sensitivity(line, bounds, "max(gate.pressure)", samples=128)
+    found = sensitivity(line, bounds, "max(gate.pressure)", samples=64)
     assert found.outcome == "max(gate.pressure) [Pa]"
     assert found.S1 == approx([one / sum(terms) for one in terms[:2]], abs=0.03)
     assert found.ST == approx([(one + terms[2]) / sum(terms) for one in terms[:2]], abs=0.03)

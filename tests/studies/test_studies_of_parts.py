@@ -292,8 +292,9 @@ def test_a_chart_of_lines_is_judged_by_cells():
     assert finer.curves()["euler"][0].trajectory == pytest.approx(errors[2] * (11.0 / 41.0) ** 2, rel=0.2)
     other = turned(rough(delay_tolerance=0.005))
     other["output"]["probes"] = ["gate.pressure", "main.pressure@0.63"]
-    two = studies.chart(other, methods=methods, step=steps, jobs=2)
-    assert [one.trajectory for one in two.points] == pytest.approx([one.trajectory for one in found.points], rel=1e-8)
+    two = studies.chart(other, methods=methods, step=steps[:2], jobs=2)
+    shown = [point.trajectory for point in two.curves()["euler"]]
+    assert shown == pytest.approx(errors[:2], rel=1e-8)
 
 
 def test_a_chart_of_lines_has_steps_and_no_more():
