@@ -21,6 +21,7 @@ from fvsolve.units import show
 
 CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
+FIRST_CHUNK = 1000.0  # steps before the first pause
 # steps between two checks by `RunChecks.check` where it is needed often
 FREQUENT_CHECK_STEPS = loop_records.GROWTH_CHECK_STEPS
 PERSISTENT = ("extremes", "envelope", "maxima", "marks", "armed", "discrete")
@@ -105,7 +106,7 @@ class Run:
         self.changes: list[tuple[float, float, float]] = []  # changes of the method under `auto`
         self.loop.now[:] = state.y
         self.loop.state["t"] = state.t
-        self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
+        self.budget, self.seconds, self.saved = FIRST_CHUNK, 0.0, time.perf_counter()
         self.checks = RunChecks(self.run_data)
         self.loop.stepper.largest = self.checks.largest_if_needed
         if self.checks.needs_frequent_checks:

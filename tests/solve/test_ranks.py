@@ -126,12 +126,7 @@ def test_a_run_of_three_ranks_is_resumed_by_two_and_by_one(tmp_path):
     stopping = SCRIPT.replace("pictures=False", "progress=stop, pictures=False").replace("import json", """
 import importlib
 solve = importlib.import_module("fvsolve.solve.solve")
-solve.CHECKPOINT_SECONDS = solve.CHUNK_SECONDS = 0.0  # checkpoints after 80, 90, ... steps
-begin = solve.Run.__init__
-def begin_with_few_steps(run, *given):
-    begin(run, *given)
-    run.budget, run.left = 40.0, 80.0
-solve.Run.__init__ = begin_with_few_steps
+solve.CHECKPOINT_SECONDS, solve.CHUNK_SECONDS, solve.FIRST_CHUNK = 0.0, 0.0, 80.0  # after 80, 100, 110, ... steps
 def stop(t, *given):
     if t > 0.11:
         raise KeyboardInterrupt

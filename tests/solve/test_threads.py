@@ -251,15 +251,9 @@ def test_bands_that_do_not_wait_for_each_other_are_seen():
 def test_a_run_is_resumed_by_another_number_of_threads_to_the_same_bits(tmp_path, monkeypatch):
     case = with_maxima(water(end=0.2, step=1e-3), "pool")
     whole = fvsolve.run(case, out=tmp_path / "whole", pictures=False)
-    begin = Run.__init__
-
-    def begin_with_few_steps(run, *given):
-        begin(run, *given)
-        run.budget, run.left = 40.0, 80.0
-
-    monkeypatch.setattr(Run, "__init__", begin_with_few_steps)
-    for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):  # checkpoints after 80, 90, ... steps
-        monkeypatch.setattr(importlib.import_module("fvsolve.solve.solve"), name, 0.0)
+    settings = {"CHECKPOINT_SECONDS": 0.0, "CHUNK_SECONDS": 0.0, "FIRST_CHUNK": 80.0}
+    for name, value in settings.items():  # checkpoints after 80, 100, 110, ... steps
+        monkeypatch.setattr(importlib.import_module("fvsolve.solve.solve"), name, value)
 
     def stop(t, seconds, steps):
         if t > 0.11:
