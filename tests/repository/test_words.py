@@ -36,11 +36,13 @@ def found() -> dict[str, list[tuple[str, str]]]:
     """Identifiers, docstrings and other texts of all modules, each with its place."""
     lists: dict[str, list[tuple[str, str]]] = {"names": [], "docstrings": [], "texts": []}
     gc.disable()  # half of the time, with a million nodes
-    for path in PATHS:
-        nodes = [*ast.walk(ast.parse(path.read_text(encoding="utf-8")))]
-        for kind, listed in (("names", names(nodes)), ("docstrings", docstrings(nodes)), ("texts", texts(nodes))):
-            lists[kind] += [(f"{path.relative_to(PACKAGE).as_posix()}:{line}", text) for text, line in listed]
-    gc.enable()
+    try:
+        for path in PATHS:
+            nodes = [*ast.walk(ast.parse(path.read_text(encoding="utf-8")))]
+            for kind, listed in (("names", names(nodes)), ("docstrings", docstrings(nodes)), ("texts", texts(nodes))):
+                lists[kind] += [(f"{path.relative_to(PACKAGE).as_posix()}:{line}", text) for text, line in listed]
+    finally:
+        gc.enable()
     return lists
 
 
