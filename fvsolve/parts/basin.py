@@ -188,7 +188,7 @@ class Physics(Table):
     def __init_subclass__(cls, name: str, **rest: Any) -> None:
         super().__init_subclass__(**rest)
         cls.name = name
-        Physics.kinds.declare(name, cls, "physics")
+        Physics.kinds.declare(name, cls, "physics", "basin")  # whose modules are those of all physics
 
     @classmethod
     def __pydantic_init_subclass__(cls, **rest: Any) -> None:

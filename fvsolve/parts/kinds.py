@@ -49,10 +49,13 @@ class Kinds(dict[str, Any]):
                     import_module(module)
                 self.imported.add(kind)  # last, so that another thread waits for the import
 
-    def declare(self, kind: str, model: type, noun: str) -> None:
-        """Add the class of a type; noun : of the type, for messages. Raises FvsolveError if the type exists already."""
+    def declare(self, kind: str, model: type, noun: str, *others: str) -> None:
+        """Add the class of a type. Raises FvsolveError if the type exists already.
+
+        noun : of the type, for messages; others : built-in types that exist before a class of another package is added
+        """
         if model.__module__ not in modules_of_types().get(kind, ()):  # a class of another package
-            self.load(kind)
+            self.load(kind, *others)
         if super().__contains__(kind):
             raise FvsolveError(f"{noun} {show(kind)} exists already; expected another name")
         self[kind] = model

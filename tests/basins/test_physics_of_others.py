@@ -197,6 +197,25 @@ def test_a_key_that_is_there_keeps_its_meaning(key):
     assert "clock" not in Physics.kinds and Basin.keys().count(key) == 1
 
 
+FIRST = """
+from typing import Annotated
+from fvsolve.parts.basin import Physics
+from fvsolve.parts.value import Quantity
+keys = {"__annotations__": {"pressure": Annotated[float, Quantity("time")]}, "__module__": "clocks"}
+try:
+    type(Physics)("Clock", (Physics,), keys, name="clock")
+except Exception as error:
+    print(error)
+print(Physics.kinds["liquid"].__name__)
+"""
+
+
+def test_a_key_keeps_its_meaning_in_a_process_that_has_not_loaded_its_physics():
+    found = subprocess.run([sys.executable, "-c", FIRST], capture_output=True, text=True)
+    said, liquid = found.stdout.splitlines()
+    assert 'physics "clock" declares pressure differently' in said and liquid == "Liquid"
+
+
 def test_a_name_that_is_there_is_taken():
     with pytest.raises(FvsolveError, match='physics "liquid" exists already'):
         type(Physics)("Other", (Physics,), {"__module__": __name__}, name="liquid")
