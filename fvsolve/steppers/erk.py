@@ -102,26 +102,24 @@ def second_order_correction(begin, end, b, damping, k, means):
     means : float64[n], work space
     """
     last = b.size - 1
-    for first in range(begin, end, CHUNK):
-        stop = min(first + CHUNK, end)
-        q, mean, early, late, final = (
-            damping[first:stop],
-            means[first:stop],
-            k[1, first:stop],
-            k[2, first:stop],
-            k[last, first:stop],
-        )
-        if not any_nonzero(q):
-            continue
+    q, mean, early, late, final = (
+        damping[begin:end],
+        means[begin:end],
+        k[1, begin:end],
+        k[2, begin:end],
+        k[last, begin:end],
+    )
+    if not any_nonzero(q):
+        return
+    for i in range(mean.size):
+        mean[i] = b[1] * early[i]
+    for j in range(2, b.size):
+        stage = k[j, begin:end]
         for i in range(mean.size):
-            mean[i] = b[1] * early[i]
-        for j in range(2, b.size):
-            stage = k[j, first:stop]
-            for i in range(mean.size):
-                mean[i] += b[j] * stage[i]
-        for i in range(mean.size):
-            rate = late[i] * (1.0 + q[i]) + q[i] * (early[i] - mean[i])
-            final[i] += q[i] * rate / ((1.0 + q[i] * q[i]) * b[last])
+            mean[i] += b[j] * stage[i]
+    for i in range(mean.size):
+        rate = late[i] * (1.0 + q[i]) + q[i] * (early[i] - mean[i])
+        final[i] += q[i] * rate / ((1.0 + q[i] * q[i]) * b[last])
 
 
 @njit
@@ -145,7 +143,10 @@ def damped_attempt(handle, run, t, h, now, new):
         stage_rates(handle, r, t + c[i] * h, r.y[3], k[i])
         store_ledger_rates(r, i)
         damp_in_turn(h, r.y[3], k[i], early if i == 2 else late, handle)
-    for m in range(row_blocks.shape[0] if s > 2 else 0):
-        second_order_correction(row_blocks[m, BEGIN], row_blocks[m, STOP], b, early, k, r.y[3])
-    form_sum(r, h, b, s, now, r.y[new])
+    for m in range(row_blocks.shape[0]):
+        for first in range(row_blocks[m, BEGIN], row_blocks[m, STOP], CHUNK):
+            stop = min(first + CHUNK, row_blocks[m, STOP])
+            if s > 2:
+                second_order_correction(first, stop, b, early, k, r.y[3])
+            combine(first, stop, r.y[now], h, b, s, k, r.y[new])
     return 0.0

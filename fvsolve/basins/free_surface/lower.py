@@ -203,7 +203,7 @@ def fast_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
     law, value = (DARCY, part.factor) if part.manning is None else (MANNING, part.manning)
     rate, zeros, gravity = np.zeros(depth.size), np.zeros(depth.size), basin.case.gravity
     flows, contents = (y[1], y[2]), (zeros - 1.0, zeros)
-    add_friction(law, gravity, np.array([value]), depth, zeros, flows, contents, (rate, zeros))
+    add_friction(law, gravity, value, depth, zeros, flows, contents, (rate, zeros))
     error = np.sqrt(1.0 + rate / RATE_CAP) - 1.0
     return tuple(float(np.average(values, weights=flow)) for values in (error, depth, rate))
 

@@ -51,15 +51,15 @@ def add_bed_friction(tables, b, a, z, y, rates, out):
 
     rates : rates of the three states of all cells of the basin, three arrays
     """
-    basin, roughness = tables.basins[b], tables.basins["roughness"][b : b + 1]
+    basin = tables.basins[b]
     n, o, seen = basin["n"], basin["y"], deviations_of(basin, tables.seen, y)
-    law, g = basin["friction"], tables.settings[0]["gravity"]
+    law, g, value = basin["friction"], tables.settings[0]["gravity"], basin["roughness"]
     depths, dh = tables.plane[basin["plan"] + a :], seen[o + a : o + z]
     flows, contents, added = flows_of(seen, o, n, a, z), flows_of(y, o, n, a, z), (rates[1][a:z], rates[2][a:z])
     if basin["held"] == inf:
-        add_friction(law, g, roughness, depths, dh, flows, contents, added)
+        add_friction(law, g, value, depths, dh, flows, contents, added)
     else:
-        rate = add_capped_friction(law, g, roughness, basin["held"], depths, dh, flows, contents, added)
+        rate = add_capped_friction(law, g, value, basin["held"], depths, dh, flows, contents, added)
         out[RATE] = max(out[RATE], rate)
 
 
@@ -75,10 +75,10 @@ def damp_stages(h, y, rates, quick, handle):
         basin = tables.basins[b]
         if basin["kind"] == OWN_CODE and basin["damped"] == 1:
             (a, z), n, o, seen = band_cells(tables, b), basin["n"], basin["y"], deviations_of(basin, tables.seen, y)
-            roughness, depths = tables.basins["roughness"][b : b + 1], tables.plane[basin["plan"] + a :]
+            depths = tables.plane[basin["plan"] + a :]
             flows, contents, damped = flows_of(seen, o, n, a, z), flows_of(y, o, n, a, z), flows_of(rates, o, n, a, z)
             damp_flows(
-                basin["friction"], g, roughness, h, depths, seen[o + a : o + z], flows, contents, damped,
+                basin["friction"], g, basin["roughness"], h, depths, seen[o + a : o + z], flows, contents, damped,
                 flows_of(quick, o, n, a, z),
             )  # fmt: skip
 
