@@ -19,6 +19,7 @@ from fvsolve.units import show
 
 COMMA_HINT = "; with decimal commas, separate columns by ; or tabs"
 SEPARATORS = ("\t", ";", ",")
+PLAIN_SIGNS = frozenset("0123456789+-.eE")
 NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?")
 
 
@@ -89,6 +90,13 @@ class CsvRows:
 
         Raises CsvError for other texts, and for a decimal comma below a number with a decimal point.
         """
+        texts = [row[column] for row in self.cells]
+        if PLAIN_SIGNS.issuperset("".join(texts)):  # for long columns: NumPy reads the same numbers
+            try:
+                if np.isfinite(array := np.array(texts, float)).all():
+                    return array.tolist()
+            except ValueError:
+                pass
         values, points = [], False
         for k, (line, row) in enumerate(zip(self.lines, self.cells, strict=True)):
             text = row[column]
@@ -154,6 +162,8 @@ def is_uniform(rows: list[list[str]]) -> bool:
 
 def split_lines(path: Path, lines: list[tuple[int, str]], mark: str = ",") -> list[list[str]]:
     """Split each line into the texts of its cells; mark : separator; path : file, for messages"""
+    if not any('"' in line for _, line in lines):
+        return [[cell.strip() for cell in line.split(mark)] for _, line in lines]
     try:
         return [[cell.strip() for cell in next(csv.reader([line], delimiter=mark))] for _, line in lines]
     except csv.Error as error:

@@ -8,7 +8,7 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, partial, reduce
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
@@ -333,19 +333,58 @@ def read_points(path: Path, dimension: str) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Linear interpolation between scattered points; outside their convex hull, the value of the nearest point.
+    """Interpolation between points: bilinear if they form a rectangular grid, otherwise linear in triangles.
 
+    Outside the grid, or outside the convex hull of the points, it is the value at the nearest place of the grid or at
+    the nearest point.
     columns : float64[n, 3]  x [m], y [m] and value of the points
     """
 
     columns: np.ndarray
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return self._interpolation(x, y)
+
+    @cached_property
+    def _interpolation(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        """Function of arrays x and y, made once."""
+        places, values = self.columns[:, :2], self.columns[:, 2]
+        if lines := grid_lines(places):
+            return partial(bilinear, *lines, values[np.lexsort(places.T)].reshape(lines[1].size, lines[0].size))
         from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
-        places, values = self.columns[:, :2], self.columns[:, 2]
-        inner = LinearNDInterpolator(places, values)(x, y)
-        return np.where(np.isnan(inner), NearestNDInterpolator(places, values)(x, y), inner)
+        inner, outer = LinearNDInterpolator(places, values), NearestNDInterpolator(places, values)
+
+        def interpolate(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+            found = inner(x, y)
+            return np.where(np.isnan(found), outer(x, y), found)
+
+        return interpolate
+
+
+def grid_lines(places: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Coordinates of the lines along x and y of a rectangular grid, each increasing; None for scattered points.
+
+    places : float64[n, 2]  points, in any order
+    """
+    x, column = np.unique(places[:, 0], return_inverse=True)
+    y, row = np.unique(places[:, 1], return_inverse=True)
+    if min(x.size, y.size) < 2 or x.size * y.size != len(places):
+        return None
+    return (x, y) if np.unique(row * x.size + column).size == len(places) else None
+
+
+def bilinear(lines_x: np.ndarray, lines_y: np.ndarray, values: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Bilinear interpolation in a rectangular grid; points outside get the value at the nearest place of the grid.
+
+    lines_x, lines_y : increasing coordinates of nx and ny lines; values : float64[ny, nx]; x, y : points
+    """
+    (i, a), (j, b) = ((at, (np.clip(q, lines[0], lines[-1]) - lines[at]) / (lines[at + 1] - lines[at]))
+                      for q, lines in ((x, lines_x), (y, lines_y))
+                      for at in [np.clip(np.searchsorted(lines, q, side="right") - 1, 0, lines.size - 2)])  # fmt: skip
+    below = values[j, i] * (1.0 - a) + values[j, i + 1] * a
+    above = values[j + 1, i] * (1.0 - a) + values[j + 1, i + 1] * a
+    return below * (1.0 - b) + above * b
 
 
 def number_or_text(text: str) -> Any:

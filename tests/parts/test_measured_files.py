@@ -121,6 +121,26 @@ def test_points_of_a_bed_are_read_in_their_units(text, tmp_path):
         SpatialFieldKey("length").read({"file": "bed.csv"}, ReadContext(folder=tmp_path))
 
 
+@pytest.mark.parametrize("order", ["by rows", "by columns", "mixed"])
+def test_points_on_a_rectangular_grid_are_interpolated_bilinearly_and_others_in_triangles(order, tmp_path):
+    def shape(x, y):
+        return 1.0 + 0.5 * x - y + 0.25 * x * y
+
+    x, y = (q.ravel() for q in np.meshgrid([0.0, 1.0, 3.0], [-1.0, 0.0, 0.5, 2.0]))
+    at = {"by rows": np.arange(12), "by columns": np.lexsort((y, x)), "mixed": np.random.default_rng(3).permutation(12)}
+    table = np.column_stack([x, y, shape(x, y)])[at[order]]
+    places = np.array([0.3, 2.9, 1.0, -5.0, 9.0, 0.5]), np.array([-0.9, 1.7, 0.5, 0.25, -3.0, 7.0])
+
+    def read(rows):
+        np.savetxt(tmp_path / "bed.csv", rows, delimiter=",", header="x [m],y [m],bed [m]", comments="")
+        return SpatialFieldKey("length").read({"file": "bed.csv"}, ReadContext(folder=tmp_path)).at(*places)
+
+    inside = np.clip(places[0], 0.0, 3.0), np.clip(places[1], -1.0, 2.0)
+    assert read(table) == approx(shape(*inside), rel=1e-14)
+    scattered = read(table[table[:, 2] != table[5, 2]])  # without one point they form no grid
+    assert scattered[0] != approx(shape(0.3, -0.9), rel=1e-3) and np.isin(scattered[3:], table[:, 2]).all()
+
+
 @pytest.mark.parametrize("text", [
     "x,y,u,v\n-9,-9,0.5,0\n9,-9,0.5,0\n-9,9,0.5,0\n9,9,0.5,0\n",
     "x [cm];y [m];u [cm/s];v [m/s]\n-900;-9;50,0;0\n900;-9;50;0\n-900;9;50;0\n900;9;50;0\n",
