@@ -45,7 +45,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/studies": (14851, 51),
     "fvsolve/validation": (1463, 11),
     "tests/attitude": (447, 2),
-    "tests/basins": (6947, 22),
+    "tests/basins": (6946, 22),
     "tests/case": (4475, 15),
     "tests/cli": (1039, 7),
     "tests/draw": (217, 2),
