@@ -27,8 +27,8 @@ from fvsolve.kernels.delay_lines.line_rates import (
     BEFORE_ALL,
     entry_before,
     has_friction,
-    sent_wave_linear,
-    waves_at_linear,
+    smooth_wave_linear,
+    waves_in_stretch,
 )
 from fvsolve.kernels.dtypes import ALONE, AMENDED, ARRIVES, JUNCTION, NEVER, PIPE_FLOW, PIPE_PRESSURE, STATUS
 from fvsolve.kernels.dtypes import ARRIVED as LET_ARRIVE
@@ -106,6 +106,14 @@ def extremes_at_jump(t, time, y, state, handle):
             marks[pipes.size + i] = time
 
 
+@njit(forceinline=True)
+def wave_at_jump(past, places, clock, ring, mask, at, wave, i):
+    """Wave sent into a stretch just after jump i of its list [kg/s]; ring, mask : result of `ring_of`."""
+    sent = past[history.jump_place(past, places, at, i)]
+    count = history.count_until(past, places, at, i + 1, sent + clock[4])
+    return smooth_wave_linear(past, clock, ring, mask, wave, sent) + history.sum_of_first(past, places, at, count)
+
+
 @njit
 def line_extremes_at_jumps(past, places, clock, line, q, x, sign, before, t):
     """Extremes of r + sign l on both sides of the jumps that pass a point of a delay line, without friction loss.
@@ -120,13 +128,18 @@ def line_extremes_at_jumps(past, places, clock, line, q, x, sign, before, t):
         head, other = history.jump_head(places, s, wave), history.jump_head(places, s, 1 - wave)
         share = x if wave == 0 else 1.0 - x
         begin = history.first_after(past, places, head, before - share * tau + same)
+        met, back = 0, (2.0 * share - 1.0) * tau  # each jump meets the wave that was sent `back` later
         for i in range(begin, int(past[head + history.JUMP_COUNT])):
             place = history.jump_place(past, places, head, i)
             sent, size = past[place], past[place + queue]
             if sent > t - share * tau + same:
                 break
-            here = sent_wave_linear(past, places, clock, ring, mask, head, wave, sent)
-            there = sent_wave_linear(past, places, clock, ring, mask, other, 1 - wave, sent + (2.0 * share - 1.0) * tau)
+            if i == begin:
+                met = history.first_after(past, places, other, sent + back + same)
+            met = history.count_until(past, places, other, met, sent + back + same)
+            here = wave_at_jump(past, places, clock, ring, mask, head, wave, i)
+            there = smooth_wave_linear(past, clock, ring, mask, 1 - wave, sent + back)
+            there += history.sum_of_first(past, places, other, met)
             for side in range(2):
                 moved = here - (1 - side) * size
                 value = moved + sign * there if wave == 0 else there + sign * moved
@@ -142,13 +155,13 @@ SLACK = 1e-9  # by which cells count as longer, as fraction of a stretch
 
 
 @njit
-def wave_bounds(past, places, clock, line, q, wave, begin, end):
+def wave_bounds(past, places, clock, line, q, wave, first, begin, end):
     """Bounds (least, greatest) of a wave of stretch q that was sent between two times, on both sides of its jumps.
 
     They are sums of bounds of its smooth part and of its jumps, infinite if two jumps have times that count as equal.
+    first : number of the jumps that were sent before `begin`
     """
     at, queue, same = history.jump_head(places, line["stretch"] + q, wave), int(past[history.JUMP_CAPACITY]), clock[4]
-    first = history.first_after(past, places, at, begin - same)
     low = high = history.sum_of_first(past, places, at, first)
     earlier = -history.INFINITE
     for i in range(first, int(past[at + history.JUMP_COUNT])):
@@ -187,7 +200,7 @@ def envelope_where_jumps_cross(past, places, clock, tables, line, q, x, back, be
         sent, size = past[place], past[place + queue]
         if sent > t - x[0] * tau + same:
             break
-        r = sent_wave_linear(past, places, clock, ring, mask, forward, 0, sent)
+        r = wave_at_jump(past, places, clock, ring, mask, forward, 0, i)
         more = abs(delta) + BOUND_ROUNDING * (abs(r) + abs(size))
         low, high = min(r, r - size) + back[0] - more, max(r, r - size) + back[1] + more
         if low >= envelope[0, at] and high <= envelope[2, at]:
@@ -200,11 +213,15 @@ def envelope_where_jumps_cross(past, places, clock, tables, line, q, x, back, be
             opposite = past[other]
             if opposite > ends + same:
                 break
+            l, change = wave_at_jump(past, places, clock, ring, mask, backward, 1, j), past[other + queue]
+            apart = more + BOUND_ROUNDING * (abs(l) + abs(change))
+            low, high = min(r, r - size) + min(l, l - change) - apart, max(r, r - size) + max(l, l - change) + apart
+            if low >= envelope[0, at] and high <= envelope[2, at]:
+                continue
             where, time = 0.5 * (tau + opposite - sent) / tau, 0.5 * (tau + opposite + sent)
-            l = sent_wave_linear(past, places, clock, ring, mask, backward, 1, opposite)
             cell = first_cell + min(int((q + where) * n / line["stretches"]), n - 1)
             for side in range(4):
-                value = r - (side % 2) * size + l - (side // 2) * past[other + queue]
+                value = r - (side % 2) * size + l - (side // 2) * change
                 update_extremes(envelope, cell, time, value + (1.0 - 2.0 * where) * delta)
 
 
@@ -221,14 +238,18 @@ def update_line_extremes(past, places, tables, before, t):
         stretches, n, tau = line["stretches"], line["places"], line["tau"]
         for q in range(stretches):
             head = history.jump_head(places, line["stretch"] + q, 0)
-            forward, backward = past[head + history.JUMP_COUNT], past[head + history.HEAD_SIZE + history.JUMP_COUNT]
+            other = head + history.HEAD_SIZE
+            forward, backward = past[head + history.JUMP_COUNT], past[other + history.JUMP_COUNT]
             if forward + backward == 0.0:
                 continue
-            delta = past[places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q) + 2]
+            delta, i, k = past[places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q) + 2], int(forward), 0
             for j in range((q * n) // stretches, min(n, ((q + 1) * n) // stretches + 1)):
                 low, high = max(j / n * stretches - q, 0.0) - SLACK, min((j + 1) / n * stretches - q, 1.0) + SLACK
-                ahead = wave_bounds(past, places, clock, line, q, 0, before - high * tau, t - low * tau)
-                back = wave_bounds(past, places, clock, line, q, 1, before - (1.0 - low) * tau, t - (1.0 - high) * tau)
+                begin, back_begin = before - high * tau, before - (1.0 - low) * tau
+                i = history.count_back(past, places, head, i, begin - clock[4])
+                k = history.count_until(past, places, other, k, back_begin - clock[4])
+                ahead = wave_bounds(past, places, clock, line, q, 0, i, begin, t - low * tau)
+                back = wave_bounds(past, places, clock, line, q, 1, k, back_begin, t - (1.0 - high) * tau)
                 cell, most = pipe["cell"] + j, abs(delta)
                 least, greatest = ahead[0] + back[0] - most, ahead[1] + back[1] + most
                 if high > low and not (least >= tables.envelope[0, cell] and greatest <= tables.envelope[2, cell]):
@@ -286,9 +307,10 @@ def update_line_envelopes(t, places, tables):
     for i in range(tables.delays.size):
         line, envelope = tables.delays[i], tables.envelope
         n, cell = line["places"], tables.pipes[line["pipe"]]["cell"]
-        r, l, low, high = tables.scratch[:n], tables.scratch[n : 2 * n], 0, 0
+        r, l, low, high, j = tables.scratch[:n], tables.scratch[n : 2 * n], 0, 0, 0
+        for q in range(line["stretches"]):
+            j = waves_in_stretch(t, tables.past, places, clock, line, q, j, r, l)
         for j in range(n):
-            r[j], l[j] = waves_at_linear(t, tables.past, places, clock, line, (j + 0.5) / n)
             s = r[j] + l[j]
             low += not s >= envelope[0, cell + j]
             high += not s <= envelope[2, cell + j]

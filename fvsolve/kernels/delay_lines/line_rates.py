@@ -266,43 +266,61 @@ def entry_before(past, clock, t):
     return (BEFORE_ALL, 0.0) if k < history.PROFILE_ENTRIES and x == 0.0 else (k, x)
 
 
+@njit(forceinline=True)
+def smooth_wave_linear(past, clock, ring, mask, wave, t):
+    """Smooth part of a wave sent into a stretch at t [kg/s], by linear interpolation between entries.
+
+    ring, mask : result of `ring_of`
+    """
+    k, x = entry_before(past, clock, t)
+    if k == BEFORE_ALL:
+        return 0.0
+    a, b = ring + 2 * (k & mask) + wave, ring + 2 * ((k + 1) & mask) + wave
+    return past[a] + x * (past[b] - past[a])
+
+
 @njit
 def sent_wave_linear(past, places, clock, ring, mask, jumps, wave, t):
     """Wave sent into a stretch at t [kg/s], by linear interpolation between entries, with its jumps.
 
     ring, mask : result of `ring_of`; jumps : offset of the head of its jumps
     """
-    k, x = entry_before(past, clock, t)
-    if k == BEFORE_ALL:
-        return history.jumps_until(past, places, jumps, t + clock[4])
-    a, b = ring + 2 * (k & mask) + wave, ring + 2 * ((k + 1) & mask) + wave
-    return past[a] + x * (past[b] - past[a]) + history.jumps_until(past, places, jumps, t + clock[4])
+    smooth = smooth_wave_linear(past, clock, ring, mask, wave, t)
+    return smooth + history.jumps_until(past, places, jumps, t + clock[4])
 
 
-@njit(forceinline=True)
-def waves_at_linear(t, past, places, clock, line, share):
-    """Both waves as in `waves_at` at the time t of the last entry, by linear interpolation; used for envelopes.
+@njit
+def waves_in_stretch(t, past, places, clock, line, q, first, r, l):
+    """Write both waves at the places of stretch q, as in `waves_at` at the time t of the last entry, for envelopes.
 
-    The friction loss is that of the waves that arrive at the ends of the stretch at t.
-    share : distance from `from` as a fraction of the length of the line
+    Waves are linear between entries. The friction loss is that of the waves that arrive at the ends of the stretch.
+    first : number of its first place; returns that of the next stretch
+    r, l : float64[n]  waves at the centres of n equal parts of the line
     """
-    stretches, tau = line["stretches"], line["tau"]
-    q = min(int(share * stretches), stretches - 1)
-    x, s = share * stretches - q, line["stretch"] + q
-    ring, mask = history.ring_of(places, line, q)
-    delta, jumps = past[places[0] + history.ARRIVALS_SIZE * s + 2], history.jump_head(places, s, 0)
-    steps, others = tau * clock[2], jumps + history.HEAD_SIZE
-    if steps + 2.0 < clock[3] and past[jumps + history.JUMP_COUNT] + past[others + history.JUMP_COUNT] == 0.0:
-        ahead, back = x * steps, (1.0 - x) * steps  # age of both waves [steps]
-        i, j = int(ahead), int(back)
-        a, b = ring + 2 * ((clock[0] - i) & mask), ring + 2 * ((clock[0] - i - 1) & mask)
-        c, d = ring + 2 * ((clock[0] - j) & mask) + 1, ring + 2 * ((clock[0] - j - 1) & mask) + 1
-        r = past[a] + (ahead - i) * (past[b] - past[a]) + past[jumps + history.REMOVED_SUM]
-        l = past[c] + (back - j) * (past[d] - past[c]) + past[others + history.REMOVED_SUM]
-    else:
-        r = sent_wave_linear(past, places, clock, ring, mask, jumps, 0, t - x * tau)
-        l = sent_wave_linear(past, places, clock, ring, mask, others, 1, t - (1.0 - x) * tau)
-    return r - x * delta, l + (1.0 - x) * delta
+    stretches, tau, n, s, j = line["stretches"], line["tau"], r.size, line["stretch"] + q, first
+    (ring, mask), jumps = history.ring_of(places, line, q), history.jump_head(places, s, 0)
+    delta, steps, others = past[places[0] + history.ARRIVALS_SIZE * s + 2], tau * clock[2], jumps + history.HEAD_SIZE
+    i, k = int(past[jumps + history.JUMP_COUNT]), 0
+    calm = steps + 2.0 < clock[3] and i + past[others + history.JUMP_COUNT] == 0.0
+    while j < n and (q + 1 == stretches or int((j + 0.5) / n * stretches) <= q):
+        x = (j + 0.5) / n * stretches - q
+        if calm:
+            before, after = x * steps, (1.0 - x) * steps  # age of both waves [steps]
+            u, v = int(before), int(after)
+            a, b = ring + 2 * ((clock[0] - u) & mask), ring + 2 * ((clock[0] - u - 1) & mask)
+            c, d = ring + 2 * ((clock[0] - v) & mask) + 1, ring + 2 * ((clock[0] - v - 1) & mask) + 1
+            ahead = past[a] + (before - u) * (past[b] - past[a]) + past[jumps + history.REMOVED_SUM]
+            back = past[c] + (after - v) * (past[d] - past[c]) + past[others + history.REMOVED_SUM]
+        else:  # i and k jumps were sent until the times of both readings, which fall and rise along the stretch
+            sent, returned = t - x * tau, t - (1.0 - x) * tau
+            i = history.count_back(past, places, jumps, i, sent + clock[4])
+            k = history.count_until(past, places, others, k, returned + clock[4])
+            ahead, back = history.sum_of_first(past, places, jumps, i), history.sum_of_first(past, places, others, k)
+            ahead = smooth_wave_linear(past, clock, ring, mask, 0, sent) + ahead
+            back = smooth_wave_linear(past, clock, ring, mask, 1, returned) + back
+        r[j], l[j] = ahead - x * delta, back + (1.0 - x) * delta
+        j += 1
+    return j
 
 
 @njit

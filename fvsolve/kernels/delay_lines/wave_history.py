@@ -240,6 +240,22 @@ def first_after(past, places, at, t):
 
 
 @njit(forceinline=True)
+def count_until(past, places, at, i, t):
+    """Number of the jumps of a list that were sent up to t, as `first_after`, if it is at least i, by search from i."""
+    while i < int(past[at + JUMP_COUNT]) and past[jump_place(past, places, at, i)] <= t:
+        i += 1
+    return i
+
+
+@njit(forceinline=True)
+def count_back(past, places, at, i, t):
+    """Number of the jumps of a list that were sent up to t, as `first_after`, if it is at most i, by search from i."""
+    while i > 0 and past[jump_place(past, places, at, i - 1)] > t:
+        i -= 1
+    return i
+
+
+@njit(forceinline=True)
 def sum_of_first(past, places, at, count):
     """Sum of the jumps removed from the list of a wave and of the first `count` jumps in it [kg/s]."""
     if count == 0:
