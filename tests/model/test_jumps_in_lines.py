@@ -347,8 +347,11 @@ def test_bounds_by_which_cells_are_left_out_contain_all_waves(case, jumps_seen):
         (ring, mask), head = history.ring_of(places, line, 0), history.jump_head(places, int(line["stretch"]), wave)
         for _ in range(50):
             begin, end = np.sort(clock[1] - line["tau"] * random.uniform(0.0, 1.0, 2))
-            least, greatest = wave_bounds(past, places, clock, line, 0, wave, begin, end)
             listed = range(int(past[head + history.JUMP_COUNT]))
+            first = history.first_after(past, places, head, begin - clock[4])
+            assert history.count_until(past, places, head, first // 2, begin - clock[4]) == first
+            assert history.count_back(past, places, head, len(listed), begin - clock[4]) == first
+            least, greatest = wave_bounds(past, places, clock, line, 0, wave, first, begin, end)
             sent = [past[history.jump_place(past, places, head, i)] for i in listed]
             sent = [t for t in sent if begin <= t <= end]
             times = np.array([*np.linspace(begin, end, 20), *sent, *(np.array(sent) - 1e-6)])
