@@ -128,18 +128,18 @@ def line_extremes_at_jumps(past, places, clock, line, q, x, sign, before, t):
         head, other = history.jump_head(places, s, wave), history.jump_head(places, s, 1 - wave)
         share = x if wave == 0 else 1.0 - x
         begin = history.first_after(past, places, head, before - share * tau + same)
-        met, back = 0, (2.0 * share - 1.0) * tau  # each jump meets the wave that was sent `back` later
+        reached, back = 0, (2.0 * share - 1.0) * tau  # each jump meets the wave that was sent `back` later
         for i in range(begin, int(past[head + history.JUMP_COUNT])):
             place = history.jump_place(past, places, head, i)
             sent, size = past[place], past[place + queue]
             if sent > t - share * tau + same:
                 break
             if i == begin:
-                met = history.first_after(past, places, other, sent + back + same)
-            met = history.count_until(past, places, other, met, sent + back + same)
+                reached = history.first_after(past, places, other, sent + back + same)
+            reached = history.count_until(past, places, other, reached, sent + back + same)
             here = wave_at_jump(past, places, clock, ring, mask, head, wave, i)
             there = smooth_wave_linear(past, clock, ring, mask, 1 - wave, sent + back)
-            there += history.sum_of_first(past, places, other, met)
+            there += history.sum_of_first(past, places, other, reached)
             for side in range(2):
                 moved = here - (1 - side) * size
                 value = moved + sign * there if wave == 0 else there + sign * moved
