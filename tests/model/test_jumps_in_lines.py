@@ -26,7 +26,7 @@ from scipy.integrate import solve_ivp
 import fvsolve
 from fvsolve.kernels.delay_lines import wave_history as history
 from fvsolve.kernels.delay_lines.history_update import wave_bounds
-from fvsolve.kernels.delay_lines.line_rates import sent_wave_linear
+from fvsolve.kernels.delay_lines.line_rates import smooth_wave_linear
 from fvsolve.solve import initial_state
 from fvsolve.solve.solve import Run
 from fvsolve.studies.outcome import RowSink
@@ -345,6 +345,11 @@ def test_bounds_by_which_cells_are_left_out_contain_all_waves(case, jumps_seen):
     longest = max(np.diff([history.time_of(past, k) for k in range(history.PROFILE_ENTRIES, int(past[history.COUNT]))]))
     for line, wave in ((model.tables.delays[k].copy(), wave) for k in range(2) for wave in range(2)):
         (ring, mask), head = history.ring_of(places, line, 0), history.jump_head(places, int(line["stretch"]), wave)
+
+        def sent_wave(t, ring=ring, mask=mask, head=head, wave=wave):
+            jumps = history.jumps_until(past, places, head, t + clock[4])
+            return smooth_wave_linear(past, clock, ring, mask, wave, t) + jumps
+
         for _ in range(50):
             begin, end = np.sort(clock[1] - line["tau"] * random.uniform(0.0, 1.0, 2))
             listed = range(int(past[head + history.JUMP_COUNT]))
@@ -355,10 +360,10 @@ def test_bounds_by_which_cells_are_left_out_contain_all_waves(case, jumps_seen):
             sent = [past[history.jump_place(past, places, head, i)] for i in listed]
             sent = [t for t in sent if begin <= t <= end]
             times = np.array([*np.linspace(begin, end, 20), *sent, *(np.array(sent) - 1e-6)])
-            found = [sent_wave_linear(past, places, clock, ring, mask, head, wave, t) for t in times[times >= begin]]
+            found = [sent_wave(t) for t in times[times >= begin]]
             assert least <= min(found) and max(found) <= greatest
             near = np.linspace(begin - longest, min(end + longest, clock[1]), 40)  # with the entries on both sides
-            around = [sent_wave_linear(past, places, clock, ring, mask, head, wave, t) for t in near]
+            around = [sent_wave(t) for t in near]
             assert greatest - least <= 2.0 * np.ptp([*found, *around]) + 1.0
             checked, varied = checked + len(sent), max(varied, np.ptp(found))
     assert checked >= jumps_seen and varied > 5.0

@@ -136,7 +136,8 @@ def line_extremes_at_jumps(past, places, clock, line, q, x, sign, before, t):
                 break
             if i == begin:
                 reached = history.first_after(past, places, other, sent + back + same)
-            reached = history.count_until(past, places, other, reached, sent + back + same)
+            else:
+                reached = history.count_until(past, places, other, reached, sent + back + same)
             here = wave_at_jump(past, places, clock, ring, mask, head, wave, i)
             there = smooth_wave_linear(past, clock, ring, mask, 1 - wave, sent + back)
             there += history.sum_of_first(past, places, other, reached)
@@ -159,7 +160,7 @@ def wave_bounds(past, places, clock, line, q, wave, first, begin, end):
     """Bounds (least, greatest) of a wave of stretch q that was sent between two times, on both sides of its jumps.
 
     They are sums of bounds of its smooth part and of its jumps, infinite if two jumps have times that count as equal.
-    first : number of the jumps that were sent before `begin`
+    first : number of the jumps that were sent before `begin`, without those at a time that counts as equal
     """
     at, queue, same = history.jump_head(places, line["stretch"] + q, wave), int(past[history.JUMP_CAPACITY]), clock[4]
     low = high = history.sum_of_first(past, places, at, first)
@@ -217,7 +218,7 @@ def envelope_where_jumps_cross(past, places, clock, tables, line, q, x, back, be
             apart = more + BOUND_ROUNDING * (abs(l) + abs(change))
             low, high = min(r, r - size) + min(l, l - change) - apart, max(r, r - size) + max(l, l - change) + apart
             if low >= envelope[0, at] and high <= envelope[2, at]:
-                continue
+                continue  # a pair at the end of the cell is looked at with the next cell too
             where, time = 0.5 * (tau + opposite - sent) / tau, 0.5 * (tau + opposite + sent)
             cell = first_cell + min(int((q + where) * n / line["stretches"]), n - 1)
             for side in range(4):

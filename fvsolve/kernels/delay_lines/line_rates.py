@@ -280,16 +280,6 @@ def smooth_wave_linear(past, clock, ring, mask, wave, t):
 
 
 @njit
-def sent_wave_linear(past, places, clock, ring, mask, jumps, wave, t):
-    """Wave sent into a stretch at t [kg/s], by linear interpolation between entries, with its jumps.
-
-    ring, mask : result of `ring_of`; jumps : offset of the head of its jumps
-    """
-    smooth = smooth_wave_linear(past, clock, ring, mask, wave, t)
-    return smooth + history.jumps_until(past, places, jumps, t + clock[4])
-
-
-@njit
 def waves_in_stretch(t, past, places, clock, line, q, first, r, l):
     """Write both waves at the places of stretch q, as in `waves_at` at the time t of the last entry, for envelopes.
 
