@@ -20,6 +20,10 @@ CASE, KEY, GOAL, SHARE = "valve-closure", "links.valve.area", 500.0, 0.9
 CELLS = {"links.main.cells": 20, "numerics.scheme": "upwind5", "numerics.method": "rk4", "output.fields": 0}
 LINE = {"links.main.cells": 20, "numerics.pipe_model": "delay-line", "numerics.method": "euler", "output.fields": 0}
 DELAYS = (0.01, 0.05)  # steps of delay lines [s]; the errors of the second are near those of 20 cells
+LIMITS = {  # of closures
+    "limits.high": {"on": "pipes", "maximum": "16 barg"}, "limits.low": {"on": "pipes", "minimum": "vacuum"},
+    "limits.gate": {"on": "gate", "quantity": "head", "maximum": "90 m"},
+}  # fmt: skip
 FINE, PROBE = 2000, "gate.pressure"  # cells of the reference run, and probe of the errors
 TIMES, RUNS, REPEATS = 200, 2000, 20
 
@@ -29,23 +33,28 @@ def area(k: float) -> dict[str, float]:
     return {KEY: 0.0017 + 1e-7 * k}
 
 
-def cost(one) -> float:
+def closure(k: float) -> dict[str, dict]:
+    """Override with a closure of the valve in two strokes that no earlier run used."""
+    return {"links.valve.opening": {"time": [1.0, 1.5, 2.0], "value": [1.0, 0.1 + 1e-4 * k, 0.0]}}
+
+
+def cost(one, values=area) -> float:
     """CPU time of one call [s], mean of the faster half of TIMES calls, because other processes use the machine too."""
     spent = []
     for k in range(TIMES + 5):
         began = time.process_time()
-        one(area(k))
+        one(values(k))
         spent.append(time.process_time() - began)
     quick = sorted(spent[5:])[: TIMES // 2]
     return sum(quick) / len(quick)
 
 
-def cost_in_batches(base: dict) -> float:
+def cost_in_batches(base: dict, values=area) -> float:
     """CPU time of a row in a sweep of TIMES rows [s], least of REPEATS sweeps after the first."""
     spent, rows = [], BatchedRows(RowMaker(CASE, base))
     for repeat in range(REPEATS + 1):
         began = time.process_time()
-        for _ in rows.results([area(k + 0.1 * repeat) for k in range(TIMES)]):
+        for _ in rows.results([values(k + 0.1 * repeat) for k in range(TIMES)]):
             pass
         spent.append((time.process_time() - began) / TIMES)
     return min(spent[1:])
@@ -78,6 +87,14 @@ def by(base: dict, name: str, goal: float | None, fine) -> None:
     told("  of which vary(model, set)", cost(lambda values: vary(model, values)))
     told("  a row of a sweep, alone", cost(rows))
     told("  a row of a sweep, in batches", cost_in_batches(base), goal)
+
+
+def closures(step: float) -> None:
+    """Print the cost of rows of closures with limits, on a delay line with this step [s]."""
+    base = LINE | LIMITS | {"numerics.step": step}
+    print(f"closures with three limits, delay line, steps of {1e3 * step:.0f} ms")
+    told("  a row of a sweep, alone", cost(RowMaker(CASE, base), closure))
+    told("  a row of a sweep, in batches", cost_in_batches(base, closure), 2 * GOAL)
 
 
 def dask() -> None:
@@ -121,6 +138,7 @@ def main() -> None:
     by(CELLS, "20 cells, upwind5 and rk4", GOAL, fine)
     for step in DELAYS:
         by(LINE | {"numerics.step": step}, f"delay line, steps of {1e3 * step:.0f} ms", 2 * GOAL, fine)
+        closures(step)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """Notices of a case: values outside usual ranges, wave speeds that contradict the wall, schedules after the end."""
 
+import functools
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -90,18 +91,28 @@ def _of_table(table: Table, raw: Any) -> Iterator[tuple[tuple[Any, ...], float, 
 
     raw : content of the table as in the file
     """
-    for name, info in type(table).model_fields.items():
-        key, value = info.alias or name, getattr(table, name)
-        given = _raw_value(raw, (key,))
+    for name, key, declarations in _fields_of(type(table)):
+        if (value := getattr(table, name)) is None:
+            continue
         if isinstance(value, Table):
-            yield from (((key, *keys), *rest) for keys, *rest in _of_table(value, given))
-        for declaration in info.metadata:
-            odd = None if value is None else _beyond(declaration, value, given)
-            if odd:
+            yield from (((key, *keys), *rest) for keys, *rest in _of_table(value, _raw_value(raw, (key,))))
+        for declaration in declarations:
+            if odd := _beyond(declaration, value, _raw_value(raw, (key,))):
                 yield (key,), *odd
         if isinstance(value, Schedule) and value.kind == "smooth" and len(value.time) == 2:
             yield (key,), 2.0, 3.0, TWO_ENTRIES
     yield from table.unusual()
+
+
+@functools.cache
+def _fields_of(kind: type[Table]) -> list[tuple[str, str, list]]:
+    """Fields of a type of tables : (name, key in the file, declarations of its values that state a usual range)."""
+    return [(name, info.alias or name, [value for value in info.metadata if _states_range(value)])
+            for name, info in kind.model_fields.items()]  # fmt: skip
+
+
+def _states_range(declared: Any) -> bool:
+    return any(getattr(value, "usual", None) for value in (declared, getattr(declared, "number", None)))
 
 
 def _beyond(declared: Any, value: Any, given: Any) -> tuple[float, float, str] | None:
@@ -173,14 +184,19 @@ def starts_after_end(part: Any, end: float) -> Iterator[tuple[str, float]]:
     The time is that of the last entry or of the trip. A periodic schedule counts if its period exceeds `end`; its time
     is then the period. Schedules of more than `MAX_ENTRIES` entries are left out.
     """
-    for name, info in type(part).model_fields.items():
-        value = getattr(part, name)
-        if isinstance(value, Schedule) and value.wave:
-            if (period := value.wave[2]) > end:
-                yield info.alias or name, float(period)
-        elif isinstance(value, Schedule) and value.kind not in ("control", "formula"):
-            changes = len(value.time) and len(value.time) <= MAX_ENTRIES and value.time[-1] > end
-            if changes and np.ptp(value.value[max(np.searchsorted(value.time, end, "right") - 1, 0) :]) > 0.0:
-                yield info.alias or name, float(value.time[-1])
-        elif name == "trip" and value is not None and value > end:
+    declared = type(part).model_fields
+    for name, value in vars(part).items():
+        if name == "trip" and value is not None and value > end:
             yield name, float(value)
+        if isinstance(value, Schedule) and name in declared and (last := last_change(value)) > end:
+            after = value.value[max(np.searchsorted(value.time, end, "right") - 1, 0) :]
+            if value.wave or np.ptp(after) > 0.0:
+                yield declared[name].alias or name, last
+
+
+def last_change(schedule: Schedule) -> float:
+    """Time of the last entry of a schedule [s], or the period of a wave; -inf for the schedules that do not count."""
+    if schedule.wave:
+        return float(schedule.wave[2])
+    counts = schedule.kind not in ("control", "formula") and 0 < len(schedule.time) <= MAX_ENTRIES
+    return float(schedule.time[-1]) if counts else -math.inf

@@ -106,6 +106,15 @@ def envelope_columns(case) -> list[UnitColumn]:
     return [column(name, dimension, case) for name, dimension in ENVELOPE_QUANTITIES.items()]
 
 
+def with_points(summary, pipe: str, arrays: dict) -> dict:
+    """Envelope of a pipe at its cells (`arrays`) and at observed points between cells, sorted by distance."""
+    points = summary.points.get(pipe)
+    if points is None:
+        return arrays
+    order = np.argsort(np.concatenate([arrays["distance"], points["distance"]]), kind="stable")
+    return {key: np.concatenate([values, points[key]])[order] for key, values in arrays.items()}
+
+
 def with_initial_heads(summary, model) -> dict:
     """Envelope of each pipe in SI, with the heads at the start as `initial_head` [m].
 
@@ -113,11 +122,8 @@ def with_initial_heads(summary, model) -> dict:
     """
     envelopes = {}
     for k, pipe in enumerate(model.pipes):
-        arrays = {**summary.envelope[pipe.name], "initial_pressure": model.cell_pressure(k, np.zeros(pipe.cells))}
-        if (points := summary.points.get(pipe.name)) is not None:
-            arrays = {key: np.concatenate([values, points[key]]) for key, values in arrays.items()}
-            order = np.argsort(arrays["distance"], kind="stable")
-            arrays = {key: values[order] for key, values in arrays.items()}
+        cells = {**summary.envelope[pipe.name], "initial_pressure": model.cell_pressure(k, np.zeros(pipe.cells))}
+        arrays = with_points(summary, pipe.name, cells)
         arrays["initial_head"] = model.head(arrays.pop("initial_pressure"), arrays["elevation"])
         envelopes[pipe.name] = arrays
     return envelopes

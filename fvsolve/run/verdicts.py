@@ -6,11 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fvsolve.case import case_notices
 from fvsolve.case.claims import VACUUM
 from fvsolve.case.pipe_routes import Leg, is_cut, legs, pipe_leg
 from fvsolve.case.probe import OF_PRESSURE
-from fvsolve.output.csv_files import with_initial_heads
+from fvsolve.output.csv_files import with_points
 from fvsolve.output.unit_columns import UnitColumn, column, probe_columns
 from fvsolve.run.result import FAILS, HOLDS, OPEN, Comparison
 
@@ -50,7 +49,6 @@ def part_extremes(model, summary, extent) -> list[PartExtremes]:
     """
     is_pressure = extent.quantity in OF_PRESSURE
     pipes = {pipe.name: pipe for pipe in model.pipes}
-    envelope = with_initial_heads(summary, model) if is_pressure else {}
     quantity = "pressure" if is_pressure else extent.quantity
     rows: dict[str, list] = {}  # watched probes along pipes
     for probe in model.watched:
@@ -58,8 +56,9 @@ def part_extremes(model, summary, extent) -> list[PartExtremes]:
             rows.setdefault(probe.name, []).append(probe)
     parts = []
     for group, name in extent.parts:
-        if group == "links" and name in envelope:
-            parts.append(PartExtremes(group, name, *(np.asarray(envelope[name][key]) for key in ENVELOPE_KEYS)))
+        if group == "links" and is_pressure and name in summary.envelope:
+            cells = {key: summary.envelope[name][key] for key in ENVELOPE_KEYS}
+            parts.append(PartExtremes(group, name, *with_points(summary, name, cells).values()))
         elif group == "links" and name in rows:
             # probes of which only extremes are recorded
             fraction = np.array([probe.fraction for probe in rows[name]])
@@ -135,16 +134,17 @@ class PlaceMargins(NamedTuple):
 
 def verdicts(model, summary) -> list[dict[str, Any]]:
     """Verdict on every limit of the case, in units of `[output]`, with its worst parts."""
-    return [verdict(rows) for rows in places(model, summary)]
+    return [verdict(rows) for rows in places(model, summary, margins=False)]
 
 
-def places(model, summary) -> list[list[dict[str, Any]]]:
+def places(model, summary, margins=True) -> list[list[dict[str, Any]]]:
     """Rows for every limit of the case: for each part and each bound a dict on the position with the least margin.
 
     If a limit is not exceeded but the run is not ok, has marks, or ends before a schedule does, the state is open.
+    margins : True if the rows are to have the margins at all positions, `PLACES_KEY`
     """
     chainage = Chainages(model.case)
-    complete = bool(summary.ok and not summary.marks and not case_notices.end_notices(model.case))
+    complete = bool(summary.ok and not summary.marks and not any(notice.kind == "end" for notice in model.case.notices))
     tables = []
     for limit in model.case.limits.values():
         extent = limit.extent
@@ -153,8 +153,8 @@ def places(model, summary) -> list[list[dict[str, Any]]]:
         rows = []
         for part in part_extremes(model, summary, extent):
             for row in nearest(model, summary, limit, part, complete):
-                margins = {PLACES_KEY: place_margins(model, extent, shown, row)}
-                rows.append(row_of(row, shown, chainage, extent) | shared | margins)
+                all_places = {PLACES_KEY: place_margins(model, extent, shown, row)} if margins else {}
+                rows.append(row_of(row, shown, chainage, extent) | shared | all_places)
         tables.append(rows)
     return tables
 

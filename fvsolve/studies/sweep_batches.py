@@ -34,7 +34,7 @@ SIZE = 32  # number of copies in a batch
 LEAST = 8  # number of variants below which a batch takes more time than single runs
 MOST_FAILED = 2  # number of failed batches in a row after which variants run alone
 KINDS = {"nodes": {"reservoir", "junction"}, "links": {"pipe", "valve", "orifice"}}  # suited kinds of parts
-UNSUITED = ("signals", "scalars", "controls", "reactions", "meshes", "lumped", "routes", "limits", "compare")
+UNSUITED = ("signals", "scalars", "controls", "reactions", "meshes", "lumped", "routes", "compare")
 KINKED = ("constant", "linear", "smooth", "ramp", "step")  # schedules that `break_times` describes
 UNCHANGED = [field.name for field in fields(Case) if field.name not in CHANGING_FIELDS]
 COPY = re.compile(r"~\d+~")  # ending of the names of the parts of a copy; names in a case file have no ~
@@ -51,7 +51,7 @@ def is_suited(model: Any) -> bool:
     if numerics.rtol is not None or numerics.method == "auto" or not method_named(numerics.method).explicit:
         return False
     others = any(getattr(case, name) for name in UNSUITED) or case.exact or case.validation or case.needs_equilibrium
-    if others or case.extreme_probes or numerics.below_vapor == "stop" or not case.law.linear:
+    if others or numerics.below_vapor == "stop" or not case.law.linear:
         return False
     parts = [(group, name, part) for group in KINDS for name, part in getattr(case, group).items()]
     names = {name for _, name, _ in parts}
@@ -108,12 +108,18 @@ class DraftOfCopy:
 
 @dataclass
 class VariantModel:
-    """Data of the model of a variant for its row of results; `computed` is common to all variants."""
+    """Data of the model of a variant for its row of results; `computed` and `watched` are common to all variants."""
 
     case: Case
     probes: list
     computed: dict
     warnings: list[Notice]
+    watched: list
+    pipes: list = field(default_factory=list)
+    elevation: dict[str, float] = field(default_factory=dict)
+
+    def head(self, pressure: np.ndarray, elevation: np.ndarray) -> np.ndarray:
+        return self.case.law.head(pressure, elevation)
 
 
 @dataclass
@@ -142,12 +148,14 @@ class Batch:
     def __init__(self, model: Any) -> None:
         self.case, self.breaks = model.case, (model.breaks, model.step_max)
         case, self.expect, self.computed, self.functions = model.case, {}, {}, None
-        self.pipes = [pipe.name for pipe in model.pipes]
+        self.pipes, self.watched = [pipe.name for pipe in model.pipes], case.extreme_probes
         self.nodes = [{name: copied(part, k) for name, part in case.nodes.items()} for k in range(SIZE)]
         self.links = [{name: copied(part, k) for name, part in case.links.items()} for k in range(SIZE)]
         probes = [replace(probe, text=probe_text(probe, k), name=probe.name + ending(k))
                   for k in range(SIZE) for probe in case.probes]  # fmt: skip
         self.output = case.output.model_copy(update={"probes": probes, "fields": 0})
+        self.extreme_probes = [replace(probe, text=probe_text(probe, k), name=probe.name + ending(k))
+                               for k in range(SIZE) for probe in self.watched]  # fmt: skip
         self.tables = tables_before_start(self.joined([case] * SIZE))
 
     def joined(self, cases: Sequence[Case]) -> Case:
@@ -161,8 +169,8 @@ class Batch:
                                             (links, case.links, self.case.links, self.links[k])):  # fmt: skip
                 for name, part in own.items():
                     found[name + ending(k)] = parts[name] if part is base[name] else copied(part, k)
-        case = replace(self.case, nodes=nodes, links=links, output=self.output, expect=self.expect)
-        case.__dict__["notices"] = []
+        case = replace(self.case, nodes=nodes, links=links, output=self.output, expect=self.expect, limits={})
+        case.__dict__.update(notices=[], extreme_probes=self.extreme_probes)
         return case
 
     def rows(self, cases: Sequence[Case]) -> list[dict[str, Any]] | None:
@@ -185,7 +193,7 @@ class Batch:
         texts = [probe.text for probe in self.case.probes]
         self.columns = [replace(column, name=text) for column, text in zip(sink.columns, texts, strict=False)]
         values = np.ascontiguousarray(sink.table().T)
-        return [self.row(case, k, summary, sink.time, values, [given[k] for given in lists])
+        return [self.row(case, k, model, summary, sink.time, values, [given[k] for given in lists])
                 for k, case in enumerate(cases)]  # fmt: skip
 
     def model(self, joined: Case) -> tuple[ModelDraft, Any]:
@@ -213,18 +221,33 @@ class Batch:
         columns = draft.column_table[:0]
         return start_notices(DraftOfCopy(case, self.pipes, draft.pipe_table[own], [], columns, draft.fluid, []))
 
-    def row(self, case: Case, k: int, summary: Any, time: Any, values: np.ndarray, notices: list[list]) -> dict:
+    def row(self, case: Case, k: int, joined: Any, summary: Any, time: Any, values: np.ndarray, notices: list) -> dict:
         """Row of results of copy k.
 
-        time : column of the time; values : float64[1 + probes, rows]  times and probe values of the run
+        joined, summary : model of all copies, and the summary of its run; time : column of the time
+        values : float64[1 + probes, rows]  times and probe values of the run
         notices : of the model of the copy, and its marks
         """
         probes = self.case.probes
         extremes = {probe.text: summary.extremes[probe_text(probe, k)] for probe in probes}
         own = replace(summary, extremes=extremes, seconds=summary.seconds / SIZE, marks=notices[1])
-        model = VariantModel(case, probes, self.computed, [*case.notices, *notices[0]])
+        model = VariantModel(case, probes, self.computed, [*case.notices, *notices[0]], self.watched)
+        if self.watched:
+            self.set_extents(model, own, k, joined, summary)
         rows = np.concatenate((values[:1], values[1 + k * len(probes) :][: len(probes)])).T
         return row_of(model, own, VariantSink(self.columns, time, rows))
+
+    def set_extents(self, model: VariantModel, own: Any, k: int, joined: Any, summary: Any) -> None:
+        """Set data of copy k from which limits, and expectations on whole parts, are evaluated.
+
+        model, own : model and summary of the copy; joined, summary : those of all copies
+        """
+        first = k * len(self.pipes)
+        model.pipes = [replace(joined.pipes[first + i], name=name) for i, name in enumerate(self.pipes)]
+        model.elevation = {name: joined.elevation[name + ending(k)] for name in self.case.nodes}
+        own.watched = {probe.text: summary.watched[probe_text(probe, k)] for probe in self.watched}
+        own.envelope = {name: summary.envelope[name + ending(k)] for name in self.pipes}
+        own.points = {name: summary.points[key] for name in self.pipes if (key := name + ending(k)) in summary.points}
 
 
 def copied(part: Any, k: int) -> Any:

@@ -168,6 +168,33 @@ def test_expectations_are_those_of_the_own_run():
     assert untimed(rows) == untimed(alone(case, tasks)) and len({row["expectations"] for row in rows}) == 2
 
 
+LIMITS = {
+    "pipes": {"on": "pipes", "maximum": 1e6, "minimum": "vacuum"},
+    "nodes": {"on": "nodes", "quantity": "head", "maximum": 100.0},
+    "gate": {"on": "gate", "quantity": "gauge_pressure", "maximum": 9e5},
+    "speed": {"on": ["upper", "main"], "quantity": "velocity", "maximum": 1.0},
+    "flow": {"on": "valve", "quantity": "flow", "minimum": -1e-3},
+}
+
+
+@pytest.mark.in_turn
+@pytest.mark.parametrize("limit", LIMITS)
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("shape", ["straight", "profile"])
+def test_verdicts_are_those_of_the_own_run(shape, name, limit):
+    case = network(METHODS[name])
+    case["limits"] = {limit: LIMITS[limit]}
+    for node, height in zip(case["nodes"].values(), (3.0, 1.0, 2.0, 0.0, 1.5), strict=True):
+        node["elevation"] = height
+    if shape == "profile":
+        case["links"]["main"]["profile"] = {"chainage": [0.0, 50.0, 120.0], "elevation": [0.0, 9.0, 3.0]}
+    case["expect"] = {"max(pipes.pressure)": {"value": 8e5, "atol": 2e5}}
+    tasks = [{"links.valve.area": area} for area in np.linspace(5e-4, 0.012, 20).tolist()]
+    rows = batched(case, tasks)
+    assert untimed(rows) == untimed(alone(case, tasks))
+    assert {row["verdicts"] for row in rows} == {True, False} and {row["expectations"] for row in rows} == {True, False}
+
+
 OTHER_STEPS = {
     "links.valve.opening.duration": [0.1, 0.2], "links.main.cells": [12, 14], "numerics.end": [1.0, 0.8],
     "links.main.wave_speed": [1000.0, 1200.0],
