@@ -267,12 +267,17 @@ class BasinRows:
 
     def reflection(self, patch) -> float:
         """Reflection coefficient of waves at a patch: 0 if it is open, 1 for a wall, other values for impedances."""
-        return 0.0 if patch.boundary == "open" else 1.0
+        return 0.0 if patch.passes else 1.0
 
     def is_open(self, patch: str) -> bool:
         """True if fluid flows through a patch without a link."""
         stated = self.part.patches.get(patch)
         return stated is not None and self.reflection(stated) != 1.0
+
+    @property
+    def driven(self) -> dict[str, Any]:
+        """Patches with a closure, by name."""
+        return {name: patch for name, patch in self.part.patches.items() if patch.closure}
 
     @property
     def opening(self) -> str | None:
@@ -385,7 +390,7 @@ class BasinRows:
             from fvsolve.basins.lower_motion import lower_lines
 
             lower_lines(draft, self, row)
-        row["body"] = row["frame"] = row["maxima"] = -1
+        row["body"] = row["frame"] = row["maxima"] = row["driven"] = -1
         self.lower(draft, row)
         if self.part.on is not None:
             from fvsolve.basins.lower_motion import lower_frame

@@ -20,11 +20,12 @@ from fvsolve.errors import MeshError, article, did_you_mean, listing
 from fvsolve.exact.solution import value
 from fvsolve.fluid.laws import law_names
 from fvsolve.parts import Basin
-from fvsolve.parts.basin import BasinStart, MovingWall, PatchNode, Physics
+from fvsolve.parts.basin import CLOSURES, BasinStart, DrivenPatch, MovingWall, PatchNode, Physics
 from fvsolve.parts.formula import SpatialField, means, samples
 from fvsolve.parts.value import ReadContext, ValueFault
 from fvsolve.units import show
 
+BOUNDARY_KEYS = ("boundary", "impedance", *CLOSURES)  # keys of patches through which no link leads
 SAMPLES = 1001  # number of samples of a travel
 NEAR = 1e-9  # tolerance of a length or of a normal, relative
 FLAT = 1e-12  # tolerance of the elevation of a bed, relative
@@ -97,6 +98,36 @@ def moving_wall_faults(
         yield ("nodes", name, "holes"), text
 
 
+def closure_faults(basin: Any, options: Any) -> Faults:
+    """Faults (key path within the patch, message) of the closure of a driven patch; options : keys of the patch."""
+    if options.depth is not None and options.discharge is None:
+        yield ("depth",), "is the depth of an inflow by `discharge`; give `discharge` too, or leave this key out"
+    if options.closure is None:
+        return
+    below = "boundary" if options.closure == options.boundary else options.closure
+    if not basin.physics_type.has_closures:
+        yield (below,), f"does not apply to physics {show(basin.physics)}; leave this key out"
+        return
+    if basin.on is not None:
+        yield (below,), "a basin on a body has no driven patches; expected a wall, an open boundary or a link"
+    if options.normal_slope is not None and not basin.manning:
+        yield (below,), "needs the friction of the bed; give `manning` of the basin too"
+    if options.rating is not None and options.rating.fault:
+        key, text = options.rating.fault
+        yield (below, key), text
+
+
+def rating_faults(basin: Any, mesh: Any, patch: str) -> Faults:
+    """Fault (key path within the patch, message) of a rating with outflow below the bed."""
+    rating = basin.patches[patch].rating
+    if rating is None or rating.fault or not basin.physics_type.has_closures:
+        return
+    bed = means(samples(basin.bed, mesh))[boundary_cells(mesh, patch)]
+    if rating.lowest < bed.min():
+        text = f"passes water from the level {rating.lowest:g} m on, below the bed, {bed.min():g} m at its lowest"
+        yield ("rating", "level"), f"{text}; expected 0 flow up to the bed"
+
+
 def wall_faults(
     basin: Any, mesh: Any, patch: str, options: Any, nodes: dict, times: tuple, named: Any
 ) -> Iterator[tuple[tuple, str]]:
@@ -106,7 +137,7 @@ def wall_faults(
     """
     if not basin.physics_type.moves:
         yield (), f"physics {show(basin.physics)} does not support moving walls; leave out `body` or `travel`"
-    for other in ("boundary", "impedance", "scalars"):
+    for other in (*BOUNDARY_KEYS, "scalars"):
         if getattr(options, other):
             yield (other,), "applies only to an open boundary, and this is a moving wall; leave this key out"
     if options.span is not None:
@@ -432,9 +463,11 @@ def boundary_cells(mesh: Mesh, patch: str) -> np.ndarray:
 
 
 def place_kind(basin: Basin, patch: str) -> type[PatchNode]:
-    """Class of the node that a patch forms for links: `MovingWall` or `PatchNode`."""
+    """Class of the node that a patch forms: `MovingWall`, `DrivenPatch`, or else `PatchNode`."""
     stated = basin.patches.get(patch)
-    return MovingWall if stated is not None and stated.moves else PatchNode
+    if stated is None:
+        return PatchNode
+    return MovingWall if stated.moves else DrivenPatch if stated.closure else PatchNode
 
 
 def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, PatchNode]:
@@ -505,10 +538,13 @@ def find_faults(
             elif f"{name}.{patch}" in joined and not own.joined:
                 text = "a link joins this patch, but the key `velocity` gives the flow; expected no link"
                 yield (*key, "patches", patch), text
-            elif f"{name}.{patch}" in joined and (options.boundary or options.impedance) is not None:
-                key_name = "boundary" if options.boundary else "impedance"
+            elif f"{name}.{patch}" in joined:
                 text = "a link joins this patch and is its boundary; leave this key out"
-                yield (*key, "patches", patch, key_name), text
+                given = (other for other in BOUNDARY_KEYS if getattr(options, other) is not None)
+                yield from (((*key, "patches", patch, other), text) for other in given)
+            if patch in known:
+                faults = [*closure_faults(basin, options), *rating_faults(basin, meshes[name], patch)]
+                yield from (((*key, "patches", patch, *below), text) for below, text in faults)
             if options.impedance is not None and not own.allows_impedance:
                 text = f"does not apply to physics {show(basin.physics)}; leave this key out"
                 yield (*key, "patches", patch, "impedance"), text

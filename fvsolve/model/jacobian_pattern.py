@@ -99,6 +99,10 @@ class Couplings:
             if row["open"]:
                 cells = pattern.cells_read(pattern.neighbours(basin), self.integers[behind : behind + row["faces"]])
                 yield pairs_of(unique_states(self.size + i), pattern.cell_states(basin, cells))
+            if row["closure"] in (rec.DISCHARGE, rec.RATING):  # one level for all faces
+                second = self.integers[row["second"] : row["second"] + row["faces"]]
+                read = unique_states(self.behind(i), pattern.cell_states(basin, np.unique(second)))
+                yield pairs_of(self.behind(i), read)
 
     # nodes ------------------------------------------------------------------------------------------------------
 

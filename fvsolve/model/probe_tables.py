@@ -155,10 +155,14 @@ def linear_offsets(draft, start, row, probe) -> None:
             base, z = start.profile_at(int(row["index"]), probe.fraction)
             row["scale"] = 1.0 / draft.pipe_table[row["index"]]["admittance"]
         row["offset"] = base - (0.0 if probe.quantity == "pressure" else draft.case.ambient_pressure)
-        if probe.quantity == "head":
+        place = draft.case.places.get(probe.name)
+        is_level = probe.quantity == "level" and place is not None and place.kind == "patch"
+        if probe.quantity == "head" or is_level:
             divisor = weight if weight > 0.0 else np.nan  # without gravity there is no head
             row["scale"] /= divisor
             row["offset"] = row["offset"] / divisor + z
+        if is_level:
+            row["offset"] -= draft.case.nodes[place.basin].elevation or 0.0
 
 
 def barotropic_offsets(draft, start, row, probe) -> None:

@@ -388,10 +388,11 @@ class Run:
         warnings += found.device_notices(self.run_data) + found.spill_notices(self.run_data)
         warnings += found.drift_notices(model, loop.now)
         warnings += split_step_notices(model.case.numerics, loop.stepper.counts())
-        ok = reason == "finished" and all(entry.ok for entry in warnings)
+        held = found.held_discharges(self.run_data, self.start, loop.t, ledger[:, : len(model.node_names)].sum(axis=0))
+        ok = reason == "finished" and not held and all(entry.ok for entry in warnings)
         extremes, watched = found.find_extremes(self.run_data)
         summary = Summary(
-            reason, ok, loop.t, found.find_marks(self.run_data), ledgers, extremes,
+            reason, ok, loop.t, found.find_marks(self.run_data) + held, ledgers, extremes,
             found.find_envelope(self.run_data), found.find_point_envelopes(self.run_data), watched,
             loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
             self.setup, [Event(t, *model.events[k]) for t, k in loop.switched],

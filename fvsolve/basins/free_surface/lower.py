@@ -17,7 +17,7 @@ import numpy as np
 
 from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
-from fvsolve.basins.free_surface import surface_grid, surface_maxima, surface_mesh
+from fvsolve.basins.free_surface import patch_closures, surface_grid, surface_maxima, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import RATE_CAP, add_friction
 from fvsolve.basins.free_surface.surface_patches import DEPTH
 from fvsolve.basins.free_surface.surface_rows import THIN
@@ -246,9 +246,18 @@ WATER_TERMS = RhsTerms(
     power="surface_energy: add_power",
     stored="surface_energy: add_stored",
 )
+DRIVEN_TERMS = RhsTerms(
+    package=PACKAGE,
+    move="patch_closures: close_patches",  # before the rates of cells
+    observe="patch_closures: observe_froude",
+)
 DEPTH_SCALE = 0.1  # [m] of depth
 ROUNDING = 1e-12  # depth over levels and beds below which there is no water
 TINY = 1e-300
+CLOSURES = {  # key of a driven patch, or word of its key `boundary` -> code
+    "stage": rec.STAGE, "discharge": rec.DISCHARGE, "rating": rec.RATING, "normal_slope": rec.NORMAL_SLOPE,
+    "critical": rec.CRITICAL,
+}  # fmt: skip
 NO_CAP = 1e100  # rate of friction [1/s] above all possible rates
 COURANT_FACTOR = 2.0  # Courant numbers of water refer to half cells, so that no depth falls below zero at 1,
 SHORE_COURANT_FACTOR = 6.0  # and to sixths of cells under fifth order with a shore
@@ -287,8 +296,10 @@ class FreeSurfaceRows(BasinRows):
 
     def pieces(self, valves: bool) -> Iterator[RhsTerms]:
         kind = f"{'moving_' if self.moves else ''}{'grids' if self.is_grid else 'meshes'}"
-        yield RhsTerms(package=PACKAGE, rates=f"surface_rates: water_{kind}")
+        yield RhsTerms(package=PACKAGE, rates=f"surface_rates: water_{'driven_' if self.driven else ''}{kind}")
         yield WATER_TERMS
+        if self.driven:
+            yield DRIVEN_TERMS
         if self.part.on is not None:
             yield FRAME_FORCES
         if self.damped:
@@ -306,6 +317,35 @@ class FreeSurfaceRows(BasinRows):
     @property
     def forms_stages(self) -> bool:
         return self.is_grid and not (self.undivided_reason or self.scalars)
+
+    def lower_patch(self, draft, patch: str, row) -> None:
+        super().lower_patch(draft, patch, row)
+        cells = draft.integers[row["first"] : row["first"] + row["count"]]
+        row["rest"], row["depth"] = self.part.level, -1
+        row["lowest"] = max(float(self.bed[cells].min()) - self.part.level, 0.0)
+        if patch not in self.driven:
+            return
+        stated = self.part.patches[patch]
+        row["closure"] = CLOSURES[stated.closure]
+        behind = np.array(draft.integers[row["ring"] + row["faces"] :][: row["faces"]])
+        row["second"] = len(draft.integers)
+        draft.integers += self.second_cells(patch, behind).tolist()
+        for key, column in (("stage", "drive"), ("discharge", "drive"), ("depth", "depth")):
+            if (schedule := getattr(stated, key)) is not None:
+                row[column] = draft.schedules.add(schedule)
+        if stated.rating is not None:
+            row["numbers"] = draft.to_plane(np.array([stated.rating.level, stated.rating.flow]))
+            row["points"] = len(stated.rating.level)
+        if stated.normal_slope is not None:
+            row["conveyance"] = math.sqrt(stated.normal_slope) / self.part.manning
+
+    def second_cells(self, patch: str, behind: np.ndarray) -> np.ndarray:
+        """Cells next inside the cells `behind` the faces of a patch; the same cells on a mesh, and with upwind."""
+        if not self.is_grid or self.scheme == "upwind":
+            return behind
+        grid, (x, y) = self.mesh.grid, -np.round(self.mesh.normal[self.mesh.patch(patch)].T).astype(int)
+        step = x * (grid.nx > 1) + y * grid.nx * (grid.ny > 1)
+        return behind + step
 
     def scales(self) -> list[float]:
         flow = DEPTH_SCALE * np.sqrt(self.case.gravity * DEPTH_SCALE)
@@ -328,16 +368,23 @@ class FreeSurfaceRows(BasinRows):
         else:
             row["work"] = draft.to_work(mesh_blocks.work_size(surface_mesh, self.integers))
         row["plan"] = draft.to_plane(plan)
+        row["driven"] = draft.to_work(patch_closures.ROWS * int(row["outer"])) if self.driven else -1
         if self.records_maxima:
             row["wet_depth"] = self.case.output.wet_depth
             rows = max(int(row["ny"]), 1)
             row["maxima_row"] = surface_maxima.QUANTITIES * (self.n // rows)
             row["maxima"] = draft.to_maxima(rows * int(row["maxima_row"]))
-        if not (self.depth + self.start()[0]).max() > 0.0:
+        if not (self.depth + self.start()[0]).max() > 0.0 and not self.fills:
             amount = draft.case.amount
             text = f"basin {self.name} starts dry: level {amount(part.level, 'level')} is not above its bed, lowest at "
             text += amount(float(self.bed.min()), "level")
             draft.warnings.append(Notice("start", f"nodes.{self.name}", text, "level", part.level, self.bed.min()))
+
+    @property
+    def fills(self) -> bool:
+        """True if a driven patch or a link can bring water into the basin."""
+        joined = {place for link in self.case.links.values() for place in link.ports.values()}
+        return any(name in self.driven or f"{self.name}.{name}" in joined for name in self.part.patches)
 
     @property
     def rubs(self) -> bool:

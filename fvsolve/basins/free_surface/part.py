@@ -35,6 +35,7 @@ class FreeSurface(Physics, name="free-surface"):
     links_on_bodies: ClassVar[bool] = True
     description: ClassVar[str] = "a free surface, whose water has one density"
     has_shocks: ClassVar[bool] = True
+    has_closures: ClassVar[bool] = True
 
     level: Annotated[
         float,
