@@ -172,6 +172,23 @@ class BasinRows:
         """Longest explicit step while no wave limits steps, at Courant number 1 [s]."""
         return np.inf
 
+    soil: Any = None  # keys of the soil into which water infiltrates; None without infiltration
+    rains: bool = False  # True if rain falls on the basin
+
+    @property
+    def source_names(self) -> list[str]:
+        """Names of its rows in the ledger of rain and infiltration."""
+        return ["rain"] * self.rains + ["infiltration"] * (self.soil is not None)
+
+    @property
+    def source_states(self) -> np.ndarray:
+        """Indices in y of the heights of rain and of infiltrated water."""
+        rained = [int(self.row["rained"])] if self.rains else []
+        return np.append(rained, int(self.row["infiltrated"]) + np.arange(self.n if self.soil else 0)).astype(int)
+
+    def lower_sources(self, draft, row) -> None:
+        """Fill the columns of rain and infiltration, and add their states."""
+
     def notices(self, y: np.ndarray) -> list[Notice]:
         """Notices on the deviations y of cells at the start of a run."""
         return []
@@ -201,6 +218,8 @@ class BasinRows:
             return "its walls move"
         if self.part.on is not None:
             return "it is on a body"
+        if self.soil is not None:
+            return "its soil takes water"
         if self.scalars and self.is_fifth_order:
             return f"its scalars use the scheme {self.scheme}"
         if self.scalars and self.opening is not None:
@@ -404,6 +423,8 @@ class BasinRows:
         row["carried"] = draft.size if self.scalars else -1
         for name in self.scalars:
             draft.states(Numbered(f"{self.name}.{name}", self.n), self.scalar_scale(name))
+        row["rain"], row["total_area"] = -1, mesh.area.sum()
+        self.lower_sources(draft, row)
         self.memory = 8 * (draft.used_size() + draft.size - before)
         place = f"nodes.{self.name}"
         draft.warnings += [Notice("mesh", place, f"basin {self.name}: {note}", "mesh") for note in mesh.notes]

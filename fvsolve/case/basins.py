@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -115,6 +115,14 @@ def closure_faults(basin: Any, options: Any) -> Faults:
     if options.rating is not None and options.rating.fault:
         key, text = options.rating.fault
         yield (below, key), text
+
+
+def source_faults(basin: Any) -> Faults:
+    """Faults (key path within the basin, message) of rain and infiltration on a basin that moves or is deformed."""
+    for key in ("rain", "infiltration"):
+        if getattr(basin, key, None) is not None and (basin.on is not None or moving_walls(basin)):
+            where = "a basin on a body" if basin.on is not None else "a basin with a moving wall"
+            yield (key,), f"is not supported for {where}; expected a fixed basin, or leave this key out"
 
 
 def rating_faults(basin: Any, mesh: Any, patch: str) -> Faults:
@@ -313,14 +321,15 @@ class BasinFields:
     """Mesh of a basin, and its fields that probes can record (name -> dimension).
 
     has_maxima : True if its greatest values in cells can be recorded; what : text about the basin, for messages
+    quantities : quantities of the whole basin (name -> dimension)
     """
 
     fields: dict[str, str]
     mesh: Mesh
     has_maxima: bool = False
     what: str = ""
+    quantities: dict[str, str] = field(default_factory=dict)
     kind: ClassVar[str] = "basin"
-    quantities: ClassVar[dict[str, str]] = {}
 
     def point(self, label: str, place: str | None) -> tuple[float, float]:
         """Point (x, y) [m] from the text `place` after "@" in a probe, such as "3.5,1.2".
@@ -368,7 +377,7 @@ def probe_kinds(name: str, basin: Basin, mesh: Mesh | None, lumped: Mesh | None,
     fields = own.fields | (dict.fromkeys(scalars, "number") if own.carries else {})
     patches = {f"{name}.{patch}": place_kind(basin, patch) for patch in patch_names(mesh)}
     what = f"{name} has the physics {show(own.name)}"
-    return {name: BasinFields(fields, mesh, bool(own.maxima), what), **patches}
+    return {name: BasinFields(fields, mesh, bool(own.maxima), what, own.totals), **patches}
 
 
 def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
@@ -556,6 +565,7 @@ def find_faults(
             for other in sorted(basin.start.model_fields_set - set(own.starts.model_fields)):
                 yield (*key, "start", other), f"does not apply to physics {show(basin.physics)}; leave this key out"
         shapes += [(("scalars", scalar), shape, None) for scalar, shape in basin.scalars.items()]
+        yield from (((*key, *below), text) for below, text in source_faults(basin))
         for below, shape, points in shapes:
             try:
                 if points is not None:
@@ -564,3 +574,5 @@ def find_faults(
                     samples(shape, meshes[name])
             except ValueError as error:
                 yield (*key, *below), str(error)
+            else:
+                yield from (((*key, *below), text) for text in own.value_faults(basin, below, shape, meshes[name]))

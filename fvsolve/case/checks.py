@@ -224,6 +224,9 @@ def scalar_faults(
             for scalar, factor in getattr(part, "retardation", {}).items():
                 if (text := _retardation_fault(scalar, factor, scalars)) is not None:
                     yield (group, name, "retardation", scalar), text
+            if scalars and isinstance(part, Basin) and getattr(part, "infiltration", None) is not None:
+                text = "takes water, but not the scalars in it; expected a case without scalars, or no infiltration"
+                yield (group, name, "infiltration"), text
             if scalars and isinstance(part, Basin) and not part.physics_type.carries:
                 text = f"scalars are not supported with physics {show(part.physics)}; expected a free surface"
                 yield (group, name), text

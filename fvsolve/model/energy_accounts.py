@@ -193,6 +193,9 @@ class Accounts:
         if any(basin.part.on is not None and basin.opening for basin in model.basins):
             raise FvsolveError("the energy of a basin on a body with an open side is not supported; expected closed "
                                "sides, or a basin that no body carries")  # fmt: skip
+        if model.sources:
+            raise FvsolveError(f"the energy of rain and infiltration ({listing(model.sources)}) is not supported; "
+                               "expected a basin without them")  # fmt: skip
         if driven := [f"{basin.name}.{name}" for basin in model.basins for name in basin.driven]:
             raise FvsolveError(f"the energy of water through driven patches ({listing(driven)}) is not supported; "
                                "expected walls, open sides, or links")  # fmt: skip

@@ -31,6 +31,9 @@ def fill_probes(draft, probes: list) -> np.ndarray:
             lower_reaction_probe(draft, row, probe)
         elif probe.point is not None:
             lower_basin_point(draft, row, probe)
+        elif probe.part == "nodes" and probe.name in case.meshes:
+            row["kind"], row["index"] = rec.CELL_FIELD, list(case.meshes).index(probe.name)
+            draft.basins[row["index"]].lower_probe(row, probe.quantity, np.zeros(0, int), np.zeros(0))
         elif probe.quantity in draft.case.scalars and not is_in_network(parts[probe.part].get(probe.name)):
             scalar_probe(draft, row, probe)
         elif probe.name in draft.case.network_places and probe.name not in parts["nodes"]:  # PUMP.shaft

@@ -242,6 +242,7 @@ class Physics(Table):
     states: ClassVar[dict[str, str]] = {}
     fields: ClassVar[dict[str, str]] = {}
     maxima: ClassVar[dict[str, str]] = {}
+    totals: ClassVar[dict[str, str]] = {}
     starts: ClassVar[type[Table]] = Table
     laws: ClassVar[tuple[str, ...]] = ()
     description: ClassVar[str] = "basins"
@@ -303,6 +304,11 @@ class Physics(Table):
         for key in cls.model_fields:
             if isinstance(shape := getattr(basin, key), SpatialField):
                 yield (key,), shape, None
+
+    @classmethod
+    def value_faults(cls, basin: "Basin", place: tuple[str, ...], shape: Any, mesh: Any) -> Iterator[str]:
+        """Yield fault texts of the values of a field in the cells of a basin; place : its key path"""
+        yield from ()
 
     @classmethod
     def own_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:

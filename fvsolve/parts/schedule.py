@@ -211,7 +211,8 @@ class Scheduled(Value):
             unit = values["unit"]
             t, v, *headers = read_columns(path, values["time"], values["value"], self.dimension, setting, unit)
             if self.needs_unit and not unit and not split_header(headers[1])[1]:
-                text = f'{path.name}, column {show(headers[1])} has no unit; expected for example `unit = "m"`'
+                unit = DIMENSIONS[self.dimension].example.split()[-1]
+                text = f"{path.name}, column {show(headers[1])} has no unit; expected for example `unit = {show(unit)}`"
                 raise ValueError(text)
             val.check_increasing(t, t.tolist(), f"{path.name}: times")
             for x in v.tolist():

@@ -308,7 +308,8 @@ def relative(remainder: float, largest: float) -> float:
 def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, Any]:
     """Mass balance of a run as a dict: stored mass at start and end, inflow, outflow, spilled, made up, remainder [kg].
 
-    ledger : float64[2, nodes]  inflow at each node [kg], and outflow as negative numbers
+    ledger : float64[2, nodes + sources]  inflow at each node, and of rain and infiltration [kg]; outflow as negative
+    numbers
     The entry `relative` is the remainder as a fraction of the largest term.
     """
     kinds = model.tables.nodes["kind"]
@@ -317,7 +318,8 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     # nodes with `made_up` and `spilled`
     own = [kind in (rec.TANK, rec.PATCH) and i not in passes for i, kind in enumerate(kinds)]
     words = [("made_up", "spilled") if in_cells else ("inflow", "outflow") for in_cells in own]
-    rows = zip(model.node_names, words, ledger[0], ledger[1], strict=True)
+    names, words = [*model.node_names, *model.sources], words + [("inflow", "outflow")] * len(model.sources)
+    rows = zip(names, words, ledger[0], ledger[1], strict=True)
     nodes = {name: {inflow_word: float(x), outflow_word: float(0.0 - y)}
              for name, (inflow_word, outflow_word), x, y in rows if x != 0.0 or y != 0.0}  # fmt: skip
     total = {word: sum(row.get(word, 0.0) for row in nodes.values()) for pair in set(words) for word in pair}

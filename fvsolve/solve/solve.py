@@ -381,7 +381,9 @@ class Run:
         if reason == "finished":
             self.check_basins(loop.t, loop.now)
         ledger = loop.stepper.ledger.reshape(LEDGER_ROWS, -1)[:2]
-        ledgers = {"mass": mass_ledger(model, loop.now, ledger[:, : len(model.node_names)])}
+        first = int(model.layout["source"] - model.layout["supply"])
+        booked = ledger[:, [*range(len(model.node_names)), *range(first, first + len(model.sources))]]
+        ledgers = {"mass": mass_ledger(model, loop.now, booked)}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
         basin_notices = [notice for entry in self.watches for notice in entry.notices()]
         warnings = [*self.notices, *basin_notices, *self.checks.warnings(ledgers)]

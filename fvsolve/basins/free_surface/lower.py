@@ -15,11 +15,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fvsolve.assembly.state_names import Numbered
 from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
 from fvsolve.basins.free_surface import patch_closures, surface_grid, surface_maxima, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import RATE_CAP, add_friction
-from fvsolve.basins.free_surface.surface_patches import DEPTH
+from fvsolve.basins.free_surface.surface_patches import DEPTH, TOTALS
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.case.bodies import free_joints
@@ -252,6 +253,8 @@ DRIVEN_TERMS = RhsTerms(
     observe="patch_closures: observe_froude",
 )
 DEPTH_SCALE = 0.1  # [m] of depth
+HEIGHT_SCALE = 1e-3  # [m] of rain and infiltrated water
+SOILS = {"constant": rec.CONSTANT_RATE, "horton": rec.HORTON, "green-ampt": rec.GREEN_AMPT}
 ROUNDING = 1e-12  # depth over levels and beds below which there is no water
 TINY = 1e-300
 CLOSURES = {  # key of a driven patch, or word of its key `boundary` -> code
@@ -318,6 +321,26 @@ class FreeSurfaceRows(BasinRows):
     def forms_stages(self) -> bool:
         return self.is_grid and not (self.undivided_reason or self.scalars)
 
+    @property
+    def rains(self) -> bool:
+        return self.part.rain is not None
+
+    @property
+    def soil(self):
+        return self.part.infiltration
+
+    def lower_sources(self, draft, row) -> None:
+        row["shower"], row["source"] = draft.to_work(1), draft.sources
+        if self.rains:
+            row["rain"] = draft.schedules.add(self.part.rain)
+            row["rained"] = draft.states(Numbered(f"{self.name}.rained", 1), HEIGHT_SCALE)
+        if self.soil is not None:
+            row["soil"] = SOILS[self.soil.model]
+            row["soil_numbers"] = draft.to_plane(np.array([self.formula(shape) for shape in self.soil.numbers]))
+            row["soil_work"] = draft.to_work(self.n)
+            row["infiltrated"] = draft.states(Numbered(f"{self.name}.infiltrated", self.n), HEIGHT_SCALE)
+        draft.sources += len(self.source_names)
+
     def lower_patch(self, draft, patch: str, row) -> None:
         super().lower_patch(draft, patch, row)
         cells = draft.integers[row["first"] : row["first"] + row["count"]]
@@ -369,8 +392,8 @@ class FreeSurfaceRows(BasinRows):
             row["work"] = draft.to_work(mesh_blocks.work_size(surface_mesh, self.integers))
         row["plan"] = draft.to_plane(plan)
         row["driven"] = draft.to_work(patch_closures.ROWS * int(row["outer"])) if self.driven else -1
+        row["wet_depth"] = self.case.output.wet_depth
         if self.records_maxima:
-            row["wet_depth"] = self.case.output.wet_depth
             rows = max(int(row["ny"]), 1)
             row["maxima_row"] = surface_maxima.QUANTITIES * (self.n // rows)
             row["maxima"] = draft.to_maxima(rows * int(row["maxima_row"]))
@@ -382,7 +405,9 @@ class FreeSurfaceRows(BasinRows):
 
     @property
     def fills(self) -> bool:
-        """True if a driven patch or a link can bring water into the basin."""
+        """True if rain, a driven patch or a link can bring water into the basin."""
+        if self.rains:
+            return True
         joined = {place for link in self.case.links.values() for place in link.ports.values()}
         return any(name in self.driven or f"{self.name}.{name}" in joined for name in self.part.patches)
 
@@ -462,6 +487,9 @@ class FreeSurfaceRows(BasinRows):
         return {"depth": (low, high), "wave_speed": (float(speeds[0]), float(speeds[1]))}
 
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
+        if field in TOTALS:
+            row["side"] = TOTALS[field]
+            return None
         if field not in ("depth", "surface", "bed"):
             return super().lower_probe(row, field, cells, weights)
         row["side"], row["scale"] = DEPTH, float(field != "bed")

@@ -10,11 +10,12 @@ from fvsolve.basins.free_surface import surface_grid, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import add_capped_friction, add_friction, damp_flows
 from fvsolve.basins.free_surface.patch_closures import driven_faces
 from fvsolve.basins.free_surface.surface_rows import GHOSTS, MAX_COLUMNS
+from fvsolve.basins.free_surface.water_sources import DRAIN_TIME, add_infiltration, add_rain, begin_rain
 from fvsolve.basins.moving_meshes import mesh_motion
 from fvsolve.basins.moving_walls import grid_motion
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels import stage_sums as sums_of
-from fvsolve.kernels.dtypes import NO_DRAG, RATE
+from fvsolve.kernels.dtypes import NO_DRAG, NO_SOIL, RATE
 from fvsolve.kernels.table_handle import open_tables
 
 OWN_CODE = physics_code(__package__)
@@ -97,6 +98,11 @@ def finish_block(tables, b, row, block_stop, first, last, y, rates, out):
             add_bed_friction(tables, b, nx * row, nx * block_stop, y, rates, out)
         for j in range(row, block_stop if last - first < nx else row):
             add_bed_friction(tables, b, nx * j + first, nx * j + last, y, rates, out)
+    if basin["rain"] >= 0:
+        if first == 0 and last == nx:
+            add_rain(tables, basin, rates[0][nx * row : nx * block_stop])
+        for j in range(row, block_stop if last - first < nx else row):
+            add_rain(tables, basin, rates[0][nx * j + first : nx * j + last])
     for q in range(3):
         at = basin["y"] + q * basin["n"]
         if sums[sums_of.MODE] == sums_of.CHECK:
@@ -178,7 +184,15 @@ def grid_rates(tables, b, y, rates, out, moves, faces):
     if basin["friction"] != NO_DRAG:
         a, z = band_cells(tables, b)
         add_bed_friction(tables, b, a, z, y, rates, out)
+    add_rain_to_band(tables, b, rates)
     return rate
+
+
+@njit
+def add_rain_to_band(tables, b, rates):
+    """Add the rate of rain to the rates of depth of the cells of basin b that this thread computes."""
+    a, z = band_cells(tables, b)
+    add_rain(tables, tables.basins[b], rates[0][a:z])
 
 
 @njit
@@ -202,6 +216,7 @@ def mesh_rates(tables, b, y, rates, out, moves, faces):
     if basin["friction"] != NO_DRAG:
         a, z = band
         add_bed_friction(tables, b, a, z, y, rates, out)
+    add_rain_to_band(tables, b, rates)
     return rate
 
 
@@ -232,9 +247,13 @@ def _rates(t, y, dydt, out, handle):
             continue
         if (basin["driven"] >= 0) != DRIVEN:
             continue
+        begin_rain(tables, basin, t, dydt, out)
         if MOVING or needs_rates(basin, dydt):
             rate = CELLS(tables, b, y, rates_of(tables, basin, dydt), out, MOTION(tables, basin), FACES(tables, basin))
             put_open_flows(tables, b, tables.settings[0]["rho"], out)
+            if basin["soil"] != NO_SOIL:  # steps keep all depths above 0
+                add_infiltration(tables, basin, t, y, dydt, out)
+                rate += 1.0 / (basin["unsplit"] * DRAIN_TIME)
             out[RATE] = max(out[RATE], basin["unsplit"] * rate)
 
 
