@@ -246,6 +246,7 @@ class ModelDraft:
     reaction_table: np.ndarray = no_rows(rec.REACTION)
     heat_source_table: np.ndarray = no_rows(rec.HEAT_SOURCE)
     exchanger_table: np.ndarray = no_rows(rec.EXCHANGER)
+    sources: int = 0  # number of rows in the ledger of rain and infiltration
     heat_rows: int = 0  # rows in the ledger of the heat of restrictions and pipes
     wall_table: np.ndarray = no_rows(rec.WALL)
     delay_table: np.ndarray = no_rows(rec.DELAY)

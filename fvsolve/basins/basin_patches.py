@@ -8,7 +8,7 @@ from zlib import crc32
 from fvsolve.basins.boundary_cells import patch_inflow
 from fvsolve.jit import njit
 from fvsolve.kernels import band_exchange
-from fvsolve.kernels.dtypes import GN
+from fvsolve.kernels.dtypes import DISCHARGE, GN
 from fvsolve.kernels.table_handle import open_tables
 
 
@@ -62,13 +62,17 @@ def put_boundary_flows(t, y, dydt, out, handle):
 def record_patches(t, y, out, handle, values):
     """Record, for each patch, the first time at which its links take more water than its cells supply.
 
-    Open patches are excluded.
+    At a patch with a scheduled discharge it is the first time at which this is held at critical outflow. Other open
+    patches are excluded.
     """
     tables = open_tables(handle)
-    patches, marks, nodes = tables.patches, tables.marks, tables.nodes.size
+    patches, marks, nodes, layout = tables.patches, tables.marks, tables.nodes, tables.layout[0]
     for k in range(patches.size):
-        at = tables.pipes.size + nodes + patches[k]["node"]
-        is_short = patches[k]["open"] == 0 and out[tables.layout[0]["supply"] + patches[k]["node"]] > 0.0
+        i = patches[k]["node"]
+        at = tables.pipes.size + nodes.size + i
+        is_short = patches[k]["open"] == 0 and out[layout["supply"] + i] > 0.0
+        if patches[k]["closure"] == DISCHARGE:
+            is_short = out[layout["outflow_fraction"] + nodes[i]["row"]] < 1.0
         if is_short and marks[at] != marks[at]:
             marks[at] = t
 

@@ -172,6 +172,23 @@ class BasinRows:
         """Longest explicit step while no wave limits steps, at Courant number 1 [s]."""
         return np.inf
 
+    soil: Any = None  # keys of the soil into which water infiltrates; None without infiltration
+    rains: bool = False  # True if rain falls on the basin
+
+    @property
+    def source_names(self) -> list[str]:
+        """Names of its rows in the ledger of rain and infiltration."""
+        return ["rain"] * self.rains + ["infiltration"] * (self.soil is not None)
+
+    @property
+    def source_states(self) -> np.ndarray:
+        """Indices in y of the heights of rain and of infiltrated water."""
+        rained = [int(self.row["rained"])] if self.rains else []
+        return np.append(rained, int(self.row["infiltrated"]) + np.arange(self.n if self.soil else 0)).astype(int)
+
+    def lower_sources(self, draft, row) -> None:
+        """Fill the columns of rain and infiltration, and add their states."""
+
     def notices(self, y: np.ndarray) -> list[Notice]:
         """Notices on the deviations y of cells at the start of a run."""
         return []
@@ -201,6 +218,8 @@ class BasinRows:
             return "its walls move"
         if self.part.on is not None:
             return "it is on a body"
+        if self.soil is not None:
+            return "its soil takes water"
         if self.scalars and self.is_fifth_order:
             return f"its scalars use the scheme {self.scheme}"
         if self.scalars and self.opening is not None:
@@ -267,12 +286,17 @@ class BasinRows:
 
     def reflection(self, patch) -> float:
         """Reflection coefficient of waves at a patch: 0 if it is open, 1 for a wall, other values for impedances."""
-        return 0.0 if patch.boundary == "open" else 1.0
+        return 0.0 if patch.passes else 1.0
 
     def is_open(self, patch: str) -> bool:
         """True if fluid flows through a patch without a link."""
         stated = self.part.patches.get(patch)
         return stated is not None and self.reflection(stated) != 1.0
+
+    @property
+    def driven(self) -> dict[str, Any]:
+        """Patches with a closure, by name."""
+        return {name: patch for name, patch in self.part.patches.items() if patch.closure}
 
     @property
     def opening(self) -> str | None:
@@ -385,7 +409,7 @@ class BasinRows:
             from fvsolve.basins.lower_motion import lower_lines
 
             lower_lines(draft, self, row)
-        row["body"] = row["frame"] = row["maxima"] = -1
+        row["body"] = row["frame"] = row["maxima"] = row["driven"] = -1
         self.lower(draft, row)
         if self.part.on is not None:
             from fvsolve.basins.lower_motion import lower_frame
@@ -399,6 +423,8 @@ class BasinRows:
         row["carried"] = draft.size if self.scalars else -1
         for name in self.scalars:
             draft.states(Numbered(f"{self.name}.{name}", self.n), self.scalar_scale(name))
+        row["rain"], row["total_area"] = -1, mesh.area.sum()
+        self.lower_sources(draft, row)
         self.memory = 8 * (draft.used_size() + draft.size - before)
         place = f"nodes.{self.name}"
         draft.warnings += [Notice("mesh", place, f"basin {self.name}: {note}", "mesh") for note in mesh.notes]

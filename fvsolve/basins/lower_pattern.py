@@ -67,7 +67,18 @@ def cell_states(basin, cells: np.ndarray, quantities: int | None = None) -> np.n
 def all_states(basin) -> np.ndarray:
     """Indices in y of all states of a basin."""
     own = int(basin.row["y"]) + np.arange(len(basin.quantities) * basin.n)
-    return np.concatenate([own, int(basin.row["carried"]) + np.arange(len(basin.scalars) * basin.n)])
+    carried = int(basin.row["carried"]) + np.arange(len(basin.scalars) * basin.n)
+    return np.concatenate([own, carried, basin.source_states])
+
+
+def source_pattern(basin, ledger: int) -> tuple[np.ndarray, np.ndarray]:
+    """(rates, states) as indices in y: rates of depth, infiltrated height and ledger, and heights on which they depend.
+
+    ledger : row of the infiltration in the ledger, after the states
+    """
+    depth, height = int(basin.row["y"]) + np.arange(basin.n), int(basin.row["infiltrated"]) + np.arange(basin.n)
+    total = np.full(basin.n, ledger)
+    return np.concatenate([depth, height, height, total, total]), np.concatenate([height, depth, height, depth, height])
 
 
 def neighbours(basin) -> csr_array:

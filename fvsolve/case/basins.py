@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -20,11 +20,12 @@ from fvsolve.errors import MeshError, article, did_you_mean, listing
 from fvsolve.exact.solution import value
 from fvsolve.fluid.laws import law_names
 from fvsolve.parts import Basin
-from fvsolve.parts.basin import BasinStart, MovingWall, PatchNode, Physics
+from fvsolve.parts.basin import CLOSURES, BasinStart, DrivenPatch, MovingWall, PatchNode, Physics
 from fvsolve.parts.formula import SpatialField, means, samples
 from fvsolve.parts.value import ReadContext, ValueFault
 from fvsolve.units import show
 
+BOUNDARY_KEYS = ("boundary", "impedance", *CLOSURES)  # keys of patches through which no link leads
 SAMPLES = 1001  # number of samples of a travel
 NEAR = 1e-9  # tolerance of a length or of a normal, relative
 FLAT = 1e-12  # tolerance of the elevation of a bed, relative
@@ -97,6 +98,44 @@ def moving_wall_faults(
         yield ("nodes", name, "holes"), text
 
 
+def closure_faults(basin: Any, options: Any) -> Faults:
+    """Faults (key path within the patch, message) of the closure of a driven patch; options : keys of the patch."""
+    if options.depth is not None and options.discharge is None:
+        yield ("depth",), "is the depth of an inflow by `discharge`; give `discharge` too, or leave this key out"
+    if options.closure is None:
+        return
+    below = "boundary" if options.closure == options.boundary else options.closure
+    if not basin.physics_type.has_closures:
+        yield (below,), f"does not apply to physics {show(basin.physics)}; leave this key out"
+        return
+    if basin.on is not None:
+        yield (below,), "a basin on a body has no driven patches; expected a wall, an open boundary or a link"
+    if options.normal_slope is not None and not basin.manning:
+        yield (below,), "needs the friction of the bed; give `manning` of the basin too"
+    if options.rating is not None and options.rating.fault:
+        key, text = options.rating.fault
+        yield (below, key), text
+
+
+def source_faults(basin: Any) -> Faults:
+    """Faults (key path within the basin, message) of rain and infiltration on a basin that moves or is deformed."""
+    for key in ("rain", "infiltration"):
+        if getattr(basin, key, None) is not None and (basin.on is not None or moving_walls(basin)):
+            where = "a basin on a body" if basin.on is not None else "a basin with a moving wall"
+            yield (key,), f"is not supported for {where}; expected a fixed basin, or leave this key out"
+
+
+def rating_faults(basin: Any, mesh: Any, patch: str) -> Faults:
+    """Fault (key path within the patch, message) of a rating with outflow below the bed."""
+    rating = basin.patches[patch].rating
+    if rating is None or rating.fault or not basin.physics_type.has_closures:
+        return
+    bed = means(samples(basin.bed, mesh))[boundary_cells(mesh, patch)]
+    if rating.lowest < bed.min():
+        text = f"passes water from the level {rating.lowest:g} m on, below the bed, {bed.min():g} m at its lowest"
+        yield ("rating", "level"), f"{text}; expected 0 flow up to the bed"
+
+
 def wall_faults(
     basin: Any, mesh: Any, patch: str, options: Any, nodes: dict, times: tuple, named: Any
 ) -> Iterator[tuple[tuple, str]]:
@@ -106,7 +145,7 @@ def wall_faults(
     """
     if not basin.physics_type.moves:
         yield (), f"physics {show(basin.physics)} does not support moving walls; leave out `body` or `travel`"
-    for other in ("boundary", "impedance", "scalars"):
+    for other in (*BOUNDARY_KEYS, "scalars"):
         if getattr(options, other):
             yield (other,), "applies only to an open boundary, and this is a moving wall; leave this key out"
     if options.span is not None:
@@ -282,14 +321,15 @@ class BasinFields:
     """Mesh of a basin, and its fields that probes can record (name -> dimension).
 
     has_maxima : True if its greatest values in cells can be recorded; what : text about the basin, for messages
+    quantities : quantities of the whole basin (name -> dimension)
     """
 
     fields: dict[str, str]
     mesh: Mesh
     has_maxima: bool = False
     what: str = ""
+    quantities: dict[str, str] = field(default_factory=dict)
     kind: ClassVar[str] = "basin"
-    quantities: ClassVar[dict[str, str]] = {}
 
     def point(self, label: str, place: str | None) -> tuple[float, float]:
         """Point (x, y) [m] from the text `place` after "@" in a probe, such as "3.5,1.2".
@@ -337,7 +377,7 @@ def probe_kinds(name: str, basin: Basin, mesh: Mesh | None, lumped: Mesh | None,
     fields = own.fields | (dict.fromkeys(scalars, "number") if own.carries else {})
     patches = {f"{name}.{patch}": place_kind(basin, patch) for patch in patch_names(mesh)}
     what = f"{name} has the physics {show(own.name)}"
-    return {name: BasinFields(fields, mesh, bool(own.maxima), what), **patches}
+    return {name: BasinFields(fields, mesh, bool(own.maxima), what, own.totals), **patches}
 
 
 def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
@@ -432,9 +472,11 @@ def boundary_cells(mesh: Mesh, patch: str) -> np.ndarray:
 
 
 def place_kind(basin: Basin, patch: str) -> type[PatchNode]:
-    """Class of the node that a patch forms for links: `MovingWall` or `PatchNode`."""
+    """Class of the node that a patch forms: `MovingWall`, `DrivenPatch`, or else `PatchNode`."""
     stated = basin.patches.get(patch)
-    return MovingWall if stated is not None and stated.moves else PatchNode
+    if stated is None:
+        return PatchNode
+    return MovingWall if stated.moves else DrivenPatch if stated.closure else PatchNode
 
 
 def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, PatchNode]:
@@ -505,10 +547,13 @@ def find_faults(
             elif f"{name}.{patch}" in joined and not own.joined:
                 text = "a link joins this patch, but the key `velocity` gives the flow; expected no link"
                 yield (*key, "patches", patch), text
-            elif f"{name}.{patch}" in joined and (options.boundary or options.impedance) is not None:
-                key_name = "boundary" if options.boundary else "impedance"
+            elif f"{name}.{patch}" in joined:
                 text = "a link joins this patch and is its boundary; leave this key out"
-                yield (*key, "patches", patch, key_name), text
+                given = (other for other in BOUNDARY_KEYS if getattr(options, other) is not None)
+                yield from (((*key, "patches", patch, other), text) for other in given)
+            if patch in known:
+                faults = [*closure_faults(basin, options), *rating_faults(basin, meshes[name], patch)]
+                yield from (((*key, "patches", patch, *below), text) for below, text in faults)
             if options.impedance is not None and not own.allows_impedance:
                 text = f"does not apply to physics {show(basin.physics)}; leave this key out"
                 yield (*key, "patches", patch, "impedance"), text
@@ -520,6 +565,7 @@ def find_faults(
             for other in sorted(basin.start.model_fields_set - set(own.starts.model_fields)):
                 yield (*key, "start", other), f"does not apply to physics {show(basin.physics)}; leave this key out"
         shapes += [(("scalars", scalar), shape, None) for scalar, shape in basin.scalars.items()]
+        yield from (((*key, *below), text) for below, text in source_faults(basin))
         for below, shape, points in shapes:
             try:
                 if points is not None:
@@ -528,3 +574,5 @@ def find_faults(
                     samples(shape, meshes[name])
             except ValueError as error:
                 yield (*key, *below), str(error)
+            else:
+                yield from (((*key, *below), text) for text in own.value_faults(basin, below, shape, meshes[name]))

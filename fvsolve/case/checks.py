@@ -224,6 +224,9 @@ def scalar_faults(
             for scalar, factor in getattr(part, "retardation", {}).items():
                 if (text := _retardation_fault(scalar, factor, scalars)) is not None:
                     yield (group, name, "retardation", scalar), text
+            if scalars and isinstance(part, Basin) and getattr(part, "infiltration", None) is not None:
+                text = "takes water, but not the scalars in it; expected a case without scalars, or no infiltration"
+                yield (group, name, "infiltration"), text
             if scalars and isinstance(part, Basin) and not part.physics_type.carries:
                 text = f"scalars are not supported with physics {show(part.physics)}; expected a free surface"
                 yield (group, name), text
@@ -232,7 +235,7 @@ def scalar_faults(
                     place = (group, name, "patches", patch, "scalars", scalar)
                     if scalar not in scalars:
                         yield place, _unknown_scalar(scalar, scalars)
-                    elif part.physics_type.joined and patch_options.boundary != "open":
+                    elif part.physics_type.joined and not patch_options.passes:
                         text = "is not valid here, because the joined links give the value. Remove this key, or set "
                         yield place, text + 'boundary = "open"'
             if scalars and part.no_scalars:

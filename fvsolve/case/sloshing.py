@@ -228,7 +228,7 @@ def unsupported_keys(key: tuple, basin: Any) -> Faults:
     for key_name in sorted(basin.start.model_fields_set) if basin.start is not None else ():
         yield (*key, "start", key_name), "sloshing modes start from level water at rest; leave this key out"
     for patch, patch_options in basin.patches.items():
-        if patch_options.boundary == "open":
+        if patch_options.passes:
             text = "sloshing modes are valid only with walls on all sides; expected a wall"
             yield (*key, "patches", patch, "boundary"), text
     for key_name in ("manning", "factor"):

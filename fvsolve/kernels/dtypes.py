@@ -175,6 +175,7 @@ VALVE = record(
     table_size=i8,
     solve=i8,  # SINGLE, CLUSTER, or ALONE between two stored or given pressures
     chained=i8,  # 1: in a cluster with quasi-steady pipes; the other links at its junctions limit its rate
+    flow_given=i8,  # 1: nothing else joins a junction at its end, so its flow is given there and has no rate
     conductance=f8,  # 2 rho (Cd A)^2 at full opening: M |M| = conductance * dp
     transition=f8,  # flow below which the law is laminar [kg/s]; 0 if pipes bound the slope of the root
     rounding_drop=f8,  # drop below which the law is laminar at any opening [Pa]: too small for error control
@@ -472,6 +473,7 @@ LAYOUT = record(
     loss=i8,  # then the negative decay of each scalar [kg/s]
     heat=i8,  # then heat over specific heat: of restrictions, of friction in pipes, of heat exchangers [kg K/s]
     extent=i8,  # then the rates of reactions, times the mass that reacts [kg mol/m3/s]
+    source=i8,  # then rain on basins, and negative infiltration [kg/s]
     quickest=i8,  # greatest rate of change by reactions [1/s], an entry if there are reactions
     value=i8,  # of each scalar at all nodes
     edge=i8,  # values of scalars in pipes at both ends
@@ -538,6 +540,7 @@ MOLAR_RATE, CHEMICAL_POWER, AFFINITY = 0, 1, 2
 # between nodes `index` and `cell`; floats[weights:] : fraction of the way, elevation there [m], and pressure because
 # this place lies below the line between the nodes [Pa]
 PRESSURE_BETWEEN = 31
+PATCH_FROUDE = 32  # Froude number of the flow through driven patch `index`
 
 BASIN = record(
     kind=i8,  # code of its physics, see `basins.basin_patches`
@@ -594,10 +597,21 @@ BASIN = record(
     places=i8,  # offset in `plane` of positions of corners, then of centres of cells, see `moving_meshes`
     sides=i8,  # offset in `plane` of normal speeds of sides, by block, side of four and cell [m/s]
     ends=i8,  # offset in `integers` of corners of sides and cells, see `moving_meshes`
+    driven=i8,  # offset in `work` of flows at faces of driven patches, see `free_surface.patch_closures`; -1 for none
+    rain=i8,  # schedule of the rate of rain; -1 for none
+    shower=i8,  # offset in `work` of the present rate of rain [m/s]
+    rained=i8,  # state: height of rain since the start [m]
+    soil=i8,  # NO_SOIL, CONSTANT_RATE, HORTON or GREEN_AMPT
+    soil_numbers=i8,  # offset in `plane` of numbers of the soil in cells, see `free_surface.water_sources`
+    soil_work=i8,  # offset in `work` of rates of infiltration in cells, for probes
+    infiltrated=i8,  # first state of infiltrated heights of cells [m]
+    source=i8,  # first of its rows in the ledger of rain and infiltration
+    total_area=f8,  # of all cells [m2]
     maxima=i8,  # offset in `maxima` of greatest values of its cells, see `free_surface.surface_maxima`; -1 for none
     maxima_row=i8,  # number of these for each row of cells; a mesh is one row
     wet_depth=f8,  # depth above which a cell counts as wet there [m]
 )
+NO_SOIL, CONSTANT_RATE, HORTON, GREEN_AMPT = range(4)
 NO_DRAG, MANNING, DARCY = 0, 1, 2
 PATCHES = record(
     basin=i8,
@@ -613,7 +627,17 @@ PATCHES = record(
     open=i8,  # 1 if it is not a wall and joins no link: its flow is that of the boundary
     moves=i8,  # 1 if it is a moving wall
     values=i8,  # offset in `integers` of schedules of inflow values, for each scalar; -1: its initial value
+    second=i8,  # offset in `integers` of the cells next inside those behind its faces; a cell itself if there is none
+    closure=i8,  # NO_CLOSURE, or the closure of a driven patch
+    drive=i8,  # schedule of its stage or discharge
+    depth=i8,  # schedule of the depth of supercritical inflow; -1 for none
+    numbers=i8,  # offset in `plane` of the levels of a rating, then of its flows
+    points=i8,  # number of these levels
+    conveyance=f8,  # sqrt(slope) / n of uniform flow [m^(1/3)/s]
+    rest=f8,  # level at rest above the elevation of the basin [m]
+    lowest=f8,  # lowest bed of its cells above the level at rest, at least 0 [m]
 )
+NO_CLOSURE, STAGE, DISCHARGE, RATING, CRITICAL, NORMAL_SLOPE = range(6)
 
 WALL = record(
     basin=i8,

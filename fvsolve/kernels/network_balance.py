@@ -160,7 +160,7 @@ def valve_rate_limit(t, y, dydt, out, handle):
     """Raise out[RATE] to the greatest rate [1/s] at which the flow through a valve equalises the pressures at its ends.
 
     The rate is also high enough that a step does not pass a drop of zero. Valves of vessels are left out, because their
-    devices set a rate.
+    devices set a rate, and valves with a given flow, which no pressure changes.
     """
     tables = open_tables(handle)
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
@@ -177,8 +177,8 @@ def valve_rate_limit(t, y, dydt, out, handle):
         if nodes[j]["kind"] == PATCH and drop <= 0.0:
             stiff_j *= out[layout["outflow_fraction"] + nodes[j]["row"]]
         stiff = stiff_i + stiff_j
-        if valve["device"] >= 0 and tables.devices[valve["device"]]["row"] >= 0:
-            continue  # valve of a vessel, whose device sets its own rate
+        if valve["flow_given"] == 1 or (valve["device"] >= 0 and tables.devices[valve["device"]]["row"] >= 0):
+            continue  # the device of a vessel sets its own rate
         if stiff > 0.0:
             g = conductance(tables, out, k)
             slope = restriction_slope(tables, out, k, drop)

@@ -401,6 +401,7 @@ def layout_of(draft: ModelDraft) -> np.ndarray:
     for name, size in (
         ("pressure", nodes), ("supply", nodes), ("gain", scalars * nodes), ("loss", sum(draft.scalar_table["losses"])),
         ("heat", draft.heat_rows + len(draft.exchanger_table)), ("extent", sum(draft.reaction_table["extents"])),
+        ("source", draft.sources),
         ("net", nodes), ("quickest", len(draft.reaction_table) > 0),
         ("ends", 4 * pipes), ("valve", valves), ("column", columns), ("valve_controlled", columns),
         ("stiffness", draft.moving), ("outflow_fraction", draft.moving), ("swept", draft.moving),

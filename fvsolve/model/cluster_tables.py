@@ -35,6 +35,7 @@ def classify_nodes(draft) -> None:
     for root, ks in touched.items():
         own = couples.get(root, [])
         valves["chained"][ks] = valves["chained"][ks].any() if ks else 0
+        valves["flow_given"][ks] = len(ks) == 1 and not own and not nodes["admittance"][members[root]].any()
         if not has_single_root(draft, members[root], ks, own):
             clusters.append(add_cluster(draft, members[root], ks, own))
     fixed = ~inner[valves["from_node"]] & ~inner[valves["to_node"]]

@@ -8,7 +8,7 @@ import numpy as np
 from fvsolve.assembly.lowering import lowering_of, rows_in
 from fvsolve.assembly.pipe_terms import elements, memory_shares
 from fvsolve.case.bodies import missing_reactions
-from fvsolve.errors import FvsolveError
+from fvsolve.errors import FvsolveError, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.model import Model
 from fvsolve.model.run_data import RunData
@@ -193,6 +193,12 @@ class Accounts:
         if any(basin.part.on is not None and basin.opening for basin in model.basins):
             raise FvsolveError("the energy of a basin on a body with an open side is not supported; expected closed "
                                "sides, or a basin that no body carries")  # fmt: skip
+        if model.sources:
+            raise FvsolveError(f"the energy of rain and infiltration ({listing(model.sources)}) is not supported; "
+                               "expected a basin without them")  # fmt: skip
+        if driven := [f"{basin.name}.{name}" for basin in model.basins for name in basin.driven]:
+            raise FvsolveError(f"the energy of water through driven patches ({listing(driven)}) is not supported; "
+                               "expected walls, open sides, or links")  # fmt: skip
         if model.basins and not case.law.linear:
             raise FvsolveError('the energy of basins is computed for law = "linear" only; expected this density law')
         self.power, self.stored = model.functions.energies

@@ -79,6 +79,9 @@ class Couplings:
             yield from self.creep_pairs(pipe)
         for basin in self.basins:
             yield pattern.interior_pattern(basin)
+            if basin.soil is not None:
+                first = int(self.model.layout["source"] - self.model.layout["supply"])
+                yield pattern.source_pattern(basin, self.size + first + int(basin.row["source"]) + basin.rains)
         yield from self.boundary_pairs()
         yield from self.stored()
         for column in self.columns:
@@ -99,6 +102,10 @@ class Couplings:
             if row["open"]:
                 cells = pattern.cells_read(pattern.neighbours(basin), self.integers[behind : behind + row["faces"]])
                 yield pairs_of(unique_states(self.size + i), pattern.cell_states(basin, cells))
+            if row["closure"] in (rec.DISCHARGE, rec.RATING):  # one level for all faces
+                second = self.integers[row["second"] : row["second"] + row["faces"]]
+                read = unique_states(self.behind(i), pattern.cell_states(basin, np.unique(second)))
+                yield pairs_of(self.behind(i), read)
 
     # nodes ------------------------------------------------------------------------------------------------------
 
@@ -533,7 +540,8 @@ class ScalarCouplings:
             flow = [of.sets[i], of.sets[j], of.opening_states(valve)]
             self.through[i] += flow
             self.through[j] += flow
-        self.heated, self.tables, self.ledgers = self.row["specific_heat"] > 0.0, model.tables, model.ledgers
+        self.heated, self.tables = self.row["specific_heat"] > 0.0, model.tables
+        self.heat_end = int(model.layout["extent"] - model.layout["supply"])  # rows of the ledger up to that of heat
         for exchanger in self.tables.exchangers if self.heated else ():
             self.through[exchanger["node"]].append(of.network_potential(exchanger["place"]))
         for source in self.tables.heat_sources if self.heated else ():
@@ -567,7 +575,7 @@ class ScalarCouplings:
                 for at in (pipe["y"], pipe["y"] + n, *memory):
                     yield self.row["y"] + pipe["cell"] + here, at + here + offset
                     yield row[here], at + here + offset
-        first = self.of.size + self.ledgers - len(self.tables.exchangers)
+        first = self.of.size + self.heat_end - len(self.tables.exchangers)
         for k, exchanger in enumerate(self.tables.exchangers):
             i = exchanger["node"]
             yield pairs_of(unique_states(first + k), unique_states(self.values[i], *self.through[i]))

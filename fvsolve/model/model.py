@@ -198,8 +198,13 @@ class Model(Displayable):
         return len(self.state_names)
 
     @property
+    def sources(self) -> list[str]:
+        """Names of the rows of the ledger of rain and infiltration, such as "street.rain"."""
+        return [f"{basin.name}.{name}" for basin in self.basins for name in basin.source_names]
+
+    @property
     def ledgers(self) -> int:
-        """Number of rows of the ledger: supply of nodes; inflow of scalars at nodes, decay, heat and reactions."""
+        """Number of rows of the ledger: supply of nodes; inflow of scalars, decay, heat, reactions; rain and soil."""
         return int(self.layout["net"] - self.layout["supply"])
 
     @property

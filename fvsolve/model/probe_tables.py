@@ -31,6 +31,9 @@ def fill_probes(draft, probes: list) -> np.ndarray:
             lower_reaction_probe(draft, row, probe)
         elif probe.point is not None:
             lower_basin_point(draft, row, probe)
+        elif probe.part == "nodes" and probe.name in case.meshes:
+            row["kind"], row["index"] = rec.CELL_FIELD, list(case.meshes).index(probe.name)
+            draft.basins[row["index"]].lower_probe(row, probe.quantity, np.zeros(0, int), np.zeros(0))
         elif probe.quantity in draft.case.scalars and not is_in_network(parts[probe.part].get(probe.name)):
             scalar_probe(draft, row, probe)
         elif probe.name in draft.case.network_places and probe.name not in parts["nodes"]:  # PUMP.shaft
@@ -155,10 +158,14 @@ def linear_offsets(draft, start, row, probe) -> None:
             base, z = start.profile_at(int(row["index"]), probe.fraction)
             row["scale"] = 1.0 / draft.pipe_table[row["index"]]["admittance"]
         row["offset"] = base - (0.0 if probe.quantity == "pressure" else draft.case.ambient_pressure)
-        if probe.quantity == "head":
+        place = draft.case.places.get(probe.name)
+        is_level = probe.quantity == "level" and place is not None and place.kind == "patch"
+        if probe.quantity == "head" or is_level:
             divisor = weight if weight > 0.0 else np.nan  # without gravity there is no head
             row["scale"] /= divisor
             row["offset"] = row["offset"] / divisor + z
+        if is_level:
+            row["offset"] -= draft.case.nodes[place.basin].elevation or 0.0
 
 
 def barotropic_offsets(draft, start, row, probe) -> None:

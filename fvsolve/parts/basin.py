@@ -26,6 +26,7 @@ from fvsolve.parts.value import (
     ReadContext,
     Rows,
     Text,
+    UsualRange,
     Value,
     nonnegative,
     positive,
@@ -36,6 +37,35 @@ SIDES = ("west", "east", "south", "north")
 RECTANGLE_KEYS = ("size", "cells", "grading", "holes")  # keys of rectangles
 SLOSHING_MODELS = ("frozen", "modes", "cells")
 VELOCITY_FIELDS = {"u": "velocity", "v": "velocity", "speed": "velocity"}  # fields of a physics that has velocities
+
+
+class Rating(Table):
+    """Flow out of a basin by the level of its water."""
+
+    level: Annotated[tuple[float, ...], Rows("level", rising=True, about="levels above the elevation [m]")]
+    flow: Annotated[tuple[float, ...], Rows("flow", nonnegative, about="flow out at each level [m3/s]")]
+
+    @property
+    def fault(self) -> tuple[str, str] | None:
+        """(key, text) of the fault of the points; None for a rating whose flow rises from 0."""
+        if len(self.level) != len(self.flow) or len(self.level) < 2:
+            counts = f"has {len(self.flow)} flows for {len(self.level)} levels"
+            return "flow", f"{counts}; expected a flow for each of two or more levels"
+        if self.flow[0] > 0.0:
+            return "flow", f"begins with {self.flow[0]:g} m3/s; expected 0 at the lowest level"
+        rises = np.diff(self.flow)
+        first = int(np.argmax(rises > 0.0))
+        if not rises.any() or (rises[first:] <= 0.0).any():
+            return "flow", "does not rise; expected flows that rise above the highest level without flow"
+        return None
+
+    @property
+    def lowest(self) -> float:
+        """Highest level without flow [m]."""
+        return self.level[int(np.flatnonzero(np.array(self.flow) <= 0.0)[-1])]
+
+
+CLOSURES = ("stage", "discharge", "rating", "normal_slope")  # keys that close a driven patch
 
 
 class Patch(Table):
@@ -51,10 +81,31 @@ class Patch(Table):
     )] = None  # fmt: skip
     boundary: Annotated[
         str | None,
-        Choice("boundary", ("wall", "open"), "boundary condition: open (waves leave); a wall if left out"),
+        Choice(
+            "boundary",
+            ("wall", "open", "critical"),
+            "boundary condition: open (waves leave) or critical (free overfall); a wall if left out",
+        ),
     ] = None
     impedance: Annotated[float | None, Quantity(
         "impedance", nonnegative, "ratio of pressure to velocity of waves in a liquid, instead of `boundary` [Pa s/m]",
+    )] = None  # fmt: skip
+    stage: Annotated[
+        Schedule | None,
+        Scheduled("level", about="level of the water at the patch above the elevation [m]", needs_unit=True),
+    ] = None
+    discharge: Annotated[Schedule | None, Scheduled("flow", about="flow into the basin through the patch [m3/s]")] = (
+        None
+    )
+    depth: Annotated[Schedule | None, Scheduled(
+        "length", nonnegative, "depth of a supercritical inflow by `discharge` [m]; at most critical flow if left out",
+    )] = None  # fmt: skip
+    rating: Annotated[
+        Rating | None, Nested(Rating, "flow out of the basin by the level at the patch, linear between points")
+    ] = None
+    normal_slope: Annotated[float | None, Quantity(
+        "number", positive, "slope of the uniform outflow through the patch, which needs `manning` [-]",
+        UsualRange(1e-5, 0.1, "lowland river to torrent"), VALUE,
     )] = None  # fmt: skip
     body: Annotated[str | None, Text("mass, or body on a prismatic joint, that moves this wall along x or y")] = None
     travel: Annotated[
@@ -68,7 +119,18 @@ class Patch(Table):
     scalars: Annotated[
         dict[str, Any], ScalarValues("scalar values of the inflow, for a given velocity or an open boundary")
     ] = {}
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("boundary", "impedance"), ("body", "travel"))
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("boundary", "impedance", *CLOSURES), ("body", "travel"))
+
+    @property
+    def closure(self) -> str | None:
+        """Key of the closure of a driven patch, or "critical"; None for other patches."""
+        stated = next((key for key in CLOSURES if getattr(self, key) is not None), None)
+        return self.boundary if stated is None and self.boundary == "critical" else stated
+
+    @property
+    def passes(self) -> bool:
+        """True if water flows through the patch without a link: it is open or driven."""
+        return self.boundary == "open" or self.closure is not None
 
     @property
     def moves(self) -> bool:
@@ -145,6 +207,12 @@ class PatchNode(PlaceOnBody):
     pressure: float | None = None  # of a liquid at rest [Pa]
 
 
+class DrivenPatch(PatchNode):
+    """A patch with a closure; probes: level above the elevation of the basin, Froude number of the flow through it."""
+
+    quantities: ClassVar[dict[str, str]] = PatchNode.quantities | {"level": "level", "froude": "number"}
+
+
 class MovingWall(PatchNode):
     """A patch that is a moving wall; probes: force on the water (inward), power into the water, travel."""
 
@@ -165,6 +233,7 @@ class Physics(Table):
     on_bodies : True if the basin may be on a body; links_on_bodies : True if links may then join its patches
     has_modes : True if `sloshing` may be other than "cells"; carries : True if the basin carries scalars
     allows_impedance : True if a boundary may have an impedance
+    has_closures : True if patches may have a stage, discharge, rating or slope
     has_shocks : True if waves steepen into lasting shocks; schemes then have at most second order in smooth plane flow
     """
 
@@ -173,6 +242,7 @@ class Physics(Table):
     states: ClassVar[dict[str, str]] = {}
     fields: ClassVar[dict[str, str]] = {}
     maxima: ClassVar[dict[str, str]] = {}
+    totals: ClassVar[dict[str, str]] = {}
     starts: ClassVar[type[Table]] = Table
     laws: ClassVar[tuple[str, ...]] = ()
     description: ClassVar[str] = "basins"
@@ -184,6 +254,7 @@ class Physics(Table):
     carries: ClassVar[bool] = True
     allows_impedance: ClassVar[bool] = False
     has_shocks: ClassVar[bool] = False
+    has_closures: ClassVar[bool] = False
 
     def __init_subclass__(cls, name: str, **rest: Any) -> None:
         super().__init_subclass__(**rest)
@@ -233,6 +304,11 @@ class Physics(Table):
         for key in cls.model_fields:
             if isinstance(shape := getattr(basin, key), SpatialField):
                 yield (key,), shape, None
+
+    @classmethod
+    def value_faults(cls, basin: "Basin", place: tuple[str, ...], shape: Any, mesh: Any) -> Iterator[str]:
+        """Yield fault texts of the values of a field in the cells of a basin; place : its key path"""
+        yield from ()
 
     @classmethod
     def own_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
@@ -367,6 +443,9 @@ class PatchRows(Lowering, kind="patch"):
         if probe.quantity in ("force", "power", "travel"):
             row["kind"], row["index"] = rec.WALL_VALUE, draft.wall_names.index(name)
             row["side"] = ("force", "power", "travel").index(probe.quantity)
+        elif probe.quantity == "froude":
+            row["kind"] = rec.PATCH_FROUDE
+            row["index"] = draft.patch_table["node"].tolist().index(draft.node_index[name])
         elif probe.quantity != "flow":
             super().probe(draft, name, probe, row)
         else:

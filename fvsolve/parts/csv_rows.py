@@ -68,14 +68,19 @@ class CsvRows:
         shown = f"{did_you_mean(name, self.header)}; columns are {', '.join(map(show, self.header))}"
         raise ValueError(f"{self.file} has no column {show(name)}{shown}")
 
-    def numbers(self, column: int, dimension: str, ambient: float = 101325.0) -> np.ndarray:
+    def numbers(self, column: int, dimension: str, ambient: float = 101325.0, stated: str = "") -> np.ndarray:
         """Values of a column in SI : float64[n].
 
-        The header of the column states its unit, SI if it has none; pressures become absolute.
+        The header of the column states its unit; without one it is the unit `stated`, or else SI. Pressures become
+        absolute.
         dimension : dimension that the unit must have; ambient : ambient pressure [Pa], added to gauge pressures
-        Raises ValueError for a unit of another dimension, and for texts that are not numbers.
+        Raises ValueError for a unit of another dimension, for two units, and for texts that are not numbers.
         """
         unit = split_header(self.header[column])[1]
+        if unit and stated:
+            text = f"{self.file}, column {show(self.header[column])} has its own unit; leave out `unit`"
+            raise ValueError(text)
+        unit = unit or stated
         try:
             known = units.find(unit, dimension) if unit else None
         except ValueError as error:
@@ -221,17 +226,18 @@ def copy_name(path: Path, setting: ReadContext) -> str:
 
 
 def read_columns(
-    path: Path, time: str | None, value: str | None, dimension: str, setting: ReadContext
+    path: Path, time: str | None, value: str | None, dimension: str, setting: ReadContext, unit: str = ""
 ) -> tuple[np.ndarray, np.ndarray, str, str]:
     """(times [s], values [SI, pressures absolute], header of the times, header of the values) of a CSV file.
 
     Times and values are float64[n].
     time, value : headers of the columns, with or without unit; None for the first and the second column
+    unit : unit of the values if their header has none; "" for SI
     Raises ValueError with the faulty line of the file.
     """
     rows = read_rows(path)
     time_column, value_column = rows.column(time, 0), rows.column(value, 1)
-    t, v = rows.numbers(time_column, "time"), rows.numbers(value_column, dimension, setting.ambient)
+    t, v = rows.numbers(time_column, "time"), rows.numbers(value_column, dimension, setting.ambient, unit)
     return t, v, rows.header[time_column], rows.header[value_column]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
-from fvsolve.parts.csv_rows import copy_name, find_file, read_columns
+from fvsolve.parts.csv_rows import copy_name, find_file, read_columns, split_header
 from fvsolve.parts.formula_program import Program, is_formula, program_in
 from fvsolve.parts.table_model import keys_json, read_keys
 from fvsolve.parts.value import NEEDED, Choice, Number, Quantity, Range, ReadContext, Rows, Text, Value, ValueFault
@@ -101,6 +101,7 @@ class Scheduled(Value):
     usual: val.UsualRange | None = None
     changes: str = val.PROFILE
     moves: bool = False  # True if it moves a body or a wall, so that its slopes are needed
+    needs_unit: bool = False  # True if a file must state the unit of the values
 
     def read(self, given: Any, setting: ReadContext) -> Schedule:
         if isinstance(given, Schedule):
@@ -142,7 +143,10 @@ class Scheduled(Value):
                 "period": (Quantity("time", val.positive), NEEDED),
                 "phase": (Quantity("angle"), 0.0),
             },
-            "file": {"file": (Text(), NEEDED), "time": (Text(), None), "value": (Text(), None), "kind": kind},
+            "file": {
+                "file": (Text(), NEEDED), "time": (Text(), None), "value": (Text(), None), "unit": (Text(), ""),
+                "kind": kind,
+            },
             "signal": {"signal": (Text(), NEEDED), "factor": (Quantity(self.dimension), None)},
             "control": {"control": (Text(), NEEDED)},
             "formula": {"formula": (Text(), NEEDED), "unit": (Text(), "")},
@@ -204,13 +208,19 @@ class Scheduled(Value):
         kind = values["kind"]
         try:
             path = find_file(values["file"], setting)
-            t, v, *headers = read_columns(path, values["time"], values["value"], self.dimension, setting)
+            unit = values["unit"]
+            t, v, *headers = read_columns(path, values["time"], values["value"], self.dimension, setting, unit)
+            if self.needs_unit and not unit and not split_header(headers[1])[1]:
+                unit = DIMENSIONS[self.dimension].example.split()[-1]
+                text = f"{path.name}, column {show(headers[1])} has no unit; expected for example `unit = {show(unit)}`"
+                raise ValueError(text)
             val.check_increasing(t, t.tolist(), f"{path.name}: times")
             for x in v.tolist():
                 self.range.check(x, x)
         except ValueError as error:
             raise ValueFault([(("file",), str(error))]) from None
         origin = {"file": copy_name(path, setting), "time": headers[0], "value": headers[1], "kind": kind}
+        origin |= {"unit": unit} if unit else {}
         return Schedule(kind if len(v) > 1 else "constant", t, v, origin=origin)
 
     def _read_signal(self, given: dict[str, Any], setting: ReadContext) -> Schedule:

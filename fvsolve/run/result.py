@@ -41,12 +41,14 @@ class ResultMark(NamedTuple):
     """First part and time [s] at which the model does not describe what happens; later results are not valid.
 
     what : name of the event; place : part, such as "links.main"; text : message
+    volume : volume that lacks in a scheduled discharge [m3]; None for other events
     """
 
     what: str
     place: str
     time: float
     text: str
+    volume: float | None = None
 
 
 class Extremes(NamedTuple):
@@ -161,7 +163,7 @@ class Result(Displayable):
 
     @property
     def ok(self) -> bool:
-        """True if the run reached its end, and no warning marks its numbers as wrong."""
+        """True if the run reached its end, no warning marks its numbers as wrong, and no discharge was held."""
         return self.summary["ok"]
 
     @property

@@ -165,6 +165,8 @@ def common_cells(model: Model, b: int):
     integers = model.tables.integers
     for patch in model.tables.patches[model.tables.patches["basin"] == b]:
         yield integers[patch["first"] : patch["first"] + patch["count"]]
+        if patch["closure"] != rec.NO_CLOSURE:
+            yield integers[patch["second"] : patch["second"] + patch["faces"]]
     probes = model.tables.probes
     for probe in probes[np.isin(probes["kind"], (rec.CELL_FIELD, rec.CELL_SCALAR)) & (probes["index"] == b)]:
         yield integers[probe["cell"] : probe["cell"] + probe["count"]]

@@ -10,6 +10,7 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.model import Model, RunData
 from fvsolve.solve.run_up import RunUpTable, run_up_table
 
+INTEGRATION_TIMES = 10001  # times at which a scheduled flow is integrated, beside its own
 DRIFT = 1e-6  # deviation of the length of Euler parameters from 1 above which a notice is given
 
 
@@ -18,12 +19,14 @@ class Mark:
     """First occurrence of a condition outside the validity of the model, after which results are not reliable.
 
     what : kind of condition; place : key path of the part; time : [s]; text : description with a remedy
+    volume : volume that lacks in a discharge [m3], None for other conditions
     """
 
     what: str
     place: str
     time: float
     text: str
+    volume: float | None = None
 
 
 @dataclass(frozen=True)
@@ -112,6 +115,8 @@ def find_marks(run_data: RunData) -> list[Mark]:
     kinds = [("below vapor pressure", f"links.{pipe.name}") for pipe in pipes]
     kinds += [(kind, f"nodes.{name}") for kind in ("below vapor pressure", "dry", "spilling") for name in nodes]
     kinds = [(kind, place.removesuffix(".inside")) for kind, place in kinds]
+    for node in model.tables.patches["node"][model.tables.patches["closure"] == rec.DISCHARGE]:
+        kinds[len(pipes) + len(nodes) + node] = "", ""  # of `held_discharges`
     kinds += [("stopped dead", f"links.{name}") for name in model.column_names]
     kinds += [("beyond its stroke", f"links.{name}") for name in model.piston_names]
     kinds += [("outside its curve", f"links.{name}") for name, *_ in model.devices]
@@ -138,6 +143,35 @@ def find_marks(run_data: RunData) -> list[Mark]:
         for kind, place, time in found
         if kind in texts and not (kind == "below vapor pressure" and model.cavitates)
     ]
+
+
+def held_discharges(run_data: RunData, start: float, t: float, entered: np.ndarray) -> list[Mark]:
+    """Marks of patches whose scheduled outflow is more than critical flow, which leaves instead.
+
+    start, t : times of start and end [s]; entered : float64[nodes]  mass that has entered at each node [kg]
+    """
+    model, marks = run_data.model, []
+    times = run_data.marks[len(model.pipes) + len(model.node_names) :]
+    for row in model.tables.patches[model.tables.patches["closure"] == rec.DISCHARGE]:
+        name, time = model.node_names[row["node"]], float(times[row["node"]])
+        if np.isfinite(time):
+            basin, _, patch = name.partition(".")
+            schedule = model.case.nodes[basin].patches[patch].discharge
+            volume = float(entered[row["node"]]) / model.case.properties.density - scheduled_volume(schedule, start, t)
+            lack, when = (model.case.amount(x, kind, 4) for x, kind in ((volume, "volume"), (time, "time")))
+            text = (f"{name}: from {when} on the scheduled outflow is more than critical flow, which leaves instead; "
+                    f"{lack} less than scheduled have left; give less outflow, or `stage` or `rating`")  # fmt: skip
+            marks.append(Mark("discharge held", f"nodes.{name}", time, text, volume))
+    return marks
+
+
+def scheduled_volume(schedule, start: float, end: float) -> float:
+    """Integral of a scheduled flow [m3] from `start` to `end`; nan for the output of a control."""
+    from fvsolve.exact.solution import value
+
+    inside = schedule.time[(schedule.time > start) & (schedule.time < end)]
+    t = np.union1d(np.linspace(start, end, INTEGRATION_TIMES), inside)
+    return float(0.5 * np.sum((value(schedule, t[:-1]) + value(schedule, t[1:], left=True)) * np.diff(t)))
 
 
 def spill_notices(run_data: RunData) -> list[Notice]:
@@ -274,7 +308,8 @@ def relative(remainder: float, largest: float) -> float:
 def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, Any]:
     """Mass balance of a run as a dict: stored mass at start and end, inflow, outflow, spilled, made up, remainder [kg].
 
-    ledger : float64[2, nodes]  inflow at each node [kg], and outflow as negative numbers
+    ledger : float64[2, nodes + sources]  inflow at each node, and of rain and infiltration [kg]; outflow as negative
+    numbers
     The entry `relative` is the remainder as a fraction of the largest term.
     """
     kinds = model.tables.nodes["kind"]
@@ -283,7 +318,8 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     # nodes with `made_up` and `spilled`
     own = [kind in (rec.TANK, rec.PATCH) and i not in passes for i, kind in enumerate(kinds)]
     words = [("made_up", "spilled") if in_cells else ("inflow", "outflow") for in_cells in own]
-    rows = zip(model.node_names, words, ledger[0], ledger[1], strict=True)
+    names, words = [*model.node_names, *model.sources], words + [("inflow", "outflow")] * len(model.sources)
+    rows = zip(names, words, ledger[0], ledger[1], strict=True)
     nodes = {name: {inflow_word: float(x), outflow_word: float(0.0 - y)}
              for name, (inflow_word, outflow_word), x, y in rows if x != 0.0 or y != 0.0}  # fmt: skip
     total = {word: sum(row.get(word, 0.0) for row in nodes.values()) for pair in set(words) for word in pair}

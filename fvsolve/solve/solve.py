@@ -381,17 +381,20 @@ class Run:
         if reason == "finished":
             self.check_basins(loop.t, loop.now)
         ledger = loop.stepper.ledger.reshape(LEDGER_ROWS, -1)[:2]
-        ledgers = {"mass": mass_ledger(model, loop.now, ledger[:, : len(model.node_names)])}
+        first = int(model.layout["source"] - model.layout["supply"])
+        booked = ledger[:, [*range(len(model.node_names)), *range(first, first + len(model.sources))]]
+        ledgers = {"mass": mass_ledger(model, loop.now, booked)}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
         basin_notices = [notice for entry in self.watches for notice in entry.notices()]
         warnings = [*self.notices, *basin_notices, *self.checks.warnings(ledgers)]
         warnings += found.device_notices(self.run_data) + found.spill_notices(self.run_data)
         warnings += found.drift_notices(model, loop.now)
         warnings += split_step_notices(model.case.numerics, loop.stepper.counts())
-        ok = reason == "finished" and all(entry.ok for entry in warnings)
+        held = found.held_discharges(self.run_data, self.start, loop.t, ledger[:, : len(model.node_names)].sum(axis=0))
+        ok = reason == "finished" and not held and all(entry.ok for entry in warnings)
         extremes, watched = found.find_extremes(self.run_data)
         summary = Summary(
-            reason, ok, loop.t, found.find_marks(self.run_data), ledgers, extremes,
+            reason, ok, loop.t, found.find_marks(self.run_data) + held, ledgers, extremes,
             found.find_envelope(self.run_data), found.find_point_envelopes(self.run_data), watched,
             loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
             self.setup, [Event(t, *model.events[k]) for t, k in loop.switched],

@@ -46,7 +46,7 @@ class Field:
     def shallow(self, scheme, plan, y, reflect=NONE, flow=NONE, wide=2.0):
         """Return (rates, greatest rate); work starts as NaN, to detect values that are read before they are written."""
         work, found = np.full(work_size(surface_mesh, self.integers), np.nan), np.full_like(y, np.nan)
-        water, states = surface_mesh.MeshWater(G, scheme, wide, plan), tuple(np.ascontiguousarray(y))
+        water, states = surface_mesh.MeshWater(G, scheme, wide, plan, None), tuple(np.ascontiguousarray(y))
         rate = water_mesh_rates(
             water, self.floats, self.integers, reflect, states, flow, NONE, work, tuple(found), self.band, None, None
         )

@@ -43,7 +43,7 @@ class Water:
         spacing = self.kx, self.ky
         grid = WaterGrid(G, self.scheme, self.limiter, self.nx, self.ny, *spacing, self.reflect, self.plan)
         flows = FaceFlows(self.flow_x, self.flow_y, NONE)
-        rate = grid_rates(grid, 0, self.ny, (a[0], a[1], a[2]), flows, self.work, (b[0], b[1], b[2]), None)
+        rate = grid_rates(grid, 0, self.ny, (a[0], a[1], a[2]), flows, self.work, (b[0], b[1], b[2]), None, None)
         if self.friction is not None:
             law, c = self.friction
             rate += add_capped_friction(law, G, c, 1e3, self.plan[0], a[0], (a[1], a[2]), (a[1], a[2]), (b[1], b[2]))

@@ -250,3 +250,19 @@ def random_pipe(rng, start: str, end: str, smooth: bool) -> dict:
     """Pipe of one to twelve cells, frictionless if `smooth`, otherwise with one of two friction models."""
     friction = {"model": "none"} if smooth else (FACTOR, ROUGH)[rng.integers(2)]
     return pipe(start, end, 100.0, 0.2, 1000.0, int(rng.integers(1, 13)), friction=friction)
+
+
+SOILS = {
+    "constant": {"rate": 1e-5}, "horton": {"initial": 6e-5, "final": 1e-5, "decay": 1e-2},
+    "green-ampt": {"conductivity": 2e-6, "suction": 0.17, "deficit": 0.3},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("soil", SOILS)
+def test_infiltration_depends_on_the_states_of_the_pattern_only(soil):
+    basin = {"type": "basin", "size": [6.0, 4.0], "cells": [6, 4], "level": 0.3, "elevation": 0.0, "rain": 1e-5,
+             "bed": "0.2*sin(x)*cos(y)", "infiltration": {"model": soil} | SOILS[soil]}  # fmt: skip
+    numerics = {"scheme": "muscl", "method": "tr-bdf2", "step": 1.0}
+    model = fvsolve.build(fvsolve.load(scene({"field": basin}, {}, 1.0, numerics)))
+    y = np.abs(model.scale * np.random.default_rng(1).normal(size=model.y_size))
+    assert stray(model, 0.2, y) < 1e-7

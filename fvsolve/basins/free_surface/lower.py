@@ -15,11 +15,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fvsolve.assembly.state_names import Numbered
 from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
-from fvsolve.basins.free_surface import surface_grid, surface_maxima, surface_mesh
+from fvsolve.basins.free_surface import patch_closures, surface_grid, surface_maxima, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import RATE_CAP, add_friction
-from fvsolve.basins.free_surface.surface_patches import DEPTH
+from fvsolve.basins.free_surface.surface_patches import DEPTH, TOTALS
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.case.bodies import free_joints
@@ -246,9 +247,20 @@ WATER_TERMS = RhsTerms(
     power="surface_energy: add_power",
     stored="surface_energy: add_stored",
 )
+DRIVEN_TERMS = RhsTerms(
+    package=PACKAGE,
+    move="patch_closures: close_patches",  # before the rates of cells
+    observe="patch_closures: observe_froude",
+)
 DEPTH_SCALE = 0.1  # [m] of depth
+HEIGHT_SCALE = 1e-3  # [m] of rain and infiltrated water
+SOILS = {"constant": rec.CONSTANT_RATE, "horton": rec.HORTON, "green-ampt": rec.GREEN_AMPT}
 ROUNDING = 1e-12  # depth over levels and beds below which there is no water
 TINY = 1e-300
+CLOSURES = {  # key of a driven patch, or word of its key `boundary` -> code
+    "stage": rec.STAGE, "discharge": rec.DISCHARGE, "rating": rec.RATING, "normal_slope": rec.NORMAL_SLOPE,
+    "critical": rec.CRITICAL,
+}  # fmt: skip
 NO_CAP = 1e100  # rate of friction [1/s] above all possible rates
 COURANT_FACTOR = 2.0  # Courant numbers of water refer to half cells, so that no depth falls below zero at 1,
 SHORE_COURANT_FACTOR = 6.0  # and to sixths of cells under fifth order with a shore
@@ -287,8 +299,10 @@ class FreeSurfaceRows(BasinRows):
 
     def pieces(self, valves: bool) -> Iterator[RhsTerms]:
         kind = f"{'moving_' if self.moves else ''}{'grids' if self.is_grid else 'meshes'}"
-        yield RhsTerms(package=PACKAGE, rates=f"surface_rates: water_{kind}")
+        yield RhsTerms(package=PACKAGE, rates=f"surface_rates: water_{'driven_' if self.driven else ''}{kind}")
         yield WATER_TERMS
+        if self.driven:
+            yield DRIVEN_TERMS
         if self.part.on is not None:
             yield FRAME_FORCES
         if self.damped:
@@ -306,6 +320,55 @@ class FreeSurfaceRows(BasinRows):
     @property
     def forms_stages(self) -> bool:
         return self.is_grid and not (self.undivided_reason or self.scalars)
+
+    @property
+    def rains(self) -> bool:
+        return self.part.rain is not None
+
+    @property
+    def soil(self):
+        return self.part.infiltration
+
+    def lower_sources(self, draft, row) -> None:
+        row["shower"], row["source"] = draft.to_work(1), draft.sources
+        if self.rains:
+            row["rain"] = draft.schedules.add(self.part.rain)
+            row["rained"] = draft.states(Numbered(f"{self.name}.rained", 1), HEIGHT_SCALE)
+        if self.soil is not None:
+            row["soil"] = SOILS[self.soil.model]
+            row["soil_numbers"] = draft.to_plane(np.array([self.formula(shape) for shape in self.soil.numbers]))
+            row["soil_work"] = draft.to_work(self.n)
+            row["infiltrated"] = draft.states(Numbered(f"{self.name}.infiltrated", self.n), HEIGHT_SCALE)
+        draft.sources += len(self.source_names)
+
+    def lower_patch(self, draft, patch: str, row) -> None:
+        super().lower_patch(draft, patch, row)
+        cells = draft.integers[row["first"] : row["first"] + row["count"]]
+        row["rest"], row["depth"] = self.part.level, -1
+        row["lowest"] = max(float(self.bed[cells].min()) - self.part.level, 0.0)
+        if patch not in self.driven:
+            return
+        stated = self.part.patches[patch]
+        row["closure"] = CLOSURES[stated.closure]
+        behind = np.array(draft.integers[row["ring"] + row["faces"] :][: row["faces"]])
+        row["second"] = len(draft.integers)
+        draft.integers += self.second_cells(patch, behind).tolist()
+        for key, column in (("stage", "drive"), ("discharge", "drive"), ("depth", "depth")):
+            if (schedule := getattr(stated, key)) is not None:
+                row[column] = draft.schedules.add(schedule)
+        if stated.rating is not None:
+            row["numbers"] = draft.to_plane(np.array([stated.rating.level, stated.rating.flow]))
+            row["points"] = len(stated.rating.level)
+        if stated.normal_slope is not None:
+            row["conveyance"] = math.sqrt(stated.normal_slope) / self.part.manning
+
+    def second_cells(self, patch: str, behind: np.ndarray) -> np.ndarray:
+        """Cells next inside the cells `behind` the faces of a patch; the same cells on a mesh, and with upwind."""
+        if not self.is_grid or self.scheme == "upwind":
+            return behind
+        grid, (x, y) = self.mesh.grid, -np.round(self.mesh.normal[self.mesh.patch(patch)].T).astype(int)
+        step = x * (grid.nx > 1) + y * grid.nx * (grid.ny > 1)
+        return behind + step
 
     def scales(self) -> list[float]:
         flow = DEPTH_SCALE * np.sqrt(self.case.gravity * DEPTH_SCALE)
@@ -328,16 +391,25 @@ class FreeSurfaceRows(BasinRows):
         else:
             row["work"] = draft.to_work(mesh_blocks.work_size(surface_mesh, self.integers))
         row["plan"] = draft.to_plane(plan)
+        row["driven"] = draft.to_work(patch_closures.ROWS * int(row["outer"])) if self.driven else -1
+        row["wet_depth"] = self.case.output.wet_depth
         if self.records_maxima:
-            row["wet_depth"] = self.case.output.wet_depth
             rows = max(int(row["ny"]), 1)
             row["maxima_row"] = surface_maxima.QUANTITIES * (self.n // rows)
             row["maxima"] = draft.to_maxima(rows * int(row["maxima_row"]))
-        if not (self.depth + self.start()[0]).max() > 0.0:
+        if not (self.depth + self.start()[0]).max() > 0.0 and not self.fills:
             amount = draft.case.amount
             text = f"basin {self.name} starts dry: level {amount(part.level, 'level')} is not above its bed, lowest at "
             text += amount(float(self.bed.min()), "level")
             draft.warnings.append(Notice("start", f"nodes.{self.name}", text, "level", part.level, self.bed.min()))
+
+    @property
+    def fills(self) -> bool:
+        """True if rain, a driven patch or a link can bring water into the basin."""
+        if self.rains:
+            return True
+        joined = {place for link in self.case.links.values() for place in link.ports.values()}
+        return any(name in self.driven or f"{self.name}.{name}" in joined for name in self.part.patches)
 
     @property
     def rubs(self) -> bool:
@@ -415,6 +487,9 @@ class FreeSurfaceRows(BasinRows):
         return {"depth": (low, high), "wave_speed": (float(speeds[0]), float(speeds[1]))}
 
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
+        if field in TOTALS:
+            row["side"] = TOTALS[field]
+            return None
         if field not in ("depth", "surface", "bed"):
             return super().lower_probe(row, field, cells, weights)
         row["side"], row["scale"] = DEPTH, float(field != "bed")

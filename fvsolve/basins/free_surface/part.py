@@ -4,9 +4,13 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from fvsolve.errors import listing
 from fvsolve.parts.basin import VELOCITY_FIELDS, Physics, VelocityStart
-from fvsolve.parts.formula import SpatialField, SpatialFieldKey
-from fvsolve.parts.value import VALUE, Quantity, UsualRange, anything, nonnegative
+from fvsolve.parts.formula import SpatialField, SpatialFieldKey, samples
+from fvsolve.parts.schedule import Schedule, Scheduled
+from fvsolve.parts.table_model import Nested, Table
+from fvsolve.parts.value import SHAPE, VALUE, Choice, Quantity, UsualRange, anything, between, nonnegative
+from fvsolve.units import show
 
 
 class SurfaceStart(VelocityStart):
@@ -15,6 +19,56 @@ class SurfaceStart(VelocityStart):
     level: Annotated[
         SpatialField | None, SpatialFieldKey("length", "level of the free surface above the elevation [m]")
     ] = None
+
+
+SOIL_KEYS = {  # model of infiltration -> its keys
+    "constant": ("rate",), "horton": ("initial", "final", "decay"),
+    "green-ampt": ("conductivity", "suction", "deficit"),
+}  # fmt: skip
+
+
+class Infiltration(Table):
+    """Soil into which water infiltrates: each number is a value, a formula of x and y, or points of a file."""
+
+    model: Annotated[str, Choice("model", tuple(SOIL_KEYS), "law of the infiltration capacity", changes=SHAPE)]
+    rate: Annotated[SpatialField | None, SpatialFieldKey("rainfall", "infiltration capacity [m/s]", nonnegative)] = None
+    initial: Annotated[
+        SpatialField | None, SpatialFieldKey("rainfall", "infiltration capacity at the start [m/s]", nonnegative)
+    ] = None
+    final: Annotated[
+        SpatialField | None, SpatialFieldKey("rainfall", "infiltration capacity after a long time [m/s]", nonnegative)
+    ] = None
+    decay: Annotated[
+        SpatialField | None, SpatialFieldKey("frequency", "rate of decay from initial to final [1/s]", nonnegative)
+    ] = None
+    conductivity: Annotated[
+        SpatialField | None, SpatialFieldKey("rainfall", "hydraulic conductivity of the wetted soil [m/s]", nonnegative)
+    ] = None
+    suction: Annotated[
+        SpatialField | None, SpatialFieldKey("length", "suction head at the wetting front [m]", nonnegative)
+    ] = None
+    deficit: Annotated[
+        SpatialField | None,
+        SpatialFieldKey("number", "moisture deficit, porosity minus water content [-]", between(0, 1)),
+    ] = None
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
+        own = SOIL_KEYS.get(given.get("model"), ())
+        others = {key for keys in SOIL_KEYS.values() for key in keys} - {*own}
+        faults = [((), f"{key} is missing") for key in own if key not in given]
+        text = f"is not a key of the model {show(given.get('model'))}, which has {listing(own)}"
+        return faults + [((key,), text) for key in given if own and key in others]
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Keys of its model."""
+        return SOIL_KEYS[self.model]
+
+    @property
+    def numbers(self) -> list[SpatialField | None]:
+        """Fields of its three numbers, None for those that its model does not have."""
+        return [*(getattr(self, key) for key in self.fields), None, None][:3]
 
 
 class FreeSurface(Physics, name="free-surface"):
@@ -26,6 +80,10 @@ class FreeSurface(Physics, name="free-surface"):
         "max_depth": "level", "max_surface": "level", "max_speed": "velocity", "max_hazard": "unit_flow",
         "arrival_time": "time", "wet_duration": "time",
     }  # fmt: skip
+    totals: ClassVar[dict[str, str]] = {
+        "volume": "volume", "wet_area": "area", "rain": "flow", "rained": "volume", "infiltration": "flow",
+        "infiltrated": "volume",
+    }  # fmt: skip
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("manning", "factor"),)
     starts: ClassVar[type[VelocityStart]] = SurfaceStart
     laws: ClassVar[tuple[str, ...]] = ("linear",)
@@ -35,6 +93,7 @@ class FreeSurface(Physics, name="free-surface"):
     links_on_bodies: ClassVar[bool] = True
     description: ClassVar[str] = "a free surface, whose water has one density"
     has_shocks: ClassVar[bool] = True
+    has_closures: ClassVar[bool] = True
 
     level: Annotated[
         float,
@@ -59,6 +118,34 @@ class FreeSurface(Physics, name="free-surface"):
             UsualRange(0.002, 3.0, "glass to boulders"), VALUE,
         ),
     ] = None  # fmt: skip
+
+    rain: Annotated[
+        Schedule | None,
+        Scheduled(
+            "rainfall", nonnegative, "rate of rain on the whole basin [m/s]; default: none",
+            UsualRange(1e-9, 500 / 3.6e6, "drizzle to cloudburst"), needs_unit=True,
+        ),
+    ] = None  # fmt: skip
+    infiltration: Annotated[
+        Infiltration | None, Nested(Infiltration, "soil into which water infiltrates; default: none")
+    ] = None
+
+    @classmethod
+    def formulas(cls, basin, mesh):
+        yield from super().formulas(basin, mesh)
+        for key in basin.infiltration.fields if basin.infiltration is not None else ():
+            yield ("infiltration", key), getattr(basin.infiltration, key), None
+
+    @classmethod
+    def value_faults(cls, basin, place, shape, mesh):
+        if place[0] != "infiltration" or shape is None:
+            return
+        values, greatest = samples(shape, mesh), 1.0 if place[1] == "deficit" else np.inf
+        if not (values.min() >= 0.0 and values.max() <= greatest):
+            worst = values.min() if values.min() < 0.0 else values.max()
+            yield f"is {worst:g} in a cell; expected {'0 to 1' if greatest == 1.0 else 'no values below 0'}"
+        elif place[1] == "initial" and (values < samples(basin.infiltration.final, mesh)).any():
+            yield "is below `final` in a cell; expected a capacity that decreases"
 
     @classmethod
     def has_friction(cls, basin) -> bool:

@@ -19,6 +19,7 @@ import numpy as np
 from fvsolve.basins.basin_patches import put_inward
 from fvsolve.basins.cell_sides import fill
 from fvsolve.basins.free_surface import surface_rows as rows_of
+from fvsolve.basins.free_surface.patch_closures import FLOW, MOMENTUM, SPEED, SURFACE
 from fvsolve.basins.free_surface.surface_rows import EAST, GHOSTS, HIGH, MAX_COLUMNS, NORTH, STRIDE
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import LINEAR, WENO5
@@ -129,7 +130,7 @@ def factors_of(j, left, right, moves, scratch):
 
 
 @njit
-def put_row(grid, j, first, last, states, rows, moves):
+def put_row(grid, j, first, last, states, rows, moves, faces):
     """Write columns `first` to `last` - 1 of row j of cells, with ghost cells, to the ring buffer.
 
     A row beyond the grid is computed from the rows inside, which must be in the buffer. The greatest rates of columns
@@ -139,7 +140,7 @@ def put_row(grid, j, first, last, states, rows, moves):
     fields, reach = (rows_of.FIELDS, 3) if fifth else (rows_of.FLOW_EAST // STRIDE, 2)
     left, right, walls = max(first - GHOSTS, 0), min(last + GHOSTS, nx), grid.reflect.size > 0
     if j < 0 or j >= ny:
-        put_row_beyond(grid, j, first, last, fields, rows, moves)
+        put_row_beyond(grid, j, first, last, fields, rows, moves, faces)
         return
     a, b, cells, kx = j * nx + left, j * nx + right, rows.cells[ring_offset(j, left - first) :], grid.kx[left:right]
     dh, qx, qy = states[0][a:b], states[1][a:b], states[2][a:b]
@@ -158,14 +159,18 @@ def put_row(grid, j, first, last, states, rows, moves):
         rows_of.put_ghost_end(fields, reach, grid.reflect[j] if walls else 1.0, block, GHOSTS, -1, nx)
         if moves is not None and moves.speed_x.size > 0:
             rows_of.correct_ghost_end(fields, reach, moves.speed_x[0], block, GHOSTS, -1)
+        if faces is not None and faces.values[SPEED, j] > 0.0 and nx > 1:
+            rows_of.extrapolate_ghosts(fields, reach, block, GHOSTS, -1)
     if right == nx:
         rows_of.put_ghost_end(fields, reach, grid.reflect[ny + j] if walls else 1.0, block, end, 1, nx)
         if moves is not None and moves.speed_x.size > 0:
             rows_of.correct_ghost_end(fields, reach, moves.speed_x[nx], block, end, 1)
+        if faces is not None and faces.values[SPEED, ny + j] > 0.0 and nx > 1:
+            rows_of.extrapolate_ghosts(fields, reach, block, end, 1)
 
 
 @njit
-def put_row_beyond(grid, j, first, last, fields, rows, moves):
+def put_row_beyond(grid, j, first, last, fields, rows, moves, faces):
     """Write columns `first` to `last` - 1 of row j, which is beyond the grid, to the ring buffer, as `put_row` does.
 
     fields : number of quantities of a cell
@@ -181,6 +186,12 @@ def put_row_beyond(grid, j, first, last, fields, rows, moves):
     )
     if moves is not None and moves.speed_y.size > 0:
         rows_of.correct_ghost_row(n, fields, moves.speed_y[0 if j < 0 else ny], cells)
+    if faces is not None and ny > 1:
+        beyond, outer, inner = (-j, 0, 1) if j < 0 else (j - ny + 1, ny - 1, ny - 2)
+        here, inside = rows.cells[ring_offset(outer, 0) :], rows.cells[ring_offset(inner, 0) :]
+        for i in range(n):
+            if faces.values[SPEED, at + i] > 0.0:
+                rows_of.extrapolate_across(fields, i, beyond, here, inside, cells)
 
 
 @njit
@@ -210,7 +221,28 @@ def close_fixed_walls(walls, f, count):
 
 
 @njit
-def grid_rates(grid, begin, stop, states, flows, work, rates, moves):
+def close_driven(g, driven, turn, tangent, cells, kn, kt, side, f, top):
+    """Replace the fluxes through a row of boundary faces of driven patches, and raise the greatest rates.
+
+    driven : columns of `DrivenFaces.values` for these faces; turn : 1 if fluxes are positive inward, -1 if outward
+    tangent : NORTH or EAST, velocity along the faces; cells : cells behind the faces; side : their values at the faces
+    kn, kt : 1 / sizes of the cells across and along the faces [1/m], each with a value for each face, or a single one
+    """
+    for i in range(driven.shape[1]):
+        speed, q = driven[SPEED, i], turn * driven[FLOW, i]
+        if speed > 0.0:
+            h, e = side[i], side[i + rows_of.SURFACE]
+            depth = max(h + (driven[SURFACE, i] - e), 0.0)
+            flow = driven[MOMENTUM, i] + 0.5 * g * ((depth - h) * (depth + h))
+            f[i], f[i + rows_of.BEFORE], f[i + rows_of.AFTER] = q, flow, flow
+            f[i + rows_of.ALONG] = q * side[i + tangent] if driven[FLOW, i] < 0.0 else 0.0
+            rate = speed * kn[min(i, kn.size - 1)]
+            rate += (abs(cells[i + tangent]) + cells[i + rows_of.WAVE]) * kt[min(i, kt.size - 1)]
+            top[i] = max(top[i], rate)
+
+
+@njit
+def grid_rates(grid, begin, stop, states, flows, work, rates, moves, faces):
     """Write the rates of cells of rows `begin` to `stop` - 1; return the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
     Rows are counted over the whole grid; neighbours within the stencil of the scheme are read too.
@@ -218,18 +250,18 @@ def grid_rates(grid, begin, stop, states, flows, work, rates, moves):
     states : deviation of depth from rest [m] and both unit flows [m2/s], three arrays; with moving walls, the changes
     of their amounts over undeformed areas, see `basins.cell_sides`; rates : arrays for their rates
     work : float64[WORK], fastest if aligned to a cache line; float64[MOVING] if lines move
-    moves : None, or the `GridMotion` of moving walls
+    moves : None, or the `GridMotion` of moving walls; faces : None, or the `DrivenFaces` of driven patches
     """
     most = 0.0
     for first in range(0, grid.nx, MAX_COLUMNS):
         last = min(first + MAX_COLUMNS, grid.nx)
-        rate = column_rates(grid, begin, stop, True, first, last, states, flows, work, rates, moves)
+        rate = column_rates(grid, begin, stop, True, first, last, states, flows, work, rates, moves, faces)
         most = max(most, rate)
     return most
 
 
 @njit
-def column_rates(grid, begin, stop, fresh, first, last, states, flows, work, rates, moves):
+def column_rates(grid, begin, stop, fresh, first, last, states, flows, work, rates, moves, faces):
     """Write the rates of columns `first` to `last` - 1, at most MAX_COLUMNS; return their greatest rate [1/s].
 
     fresh : False if the last call ended at row `begin` with the same `work`; then its results are used again
@@ -241,21 +273,21 @@ def column_rates(grid, begin, stop, fresh, first, last, states, flows, work, rat
         fill(0.0, rows.top)
         ahead = min(ahead, grid.ny)
         for j in range(max(begin - reach, 0), ahead):
-            put_row(grid, j, first, last, states, rows, moves)
+            put_row(grid, j, first, last, states, rows, moves, faces)
         for j in range(-1, begin - 1 - reach, -1):
-            put_row(grid, j, first, last, states, rows, moves)
+            put_row(grid, j, first, last, states, rows, moves, faces)
     for j in range(begin - 1 if fresh else begin + 1, stop + 1):
         while ahead < j + reach:
-            put_row(grid, ahead, first, last, states, rows, moves)
+            put_row(grid, ahead, first, last, states, rows, moves, faces)
             ahead += 1
         a, b = rows.cells[ring_offset(j - 2, 0) :], rows.cells[ring_offset(j - 1, 0) :]
         d, e = rows.cells[ring_offset(j + 1, 0) :], rows.cells[ring_offset(j + 2, 0) :]
         c, sides = rows.cells[ring_offset(j, 0) :], rows.sides[(j & 1) * SIDE :]
         put_values(grid, last - first, a, b, c, d, e, sides, rows.deep)
         if j >= begin:
-            put_fluxes_across(grid, j, first, last, rows, flows, moves)
+            put_fluxes_across(grid, j, first, last, rows, flows, moves, faces)
         if j > begin:
-            put_fluxes_along(grid, j - 1, first, last, rows, flows, moves)
+            put_fluxes_along(grid, j - 1, first, last, rows, flows, moves, faces)
             put_row_rates(grid, j - 1, first, last, rows, rates, moves)
     for i in range(STRIDE):
         most = max(most, rows.top[i])
@@ -274,7 +306,7 @@ def put_values(grid, n, a, b, c, d, e, sides, deep):
 
 
 @inline
-def put_fluxes_across(grid, j, first, last, rows, flows, moves):
+def put_fluxes_across(grid, j, first, last, rows, flows, moves, faces):
     """Write the fluxes through the faces between rows j - 1 and j to `rows.fluxes`, and the flows through them.
 
     Arguments as in `column_rates`
@@ -296,6 +328,10 @@ def put_fluxes_across(grid, j, first, last, rows, flows, moves):
             close_walls(g, moves.speed_y[j], rest, low if j == 0 else under, north, moves.thrust[at : at + n])
     if fifth and ny < REACH and is_side:
         close_fixed_walls(grid.reflect[at : at + n], north, n)
+    if faces is not None and is_side:
+        cells, side, turn = (here, low, 1.0) if j == 0 else (before, under, -1.0)
+        ky, kx, top = grid.ky[min(j, ny - 1) : min(j, ny - 1) + 1], grid.kx[first:last], rows.top[GHOSTS:]
+        close_driven(g, faces.values[:, at : at + n], turn, EAST, cells, ky, kx, side, north, top)
     if flows.y.size > 0:
         copy(north, flows.y[j * nx + first : j * nx + last])
     if flows.through.size > 0 and is_side:
@@ -303,7 +339,7 @@ def put_fluxes_across(grid, j, first, last, rows, flows, moves):
 
 
 @inline
-def put_fluxes_along(grid, j, first, last, rows, flows, moves):
+def put_fluxes_along(grid, j, first, last, rows, flows, moves, faces):
     """Write the fluxes through the faces along row j to `rows.along`, and the flows through them.
 
     Arguments as in `column_rates`
@@ -327,6 +363,13 @@ def put_fluxes_along(grid, j, first, last, rows, flows, moves):
     if fifth and nx < REACH:
         close_fixed_walls(grid.reflect[j : j + 1], along, 1)
         close_fixed_walls(grid.reflect[ny + j : ny + j + 1], along[n:], 1)
+    if faces is not None:
+        kx, ky, top = grid.kx, grid.ky[j : j + 1], rows.top[GHOSTS:]
+        if first == 0:
+            close_driven(g, faces.values[:, j : j + 1], 1.0, NORTH, after, kx[:1], ky, right, along, top)
+        if last == nx:
+            east, end = faces.values[:, ny + j : ny + j + 1], n - 1
+            close_driven(g, east, -1.0, NORTH, after[end:], kx[nx - 1 :], ky, left[n:], along[n:], top[end:])
     if flows.x.size > 0:
         copy(along, flows.x[j * (nx + 1) + first : j * (nx + 1) + last + 1])
     if flows.through.size > 0 and first == 0:

@@ -13,6 +13,8 @@ import numpy as np
 
 from fvsolve.basins import cell_sides as side
 from fvsolve.basins.cell_sides import BLOCK, HUGE, INDICES, MEASURES, TINY, gather, limited_sides, ring_place
+from fvsolve.basins.free_surface.patch_closures import FLOW, MOMENTUM, SPEED, DrivenFaces
+from fvsolve.basins.free_surface.patch_closures import SURFACE as DRIVEN_SURFACE
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.mesh_blocks import own_sides
 from fvsolve.jit import inline, njit
@@ -34,12 +36,14 @@ class MeshWater(NamedTuple):
     g : gravity normal to the basin [m/s2]; scheme : UPWIND or MUSCL
     wide_by : factor on the range of the neighbours that limits values at sides; with 1 they stay within that range
     plan : float64[2, n]  depth at rest and surface at rest above the level [m]
+    faces : None, or the `DrivenFaces` of driven patches
     """
 
     g: float
     scheme: int
     wide_by: float
     plan: np.ndarray
+    faces: DrivenFaces | None
 
 
 @inline
@@ -122,12 +126,14 @@ def add_side(water, mesh, j, k, first, last, reflect, cells, sides, w, moves, ph
         i = mesh.edges[q] % BLOCK
         w[_U + i], w[_V + i] = mirrored_velocity(mesh, q, reflect, sides[2, own + i], sides[3, own + i], moves)
     centre = cells[0, o:], cells[1, o:], cells[4, o:]
+    edges, number = mesh.edges[first:last], mesh.number[first:last]
     if moves is None:
         add_side_fluxes(water.g, centre, inside, geo, w, None)
     else:
         add_side_fluxes(water.g, centre, inside, geo, w, moves.speeds[(4 * j + k) * BLOCK :])
-        edges, number, rest = mesh.edges[first:last], mesh.number[first:last], water.plan[DEPTH, j * BLOCK :]
+        rest = water.plan[DEPTH, j * BLOCK :]
         close_walls(water.g, edges, number, reflect, rest, cells[0, o:], geo, w, moves.thrust)
+    close_driven(water.g, water.faces, edges, number, inside, cells[4, o:], geo, w)
 
 
 @njit
@@ -180,6 +186,32 @@ def close_walls(g, edges, number, reflect, rest, h0, geo, w, thrust):
         if reflect.size == 0 or reflect[number[q]] == 1.0:
             w[_RH + i] += geo[_REACH + i] * w[MASS + i]
             w[MASS + i] = 0.0
+
+
+@njit
+def close_driven(g, faces, edges, number, inside, waves, geo, w):
+    """Replace the fluxes through boundary sides of driven patches, which were computed for an open boundary.
+
+    Through an open side flow depth times velocity and its momentum, as inside.
+    faces : see `MeshWater`; waves : wave speeds of the cells; other arguments as for `close_walls` and
+    `add_side_fluxes`
+    """
+    h, e, u, v = inside
+    if faces is not None:
+        driven = faces.values
+        for q in range(edges.size):
+            i, k = edges[q] % BLOCK, number[q]
+            if driven[SPEED, k] > 0.0:
+                nx, ny, reach, flow = geo[_NX + i], geo[_NY + i], geo[_REACH + i], -driven[FLOW, k]
+                across, along = u[i] * nx + v[i] * ny, v[i] * nx - u[i] * ny
+                depth = max(h[i] + (driven[DRIVEN_SURFACE, k] - e[i]), 0.0)
+                push = driven[MOMENTUM, k] + 0.5 * g * ((depth - h[i]) * (depth + h[i])) - w[MASS + i] * across
+                drift = (max(flow, 0.0) - w[MASS + i]) * along
+                w[_RH + i] -= reach * (flow - w[MASS + i])
+                w[_RX + i] -= reach * (push * nx - drift * ny)
+                w[_RY + i] -= reach * (push * ny + drift * nx)
+                w[_FAST + i] += reach * max(driven[SPEED, k] - (abs(across) + waves[i]), 0.0)
+                w[MASS + i] = flow
 
 
 @njit

@@ -8,13 +8,18 @@ from fvsolve.basins.basin_output import FIRST_OWN, velocity_value
 from fvsolve.basins.basin_patches import add_link_momentum, normal_gravity, physics_code
 from fvsolve.basins.cell_sides import deviations_of, stretch_of_cell
 from fvsolve.basins.free_surface.surface_rows import THIN
+from fvsolve.basins.free_surface.water_sources import infiltrate, rain_rate, sum_of_products
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import CELL_FIELD, GN, PATCH, RATE
+from fvsolve.kernels.dtypes import CELL_FIELD, GN, NO_SOIL, PATCH, RATE
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.table_handle import open_tables
 
 OWN_CODE = physics_code(__package__)
-DEPTH = FIRST_OWN
+DEPTH, VOLUME, WET_AREA, RAIN, RAINED, INFILTRATION, INFILTRATED = range(FIRST_OWN, FIRST_OWN + 7)
+TOTALS = {  # quantity of a whole basin -> code
+    "volume": VOLUME, "wet_area": WET_AREA, "rain": RAIN, "rained": RAINED, "infiltration": INFILTRATION,
+    "infiltrated": INFILTRATED,
+}  # fmt: skip
 
 
 @njit
@@ -167,10 +172,33 @@ def observe_water(t, y, out, handle, values):
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
-        if probe["kind"] == CELL_FIELD and tables.basins[probe["index"]]["kind"] == OWN_CODE:
+        if probe["kind"] != CELL_FIELD or tables.basins[probe["index"]]["kind"] != OWN_CODE:
+            continue
+        if probe["side"] > DEPTH:
+            values[k] = total_of_basin(tables, tables.basins[probe["index"]], probe["side"], t, y)
+        else:
             depth, u, v = read_water(tables, probe, y)
             own = probe["side"] == DEPTH
             values[k] = probe["scale"] * depth + probe["offset"] if own else velocity_value(probe["side"], u, v)
+
+
+@njit
+def total_of_basin(tables, basin, quantity, t, y):
+    """Value of one of `TOTALS` for a basin: volume [m3], area deeper than `wet_depth` [m2], flow [m3/s]."""
+    if quantity == RAIN:
+        return rain_rate(tables, basin, t) * basin["total_area"]
+    if quantity == RAINED:
+        return y[basin["rained"]] * basin["total_area"] if basin["rain"] >= 0 else 0.0
+    total, n, soaks = 0.0, basin["n"], basin["soil"] != NO_SOIL
+    if quantity == INFILTRATION:
+        return infiltrate(tables, basin, t, y, tables.work[basin["soil_work"] :][:n]) if soaks else 0.0
+    if quantity == INFILTRATED:
+        area, first = tables.plane[basin["area"] : basin["area"] + n], basin["infiltrated"]
+        return sum_of_products(y[first : first + n], area) if soaks else 0.0
+    for i in range(n):
+        area, depth = tables.plane[basin["area"] + i], near.depth_at_patch(tables.plane, basin, i, y)
+        total += area * depth if quantity == VOLUME else area if depth > basin["wet_depth"] else 0.0
+    return total
 
 
 @njit

@@ -8,12 +8,14 @@ from fvsolve.basins.boundary_cells import band_cells
 from fvsolve.basins.cell_sides import deviations_of
 from fvsolve.basins.free_surface import surface_grid, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import add_capped_friction, add_friction, damp_flows
+from fvsolve.basins.free_surface.patch_closures import driven_faces
 from fvsolve.basins.free_surface.surface_rows import GHOSTS, MAX_COLUMNS
+from fvsolve.basins.free_surface.water_sources import DRAIN_TIME, add_infiltration, add_rain, begin_rain
 from fvsolve.basins.moving_meshes import mesh_motion
 from fvsolve.basins.moving_walls import grid_motion
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels import stage_sums as sums_of
-from fvsolve.kernels.dtypes import NO_DRAG, RATE
+from fvsolve.kernels.dtypes import NO_DRAG, NO_SOIL, RATE
 from fvsolve.kernels.table_handle import open_tables
 
 OWN_CODE = physics_code(__package__)
@@ -96,6 +98,11 @@ def finish_block(tables, b, row, block_stop, first, last, y, rates, out):
             add_bed_friction(tables, b, nx * row, nx * block_stop, y, rates, out)
         for j in range(row, block_stop if last - first < nx else row):
             add_bed_friction(tables, b, nx * j + first, nx * j + last, y, rates, out)
+    if basin["rain"] >= 0:
+        if first == 0 and last == nx:
+            add_rain(tables, basin, rates[0][nx * row : nx * block_stop])
+        for j in range(row, block_stop if last - first < nx else row):
+            add_rain(tables, basin, rates[0][nx * j + first : nx * j + last])
     for q in range(3):
         at = basin["y"] + q * basin["n"]
         if sums[sums_of.MODE] == sums_of.CHECK:
@@ -105,7 +112,7 @@ def finish_block(tables, b, row, block_stop, first, last, y, rates, out):
 
 
 @njit
-def by_blocks(tables, b, grid, states, flows, work, y, rates, out):
+def by_blocks(tables, b, grid, states, flows, work, y, rates, out, faces):
     """Write the rates of `surface_grid.grid_rates` and friction block by block, and return the greatest rate [1/s].
 
     The sums of Runge-Kutta stages requested in `tables.sums` are formed in the same pass.
@@ -126,7 +133,7 @@ def by_blocks(tables, b, grid, states, flows, work, y, rates, out):
             formed_ahead = ahead
             fresh = row == begin
             rate = surface_grid.column_rates(
-                grid, row, block_stop, fresh, first, last, states, flows, work, rates, None
+                grid, row, block_stop, fresh, first, last, states, flows, work, rates, None, faces
             )
             most = max(most, rate)
             finish_block(tables, b, row, block_stop, first, last, y, rates, out)
@@ -153,7 +160,7 @@ def rates_of(tables, basin, dydt):
 
 
 @njit
-def grid_rates(tables, b, y, rates, out, moves):
+def grid_rates(tables, b, y, rates, out, moves, faces):
     """Write the rates of basin b, whose mesh is a grid; return the greatest rate of its cells [1/s].
 
     rates : as for `add_bed_friction`; moves : None, or the `GridMotion` of moving walls
@@ -167,21 +174,29 @@ def grid_rates(tables, b, y, rates, out, moves):
     states = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
     if moves is None and sums_of.requested_mode(tables, b) != sums_of.OFF:
         flows = surface_grid.FaceFlows(flow_x, flow_y, passing)
-        return by_blocks(tables, b, grid, states, flows, scratch, y, rates, out)
+        return by_blocks(tables, b, grid, states, flows, scratch, y, rates, out, faces)
     if f >= 0:  # needed for scalars
         flow_x, flow_y = work[f : f + count], work[f + count : f + count + (grid.ny + 1) * grid.nx]
     flows, begin, stop = surface_grid.FaceFlows(flow_x, flow_y, passing), bands[2 * b], bands[2 * b + 1]
-    rate = surface_grid.grid_rates(grid, begin, stop, states, flows, scratch, rates, moves)
+    rate = surface_grid.grid_rates(grid, begin, stop, states, flows, scratch, rates, moves, faces)
     if f >= 0:
         through_faces(begin, stop, grid.kx, grid.ky, flow_x, flow_y)
     if basin["friction"] != NO_DRAG:
         a, z = band_cells(tables, b)
         add_bed_friction(tables, b, a, z, y, rates, out)
+    add_rain_to_band(tables, b, rates)
     return rate
 
 
 @njit
-def mesh_rates(tables, b, y, rates, out, moves):
+def add_rain_to_band(tables, b, rates):
+    """Add the rate of rain to the rates of depth of the cells of basin b that this thread computes."""
+    a, z = band_cells(tables, b)
+    add_rain(tables, tables.basins[b], rates[0][a:z])
+
+
+@njit
+def mesh_rates(tables, b, y, rates, out, moves, faces):
     """Write the rates of basin b, whose mesh is not a grid; return the greatest rate of its cells [1/s].
 
     moves : None, or `MeshMotion`; otherwise as for `grid_rates`
@@ -192,7 +207,7 @@ def mesh_rates(tables, b, y, rates, out, moves):
     flow = work[:0]
     if f >= 0:  # needed for scalars
         flow = work[f : f + basin["faces"]]
-    water = surface_mesh.MeshWater(grid.g, basin["scheme"], basin["wide"], grid.plan)
+    water = surface_mesh.MeshWater(grid.g, basin["scheme"], basin["wide"], grid.plan, faces)
     floats, integers = tables.plane[basin["mesh"] :], tables.integers[basin["links"] :]
     states = seen[o : o + n], seen[o + n : o + 2 * n], seen[o + 2 * n : o + 3 * n]
     passing, scratch = work[through : through + basin["outer_given"]], work[basin["work"] :]
@@ -201,6 +216,7 @@ def mesh_rates(tables, b, y, rates, out, moves):
     if basin["friction"] != NO_DRAG:
         a, z = band
         add_bed_friction(tables, b, a, z, y, rates, out)
+    add_rain_to_band(tables, b, rates)
     return rate
 
 
@@ -209,8 +225,14 @@ def no_motion(tables, basin):
     """Return None: walls do not move."""
 
 
-# Constants of the template: True for grids; True for moving walls; functions for the rates and for the motion.
-GRIDS, MOVING, CELLS, MOTION = True, False, grid_rates, no_motion
+@njit
+def no_faces(tables, basin):
+    """Return None: no patch is driven."""
+
+
+# Constants of the template: True for grids, for moving walls, and for driven patches; functions for the rates, for the
+# motion of walls, and for the driven faces.
+GRIDS, MOVING, DRIVEN, CELLS, MOTION, FACES = True, False, False, grid_rates, no_motion, no_faces
 
 
 def _rates(t, y, dydt, out, handle):
@@ -223,9 +245,15 @@ def _rates(t, y, dydt, out, handle):
         basin = tables.basins[b]
         if basin["kind"] != OWN_CODE or (basin["nx"] > 0) != GRIDS or (basin["walls"] > 0) != MOVING:
             continue
+        if (basin["driven"] >= 0) != DRIVEN:
+            continue
+        begin_rain(tables, basin, t, dydt, out)
         if MOVING or needs_rates(basin, dydt):
-            rate = CELLS(tables, b, y, rates_of(tables, basin, dydt), out, MOTION(tables, basin))
+            rate = CELLS(tables, b, y, rates_of(tables, basin, dydt), out, MOTION(tables, basin), FACES(tables, basin))
             put_open_flows(tables, b, tables.settings[0]["rho"], out)
+            if basin["soil"] != NO_SOIL:  # steps keep all depths above 0
+                add_infiltration(tables, basin, t, y, dydt, out)
+                rate += 1.0 / (basin["unsplit"] * DRAIN_TIME)
             out[RATE] = max(out[RATE], basin["unsplit"] * rate)
 
 
@@ -235,3 +263,14 @@ water_moving_grids = specialise(_rates, "water_moving_grids", MOVING=True, MOTIO
 water_moving_meshes = specialise(
     _rates, "water_moving_meshes", GRIDS=False, MOVING=True, CELLS=mesh_rates, MOTION=mesh_motion
 )
+water_driven_grids = specialise(_rates, "water_driven_grids", DRIVEN=True, FACES=driven_faces)
+water_driven_meshes = specialise(
+    _rates, "water_driven_meshes", GRIDS=False, DRIVEN=True, CELLS=mesh_rates, FACES=driven_faces
+)
+water_driven_moving_grids = specialise(
+    _rates, "water_driven_moving_grids", MOVING=True, DRIVEN=True, MOTION=grid_motion, FACES=driven_faces
+)
+water_driven_moving_meshes = specialise(
+    _rates, "water_driven_moving_meshes", GRIDS=False, MOVING=True, DRIVEN=True, CELLS=mesh_rates, MOTION=mesh_motion,
+    FACES=driven_faces,
+)  # fmt: skip

@@ -107,6 +107,35 @@ def correct_ghost_row(n, fields, speed, cells):
 
 
 @njit
+def extrapolate_ghosts(fields, reach, cells, at, step):
+    """Replace `reach` ghost cells beyond cell `at` by linear extrapolation, if this cell and the next inside are wet.
+
+    step : distance in `cells` from a cell to the next outward; the depth stays at 0 or above
+    """
+    if not (cells[at] > 0.0 and cells[at - step] > 0.0):
+        return
+    for f in range(fields):
+        here = at + f * STRIDE
+        slope = cells[here] - cells[here - step]
+        for k in range(1, reach + 1):
+            value = cells[here] + k * slope
+            cells[here + k * step] = max(value, 0.0) if f * STRIDE == DEPTH else value
+
+
+@njit
+def extrapolate_across(fields, i, beyond, here, inside, cells):
+    """Replace cell i of a ghost row by linear extrapolation across the rows, if both cells inside are wet.
+
+    beyond : number of rows from the last row `here` to the ghost row; inside : row next to the last
+    """
+    if here[i] > 0.0 and inside[i] > 0.0:
+        for f in range(fields):
+            at = f * STRIDE + i
+            value = here[at] + beyond * (here[at] - inside[at])
+            cells[at] = max(value, 0.0) if f * STRIDE == DEPTH else value
+
+
+@njit
 def put_ghost_row(n, fields, walls, last, mirror, cells):
     """Write a row of n ghost cells beyond the grid to `cells`.
 

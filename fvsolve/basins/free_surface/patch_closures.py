@@ -1,0 +1,354 @@
+"""Driven patches of water with a free surface: a level that a schedule, a rating or a slope determines.
+
+A face of a patch, with depth h and inward velocity u in the cell behind it, sends the invariant u - 2 c outward,
+c = sqrt(g h). If the surface at the face has the height z, the depth there is h_b = z - bed, c_b = sqrt(g h_b), the
+velocity u_b = u + 2 (c_b - c), and the inflow per width q = h_b u_b, with dq/dz = u_b + c_b. Outflow is at most
+critical: then c_b = (2 c - u) / 3. Inflow is at most critical too. An outflow faster than waves takes the state of the
+cell. A level below the bed is thus a free overfall, and a dry face above the level passes nothing. The flow of a patch
+rises with its level, so each closure has one root: the level itself (stage), the sum of flows (discharge), a rating of
+outflow over level, or the flow of uniform depth on a slope at each face.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from fvsolve.basins.basin_patches import physics_code
+from fvsolve.basins.cell_sides import deviations_of
+from fvsolve.basins.free_surface.surface_rows import THIN
+from fvsolve.jit import njit
+from fvsolve.kernels.cube_root import cube_root_reciprocal
+from fvsolve.kernels.dtypes import CRITICAL, DISCHARGE, NO_CLOSURE, PATCH_FROUDE, RATING, STAGE
+from fvsolve.kernels.schedule_pieces import schedule_value
+from fvsolve.kernels.table_handle import open_tables
+
+OWN_CODE = physics_code(__package__)
+# Rows of the work array of driven faces: inflow per width, its momentum q^2 / h_b, surface above the level at rest,
+# greatest wave speed |u_b| + c_b (0 at faces that are not driven), all in the order of boundary faces; then depth,
+# surface and inward velocity of the cells behind the faces of a patch, and lengths of these faces.
+FLOW, MOMENTUM, SURFACE, SPEED, DEPTH, INSIDE, INWARD, LENGTH, ROWS = range(9)
+ITERATIONS = 100
+ROUNDING = 1e-15  # relative error of a flow at which a level is accepted
+HELD = 1e-9  # relative difference of a discharge from its schedule above which it counts as held
+LEAST_RISE = 1e-3  # first rise of the level in the search for an upper bound [m]
+
+
+@njit(forceinline=True)
+def driven_range(basin):
+    """(offset in `work`, number of boundary faces) of the work array of driven faces; (0, 0) without driven patches."""
+    return (basin["driven"], basin["outer"]) if basin["driven"] >= 0 else (0, 0)
+
+
+class DrivenFaces(NamedTuple):
+    """Driven faces of a basin. values : float64[ROWS, outer]  rows FLOW to SPEED at boundary faces"""
+
+    values: np.ndarray
+
+
+@njit
+def driven_faces(tables, basin):
+    """`DrivenFaces` of a basin with driven patches."""
+    first, outer = driven_range(basin)
+    return DrivenFaces(tables.work[first : first + ROWS * outer].reshape((ROWS, outer)))
+
+
+@njit
+def face_flow(g, z, h, e, u):
+    """(inflow q per width [m2/s], dq/dz [m/s], depth [m]) at a face with the surface z.
+
+    h, e, u : depth, surface and inward velocity of the cell behind the face; z and e count from the level at rest
+    """
+    c, depth = sqrt(g * h), max(h + (z - e), 0.0)
+    if h > 0.0 and -u >= c:
+        return h * u, 0.0, h
+    speed = sqrt(g * depth)
+    own = u + 2.0 * (speed - c)
+    if own < -speed:
+        speed = max((2.0 * c - u) / 3.0, 0.0)
+        return -speed * speed * speed / g, 0.0, speed * speed / g
+    if own > speed:
+        return depth * speed, 1.5 * speed, depth
+    return depth * own, own + speed, depth
+
+
+@njit
+def patch_flow(g, z, faces):
+    """(inflow [m3/s], its derivative by z [m2/s]) through all faces with the surface z.
+
+    faces : (depth, surface, inward velocity, length) of the faces, four arrays
+    """
+    h, e, u, lengths = faces
+    total, slope = 0.0, 0.0
+    for m in range(h.size):
+        q, change, _ = face_flow(g, z, h[m], e[m], u[m])
+        total += lengths[m] * q
+        slope += lengths[m] * change
+    return total, slope
+
+
+@njit
+def rated_flow(levels, flows, z):
+    """(outflow [m3/s], its derivative by the level [m2/s]) of a rating: zero below its first point, then linear.
+
+    levels : increasing levels [m]; flows : outflows [m3/s]
+    """
+    if z <= levels[0]:
+        return 0.0, 0.0
+    k = 1
+    while k < levels.size - 1 and z > levels[k]:
+        k += 1
+    slope = (flows[k] - flows[k - 1]) / (levels[k] - levels[k - 1])
+    return flows[k - 1] + slope * (z - levels[k - 1]), slope
+
+
+@njit
+def excess(g, z, faces, target, rest, levels, flows):
+    """(inflow minus that of the closure, its derivative by z).
+
+    target : scheduled discharge [m3/s]; rest : level at rest [m]; levels, flows : rating, empty for a discharge
+    """
+    total, slope = patch_flow(g, z, faces)
+    if levels.size == 0:
+        return total - target, slope
+    leaving, change = rated_flow(levels, flows, rest + z)
+    return total + leaving, slope + change
+
+
+@njit
+def first_level(g, faces, target):
+    """First estimate of the level of a patch: mean surface of wet faces, or critical inflow over the lowest dry bed."""
+    h, e, _, lengths = faces
+    wet, total, low, wide = 0.0, 0.0, e[0], 0.0
+    for m in range(h.size):
+        wide += lengths[m]
+        low = min(low, e[m])
+        if h[m] > 0.0:
+            wet += lengths[m]
+            total += lengths[m] * e[m]
+    if wet > 0.0:
+        return total / wet
+    unit = max(target, 0.0) / wide
+    return low + (1.0 / cube_root_reciprocal(unit * unit / g) if unit > 0.0 else 0.0)
+
+
+@njit
+def solve_level(g, faces, target, rest, levels, flows):
+    """Level at which a patch has its discharge or rated flow; the lowest bed if the outflow would be above critical.
+
+    Newton's method within bounds; other arguments as for `excess`.
+    """
+    h, e, _, lengths = faces
+    z = first_level(g, faces, target)
+    f, slope = excess(g, z, faces, target, rest, levels, flows)
+    if f == 0.0:
+        return z
+    low = high = z
+    if f < 0.0:
+        rise = LEAST_RISE
+        while excess(g, high, faces, target, rest, levels, flows)[0] < 0.0 and rise < 1e9:
+            low, high, rise = high, high + rise, 4.0 * rise
+        if rise >= 1e9:  # water leaves faster than waves, whatever the level
+            return z
+    else:
+        for m in range(h.size):
+            low = min(low, e[m] - h[m])
+        if excess(g, low, faces, target, rest, levels, flows)[0] >= 0.0:
+            return low
+    for _ in range(ITERATIONS):
+        new = z - f / slope if slope > 0.0 else 0.5 * (low + high)
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        if new == z or not low < new < high:
+            break
+        z = new
+        f, slope = excess(g, z, faces, target, rest, levels, flows)
+        if f < 0.0:
+            low = z
+        else:
+            high = z
+        if abs(f) <= ROUNDING * abs(target):
+            break
+    return z
+
+
+@njit
+def uniform_depth(g, h, e, u, conveyance):
+    """Surface at which the outflow of a face is that of uniform flow, conveyance * depth^(5/3), above the rest level.
+
+    conveyance : sqrt(slope) / Manning's n [m^(1/3)/s]; h, e, u : as for `face_flow`
+    """
+    low, high, z = e - h, e + max(h, LEAST_RISE), e
+    for _ in range(ITERATIONS):
+        q, change, depth = face_flow(g, z, h, e, u)
+        deep = h + (z - e)
+        root = 1.0 / cube_root_reciprocal(deep) if deep > 0.0 else 0.0
+        f, slope = q + conveyance * deep * root * root, change + 5.0 / 3.0 * conveyance * root * root
+        if f == 0.0:
+            break
+        if f < 0.0:
+            low = z
+            if high <= z:
+                high = z + 2.0 * (z - (e - h)) + LEAST_RISE
+        else:
+            high = z
+        new = z - f / slope if slope > 0.0 else 0.5 * (low + high)
+        if not low < new:
+            new = 0.5 * (low + z)
+        if new == z:
+            break
+        z = new
+    return z
+
+
+@njit
+def read_cell(plane, basin, k, x, y, deviations):
+    """(depth, surface above the level at rest, velocity against the normal (x, y)) of cell k."""
+    n, o = basin["n"], basin["y"]
+    depth = max(plane[basin["plan"] + k] + deviations[o + k], 0.0)
+    wet = max(depth, THIN)
+    share = 2.0 * depth / (depth * depth + wet * wet)
+    across = deviations[o + n + k] * x + deviations[o + 2 * n + k] * y
+    return depth, plane[basin["plan"] + n + k] + deviations[o + k], -share * across
+
+
+@njit
+def read_faces(tables, patch, y):
+    """Write the state inside the faces of a patch to the work array of its basin; return four arrays.
+
+    They are depth, surface above the level at rest, inward velocity, and length of the faces. y : deviations of cells
+    """
+    basin, plane, integers = tables.basins[patch["basin"]], tables.plane, tables.integers
+    count, at = patch["faces"], patch["normals"]
+    first, outer = driven_range(basin)
+    rows = tables.work[first : first + ROWS * outer].reshape((ROWS, outer))
+    h, e, u, lengths = rows[DEPTH, :count], rows[INSIDE, :count], rows[INWARD, :count], rows[LENGTH, :count]
+    for m in range(count):
+        k, inner = integers[patch["ring"] + count + m], integers[patch["second"] + m]
+        nx, ny = plane[at + m], plane[at + count + m]
+        h[m], e[m], u[m] = read_cell(plane, basin, k, nx, ny, y)
+        if inner != k and h[m] > 0.0:
+            depth, surface, inward = read_cell(plane, basin, inner, nx, ny, y)
+            if depth > 0.0:  # linear extrapolation from two cells, as in the ghost cells of the rates
+                h[m] = 0.5 * (h[m] + max(2.0 * h[m] - depth, 0.0))
+                e[m] += 0.5 * (e[m] - surface)
+                u[m] += 0.5 * (u[m] - inward)
+        lengths[m] = plane[at + 2 * count + m] * plane[basin["area"] + k]
+    return h, e, u, lengths
+
+
+@njit
+def level_of_patch(tables, patch, g, faces, t):
+    """(level of a patch above the level at rest [m], scheduled discharge [m3/s]); 0 for closures of single faces."""
+    empty = tables.plane[:0]
+    if patch["closure"] == STAGE:
+        return schedule_value(tables, patch["drive"], t) - patch["rest"], 0.0
+    if patch["closure"] == DISCHARGE:
+        target = schedule_value(tables, patch["drive"], t)
+        return solve_level(g, faces, target, 0.0, empty, empty), target
+    if patch["closure"] == RATING:
+        at, count = patch["numbers"], patch["points"]
+        levels, flows = tables.plane[at : at + count], tables.plane[at + count : at + 2 * count]
+        return solve_level(g, faces, 0.0, patch["rest"], levels, flows), 0.0
+    return 0.0, 0.0
+
+
+@njit
+def close_face(patch, g, z, h, e, u):
+    """(inflow per width [m2/s], depth [m]) at a face of a patch with the level z; h, e, u : as for `face_flow`"""
+    if patch["closure"] == CRITICAL:
+        q, _, depth = face_flow(g, e - h, h, e, u)
+    elif patch["closure"] > CRITICAL:
+        q, _, depth = face_flow(g, uniform_depth(g, h, e, u, patch["conveyance"]), h, e, u)
+    else:
+        q, _, depth = face_flow(g, z, h, e, u)
+    return q, depth
+
+
+@njit
+def close_patch(tables, patch, t, y, out):
+    """Write the flow and the momentum of all faces of a driven patch, and the pressure of its node.
+
+    During outflow above critical the fraction of the discharge that leaves is written to the node's outflow fraction.
+    """
+    layout, basin, node = tables.layout[0], tables.basins[patch["basin"]], tables.nodes[patch["node"]]
+    g, faces, (first, outer) = tables.settings[0]["gravity"], read_faces(tables, patch, y), driven_range(basin)
+    rows, (h, e, u, lengths) = tables.work[first : first + ROWS * outer].reshape((ROWS, outer)), faces
+    z, target = level_of_patch(tables, patch, g, faces, t)
+    total, surface, wet, wide, held = 0.0, 0.0, 0.0, 0.0, 1.0
+    given = schedule_value(tables, patch["depth"], t) if patch["depth"] >= 0 else 0.0
+    for m in range(h.size):
+        k = tables.integers[patch["ring"] + m]
+        q, depth = close_face(patch, g, z, h[m], e[m], u[m])
+        if given > 0.0:
+            depth = given
+        rows[FLOW, k], rows[SURFACE, k] = q, e[m] + (depth - h[m])
+        total += lengths[m] * q
+        wide += lengths[m]
+        if depth > 0.0:
+            wet += lengths[m]
+            surface += lengths[m] * rows[SURFACE, k]
+    if patch["closure"] == DISCHARGE:
+        held = put_discharge(tables, patch, rows, total, target, wide, given)
+    for m in range(h.size):
+        k = tables.integers[patch["ring"] + m]
+        q, depth = rows[FLOW, k], h[m] + (rows[SURFACE, k] - e[m])
+        u_face = q / depth if depth > 0.0 else 0.0
+        rows[MOMENTUM, k], rows[SPEED, k] = q * u_face, abs(u_face) + sqrt(g * max(depth, 0.0))
+    rise = (surface / wet if wet > 0.0 else z) - patch["lowest"]
+    out[layout["pressure"] + patch["node"]] = tables.settings[0]["rho"] * g * rise
+    out[layout["outflow_fraction"] + node["row"]] = held
+
+
+@njit
+def put_discharge(tables, patch, rows, total, target, wide, given):
+    """Correct the flows of faces so that their sum is the discharge; return the fraction that leaves, else 1.
+
+    total : sum of the flows [m3/s]; target : discharge [m3/s]; wide : length of all faces [m]; given : depth of a
+    supercritical inflow [m], or 0
+    """
+    is_held = given == 0.0 and target < total and total - target > HELD * abs(target)
+    if is_held:
+        return total / target
+    for m in range(patch["faces"] if total != target or given > 0.0 else 0):
+        k = tables.integers[patch["ring"] + m]
+        if given > 0.0:
+            rows[FLOW, k] = target / wide
+        elif total * target > 0.0:
+            rows[FLOW, k] *= target / total
+        else:
+            rows[FLOW, k] += (target - total) / wide
+    return 1.0
+
+
+@njit
+def close_patches(t, y, dydt, out, handle):
+    """Write flows and momentum at the faces of all driven patches, for the rates of cells."""
+    tables = open_tables(handle)
+    for k in range(tables.patches.size):
+        patch = tables.patches[k]
+        basin = tables.basins[patch["basin"]]
+        if basin["kind"] == OWN_CODE and patch["closure"] != NO_CLOSURE:
+            close_patch(tables, patch, t, deviations_of(basin, tables.seen, y), out)
+
+
+@njit
+def observe_froude(t, y, out, handle, values):
+    """Write the Froude numbers of flows through driven patches: flow over the sum of length, depth and wave speed."""
+    tables = open_tables(handle)
+    g = tables.settings[0]["gravity"]
+    for p in range(tables.probes.size):
+        if tables.probes[p]["kind"] == PATCH_FROUDE:
+            patch = tables.patches[tables.probes[p]["index"]]
+            basin = tables.basins[patch["basin"]]
+            at, lengths = basin["driven"], tables.plane[patch["normals"] + 2 * patch["faces"] :]
+            total, critical = 0.0, 0.0
+            for m in range(patch["faces"]):
+                k = at + tables.integers[patch["ring"] + m]
+                cell = tables.integers[patch["ring"] + patch["faces"] + m]
+                q, square = tables.work[k + FLOW * basin["outer"]], tables.work[k + MOMENTUM * basin["outer"]]
+                wave = tables.work[k + SPEED * basin["outer"]] - (square / abs(q) if q != 0.0 else 0.0)
+                length = lengths[m] * tables.plane[basin["area"] + cell]
+                total += length * q
+                critical += length * wave * wave * wave / g
+            values[p] = abs(total) / critical if critical > 0.0 else 0.0

@@ -1,0 +1,259 @@
+"""Rain and infiltration: kinematic waves, infiltration laws in closed form, balances, and the same by other ways."""
+
+import math
+
+import numpy as np
+import pytest
+from pytest import approx
+from reference.basins import ended, model_of, on_sides
+from reference.meshes import boundary, triangles, write
+from reference.scenes import scene
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import fvsolve
+
+MM_PER_HOUR = 1.0 / 3.6e6  # [m/s]
+NUMERICS = {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.9}
+TOTALS = [f"field.{name}" for name in ("volume", "wet_area", "rain", "rained", "infiltration", "infiltrated")]
+
+
+def field(end, numerics=None, patches=None, every=None, **basin) -> dict:
+    own = {"type": "basin", "size": [10.0, 10.0], "cells": [4, 4], "level": -1.0, "elevation": 0.0, **basin}
+    own |= {"patches": patches} if patches else {}
+    given = {key: value for key, value in (NUMERICS | (numerics or {})).items() if value is not None}
+    return scene({"field": own}, {}, end, given, TOTALS, every or end / 20)
+
+
+LONG, SLOPE, ROUGHNESS, INTENSITY = 100.0, 0.02, 0.02, 50 * MM_PER_HOUR
+PLANE = {"size": [LONG, 1.0], "cells": [200, 1], "bed": f"{SLOPE}*({LONG} - x)", "manning": ROUGHNESS,
+         "patches": {"foot": {"side": "east", "boundary": "critical"}}}  # fmt: skip
+FACTOR = math.sqrt(SLOPE) / ROUGHNESS  # q = FACTOR h^(5/3)
+CONCENTRATION = (LONG / (FACTOR * INTENSITY ** (2 / 3))) ** 0.6  # time to the steady flow [s]
+
+
+def kinematic(x: np.ndarray, t: float) -> np.ndarray:
+    """Depth of a kinematic wave by rain that began at t = 0 : i t up to where the flow is steady, else i x = q."""
+    return np.minimum(INTENSITY * t, (INTENSITY * x / FACTOR) ** 0.6)
+
+
+@pytest.mark.parametrize("share", [0.6, 1.5], ids=["rising", "steady"])
+def test_rain_on_a_plane_is_a_kinematic_wave(share):
+    end = share * CONCENTRATION
+    model, state = ended(field(end, rain=INTENSITY, **PLANE))
+    basin = model.basins[0]
+    depth, exact = basin.depth + basin.deviations(state.y)[0], kinematic(basin.x, end)
+    assert np.sum(np.abs(depth - exact)) < 0.01 * np.sum(exact)
+
+
+def test_the_steady_flow_from_a_plane_is_its_rain():
+    found = fvsolve.run(field(1.5 * CONCENTRATION, rain=f"{INTENSITY} m/s", **PLANE))
+    assert found.ok
+    flow = -found.summary["ledgers"]["mass"]["by_node"]["field.foot"] / 1000.0
+    stored = found["field.volume"][-1]
+    assert found["field.rained"][-1] == approx(flow + stored, rel=1e-12)
+    assert np.ptp(found["field.volume"][-4:]) < 1e-3 * stored
+
+
+def test_the_recession_after_rain_is_that_of_kinematic_waves():
+    """A depth h at the foot leaves at the time at which all waves of depth above h have left : q (t - T) known."""
+    stop, end = 1.2 * CONCENTRATION, 1.2 * CONCENTRATION + 300.0
+    rain = {"time": [0.0, stop], "value": [INTENSITY, 0.0], "kind": "step"}
+    model, state = ended(field(end, rain=rain, **PLANE))
+    basin = model.basins[0]
+    depth = basin.depth + basin.deviations(state.y)[0]
+
+    def place(h):  # x(h, t) of the wave that had the depth h when the rain stopped
+        return FACTOR * h ** (5 / 3) / INTENSITY + 5 / 3 * FACTOR * h ** (2 / 3) * (end - stop)
+
+    exact = np.array([brentq(lambda h, x=x: place(h) - x, 0.0, 0.1) for x in basin.x])
+    assert np.sum(np.abs(depth - exact)) < 0.01 * np.sum(exact)
+
+
+CONDUCTIVITY, SUCTION, DEFICIT = 6.5 * MM_PER_HOUR, 0.1668, 0.34
+GREEN_AMPT = {"model": "green-ampt", "conductivity": "6.5 mm/h", "suction": "166.8 mm", "deficit": DEFICIT}
+HORTON = {"model": "horton", "initial": "60 mm/h", "final": "10 mm/h", "decay": "2 1/h"}
+BY_METHOD = {
+    "ssp-rk2": {"courant": 0.9}, "rk4": {"courant": 0.9}, "dormand-prince": {"rtol": 1e-6}, "tr-bdf2": {"step": 5.0},
+    "radau-iia-5": {"rtol": 1e-7}, "rodas-5p": {"rtol": 1e-7},
+}  # fmt: skip
+
+
+def green_ampt_height(t: float) -> float:
+    """Height infiltrated from rain that ponds at the time t_p : K (t - t_p) = F - F_p - S ln((F + S) / (F_p + S))."""
+    rain, store = INTENSITY, SUCTION * DEFICIT
+    before = CONDUCTIVITY * store / (rain - CONDUCTIVITY)
+    ponding = before / rain
+
+    def excess(height):
+        return (height - before - store * math.log((height + store) / (before + store))
+                - CONDUCTIVITY * (t - ponding))  # fmt: skip
+
+    return brentq(excess, before, 1.0, xtol=1e-15)
+
+
+@pytest.mark.in_turn
+@pytest.mark.parametrize("method", BY_METHOD)
+@pytest.mark.parametrize("hours", [1.0, 2.0])
+def test_green_ampt_is_its_closed_form(method, hours):
+    numerics = {"courant": None, "method": method} | BY_METHOD[method]
+    found = fvsolve.run(field(3600.0 * hours, numerics, rain="50 mm/h", infiltration=GREEN_AMPT))
+    exact = green_ampt_height(3600.0 * hours)
+    assert exact == approx({1.0: 30.159e-3, 2.0: 46.353e-3}[hours], abs=1e-6)
+    assert found["field.infiltrated"][-1] / 100.0 == approx(exact, rel=1e-4)
+
+
+def test_green_ampt_ponds_when_its_capacity_falls_to_the_rain():
+    found = fvsolve.run(
+        field(640.0, {"courant": None, "step": 0.5}, every=0.5, rain="50 mm/h", infiltration=GREEN_AMPT)
+    )
+    first = found.t[np.argmax(found["field.volume"] > 1e-7)]  # 1e-9 m
+    assert first == approx(610.1, abs=1.0)
+
+
+@pytest.mark.in_turn
+@pytest.mark.parametrize("method", BY_METHOD)
+def test_horton_is_its_integral(method):
+    numerics = (
+        {"courant": None, "method": method}
+        | BY_METHOD[method]
+        | ({"rtol": 1e-8} if "rtol" in BY_METHOD[method] else {})
+    )
+    numerics |= {"step": 1.0} if method == "tr-bdf2" else {}
+    found = fvsolve.run(field(7200.0, numerics, rain="70 mm/h", infiltration=HORTON))
+    k, first, last = 2.0 / 3600.0, 60 * MM_PER_HOUR, 10 * MM_PER_HOUR  # the rain is always above the capacity
+    exact = last * 7200.0 + (first - last) / k * (1.0 - math.exp(-k * 7200.0))
+    # at first, water must stand for the excess of the capacity over the share h / tau of the depth
+    assert found["field.infiltrated"][-1] / 100.0 == approx(exact, rel=1e-6)
+
+
+def test_a_constant_capacity_takes_no_more_than_the_rain():
+    for rate, taken in (("20 mm/h", 20.0), ("80 mm/h", 50.0)):
+        soil = {"model": "constant", "rate": rate}
+        found = fvsolve.run(field(3600.0, rain="50 mm/h", infiltration=soil))
+        assert found["field.infiltrated"][-1] == approx(100.0 * taken * 1e-3, rel=1e-9)
+        assert found["field.infiltration"][-1] == approx(100.0 * taken * MM_PER_HOUR, rel=1e-9)
+        assert found["field.rain"][-1] == approx(100.0 * INTENSITY, rel=1e-15)
+
+
+STORM = {"time": ["0 s", "20 s", "60 s", "90 s"], "value": ["0 mm/h", "900 mm/h", "100 mm/h", "0 mm/h"]}
+HILLS = "0.3*sin(1.7*x)*cos(2.3*y) + 0.04*x"
+SOILS = {
+    "none": {}, "constant": {"infiltration": {"model": "constant", "rate": "1e-5*(2 + sin(x))"}},
+    "horton": {"infiltration": HORTON}, "green-ampt": {"infiltration": GREEN_AMPT},
+}  # fmt: skip
+OPEN = {"out": {"side": "east", "boundary": "critical"}}
+
+
+@pytest.mark.in_turn
+@pytest.mark.parametrize("soil", SOILS)
+@pytest.mark.parametrize("mesh", ["grid", "triangles"])
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
+def test_a_storm_on_dry_rough_ground_keeps_its_balance_and_depths_above_zero(scheme, mesh, soil, tmp_path):
+    sides = ("east",)
+    case = field(120.0, {"scheme": scheme}, OPEN, cells=[12, 10], bed=HILLS, manning=0.03, rain=STORM, **SOILS[soil])
+    if mesh == "triangles":
+        case = on_triangles(case, sides, tmp_path)
+    found = fvsolve.run(case)
+    mass = found.summary["ledgers"]["mass"]
+    rained = 1e-3 * mass["by_node"]["field.rain"]
+    by_hand = 100.0 * (450.0 * 20.0 + 500.0 * 40.0 + 50.0 * 30.0) * MM_PER_HOUR
+    assert mass["relative"] < 1e-12 and rained == approx(by_hand, rel=1e-12)
+    assert found["field.rained"][-1] == approx(rained, rel=1e-12)
+    assert found["field.infiltrated"][-1] == approx(-1e-3 * mass["by_node"].get("field.infiltration", 0.0), rel=1e-12)
+    model, state = ended(case)
+    assert (model.basins[0].depth + model.basins[0].deviations(state.y)[0]).min() > -1e-15
+
+
+def on_triangles(case: dict, sides, folder) -> dict:
+    """The same case with triangles."""
+    basin = dict(case["nodes"]["field"])
+    size = basin.pop("size")
+    del basin["cells"]
+    points, cells = triangles(size, 1.0)
+    write(folder / "t.msh", points, cells.tolist(), on_sides(points, boundary(cells), size, sides))
+    patches = {
+        name: {key: value for key, value in patch.items() if key != "side"} for name, patch in basin["patches"].items()
+    }
+    patches = {side: patches["out"] for side in sides}
+    return case | {"nodes": {"field": basin | {"mesh": {"file": str(folder / "t.msh")}, "patches": patches}}}
+
+
+@pytest.mark.parametrize("soil", SOILS)
+@pytest.mark.parametrize("threads", [2, 3])
+def test_any_number_of_threads_gives_the_bits_of_one(threads, soil):
+    case = field(30.0, {}, OPEN, cells=[12, 24], bed=HILLS, manning=0.03, rain=STORM, **SOILS[soil])
+    case["output"]["probes"] = ["field.out.flow", "field.rained", "field.depth@3,4"]
+    one, more = (fvsolve.run(case, threads=count) for count in (1, threads))
+    assert all((one[probe] == more[probe]).all() for probe in one.probes)
+    assert more.summary["threads"] == (threads if soil == "none" else 1)
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
+def test_no_rain_and_a_tight_soil_move_not_a_bit(scheme):
+    soil = {"model": "constant", "rate": 0.0}
+    model = model_of(
+        field(1.0, {"scheme": scheme}, cells=[12, 10], level=0.1, bed=HILLS, rain="0 mm/h", infiltration=soil)
+    )
+    dydt, out = model.evaluate(0.0, np.zeros(model.y_size))
+    assert not dydt.any() and not out[model.layout["supply"] :][: model.ledgers].any()
+
+
+def test_a_resumed_run_has_the_bits_and_the_balance_of_a_whole_one(tmp_path):
+    numerics = {"courant": None, "step": 0.0625}
+    case = field(90.0, numerics, OPEN, cells=[12, 10], bed=HILLS, manning=0.03, rain=STORM, infiltration=GREEN_AMPT)
+    whole = fvsolve.run(case)
+    fvsolve.run(case, {"numerics.end": 45.0}, out=tmp_path / "run")
+    rest = fvsolve.run(case, out=tmp_path / "run", resume=True)
+    assert rest["field.infiltrated"][-1] == whole["field.infiltrated"][-1] > 0.0
+    assert rest.summary["ledgers"]["mass"]["relative"] < 1e-12
+
+
+def test_infiltration_of_standing_water_is_that_of_solve_ivp():
+    """h' = -f, F' = f with f = min(K (1 + S / F), h / 10 s) : water that stands at the start soaks in too."""
+    found = fvsolve.run(field(900.0, {"courant": None, "step": 0.5}, every=30.0, level=0.01, infiltration=GREEN_AMPT))
+
+    def rates(t, y):
+        taken = min(CONDUCTIVITY * (1.0 + SUCTION * DEFICIT / max(y[1], 1e-300)), max(y[0], 0.0) / 10.0)
+        return [-taken, taken]
+
+    exact = solve_ivp(rates, (0.0, 900.0), [0.01, 0.0], method="LSODA", rtol=1e-10, atol=1e-14, t_eval=found.t)
+    assert found["field.infiltrated"] / 100.0 == approx(exact.y[1], rel=2e-4, abs=1e-8)
+
+
+FAULTS = {
+    "rate is missing": {"infiltration": {"model": "constant"}},
+    "which has rate": {"infiltration": {"model": "constant", "rate": 0.0, "decay": 1.0}},
+    "no model named": {"infiltration": {"model": "philip"}},
+    "at least 0": {"infiltration": GREEN_AMPT | {"suction": "-1 mm"}},
+    "between 0 and 1": {"infiltration": GREEN_AMPT | {"deficit": 1.4}},
+    "expected no values below 0": {"infiltration": {"model": "constant", "rate": "1e-6*(x - 5)"}},
+    "expected 0 to 1": {"infiltration": GREEN_AMPT | {"deficit": "0.2*x"}},
+    "is below `final`": {"infiltration": HORTON | {"final": "70 mm/h"}},
+    "rain: .* at least 0": {"rain": "-1 mm/h"},
+    "not supported for a basin with a moving wall": {
+        "rain": "1 mm/h", "patches": {"wall": {"side": "west", "travel": 0.0}}
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", FAULTS)
+def test_rain_and_soil_that_cannot_be_are_named(text):
+    with pytest.raises(fvsolve.FvsolveError, match=text):
+        fvsolve.load(field(1.0, **FAULTS[text]))
+
+
+def test_scalars_cannot_infiltrate():
+    case = field(1.0, infiltration=GREEN_AMPT) | {"scalars": {"dye": {}}}
+    with pytest.raises(fvsolve.FvsolveError, match=r"field\.infiltration: .* not the scalars in it"):
+        fvsolve.load(case)
+
+
+def test_rain_above_a_cloudburst_gets_a_note():
+    assert any("cloudburst" in notice.text for notice in fvsolve.load(field(1.0, rain="900 mm/h")).notices)
+    assert not fvsolve.load(field(1.0, rain="90 mm/h")).notices
+
+
+def test_a_case_that_rain_fills_starts_dry_without_a_notice():
+    assert not [notice for notice in model_of(field(1.0, rain="90 mm/h")).warnings if "dry" in notice.text]
+    assert [notice for notice in model_of(field(1.0)).warnings if "dry" in notice.text]
