@@ -578,7 +578,7 @@ BASIN = record(
     fastest=f8,  # rate of a given velocity [1/s]
     period=f8,  # period of the reversal of a given velocity [s]; 0 for none
     friction=i8,  # NO_DRAG, MANNING or DARCY
-    roughness=f8,  # Manning's n, or a friction factor
+    roughness=i8,  # offset in `plane` of Manning's n or the friction factor of cells
     held=f8,  # bound of the rate of friction [1/s]; infinity if it does not limit steps
     damped=i8,  # 1 if rates are divided by 1 + h r of friction, which then does not limit steps
     unsplit=f8,  # rate of its cells for the step limit over the rate from the kernels
@@ -633,7 +633,7 @@ PATCHES = record(
     depth=i8,  # schedule of the depth of supercritical inflow; -1 for none
     numbers=i8,  # offset in `plane` of the levels of a rating, then of its flows
     points=i8,  # number of these levels
-    conveyance=f8,  # sqrt(slope) / n of uniform flow [m^(1/3)/s]
+    conveyance=i8,  # offset in `plane` of sqrt(slope) / n of uniform flow at its faces [m^(1/3)/s]
     rest=f8,  # level at rest above the elevation of the basin [m]
     lowest=f8,  # lowest bed of its cells above the level at rest, at least 0 [m]
 )

@@ -318,6 +318,27 @@ class SpatialFieldKey(Value):
         return f"{Quantity(self.dimension, self.range).takes}; formula"
 
 
+@dataclass(frozen=True)
+class NumberOrField(Value):
+    """Value of a case file for a number, or a field over a plane as a formula of x and y or points of a file."""
+
+    schema: ClassVar[dict[str, Any]] = {"type": ["number", "string", "object"]}
+
+    number: Quantity
+    about: str = ""
+    changes: str = PROFILE
+
+    def read(self, given: Any, setting: ReadContext) -> float | SpatialField:
+        if isinstance(given, float):
+            return self.number.read(given, setting)
+        found = SpatialFieldKey(self.number.dimension, self.about, self.number.range).read(given, setting)
+        return found.given if isinstance(found.given, float) else found
+
+    @property
+    def takes(self) -> str:
+        return f"{self.number.takes}; formula"
+
+
 def read_points(path: Path, dimension: str) -> np.ndarray:
     """Points of a CSV file : float64[n, 3] with x [m], y [m] and the value [SI].
 

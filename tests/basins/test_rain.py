@@ -257,3 +257,39 @@ def test_rain_above_a_cloudburst_gets_a_note():
 def test_a_case_that_rain_fills_starts_dry_without_a_notice():
     assert not [notice for notice in model_of(field(1.0, rain="90 mm/h")).warnings if "dry" in notice.text]
     assert [notice for notice in model_of(field(1.0)).warnings if "dry" in notice.text]
+
+
+def test_a_v_shaped_catchment_has_the_flow_and_the_store_of_kinematic_waves():
+    """Two planes of 800 m by 1000 m, slope 0.05, n 0.015, drain into a channel of 20 m, slope 0.02, n 0.15.
+
+    (After Overton and Brakensiek.) The planes follow the slope of the channel, so their water runs obliquely, with
+    q = i s after the path s. At their lower end it leaves; the channel takes what crosses its banks.
+    """
+    rate, long, across, along = 10.8 * MM_PER_HOUR, 1000.0, 0.05, 0.02
+    sides = {"left": [0.0, 800.0], "out": [800.0, 820.0], "right": [820.0, 1620.0]}
+    patches = {name: {"side": "north", "span": span, "normal_slope": along} for name, span in sides.items()}
+    basin = {"size": [1620.0, long], "cells": [81, 20], "bed": "0.02*(1000 - y) + 0.05*max(abs(x - 810) - 10, 0)",
+             "manning": "where(abs(x - 810) < 10, 0.15, 0.015)", "rain": "10.8 mm/h", "patches": patches}  # fmt: skip
+    case = field(5400.0, **basin)
+    case["output"]["probes"] += ["field.out.flow"]
+    found = fvsolve.run(case)
+    slope = math.hypot(across, along)
+    d, y = np.meshgrid((np.arange(800) + 0.5), (np.arange(1000) + 0.5))  # distance from the ridge and along the channel
+    path = np.minimum(d * slope / across, y * slope / along)
+    planes = 2.0 * np.sum((rate * path * 0.015 / math.sqrt(slope)) ** 0.6)
+    bank = rate * np.minimum(800.0 * slope / across, y[:, 0] * slope / along) * across / slope
+    flow = np.cumsum(2.0 * bank + 20.0 * rate)
+    channel = np.sum(20.0 * (flow / 20.0 * 0.15 / math.sqrt(along)) ** 0.6)
+    assert found.ok and -found["field.out.flow"][-1] == approx(flow[-1], rel=0.02)
+    assert found["field.volume"][-1] == approx(planes + channel, rel=0.02)
+
+
+def test_a_field_of_manning_with_one_value_gives_the_bits_of_a_number():
+    both = [field(60.0, {}, OPEN, cells=[12, 10], bed=HILLS, manning=n, rain=STORM) for n in (0.03, "0.03 + 0*x")]
+    one, other = (fvsolve.run(case) for case in both)
+    assert (one["field.volume"] == other["field.volume"]).all()
+
+
+def test_a_field_of_manning_below_zero_is_named():
+    with pytest.raises(fvsolve.FvsolveError, match=r"manning: is .* expected no values below 0"):
+        fvsolve.load(field(1.0, manning="0.01*(x - 5)"))

@@ -46,6 +46,7 @@ class Water:
         rate = grid_rates(grid, 0, self.ny, (a[0], a[1], a[2]), flows, self.work, (b[0], b[1], b[2]), None, None)
         if self.friction is not None:
             law, c = self.friction
+            c = np.full(self.plan[0].size, c)
             rate += add_capped_friction(law, G, c, 1e3, self.plan[0], a[0], (a[1], a[2]), (a[1], a[2]), (b[1], b[2]))
         return rate
 
@@ -314,7 +315,7 @@ def test_flow_down_a_slope_nears_the_normal_one(law, coefficient):
 def test_friction_of_films_is_bounded_and_takes_no_more_than_there_is():
     h = np.array([0.0, 1e-12, 1e-6, 1e-4, 1e-2, 1.0])
     q, none, out = h * 2.0, np.zeros(6), np.zeros((2, 6))
-    rate = add_capped_friction(MANNING, G, 0.03, 50.0, none, h, (q, -q), (q, -q), (out[0], out[1]))
+    rate = add_capped_friction(MANNING, G, np.full(6, 0.03), 50.0, none, h, (q, -q), (q, -q), (out[0], out[1]))
     assert 90.0 < rate <= 100.0 and np.array_equal(out[0], -out[1]) and not out[:, 0].any()
     assert np.all(-out[0] <= 50.0 * q)
     assert -out[0, 5] == approx(G * 0.03**2 * math.hypot(2.0, 2.0) * 2.0, rel=1e-3)

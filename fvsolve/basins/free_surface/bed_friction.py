@@ -33,23 +33,23 @@ def drag_per_flow(law, g, value, depth):
 
 
 @njit
-def add_friction(law, g, value, depth0, dh, flows, contents, rates):
+def add_friction(law, g, values, depth0, dh, flows, contents, rates):
     """Add the friction -r q to the rates of n cells; r is the decay rate of the flow [1/s], see `drag_per_flow`.
 
-    law, value : MANNING and n [s/m^(1/3)], or DARCY and f [-]
+    law, values : MANNING and n in cells [s/m^(1/3)], or DARCY and f in cells [-]
     depth0, dh : depth at rest and deviation from it [m]; flows : unit flows along x and y, two arrays
     contents : states q along x and y that have the rates `rates`: unit flows, or, with moving walls, unit flows times
     present over undeformed area
     """
     (qx, qy), (content_x, content_y), (rate_x, rate_y) = flows, contents, rates
     for i in range(dh.size):
-        rate = drag_per_flow(law, g, value, depth0[i] + dh[i]) * sqrt(qx[i] * qx[i] + qy[i] * qy[i])
+        rate = drag_per_flow(law, g, values[i], depth0[i] + dh[i]) * sqrt(qx[i] * qx[i] + qy[i] * qy[i])
         rate_x[i] -= rate * content_x[i]
         rate_y[i] -= rate * content_y[i]
 
 
 @njit
-def add_capped_friction(law, g, value, cap, depth0, dh, flows, contents, rates):
+def add_capped_friction(law, g, values, cap, depth0, dh, flows, contents, rates):
     """Add friction with a capped decay rate of the flow, r / (1 + r / cap) [1/s]; return twice its greatest value.
 
     An error of the flow decays at the returned rate, which limits explicit steps. Other arguments as for `add_friction`
@@ -57,7 +57,7 @@ def add_capped_friction(law, g, value, cap, depth0, dh, flows, contents, rates):
     (qx, qy), (content_x, content_y), (rate_x, rate_y) = flows, contents, rates
     most = 0.0
     for i in range(dh.size):
-        rate = drag_per_flow(law, g, value, depth0[i] + dh[i]) * sqrt(qx[i] * qx[i] + qy[i] * qy[i])
+        rate = drag_per_flow(law, g, values[i], depth0[i] + dh[i]) * sqrt(qx[i] * qx[i] + qy[i] * qy[i])
         rate *= cap / (cap + rate + TINY)
         most = max(most, rate)
         rate_x[i] -= rate * content_x[i]
@@ -66,7 +66,7 @@ def add_capped_friction(law, g, value, cap, depth0, dh, flows, contents, rates):
 
 
 @njit
-def damp_flows(law, g, value, h, depth0, dh, flows, contents, rates, quick):
+def damp_flows(law, g, values, h, depth0, dh, flows, contents, rates, quick):
     """Divide the rates of unit flows q, which include friction -r q, by 1 + h R, and write h R to `quick`.
 
     h is the time step, and R = r + r'. Without friction, a step would lead to the flow q + h (rate + r q). Implicit
@@ -77,7 +77,7 @@ def damp_flows(law, g, value, h, depth0, dh, flows, contents, rates, quick):
     (qx, qy), (content_x, content_y), (rate_x, rate_y) = flows, contents, rates
     quick_x, quick_y = quick
     for i in range(dh.size):
-        per = drag_per_flow(law, g, value, depth0[i] + dh[i])
+        per = drag_per_flow(law, g, values[i], depth0[i] + dh[i])
         flow, content = qx[i] * qx[i] + qy[i] * qy[i], content_x[i] * content_x[i] + content_y[i] * content_y[i]
         rate = per * sqrt(flow)
         stretch = 1.0 if flow == content else flow / (content + TINY)  # undeformed area over present area, squared

@@ -10,7 +10,7 @@ friction.
 
 import math
 from collections.abc import Iterator
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +29,7 @@ from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.dtypes import DARCY, MANNING
 from fvsolve.kernels.rhs_assembly import RhsTerms
-from fvsolve.parts.formula import means, samples
+from fvsolve.parts.formula import SpatialField, means, samples
 from fvsolve.steppers.analysis.stability_properties import in_euler_steps
 from fvsolve.steppers.tableau import AUTO, METHODS
 
@@ -201,10 +201,10 @@ def fast_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
     flow = np.where(depth > DRY_DEPTH, np.hypot(y[1], y[2]) * basin.mesh.area, 0.0)
     if not flow.any():
         return 0.0, math.nan, math.nan
-    law, value = (DARCY, part.factor) if part.manning is None else (MANNING, part.manning)
+    law = DARCY if part.manning is None else MANNING
     rate, zeros, gravity = np.zeros(depth.size), np.zeros(depth.size), basin.case.gravity
     flows, contents = (y[1], y[2]), (zeros - 1.0, zeros)
-    add_friction(law, gravity, value, depth, zeros, flows, contents, (rate, zeros))
+    add_friction(law, gravity, basin.roughness, depth, zeros, flows, contents, (rate, zeros))
     error = np.sqrt(1.0 + rate / RATE_CAP) - 1.0
     return tuple(float(np.average(values, weights=flow)) for values in (error, depth, rate))
 
@@ -360,7 +360,7 @@ class FreeSurfaceRows(BasinRows):
             row["numbers"] = draft.to_plane(np.array([stated.rating.level, stated.rating.flow]))
             row["points"] = len(stated.rating.level)
         if stated.normal_slope is not None:
-            row["conveyance"] = math.sqrt(stated.normal_slope) / self.part.manning
+            row["conveyance"] = draft.to_plane(math.sqrt(stated.normal_slope) / self.roughness[behind])
 
     def second_cells(self, patch: str, behind: np.ndarray) -> np.ndarray:
         """Cells next inside the cells `behind` the faces of a patch; the same cells on a mesh, and with upwind."""
@@ -381,7 +381,7 @@ class FreeSurfaceRows(BasinRows):
         row["rest"] = weight * (part.level + (part.elevation or 0.0))
         if part.manning is not None or part.factor is not None:
             row["friction"] = rec.DARCY if part.manning is None else rec.MANNING
-            row["roughness"] = part.factor if part.manning is None else part.manning
+            row["roughness"] = draft.to_plane(self.roughness)
             row["held"], row["damped"] = self.rate_cap, self.damped
         row["unsplit"] = COURANT_FACTOR
         if self.is_grid:
@@ -415,6 +415,12 @@ class FreeSurfaceRows(BasinRows):
     def rubs(self) -> bool:
         """True if the bed has friction."""
         return self.part.physics_type.has_friction(self.part)
+
+    @cached_property
+    def roughness(self) -> np.ndarray:
+        """Manning's n, or the friction factor, in cells : float64[n]."""
+        stated = self.part.factor if self.part.manning is None else self.part.manning
+        return self.formula(stated) if isinstance(stated, SpatialField) else np.full(self.n, stated)
 
     @property
     def damped(self) -> bool:

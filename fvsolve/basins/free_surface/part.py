@@ -6,7 +6,7 @@ import numpy as np
 
 from fvsolve.errors import listing
 from fvsolve.parts.basin import VELOCITY_FIELDS, Physics, VelocityStart
-from fvsolve.parts.formula import SpatialField, SpatialFieldKey, samples
+from fvsolve.parts.formula import NumberOrField, SpatialField, SpatialFieldKey, samples
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import Nested, Table
 from fvsolve.parts.value import SHAPE, VALUE, Choice, Quantity, UsualRange, anything, between, nonnegative
@@ -104,10 +104,10 @@ class FreeSurface(Physics, name="free-surface"):
         SpatialFieldKey("length", "height of the bed of a free surface above the elevation [m]; default 0"),
     ] = None
     manning: Annotated[
-        float | None,
-        Quantity(
-            "number", nonnegative, "Manning's n of the bed of a free surface [s/m^(1/3)]; default: no friction",
-            UsualRange(0.005, 0.5, "glass to dense brush"), VALUE,
+        float | SpatialField | None,
+        NumberOrField(
+            Quantity("number", nonnegative, usual=UsualRange(0.005, 0.5, "glass to dense brush")),
+            "Manning's n of the bed of a free surface [s/m^(1/3)]; default: no friction", VALUE,
         ),
     ] = None  # fmt: skip
     factor: Annotated[
@@ -138,13 +138,13 @@ class FreeSurface(Physics, name="free-surface"):
 
     @classmethod
     def value_faults(cls, basin, place, shape, mesh):
-        if place[0] != "infiltration" or shape is None:
+        if place[0] not in ("infiltration", "manning") or shape is None:
             return
-        values, greatest = samples(shape, mesh), 1.0 if place[1] == "deficit" else np.inf
+        values, greatest = samples(shape, mesh), 1.0 if place[-1] == "deficit" else np.inf
         if not (values.min() >= 0.0 and values.max() <= greatest):
             worst = values.min() if values.min() < 0.0 else values.max()
             yield f"is {worst:g} in a cell; expected {'0 to 1' if greatest == 1.0 else 'no values below 0'}"
-        elif place[1] == "initial" and (values < samples(basin.infiltration.final, mesh)).any():
+        elif place[-1] == "initial" and (values < samples(basin.infiltration.final, mesh)).any():
             yield "is below `final` in a cell; expected a capacity that decreases"
 
     @classmethod

@@ -254,12 +254,12 @@ def level_of_patch(tables, patch, g, faces, t):
 
 
 @njit
-def close_face(patch, g, z, h, e, u):
-    """(inflow per width [m2/s], depth [m]) at a face of a patch with the level z; h, e, u : as for `face_flow`"""
+def close_face(plane, patch, m, g, z, h, e, u):
+    """(inflow per width [m2/s], depth [m]) at face m of a patch with the level z; h, e, u : as for `face_flow`"""
     if patch["closure"] == CRITICAL:
         q, _, depth = face_flow(g, e - h, h, e, u)
     elif patch["closure"] > CRITICAL:
-        q, _, depth = face_flow(g, uniform_depth(g, h, e, u, patch["conveyance"]), h, e, u)
+        q, _, depth = face_flow(g, uniform_depth(g, h, e, u, plane[patch["conveyance"] + m]), h, e, u)
     else:
         q, _, depth = face_flow(g, z, h, e, u)
     return q, depth
@@ -279,7 +279,7 @@ def close_patch(tables, patch, t, y, out):
     given = schedule_value(tables, patch["depth"], t) if patch["depth"] >= 0 else 0.0
     for m in range(h.size):
         k = tables.integers[patch["ring"] + m]
-        q, depth = close_face(patch, g, z, h[m], e[m], u[m])
+        q, depth = close_face(tables.plane, patch, m, g, z, h[m], e[m], u[m])
         if given > 0.0:
             depth = given
         rows[FLOW, k], rows[SURFACE, k] = q, e[m] + (depth - h[m])

@@ -51,7 +51,7 @@ def water_power(st, basin, plane, y, dydt, rows):
     n, o = basin["n"], basin["y"]
     depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
     weight, rest, area = st["rho"] * st["gravity"], rest_potential(st, basin), plane[basin["area"] :]
-    drawn = plane[basin["drawn"] :]
+    drawn, rough = plane[basin["drawn"] :], plane[basin["roughness"] :]
     friction, rate = 0.0, 0.0
     for i in range(n):
         d, qx, qy = y[o + i], y[o + n + i], y[o + 2 * n + i]
@@ -61,19 +61,20 @@ def water_power(st, basin, plane, y, dydt, rows):
         level = rest + weight * (surface[i] + d) - 0.5 * st["rho"] * (u * u + v * v)
         kinetic = u * dydt[o + n + i] + v * dydt[o + 2 * n + i]
         rate += drawn[i] * (level * dydt[o + i] + st["rho"] * kinetic)
-        friction += area[i] * drag_power(st, basin, depth, sqrt(qx * qx + qy * qy), u * u + v * v)
+        friction += area[i] * drag_power(st, basin, rough[i], depth, sqrt(qx * qx + qy * qy), u * u + v * v)
     rows[2], rows[3] = friction, rate
 
 
 @njit
-def drag_power(st, basin, depth, flow, square):
+def drag_power(st, basin, roughness, depth, flow, square):
     """Power dissipated by bed friction per area [W/m2].
 
+    roughness : Manning's n or the friction factor of the cell
     depth : depth of the water [m]; flow : unit flow [m2/s]; square : square of the velocity [m2/s2]
     """
     if basin["friction"] == NO_DRAG:
         return 0.0
-    rate = drag_per_flow(basin["friction"], st["gravity"], basin["roughness"], depth) * flow
+    rate = drag_per_flow(basin["friction"], st["gravity"], roughness, depth) * flow
     return st["rho"] * depth * square * rate / (1.0 + rate / basin["held"])
 
 

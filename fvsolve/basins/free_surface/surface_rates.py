@@ -55,13 +55,13 @@ def add_bed_friction(tables, b, a, z, y, rates, out):
     """
     basin = tables.basins[b]
     n, o, seen = basin["n"], basin["y"], deviations_of(basin, tables.seen, y)
-    law, g, value = basin["friction"], tables.settings[0]["gravity"], basin["roughness"]
+    law, g, values = basin["friction"], tables.settings[0]["gravity"], tables.plane[basin["roughness"] + a :]
     depths, dh = tables.plane[basin["plan"] + a :], seen[o + a : o + z]
     flows, contents, added = flows_of(seen, o, n, a, z), flows_of(y, o, n, a, z), (rates[1][a:z], rates[2][a:z])
     if basin["held"] == inf:
-        add_friction(law, g, value, depths, dh, flows, contents, added)
+        add_friction(law, g, values, depths, dh, flows, contents, added)
     else:
-        rate = add_capped_friction(law, g, value, basin["held"], depths, dh, flows, contents, added)
+        rate = add_capped_friction(law, g, values, basin["held"], depths, dh, flows, contents, added)
         out[RATE] = max(out[RATE], rate)
 
 
@@ -77,10 +77,10 @@ def damp_stages(h, y, rates, quick, handle):
         basin = tables.basins[b]
         if basin["kind"] == OWN_CODE and basin["damped"] == 1:
             (a, z), n, o, seen = band_cells(tables, b), basin["n"], basin["y"], deviations_of(basin, tables.seen, y)
-            depths = tables.plane[basin["plan"] + a :]
+            depths, values = tables.plane[basin["plan"] + a :], tables.plane[basin["roughness"] + a :]
             flows, contents, damped = flows_of(seen, o, n, a, z), flows_of(y, o, n, a, z), flows_of(rates, o, n, a, z)
             damp_flows(
-                basin["friction"], g, basin["roughness"], h, depths, seen[o + a : o + z], flows, contents, damped,
+                basin["friction"], g, values, h, depths, seen[o + a : o + z], flows, contents, damped,
                 flows_of(quick, o, n, a, z),
             )  # fmt: skip
 
