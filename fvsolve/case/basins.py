@@ -321,7 +321,7 @@ class BasinFields:
     """Mesh of a basin, and its fields that probes can record (name -> dimension).
 
     has_maxima : True if its greatest values in cells can be recorded; what : text about the basin, for messages
-    quantities : quantities of the whole basin (name -> dimension)
+    quantities : quantities of the whole basin (name -> dimension); gauges : named points [m]
     """
 
     fields: dict[str, str]
@@ -329,10 +329,11 @@ class BasinFields:
     has_maxima: bool = False
     what: str = ""
     quantities: dict[str, str] = field(default_factory=dict)
+    gauges: dict[str, tuple[float, float]] = field(default_factory=dict)
     kind: ClassVar[str] = "basin"
 
     def point(self, label: str, place: str | None) -> tuple[float, float]:
-        """Point (x, y) [m] from the text `place` after "@" in a probe, such as "3.5,1.2".
+        """Point (x, y) [m] from the text `place` after "@" in a probe, such as "3.5,1.2", or the name of a gauge.
 
         label : text of the probe before "@", for messages; place : None if the probe has no "@"
         Raises ValueError if the text is not a point inside the mesh.
@@ -340,10 +341,14 @@ class BasinFields:
         middle = ",".join(f"{value:.4g}" for value in self.mesh.centre[len(self.mesh.centre) // 2])
         if place is None:
             raise ValueError(f'a probe of a basin needs a point, for example "{label}@{middle}"')
+        if place.strip() in self.gauges:
+            return self.gauges[place.strip()]  # a point outside is a fault of the gauge
         try:
             x, y = (float(part) for part in place.split(","))
         except ValueError:
-            raise ValueError(f'"@{place}" is not a point x,y [m]; expected for example "@{middle}"') from None
+            near = did_you_mean(place.strip(), self.gauges)
+            text = f'"@{place}" is not a point x,y [m], or the name of a gauge of this basin{near}'
+            raise ValueError(f'{text}; expected for example "@{middle}"') from None
         return self.inside(x, y)
 
     def inside(self, x: float, y: float) -> tuple[float, float]:
@@ -429,6 +434,25 @@ def output_faults(output: Output, nodes: dict[str, Any]) -> Faults:
         yield from _basin_faults(("output", "maxima", k), name, nodes, True)
     if output.lines and output.fields == 0:
         yield ("output", "lines"), "are written with every frame, but `fields` is 0; expected `fields = 1` or more"
+
+
+def add_gauges(output: Output, nodes: dict[str, Any]) -> Faults:
+    """Add the gauges of `[output]` to their basins; yield their faults (key path, message).
+
+    nodes : as for `output_faults`
+    """
+    for name, gauge in output.gauges.items():
+        key, pool = ("output", "gauges", name), nodes.get(gauge.basin)
+        yield from ((key, text) for text in name_faults(name))
+        yield from _basin_faults((*key, "basin"), gauge.basin, nodes, False)
+        if name in nodes:
+            yield key, f"{name} is also the name of a node; expected another name"
+        if isinstance(pool, BasinFields):
+            pool.gauges[name] = gauge.at
+            try:
+                pool.inside(*gauge.at)
+            except ValueError as error:
+                yield (*key, "at"), str(error)
 
 
 def _basin_faults(key: tuple, name: Any, nodes: dict[str, Any], recorded: bool) -> Faults:

@@ -305,6 +305,7 @@ def read_output(reading: Reading, numerics: Numerics | None, kinds: dict[str, An
     """Table `[output]` with its probes and its interval of rows; None if it is faulty. kinds : as for `read_probe`"""
     output = reading.table("output", Output)
     valid = output if output is not None else reading.valid_keys("output", Output)
+    reading.add(basins.add_gauges(valid, kinds["nodes"]))
     if valid.probes is None:
         probes = default_probes(kinds)
     else:

@@ -402,6 +402,13 @@ class RunUp(Table):
         return 0.0 if self.about is not None else math.dist(self.from_, self.to)
 
 
+class Gauge(Table):
+    """Table of a named point of a basin, at which probes may record fields: `BASIN.depth@GAUGE`."""
+
+    basin: Annotated[str, val.Text("name of the basin", VALUE)]
+    at: Annotated[tuple[float, float], val.Rows("length", length=2, about="x, y of the point [m]", changes=VALUE)]
+
+
 class Output(Table):
     """Table `[output]`: recorded quantities, output times and units."""
 
@@ -428,6 +435,7 @@ class Output(Table):
     run_up: Annotated[
         Any, NamedTables(RunUp, "named run-ups: { shore = { basin, about } } or { beach = { basin, from, to } }")
     ] = {}
+    gauges: Annotated[Any, NamedTables(Gauge, "named points of basins for probes: { kerb = { basin, at } }")] = {}
     units: Annotated[dict[str, str], OutputUnits()] = {}
 
     @property

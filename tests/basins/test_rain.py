@@ -293,3 +293,30 @@ def test_a_field_of_manning_with_one_value_gives_the_bits_of_a_number():
 def test_a_field_of_manning_below_zero_is_named():
     with pytest.raises(fvsolve.FvsolveError, match=r"manning: is .* expected no values below 0"):
         fvsolve.load(field(1.0, manning="0.01*(x - 5)"))
+
+
+GAUGES = {"kerb": {"basin": "field", "at": ["3 m", 4.0]}}
+
+
+def gauged(gauges, probes) -> dict:
+    return field(1.0) | {"output": {"gauges": gauges, "probes": probes, "every": 0.5}}
+
+
+def test_a_gauge_names_a_point():
+    found = fvsolve.run(gauged(GAUGES, ["field.depth@kerb", "field.depth@3,4"]), {"nodes.field.bed": "0.2*x - 3"})
+    assert (found["field.depth@kerb"] == found["field.depth@3,4"]).all()
+
+
+@pytest.mark.parametrize(
+    "text, gauges",
+    {
+        'did you mean "kerb"': GAUGES | {"kerbs": GAUGES["kerb"]},
+        "lies outside the mesh": {"kirb": {"basin": "field", "at": [30, 4]}},
+        "no basin named": {"kirb": {"basin": "fild", "at": [3, 4]}},
+        "is also the name of a node": {"kirb": GAUGES["kerb"], "field": GAUGES["kerb"]},
+        "at is missing": {"kirb": {"basin": "field"}},
+    }.items(),
+)
+def test_a_gauge_that_cannot_be_is_named(text, gauges):
+    with pytest.raises(fvsolve.FvsolveError, match=text):
+        fvsolve.load(gauged(gauges, ["field.depth@kirb"]))
