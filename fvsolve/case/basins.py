@@ -19,9 +19,8 @@ from fvsolve.case.sections import Output
 from fvsolve.errors import MeshError, article, did_you_mean, listing
 from fvsolve.exact.solution import value
 from fvsolve.fluid.laws import law_names
-from fvsolve.parts import Basin
-from fvsolve.parts.basin import BasinStart, MovingWall, PatchNode, Physics
 from fvsolve.parts.formula import SpatialField, means, samples
+from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.value import ReadContext, ValueFault
 from fvsolve.units import show
 
@@ -273,6 +272,7 @@ def crossing_faults(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
     from fvsolve.mesh.mesh import MeshPoints
+    from fvsolve.parts.basin import Basin, PatchNode
 
 Faults = Iterator[tuple[tuple, str]]
 
@@ -369,6 +369,8 @@ def fault_keys(place: str) -> tuple:
 
     It is () if the place does not begin with a key of a basin.
     """
+    from fvsolve.parts.basin import Basin
+
     path = [int(word) if word.isdigit() else word for word in re.split(r"[.\[\]]", place) if word]
     return tuple(path) if path and path[0] in Basin.keys() else ()
 
@@ -402,6 +404,8 @@ def _basin_faults(key: tuple, name: Any, nodes: dict[str, Any], recorded: bool) 
         near = did_you_mean(str(name), pools) or f"; basins are {listing(pools) or 'none'}"
         yield key, f"no basin named {show(name)}{near}"
     elif pool is not None and recorded and not pool.has_maxima:
+        from fvsolve.parts.basin import Physics
+
         able = listing(show(kind) for kind, physics in Physics.kinds.items() if physics.maxima)
         yield key, f"{pool.what}; expected a basin with cells and the physics {able}"
 
@@ -433,6 +437,8 @@ def boundary_cells(mesh: Mesh, patch: str) -> np.ndarray:
 
 def place_kind(basin: Basin, patch: str) -> type[PatchNode]:
     """Class of the node that a patch forms for links: `MovingWall` or `PatchNode`."""
+    from fvsolve.parts.basin import MovingWall, PatchNode
+
     stated = basin.patches.get(patch)
     return MovingWall if stated is not None and stated.moves else PatchNode
 
@@ -486,7 +492,7 @@ def find_faults(
     meshes : meshes of basins by name; fluid : properties of the fluid, or None if it is faulty
     times : start and end of the run [s]; all_nodes : tables of all nodes, also of faulty nodes
     """
-    pools = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
+    pools = {name: node for name, node in nodes.items() if is_kind(node, "basin")}
     joined = {place for link in links.values() for place in link.ports.values()}
     for name, basin in pools.items():
         key = ("nodes", name)
@@ -515,7 +521,8 @@ def find_faults(
         shapes = [*own.formulas(basin, meshes[name])]
         if basin.start is not None:
             shapes += [
-                (("start", key_name), getattr(basin.start, key_name), None) for key_name in BasinStart.model_fields
+                (("start", key_name), getattr(basin.start, key_name), None)
+                for key_name in type(basin.start).model_fields
             ]
             for other in sorted(basin.start.model_fields_set - set(own.starts.model_fields)):
                 yield (*key, "start", other), f"does not apply to physics {show(basin.physics)}; leave this key out"

@@ -21,10 +21,11 @@ from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, 
 from fvsolve.case.validation_table import read_validation
 from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.fluid import follow_temperature, properties, specific_heat
-from fvsolve.parts import KINDS, Basin, Friction, Pipe, Scalar
+from fvsolve.parts import KINDS, Friction, Pipe, Scalar
 from fvsolve.parts import value as val
 from fvsolve.parts.carried_scalar import ZEROS
 from fvsolve.parts.control import Control
+from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.pipe.pipe_wall import OF_WALL
 from fvsolve.parts.schedule import Schedule, Scheduled, signal_fault
 from fvsolve.parts.table_model import read_keys
@@ -298,7 +299,7 @@ def check_unused_signals(reading: Reading) -> None:
 def has_cells(table: dict[str, Any]) -> bool:
     """True if a case has pipes or basins, or parts of unknown type. table : nested dicts of the case"""
     kinds = [kind for group in ("nodes", "links") for kind in part_reading.table_kinds(table, group).values()]
-    return not {Pipe, Basin, None}.isdisjoint(kinds)
+    return any(kind in (Pipe, None) or is_kind(kind, "basin") for kind in kinds)
 
 
 def read_output(reading: Reading, numerics: Numerics | None, kinds: dict[str, Any]) -> Output | None:
@@ -473,7 +474,7 @@ def is_self_contained(case: Case) -> bool:
     outer = case.signals or case.controls or case.scalars or case.compare or case.copies or case.equilibrium_nodes
     no_outer_input = not (chainage.placed(chainage.add_bends(case.raw)) or outer)
     exact_in_file = case.exact is None or "exact" in case.raw
-    return no_outer_input and exact_in_file and not any(isinstance(node, Basin) for node in case.nodes.values())
+    return no_outer_input and exact_in_file and not any(is_kind(node, "basin") for node in case.nodes.values())
 
 
 def is_number_key(raw: Any, keys: tuple) -> bool:

@@ -13,15 +13,19 @@ surface held flat the water has the inertia of an ideal fluid under a lid (Jouko
 Higher modes are left out: their water moves with the tank.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from fvsolve.case.bodies import point_inertia, poses
-from fvsolve.parts.body import Body, Joint
 from fvsolve.parts.formula import means, samples
 from fvsolve.parts.schedule import constant
+
+if TYPE_CHECKING:
+    from fvsolve.parts.body import Body, Joint
 
 MODES = 3  # modes along x, and along y
 ROUNDNESS = 1e-3  # allowed deviation of the corners of a circular outline, relative to the radius
@@ -253,6 +257,8 @@ def mode_bodies(name: str, basin: Any, mesh: Any, pose: Any, density: float, gra
     mass. In a cylinder the modes of one number along x and y share a mass, which slides along y on a massless body
     that slides along x. pose : pose at the start of the body that carries the basin
     """
+    from fvsolve.parts.body import Joint
+
     outline, turn, all_modes, result = outline_of(mesh), basin.rotation, modes_of(basin, mesh, density, gravity), {}
     bed = np.array(basin.place) + turn @ (*outline.middle, bed_of(basin, mesh))
     places = [bed + turn[:, 2] * item.height for item in all_modes]
@@ -312,6 +318,8 @@ def hidden_body(mass: float, inertia: np.ndarray, joint: Joint, centre: np.ndarr
     mass : may be negative [kg]; inertia : float64[3, 3]  about the centre of mass [kg m2]
     centre : centre of mass in the axes of the body [m]
     """
+    from fvsolve.parts.body import Body
+
     return Body.model_construct(
         mass=mass, inertia=tuple(map(tuple, inertia.tolist())), joint=joint, points={},
         centre_of_mass=tuple(np.asarray(centre).tolist()),

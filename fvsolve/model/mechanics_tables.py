@@ -1,6 +1,9 @@
 """Tables of masses, force elements, bodies, joints, points, and networks on bodies; closed chambers at the start."""
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,8 +13,11 @@ from fvsolve.case import bodies
 from fvsolve.case.bodies import free_joints
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.static_forces import DRIVES, MOTION, StaticForces, pin_rows, rounding
-from fvsolve.parts.body import Body
+from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.units import show
+
+if TYPE_CHECKING:
+    from fvsolve.parts.body import Body
 
 SMALL_PRESSURE = 1e5  # a small pressure, which sets the size of a small travel
 # [m] of masses without chambers, [m/s] of masses without stiffness, and of joints; [rad], [rad/s] of joints
@@ -223,7 +229,7 @@ def lower_bodies(draft) -> None:
     for i, (name, row) in enumerate(zip(draft.body_names, table, strict=True)):
         body = nodes[name]
         parent_name = bodies.carrier_of(body)[0]
-        row["parent"] = draft.body_names.index(parent_name) if isinstance(nodes.get(parent_name), Body) else -1
+        row["parent"] = draft.body_names.index(parent_name) if is_kind(nodes.get(parent_name), "body") else -1
         row["root"] = table[row["parent"]]["root"] if row["parent"] >= 0 else i
         fill_body(draft, name, body, row)
         row["freedom"] = len(paths)
