@@ -9,6 +9,7 @@ cells. The other ranks wait for a broadcast of a function to call and its argume
 """
 
 import base64
+import functools
 import html
 import re
 import zlib
@@ -28,6 +29,7 @@ FIELD_UNITS = {
 UNIT_XML = '<InformationKey name="UNITS_LABEL" location="vtkDataArray">{}</InformationKey>\n'
 VTK_TYPES = {"f": "Float", "i": "Int", "u": "UInt"}
 CELL_TYPES = {"line": 3, "triangle": 5, "quad": 9}  # type -> its number in VTK
+KEPT_BYTES = 65536  # size of arrays above which the compressed bytes are not kept
 ZLIB_LEVEL = 1  # higher levels take several times as long, for files that are little smaller
 VTU_HEAD = """<?xml version="1.0"?>
 <VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian" header_type="UInt64" \
@@ -237,13 +239,19 @@ def array_xml(name: str, values: np.ndarray, units: dict[str, str]) -> str:
     values : float64[n], int32[n] or int64[n], or with a second axis for components
     """
     values = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
-    block = zlib.compress(values.tobytes(), ZLIB_LEVEL)
-    sizes = np.array([1, values.nbytes, 0, len(block)] if values.nbytes else [0, 0, 0], dtype="<u8").tobytes()
-    content = base64.b64encode(sizes) + base64.b64encode(block if values.nbytes else b"")
+    encode = encoded if values.nbytes <= KEPT_BYTES else encoded.__wrapped__
     kind = f"{VTK_TYPES[values.dtype.kind]}{8 * values.itemsize}"
     shape = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""
     head = f'<DataArray type="{kind}" Name="{html.escape(name)}"{shape} format="binary">'
-    return f"{head}{content.decode()}\n{unit_xml(units, name)}</DataArray>\n"
+    return f"{head}{encode(values.tobytes())}\n{unit_xml(units, name)}</DataArray>\n"
+
+
+@functools.lru_cache(maxsize=64)
+def encoded(data: bytes) -> str:
+    """Sizes and bytes of a single block compressed by zlib, in base 64; kept for arrays that each frame repeats."""
+    block = zlib.compress(data, ZLIB_LEVEL) if data else b""
+    sizes = np.array([1, len(data), 0, len(block)] if data else [0, 0, 0], dtype="<u8").tobytes()
+    return (base64.b64encode(sizes) + base64.b64encode(block)).decode()
 
 
 def unit_xml(units: dict[str, str], name: str) -> str:
