@@ -18,13 +18,11 @@ from fvsolve.case.probe import default_probes, read_probe
 from fvsolve.case.reactions import reaction_kinds, read_reactions
 from fvsolve.case.reading import Raw, Reading, copy_paths, default_faults, defaults_of, override, read_raw, split_key
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output, ViscosityLaw
-from fvsolve.case.validation_table import read_validation
 from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.fluid import follow_temperature, properties, specific_heat
 from fvsolve.parts import KINDS, Friction, Pipe, Scalar
 from fvsolve.parts import value as val
 from fvsolve.parts.carried_scalar import ZEROS
-from fvsolve.parts.control import Control
 from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.pipe.pipe_wall import OF_WALL
 from fvsolve.parts.schedule import Schedule, Scheduled, signal_fault
@@ -85,7 +83,11 @@ def shortest_cell_time(links: Mapping[str, Any], meshes: Mapping[str, Any], flui
 
 def alternatives_of(table: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Groups of alternative keys of the tables of a case; a table may have at most one key of a group."""
-    models, groups = [Numerics, Friction], KINDS | {"controls": Control.kinds}
+    models, groups = [Numerics, Friction], dict(KINDS)
+    if "controls" in table:
+        from fvsolve.parts.control import Control
+
+        groups["controls"] = Control.kinds
     for group, kinds in groups.items():
         parts = table[group].values() if isinstance(table.get(group), Mapping) else ()
         types = [str(part.get("type")) for part in parts if isinstance(part, Mapping)]
@@ -131,7 +133,11 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     output = read_output(reading, numerics, kinds)
     kinds["run_up"] = run_up_kinds(reading, output)
     expect, compare = claims.read_expectations(reading, kinds, routes), claims.read_comparisons(reading, kinds)
-    validation = read_validation(reading, kinds, routes)
+    validation = None
+    if "validation" in reading.raw.table:
+        from fvsolve.case.validation_table import read_validation
+
+        validation = read_validation(reading, kinds, routes)
     limits = claims.read_limits(reading, kinds, routes, parts.links, state, general["gravity"])
     check_parts(reading, network, parts, state, numerics, general["gravity"])
     cells = has_cells(network.table)

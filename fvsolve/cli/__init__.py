@@ -59,6 +59,8 @@ def main() -> None:
         sys.exit(0)
     atexit.register(gc.freeze)  # at the end Python would search all modules for unused objects, a fifth of a short run
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else pydantic searches all installed packages
+    if sys.argv[1:2] == ["run"]:
+        gc.disable()  # until `run` has imported its modules, none of which becomes unused
     before, warnings.formatwarning = warnings.formatwarning, lambda message, *_, **__: f"{visible(str(message))}\n"
     try:
         (overview() if sys.argv[1:] in ([], ["--help"]) else application(*sys.argv[1:2]))(prog_name="fvsolve")
@@ -76,6 +78,7 @@ def main() -> None:
     except Exception as error:  # a defect of fvsolve: print its location, so that it can be reported
         _exit_with(f"internal error in {_location(error)}: {type(error).__name__}: {error}; please report it", 1)
     finally:
+        gc.enable()
         warnings.formatwarning = before
 
 

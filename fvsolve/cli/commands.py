@@ -1,5 +1,6 @@
 """Commands for runs and cases."""
 
+import gc
 import os
 import sys
 from contextlib import closing
@@ -35,6 +36,8 @@ def run(
         from fvsolve.cli import printing
         from fvsolve.run import model_of, mpi_run
 
+        gc.freeze()
+        gc.enable()
         if mpi_run.is_other_rank():
             painter.end()
             for name in dict.fromkeys(cases):
