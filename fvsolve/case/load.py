@@ -15,7 +15,6 @@ from fvsolve.case.controls import read_controls
 from fvsolve.case.part_reading import Parts
 from fvsolve.case.pipe_routes import legs, read_routes
 from fvsolve.case.probe import default_probes, read_probe
-from fvsolve.case.reactions import reaction_kinds, read_reactions
 from fvsolve.case.reading import Raw, Reading, copy_paths, default_faults, defaults_of, override, read_raw, split_key
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output, ViscosityLaw
 from fvsolve.errors import FluidError, did_you_mean
@@ -121,14 +120,18 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     check_names(reading)
     network = part_reading.cut_pipes(reading, state, numerics)
     scalars = read_scalars(reading)
-    reactions = read_reactions(reading, scalars)
+    reactions: dict[str, Any] = {}
+    if "reactions" in reading.raw.table:
+        from fvsolve.case.reactions import reaction_kinds, read_reactions
+
+        reactions = read_reactions(reading, scalars)
     parts = part_reading.read_parts(reading, network)
     scalars = fill_specific_heats(reading, scalars, parts.links, state)
     check_unused_signals(reading)
     kinds = part_reading.place_kinds(network, parts, scalars, bool(reading.faults))
     routes = read_routes(reading, network, parts.links)
     kinds["routes"] = {name: route and (legs(route, parts.links), parts.links) for name, route in routes.items()}
-    kinds["reactions"] = reaction_kinds(reactions)
+    kinds["reactions"] = reaction_kinds(reactions) if reactions else {}
     blocks = read_controls(reading, kinds)
     output = read_output(reading, numerics, kinds)
     kinds["run_up"] = run_up_kinds(reading, output)

@@ -79,6 +79,7 @@ def main() -> None:
         _exit_with(f"internal error in {_location(error)}: {type(error).__name__}: {error}; please report it", 1)
     finally:
         gc.enable()
+        os.environ.pop("PYDANTIC_DISABLE_PLUGINS", None)
         warnings.formatwarning = before
 
 

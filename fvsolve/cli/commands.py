@@ -36,7 +36,8 @@ def run(
         from fvsolve.cli import printing
         from fvsolve.run import model_of, mpi_run
 
-        gc.freeze()
+        if not gc.get_freeze_count():  # once in a process, since it keeps unused objects too
+            gc.freeze()
         gc.enable()
         if mpi_run.is_other_rank():
             painter.end()
