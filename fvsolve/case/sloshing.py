@@ -13,19 +13,14 @@ surface held flat the water has the inertia of an ideal fluid under a lid (Jouko
 Higher modes are left out: their water moves with the tank.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fvsolve.case.bodies import point_inertia, poses
 from fvsolve.parts.formula import means, samples
 from fvsolve.parts.schedule import constant
-
-if TYPE_CHECKING:
-    from fvsolve.parts.body import Body, Joint
 
 MODES = 3  # modes along x, and along y
 ROUNDNESS = 1e-3  # allowed deviation of the corners of a circular outline, relative to the radius
@@ -250,7 +245,7 @@ def held_water(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray
     return density * area_of(outline) * depth, centre, lid_inertia(outline, depth, density)
 
 
-def mode_bodies(name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity: float) -> dict[str, Body]:
+def mode_bodies(name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity: float) -> dict[str, Any]:
     """Bodies, by name, that model the sloshing modes of a basin: one on a spring per mode, and one of negative mass.
 
     The fixed body of negative mass subtracts the moving masses from the water, which is added to the body with its full
@@ -312,7 +307,7 @@ def modes_of(basin: Any, mesh: Any, density: float, gravity: float) -> list[Slos
     return modes(outline_of(mesh), depth_of(basin, mesh), density, gravity)
 
 
-def hidden_body(mass: float, inertia: np.ndarray, joint: Joint, centre: np.ndarray) -> Body:
+def hidden_body(mass: float, inertia: np.ndarray, joint: Any, centre: np.ndarray) -> Any:
     """Body that is not in the file.
 
     mass : may be negative [kg]; inertia : float64[3, 3]  about the centre of mass [kg m2]

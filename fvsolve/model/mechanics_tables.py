@@ -1,9 +1,7 @@
 """Tables of masses, force elements, bodies, joints, points, and networks on bodies; closed chambers at the start."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +13,6 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.model.static_forces import DRIVES, MOTION, StaticForces, pin_rows, rounding
 from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.units import show
-
-if TYPE_CHECKING:
-    from fvsolve.parts.body import Body
 
 SMALL_PRESSURE = 1e5  # a small pressure, which sets the size of a small travel
 # [m] of masses without chambers, [m/s] of masses without stiffness, and of joints; [rad], [rad/s] of joints
@@ -247,7 +242,7 @@ def lower_bodies(draft) -> None:
     draft.factor_size = at
 
 
-def fill_body(draft, name: str, body: Body, row) -> None:
+def fill_body(draft, name: str, body: Any, row) -> None:
     """Fill the BODY row of a body, and add the states of its joint."""
     joint, t = body.joint, draft.case.numerics.start
     row["joint"], row["mass"], row["centre"] = KINDS[joint.kind], body.mass, body.centre_of_mass
