@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -30,8 +30,7 @@ WORLD = ""  # root of all bodies; it has no name
 Faults = Iterator[tuple[tuple, str]]
 
 
-@dataclass(frozen=True)
-class Pose:
+class Pose(NamedTuple):
     """Pose and motion of a body in world axes.
 
     attitude : float64[3, 3]  rotation matrix from body axes to world axes
