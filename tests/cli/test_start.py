@@ -1,6 +1,7 @@
 """Commands import only what they use, and print the same as the libraries that they do without."""
 
 import contextlib
+import gc
 import io
 import subprocess
 import sys
@@ -31,9 +32,24 @@ def test_version_and_help_need_no_arrays_and_no_parts(words):
 def test_a_run_imports_only_the_kinds_of_its_case(tmp_path):
     modules = imported("run", "two-tanks", "--no-pictures", "--out", str(tmp_path / "run"))
     assert {"fvsolve.parts.tank", "llvmlite.binding"} <= modules
-    others = ("parts.basin", "parts.body", "parts.rotation", "parts.self_acting.part", "parts.outlet.part")
+    others = (
+        "parts.basin",
+        "parts.body",
+        "parts.rotation",
+        "parts.control",
+        "parts.reaction",
+        "parts.outlet.part",
+        "case.schema",
+    )
     assert not modules & {f"fvsolve.{name}" for name in others}
     assert not modules & {"numba", "CoolProp", "meshio", "rich", "matplotlib", "numpy.random"}
+
+
+@pytest.mark.parametrize("words", [["run", "two-tanks", "--no-pictures"], ["run", "--nonsense"], ["run", "nowhere"]])
+def test_unused_objects_are_collected_after_the_start(words, fvs, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    fvs(*words)
+    assert gc.isenabled()
 
 
 def test_the_overview_is_the_help_of_all_commands(monkeypatch):
