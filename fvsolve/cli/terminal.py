@@ -49,18 +49,19 @@ def show(items: Iterable) -> None:
     Texts are printed literally: markup and control characters have no effect. Output that does not go to a terminal is
     wide and without color, and needs rich only for tables that are too wide or contain other characters than ASCII.
     """
+    console = _console() if sys.stdout.isatty() else None
     for item in items:
         if isinstance(item, (str, tuple)):
             text, style = (item, None) if isinstance(item, str) else item
-            if sys.stdout.isatty():
-                _console().print(visible(text), style=style, highlight=False, markup=False, soft_wrap=True)
+            if console:
+                console.print(visible(text), style=style, highlight=False, markup=False, soft_wrap=True)
             else:
                 print(visible(text))
         else:
             table = item if isinstance(item, TextTable) else TextTable(*item.words())
-            lines = None if sys.stdout.isatty() else table_lines(table)
+            lines = None if console else table_lines(table)
             if lines is None:
-                _console().print(_grid(table))
+                (console or _console()).print(_grid(table))
             else:
                 print("\n".join(lines))
 
