@@ -24,7 +24,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/assembly": (1964, 10),
     "fvsolve/basins": (9291, 46),
     "fvsolve/case": (7439, 25),
-    "fvsolve/cli": (3522, 17),
+    "fvsolve/cli": (3523, 17),
     "fvsolve/compile": (1343, 7),
     "fvsolve/data": (12, 1),
     "fvsolve/draw": (2993, 14),
