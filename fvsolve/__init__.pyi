@@ -1,6 +1,6 @@
 """Public names for type checkers and editors, which do not see names that are imported on first use."""
 
-from fvsolve.case import Case as Case
+from fvsolve.case.case import Case as Case
 from fvsolve.case.load import load as load
 from fvsolve.errors import CaseError as CaseError
 from fvsolve.errors import FluidError as FluidError

@@ -9,15 +9,13 @@ import functools
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from decimal import Decimal, DecimalException
-from typing import Any
+from typing import Any, NamedTuple
 
 from fvsolve.data import read_table
 
 
-@dataclass(frozen=True)
-class Unit:
+class Unit(NamedTuple):
     """A unit: SI value = (number + offset) numerator / denominator.
 
     gauge : True for pressures relative to ambient pressure; absolute : True if the spelling states an absolute pressure
@@ -49,8 +47,7 @@ class Unit:
         return si * self.denominator / self.numerator - self.offset
 
 
-@dataclass(frozen=True)
-class Dimension:
+class Dimension(NamedTuple):
     """A dimension: words for messages, SI unit and example of a value.
 
     base : dimension whose units it uses, "" if it has units of its own; gauge : True if gauge units are allowed

@@ -168,7 +168,7 @@ def no_rows(record: np.dtype) -> Any:
     return field(default_factory=lambda: np.zeros(0, record))
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(slots=True, eq=False, repr=False)
 class ModelDraft:
     """Tables, names and states of a model while it is built. It has slots: no other attributes can be added."""
 

@@ -1,11 +1,18 @@
 """Reading of case files: keys, units, and checks between the parts of a case."""
 
-from fvsolve.case.case import Case
-from fvsolve.case.claims import Compare, Expect
-from fvsolve.case.load import load
-from fvsolve.case.probe import Probe
-from fvsolve.case.reading import locate_faults
-from fvsolve.case.schema import schema
-from fvsolve.case.sections import FluidSpec, Numerics, Output
+from fvsolve.lazy_exports import lazy_names
 
-__all__ = ["Case", "Compare", "Expect", "FluidSpec", "Numerics", "Output", "Probe", "load", "locate_faults", "schema"]
+_MODULES = {
+    "Case": "case",
+    "Compare": "claims",
+    "Expect": "claims",
+    "FluidSpec": "sections",
+    "Numerics": "sections",
+    "Output": "sections",
+    "Probe": "probe",
+    "load": "load",
+    "locate_faults": "reading",
+    "schema": "schema",
+}
+
+__all__ = lazy_names(__name__, _MODULES)  # noqa: PLE0605

@@ -19,13 +19,11 @@ from fvsolve.case.sections import Output
 from fvsolve.errors import MeshError, article, did_you_mean, listing
 from fvsolve.exact.solution import value
 from fvsolve.fluid.laws import law_names
-from fvsolve.parts import Basin
-from fvsolve.parts.basin import CLOSURES, BasinStart, DrivenPatch, MovingWall, PatchNode, Physics
 from fvsolve.parts.formula import SpatialField, means, samples
+from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.value import ReadContext, ValueFault
 from fvsolve.units import show
 
-BOUNDARY_KEYS = ("boundary", "impedance", *CLOSURES)  # keys of patches through which no link leads
 SAMPLES = 1001  # number of samples of a travel
 NEAR = 1e-9  # tolerance of a length or of a normal, relative
 FLAT = 1e-12  # tolerance of the elevation of a bed, relative
@@ -145,7 +143,7 @@ def wall_faults(
     """
     if not basin.physics_type.moves:
         yield (), f"physics {show(basin.physics)} does not support moving walls; leave out `body` or `travel`"
-    for other in (*BOUNDARY_KEYS, "scalars"):
+    for other in (*options.boundary_keys, "scalars"):
         if getattr(options, other):
             yield (other,), "applies only to an open boundary, and this is a moving wall; leave this key out"
     if options.span is not None:
@@ -312,6 +310,7 @@ def crossing_faults(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
     from fvsolve.mesh.mesh import MeshPoints
+    from fvsolve.parts.basin import Basin, PatchNode
 
 Faults = Iterator[tuple[tuple, str]]
 
@@ -414,6 +413,8 @@ def fault_keys(place: str) -> tuple:
 
     It is () if the place does not begin with a key of a basin.
     """
+    from fvsolve.parts.basin import Basin
+
     path = [int(word) if word.isdigit() else word for word in re.split(r"[.\[\]]", place) if word]
     return tuple(path) if path and path[0] in Basin.keys() else ()
 
@@ -466,6 +467,8 @@ def _basin_faults(key: tuple, name: Any, nodes: dict[str, Any], recorded: bool) 
         near = did_you_mean(str(name), pools) or f"; basins are {listing(pools) or 'none'}"
         yield key, f"no basin named {show(name)}{near}"
     elif pool is not None and recorded and not pool.has_maxima:
+        from fvsolve.parts.basin import Physics
+
         able = listing(show(kind) for kind, physics in Physics.kinds.items() if physics.maxima)
         yield key, f"{pool.what}; expected a basin with cells and the physics {able}"
 
@@ -497,6 +500,8 @@ def boundary_cells(mesh: Mesh, patch: str) -> np.ndarray:
 
 def place_kind(basin: Basin, patch: str) -> type[PatchNode]:
     """Class of the node that a patch forms: `MovingWall`, `DrivenPatch`, or else `PatchNode`."""
+    from fvsolve.parts.basin import DrivenPatch, MovingWall, PatchNode
+
     stated = basin.patches.get(patch)
     if stated is None:
         return PatchNode
@@ -552,7 +557,7 @@ def find_faults(
     meshes : meshes of basins by name; fluid : properties of the fluid, or None if it is faulty
     times : start and end of the run [s]; all_nodes : tables of all nodes, also of faulty nodes
     """
-    pools = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
+    pools = {name: node for name, node in nodes.items() if is_kind(node, "basin")}
     joined = {place for link in links.values() for place in link.ports.values()}
     for name, basin in pools.items():
         key = ("nodes", name)
@@ -573,7 +578,7 @@ def find_faults(
                 yield (*key, "patches", patch), text
             elif f"{name}.{patch}" in joined:
                 text = "a link joins this patch and is its boundary; leave this key out"
-                given = (other for other in BOUNDARY_KEYS if getattr(options, other) is not None)
+                given = (other for other in options.boundary_keys if getattr(options, other) is not None)
                 yield from (((*key, "patches", patch, other), text) for other in given)
             if patch in known:
                 faults = [*closure_faults(basin, options), *rating_faults(basin, meshes[name], patch)]
@@ -584,7 +589,8 @@ def find_faults(
         shapes = [*own.formulas(basin, meshes[name])]
         if basin.start is not None:
             shapes += [
-                (("start", key_name), getattr(basin.start, key_name), None) for key_name in BasinStart.model_fields
+                (("start", key_name), getattr(basin.start, key_name), None)
+                for key_name in type(basin.start).model_fields
             ]
             for other in sorted(basin.start.model_fields_set - set(own.starts.model_fields)):
                 yield (*key, "start", other), f"does not apply to physics {show(basin.physics)}; leave this key out"

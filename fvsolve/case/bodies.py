@@ -5,9 +5,11 @@ Arguments: nodes, links : parts by name; named : tables of all nodes, also of fa
 `Pose`; patches : patches of basins on bodies, by full name.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -15,11 +17,12 @@ from fvsolve import attitude
 from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.exact.solution import value
 from fvsolve.parts.attitude_keys import is_zero_vector
-from fvsolve.parts.basin import Basin, Physics
-from fvsolve.parts.body import Body
 from fvsolve.parts.formula import means, samples
-from fvsolve.parts.nodes_and_links import Node, PlaceOnBody
+from fvsolve.parts.nodes_and_links import Node, PlaceOnBody, is_kind
 from fvsolve.units import show
+
+if TYPE_CHECKING:
+    from fvsolve.parts.body import Body
 
 # Largest gap of a pin at the start, relative to its lengths: typed numbers have few digits.
 PIN_GAP = 1e-4
@@ -27,8 +30,7 @@ WORLD = ""  # root of all bodies; it has no name
 Faults = Iterator[tuple[tuple, str]]
 
 
-@dataclass(frozen=True)
-class Pose:
+class Pose(NamedTuple):
     """Pose and motion of a body in world axes.
 
     attitude : float64[3, 3]  rotation matrix from body axes to world axes
@@ -67,7 +69,7 @@ class BodyQuantities:
             absent = {"travel"}
         elif joint.kind == "prismatic":
             absent = {"angle"}
-        result = {key: dimension for key, dimension in Body.quantities.items() if key not in absent}
+        result = {key: dimension for key, dimension in self.body.quantities.items() if key not in absent}
         return result | ({"rate": "velocity"} if joint.kind == "prismatic" else {})
 
 
@@ -76,7 +78,7 @@ def bodies_of(nodes: dict[str, Any]) -> dict[str, Body]:
 
     Bodies in a loop, bodies on a missing node or point, and bodies that these carry are left out.
     """
-    waiting, result = {name: node for name, node in nodes.items() if isinstance(node, Body)}, {}
+    waiting, result = {name: node for name, node in nodes.items() if is_kind(node, "body")}, {}
     frames = [name for name, node in nodes.items() if node.kind == "frame"]
     while waiting:
         ready = {name: body for name, body in waiting.items()
@@ -171,7 +173,7 @@ def body_point(nodes: dict[str, Any], place: str) -> tuple[str, np.ndarray] | No
         return name, np.zeros(3)
     if point not in getattr(node, "points", {}):
         return None
-    return name if isinstance(node, Body) else WORLD, np.array(node.points[point])
+    return name if is_kind(node, "body") else WORLD, np.array(node.points[point])
 
 
 def separation(nodes: dict[str, Any], poses_of: dict[str, Pose], first: str, second: str) -> float | None:
@@ -233,7 +235,7 @@ def find_faults(nodes: dict[str, Any], named: Any) -> Faults:
     named : tables of all nodes, also of faulty nodes
     """
     own = {name: node for name, node in nodes.items() if hasattr(node, "points")}
-    bodies = {name: node for name, node in own.items() if isinstance(node, Body)}
+    bodies = {name: node for name, node in own.items() if is_kind(node, "body")}
     for name, body in bodies.items():
         on, point = carrier_of(body)
         keys = ("nodes", name, "joint", "on")
@@ -273,7 +275,7 @@ def free_joints(on: str, nodes: dict[str, Any]) -> Iterator[str]:
 def carriers(on: str, nodes: dict[str, Any]) -> Iterator[str]:
     """Yield the names of the body `on` and of all bodies that carry it, from `on` to the world."""
     seen: set[str] = set()
-    while isinstance(nodes.get(on), Body) and on not in seen:
+    while is_kind(nodes.get(on), "body") and on not in seen:
         seen.add(on)
         yield on
         on = carrier_of(nodes[on])[0]
@@ -292,7 +294,7 @@ BISECTIONS = 200  # number of bisections
 def with_elevation(node: Node, poses: dict[str, Any]) -> Node:
     """Copy of a node on a body with its elevation at the start; any other node, or a basin, is returned unchanged."""
     pose = poses.get(getattr(node, "on", None))
-    if pose is None or isinstance(node, Basin):
+    if pose is None or is_kind(node, "basin"):
         return node
     return node.model_copy(update={"elevation": float(pose.at(node.place)[2])})
 
@@ -300,13 +302,13 @@ def with_elevation(node: Node, poses: dict[str, Any]) -> Node:
 def has_elevation(node: Node, poses: dict[str, Any]) -> bool:
     """True if a node is fixed in the world, or is on a body with a known pose and is not a basin."""
     on = getattr(node, "on", None)
-    return on is None or (on in poses and not isinstance(node, Basin))
+    return on is None or (on in poses and not is_kind(node, "basin"))
 
 
 def faults_on_bodies(nodes: dict[str, Any], links: dict[str, Any], patches: dict[str, Any], named: Any) -> Faults:
     """Faults (key path, message) of nodes on bodies, and of links that join them."""
     for name, node in nodes.items():
-        if isinstance(node, Basin) or not isinstance(node, PlaceOnBody):
+        if is_kind(node, "basin") or not isinstance(node, PlaceOnBody):
             continue
         yield from place_faults(name, node, nodes, named)
         if node.on is not None and getattr(node, "head", None) is not None:
@@ -343,7 +345,7 @@ def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool =
         if not any(map(on_body, ends)):
             continue
         key = ("links", name)
-        for end in dict.fromkeys(end for end in ends if isinstance(node_of(end, nodes), Basin)):
+        for end in dict.fromkeys(end for end in ends if is_kind(node_of(end, nodes), "basin")):
             text = f"the reaction of the flow through {end} is not modelled yet; expected a tank instead of the basin"
             yield key, text
         if link.kind == "leak":
@@ -389,7 +391,7 @@ def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict
     unable = [*dict.fromkeys(words for end, node in zip(ends, stand, strict=True) for words in patch_faults(end, node))]
     yield from (((), text) for text in unable)
     where = [patches.get(end, node) for end, node in zip(ends, stand, strict=True)]
-    if unable or any(isinstance(node, Basin) for node in where):
+    if unable or any(is_kind(node, "basin") for node in where):
         return  # an end is faulty
     length = getattr(link, "length", None)
     points = np.array([where[0].place, *getattr(link, "route", []), where[-1].place])
@@ -407,7 +409,7 @@ def patch_faults(end: str, node: Any) -> Iterator[str]:
 
     node : node of the place, see `node_of`; nothing is yielded for a node that is not a basin
     """
-    if not isinstance(node, Basin):
+    if not is_kind(node, "basin"):
         return
     if not node.physics_type.links_on_bodies:
         place = f"of a basin on a body, which physics {show(node.physics)} does not support yet"
@@ -432,6 +434,8 @@ def basin_faults(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Fa
             yield (*key, "sloshing"), text
         return
     if not basin.physics_type.on_bodies:
+        from fvsolve.parts.basin import Physics
+
         kinds = " or ".join(show(name) for name, patch_options in Physics.kinds.items() if patch_options.on_bodies)
         yield (*key, "on"), f"physics {show(basin.physics)} cannot be on a body; expected {kinds}"
     if basin.sloshing != "cells" and not basin.physics_type.has_modes:
@@ -467,9 +471,9 @@ def place_faults(name: str, node: PlaceOnBody, nodes: dict[str, Any], named: Any
 
 def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:
     """Yield a fault text if the name `on` is not that of a body."""
-    bodies = [body for body, node in nodes.items() if isinstance(node, Body)]
+    bodies = [body for body, node in nodes.items() if is_kind(node, "body")]
     bodies += [body for body in named if body not in nodes and getattr(named[body], "get", {}.get)("type") == "body"]
-    if not isinstance(nodes.get(on), Body):
+    if not is_kind(nodes.get(on), "body"):
         state = f"is {article(nodes[on].kind)}" if on in nodes else "is not a node"
         expected = f"expected a body: {listing(bodies)}" if bodies else "the case has no body"
         yield f"{show(on)} {state}; {expected}{did_you_mean(on, bodies)}"

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fvsolve import units
 from fvsolve.case import basins, bodies, case_notices, sloshing, text
@@ -24,10 +24,12 @@ from fvsolve.fluid.laws import Law
 from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.parts.pipe.pipe_wall import OF_WALL, elastic_compliance, heat_retardation
-from fvsolve.parts.reaction import Reaction
 from fvsolve.parts.table_model import plain_value
 from fvsolve.schemes import SCHEMES
 from fvsolve.units import show
+
+if TYPE_CHECKING:
+    from fvsolve.parts.reaction import Reaction
 
 REPORT_KEYS = ("title", "expect", "compare", "validation")
 

@@ -13,11 +13,10 @@ from fvsolve.case.reading import Raw
 from fvsolve.case.resource_checks import name_faults
 from fvsolve.case.sections import CAVITY_SCHEMES, FluidSpec, Numerics
 from fvsolve.errors import article, did_you_mean, listing
-from fvsolve.parts import KINDS, Basin
-from fvsolve.parts.basin import VELOCITY_FIELDS, Physics
+from fvsolve.parts import KINDS
 from fvsolve.parts.carried_scalar import ZEROS
 from fvsolve.parts.formula_program import is_formula
-from fvsolve.parts.nodes_and_links import is_in_network
+from fvsolve.parts.nodes_and_links import is_in_network, is_kind
 from fvsolve.parts.pipe.pipe_wall import OF_WALL
 from fvsolve.parts.table_model import CaseContext
 from fvsolve.parts.value import ROOT
@@ -199,6 +198,8 @@ def reserved_names() -> set[str]:
     These are columns of output files, quantities of parts that may carry scalars, and fields of basins other than
     velocities.
     """
+    from fvsolve.parts.basin import VELOCITY_FIELDS, Physics
+
     kinds = [kind for group in KINDS.values() for kind in group.values()
              if not is_in_network(kind)]  # fmt: skip
     fields = {name for physics in Physics.kinds.values() for name in physics.fields if name not in VELOCITY_FIELDS}
@@ -224,10 +225,10 @@ def scalar_faults(
             for scalar, factor in getattr(part, "retardation", {}).items():
                 if (text := _retardation_fault(scalar, factor, scalars)) is not None:
                     yield (group, name, "retardation", scalar), text
-            if scalars and isinstance(part, Basin) and getattr(part, "infiltration", None) is not None:
+            if scalars and is_kind(part, "basin") and getattr(part, "infiltration", None) is not None:
                 text = "takes water, but not the scalars in it; expected a case without scalars, or no infiltration"
                 yield (group, name, "infiltration"), text
-            if scalars and isinstance(part, Basin) and not part.physics_type.carries:
+            if scalars and is_kind(part, "basin") and not part.physics_type.carries:
                 text = f"scalars are not supported with physics {show(part.physics)}; expected a free surface"
                 yield (group, name), text
             for patch, patch_options in getattr(part, "patches", {}).items():
@@ -270,7 +271,7 @@ def scalar_range_faults(
     places = [(("scalars", name, "initial"), name, sound[name].initial) for name in bounds]
     for group, parts in (("nodes", nodes), ("links", links)):
         for name, part in parts.items():
-            own = {} if isinstance(part, Basin) else getattr(part, "scalars", {})
+            own = {} if is_kind(part, "basin") else getattr(part, "scalars", {})
             places += [((group, name, "scalars", scalar), scalar, value) for scalar, value in own.items()]
             for patch, options in getattr(part, "patches", {}).items():
                 where = (group, name, "patches", patch, "scalars")
@@ -309,7 +310,7 @@ def _scalar_value_fault(scalar: str, value: Any, part: Any, scalars: dict[str, A
     """Fault text for the value of a scalar that a part states; None if it is valid."""
     if scalar not in scalars:
         return _unknown_scalar(scalar, scalars)
-    if isinstance(part, Basin):
+    if is_kind(part, "basin"):
         return None
     if part.own_scalars == "start" and not value.constant:
         return "is the value at the start; expected a number, not a schedule"

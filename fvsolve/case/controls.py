@@ -4,18 +4,23 @@ The unit of the first input of a block is that of the probe or block that it rea
 keys that it drives. A block without `limits` has the range of these keys.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fvsolve.case.probe import Probe, read_probe
 from fvsolve.case.reading import Reading, driven_keys
 from fvsolve.case.resource_checks import name_faults
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts.control import PREFIX, UNKNOWN, Control, SingleInput
+from fvsolve.parts.schedule import BLOCK_PREFIX, UNKNOWN
 from fvsolve.parts.value import Range
 from fvsolve.units import DIMENSIONS, show
+
+if TYPE_CHECKING:
+    from fvsolve.parts.control import Control
 
 MOST_SAMPLES = 1e9  # of a block in a run
 DIFFERENCES = {"pressure": "pressure_drop", "gauge_pressure": "pressure_drop"}  # dimension of an error
@@ -68,6 +73,9 @@ class Blocks:
     """Blocks of a case while they are read. kinds : as for `read_probe`"""
 
     def __init__(self, reading: Reading, kinds: dict[str, Any]) -> None:
+        from fvsolve.parts.control import Control
+
+        self.known_types = Control.kinds
         self.reading, self.kinds, self.setting = reading, kinds, reading.setting
         self.given = {name: item for name, item in reading.group("controls").items() if self.types(name, item)}
         self.inputs: dict[str, dict[tuple[str, ...], Probe | str | None]] = {
@@ -77,7 +85,7 @@ class Blocks:
 
     def types(self, name: str, given: Any) -> type[Control] | None:
         """Class of a block; None, with a fault, if its type is missing or unknown."""
-        reading, known = self.reading, Control.kinds
+        reading, known = self.reading, self.known_types
         reading.add((("controls", name), text) for text in name_faults(name))
         if not isinstance(given, dict):
             return reading.fault(("controls", name), f"{show(given)} is not a table; expected a table with a type")
@@ -90,7 +98,7 @@ class Blocks:
         return reading.fault(("controls", name, "type"), f"unknown type {show(word)}{near}")
 
     def kind(self, name: str) -> type[Control]:
-        return Control.kinds[self.given[name]["type"]]
+        return self.known_types[self.given[name]["type"]]
 
     def read_inputs(self, name: str, given: dict[str, Any]) -> Iterator[tuple[tuple[str, ...], Probe | str | None]]:
         """Yield the inputs of a block: (key path in the block, probe or name of a block, None if it is faulty)."""
@@ -104,7 +112,7 @@ class Blocks:
     def read_input(self, text: str) -> Probe | str | None:
         """Probe or name of a block; None for a probe of a faulty part. Raises ValueError."""
         known = self.reading.raw.table["controls"]
-        name = text.removeprefix(PREFIX)
+        name = text.removeprefix(BLOCK_PREFIX)
         if name != text and "." not in name:
             if name not in known:
                 near = did_you_mean(name, known)
@@ -115,15 +123,15 @@ class Blocks:
         except ValueError as error:
             block = name.partition(".")[0]
             if block in known and (name != text or block == text):
-                raise ValueError(f'{show(text)} is not a block; did you mean "{PREFIX}{block}"?') from None
-            hint = "" if "did you mean" in str(error) else f"; a block is named {PREFIX}NAME"
+                raise ValueError(f'{show(text)} is not a block; did you mean "{BLOCK_PREFIX}{block}"?') from None
+            hint = "" if "did you mean" in str(error) else f"; a block is named {BLOCK_PREFIX}NAME"
             raise ValueError(f"{error}{hint}") from None
 
     def first_dimension(self, name: str) -> str:
         """Dimension of the first input of a block; UNKNOWN if this input is missing or faulty."""
         inputs = self.inputs[name]
         if not inputs:
-            return UNKNOWN if issubclass(self.kind(name), SingleInput) else "number"
+            return UNKNOWN if "input" in self.kind(name).keys() else "number"
         first = next(iter(inputs.values()))
         return first.dimension if isinstance(first, Probe) else self.outputs.get(first, UNKNOWN)
 
@@ -263,14 +271,14 @@ def read_controls(reading: Reading, kinds: dict[str, Any]) -> dict[str, Block | 
             reading.fault((group, "controls"), '"controls" is the name of the blocks; expected another name')
     blocks = Blocks(reading, kinds)
     result = blocks.read()
-    kinds["controls"] = {f"{PREFIX}{name}": None for name in reading.raw.table["controls"]}
+    kinds["controls"] = {f"{BLOCK_PREFIX}{name}": None for name in reading.raw.table["controls"]}
     for name, block in result.items():
         if block is not None:
             first, output = block.dimensions
             own = {"output": output} | ({"input": first} if block.inputs else {})
             if block.control.setpoint_schedule is not None:
                 own["error"] = DIFFERENCES.get(first, first)
-            kinds["controls"][f"{PREFIX}{name}"] = BlockQuantities(block.control.kind, own)
+            kinds["controls"][f"{BLOCK_PREFIX}{name}"] = BlockQuantities(block.control.kind, own)
     return result
 
 

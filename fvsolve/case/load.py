@@ -15,16 +15,14 @@ from fvsolve.case.controls import read_controls
 from fvsolve.case.part_reading import Parts
 from fvsolve.case.pipe_routes import legs, read_routes
 from fvsolve.case.probe import default_probes, read_probe
-from fvsolve.case.reactions import reaction_kinds, read_reactions
 from fvsolve.case.reading import Raw, Reading, copy_paths, default_faults, defaults_of, override, read_raw, split_key
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output, ViscosityLaw
-from fvsolve.case.validation_table import read_validation
 from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.fluid import follow_temperature, properties, specific_heat
-from fvsolve.parts import KINDS, Basin, Friction, Pipe, Scalar
+from fvsolve.parts import KINDS, Friction, Pipe, Scalar
 from fvsolve.parts import value as val
 from fvsolve.parts.carried_scalar import ZEROS
-from fvsolve.parts.control import Control
+from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.pipe.pipe_wall import OF_WALL
 from fvsolve.parts.schedule import Schedule, Scheduled, signal_fault
 from fvsolve.parts.table_model import read_keys
@@ -84,7 +82,11 @@ def shortest_cell_time(links: Mapping[str, Any], meshes: Mapping[str, Any], flui
 
 def alternatives_of(table: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Groups of alternative keys of the tables of a case; a table may have at most one key of a group."""
-    models, groups = [Numerics, Friction], KINDS | {"controls": Control.kinds}
+    models, groups = [Numerics, Friction], dict(KINDS)
+    if "controls" in table:
+        from fvsolve.parts.control import Control
+
+        groups["controls"] = Control.kinds
     for group, kinds in groups.items():
         parts = table[group].values() if isinstance(table.get(group), Mapping) else ()
         types = [str(part.get("type")) for part in parts if isinstance(part, Mapping)]
@@ -118,19 +120,27 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     check_names(reading)
     network = part_reading.cut_pipes(reading, state, numerics)
     scalars = read_scalars(reading)
-    reactions = read_reactions(reading, scalars)
+    reactions: dict[str, Any] = {}
+    if "reactions" in reading.raw.table:
+        from fvsolve.case.reactions import reaction_kinds, read_reactions
+
+        reactions = read_reactions(reading, scalars)
     parts = part_reading.read_parts(reading, network)
     scalars = fill_specific_heats(reading, scalars, parts.links, state)
     check_unused_signals(reading)
     kinds = part_reading.place_kinds(network, parts, scalars, bool(reading.faults))
     routes = read_routes(reading, network, parts.links)
     kinds["routes"] = {name: route and (legs(route, parts.links), parts.links) for name, route in routes.items()}
-    kinds["reactions"] = reaction_kinds(reactions)
+    kinds["reactions"] = reaction_kinds(reactions) if reactions else {}
     blocks = read_controls(reading, kinds)
     output = read_output(reading, numerics, kinds)
     kinds["run_up"] = run_up_kinds(reading, output)
     expect, compare = claims.read_expectations(reading, kinds, routes), claims.read_comparisons(reading, kinds)
-    validation = read_validation(reading, kinds, routes)
+    validation = None
+    if "validation" in reading.raw.table:
+        from fvsolve.case.validation_table import read_validation
+
+        validation = read_validation(reading, kinds, routes)
     limits = claims.read_limits(reading, kinds, routes, parts.links, state, general["gravity"])
     check_parts(reading, network, parts, state, numerics, general["gravity"])
     cells = has_cells(network.table)
@@ -298,7 +308,7 @@ def check_unused_signals(reading: Reading) -> None:
 def has_cells(table: dict[str, Any]) -> bool:
     """True if a case has pipes or basins, or parts of unknown type. table : nested dicts of the case"""
     kinds = [kind for group in ("nodes", "links") for kind in part_reading.table_kinds(table, group).values()]
-    return not {Pipe, Basin, None}.isdisjoint(kinds)
+    return any(kind in (Pipe, None) or is_kind(kind, "basin") for kind in kinds)
 
 
 def read_output(reading: Reading, numerics: Numerics | None, kinds: dict[str, Any]) -> Output | None:
@@ -474,7 +484,7 @@ def is_self_contained(case: Case) -> bool:
     outer = case.signals or case.controls or case.scalars or case.compare or case.copies or case.equilibrium_nodes
     no_outer_input = not (chainage.placed(chainage.add_bends(case.raw)) or outer)
     exact_in_file = case.exact is None or "exact" in case.raw
-    return no_outer_input and exact_in_file and not any(isinstance(node, Basin) for node in case.nodes.values())
+    return no_outer_input and exact_in_file and not any(is_kind(node, "basin") for node in case.nodes.values())
 
 
 def is_number_key(raw: Any, keys: tuple) -> bool:

@@ -9,10 +9,9 @@ from fvsolve.case.reading import GROUPS, Reading, fill_pipes, with_defaults
 from fvsolve.case.sections import Numerics
 from fvsolve.data import read_table
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts import KINDS, Basin, Chamber, Pipe
-from fvsolve.parts.body import Body, BodyPoint
+from fvsolve.parts import KINDS, Chamber, Pipe
+from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.pipe.part import MOST_CELLS
-from fvsolve.parts.rotation import ShaftPlace
 from fvsolve.units import show
 
 LINKLESS = ("basin", "body")  # nodes that need no link
@@ -66,12 +65,12 @@ def read_parts(reading: Reading, network: chainage.CutTable) -> Parts:
     meshes: dict[str, Any] = {}
     lumped: dict[str, Any] = {}
     for name, node in nodes.items():
-        if isinstance(node, Basin):
+        if is_kind(node, "basin"):
             with reading.catch("nodes", name):
                 read_mesh = functools.partial(basins.mesh_of, node, reading.setting)
                 (lumped if node.lumped else meshes)[name] = reading.reuse(("meshes", name), node, read_mesh)
     sound = {name: node for name, node in nodes.items()
-             if not isinstance(node, Basin) or name in (*meshes, *lumped)}  # fmt: skip
+             if not is_kind(node, "basin") or name in (*meshes, *lumped)}  # fmt: skip
     return Parts(sound, links, meshes, lumped)
 
 
@@ -154,13 +153,21 @@ def place_kinds(network: chainage.CutTable, parts: Parts, scalars: dict[str, Any
     """
     table = network.table
     nodes, links = table_kinds(table, "nodes"), table_kinds(table, "links")
-    bare = [name for name, kind in nodes.items() if kind is Basin and name not in (*parts.meshes, *parts.lumped)]
+    bare = [
+        name for name, kind in nodes.items() if is_kind(kind, "basin") and name not in (*parts.meshes, *parts.lumped)
+    ]
     nodes |= {f"{name}.{place}": Chamber for name, kind in links.items() if kind
               for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
-    nodes |= dict.fromkeys(connections.joined_shafts(table.get("links", {})), ShaftPlace)
-    nodes |= {name: bodies.BodyQuantities(node) for name, node in parts.nodes.items() if isinstance(node, Body)}
+    if shafts := connections.joined_shafts(table.get("links", {})):
+        from fvsolve.parts.rotation import ShaftPlace
+
+        nodes |= dict.fromkeys(shafts, ShaftPlace)
+    nodes |= {name: bodies.BodyQuantities(node) for name, node in parts.nodes.items() if is_kind(node, "body")}
     for name, node in table.get("nodes", {}).items():  # faulty nodes included
-        nodes |= dict.fromkeys(connections.points_of(name, node), BodyPoint)
+        if points := connections.points_of(name, node):
+            from fvsolve.parts.body import BodyPoint
+
+            nodes |= dict.fromkeys(points, BodyPoint)
     nodes |= dict.fromkeys(bare)  # faulty
     for name in (*parts.meshes, *parts.lumped):
         nodes |= basins.probe_kinds(name, parts.nodes[name], parts.meshes.get(name), parts.lumped.get(name), scalars)

@@ -3,8 +3,7 @@
 import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from fvsolve.case.chainage import CutTable, is_pipe
 from fvsolve.case.connections import islands, kind_of
@@ -47,8 +46,7 @@ class Route(Table):
     )] = None  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Leg:
+class Leg(NamedTuple):
     """Pipe on a route, with its chainages and direction.
 
     begin, end : chainages where the route enters and leaves the pipe [m]

@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fvsolve.case.bodies import point_inertia, poses
-from fvsolve.parts.body import Body, Joint
 from fvsolve.parts.formula import means, samples
 from fvsolve.parts.schedule import constant
 
@@ -246,13 +245,15 @@ def held_water(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray
     return density * area_of(outline) * depth, centre, lid_inertia(outline, depth, density)
 
 
-def mode_bodies(name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity: float) -> dict[str, Body]:
+def mode_bodies(name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity: float) -> dict[str, Any]:
     """Bodies, by name, that model the sloshing modes of a basin: one on a spring per mode, and one of negative mass.
 
     The fixed body of negative mass subtracts the moving masses from the water, which is added to the body with its full
     mass. In a cylinder the modes of one number along x and y share a mass, which slides along y on a massless body
     that slides along x. pose : pose at the start of the body that carries the basin
     """
+    from fvsolve.parts.body import Joint
+
     outline, turn, all_modes, result = outline_of(mesh), basin.rotation, modes_of(basin, mesh, density, gravity), {}
     bed = np.array(basin.place) + turn @ (*outline.middle, bed_of(basin, mesh))
     places = [bed + turn[:, 2] * item.height for item in all_modes]
@@ -306,12 +307,14 @@ def modes_of(basin: Any, mesh: Any, density: float, gravity: float) -> list[Slos
     return modes(outline_of(mesh), depth_of(basin, mesh), density, gravity)
 
 
-def hidden_body(mass: float, inertia: np.ndarray, joint: Joint, centre: np.ndarray) -> Body:
+def hidden_body(mass: float, inertia: np.ndarray, joint: Any, centre: np.ndarray) -> Any:
     """Body that is not in the file.
 
     mass : may be negative [kg]; inertia : float64[3, 3]  about the centre of mass [kg m2]
     centre : centre of mass in the axes of the body [m]
     """
+    from fvsolve.parts.body import Body
+
     return Body.model_construct(
         mass=mass, inertia=tuple(map(tuple, inertia.tolist())), joint=joint, points={},
         centre_of_mass=tuple(np.asarray(centre).tolist()),

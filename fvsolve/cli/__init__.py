@@ -1,8 +1,14 @@
 """Command line interface; the only package that prints or exits."""
 
+import atexit
+import copy
+import gc
+import os
+import re
 import sys
 import warnings
 from importlib import import_module
+from pathlib import Path
 
 from fvsolve.errors import FvsolveError, visible
 
@@ -17,6 +23,7 @@ COMMANDS = dict.fromkeys(("run", "check", "list", "new", "schema", "methods", "c
     "import": "file_commands",
     "linearise": "linear_commands",
     "loop": "loop_commands",
+    "methods": "methods_command",
     "optimise": "design_commands",
     "order": "accuracy_commands",
     "precompile": "file_commands",
@@ -32,6 +39,8 @@ COMMANDS = dict.fromkeys(("run", "check", "list", "new", "schema", "methods", "c
     "stability": "stability",
     "validate": "validate_command",
 }
+# Command in the source of its module : name if it is not that of the function, name of the function, help text.
+DECLARATION = re.compile(r'app\.command\((?:"([\w-]+)")?\)\ndef (\w+)\(.*?\n    """(.*?)"""', re.DOTALL)
 
 
 def main() -> None:
@@ -48,9 +57,13 @@ def main() -> None:
 
         print(f"fvsolve {fvsolve.__version__}")
         sys.exit(0)
+    atexit.register(gc.freeze)  # at the end Python would search all modules for unused objects, a fifth of a short run
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else pydantic searches all installed packages
+    if sys.argv[1:2] == ["run"]:
+        gc.disable()  # until `run` has imported its modules, none of which becomes unused
     before, warnings.formatwarning = warnings.formatwarning, lambda message, *_, **__: f"{visible(str(message))}\n"
     try:
-        application(*sys.argv[1:2])(prog_name="fvsolve")
+        (overview() if sys.argv[1:] in ([], ["--help"]) else application(*sys.argv[1:2]))(prog_name="fvsolve")
     except FvsolveError as error:
         _exit_with(str(error), 2)
     except KeyboardInterrupt:
@@ -65,6 +78,8 @@ def main() -> None:
     except Exception as error:  # a defect of fvsolve: print its location, so that it can be reported
         _exit_with(f"internal error in {_location(error)}: {type(error).__name__}: {error}; please report it", 1)
     finally:
+        gc.enable()
+        os.environ.pop("PYDANTIC_DISABLE_PLUGINS", None)
         warnings.formatwarning = before
 
 
@@ -76,6 +91,19 @@ def application(command: str = ""):
 
     app.registered_commands.sort(key=lambda info: [*COMMANDS].index(info.name or info.callback.__name__))
     return app
+
+
+def overview():
+    """Typer application that only prints its help: all commands, read from the sources without importing them."""
+    from fvsolve.cli.app import app
+
+    result = copy.copy(app)
+    result.registered_commands = []
+    sources = [Path(__file__).with_name(f"{module}.py") for module in dict.fromkeys(COMMANDS.values())]
+    found = [row for path in sources for row in DECLARATION.findall(path.read_text(encoding="utf-8"))]
+    for name, function, text in sorted(found, key=lambda row: [*COMMANDS].index(row[0] or row[1])):
+        result.command(name or function, help=text)(lambda: None)
+    return result
 
 
 def _exit_with(message: str, code: int) -> None:

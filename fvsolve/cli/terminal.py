@@ -47,17 +47,47 @@ def show(items: Iterable) -> None:
     """Print lines and tables on standard output: texts, pairs (text, style), and objects `TextTable` or `ResultTable`.
 
     Texts are printed literally: markup and control characters have no effect. Output that does not go to a terminal is
-    wide and without color.
+    wide and without color, and needs rich only for tables that are too wide or contain other characters than ASCII.
     """
-    from rich.console import Console
-
-    console = Console() if sys.stdout.isatty() else Console(width=WIDTH, no_color=True)
+    console = _console() if sys.stdout.isatty() else None
     for item in items:
         if isinstance(item, (str, tuple)):
             text, style = (item, None) if isinstance(item, str) else item
-            console.print(visible(text), style=style, highlight=False, markup=False, soft_wrap=True)
+            if console:
+                console.print(visible(text), style=style, highlight=False, markup=False, soft_wrap=True)
+            else:
+                print(visible(text))
         else:
-            console.print(_grid(item if isinstance(item, TextTable) else TextTable(*item.words())))
+            table = item if isinstance(item, TextTable) else TextTable(*item.words())
+            lines = None if console else table_lines(table)
+            if lines is None:
+                (console or _console()).print(_grid(table))
+            else:
+                print("\n".join(lines))
+
+
+def _console():
+    from rich.console import Console
+
+    return Console() if sys.stdout.isatty() else Console(width=WIDTH, no_color=True)
+
+
+def table_lines(table: TextTable) -> list[str] | None:
+    """Lines of a table, as rich prints them without color; None if it is too wide or not of printable ASCII."""
+    rows = [table.headers, *table.rows]
+    widths = [max(1, *map(len, column)) for column in zip(*rows, strict=True)]
+    text = "".join(cell for row in rows for cell in row)
+    if sum(widths) + 2 * len(widths) - 2 > WIDTH or not (text.isascii() and text.isprintable()):
+        return None
+    left = _text_columns(table)
+    cells = [[x.ljust(w) if is_left else x.rstrip().rjust(w) for x, w, is_left in zip(row, widths, left, strict=True)]
+             for row in rows]  # fmt: skip
+    return ["  ".join(row) for row in cells]
+
+
+def _text_columns(table: TextTable) -> list[bool]:
+    """For each column True if none of its cells is a number."""
+    return [not any(_is_numeric(row[i]) for row in table.rows) for i in range(len(table.headers))]
 
 
 def _grid(table: TextTable):
@@ -65,9 +95,8 @@ def _grid(table: TextTable):
     from rich.text import Text
 
     grid = Grid(box=None, pad_edge=False, header_style="bold", show_edge=False)
-    for i, header in enumerate(table.headers):
-        text = all(not _is_numeric(row[i]) for row in table.rows)
-        grid.add_column(Text(visible(header)), justify="left" if text else "right", overflow="fold")
+    for header, is_left in zip(table.headers, _text_columns(table), strict=True):
+        grid.add_column(Text(visible(header)), justify="left" if is_left else "right", overflow="fold")
     for row in table.rows:
         grid.add_row(*(Text(visible(cell)) for cell in row))
     return grid

@@ -26,9 +26,10 @@ DIGEST = hashlib.sha256().digest_size
 SUFFIX = ".code"
 # True if the store is used: LLVM's linker can link numba's objects on all systems but Windows.
 IN_USE = sys.platform != "win32" and os.environ.get("FVSOLVE_STORE", "1") != "0"
-# Environment variables of numba that do not change code; all others are part of the target.
+# Environment variables of numba that do not change code, or whose values the target states by other names; all others
+# are part of the target.
 IGNORED_SETTINGS = re.compile(
-    r"NUMBA_(CACHE|CHROME|COLOR|CUDA|DEBUG(?!INFO)|DEVELOPER|DUMP|DISABLE_(JIT|CUDA|PERF|TYPEINFER)|"
+    r"NUMBA_(CACHE|CHROME|COLOR|CPU|CUDA|DEBUG(?!INFO)|DEVELOPER|DUMP|DISABLE_(JIT|CUDA|PERF|TYPEINFER)|"
     r"FORCE_CUDA|FULL|HIGHLIGHT|NUM_|NRT_STATS|PARALLEL_DIAG|THREADING|TRACE)"
 )
 LIBRARY_NUMBERS = itertools.count()  # for unique names of libraries
@@ -50,6 +51,8 @@ class Code(NamedTuple):
 def target() -> dict[str, str]:
     """Properties on which machine code depends apart from sources: processor, versions, settings of numba.
 
+    The processor is the present one, or what NUMBA_CPU_NAME and NUMBA_CPU_FEATURES state, such as x86-64-v3 without
+    further features: then other processors that have its instructions have the same target.
     The entry `name` is the name of the folder for the code: processor, and eight digits of the hash of all properties.
     """
     import llvmlite
@@ -61,8 +64,8 @@ def target() -> dict[str, str]:
     except RuntimeError:  # as in numba
         features = ""
     settings = {
-        "processor": binding.get_host_cpu_name(),
-        "features": features,
+        "processor": os.environ.get("NUMBA_CPU_NAME", binding.get_host_cpu_name()),
+        "features": os.environ.get("NUMBA_CPU_FEATURES", features),
         "system": binding.get_process_triple(),
         "python": sys.implementation.cache_tag,
         "numba": numba_version(),

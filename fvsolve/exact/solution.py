@@ -12,7 +12,6 @@ import numpy as np
 from fvsolve.errors import article
 
 Law = Callable[[np.ndarray], np.ndarray]  # values at times
-GAUSS = np.polynomial.legendre.leggauss(5)
 
 
 class Exact(NamedTuple):
@@ -118,11 +117,12 @@ def averages(f: Callable, edges: np.ndarray, cuts: np.ndarray | None = None) -> 
     """
     cuts = edges if cuts is None else cuts
     width, middle = np.diff(cuts), 0.5 * (cuts[1:] + cuts[:-1])
-    x = middle[:, None] + 0.5 * width[:, None] * GAUSS[0]
+    places, weights = np.polynomial.legendre.leggauss(5)
+    x = middle[:, None] + 0.5 * width[:, None] * places
     cell = np.clip(np.searchsorted(edges, middle) - 1, 0, len(edges) - 2)
     result = []
     for values in f(x.ravel()):
-        parts = np.broadcast_to(values, x.size).reshape(x.shape) @ (0.5 * GAUSS[1]) * width
+        parts = np.broadcast_to(values, x.size).reshape(x.shape) @ (0.5 * weights) * width
         result.append(np.bincount(cell, parts, len(edges) - 1) / np.diff(edges))
     return tuple(result)
 

@@ -6,16 +6,15 @@ parts of the tables.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
 from importlib import import_module
+from typing import NamedTuple
 
 from fvsolve.kernels.calls import hook_of
 
 KERNELS = "fvsolve.kernels"
 
 
-@dataclass(frozen=True)
-class RhsTerms:
+class RhsTerms(NamedTuple):
     """Names of the functions that a component adds to a model: one for each phase of the right-hand side, and each job.
 
     A name is "module: function", or "" for none. The fields of phases come first, in the order in which they run.
@@ -56,7 +55,7 @@ class RhsTerms:
     package: str = KERNELS
 
 
-JOBS = tuple(field.name for field in fields(RhsTerms) if field.name != "package")
+JOBS = tuple(name for name in RhsTerms._fields if name != "package")
 PHASES = JOBS[: JOBS.index("reduce_rate") + 1]
 CLOSING = PHASES[: PHASES.index("rate_limits") + 1]
 
@@ -247,8 +246,7 @@ MIXED = RhsTerms(mix="scalar_transport: mix_scalars")
 ALWAYS = RhsTerms(record="observation: record_nodes", events="observation: tank_events")
 
 
-@dataclass(frozen=True)
-class ModelFeatures:
+class ModelFeatures(NamedTuple):
     """Features of a model, which decide on the functions of its right-hand side.
 
     family : kernels of the density law, "linear", "barotropic" or "cavitating"

@@ -35,7 +35,6 @@ from fvsolve.model.delay_lines import (
     line_methods,
     lower_delays,
 )
-from fvsolve.model.equilibrium_search import with_equilibrium
 from fvsolve.model.input_histories import histories_size
 from fvsolve.model.mechanics_tables import (
     find_closed_chambers,
@@ -186,6 +185,8 @@ def build_like(case: Case, like: Model | None = None) -> Model:
     """
     notices = []
     if case.needs_equilibrium:
+        from fvsolve.model.equilibrium_search import with_equilibrium
+
         steady = replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"}))
         case, notices = with_equilibrium(case, tables_with_start(steady))
     if like is not None and not like.tables_before_start:

@@ -1,6 +1,7 @@
 """Tables of masses, force elements, bodies, joints, points, and networks on bodies; closed chambers at the start."""
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from fvsolve.case import bodies
 from fvsolve.case.bodies import free_joints
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.static_forces import DRIVES, MOTION, StaticForces, pin_rows, rounding
-from fvsolve.parts.body import Body
+from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.units import show
 
 SMALL_PRESSURE = 1e5  # a small pressure, which sets the size of a small travel
@@ -223,7 +224,7 @@ def lower_bodies(draft) -> None:
     for i, (name, row) in enumerate(zip(draft.body_names, table, strict=True)):
         body = nodes[name]
         parent_name = bodies.carrier_of(body)[0]
-        row["parent"] = draft.body_names.index(parent_name) if isinstance(nodes.get(parent_name), Body) else -1
+        row["parent"] = draft.body_names.index(parent_name) if is_kind(nodes.get(parent_name), "body") else -1
         row["root"] = table[row["parent"]]["root"] if row["parent"] >= 0 else i
         fill_body(draft, name, body, row)
         row["freedom"] = len(paths)
@@ -241,7 +242,7 @@ def lower_bodies(draft) -> None:
     draft.factor_size = at
 
 
-def fill_body(draft, name: str, body: Body, row) -> None:
+def fill_body(draft, name: str, body: Any, row) -> None:
     """Fill the BODY row of a body, and add the states of its joint."""
     joint, t = body.joint, draft.case.numerics.start
     row["joint"], row["mass"], row["centre"] = KINDS[joint.kind], body.mass, body.centre_of_mass

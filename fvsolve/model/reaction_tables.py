@@ -1,17 +1,24 @@
 """Table of reactions: rate laws and coefficients, rates at the start, couplings of amounts, modes of reactions."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.formula_programs import INPUT
+from fvsolve.parts.carried_scalar import molar_factor
 from fvsolve.parts.formula import means, samples
-from fvsolve.parts.reaction import GAS_CONSTANT, Reaction, molar_factor
 from fvsolve.steppers.tableau import AUTO, METHODS
+
+if TYPE_CHECKING:
+    from fvsolve.parts.reaction import Reaction
+
+GAS_CONSTANT = 8.31446261815324  # [J/mol/K], exact in the SI
 
 
 def lower_reactions(draft) -> None:

@@ -11,8 +11,8 @@ from fvsolve.errors import Notice
 from fvsolve.kernels import calls
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.reaction_tables import reacting
+from fvsolve.parts.carried_scalar import molar_factor
 from fvsolve.parts.formula import means, samples
-from fvsolve.parts.reaction import molar_factor
 from fvsolve.steppers.tableau import METHODS
 from fvsolve.units import show
 

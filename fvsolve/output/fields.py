@@ -119,6 +119,7 @@ class FieldSeries:
     def __init__(self, folder: Path, model):
         self.folder, self.model, self.pieces = folder, model, None
         self.frames = 0
+        self.fixed_grids: dict[str, str] = {}  # file name of a part -> `grid_xml` of points that do not move
         places = {basin.name: np.array(basin.part.position or (0.0, 0.0)) for basin in model.basins}
         if model.pipes:
             places = network_layout.plan_positions(model.case, {pipe.name: pipe.length for pipe in model.pipes})
@@ -169,14 +170,16 @@ class FieldSeries:
             self._write_basin(t, part, basin, frame)
         if self.bodies:
             file, (points, speed) = f"fields/bodies-{self.frames:06d}.vtu", self.bodies.at(frame["out"])
-            blocks = {"body": [self.bodies.line_body], "speed": [speed]}
-            write_frame(self.folder / file, points, [("line", self.bodies.lines)], blocks, {"speed": "m/s"})
+            blocks, grid = {"body": [self.bodies.line_body], "speed": [speed]}, [("line", self.bodies.lines)]
+            write_frame(self.folder / file, grid_xml(points, grid), blocks, {"speed": "m/s"})
             self._add_to_collection(t, len(self.basins) + 1, file)
         if self.pipes:
             file = f"fields/{self.frames:06d}.vtu"
             data = {name: [np.concatenate([frame[pipe][name] for pipe in self.pipes])] for name in self.units}
             data["pipe"] = [self.pipe]
-            write_frame(self.folder / file, self.points_at(frame), [("line", self.lines)], data, self.units)
+            points = self.points_at(frame)
+            grid = self.grid("", points, [("line", self.lines)], points is self.points)
+            write_frame(self.folder / file, grid, data, self.units)
             self._add_to_collection(t, 0, file)
         self.frames += 1
 
@@ -191,10 +194,19 @@ class FieldSeries:
             if basin.part.on is not None:
                 values = values | basin.vectors_at(values, frame["out"], self.model.layout)
             blocks = {key: split_blocks(value, cells) for key, value in values.items()}
-            if basin.name in frame["points"]:  # moving basins have points of their own at each time
+            moves = basin.name in frame["points"]  # moving basins have points of their own at each time
+            if moves:
                 points = np.append(self.places[basin.name], 0.0) + frame["points"][basin.name]
-            write_frame(self.folder / file, points, cells, blocks, units)
+            write_frame(self.folder / file, self.grid(basin.name, points, cells, not moves), blocks, units)
         self._add_to_collection(t, part, file)
+
+    def grid(self, part: str, points: np.ndarray, cells: list, fixed: bool) -> str:
+        """Result of `grid_xml`, kept under the name `part` if the points are fixed."""
+        if not fixed:
+            return grid_xml(points, cells)
+        if part not in self.fixed_grids:
+            self.fixed_grids[part] = grid_xml(points, cells)
+        return self.fixed_grids[part]
 
     def points_at(self, frame: dict) -> np.ndarray:
         """Points of the pipes in world axes at the time of a frame : float64[n, 3] [m]; points on bodies move."""
@@ -210,11 +222,20 @@ class FieldSeries:
             file.write((line + PVD_TAIL).encode())
 
 
-def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, list], units: dict[str, str]) -> None:
+def write_frame(path: Path, grid: str, data: dict[str, list], units: dict[str, str]) -> None:
     """Write a .vtu file: unstructured grid in XML, arrays compressed by zlib, of which each carries its unit.
 
+    grid : result of `grid_xml`; data : name -> list of arrays, one for each block of cells; units : name -> unit
+    """
+    arrays = ((name, np.concatenate([np.asarray(block) for block in blocks])) for name, blocks in data.items())
+    text = "".join(array_xml(name, values, units) for name, values in arrays)
+    path.write_text(f"{grid}<CellData>\n{text}</CellData>\n{VTU_TAIL}", encoding="utf-8")
+
+
+def grid_xml(points: np.ndarray, cells: list) -> str:
+    """Begin of the text of a .vtu file, with points and cells.
+
     points : float64[p, 3]; cells : blocks (type of `CELL_TYPES`, int[cells, corners])
-    data : name -> list of arrays, one for each block of cells; units : name -> unit
     """
     corners = [np.asarray(block, dtype=np.int64) for _, block in cells]
     ends = np.cumsum(np.concatenate([np.full(len(block), block.shape[1], dtype=np.int64) for block in corners]))
@@ -223,12 +244,11 @@ def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, lis
         "Points": [("Points", np.asarray(points, dtype=float))],
         "Cells": [("connectivity", np.concatenate([block.ravel() for block in corners])), ("offsets", ends),
                   ("types", types)],
-        "CellData": [(name, np.concatenate([np.asarray(block) for block in blocks])) for name, blocks in data.items()],
     }  # fmt: skip
     text = VTU_HEAD.format(points=len(points), cells=len(types))
     for group, arrays in groups.items():
-        text += f"<{group}>\n{''.join(array_xml(name, values, units) for name, values in arrays)}</{group}>\n"
-    path.write_text(text + VTU_TAIL, encoding="utf-8")
+        text += f"<{group}>\n{''.join(array_xml(name, values, {}) for name, values in arrays)}</{group}>\n"
+    return text
 
 
 def array_xml(name: str, values: np.ndarray, units: dict[str, str]) -> str:
@@ -416,7 +436,7 @@ def write_piece(path: Path, basin, origin, rows, k: int, values: dict, units: di
     points = drawn_points(basin, origin, basin.mesh.points[first : last + 1])
     blocks = {key: [array] for key, array in values.items()}
     try:
-        write_frame(piece_path(path, k), points, [("quad", corners - first)], blocks, units)
+        write_frame(piece_path(path, k), grid_xml(points, [("quad", corners - first)]), blocks, units)
     except OSError as error:
         return error.errno, error.strerror or str(error), str(error.filename or piece_path(path, k))
     return ()

@@ -1,6 +1,6 @@
 """Columns of result tables: name, dimension and unit, with conversion from and to SI."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,8 +8,7 @@ from fvsolve import units
 from fvsolve.model.model import once_per_model
 
 
-@dataclass(frozen=True)
-class UnitColumn:
+class UnitColumn(NamedTuple):
     """Column of a table: name, dimension and output unit of a quantity. ambient : zero of gauge pressures [Pa]"""
 
     name: str

@@ -71,6 +71,8 @@ CLOSURES = ("stage", "discharge", "rating", "normal_slope")  # keys that close a
 class Patch(Table):
     """A section of the boundary of a basin: a node `BASIN.PATCH` for links, an open boundary, or a moving wall."""
 
+    boundary_keys: ClassVar[tuple[str, ...]] = ("boundary", "impedance", *CLOSURES)  # those that exclude a link
+
     side: Annotated[
         str | None,
         Choice("side", SIDES, "side of the rectangle, required for a rectangle; a mesh file names its own patches"),

@@ -59,6 +59,8 @@ class PartNames(Value):
 
 
 ZEROS = {"K": 0.0, "degC": 273.15}  # units of a temperature that heat changes: absolute temperature of 0 [K]
+AMOUNT_UNITS = {"mol/m3": 1.0, "mmol/l": 1.0}  # unit of a scalar -> amount of substance per volume [mol/m3]
+MASS_UNIT, MASS = "mg/l", 1e-3  # mass per volume [kg/m3]
 
 
 class Scalar(Table):
@@ -107,6 +109,14 @@ class Scalar(Table):
     def zero(self) -> float:
         """Absolute temperature at which the value of a scalar with heat is 0 [K]."""
         return ZEROS.get(self.unit, 0.0)
+
+
+def molar_factor(scalar: Scalar) -> float | None:
+    """Amount of substance per volume [mol/m3] of the value 1 of a scalar; None if its unit is no amount."""
+    unit = scalar.unit.replace(" ", "").replace("³", "3").replace("^", "").replace("L", "l")
+    if unit == MASS_UNIT:
+        return None if scalar.molar_mass is None else MASS / scalar.molar_mass
+    return AMOUNT_UNITS.get(unit)
 
 
 @dataclass(frozen=True)

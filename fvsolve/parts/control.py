@@ -6,12 +6,9 @@ from typing import Annotated, Any, ClassVar
 
 from fvsolve import units
 from fvsolve.parts.kinds import Kinds
-from fvsolve.parts.schedule import Schedule, Scheduled, constant
+from fvsolve.parts.schedule import UNKNOWN, Schedule, Scheduled, constant
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import PROFILE, VALUE, Quantity, ReadContext, Rows, Text, Value, nonnegative, positive
-
-PREFIX = "controls."  # of a block in the key `input` of another block
-UNKNOWN = ""  # dimension of an input or output that is not known because of a fault elsewhere
 
 
 def read_in(dimensions: tuple[str, ...], read: Callable[[tuple[str, ...]], Any], given: Any, instead: Any) -> Any:

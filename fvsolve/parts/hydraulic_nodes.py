@@ -8,7 +8,6 @@ from pydantic import Field
 from fvsolve.assembly.lowering import FLOW, HEAD, PRESSURE, Input, Lowering, scalar_inputs
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.nodes_and_links import PlaceOnBody
-from fvsolve.parts.outlet.part import outlet_to_ambient
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.value import VALUE, Number, Quantity, UsualRange, between, positive
@@ -45,6 +44,8 @@ class Junction(PlaceOnBody, kind="junction"):
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         if self.required_pressure is None:
             return {name: self}, {}
+        from fvsolve.parts.outlet.part import outlet_to_ambient
+
         full = float(self.demand.value.max())
         law = {"flow": full, "exponent": self.demand_exponent, "opening": self.demand, "full": full, "most": 1.0}
         law |= {"least": self.minimum_pressure, "upper": self.required_pressure}

@@ -196,6 +196,11 @@ class Ports(Value):
         return keys_json(self.keys())
 
 
+def is_kind(part: Any, kind: str) -> bool:
+    """True if a part or class of parts has the type `kind`, without the import of its class; False for None."""
+    return getattr(part, "kind", "") == kind
+
+
 def is_in_network(kind: Any) -> bool:
     """True if a part, or class of parts, is in networks of rotation, electricity and heat, which carry no scalars."""
     return getattr(kind, "in_network", False) or getattr(kind, "domain", "") in NETWORK_DOMAINS

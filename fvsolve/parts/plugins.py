@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable
 from importlib import import_module
 from importlib.machinery import ModuleSpec
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, EntryPoints, distributions
 from importlib.util import module_from_spec
 from pathlib import Path
 from typing import Any
@@ -65,7 +65,10 @@ def register_installed(entry: EntryPoint) -> None:
 
 def declare_installed() -> None:
     """Declare parts and limiters of installed packages and of environment variables; warn of unreadable ones."""
-    installed = entry_points()
+    # half of the time of `entry_points()`, which parses the file of every installed package
+    found = [package for package in distributions() if "[fvsolve." in (package.read_text("entry_points.txt") or "")]
+    packages = {package.name: package for package in reversed(found)}  # the first of a name, as in `entry_points()`
+    installed = EntryPoints(entry for package in packages.values() for entry in package.entry_points)
     offered: list[tuple[str, Callable[[Any], None], Any]] = [
         *(
             (f"{entry.name} of the entry points {GROUP}", declare, entry.value)

@@ -7,19 +7,16 @@ from typing import Annotated, Any, ClassVar
 
 from fvsolve import units
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts.carried_scalar import Scalar
+from fvsolve.parts.carried_scalar import MASS_UNIT, Scalar, molar_factor
 from fvsolve.parts.formula import SMOOTH_FUNCTIONS, Arithmetic
 from fvsolve.parts.formula_program import Program
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import VALUE, Quantity, ReadContext, Text, Value, ValueFault, nonnegative
 from fvsolve.units import show
 
-GAS_CONSTANT = 8.31446261815324  # [J/mol/K], exact in the SI
 ARROW = "->"
 EXAMPLE = '"Cl + 2 B -> P"'
 TERM = re.compile(r"(\d+\.?\d*|\.\d+)?[ ]*\*?[ ]*([^\W\d][\w-]*)")
-AMOUNT_UNITS = {"mol/m3": 1.0, "mmol/l": 1.0}  # unit of a scalar -> amount of substance per volume [mol/m3]
-MASS_UNIT, MASS = "mg/l", 1e-3  # mass per volume [kg/m3]
 UNIT_HINT = 'expected unit = "mol/m3", "mmol/l", or "mg/l" with `molar_mass`'
 BALANCED = 1e-9  # greatest relative difference of counts of atoms
 
@@ -171,14 +168,6 @@ class Reaction(Table):
             text = "has kinks: comparisons, abs, min or max; expected a smooth formula of scalars"
             raise ValueError(f"{show(self.rate)} {text}")
         return program
-
-
-def molar_factor(scalar: Scalar) -> float | None:
-    """Amount of substance per volume [mol/m3] of the value 1 of a scalar; None if its unit is no amount."""
-    unit = scalar.unit.replace(" ", "").replace("³", "3").replace("^", "").replace("L", "l")
-    if unit == MASS_UNIT:
-        return None if scalar.molar_mass is None else MASS / scalar.molar_mass
-    return AMOUNT_UNITS.get(unit)
 
 
 def unit_fault(scalar: Scalar, reaction: str) -> tuple[tuple[str, ...], str] | None:

@@ -19,6 +19,8 @@ AMPLITUDE_DIMENSIONS = {
     "pressure": "pressure_drop"
 }  # dimension of an amplitude, if the zero point of the dimension matters
 
+BLOCK_PREFIX = "controls."  # prefix of the name of a block, as in the key `input` of another block
+UNKNOWN = ""  # dimension of an input or output of a block, not known because of a fault elsewhere
 SIGNS = "*+()^<>="  # of a formula
 BOUNDED = ("pressure", "head", "angular_velocity")  # dimensions that a control may drive only within `limits`
 

@@ -3,7 +3,7 @@
 import functools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
@@ -25,8 +25,7 @@ from fvsolve.units import show
 Faults = Iterator[tuple[tuple[Any, ...], str]]  # (keys below the part, text of the fault)
 
 
-@dataclass(frozen=True)
-class CaseContext:
+class CaseContext(NamedTuple):
     """Parts and properties of a case, for checks after its parts are read.
 
     nodes, links : parts by name; ambient : ambient pressure [Pa]

@@ -1,7 +1,6 @@
 """Comparison of a run with its case: extremes, design limits, expected values, measured series; and of two runs."""
 
 import math
-from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,8 +23,7 @@ SHARED = ("name", "quantity", "until")  # keys with one value for all places of 
 PLACES_KEY = "beside"  # key of a row that is not written to files: all places of its part and bound
 
 
-@dataclass(frozen=True)
-class PartExtremes:
+class PartExtremes(NamedTuple):
     """Extremes at the n recorded positions of a part : float64[n] each; n is 1 except for pipes.
 
     distance : from the `from` end of a pipe [m], nan for other parts; elevation [m]
@@ -77,7 +75,7 @@ def valid(part: PartExtremes, until: float) -> PartExtremes:
     """Copy of the extremes of a part, with nan for those that occurred at the time `until` [s] or later."""
     sides = {side: np.where(getattr(part, f"t_{side[:3]}") < until, getattr(part, side), np.nan)
              for side in ("minimum", "maximum")}  # fmt: skip
-    return replace(part, **sides)
+    return part._replace(**sides)
 
 
 def in_quantity(model, quantity: str, pressure, elevation):

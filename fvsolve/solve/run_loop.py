@@ -16,7 +16,7 @@ from fvsolve.kernels.scalar_transport import GREATEST_RISE
 from fvsolve.model import Model, RunData
 from fvsolve.model.input_histories import delays_of
 from fvsolve.model.scalar_tables import amount_indices, state_bounds
-from fvsolve.parts.control import PREFIX
+from fvsolve.parts.schedule import BLOCK_PREFIX
 from fvsolve.solve.partition import blocked_sums, make_partition
 from fvsolve.steppers import automatic, loop_records
 from fvsolve.steppers.integrator import Integrator
@@ -357,7 +357,7 @@ class RunLoop:
             return ""
         number, time = self.run_data.written.applied[-2:]
         earliest = self.t if self.model.y_size else -np.inf
-        return f"{PREFIX}{self.model.block_names[int(number) - 1]}" if number > 0.0 and time >= earliest else ""
+        return f"{BLOCK_PREFIX}{self.model.block_names[int(number) - 1]}" if number > 0.0 and time >= earliest else ""
 
     def chattering_text(self, when: str) -> str:
         """Text with the devices that change their states without end, and a remedy; when : time of the failure."""
@@ -365,7 +365,7 @@ class RunLoop:
         first = self.t if self.at_once > 1 else self.recent_events[0]  # at the same time, or within a short span
         names = sorted({model.events[k][0] for t, k in self.switched if t >= first})
         remedies = {device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names}
-        if any(name.startswith(PREFIX) for name in names):
+        if any(name.startswith(BLOCK_PREFIX) for name in names):
             remedies["set the thresholds of the block farther apart, or give it a `filter`"] = None
         switches = [] if model.network is None else [item.part.partition(".")[2] for item in model.network.switches]
         if {*names} & {*switches}:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,8 +26,7 @@ BUILT_IN: set[str] = set()  # names of built-in methods, not available for user 
 EXACT_DECIMALS = 6  # decimals with at most this many digits are exact
 
 
-@dataclass(frozen=True)
-class Array:
+class Array(NamedTuple):
     """Exact coefficients of a tableau: fractions, or algebraic numbers with a common root.
 
     a, b, c : Butcher array; embedded : weights of the embedded solution, empty without one

@@ -25,7 +25,7 @@ from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.mesh import read, rectangle
 from fvsolve.mesh.mesh import MeshPoints
 from fvsolve.model import RunData
-from fvsolve.output.fields import basin_geometry, split_blocks, write_frame
+from fvsolve.output.fields import basin_geometry, grid_xml, split_blocks, write_frame
 from fvsolve.run.plot_scene import lengths_of, unit_of
 
 FIELDS = ("depth", "surface", "bed", "u", "v", "speed")
@@ -302,7 +302,7 @@ def test_a_frame_of_triangles_and_quads_opens_with_pyvista_and_meshio_and_knows_
     fields = model.fields(random_state(model, 1e-3), model.new_out())["block"]
     points, cells = basin_geometry(basin, np.zeros(2))
     data = {name: split_blocks(values, cells) for name, values in fields.items()}
-    write_frame(tmp_path / "block.vtu", points, cells, data, basin.units)
+    write_frame(tmp_path / "block.vtu", grid_xml(points, cells), data, basin.units)
     found, drawn = meshio.read(tmp_path / "block.vtu"), pyvista.read(tmp_path / "block.vtu")
     kinds = {block.type for block in found.cells}
     assert kinds == {"triangle", "quad"} and drawn.n_cells == basin.n

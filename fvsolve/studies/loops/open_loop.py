@@ -12,7 +12,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.kernels.delay_lines import wave_history as history
-from fvsolve.parts.control import PREFIX
+from fvsolve.parts.schedule import BLOCK_PREFIX
 from fvsolve.solve.held_inputs import hold
 from fvsolve.studies.linearise import linearise_at
 from fvsolve.studies.loops.delay_system import DelaySystem
@@ -25,7 +25,7 @@ MAX_STATES = 800  # greatest number of states
 
 def block_of(case, name: str) -> str:
     """Name of a control of a case without the prefix "controls."; raises FvsolveError if it has no loop to study."""
-    name = name.removeprefix(PREFIX)
+    name = name.removeprefix(BLOCK_PREFIX)
     if name not in case.controls:
         hint = did_you_mean(name, case.controls) or (
             f"; controls are {listing(case.controls)}" if case.controls else "; the case has no [controls]"
@@ -49,7 +49,7 @@ def open_loop(case, name: str, at: float | None) -> tuple[DelaySystem, Operating
 
     Raises FvsolveError for a control at a limit.
     """
-    own = f"{PREFIX}{name}.output"
+    own = f"{BLOCK_PREFIX}{name}.output"
     linear, system = delayed_system(case, None, own, own, at)
     refuse_limit(linear.at, name)
     return system, linear.at
@@ -61,13 +61,13 @@ def delayed_system(case, set, input: str, output: str, at: float | None, before:
     Delay lines are exact at the start; at another time they are replaced by cells.
     """
     delays = [key for key, block in case.controls.items() if block.control.kind == "delay"]
-    probes = list(dict.fromkeys([output, *(f"{PREFIX}{key}.input" for key in delays)]))
+    probes = list(dict.fromkeys([output, *(f"{BLOCK_PREFIX}{key}.input" for key in delays)]))
     point = operating_point(case, set, at, before, probes, lines=True)
-    inputs = list(dict.fromkeys([input, *(f"{PREFIX}{key}.output" for key in delays)]))
+    inputs = list(dict.fromkeys([input, *(f"{BLOCK_PREFIX}{key}.output" for key in delays)]))
     linear = linearise_at(point, inputs, len(probes))
     system = with_delays(linear, input, output, delay_blocks(point.model))
     if len(point.model.tables.delays):
-        waves = [f"{PREFIX}{key}" for key in delay_blocks(point.model)]
+        waves = [f"{BLOCK_PREFIX}{key}" for key in delay_blocks(point.model)]
         rows = [output, *(f"{wave}.input" for wave in waves)]
         system = with_lines(linear, system, [input, *(f"{wave}.output" for wave in waves)], rows)
     return linear, system
@@ -98,7 +98,7 @@ def with_delays(system, cut: str, output: str, delays: dict[str, float]) -> Dela
     if len(system.states) > MAX_STATES:
         raise state_limit_error(len(system.states))
     a = system.a if isinstance(system.a, np.ndarray) else system.a.toarray()
-    waves = [f"{PREFIX}{key}" for key in delays]
+    waves = [f"{BLOCK_PREFIX}{key}" for key in delays]
     columns = [system.inputs.index(cut), *(system.inputs.index(f"{wave}.output") for wave in waves)]
     rows = [system.outputs.index(output), *(system.outputs.index(f"{wave}.input") for wave in waves)]
     b, c, d = system.b[:, columns].copy(), system.c[rows], system.d[np.ix_(rows, columns)].copy()

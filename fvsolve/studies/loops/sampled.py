@@ -18,7 +18,7 @@ import numpy as np
 from fvsolve.assembly.control_rows import control_rows_of
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.kernels import dtypes as rec
-from fvsolve.parts.control import PREFIX
+from fvsolve.parts.schedule import BLOCK_PREFIX
 from fvsolve.solve.held_inputs import hold
 from fvsolve.studies.linearise import linearise_at
 from fvsolve.studies.loops.open_loop import MAX_STATES, delay_blocks, refuse_limit, slope, state_limit_error
@@ -59,12 +59,12 @@ class SampledLoop:
             raise FvsolveError(f"controls.{late[0]} is a delay with `period`. Expected a delay that acts at all times")
         delays = [key for key, block in blocks.items() if block.control.kind == "delay"]
         self.period, self.ticks = common_period(self.sampled)
-        own = f"{PREFIX}{name}.output"
-        probes = list(dict.fromkeys([own, *(f"{PREFIX}{key}.input" for key in delays)]))
+        own = f"{BLOCK_PREFIX}{name}.output"
+        probes = list(dict.fromkeys([own, *(f"{BLOCK_PREFIX}{key}.input" for key in delays)]))
         self.point = operating_point(case, None, at, False, probes)
         refuse_limit(self.point, name)
         self.delays, self.flows = delay_blocks(self.point.model), {}
-        inputs = list(dict.fromkeys([own, *(f"{PREFIX}{key}.output" for key in (*self.sampled, *self.delays))]))
+        inputs = list(dict.fromkeys([own, *(f"{BLOCK_PREFIX}{key}.output" for key in (*self.sampled, *self.delays))]))
         system = linearise_at(self.point, inputs, len(probes))
         if len(system.states) > MAX_STATES:
             raise state_limit_error(len(system.states))
@@ -299,7 +299,7 @@ def gain_within(low: float, high: float) -> float:
 
 def name_of(text: str) -> str:
     """Name of a control in the name of one of its quantities, "controls.NAME.output"."""
-    return text.removeprefix(PREFIX).rpartition(".")[0]
+    return text.removeprefix(BLOCK_PREFIX).rpartition(".")[0]
 
 
 def common_period(sampled: dict) -> tuple[float, dict[str, list[float]]]:
