@@ -338,8 +338,10 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     # location of the first cavity, greatest cavity volume, and its time.
     marks = pipes * (4 if draft.case.law.cavitates else 1) + 3 * nodes + len(draft.column_table)
     marks += 2 * len(draft.device_table) + len(draft.piston_table)
-    # `spare` has a copy of `out`; with delay lines two copies, and three values for each probe and node
-    spare = 2 * out + 3 * (len(draft.probe_table) + nodes) if len(draft.delay_table) else out
+    # `spare` has a copy of `out`; with delay lines two copies, three values for each probe and node, and arrival times
+    spare = out
+    if lines := len(draft.delay_table):
+        spare = 2 * out + 3 * (len(draft.probe_table) + nodes) + 2 * (1 << (4 * lines - 1).bit_length())
     draft.shapes = rec.RunArrays(
         clock=1, work=draft.work_size, marks=marks,
         armed=tanks.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),

@@ -25,7 +25,7 @@ from scipy.integrate import solve_ivp
 
 import fvsolve
 from fvsolve.kernels.delay_lines import wave_history as history
-from fvsolve.kernels.delay_lines.history_update import wave_bounds
+from fvsolve.kernels.delay_lines.history_update import earliest_arrival, wave_bounds, write_arrival
 from fvsolve.kernels.delay_lines.line_rates import smooth_wave_linear
 from fvsolve.solve import initial_state
 from fvsolve.solve.solve import Run
@@ -367,3 +367,11 @@ def test_bounds_by_which_cells_are_left_out_contain_all_waves(case, jumps_seen):
             assert greatest - least <= 2.0 * np.ptp([*found, *around]) + 1.0
             checked, varied = checked + len(sent), max(varied, np.ptp(found))
     assert checked >= jumps_seen and varied > 5.0
+
+
+def test_jumps_arrive_in_the_order_of_their_times():
+    """The tree of arrival times gives the least of them after each change, the last one of equal times."""
+    random, tree = np.random.default_rng(3), np.full(32, history.INFINITE)
+    for k in random.integers(0, 16, 400):
+        write_arrival(tree, int(k), float(random.integers(0, 9)))
+        assert earliest_arrival(tree) == np.flatnonzero(tree[16:] == tree[16:].min())[-1]

@@ -38,22 +38,24 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit(forceinline=True)
 def spare_offsets(tables):
-    """Offsets of five arrays in the array `spare`, in this order.
+    """Offsets of six arrays in the array `spare`, in this order.
 
     - probe values of the last record
     - node pressures of the last record
     - probe values at the end of the step, without the jumps that arrive in the step
     - node pressures at the end of the step, without these jumps
     - work array
+    - arrival times of jumps, see `write_arrival`
     """
     at, probes, nodes = 2 * tables.layout[0]["size"], tables.probes.size, tables.nodes.size
-    return at, at + probes, at + probes + nodes, at + 2 * probes + nodes, at + 2 * (probes + nodes)
+    both = probes + nodes
+    return at, at + probes, at + both, at + both + probes, at + 2 * both, at + 3 * both
 
 
 @njit
 def store_values(tables, out, values):
     """Store probe values and node pressures of an accepted state in `spare`, as those of the last record."""
-    first, second, _, _, _ = spare_offsets(tables)
+    first, second, _, _, _, _ = spare_offsets(tables)
     pressure = tables.layout[0]["pressure"]
     for k in range(tables.probes.size):
         tables.spare[first + k] = values[k]
@@ -68,7 +70,7 @@ def store_smooth_values(t, y, state, handle):
     state : `out` at t for this case
     """
     tables = open_tables(handle)
-    _, _, third, fourth, fifth = spare_offsets(tables)
+    _, _, third, fourth, fifth, _ = spare_offsets(tables)
     pressure = tables.layout[0]["pressure"]
     observe_in_turn(t, y, state, handle, tables.spare[third:fourth])
     for i in range(tables.nodes.size):
@@ -85,7 +87,7 @@ def extremes_at_jump(t, time, y, state, handle):
     """
     tables = open_tables(handle)
     past, spare, marks, pipes, nodes = tables.past, tables.spare, tables.marks, tables.pipes, tables.nodes
-    first, second, third, fourth, fifth = spare_offsets(tables)
+    first, second, third, fourth, fifth, _ = spare_offsets(tables)
     probes, pressure, vapor = tables.probes.size, tables.layout[0]["pressure"], tables.settings[0]["vapor"]
     before = history.time_of(past, int(past[history.COUNT]) - 1)
     share = (t - time) / (t - before)
@@ -510,23 +512,70 @@ def admit_jumps(past, places, tables, t):
 
 
 @njit
-def earliest_jump(past, places, tables, t):
-    """Jump that is the first to leave a first or last stretch of a delay line by t.
+def arrival_of(past, places, tables, number, slot, latest):
+    """Arrival time of the next jump to leave an end stretch of a delay line, if it is at most `latest`, else INFINITE.
 
-    Returns (line, stretch within the line, wave, offset of its time in `past`); the line is -1 without a jump. Jumps
-    that end a step (`ends_step`) are left out.
+    Jumps that end a step (`ends_step`) are left out.
+    slot : 0 or 1 for the forward or backward wave of the first stretch, 2 or 3 for those of the last
     """
-    best, result = t + history.time_tolerance(past), (-1, 0, 0, -1)
-    for number in range(tables.delays.size):
-        line = tables.delays[number]
-        for q in range(0, line["stretches"], max(1, line["stretches"] - 1)):
-            for wave in range(2):
-                place = first_waiting_jump(past, places, line["stretch"] + q, wave)
-                if place >= 0 and past[place] + line["tau"] <= best:
-                    size = past[place + int(past[history.JUMP_CAPACITY])]
-                    if not ends_step(past, tables, line, tables.pipes[line["pipe"]], q, wave, size):
-                        best, result = past[place] + line["tau"], (number, q, wave, place)
-    return result
+    line = tables.delays[number]
+    if slot > 1 and line["stretches"] == 1:
+        return history.INFINITE
+    q, wave = line["stretches"] - 1 if slot > 1 else 0, slot % 2
+    place = first_waiting_jump(past, places, line["stretch"] + q, wave)
+    if place < 0 or past[place] + line["tau"] > latest:
+        return history.INFINITE
+    size = past[place + int(past[history.JUMP_CAPACITY])]
+    if ends_step(past, tables, line, tables.pipes[line["pipe"]], q, wave, size):
+        return history.INFINITE
+    return past[place] + line["tau"]
+
+
+@njit(forceinline=True)
+def write_arrival(tree, k, time):
+    """Write arrival time k to a binary tree, in which each element is the least of its two children.
+
+    tree : float64[2 n]  the root is element 1, the times are the last n elements
+    """
+    k += tree.size // 2
+    tree[k] = time
+    while k > 1:
+        time = min(time, tree[k ^ 1])
+        k //= 2
+        tree[k] = time
+
+
+@njit(forceinline=True)
+def earliest_arrival(tree):
+    """Number of the least arrival time in a tree of `write_arrival`, the last one if several are equal."""
+    k = 1
+    while 2 * k < tree.size:
+        k = 2 * k + 1 * (tree[2 * k + 1] <= tree[2 * k])
+    return k - tree.size // 2
+
+
+@njit
+def write_all_times(past, places, tables, tree, latest):
+    """Write the arrival times at the ends of all delay lines to a tree (`write_arrival`), see `arrival_of`."""
+    n = tree.size // 2
+    for k in range(n):
+        within = k < 4 * tables.delays.size
+        tree[n + k] = arrival_of(past, places, tables, k // 4, k % 4, latest) if within else history.INFINITE
+    for k in range(n - 1, 0, -1):
+        tree[k] = min(tree[2 * k], tree[2 * k + 1])
+
+
+@njit
+def times_may_change(past, tables, t):
+    """True if a jump that arrives in a step until t may change the arrivals of other jumps in the step.
+
+    This holds for lines with a travel time shorter than the step, and where jumps end a step (`ends_step`).
+    """
+    h = t - history.time_of(past, int(past[history.COUNT]) - 1)
+    for i in range(tables.delays.size):
+        if tables.delays[i]["acts"] != 0 or tables.delays[i]["tau"] < h + 4.0 * history.time_tolerance(past):
+            return True
+    return False
 
 
 @njit
@@ -537,10 +586,11 @@ def pass_jumps_at_ends(past, places, own, t, y, out, handle):
     corrected (`jumps`). Jumps that end a step are left out.
     own : tables of the run, in which short lines couple their ends at once
     """
-    number, q, wave, place = earliest_jump(past, places, own, t)
-    if number < 0:
+    latest, tree = t + history.time_tolerance(past), own.spare[spare_offsets(own)[5] :]
+    write_all_times(past, places, own, tree, latest)
+    if tree[1] > latest:
         return False
-    sharp = own.sharp
+    sharp, changing = own.sharp, times_may_change(past, own, t)
     tables, size = open_tables(sharp), own.layout[0]["size"]
     state, queue = own.spare[:size], int(past[history.JUMP_CAPACITY])
     past[history.ONLY_PASSED_JUMPS], past[history.ARRIVALS_TIME] = 1.0, history.NAN
@@ -553,8 +603,13 @@ def pass_jumps_at_ends(past, places, own, t, y, out, handle):
         past[places[0] + history.ARRIVALS_SIZE * end_stretch(line, 1) + 1] = state[at + 2]
     store_smooth_values(t, y, state, handle)
     together = False  # True if a jump arrives with the jump before: the state between both never occurs
-    while number >= 0:
-        line, sent, jump = tables.delays[number], past[place], past[place + queue]
+    while tree[1] <= latest:
+        next_jump = earliest_arrival(tree)
+        number, wave = next_jump // 4, next_jump % 2
+        line = tables.delays[number]
+        q = line["stretches"] - 1 if next_jump % 4 > 1 else 0
+        place = first_waiting_jump(past, places, line["stretch"] + q, wave)
+        sent, jump = past[place], past[place + queue]
         time = min(sent + line["tau"], t)
         share = jumps.reflected_part(past, places, line, tables.pipes[line["pipe"]], q, wave, jump, t)
         past[history.jump_head(places, line["stretch"] + q, wave) + history.ARRIVED_COUNT] += 1.0
@@ -565,8 +620,11 @@ def pass_jumps_at_ends(past, places, own, t, y, out, handle):
         closed = leave_stretch(past, places, tables, y, state, number, q, 1 - wave, time, share, times) and closed
         if not closed:
             solve_nodes_again(past, places, tables, t, y, state, sharp, time, times)
-        number, q, wave, place = earliest_jump(past, places, own, t)
-        together = number >= 0 and past[place] + tables.delays[number]["tau"] <= time + history.time_tolerance(past)
+        if changing:
+            write_all_times(past, places, own, tree, latest)
+        else:
+            write_arrival(tree, next_jump, arrival_of(past, places, own, number, next_jump % 4, latest))
+        together = tree[1] <= min(latest, time + history.time_tolerance(past))
         if not together:
             extremes_at_jump(t, time, y, state, handle)
     past[history.ARRIVALS_TIME] = history.NAN
