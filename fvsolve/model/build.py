@@ -31,6 +31,7 @@ from fvsolve.model.delay_lines import (
     divide_lines,
     end_admittance_ratio,
     history_size,
+    jump_capacity,
     jump_tables,
     line_methods,
     lower_delays,
@@ -441,6 +442,8 @@ def scratch_size(draft: ModelDraft) -> int:
     spatial = 8 * len(draft.freedom_table) + draft.factor_size + 16 * len(draft.body_table)
     spatial += constraints * (2 * len(draft.freedom_table) + constraints + 1)
     spatial = max(spatial, 18 if len(draft.body_table) else 0)
+    if stretches := sum(draft.delay_table["stretches"]):
+        system = max(system, 3 * most + jump_capacity(stretches))
     return int(max(spatial, (5 if scalars else 4) * most + 64, system, 2 * len(draft.mass_table), 4 * scalars * nodes))
 
 
