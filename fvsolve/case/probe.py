@@ -228,7 +228,7 @@ def _quantity(
     length: float | None,
     begin: float,
 ) -> tuple[float | None, str]:
-    known = {**along, **own, **getattr(kind, "fields", {})}
+    known = {**getattr(kind, "fields", {}), **along, **own}
     if quantity not in known:
         has = 'with sloshing = "frozen" its water moves with its body; expected a probe of the body'
         has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}" if known else has

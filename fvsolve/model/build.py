@@ -31,6 +31,7 @@ from fvsolve.model.delay_lines import (
     divide_lines,
     end_admittance_ratio,
     history_size,
+    jump_capacity,
     jump_tables,
     line_methods,
     lower_delays,
@@ -339,8 +340,10 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     # location of the first cavity, greatest cavity volume, and its time.
     marks = pipes * (4 if draft.case.law.cavitates else 1) + 3 * nodes + len(draft.column_table)
     marks += 2 * len(draft.device_table) + len(draft.piston_table)
-    # `spare` has a copy of `out`; with delay lines two copies, and three values for each probe and node
-    spare = 2 * out + 3 * (len(draft.probe_table) + nodes) if len(draft.delay_table) else out
+    # `spare` has a copy of `out`; with delay lines two copies, three values for each probe and node, and arrival times
+    spare = out
+    if lines := len(draft.delay_table):
+        spare = 2 * out + 3 * (len(draft.probe_table) + nodes) + 2 * (1 << (4 * lines - 1).bit_length())
     draft.shapes = rec.RunArrays(
         clock=1, work=draft.work_size, marks=marks,
         armed=tanks.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),
@@ -441,6 +444,8 @@ def scratch_size(draft: ModelDraft) -> int:
     spatial = 8 * len(draft.freedom_table) + draft.factor_size + 16 * len(draft.body_table)
     spatial += constraints * (2 * len(draft.freedom_table) + constraints + 1)
     spatial = max(spatial, 18 if len(draft.body_table) else 0)
+    if stretches := sum(draft.delay_table["stretches"]):
+        system = max(system, 3 * most + jump_capacity(stretches))
     return int(max(spatial, (5 if scalars else 4) * most + 64, system, 2 * len(draft.mass_table), 4 * scalars * nodes))
 
 

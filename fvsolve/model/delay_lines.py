@@ -51,9 +51,16 @@ def history_size(delays: np.ndarray, wider: int = 1) -> int:
     """Size of the history array of these delay lines, with ring buffers `wider` times as long as at first."""
     if not len(delays):
         return 0
-    count, entries = int(delays["stretches"].sum()), wider * int((delays["ring_size"] * delays["stretches"]).sum())
-    per_stretch = at.ARRIVALS_SIZE + 2 * at.HEAD_SIZE + 6 * jump_capacity(count) + at.RING_GAP
-    return at.HEADER_SIZE + wider * int(delays["ring_size"].max()) + per_stretch * count + 2 * entries
+    count, entries = int(delays["stretches"].sum()), wider * ring_entries(delays)
+    per_wave = at.HEAD_SIZE + at.JUMP_SIZE * jump_capacity(count)
+    per_stretch = at.ARRIVALS_SIZE + 2 * per_wave + at.RING_GAP + at.BOUNDS_BEGIN
+    times = wider * int(delays["ring_size"].max())
+    return at.HEADER_SIZE + times + per_stretch * count + (2 + at.BOUNDS_SIZE) * entries
+
+
+def ring_entries(delays: np.ndarray) -> int:
+    """Capacity of the ring buffers of all stretches together, in entries, before they are lengthened."""
+    return int((delays["ring_size"] * delays["stretches"]).sum())
 
 
 def jump_capacity(count: int) -> int:
@@ -75,7 +82,7 @@ def begin_history(past: np.ndarray, delays: np.ndarray) -> None:
     sizes = [at.CAPACITY, at.JUMP_CAPACITY, at.STRETCHES, at.RING_FACTOR, at.ARRIVALS_TIME, at.CORRECTED_TIME]
     wider = 1 if past.size == history_size(delays) else ring_factor(past, delays)
     past[sizes] = wider * int(delays["ring_size"].max()), jump_capacity(count), count, wider, math.nan, -math.inf
-    past[at.NEXT_ARRIVAL] = at.INFINITE
+    past[at.NEXT_ARRIVAL], past[at.RING_ENTRIES] = at.INFINITE, ring_entries(delays)
 
 
 def ring_factor(past: np.ndarray, delays: np.ndarray) -> int:
@@ -105,7 +112,7 @@ def jump_times(past: np.ndarray, delays: np.ndarray, begin: float, end: float) -
     heads = past[places[1] : places[2]].reshape(-1, at.HEAD_SIZE)
     line_of, arrivals = np.repeat(np.arange(len(delays)), delays["stretches"]), []
     for head in np.flatnonzero(heads[:, at.JUMP_COUNT]):
-        line, first = delays[line_of[head // 2]], places[2] + 3 * queue * head
+        line, first = delays[line_of[head // 2]], places[2] + at.JUMP_SIZE * queue * head
         order = (int(heads[head, at.FIRST_JUMP]) + np.arange(int(heads[head, at.JUMP_COUNT]))) % queue
         sent = past[first + order]
         arrivals += [sent + line["tau"], sent + 0.5 * line["tau"]]
@@ -137,7 +144,7 @@ def with_doubled_rings(past: np.ndarray, delays: np.ndarray) -> np.ndarray:
     old, new = at.HEADER_SIZE, at.HEADER_SIZE
     result[new + (stored & (int(result[at.CAPACITY]) - 1))] = past[old + (stored & (int(past[at.CAPACITY]) - 1))]
     here, there = at.offsets_of(past), at.offsets_of(result)
-    result[there[0] : there[3]] = past[here[0] : here[3]]  # all except rings
+    result[there[0] : there[3]] = past[here[0] : here[3]]  # all except rings and bounds
     for row in delays:
         for q in range(row["stretches"]):
             (old, old_mask), (new, new_mask) = at.ring_of(here, row, q), at.ring_of(there, row, q)

@@ -18,7 +18,6 @@ import threading
 import time
 import traceback
 from contextlib import contextmanager
-from dataclasses import replace
 from queue import SimpleQueue
 
 import numpy as np
@@ -140,7 +139,7 @@ def copy_integrator(stepper: Integrator) -> Integrator:
 
 def band_functions(cut: Partition) -> tuple:
     """Compiled functions of a model with exchange between bands, and compiled function that adds up partial sums."""
-    features = replace(cut.model.functions.cast, bands=True, boundary_exchange=cut.exchanges_flows)
+    features = cut.model.functions.cast._replace(bands=True, boundary_exchange=cut.exchanges_flows)
     return functions(features), compile_as(band_exchange.gather_sums, JOIN)
 
 

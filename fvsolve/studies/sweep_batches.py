@@ -191,7 +191,7 @@ class Batch:
             return None
         lists[0] = [[*lists[0][k], *self.start_notices(case, k, draft)] for k, case in enumerate(cases)]
         texts = [probe.text for probe in self.case.probes]
-        self.columns = [replace(column, name=text) for column, text in zip(sink.columns, texts, strict=False)]
+        self.columns = [column._replace(name=text) for column, text in zip(sink.columns, texts, strict=False)]
         values = np.ascontiguousarray(sink.table().T)
         return [self.row(case, k, model, summary, sink.time, values, [given[k] for given in lists])
                 for k, case in enumerate(cases)]  # fmt: skip

@@ -195,7 +195,7 @@ def test_a_run_records_points_and_patches_and_claims_about_them():
 
 NO_PROBES = {
     "pool.depth": 'a probe of a basin needs a point, for example "pool.depth@',
-    "pool.depth@here": '"@here" is not a point x,y [m]; expected for example "@',
+    "pool.depth@here": '"@here" is not a point x,y [m], or the name of a gauge of this basin; expected for example "@',
     "pool.depth@1": '"@1" is not a point x,y [m]',
     "pool.depth@nan,1": "nan, 1 is not a point",
     "pool.depth@11,2": "11,2 m lies outside the mesh or in a hole; the nearest point inside is 9.99",

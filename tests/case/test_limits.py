@@ -7,7 +7,6 @@ claims have a common rule: a result that the run cannot confirm is open, and ope
 import json
 import math
 import zipfile
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -457,7 +456,7 @@ def test_a_value_that_is_no_number_never_holds(wrong: float, bounds: dict) -> No
     spoilt = {
         side: np.where(np.arange(part.minimum.size) == 2, wrong, getattr(part, side)) for side in ("minimum", "maximum")
     }
-    states = {one.state for one in nearest(model, summary, limit, replace(part, **spoilt), True)}
+    states = {one.state for one in nearest(model, summary, limit, part._replace(**spoilt), True)}
     assert "holds" not in states and {one.state for one in nearest(model, summary, limit, part, True)} == {"holds"}
     assert states == {"open"} or not math.isnan(wrong)
 

@@ -24,8 +24,9 @@ from reference.scenes import (
 from scipy.integrate import solve_ivp
 
 import fvsolve
+from fvsolve.kernels.delay_lines import wave_bounds
 from fvsolve.kernels.delay_lines import wave_history as history
-from fvsolve.kernels.delay_lines.history_update import wave_bounds
+from fvsolve.kernels.delay_lines.history_update import earliest_arrival, write_arrival
 from fvsolve.kernels.delay_lines.line_rates import smooth_wave_linear
 from fvsolve.solve import initial_state
 from fvsolve.solve.solve import Run
@@ -333,7 +334,7 @@ BOUNDED = [(stub(130.0, METHODS["euler"]), 100), (stub(130.0, METHODS["rodas-5p"
 
 @pytest.mark.parametrize("case, jumps_seen", BOUNDED)
 def test_bounds_by_which_cells_are_left_out_contain_all_waves(case, jumps_seen):
-    """The bounds of the waves sent within a time contain each wave at any moment of it, beside its jumps too.
+    """The bounds of the entries around a time contain each wave at any moment of it, beside its jumps too.
 
     In the short cases many of these times are before the first entry.
     """
@@ -342,8 +343,11 @@ def test_bounds_by_which_cells_are_left_out_contain_all_waves(case, jumps_seen):
     assert run.go().finished
     past, random, checked, varied = run.run_data.past, np.random.default_rng(7), 0, 0.0
     places, clock = history.offsets_of(past), history.reading_data(past, int(past[history.COUNT]) - 1)
+    wrap = int(past[history.CAPACITY]) - 1
     longest = max(np.diff([history.time_of(past, k) for k in range(history.PROFILE_ENTRIES, int(past[history.COUNT]))]))
     for line, wave in ((model.tables.delays[k].copy(), wave) for k in range(2) for wave in range(2)):
+        bounds = history.bounds_of(places, line, 0)
+        wave_bounds.write_bounds(past, places, clock, line, 0, wave)  # anew, because those of the last entry are there
         (ring, mask), head = history.ring_of(places, line, 0), history.jump_head(places, int(line["stretch"]), wave)
 
         def sent_wave(t, ring=ring, mask=mask, head=head, wave=wave):
@@ -356,7 +360,9 @@ def test_bounds_by_which_cells_are_left_out_contain_all_waves(case, jumps_seen):
             first = history.first_after(past, places, head, begin - clock[4])
             assert history.count_until(past, places, head, first // 2, begin - clock[4]) == first
             assert history.count_back(past, places, head, len(listed), begin - clock[4]) == first
-            least, greatest = wave_bounds(past, places, clock, line, 0, wave, first, begin, end)
+            entries = [wave_bounds.entry_back(past, wrap, clock[0], at) for at in (begin, end)]
+            assert entries[1] == wave_bounds.entry_ahead(past, wrap, entries[0], clock[0], end)
+            least, greatest = wave_bounds.bounds_between(past, bounds, mask, wave, *entries)
             sent = [past[history.jump_place(past, places, head, i)] for i in listed]
             sent = [t for t in sent if begin <= t <= end]
             times = np.array([*np.linspace(begin, end, 20), *sent, *(np.array(sent) - 1e-6)])
@@ -367,3 +373,11 @@ def test_bounds_by_which_cells_are_left_out_contain_all_waves(case, jumps_seen):
             assert greatest - least <= 2.0 * np.ptp([*found, *around]) + 1.0
             checked, varied = checked + len(sent), max(varied, np.ptp(found))
     assert checked >= jumps_seen and varied > 5.0
+
+
+def test_jumps_arrive_in_the_order_of_their_times():
+    """The tree of arrival times gives the least of them after each change, the last one of equal times."""
+    random, tree = np.random.default_rng(3), np.full(32, history.INFINITE)
+    for k in random.integers(0, 16, 400):
+        write_arrival(tree, int(k), float(random.integers(0, 9)))
+        assert earliest_arrival(tree) == np.flatnonzero(tree[16:] == tree[16:].min())[-1]

@@ -47,7 +47,8 @@ mgd: 1e6 gallon/day | MGD: 1e6 gallon/day | igpm: imperial_gallon/minute | imgd:
 IMGD: 1e6 imperial_gallon/day | afd: 43560 foot**3/day | AFD: 43560 foot**3/day | m/s: meter/second
 mm/s: millimeter/second | cm/s: centimeter/second | km/s: kilometer/second | m/min: meter/minute
 m/h: meter/hour | km/h: kilometer/hour | ft/s: foot/second | fps: foot/second | ft/min: foot/minute
-in/s: inch/second | mph: mile/hour | m/s2: meter/second**2 | cm/s2: centimeter/second**2
+in/s: inch/second | mm/h: millimeter/hour | mm/min: millimeter/minute
+in/h: inch/hour | mph: mile/hour | m/s2: meter/second**2 | cm/s2: centimeter/second**2
 ft/s2: foot/second**2 | kg/m3: kilogram/meter**3 | g/cm3: gram/centimeter**3 | g/ml: gram/milliliter
 g/mL: gram/milliliter | kg/l: kilogram/liter | kg/L: kilogram/liter | kg/dm3: kilogram/decimeter**3
 g/l: gram/liter | g/L: gram/liter | t/m3: metric_ton/meter**3 | lb/ft3: pound/foot**3

@@ -2,7 +2,7 @@
 
 A jump is an instantaneous change of a wave; it passes a point between two recorded states. The value just before or
 after it is the smooth part at that time, by linear interpolation between both states, plus the jumps that have arrived
-by then. Extremes are those at nodes, within delay lines, and where two jumps cross.
+by then. Extremes are those at nodes; those within delay lines are in `line_envelopes`.
 
 before, t : begin and end of a step [s]; other arguments are those of `wave_history`.
 
@@ -23,37 +23,34 @@ from fvsolve.kernels.calls import CLOSE, observe_in_turn, run_job
 from fvsolve.kernels.delay_lines import jumps
 from fvsolve.kernels.delay_lines import wave_history as history
 from fvsolve.kernels.delay_lines.jumps import first_waiting_jump, least_jump, store_jump, store_large_jump
-from fvsolve.kernels.delay_lines.line_rates import (
-    BEFORE_ALL,
-    entry_before,
-    has_friction,
-    smooth_wave_linear,
-    waves_in_stretch,
-)
+from fvsolve.kernels.delay_lines.line_envelopes import update_line_envelopes
+from fvsolve.kernels.delay_lines.line_rates import has_friction
 from fvsolve.kernels.dtypes import ALONE, AMENDED, ARRIVES, JUNCTION, NEVER, PIPE_FLOW, PIPE_PRESSURE, STATUS
 from fvsolve.kernels.dtypes import ARRIVED as LET_ARRIVE
-from fvsolve.kernels.observation import update_envelope, update_extremes
+from fvsolve.kernels.observation import update_extremes
 from fvsolve.kernels.table_handle import open_tables
 
 
 @njit(forceinline=True)
 def spare_offsets(tables):
-    """Offsets of five arrays in the array `spare`, in this order.
+    """Offsets of six arrays in the array `spare`, in this order.
 
     - probe values of the last record
     - node pressures of the last record
     - probe values at the end of the step, without the jumps that arrive in the step
     - node pressures at the end of the step, without these jumps
     - work array
+    - arrival times of jumps, see `write_arrival`
     """
     at, probes, nodes = 2 * tables.layout[0]["size"], tables.probes.size, tables.nodes.size
-    return at, at + probes, at + probes + nodes, at + 2 * probes + nodes, at + 2 * (probes + nodes)
+    both = probes + nodes
+    return at, at + probes, at + both, at + both + probes, at + 2 * both, at + 3 * both
 
 
 @njit
 def store_values(tables, out, values):
     """Store probe values and node pressures of an accepted state in `spare`, as those of the last record."""
-    first, second, _, _, _ = spare_offsets(tables)
+    first, second, _, _, _, _ = spare_offsets(tables)
     pressure = tables.layout[0]["pressure"]
     for k in range(tables.probes.size):
         tables.spare[first + k] = values[k]
@@ -68,7 +65,7 @@ def store_smooth_values(t, y, state, handle):
     state : `out` at t for this case
     """
     tables = open_tables(handle)
-    _, _, third, fourth, fifth = spare_offsets(tables)
+    _, _, third, fourth, fifth, _ = spare_offsets(tables)
     pressure = tables.layout[0]["pressure"]
     observe_in_turn(t, y, state, handle, tables.spare[third:fourth])
     for i in range(tables.nodes.size):
@@ -85,7 +82,7 @@ def extremes_at_jump(t, time, y, state, handle):
     """
     tables = open_tables(handle)
     past, spare, marks, pipes, nodes = tables.past, tables.spare, tables.marks, tables.pipes, tables.nodes
-    first, second, third, fourth, fifth = spare_offsets(tables)
+    first, second, third, fourth, fifth, _ = spare_offsets(tables)
     probes, pressure, vapor = tables.probes.size, tables.layout[0]["pressure"], tables.settings[0]["vapor"]
     before = history.time_of(past, int(past[history.COUNT]) - 1)
     share = (t - time) / (t - before)
@@ -106,219 +103,6 @@ def extremes_at_jump(t, time, y, state, handle):
             marks[pipes.size + i] = time
 
 
-@njit(forceinline=True)
-def wave_at_jump(past, places, clock, ring, mask, at, wave, i):
-    """Wave sent into a stretch just after jump i of its list [kg/s]; ring, mask : result of `ring_of`."""
-    sent = past[history.jump_place(past, places, at, i)]
-    count = history.count_until(past, places, at, i + 1, sent + clock[4])
-    return smooth_wave_linear(past, clock, ring, mask, wave, sent) + history.sum_of_first(past, places, at, count)
-
-
-@njit
-def line_extremes_at_jumps(past, places, clock, line, q, x, sign, before, t):
-    """Extremes of r + sign l on both sides of the jumps that pass a point of a delay line, without friction loss.
-
-    Returns (least, time of the least, greatest, time of the greatest) [kg/s, s]; without a jump, least is INFINITE.
-    r, l : forward and backward wave; sign : 1 for pressure, -1 for flow; x : position as fraction of stretch q
-    """
-    least, t_least, greatest, t_greatest = history.INFINITE, t, -history.INFINITE, t
-    queue, tau, s, same = int(past[history.JUMP_CAPACITY]), line["tau"], line["stretch"] + q, clock[4]
-    ring, mask = history.ring_of(places, line, q)
-    for wave in range(2):
-        head, other = history.jump_head(places, s, wave), history.jump_head(places, s, 1 - wave)
-        share = x if wave == 0 else 1.0 - x
-        begin = history.first_after(past, places, head, before - share * tau + same)
-        reached, back = 0, (2.0 * share - 1.0) * tau  # each jump meets the wave that was sent `back` later
-        for i in range(begin, int(past[head + history.JUMP_COUNT])):
-            place = history.jump_place(past, places, head, i)
-            sent, size = past[place], past[place + queue]
-            if sent > t - share * tau + same:
-                break
-            if i == begin:
-                reached = history.first_after(past, places, other, sent + back + same)
-            else:
-                reached = history.count_until(past, places, other, reached, sent + back + same)
-            here = wave_at_jump(past, places, clock, ring, mask, head, wave, i)
-            there = smooth_wave_linear(past, clock, ring, mask, 1 - wave, sent + back)
-            there += history.sum_of_first(past, places, other, reached)
-            for side in range(2):
-                moved = here - (1 - side) * size
-                value = moved + sign * there if wave == 0 else there + sign * moved
-                if value < least:
-                    least, t_least = value, sent + share * tau
-                if value > greatest:
-                    greatest, t_greatest = value, sent + share * tau
-    return least, t_least, greatest, t_greatest
-
-
-BOUND_ROUNDING = 1e-12  # of sums of waves, relative to their bounds
-SLACK = 1e-9  # by which cells count as longer, as fraction of a stretch
-
-
-@njit
-def wave_bounds(past, places, clock, line, q, wave, first, begin, end):
-    """Bounds (least, greatest) of a wave of stretch q that was sent between two times, on both sides of its jumps.
-
-    They are sums of bounds of its smooth part and of its jumps, infinite if two jumps have times that count as equal.
-    first : number of the jumps that were sent before `begin`, without those at a time that counts as equal
-    """
-    at, queue, same = history.jump_head(places, line["stretch"] + q, wave), int(past[history.JUMP_CAPACITY]), clock[4]
-    low = high = history.sum_of_first(past, places, at, first)
-    earlier = -history.INFINITE
-    for i in range(first, int(past[at + history.JUMP_COUNT])):
-        place = history.jump_place(past, places, at, i)
-        sent, total = past[place], past[place + 2 * queue]
-        if sent > end + same:
-            break
-        if sent <= earlier + 2.0 * same:
-            return -history.INFINITE, history.INFINITE
-        low, high, earlier = min(low, total), max(high, total), sent
-    (ring, mask), (oldest, _) = history.ring_of(places, line, q), entry_before(past, clock, begin)
-    newest, _ = entry_before(past, clock, end)
-    least = greatest = 0.0 if oldest == BEFORE_ALL else past[ring + 2 * (oldest & mask) + wave]
-    for k in range(history.PROFILE_ENTRIES if oldest == BEFORE_ALL else oldest, newest + 2):
-        value = past[ring + 2 * (k & mask) + wave]
-        least, greatest = min(least, value), max(greatest, value)
-    rounding = BOUND_ROUNDING * (abs(low) + abs(high) + abs(least) + abs(greatest))
-    return low + least - rounding, high + greatest + rounding
-
-
-@njit
-def envelope_where_jumps_cross(past, places, clock, tables, line, q, x, back, before, t):
-    """Update the pressure envelope at each point of a cell where two jumps cross between the times `before` and t.
-
-    All four combinations of values before and after both jumps are used.
-    x : both ends of the cell as fractions of stretch q; back : bounds of the backward wave there, see `wave_bounds`
-    """
-    queue, tau, s, same = int(past[history.JUMP_CAPACITY]), line["tau"], line["stretch"] + q, clock[4]
-    first_cell, (ring, mask) = tables.pipes[line["pipe"]]["cell"], history.ring_of(places, line, q)
-    forward, backward, envelope = history.jump_head(places, s, 0), history.jump_head(places, s, 1), tables.envelope
-    delta, n = past[places[0] + history.ARRIVALS_SIZE * s + 2], line["places"]
-    at = first_cell + min(int((q + 0.5 * (x[0] + x[1])) * n / line["stretches"]), n - 1)
-    for i in range(history.first_after(past, places, forward, before - x[1] * tau - same),
-                   int(past[forward + history.JUMP_COUNT])):  # fmt: skip
-        place = history.jump_place(past, places, forward, i)
-        sent, size = past[place], past[place + queue]
-        if sent > t - x[0] * tau + same:
-            break
-        r = wave_at_jump(past, places, clock, ring, mask, forward, 0, i)
-        more = abs(delta) + BOUND_ROUNDING * (abs(r) + abs(size))
-        low, high = min(r, r - size) + back[0] - more, max(r, r - size) + back[1] + more
-        if low >= envelope[0, at] and high <= envelope[2, at]:
-            continue
-        opens, ends = max(2.0 * before - tau - sent, sent - tau), min(2.0 * t - tau - sent, sent + tau)
-        opens, ends = max(opens, sent - tau + 2.0 * tau * x[0]), min(ends, sent - tau + 2.0 * tau * x[1])
-        for j in range(history.first_after(past, places, backward, opens + same),
-                       int(past[backward + history.JUMP_COUNT])):  # fmt: skip
-            other = history.jump_place(past, places, backward, j)
-            opposite = past[other]
-            if opposite > ends + same:
-                break
-            l, change = wave_at_jump(past, places, clock, ring, mask, backward, 1, j), past[other + queue]
-            apart = more + BOUND_ROUNDING * (abs(l) + abs(change))
-            low, high = min(r, r - size) + min(l, l - change) - apart, max(r, r - size) + max(l, l - change) + apart
-            if low >= envelope[0, at] and high <= envelope[2, at]:
-                continue  # a pair at the end of the cell is looked at with the next cell too
-            where, time = 0.5 * (tau + opposite - sent) / tau, 0.5 * (tau + opposite + sent)
-            cell = first_cell + min(int((q + where) * n / line["stretches"]), n - 1)
-            for side in range(4):
-                value = r - (side % 2) * size + l - (side // 2) * change
-                update_extremes(envelope, cell, time, value + (1.0 - 2.0 * where) * delta)
-
-
-@njit
-def update_line_extremes(past, places, tables, before, t):
-    """Update envelopes and extremes within delay lines by the values beside jumps that pass between `before` and t.
-
-    The first times below vapour pressure along the lines are updated too. Cells are left out where the waves that pass
-    are too small to extend the envelope.
-    """
-    clock = history.reading_data(past, int(past[history.COUNT]) - 1)
-    for number in range(tables.delays.size):
-        line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
-        stretches, n, tau = line["stretches"], line["places"], line["tau"]
-        for q in range(stretches):
-            head = history.jump_head(places, line["stretch"] + q, 0)
-            other = head + history.HEAD_SIZE
-            forward, backward = past[head + history.JUMP_COUNT], past[other + history.JUMP_COUNT]
-            if forward + backward == 0.0:
-                continue
-            delta, i, k = past[places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q) + 2], int(forward), 0
-            for j in range((q * n) // stretches, min(n, ((q + 1) * n) // stretches + 1)):
-                low, high = max(j / n * stretches - q, 0.0) - SLACK, min((j + 1) / n * stretches - q, 1.0) + SLACK
-                begin, back_begin = before - high * tau, before - (1.0 - low) * tau
-                i = history.count_back(past, places, head, i, begin - clock[4])
-                k = history.count_until(past, places, other, k, back_begin - clock[4])
-                ahead = wave_bounds(past, places, clock, line, q, 0, i, begin, t - low * tau)
-                back = wave_bounds(past, places, clock, line, q, 1, k, back_begin, t - (1.0 - high) * tau)
-                cell, most = pipe["cell"] + j, abs(delta)
-                least, greatest = ahead[0] + back[0] - most, ahead[1] + back[1] + most
-                if high > low and not (least >= tables.envelope[0, cell] and greatest <= tables.envelope[2, cell]):
-                    x = (j + 0.5) / n * stretches - q
-                    if 0.0 <= x < 1.0:
-                        extend_envelope(past, places, clock, tables, line, q, j, x, before, t)
-                    if forward > 0.0 and backward > 0.0:
-                        envelope_where_jumps_cross(past, places, clock, tables, line, q, (low, high), back, before, t)
-    update_probe_extremes(past, places, clock, tables, before, t)
-
-
-@njit
-def extend_envelope(past, places, clock, tables, line, q, j, x, before, t):
-    """Extend the envelope of cell j of a delay line by the values beside jumps that pass its centre, x of stretch q."""
-    found = line_extremes_at_jumps(past, places, clock, line, q, x, 1.0, before, t)
-    if found[0] == history.INFINITE:
-        return
-    pipe, mark = tables.pipes[line["pipe"]], line["pipe"]
-    cell, more = pipe["cell"] + j, (1.0 - 2.0 * x) * past[places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q) + 2]
-    if found[0] + more < tables.profile[cell] and tables.marks[mark] != tables.marks[mark]:
-        tables.marks[mark] = found[1]
-    update_extremes(tables.envelope, cell, found[1], found[0] + more)
-    update_extremes(tables.envelope, cell, found[3], found[2] + more)
-
-
-@njit
-def update_probe_extremes(past, places, clock, tables, before, t):
-    """Update the extremes of probes within delay lines by the values beside jumps between the times `before` and t."""
-    for k in range(tables.probes.size):
-        probe = tables.probes[k]
-        if (probe["kind"] != PIPE_PRESSURE and probe["kind"] != PIPE_FLOW) or probe["side"] != 0:
-            continue
-        pipe = tables.pipes[probe["index"]]
-        if pipe["delay"] < 0:
-            continue
-        line = tables.delays[pipe["delay"]]
-        share = tables.floats[probe["weights"]] * line["stretches"]
-        q = min(int(share), line["stretches"] - 1)
-        x, sign = share - q, 1.0 if probe["kind"] == PIPE_PRESSURE else -1.0
-        delta = past[places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q) + 2]
-        more = (1.0 - 2.0 * x) * delta if sign > 0.0 else pipe["flow"] - delta
-        least, t_least, greatest, t_greatest = line_extremes_at_jumps(past, places, clock, line, q, x, sign, before, t)
-        if least < history.INFINITE:
-            update_extremes(tables.extremes, k, t_least, probe["scale"] * (least + more) + probe["offset"])
-            update_extremes(tables.extremes, k, t_greatest, probe["scale"] * (greatest + more) + probe["offset"])
-
-
-@njit
-def update_line_envelopes(t, places, tables):
-    """Update the pressure envelopes along all delay lines at the time t of the last entry.
-
-    The first times below vapour pressure are updated too.
-    """
-    clock = history.reading_data(tables.past, int(tables.past[history.COUNT]) - 1)
-    for i in range(tables.delays.size):
-        line, envelope = tables.delays[i], tables.envelope
-        n, cell = line["places"], tables.pipes[line["pipe"]]["cell"]
-        r, l, low, high, j = tables.scratch[:n], tables.scratch[n : 2 * n], 0, 0, 0
-        for q in range(line["stretches"]):
-            j = waves_in_stretch(t, tables.past, places, clock, line, q, j, r, l)
-        for j in range(n):
-            s = r[j] + l[j]
-            low += not s >= envelope[0, cell + j]
-            high += not s <= envelope[2, cell + j]
-        if low + high > 0:
-            update_envelope(t, r, l, cell, low, high, line["pipe"], tables)
-
-
 # multiple of the least jump above which a jump ends a step: about `numerics.delay_tolerance` of the greatest
 STEP_END_FACTOR = 4.0
 CROWDED_COUNT = 1e6  # jumps travelling at one time; with so many, only a jump as large as the greatest wave ends a step
@@ -336,6 +120,7 @@ def record_lines(t, y, out, handle, values):
     tables = open_tables(handle)
     past = tables.past
     k, places, status = int(past[history.COUNT]), history.offsets_of(past), out[STATUS]
+    before = history.INFINITE
     if status == LET_ARRIVE:
         admit_jumps(past, places, tables, t)
         if jumps.has_short_lines(tables):
@@ -349,10 +134,12 @@ def record_lines(t, y, out, handle, values):
         history.begin_entry(past, t)
         jumps.detect_jumps(past, places, tables, t, y, out, jumps.has_short_lines(tables))
     else:
-        record_step(past, places, tables, t, y, out, handle)
-    if out[STATUS] == AMENDED:
+        before = record_step(past, places, tables, t, y, out, handle)
+    amended = out[STATUS] == AMENDED
+    if not amended or before < t:
+        update_line_envelopes(before, t, places, tables, not amended)
+    if amended:
         return
-    update_line_envelopes(t, places, tables)
     store_values(tables, out, values)
     if past[history.NEXT_ARRIVAL] > t + history.time_tolerance(past):
         past[history.NEXT_ARRIVAL] = next_arrival(past, places, tables, t)
@@ -369,7 +156,7 @@ def record_again(past, places, tables, t, y, out):
     (`detect_jumps`). An earlier state is ignored.
     """
     k = int(past[history.COUNT]) - 1
-    last = history.time_of(past, k)
+    last, past[history.RESTATED_ENTRY] = history.time_of(past, k), k
     if past[history.CORRECTED_TIME] == last:
         write_ends(past, places, tables, k, out)
         past[history.CORRECTED_TIME] = -history.INFINITE
@@ -382,7 +169,8 @@ def record_again(past, places, tables, t, y, out):
 def record_step(past, places, tables, t, y, out, handle):
     """Pass on the jumps that have arrived in an accepted step; then write the waves as a new entry.
 
-    Jumps at nodes correct the states y; then out[STATUS] becomes AMENDED. Extremes beside jumps are updated.
+    Jumps at nodes correct the states y; then out[STATUS] becomes AMENDED. Returns the begin of the step if jumps are
+    travelling, else INFINITE.
     """
     before = history.time_of(past, int(past[history.COUNT]) - 1)
     jumps.write_joint_arrivals(past, places, tables, t)
@@ -408,8 +196,7 @@ def record_step(past, places, tables, t, y, out, handle):
             joint = places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q)
             history.write_entry(past, places, line, q + 1, entry, 0, past[joint + 1])
             history.write_entry(past, places, line, q, entry, 1, past[joint + history.ARRIVALS_SIZE])
-    if live:
-        update_line_extremes(past, places, tables, before, t)
+    return before if live else history.INFINITE
 
 
 @njit
@@ -510,23 +297,70 @@ def admit_jumps(past, places, tables, t):
 
 
 @njit
-def earliest_jump(past, places, tables, t):
-    """Jump that is the first to leave a first or last stretch of a delay line by t.
+def arrival_of(past, places, tables, number, slot, latest):
+    """Arrival time of the next jump to leave an end stretch of a delay line, if it is at most `latest`, else INFINITE.
 
-    Returns (line, stretch within the line, wave, offset of its time in `past`); the line is -1 without a jump. Jumps
-    that end a step (`ends_step`) are left out.
+    Jumps that end a step (`ends_step`) are left out.
+    slot : 0 or 1 for the forward or backward wave of the first stretch, 2 or 3 for those of the last
     """
-    best, result = t + history.time_tolerance(past), (-1, 0, 0, -1)
-    for number in range(tables.delays.size):
-        line = tables.delays[number]
-        for q in range(0, line["stretches"], max(1, line["stretches"] - 1)):
-            for wave in range(2):
-                place = first_waiting_jump(past, places, line["stretch"] + q, wave)
-                if place >= 0 and past[place] + line["tau"] <= best:
-                    size = past[place + int(past[history.JUMP_CAPACITY])]
-                    if not ends_step(past, tables, line, tables.pipes[line["pipe"]], q, wave, size):
-                        best, result = past[place] + line["tau"], (number, q, wave, place)
-    return result
+    line = tables.delays[number]
+    if slot > 1 and line["stretches"] == 1:
+        return history.INFINITE
+    q, wave = line["stretches"] - 1 if slot > 1 else 0, slot % 2
+    place = first_waiting_jump(past, places, line["stretch"] + q, wave)
+    if place < 0 or past[place] + line["tau"] > latest:
+        return history.INFINITE
+    size = past[place + int(past[history.JUMP_CAPACITY])]
+    if ends_step(past, tables, line, tables.pipes[line["pipe"]], q, wave, size):
+        return history.INFINITE
+    return past[place] + line["tau"]
+
+
+@njit(forceinline=True)
+def write_arrival(tree, k, time):
+    """Write arrival time k to a binary tree, in which each element is the least of its two children.
+
+    tree : float64[2 n]  the root is element 1, the times are the last n elements
+    """
+    k += tree.size // 2
+    tree[k] = time
+    while k > 1:
+        time = min(time, tree[k ^ 1])
+        k //= 2
+        tree[k] = time
+
+
+@njit(forceinline=True)
+def earliest_arrival(tree):
+    """Number of the least arrival time in a tree of `write_arrival`, the last one if several are equal."""
+    k = 1
+    while 2 * k < tree.size:
+        k = 2 * k + 1 * (tree[2 * k + 1] <= tree[2 * k])
+    return k - tree.size // 2
+
+
+@njit
+def write_all_times(past, places, tables, tree, latest):
+    """Write the arrival times at the ends of all delay lines to a tree (`write_arrival`), see `arrival_of`."""
+    n = tree.size // 2
+    for k in range(n):
+        within = k < 4 * tables.delays.size
+        tree[n + k] = arrival_of(past, places, tables, k // 4, k % 4, latest) if within else history.INFINITE
+    for k in range(n - 1, 0, -1):
+        tree[k] = min(tree[2 * k], tree[2 * k + 1])
+
+
+@njit
+def times_may_change(past, tables, t):
+    """True if a jump that arrives in a step until t may change the arrivals of other jumps in the step.
+
+    This holds for lines with a travel time shorter than the step, and where jumps end a step (`ends_step`).
+    """
+    h = t - history.time_of(past, int(past[history.COUNT]) - 1)
+    for i in range(tables.delays.size):
+        if tables.delays[i]["acts"] != 0 or tables.delays[i]["tau"] < h + 4.0 * history.time_tolerance(past):
+            return True
+    return False
 
 
 @njit
@@ -537,10 +371,11 @@ def pass_jumps_at_ends(past, places, own, t, y, out, handle):
     corrected (`jumps`). Jumps that end a step are left out.
     own : tables of the run, in which short lines couple their ends at once
     """
-    number, q, wave, place = earliest_jump(past, places, own, t)
-    if number < 0:
+    latest, tree = t + history.time_tolerance(past), own.spare[spare_offsets(own)[5] :]
+    write_all_times(past, places, own, tree, latest)
+    if tree[1] > latest:
         return False
-    sharp = own.sharp
+    sharp, changing = own.sharp, times_may_change(past, own, t)
     tables, size = open_tables(sharp), own.layout[0]["size"]
     state, queue = own.spare[:size], int(past[history.JUMP_CAPACITY])
     past[history.ONLY_PASSED_JUMPS], past[history.ARRIVALS_TIME] = 1.0, history.NAN
@@ -553,8 +388,13 @@ def pass_jumps_at_ends(past, places, own, t, y, out, handle):
         past[places[0] + history.ARRIVALS_SIZE * end_stretch(line, 1) + 1] = state[at + 2]
     store_smooth_values(t, y, state, handle)
     together = False  # True if a jump arrives with the jump before: the state between both never occurs
-    while number >= 0:
-        line, sent, jump = tables.delays[number], past[place], past[place + queue]
+    while tree[1] <= latest:
+        next_jump = earliest_arrival(tree)
+        number, wave = next_jump // 4, next_jump % 2
+        line = tables.delays[number]
+        q = line["stretches"] - 1 if next_jump % 4 > 1 else 0
+        place = first_waiting_jump(past, places, line["stretch"] + q, wave)
+        sent, jump = past[place], past[place + queue]
         time = min(sent + line["tau"], t)
         share = jumps.reflected_part(past, places, line, tables.pipes[line["pipe"]], q, wave, jump, t)
         past[history.jump_head(places, line["stretch"] + q, wave) + history.ARRIVED_COUNT] += 1.0
@@ -565,8 +405,11 @@ def pass_jumps_at_ends(past, places, own, t, y, out, handle):
         closed = leave_stretch(past, places, tables, y, state, number, q, 1 - wave, time, share, times) and closed
         if not closed:
             solve_nodes_again(past, places, tables, t, y, state, sharp, time, times)
-        number, q, wave, place = earliest_jump(past, places, own, t)
-        together = number >= 0 and past[place] + tables.delays[number]["tau"] <= time + history.time_tolerance(past)
+        if changing:
+            write_all_times(past, places, own, tree, latest)
+        else:
+            write_arrival(tree, next_jump, arrival_of(past, places, own, number, next_jump % 4, latest))
+        together = tree[1] <= min(latest, time + history.time_tolerance(past))
         if not together:
             extremes_at_jump(t, time, y, state, handle)
     past[history.ARRIVALS_TIME] = history.NAN

@@ -280,12 +280,13 @@ def smooth_wave_linear(past, clock, ring, mask, wave, t):
 
 
 @njit
-def waves_in_stretch(t, past, places, clock, line, q, first, r, l):
+def waves_in_stretch(t, past, places, clock, line, q, first, r, l, unchanged, greatest):
     """Write both waves at the places of stretch q, as in `waves_at` at the time t of the last entry, for envelopes.
 
     Waves are linear between entries. The friction loss is that of the waves that arrive at the ends of the stretch.
     first : number of its first place; returns that of the next stretch
     r, l : float64[n]  waves at the centres of n equal parts of the line
+    unchanged : float64[n]  1 for places where r receives `greatest` and l receives 0, or empty
     """
     stretches, tau, n, s, j = line["stretches"], line["tau"], r.size, line["stretch"] + q, first
     (ring, mask), jumps = history.ring_of(places, line, q), history.jump_head(places, s, 0)
@@ -293,6 +294,10 @@ def waves_in_stretch(t, past, places, clock, line, q, first, r, l):
     i, k = int(past[jumps + history.JUMP_COUNT]), 0
     calm = steps + 2.0 < clock[3] and i + past[others + history.JUMP_COUNT] == 0.0
     while j < n and (q + 1 == stretches or int((j + 0.5) / n * stretches) <= q):
+        if unchanged.size > 0 and unchanged[j] > 0.0:
+            r[j], l[j] = greatest[j], 0.0
+            j += 1
+            continue
         x = (j + 0.5) / n * stretches - q
         if calm:
             before, after = x * steps, (1.0 - x) * steps  # age of both waves [steps]

@@ -12,8 +12,10 @@ The array `past` contains in this order:
     arrivals      backward wave at the beginning, forward wave at the end and friction loss of each stretch [kg/s]
     heads         of the lists of jumps, one for each wave of each stretch: sum of the jumps removed from the list,
                   index of the first jump, number of jumps, number of these that have been passed on at its end
-    jumps         lists of times, sizes and running sums of the jumps
+    jumps         lists of times, sizes, running sums and bounds of the jumps
     rings         entries (u forward, u backward) of each stretch, as many as its travel time needs
+    bounds        of each stretch: entry up to which they are written, forward and backward; least and greatest forward
+                  wave, then backward wave, since the entry before, for each entry in rings
 
 So a step through a large network touches little memory: the ends of rings, and heads.
 
@@ -37,9 +39,13 @@ NEXT_ARRIVAL = 15  # arrival of the next jump that ends a step [s]; until it is 
 ONLY_PASSED_JUMPS = 16  # 1 while readings include only jumps that have been passed on
 MOST_JUMPS_TRAVELLING = 18  # greatest number of jumps travelling at one time
 GREATEST_WAVE = 17  # greatest wave so far, deviation from the initial steady state [Pa]
+RESTATED_ENTRY = 20  # number of the last entry that has been recorded again
+RING_ENTRIES = 19  # capacity of all rings together before they are lengthened
 INFINITE = 1e300  # time [s]
 PROFILE_ENTRIES = 8  # entries of the initial steady state (zeros) before the first entry
 REMOVED_SUM, FIRST_JUMP, JUMP_COUNT, ARRIVED_COUNT, HEAD_SIZE = 0, 1, 2, 3, 4  # head of a list of jumps, its size
+JUMP_SIZE = 5  # values per jump: time, size, running sum, least and greatest wave beside it (`wave_bounds`)
+BOUNDS_BEGIN, BOUNDS_SIZE = 2, 4  # values in `bounds` before those of entries, values per entry
 ARRIVALS_SIZE = 3  # values per stretch: backward wave at its beginning, forward wave at its end, delta
 RING_GAP = 8  # numbers between rings, one cache line: else entries of the same time would share a few cache sets
 TIME_TOLERANCE, ROUNDING = 1e-9, 1e-14  # tolerance of equal times: fraction of a step, and at least of the time
@@ -55,14 +61,16 @@ def time_of(past, k):
 
 @njit(forceinline=True)
 def offsets_of(past):
-    """Offsets of arrivals, heads, jumps and rings in `past`, and the factor by which rings have been lengthened.
+    """Offsets of arrivals, heads, jumps and rings in `past`, factor by which rings are longer than at first, bounds.
 
-    These parts of the array are defined in the module docstring.
+    The offset of the bounds is the last number. These parts of the array are defined in the module docstring.
     """
     stretches, arrivals = int(past[STRETCHES]), HEADER_SIZE + int(past[CAPACITY])
     heads = arrivals + ARRIVALS_SIZE * stretches
     jumps = heads + 2 * HEAD_SIZE * stretches
-    return arrivals, heads, jumps, jumps + 6 * int(past[JUMP_CAPACITY]) * stretches, int(past[RING_FACTOR])
+    rings, factor = jumps + 2 * JUMP_SIZE * int(past[JUMP_CAPACITY]) * stretches, int(past[RING_FACTOR])
+    bounds = rings + 2 * factor * int(past[RING_ENTRIES]) + RING_GAP * stretches
+    return arrivals, heads, jumps, rings, factor, bounds
 
 
 @njit(forceinline=True)
@@ -70,6 +78,16 @@ def ring_of(places, line, q):
     """(offset in `past` of the entries of stretch q of a line, bit mask that wraps entry numbers)."""
     length = places[4] * line["ring_size"]
     return places[3] + 2 * (places[4] * line["ring"] + q * length) + RING_GAP * (line["stretch"] + q), length - 1
+
+
+@njit(forceinline=True)
+def bounds_of(places, line, q):
+    """Offset in `past` of the bounds of entries of stretch q of a line; the mask of `ring_of` wraps entry numbers.
+
+    The numbers of entries up to which they are written are BOUNDS_BEGIN values before.
+    """
+    entries = places[4] * (line["ring"] + q * line["ring_size"])
+    return places[5] + BOUNDS_SIZE * entries + BOUNDS_BEGIN * (line["stretch"] + q + 1)
 
 
 @njit(forceinline=True)
@@ -82,11 +100,19 @@ def jump_head(places, s, wave):
 def jump_place(past, places, at, i):
     """Offset in `past` of the time of jump i of a list, counted from the oldest one.
 
-    Its size is past[JUMP_CAPACITY] further, and the running sum of the list up to it as much again.
+    Its other values follow, each past[JUMP_CAPACITY] further than that before (JUMP_SIZE).
     """
     queue = int(past[JUMP_CAPACITY])
     k = int(past[at + FIRST_JUMP]) + i
-    return places[2] + 3 * queue * ((at - places[1]) // HEAD_SIZE) + (k if k < queue else k - queue)
+    return places[2] + JUMP_SIZE * queue * ((at - places[1]) // HEAD_SIZE) + (k if k < queue else k - queue)
+
+
+@njit(forceinline=True)
+def jump_number(past, places, at, place):
+    """Position in a list of the jump whose time is at the offset `place` in `past`, see `jump_place`."""
+    queue = int(past[JUMP_CAPACITY])
+    k = place - places[2] - JUMP_SIZE * queue * ((at - places[1]) // HEAD_SIZE) - int(past[at + FIRST_JUMP])
+    return k if k >= 0 else k + queue
 
 
 @njit(forceinline=True)
@@ -318,12 +344,12 @@ def insert_jump(past, places, at, t, size):
     listed becomes part of the smooth part, see `write_entry`.
     t : time at which the jump was sent [s]; size [kg/s]
     """
-    queue, count = int(past[JUMP_CAPACITY]), int(past[at + JUMP_COUNT])
+    queue, count, tolerance = int(past[JUMP_CAPACITY]), int(past[at + JUMP_COUNT]), time_tolerance(past)
     i = count
-    while i > 0 and past[jump_place(past, places, at, i - 1)] > t + time_tolerance(past):
+    while i > 0 and past[jump_place(past, places, at, i - 1)] > t + tolerance:
         i -= 1
     before = jump_place(past, places, at, max(i - 1, 0))
-    if i > int(past[at + ARRIVED_COUNT]) and abs(past[before] - t) <= time_tolerance(past):
+    if i > int(past[at + ARRIVED_COUNT]) and abs(past[before] - t) <= tolerance:
         past[before + queue] += size
         update_running_sums(past, places, at, i - 1)
         return True
