@@ -199,7 +199,7 @@ NO_PROBES = {
     "pool.depth@1": '"@1" is not a point x,y [m]',
     "pool.depth@nan,1": "nan, 1 is not a point",
     "pool.depth@11,2": "11,2 m lies outside the mesh or in a hole; the nearest point inside is 9.99",
-    "pool.dept@1,1": 'pool is a basin, which has no "dept"; it has depth, surface, bed, u, v, speed; did you mean',
+    "pool.dept@1,1": 'pool is a basin, which has no "dept"; it has depth, surface, bed, u, v, speed, volume,',
     "pool.pressure@1,1": 'which has no "pressure"',
     "pool.outlet.depth": 'pool.outlet is a patch, which has no "depth"; it has pressure, gauge_pressure, head, flow',
     "pool.outlet.flow@1,2": "pool.outlet is a patch, and flow has no place along it; leave @1,2 out",
