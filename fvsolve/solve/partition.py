@@ -202,6 +202,7 @@ def make_partition(model: Model, count: int) -> Partition:
     return Partition(model, count, basins, np.arange(count + 1) * rows[:, None] // count)
 
 
+READ_ALL_CELLS = ("volume", "wet_area")  # quantities of whole basins
 EXPLICIT_ONLY = "only explicit methods can be distributed over threads"
 
 
@@ -216,6 +217,10 @@ def single_thread_reason(model: Model) -> str:
         return "controls read the whole state"
     if model.network is not None:
         return "parts of rotation, electricity and heat read the whole state"
+    meshes = model.case.meshes
+    for probe in (*model.probes, *model.watched):
+        if probe.name in meshes and probe.quantity in READ_ALL_CELLS:
+            return f"the probe {probe.text} reads all cells"
     if not model.basins:
         return "the case has no basin; only rows of basins are distributed over threads"
     return "" if not all(basin.undivided_reason for basin in model.basins) else undivided_basins(model)

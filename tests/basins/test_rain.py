@@ -189,6 +189,19 @@ def test_any_number_of_threads_gives_the_bits_of_one(threads, soil):
     assert more.summary["threads"] == (threads if soil == "none" else 1)
 
 
+@pytest.mark.parametrize("probe", ["volume", "wet_area"])
+@pytest.mark.parametrize("asked", ["probes", "limits"])
+def test_a_probe_that_reads_all_cells_has_one_thread_and_the_same_bits(asked, probe):
+    case = field(30.0, {}, OPEN, cells=[12, 24], bed=HILLS, manning=0.03, rain=STORM)
+    case["output"]["probes"] = [f"field.{probe}"] if asked == "probes" else ["field.rained"]
+    case |= {"limits": {"most": {"on": "field", "quantity": probe, "maximum": 1e3}}} if asked == "limits" else {}
+    one, more = (fvsolve.run(case, threads=count) for count in (1, 3))
+    assert more.summary["threads"] == 1 and one.summary["extremes"] == more.summary["extremes"]
+    assert any("reads all cells" in notice["text"] for notice in more.summary["warnings"])
+    verdicts = [result.summary["verdicts"] for result in (one, more)]
+    assert verdicts[0] == verdicts[1] and len(verdicts[0]) == (asked == "limits")
+
+
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
 def test_no_rain_and_a_tight_soil_move_not_a_bit(scheme):
     soil = {"model": "constant", "rate": 0.0}
