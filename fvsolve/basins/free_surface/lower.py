@@ -330,7 +330,7 @@ class FreeSurfaceRows(BasinRows):
         return self.part.infiltration
 
     def lower_sources(self, draft, row) -> None:
-        row["shower"], row["source"] = draft.to_work(1), draft.sources
+        row["present_rain"], row["source"] = draft.to_work(1), draft.sources
         if self.rains:
             row["rain"] = draft.schedules.add(self.part.rain)
             row["rained"] = draft.states(Numbered(f"{self.name}.rained", 1), HEIGHT_SCALE)

@@ -28,7 +28,7 @@ def begin_rain(tables, basin, t, dydt, out):
     """Write the rate of rain to `work`, its mass flow to the ledger, and the rate of the height of rain to `dydt`."""
     if basin["rain"] >= 0:
         rate = rain_rate(tables, basin, t)
-        tables.work[basin["shower"]] = rate
+        tables.work[basin["present_rain"]] = rate
         out[tables.layout[0]["source"] + basin["source"]] = tables.settings[0]["rho"] * rate * basin["total_area"]
         if dydt.size > 0:
             dydt[basin["rained"]] = rate
@@ -38,7 +38,7 @@ def begin_rain(tables, basin, t, dydt, out):
 def add_rain(tables, basin, rates):
     """Add the rate of rain to rates of depth."""
     if basin["rain"] >= 0:
-        rate = tables.work[basin["shower"]]
+        rate = tables.work[basin["present_rain"]]
         for i in range(rates.size):
             rates[i] += rate
 
