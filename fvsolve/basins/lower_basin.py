@@ -17,7 +17,7 @@ from fvsolve.basins.basin_patches import physics_code
 from fvsolve.basins.cell_sides import BLOCK, HEAD, INDICES
 from fvsolve.basins.fifth_order import fifth_order_work
 from fvsolve.basins.lower_motion import lower_mesh
-from fvsolve.case.basins import boundary_cells
+from fvsolve.case.basins import boundary_cells, patch_names
 from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
@@ -269,6 +269,8 @@ class BasinRows:
         mesh, coefficients = self.mesh, np.ones(self.mesh.left.size)
         for name, patch in self.part.patches.items():
             coefficients[mesh.patch(name)] = self.reflection(patch)
+        for name in self.linked:
+            coefficients[mesh.patch(name)] = 0.0
         outer = coefficients[mesh.inner :]
         if (outer == 1.0).all():
             return np.zeros(0)
@@ -294,9 +296,14 @@ class BasinRows:
         return stated is not None and self.reflection(stated) != 1.0
 
     @property
-    def driven(self) -> dict[str, Any]:
-        """Patches with a closure, by name."""
-        return {name: patch for name, patch in self.part.patches.items() if patch.closure}
+    def driven(self) -> list[str]:
+        """Names of the patches with a closure, or with faces that links join."""
+        return [*(name for name, patch in self.part.patches.items() if patch.closure), *self.linked]
+
+    @cached_property
+    def linked(self) -> list[str]:
+        """Names of the patches whose faces pass the flow of links, see `case.basins.patches_with_faces`."""
+        return [name for name in patch_names(self.mesh) if f"{self.name}.{name}" in self.case.patches_with_faces]
 
     @property
     def opening(self) -> str | None:

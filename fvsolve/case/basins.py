@@ -503,16 +503,43 @@ def place_kind(basin: Basin, patch: str) -> type[PatchNode]:
     from fvsolve.parts.basin import DrivenPatch, MovingWall, PatchNode
 
     stated = basin.patches.get(patch)
-    if stated is None:
-        return PatchNode
-    return MovingWall if stated.moves else DrivenPatch if stated.closure else PatchNode
+    if stated is not None and (stated.moves or stated.closure):
+        return MovingWall if stated.moves else DrivenPatch
+    return DrivenPatch if may_have_faces(basin) else PatchNode
 
 
-def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, PatchNode]:
+def may_have_faces(basin: Basin) -> bool:
+    """True if the flow of links may pass through the faces of the patches of a basin."""
+    return basin.physics_type.has_closures and basin.on is None and not moving_walls(basin)
+
+
+def patches_with_faces(nodes: dict[str, Any], links: dict[str, Any], lines: str, meshes: dict) -> frozenset[str]:
+    """Patches, by full name, through whose faces the flow of their links passes; the cells behind other patches take it.
+
+    These are patches of fixed basins that may have closures, unless a delay line or a rigid column joins them.
+    lines : model of pipes that state none
+    """
+    joined, others = set(), set()
+    for link in links.values():
+        is_other = link.kind == "rigid-column" or (
+            link.kind == "pipe" and (link.pipe_model or lines) != "finite-volume"
+        )
+        (others if is_other else joined).update(link.ports.values())
+    fixed = [name for name in meshes if may_have_faces(nodes[name])]
+    names = {f"{name}.{patch}" for name in fixed for patch in patch_names(meshes[name])}
+    return frozenset(names & (joined - others))
+
+
+def places(
+    name: str, basin: Basin, mesh: Mesh, pose: Any = None, with_faces: frozenset[str] = frozenset()
+) -> dict[str, PatchNode]:
     """Nodes at the patches of a basin, also at moving walls, by full name BASIN.PATCH, with their state at rest.
 
     pose : pose of the body that carries the basin; if None, elevation and depth are those of the upright basin
+    with_faces : result of `patches_with_faces`; the cells of such a patch are the node BASIN.PATCH.inside
     """
+    from fvsolve.parts.basin import PatchJunction
+
     result = {}
     for patch in patch_names(mesh):
         rest = basin.physics_type.rest(
@@ -520,8 +547,25 @@ def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, P
         )
         if basin.on is not None:
             rest = bodies.on_body(basin, mesh, patch, rest, pose)
-        kind = place_kind(basin, patch)
-        result[f"{name}.{patch}"] = kind.model_construct(position=None, basin=name, patch=patch, **rest)
+        kind, place = place_kind(basin, patch), f"{name}.{patch}"
+        keys = {"position": None, "basin": name, "patch": patch, **rest}
+        if place in with_faces:
+            result[place] = PatchJunction.model_construct(**keys)
+            place = f"{place}.inside"
+        result[place] = kind.model_construct(**keys)
+    return result
+
+
+def face_links(nodes: dict[str, Any], meshes: dict, with_faces: frozenset[str]) -> dict[str, Any]:
+    """Links from the junctions of the links at patches to the cells there, by name BASIN.PATCH.face."""
+    result = {}
+    for name, mesh in meshes.items():
+        for patch in patch_names(mesh):
+            place = f"{name}.{patch}"
+            if place in with_faces:
+                length = float(mesh.length[mesh.patch(patch)].sum())
+                ends = {"from_": place, "to": f"{place}.inside", "basin": name, "patch": patch, "length": length}
+                result[f"{place}.face"] = nodes[name].physics_type.face_type().model_construct(**ends)
     return result
 
 

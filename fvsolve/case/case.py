@@ -131,7 +131,8 @@ class Case(Displayable):
         result = {}
         for name, node in self.nodes.items():
             if name in self.meshes:
-                result |= basins.places(name, node, self.meshes[name], self.poses.get(node.on))
+                pose = self.poses.get(node.on)
+                result |= basins.places(name, node, self.meshes[name], pose, self.patches_with_faces)
             elif node.domain == "hydraulic":
                 result |= bodies.with_elevation(node, self.poses).inner(name)[0]
         for name, link in self.links.items():
@@ -197,7 +198,14 @@ class Case(Displayable):
         result = {}
         for name, part in [*self.nodes.items(), *self.links.items()]:
             result |= part.inner(name)[1]
-        return result
+        return result | basins.face_links(self.nodes, self.meshes, self.patches_with_faces)
+
+    @cached_property
+    def patches_with_faces(self) -> frozenset[str]:
+        """Patches through whose faces the flow of their links passes, see `basins.patches_with_faces`."""
+        if not self.meshes or self.scalars:
+            return frozenset()
+        return basins.patches_with_faces(self.nodes, self.links, self.numerics.pipe_model, self.meshes)
 
     @cached_property
     def unread_blocks(self) -> set[str]:

@@ -634,10 +634,12 @@ PATCHES = record(
     numbers=i8,  # offset in `plane` of the levels of a rating, then of its flows
     points=i8,  # number of these levels
     conveyance=i8,  # offset in `plane` of sqrt(slope) / n of uniform flow at its faces [m^(1/3)/s]
+    valve=i8,  # restriction from the junction of its links to its cells
+    inside=i8,  # offset in `work` of the states inside its faces, see `free_surface.patch_closures.faces_of`
     rest=f8,  # level at rest above the elevation of the basin [m]
     lowest=f8,  # lowest bed of its cells above the level at rest, at least 0 [m]
 )
-NO_CLOSURE, STAGE, DISCHARGE, RATING, CRITICAL, NORMAL_SLOPE = range(6)
+NO_CLOSURE, STAGE, DISCHARGE, RATING, CRITICAL, NORMAL_SLOPE, LINKED = range(7)
 
 WALL = record(
     basin=i8,

@@ -159,7 +159,7 @@ def linear_offsets(draft, start, row, probe) -> None:
             row["scale"] = 1.0 / draft.pipe_table[row["index"]]["admittance"]
         row["offset"] = base - (0.0 if probe.quantity == "pressure" else draft.case.ambient_pressure)
         place = draft.case.places.get(probe.name)
-        is_level = probe.quantity == "level" and place is not None and place.kind == "patch"
+        is_level = probe.quantity == "level" and hasattr(place, "basin")
         if probe.quantity == "head" or is_level:
             divisor = weight if weight > 0.0 else np.nan  # without gravity there is no head
             row["scale"] /= divisor

@@ -16,7 +16,7 @@ from fvsolve.parts.csv_rows import copy_name, find_file
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey, uniform
 from fvsolve.parts.kinds import Kinds
 from fvsolve.parts.nodes_and_links import Node, PlaceOnBody
-from fvsolve.parts.schedule import Schedule, Scheduled
+from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table_model import NamedTables, Nested, Table
 from fvsolve.parts.value import (
     SHAPE,
@@ -215,6 +215,18 @@ class DrivenPatch(PatchNode):
     quantities: ClassVar[dict[str, str]] = PatchNode.quantities | {"level": "level", "froude": "number"}
 
 
+class PatchJunction(PatchNode):
+    """The place `BASIN.PATCH` of links whose flow passes through the faces of the patch to its cells.
+
+    Probes: as of a `DrivenPatch`. The cells are at the place `BASIN.PATCH.inside`.
+    """
+
+    fixes_pressure: ClassVar[bool] = False
+    kind: ClassVar[str] = "patch-junction"
+    quantities: ClassVar[dict[str, str]] = DrivenPatch.quantities
+    flow: ClassVar[Schedule] = constant(0.0)  # given inflow
+
+
 class MovingWall(PatchNode):
     """A patch that is a moving wall; probes: force on the water (inward), power into the water, travel."""
 
@@ -278,6 +290,11 @@ class Physics(Table):
             if table.__pydantic_complete__:  # otherwise it is built when a case first has a basin
                 table.model_rebuild(force=True)
         Basin.__doc__ = "\n".join([Basin.__doc__ or "", f"{cls.name}: {cls.__doc__}"])
+
+    @classmethod
+    def face_type(cls) -> type:
+        """Class of the link that represents the faces of a patch."""
+        raise NotImplementedError
 
     @classmethod
     def has_friction(cls, basin: "Basin") -> bool:
@@ -447,7 +464,10 @@ class PatchRows(Lowering, kind="patch"):
             row["side"] = ("force", "power", "travel").index(probe.quantity)
         elif probe.quantity == "froude":
             row["kind"] = rec.PATCH_FROUDE
-            row["index"] = draft.patch_table["node"].tolist().index(draft.node_index[name])
+            row["index"] = k = draft.patch_table["node"].tolist().index(draft.node_index[name])
+            if draft.patch_table["closure"][k] == rec.NO_CLOSURE:
+                text = f"{name} has no Froude number: a delay line or rigid column joins it, or no part at all"
+                draft.fault("output.probes", f"{text}; expected a pipe of finite volumes, a restriction or a closure")
         elif probe.quantity != "flow":
             super().probe(draft, name, probe, row)
         else:
@@ -458,3 +478,16 @@ class PatchRows(Lowering, kind="patch"):
         row["index"], row["kind"], row["scale"] = draft.node_index[name], rec.PATCH_FLOW, 1.0 / draft.fluid.density
         if not draft.case.nodes[draft.case.places[name].basin].physics_type.joined:
             row["index"], row["kind"] = draft.patch_table["node"].tolist().index(row["index"]), rec.GIVEN_FLOW
+
+
+class PatchJunctionRows(Lowering, kind="patch-junction"):
+    """Conversion to table rows of the places of links at patches: junctions."""
+
+    def place(self, draft, name, node, row) -> None:
+        row["kind"], row["schedule"] = rec.JUNCTION, draft.schedules.add_constant(0.0)
+
+    def probe(self, draft, name, probe, row) -> None:
+        if probe.quantity in ("flow", "froude"):
+            Lowering.kinds["patch"].probe(draft, f"{name}.inside", probe, row)
+        else:
+            super().probe(draft, name, probe, row)

@@ -15,10 +15,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fvsolve.assembly.lowering import Restriction
 from fvsolve.assembly.state_names import Numbered
 from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
-from fvsolve.basins.free_surface import patch_closures, surface_grid, surface_maxima, surface_mesh
+from fvsolve.basins.free_surface import law_patch_face, patch_closures, surface_grid, surface_maxima, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import RATE_CAP, add_friction
 from fvsolve.basins.free_surface.surface_patches import DEPTH, TOTALS
 from fvsolve.basins.free_surface.surface_rows import THIN
@@ -286,6 +287,33 @@ def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
     return np.maximum(still + (means(deep) - there) - follows * (still - there), 0.0)
 
 
+class PatchFaceRows(Restriction, kind="patch-face"):
+    """Conversion to table rows of the faces of patches that links join: restrictions with their own law."""
+
+    law = law_patch_face
+
+    def restriction(self, draft, name, link, row) -> None:
+        row["conductance"] = draft.fluid.density * link.length**2 * DEPTH_SCALE**2
+        row["drive"] = 1.0  # unlike that of valves without a shaft: the velocity in the cells may change alone
+
+    def numbers(self, draft, name, link) -> list[float]:
+        patches = [place for place in draft.case.places.values() if place.kind == "patch"]
+        return [float(patches.index(draft.case.places[link.to]))]
+
+    def stepper(self, start, k: int, g: float, density_ratio: float):
+        """Function as in `Restriction.stepper`, by the states of the cells at the start."""
+        link = start.case.conduits[start.draft.valve_names[k]]
+        basin = next(basin for basin in start.draft.basins if basin.name == link.basin)
+        faces, gravity, rho = basin.inside_faces(link.patch), start.case.gravity, start.draft.fluid.density
+        rest = float(np.average(faces[1], weights=faces[3]))
+
+        def step(flow, drop):
+            q, change = patch_closures.patch_flow(gravity, rest + drop / (rho * gravity), faces)
+            return rho * q - flow, max(change, law_patch_face.LEAST_SLOPE) / gravity
+
+        return step
+
+
 class FreeSurfaceRows(BasinRows):
     """Rows of the tables of a model for shallow water; states are deviation of depth [m] and flows per width [m2/s]."""
 
@@ -348,11 +376,14 @@ class FreeSurfaceRows(BasinRows):
         row["lowest"] = max(float(self.bed[cells].min()) - self.part.level, 0.0)
         if patch not in self.driven:
             return
+        behind = np.array(draft.integers[row["ring"] + row["faces"] :][: row["faces"]])
+        row["second"], row["inside"] = len(draft.integers), draft.to_work(4 * int(row["faces"]))
+        draft.integers += self.second_cells(patch, behind).tolist()
+        if patch in self.linked:
+            row["closure"], row["valve"] = rec.LINKED, draft.valve_names.index(f"{self.name}.{patch}.face")
+            return
         stated = self.part.patches[patch]
         row["closure"] = CLOSURES[stated.closure]
-        behind = np.array(draft.integers[row["ring"] + row["faces"] :][: row["faces"]])
-        row["second"] = len(draft.integers)
-        draft.integers += self.second_cells(patch, behind).tolist()
         for key, column in (("stage", "drive"), ("discharge", "drive"), ("depth", "depth")):
             if (schedule := getattr(stated, key)) is not None:
                 row[column] = draft.schedules.add(schedule)
@@ -361,6 +392,15 @@ class FreeSurfaceRows(BasinRows):
             row["points"] = len(stated.rating.level)
         if stated.normal_slope is not None:
             row["conveyance"] = draft.to_plane(math.sqrt(stated.normal_slope) / self.roughness[behind])
+
+    def inside_faces(self, patch: str) -> tuple[np.ndarray, ...]:
+        """(depth, surface above the level at rest, inward velocity, length) of the faces of a patch at the start."""
+        faces = self.mesh.patch(patch)
+        cells, states = self.mesh.left[faces], self.start()
+        depth, (x, y) = (self.depth + states[0])[cells], self.mesh.normal[faces].T
+        outward = (x * states[1, cells] + y * states[2, cells]) / np.maximum(depth, THIN)
+        surface = np.maximum(self.bed - self.part.level, 0.0) + states[0]
+        return depth, surface[cells], -outward, self.mesh.length[faces]
 
     def second_cells(self, patch: str, behind: np.ndarray) -> np.ndarray:
         """Cells next inside the cells `behind` the faces of a patch; the same cells on a mesh, and with upwind."""

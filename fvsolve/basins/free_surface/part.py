@@ -6,6 +6,7 @@ import numpy as np
 
 from fvsolve.errors import listing
 from fvsolve.parts.basin import VELOCITY_FIELDS, Physics, VelocityStart
+from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.formula import NumberOrField, SpatialField, SpatialFieldKey, samples
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import Nested, Table
@@ -69,6 +70,18 @@ class Infiltration(Table):
     def numbers(self) -> list[SpatialField | None]:
         """Fields of its three numbers, None for those that its model does not have."""
         return [*(getattr(self, key) for key in self.fields), None, None][:3]
+
+
+class PatchFace(TwoPort):
+    """Faces of a patch of water, from the junction of its links to its cells.
+
+    basin, patch : names; length : of the faces [m]
+    """
+
+    kind: ClassVar[str] = "patch-face"
+    basin: str
+    patch: str
+    length: float
 
 
 class FreeSurface(Physics, name="free-surface"):
@@ -146,6 +159,10 @@ class FreeSurface(Physics, name="free-surface"):
             yield f"is {worst:g} in a cell; expected {'0 to 1' if greatest == 1.0 else 'no values below 0'}"
         elif place[-1] == "initial" and (values < samples(basin.infiltration.final, mesh)).any():
             yield "is below `final` in a cell; expected a capacity that decreases"
+
+    @classmethod
+    def face_type(cls):
+        return PatchFace
 
     @classmethod
     def has_friction(cls, basin) -> bool:

@@ -6,7 +6,8 @@ velocity u_b = u + 2 (c_b - c), and the inflow per width q = h_b u_b, with dq/dz
 critical: then c_b = (2 c - u) / 3. Inflow is at most critical too. An outflow faster than waves takes the state of the
 cell. A level below the bed is thus a free overfall, and a dry face above the level passes nothing. The flow of a patch
 rises with its level, so each closure has one root: the level itself (stage), the sum of flows (discharge), a rating of
-outflow over level, or the flow of uniform depth on a slope at each face.
+outflow over level, or the flow of uniform depth on a slope at each face. The flow through a patch that links join
+balances theirs (`law_patch_face`); its faces then share this flow like a discharge.
 """
 
 from math import sqrt
@@ -19,15 +20,14 @@ from fvsolve.basins.cell_sides import deviations_of
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.jit import njit
 from fvsolve.kernels.cube_root import cube_root_reciprocal
-from fvsolve.kernels.dtypes import CRITICAL, DISCHARGE, NO_CLOSURE, PATCH_FROUDE, RATING, STAGE
+from fvsolve.kernels.dtypes import CRITICAL, DISCHARGE, LINKED, NO_CLOSURE, NORMAL_SLOPE, PATCH_FROUDE, RATING, STAGE
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
 
 OWN_CODE = physics_code(__package__)
 # Rows of the work array of driven faces: inflow per width, its momentum q^2 / h_b, surface above the level at rest,
-# greatest wave speed |u_b| + c_b (0 at faces that are not driven), all in the order of boundary faces; then depth,
-# surface and inward velocity of the cells behind the faces of a patch, and lengths of these faces.
-FLOW, MOMENTUM, SURFACE, SPEED, DEPTH, INSIDE, INWARD, LENGTH, ROWS = range(9)
+# greatest wave speed |u_b| + c_b (0 at faces that are not driven), all in the order of boundary faces.
+FLOW, MOMENTUM, SURFACE, SPEED, ROWS = range(5)
 ITERATIONS = 100
 ROUNDING = 1e-15  # relative error of a flow at which a level is accepted
 HELD = 1e-9  # relative difference of a discharge from its schedule above which it counts as held
@@ -213,16 +213,22 @@ def read_cell(plane, basin, k, x, y, deviations):
 
 
 @njit
+def faces_inside(tables, patch):
+    """Four arrays of the state inside the faces of a patch, see `read_faces`."""
+    at, n = patch["inside"], patch["faces"]
+    work = tables.work[at : at + 4 * n]
+    return work[:n], work[n : 2 * n], work[2 * n : 3 * n], work[3 * n :]
+
+
+@njit
 def read_faces(tables, patch, y):
-    """Write the state inside the faces of a patch to the work array of its basin; return four arrays.
+    """Write the state inside the faces of a patch to its work array; return four arrays.
 
     They are depth, surface above the level at rest, inward velocity, and length of the faces. y : deviations of cells
     """
     basin, plane, integers = tables.basins[patch["basin"]], tables.plane, tables.integers
     count, at = patch["faces"], patch["normals"]
-    first, outer = driven_range(basin)
-    rows = tables.work[first : first + ROWS * outer].reshape((ROWS, outer))
-    h, e, u, lengths = rows[DEPTH, :count], rows[INSIDE, :count], rows[INWARD, :count], rows[LENGTH, :count]
+    h, e, u, lengths = faces_inside(tables, patch)
     for m in range(count):
         k, inner = integers[patch["ring"] + count + m], integers[patch["second"] + m]
         nx, ny = plane[at + m], plane[at + count + m]
@@ -238,9 +244,12 @@ def read_faces(tables, patch, y):
 
 
 @njit
-def level_of_patch(tables, patch, g, faces, t):
-    """(level of a patch above the level at rest [m], scheduled discharge [m3/s]); 0 for closures of single faces."""
+def level_of_patch(tables, patch, g, faces, t, out):
+    """(level of a patch above the level at rest [m], given inflow [m3/s]); 0 for closures of single faces."""
     empty = tables.plane[:0]
+    if patch["closure"] == LINKED:
+        target = out[tables.layout[0]["valve"] + patch["valve"]] / tables.settings[0]["rho"]
+        return solve_level(g, faces, target, 0.0, empty, empty), target
     if patch["closure"] == STAGE:
         return schedule_value(tables, patch["drive"], t) - patch["rest"], 0.0
     if patch["closure"] == DISCHARGE:
@@ -258,7 +267,7 @@ def close_face(plane, patch, m, g, z, h, e, u):
     """(inflow per width [m2/s], depth [m]) at face m of a patch with the level z; h, e, u : as for `face_flow`"""
     if patch["closure"] == CRITICAL:
         q, _, depth = face_flow(g, e - h, h, e, u)
-    elif patch["closure"] > CRITICAL:
+    elif patch["closure"] == NORMAL_SLOPE:
         q, _, depth = face_flow(g, uniform_depth(g, h, e, u, plane[patch["conveyance"] + m]), h, e, u)
     else:
         q, _, depth = face_flow(g, z, h, e, u)
@@ -274,7 +283,7 @@ def close_patch(tables, patch, t, y, out):
     layout, basin, node = tables.layout[0], tables.basins[patch["basin"]], tables.nodes[patch["node"]]
     g, faces, (first, outer) = tables.settings[0]["gravity"], read_faces(tables, patch, y), driven_range(basin)
     rows, (h, e, u, lengths) = tables.work[first : first + ROWS * outer].reshape((ROWS, outer)), faces
-    z, target = level_of_patch(tables, patch, g, faces, t)
+    z, target = level_of_patch(tables, patch, g, faces, t, out)
     total, surface, wet, wide, held = 0.0, 0.0, 0.0, 0.0, 1.0
     given = schedule_value(tables, patch["depth"], t) if patch["depth"] >= 0 else 0.0
     for m in range(h.size):
@@ -288,13 +297,15 @@ def close_patch(tables, patch, t, y, out):
         if depth > 0.0:
             wet += lengths[m]
             surface += lengths[m] * rows[SURFACE, k]
-    if patch["closure"] == DISCHARGE:
+    if patch["closure"] == DISCHARGE or patch["closure"] == LINKED:
         held = put_discharge(tables, patch, rows, total, target, wide, given)
     for m in range(h.size):
         k = tables.integers[patch["ring"] + m]
         q, depth = rows[FLOW, k], h[m] + (rows[SURFACE, k] - e[m])
         u_face = q / depth if depth > 0.0 else 0.0
         rows[MOMENTUM, k], rows[SPEED, k] = q * u_face, abs(u_face) + sqrt(g * max(depth, 0.0))
+    if patch["closure"] == LINKED:
+        return
     rise = (surface / wet if wet > 0.0 else z) - patch["lowest"]
     out[layout["pressure"] + patch["node"]] = tables.settings[0]["rho"] * g * rise
     out[layout["outflow_fraction"] + node["row"]] = held
@@ -307,7 +318,7 @@ def put_discharge(tables, patch, rows, total, target, wide, given):
     total : sum of the flows [m3/s]; target : discharge [m3/s]; wide : length of all faces [m]; given : depth of a
     supercritical inflow [m], or 0
     """
-    is_held = given == 0.0 and target < total and total - target > HELD * abs(target)
+    is_held = patch["closure"] == DISCHARGE and given == 0.0 and target < total and total - target > HELD * abs(target)
     if is_held:
         return total / target
     for m in range(patch["faces"] if total != target or given > 0.0 else 0):

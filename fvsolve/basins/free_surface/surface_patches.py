@@ -7,10 +7,11 @@ from fvsolve.basins.basin_frames import potential_coefficients
 from fvsolve.basins.basin_output import FIRST_OWN, velocity_value
 from fvsolve.basins.basin_patches import add_link_momentum, normal_gravity, physics_code
 from fvsolve.basins.cell_sides import deviations_of, stretch_of_cell
+from fvsolve.basins.free_surface.patch_closures import read_faces
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.free_surface.water_sources import infiltrate, rain_rate, sum_of_products
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import CELL_FIELD, GN, NO_SOIL, PATCH, RATE
+from fvsolve.kernels.dtypes import CELL_FIELD, GN, LINKED, NO_SOIL, PATCH, RATE
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.table_handle import open_tables
 
@@ -71,7 +72,8 @@ def patch_pressures(t, y, dydt, out, handle):
     """Write pressure, its slope and available fraction of outflow at every patch of water to its node in `out`.
 
     The pressure is the deviation from the steady start [Pa]; the slope is per mass in the cells next to the patch
-    [Pa/kg]. The supply of the node is set to 0.
+    [Pa/kg]. The supply of the node is set to 0. States inside the faces of linked patches are written to their work
+    arrays.
     """
     tables = open_tables(handle)
     st, layout = tables.settings[0], tables.layout[0]
@@ -81,6 +83,8 @@ def patch_pressures(t, y, dydt, out, handle):
         if basin["kind"] != OWN_CODE:
             continue
         node, seen = tables.nodes[patch["node"]], deviations_of(basin, tables.seen, y)
+        if patch["closure"] == LINKED:
+            read_faces(tables, patch, seen)
         stored, depth, volume, squares = water_at_patch(tables, patch, seen)
         area = near.patch_area(tables, patch)
         slope, content = st["rho"] * normal_gravity(st, tables.plane, basin), st["rho"] * area
@@ -101,7 +105,7 @@ def patch_flows(t, y, dydt, out, handle):
     for k in range(tables.patches.size):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
-        if basin["kind"] == OWN_CODE:
+        if basin["kind"] == OWN_CODE and patch["closure"] != LINKED:
             inflow, seen = out[tables.layout[0]["net"] + patch["node"]], deviations_of(basin, tables.seen, y)
             add_patch_flow(tables, patch, inflow, seen, dydt, out)
 
