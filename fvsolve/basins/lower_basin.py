@@ -298,7 +298,12 @@ class BasinRows:
     @property
     def driven(self) -> list[str]:
         """Names of the patches with a closure, or with faces that links join."""
-        return [*(name for name, patch in self.part.patches.items() if patch.closure), *self.linked]
+        return [*self.closed, *self.linked]
+
+    @property
+    def closed(self) -> list[str]:
+        """Names of the patches with a closure."""
+        return [name for name, patch in self.part.patches.items() if patch.closure]
 
     @cached_property
     def linked(self) -> list[str]:

@@ -196,7 +196,7 @@ class Accounts:
         if model.sources:
             raise FvsolveError(f"the energy of rain and infiltration ({listing(model.sources)}) is not supported; "
                                "expected a basin without them")  # fmt: skip
-        if driven := [f"{basin.name}.{name}" for basin in model.basins for name in basin.driven]:
+        if driven := [f"{basin.name}.{name}" for basin in model.basins for name in basin.closed]:
             raise FvsolveError(f"the energy of water through driven patches ({listing(driven)}) is not supported; "
                                "expected walls, open sides, or links")  # fmt: skip
         if model.basins and not case.law.linear:

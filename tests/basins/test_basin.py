@@ -128,7 +128,9 @@ def test_a_dam_over_a_step_of_the_bed_keeps_the_error_that_the_page_tells():
 def test_a_mirrored_and_a_turned_basin_have_the_same_bits():
     lying = alone(basin((12.0, 6.0), (24, 12), 1.0, bed="0.1*x"), 1.0)
     model = model_of(lying)
-    standing = model_of(alone(basin((6.0, 12.0), (12, 24), 1.0, bed="0.1*y"), 1.0))
+    case = alone(basin((6.0, 12.0), (12, 24), 1.0, bed="0.1*y"), 1.0)
+    case["nodes"]["pool"]["patches"]["east"]["side"] = "north"
+    standing = model_of(case)
     rng = np.random.default_rng(3)
     h, u, v = 0.1 * rng.random((3, 12, 24))
     y = np.concatenate([h.ravel(), u.ravel(), v.ravel()])
@@ -171,8 +173,8 @@ def test_a_patch_that_falls_dry_stops_the_outflow_and_no_depth_falls_below_zero(
     result = fvsolve.run(case)
     mass = result.ledger["mass"]
     assert mass["relative"] < 1e-13 and mass["final"] == approx(depth.mean() * 8000.0, rel=1e-9)
-    assert mass["outflow"] == approx(1600.0 - mass["final"] + mass["made_up"], rel=1e-12)
-    assert [mark["place"] for mark in result.summary["marks"]] == ["nodes.pool.outlet"]
+    assert mass["outflow"] == approx(1600.0 - mass["final"], rel=1e-12) and mass["made_up"] == 0.0
+    assert result.ok and not result.summary["marks"]
 
 
 def test_a_pipe_that_discharges_into_one_of_two_joined_basins_keeps_all_mass(tmp_path):

@@ -274,7 +274,7 @@ def test_what_passes_a_patch_is_no_loss_of_the_scheme(head):
         basin = pool((6, 4), patches={"west": {"side": "west"}}, elevation=0.0, bed="0.1*x")
         nodes = {"pool": basin, "lake": {"type": "reservoir", "head": head, "elevation": 0.0}}
         links = {"tap": valve("pool.west", "lake", 0.2) | {"opening": opening}}
-        model = model_of(scene(nodes, links, 1.0, PLANE, ["tap.flow"]))
+        model = model_of(scene(nodes, links, 1.0, PLANE | {"scheme": "upwind"}, ["tap.flow"]))
         y = model.scale * np.random.default_rng(5).normal(scale=0.5, size=model.y_size)
         accounts = Accounts(RunData(model))
         power = accounts.power_at(0.5, y, np.zeros(model.y_size), model.new_out())

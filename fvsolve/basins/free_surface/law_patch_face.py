@@ -4,30 +4,56 @@ Its number is the row of the patch. The pressure of the cells is their mean, so 
 rest is the sum of this pressure and the drop over rho g. The flow is that of `patch_closures.patch_flow`.
 """
 
-from fvsolve.basins.free_surface.patch_closures import faces_inside, patch_flow
+from fvsolve.basins.free_surface.patch_closures import faces_inside, patch_flow, solve_level
 from fvsolve.jit import njit
 
 LEAST_SLOPE = 1e-12  # least derivative of the flow by the level [m2/s]; critical outflow does not depend on the level
+SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
+DRY_SPEED = 0.1  # the same for dry faces, over their length: speed of waves in a millimetre of water [m/s]
 
 
 @njit
-def face_inflow(out, tables, k, drop):
-    """(flow into the cells [m3/s], its derivative by the level [m2/s]) at a drop of pressure to the cells [Pa]."""
-    patch, st = tables.patches[int(tables.floats[tables.valves[k]["data"]])], tables.settings[0]
+def junction_level(out, tables, patch, drop):
+    """Level of the junction of a patch above the level at rest [m]. drop : of pressure, to the cells [Pa]"""
+    st = tables.settings[0]
     pressure = out[tables.layout[0]["pressure"] + patch["node"]] + drop
-    z = pressure / (st["rho"] * st["gravity"]) + patch["lowest"]
-    q, change = patch_flow(st["gravity"], z, faces_inside(tables, patch))
-    return q, max(change, LEAST_SLOPE)
+    return pressure / (st["rho"] * st["gravity"]) + patch["lowest"]
+
+
+@njit
+def level_step(g, faces, z, target):
+    """(change of the flow from `target` [m3/s], its derivative by the level [m2/s]) in Newton's step from the level z.
+
+    At or below critical outflow the flow has no derivative by the level. If the target is greater, the step is that
+    from the level at which it passes.
+    g : gravity; faces : as for `patch_flow`
+    """
+    q, change = patch_flow(g, z, faces)
+    if change > 0.0:
+        return q - target, change
+    long = 0.0
+    for m in range(faces[3].size):
+        long += faces[3][m]
+    if q == 0.0 and target >= 0.0:
+        return q - target, DRY_SPEED * long
+    if not target > q + SAME_FLOW * abs(q):
+        return q - target, LEAST_SLOPE
+    level = solve_level(g, faces, target, 0.0, faces[0][:0], faces[0][:0])
+    change = max(patch_flow(g, level, faces)[1], LEAST_SLOPE)
+    return change * (z - level), change
 
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
     """(a, s) of `restrictions.restriction_step`: Newton's step."""
-    q, change = face_inflow(out, tables, k, drop)
-    return tables.settings[0]["rho"] * q - m, change / tables.settings[0]["gravity"]
+    patch, st = tables.patches[int(tables.floats[tables.valves[k]["data"]])], tables.settings[0]
+    z = junction_level(out, tables, patch, drop)
+    a, s = level_step(st["gravity"], faces_inside(tables, patch), z, m / st["rho"])
+    return st["rho"] * a, s / st["gravity"]
 
 
 @njit
 def slope(out, tables, k, g, drop):
     """Derivative of the mass flow by the drop [kg/s/Pa]."""
-    return face_inflow(out, tables, k, drop)[1] / tables.settings[0]["gravity"]
+    patch, gravity = tables.patches[int(tables.floats[tables.valves[k]["data"]])], tables.settings[0]["gravity"]
+    return patch_flow(gravity, junction_level(out, tables, patch, drop), faces_inside(tables, patch))[1] / gravity

@@ -294,6 +294,7 @@ class PatchFaceRows(Restriction, kind="patch-face"):
 
     def restriction(self, draft, name, link, row) -> None:
         row["conductance"] = draft.fluid.density * link.length**2 * DEPTH_SCALE**2
+        row["chained"] = 1  # the links at the junction limit its rate
         row["drive"] = 1.0  # unlike that of valves without a shaft: the velocity in the cells may change alone
 
     def numbers(self, draft, name, link) -> list[float]:
@@ -301,15 +302,16 @@ class PatchFaceRows(Restriction, kind="patch-face"):
         return [float(patches.index(draft.case.places[link.to]))]
 
     def stepper(self, start, k: int, g: float, density_ratio: float):
-        """Function as in `Restriction.stepper`, by the states of the cells at the start."""
+        """Function as in `Restriction.stepper`, for water at rest."""
         link = start.case.conduits[start.draft.valve_names[k]]
         basin = next(basin for basin in start.draft.basins if basin.name == link.basin)
-        faces, gravity, rho = basin.inside_faces(link.patch), start.case.gravity, start.draft.fluid.density
-        rest = float(np.average(faces[1], weights=faces[3]))
+        faces, gravity, rho = basin.faces_at_rest(link.patch), start.case.gravity, start.draft.fluid.density
+        rest = max(float(faces[1].min()), 0.0)
 
         def step(flow, drop):
-            q, change = patch_closures.patch_flow(gravity, rest + drop / (rho * gravity), faces)
-            return rho * q - flow, max(change, law_patch_face.LEAST_SLOPE) / gravity
+            z = rest + float(drop) / (rho * gravity)
+            a, s = law_patch_face.level_step(gravity, faces, z, float(flow) / rho)
+            return rho * a, s / gravity
 
         return step
 
@@ -393,14 +395,12 @@ class FreeSurfaceRows(BasinRows):
         if stated.normal_slope is not None:
             row["conveyance"] = draft.to_plane(math.sqrt(stated.normal_slope) / self.roughness[behind])
 
-    def inside_faces(self, patch: str) -> tuple[np.ndarray, ...]:
-        """(depth, surface above the level at rest, inward velocity, length) of the faces of a patch at the start."""
+    def faces_at_rest(self, patch: str) -> tuple[np.ndarray, ...]:
+        """(depth, surface above the level at rest, inward velocity, length) of the faces of a patch at rest."""
         faces = self.mesh.patch(patch)
-        cells, states = self.mesh.left[faces], self.start()
-        depth, (x, y) = (self.depth + states[0])[cells], self.mesh.normal[faces].T
-        outward = (x * states[1, cells] + y * states[2, cells]) / np.maximum(depth, THIN)
-        surface = np.maximum(self.bed - self.part.level, 0.0) + states[0]
-        return depth, surface[cells], -outward, self.mesh.length[faces]
+        cells = self.mesh.left[faces]
+        surface = np.maximum(self.bed - self.part.level, 0.0)[cells]
+        return self.depth[cells], surface, np.zeros(cells.size), self.mesh.length[faces]
 
     def second_cells(self, patch: str, behind: np.ndarray) -> np.ndarray:
         """Cells next inside the cells `behind` the faces of a patch; the same cells on a mesh, and with upwind."""

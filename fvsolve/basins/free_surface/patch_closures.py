@@ -4,10 +4,11 @@ A face of a patch, with depth h and inward velocity u in the cell behind it, sen
 c = sqrt(g h). If the surface at the face has the height z, the depth there is h_b = z - bed, c_b = sqrt(g h_b), the
 velocity u_b = u + 2 (c_b - c), and the inflow per width q = h_b u_b, with dq/dz = u_b + c_b. Outflow is at most
 critical: then c_b = (2 c - u) / 3. Inflow is at most critical too. An outflow faster than waves takes the state of the
-cell. A level below the bed is thus a free overfall, and a dry face above the level passes nothing. The flow of a patch
-rises with its level, so each closure has one root: the level itself (stage), the sum of flows (discharge), a rating of
-outflow over level, or the flow of uniform depth on a slope at each face. The flow through a patch that links join
-balances theirs (`law_patch_face`); its faces then share this flow like a discharge.
+cell, up to the level at which less would leave. A level below the bed is thus a free overfall, and a dry face above the
+level passes nothing. The flow of a patch rises with its level, so each closure has one root: the level itself (stage),
+the sum of flows (discharge), a rating of outflow over level, or the flow of uniform depth on a slope at each face. The
+flow through a patch that links join balances theirs (`law_patch_face`); its faces then share this flow like a
+discharge.
 """
 
 from math import sqrt
@@ -60,16 +61,23 @@ def face_flow(g, z, h, e, u):
     h, e, u : depth, surface and inward velocity of the cell behind the face; z and e count from the level at rest
     """
     c, depth = sqrt(g * h), max(h + (z - e), 0.0)
-    if h > 0.0 and -u >= c:
-        return h * u, 0.0, h
     speed = sqrt(g * depth)
     own = u + 2.0 * (speed - c)
+    if h > 0.0 and -u >= c and (own < -speed or depth * own <= h * u):
+        return h * u, 0.0, h
     if own < -speed:
         speed = max((2.0 * c - u) / 3.0, 0.0)
         return -speed * speed * speed / g, 0.0, speed * speed / g
     if own > speed:
         return depth * speed, 1.5 * speed, depth
     return depth * own, own + speed, depth
+
+
+@njit
+def depth_at_wall(g, h, u):
+    """Depth at a face without flow, by the invariant u - 2 c of the cell behind it; h, u : as for `face_flow`"""
+    c = sqrt(g * h)
+    return max(h + u * (0.25 * u - c) / g, 0.0) if u < 2.0 * c else 0.0
 
 
 @njit
@@ -278,17 +286,21 @@ def close_face(plane, patch, m, g, z, h, e, u):
 def close_patch(tables, patch, t, y, out):
     """Write the flow and the momentum of all faces of a driven patch, and the pressure of its node.
 
+    Faces whose links are shut are walls. A level, equal at all faces, would let water pass from one to another.
     During outflow above critical the fraction of the discharge that leaves is written to the node's outflow fraction.
     """
     layout, basin, node = tables.layout[0], tables.basins[patch["basin"]], tables.nodes[patch["node"]]
     g, faces, (first, outer) = tables.settings[0]["gravity"], read_faces(tables, patch, y), driven_range(basin)
     rows, (h, e, u, lengths) = tables.work[first : first + ROWS * outer].reshape((ROWS, outer)), faces
     z, target = level_of_patch(tables, patch, g, faces, t, out)
+    shut = patch["closure"] == LINKED and target == 0.0
     total, surface, wet, wide, held = 0.0, 0.0, 0.0, 0.0, 1.0
     given = schedule_value(tables, patch["depth"], t) if patch["depth"] >= 0 else 0.0
     for m in range(h.size):
         k = tables.integers[patch["ring"] + m]
         q, depth = close_face(tables.plane, patch, m, g, z, h[m], e[m], u[m])
+        if shut:
+            q, depth = 0.0, depth_at_wall(g, h[m], u[m])
         if given > 0.0:
             depth = given
         rows[FLOW, k], rows[SURFACE, k] = q, e[m] + (depth - h[m])

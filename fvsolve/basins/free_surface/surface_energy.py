@@ -10,10 +10,12 @@ from fvsolve.basins.basin_output import basin_first_row, rest_potential
 from fvsolve.basins.basin_patches import physics_code
 from fvsolve.basins.boundary_cells import flow_weight, patch_area, patch_length, weighted_volume
 from fvsolve.basins.free_surface.bed_friction import drag_per_flow
+from fvsolve.basins.free_surface.patch_closures import FLOW, MOMENTUM, SURFACE, driven_faces, faces_inside
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.moving_walls import area_growth_rate
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import NO_DRAG
+from fvsolve.kernels.dtypes import LINKED, NO_DRAG
+from fvsolve.kernels.network_energy import total_pressure
 from fvsolve.kernels.table_handle import open_tables
 
 OWN_CODE = physics_code(__package__)
@@ -39,7 +41,9 @@ def add_power(t, y, dydt, out, handle, power):
         patch, node = patches[k], patches[k]["node"]
         if tables.basins[patch["basin"]]["kind"] == OWN_CODE and patch["moves"] == 0:
             flow = out[layout["net"] + node] + out[layout["supply"] + node]
-            power[basin_first_row(tables, power, patch["basin"]) + 1] += patch_loss(tables, patch, flow, y)
+            linked = patch["closure"] == LINKED
+            loss = face_loss(tables, patch, flow, y, out) if linked else patch_loss(tables, patch, flow, y)
+            power[basin_first_row(tables, power, patch["basin"]) + 1] += loss
 
 
 @njit
@@ -105,6 +109,29 @@ def patch_loss(tables, patch, flow, y):
         if away > 0.0:
             total += wide * away * (u * u + v * v - along * along)
     return total
+
+
+@njit
+def face_loss(tables, patch, flow, y, out):
+    """Power lost [W] at the faces of a linked patch: power of its inflow minus that of the fluxes on the cells.
+
+    flow : mass flow into the cells [kg/s]. Its power is that at the pressure of the cells: the loss from the junction
+    to this pressure is that of the restriction `law_patch_face`.
+    """
+    st, basin, plane, count = tables.settings[0], tables.basins[patch["basin"]], tables.plane, patch["faces"]
+    n, o, g, rho, at = basin["n"], basin["y"], st["gravity"], st["rho"], patch["normals"]
+    rows, (h, e, _, lengths) = driven_faces(tables, basin).values, faces_inside(tables, patch)
+    total, rest = 0.0, rest_potential(st, basin)
+    for m in range(count):
+        k, i = tables.integers[patch["ring"] + m], tables.integers[patch["ring"] + count + m]
+        share = velocity_factor(max(plane[basin["plan"] + i] + y[o + i], 0.0))
+        u, v = share * y[o + n + i], share * y[o + 2 * n + i]
+        inward = -(u * plane[at + m] + v * plane[at + count + m])
+        square, q, depth = u * u + v * v, rows[FLOW, k], max(h[m] + (rows[SURFACE, k] - e[m]), 0.0)
+        push = rows[MOMENTUM, k] + 0.5 * g * ((depth - h[m]) * (depth + h[m]))
+        level = rest + rho * (g * (plane[basin["plan"] + n + i] + y[o + i]) - 0.5 * square)
+        total += lengths[m] * (q * level + rho * (inward * push + min(q, 0.0) * (square - inward * inward)))
+    return total_pressure(tables, out, patch["node"]) * flow / rho - total
 
 
 @njit

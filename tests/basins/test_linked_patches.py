@@ -1,0 +1,152 @@
+"""Patches of water that links join: the flow passes through their faces, against exact solutions and other closures."""
+
+import math
+from importlib import import_module
+
+import numpy as np
+import pytest
+from pytest import approx
+from reference.basins import assert_equal_files, ended, model_of, on_sides, run_in_two_parts
+from reference.meshes import boundary, triangles, write
+from reference.scenes import GRAVITY as G
+from reference.scenes import lake, scene
+
+import fvsolve
+
+DEEP, WIDE, LONG = 2.0, 2.0, 60.0
+NUMERICS = {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.9}
+
+
+def channel(head, area=1.0, end=4.0, cells=(120, 2), numerics=None, side="east", probes=(), turned=False, **basin):
+    """Channel at rest with an orifice to a reservoir; turned : True if the orifice is drawn from the basin."""
+    size = (LONG, WIDE) if side in ("east", "west") else (WIDE, LONG)
+    cells = cells if side in ("east", "west") else cells[::-1]
+    own = {"type": "basin", "size": list(size), "cells": list(cells), "level": DEEP, "elevation": 0.0,
+           "patches": {"end": {"side": side}}, **basin}  # fmt: skip
+    ends = ("reach.end", "lake") if turned else ("lake", "reach.end")
+    gate = {"type": "orifice", "from": ends[0], "to": ends[1], "area": area, "discharge_coefficient": 0.6}
+    given = {key: value for key, value in (NUMERICS | (numerics or {})).items() if value is not None}
+    nodes = {"reach": own, "lake": lake(head, elevation=0.0)}
+    return scene(nodes, {"gate": gate}, end, given, probes or ["gate.flow", "reach.end.level"], end / 40)
+
+
+def inflow_at(z: float) -> float:
+    """Inflow into still water at a level of its face: behind a bore, or in a rarefaction wave, at most critical."""
+    c, rest = math.sqrt(G * z), math.sqrt(G * DEEP)
+    u = 2.0 * (c - rest) if z < DEEP else (z - DEEP) * math.sqrt(0.5 * G * (z + DEEP) / (z * DEEP))
+    if u < -c:
+        c = u = 2.0 / 3.0 * rest
+        return -WIDE * c**3 / G
+    return WIDE * z * min(u, c)
+
+
+def balanced(head: float, area: float) -> tuple[float, float]:
+    """(flow, level of the face) at which an orifice supplies the inflow of the face; by bisection."""
+    low, high = min(head, DEEP), max(head, DEEP)
+    for _ in range(100):
+        z = 0.5 * (low + high)
+        supply = 0.6 * area * math.copysign(math.sqrt(2.0 * G * abs(head - z)), head - z)
+        low, high = (z, high) if supply > inflow_at(z) else (low, z)
+    return inflow_at(z), z
+
+
+METHODS = {"ssp-rk2": {}, "rk4": {}, "dormand-prince": {"rtol": 1e-7, "courant": None},
+           "implicit-midpoint": {"step": 0.05, "courant": None}, "radau-iia-5": {"rtol": 1e-7, "courant": None},
+           "rodas-5p": {"rtol": 1e-7, "courant": None}}  # fmt: skip
+
+
+@pytest.mark.in_turn
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("head, area", [(2.4, 1.0), (3.0, 0.2), (1.7, 1.0), (2.4, 100.0)])
+def test_a_sudden_level_drives_the_flow_of_a_simple_wave(head, area, method):
+    numerics = {"method": method, **METHODS[method], "scheme": "muscl"}
+    found = fvsolve.run(channel(head, area, numerics=numerics, cells=(120, 1)))
+    flow, level = balanced(head, area)
+    assert found["gate.flow"][-1] == approx(flow, rel=1e-3) and found["reach.end.level"][-1] == approx(level, rel=1e-3)
+
+
+def test_a_wide_orifice_over_a_deep_fall_passes_the_critical_outflow():
+    found = fvsolve.run(channel(-5.0, 40.0, end=2.0))
+    assert found["gate.flow"][-1] == approx(-WIDE * 8.0 / 27.0 * math.sqrt(G) * DEEP**1.5, rel=3e-4)
+    assert found.ok
+
+
+def test_a_wide_orifice_is_a_stage():
+    tide = {"time": [0.0, 4.0], "value": [2.0, 2.3]}
+    _, linked = ended(channel(tide, 1e4))
+    driven = channel(tide)
+    driven["nodes"]["reach"]["patches"]["end"]["stage"] = tide
+    driven["links"], driven["nodes"] = {}, {"reach": driven["nodes"]["reach"]}
+    driven["output"]["probes"] = ["reach.volume"]
+    model, state = ended(driven)
+    n = model.basins[0].states_of(state.y).size
+    assert linked.y[:n] == approx(state.y[:n], abs=1e-6)
+
+
+@pytest.mark.parametrize("area", [0.5, 20.0])
+def test_links_at_patches_take_the_steps_of_open_sides(area):
+    case = channel({"time": [0, 20], "value": [2.0, 2.2]}, area, 20.0, (60, 6))
+    counts = [fvsolve.run(case).summary["steps"]]
+    case["nodes"]["reach"]["patches"]["end"]["boundary"] = "open"
+    case["links"], case["nodes"] = {}, {"reach": case["nodes"]["reach"]}
+    case["output"]["probes"] = ["reach.volume"]
+    assert counts[0] < 1.15 * fvsolve.run(case).summary["steps"]
+
+
+ROUGH = "0.3*sin(1.7*x)*cos(2.3*y) + 0.04*x"  # with dry cells at the level 2 m
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
+@pytest.mark.parametrize("path", ["grid", "triangles"])
+@pytest.mark.parametrize("side", ["west", "east"])
+def test_at_rest_not_a_bit_moves(side, path, scheme, tmp_path):
+    case = channel(DEEP, side=side, bed=ROUGH, numerics={"scheme": scheme})
+    model = model_of(case if path == "grid" else on_mesh(case, side, tmp_path))
+    assert (model.basins[0].depth == 0.0).any()
+    dydt, out = model.evaluate(0.0, np.zeros(model.y_size))
+    assert not dydt.any() and not out[model.layout["supply"] :][: model.ledgers].any()
+
+
+def on_mesh(case: dict, side: str, folder) -> dict:
+    """The same case with triangles."""
+    points, cells = triangles((LONG, WIDE), 0.5)
+    write(folder / "t.msh", points, cells.tolist(), {"end": on_sides(points, boundary(cells), (LONG, WIDE))[side]})
+    basin = {key: value for key, value in case["nodes"]["reach"].items() if key not in ("size", "cells", "patches")}
+    return case | {"nodes": case["nodes"] | {"reach": basin | {"mesh": {"file": str(folder / "t.msh")}}}}
+
+
+@pytest.mark.parametrize("ground, head", [("0", 2.5), ("0", 1.0), ("0.05*x + 0.1*sin(3*x)", 2.2)])
+def test_volume_passes_from_lake_to_basin_and_no_depth_is_negative(ground, head):
+    case = channel({"time": [0, 2, 4, 6], "value": [head, head, 1.5, 2.0]}, 3.0, 8.0, bed=ground, side="west", level=1.8)
+    found = fvsolve.run(case)
+    assert found.ok and abs(found.ledger["mass"]["relative"]) < 1e-12
+
+
+@pytest.mark.parametrize("path", ["north", "west", "turned", "resumed", "threads"])
+def test_a_restated_channel_gives_the_same(path, tmp_path, monkeypatch):
+    head = {"time": [0, 2, 4], "value": [2.0, 2.6, 1.6]}
+    here = fvsolve.run(channel(head))
+    if path == "resumed":
+        for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):  # checkpoints after 1000, 1250, ... steps
+            monkeypatch.setattr(import_module("fvsolve.solve.solve"), name, 0.0)
+        run_in_two_parts(channel(head, numerics={"step": 2e-3, "courant": None}), tmp_path, 2.5)
+        assert_equal_files(tmp_path, ["history.csv"])
+        return
+    if path == "threads":
+        there = fvsolve.run(channel(head, cells=(120, 12)), threads=3)
+        here = fvsolve.run(channel(head, cells=(120, 12)), threads=1)
+        assert (there["gate.flow"] == here["gate.flow"]).all() and there.summary["threads"] == 3
+        return
+    there = fvsolve.run(channel(head, turned=True) if path == "turned" else channel(head, side=path))
+    sign = -1.0 if path == "turned" else 1.0
+    assert sign * there["gate.flow"] == approx(here["gate.flow"], rel=1e-9, abs=1e-9)
+
+
+def test_two_links_at_a_patch_are_one_of_both_areas():
+    head = {"time": [0, 2, 4], "value": [2.0, 2.6, 1.6]}
+    case = channel(head)
+    case["links"]["gate"]["area"] = 0.4
+    case["links"]["other"] = case["links"]["gate"] | {"area": 0.6}
+    found, one = fvsolve.run(case), fvsolve.run(channel(head))
+    assert found["gate.flow"] == approx(0.4 * one["gate.flow"], rel=1e-9, abs=1e-9)
+    assert found["reach.end.level"] == approx(one["reach.end.level"], rel=1e-12)
