@@ -3,7 +3,6 @@
 from math import log
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import FRICTION_HAZEN, FRICTION_ROUGH
@@ -14,10 +13,11 @@ MANTISSA, BITS_OF_ONE = 0x000FFFFFFFFFFFFF, 0x3FF0000000000000  # bits of a floa
 QUOTIENT, REMAINDER = np.divmod(213 * (np.arange(2048) - 1023), 500)  # 0.426 e for every exponent e of a float64
 SCALES = np.ldexp(2.0 ** (REMAINDER / 500.0), QUOTIENT)  # 2^(0.426 e)
 SCALES[2047] = np.nan  # exponent of inf and NaN
-C0, C1, C2, C3, C4, C5, C6, C7, C8, C9, C10, C11, C12, C13, C14, C15 = (
-    float(c) * 2.0**k
-    for k, c in enumerate(chebyshev.cheb2poly(chebyshev.chebinterpolate(lambda x: (1.5 + 0.5 * x) ** 0.426, 15)))
-)
+# Chebyshev interpolation polynomial of m^0.426 for a mantissa m = 1.5 + u in [1, 2), in powers of u
+C0, C1, C2, C3 = 1.1885429391841094, 0.33754619472829295, -0.06458383859594458, 0.02258999154267194
+C4, C5, C6, C7 = -0.009691106002097438, 0.004618135156910341, -0.002347050217323954, 0.0012459456986562145
+C8, C9, C10, C11 = -0.0006824009481078974, 0.0003828835870081093, -0.00022023842211638112, 0.00012760184472426772
+C12, C13, C14, C15 = -6.871804362162948e-05, 4.135631024837494e-05, -3.944523632526398e-05, 2.3126602172851562e-05
 LAMINAR, TURBULENT = 2000.0, 4000.0  # Reynolds numbers; both laws are blended between them
 
 
