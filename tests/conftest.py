@@ -4,6 +4,7 @@
 and `pytest PATH` run every test. `tests/choose_quick_tests.py` writes the list from a recording.
 """
 
+import gc
 import json
 import os
 import signal
@@ -67,6 +68,13 @@ def pytest_collection_modifyitems(config, items):
         chosen = {item for item in chosen if is_in_turn(item)}
     config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
     items[:] = [item for item in items if item in chosen]
+
+
+def pytest_collection_finish(session):
+    """Search new objects alone for unused objects, and seldom: modules and tests stay to the end."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
 
 
 def pytest_sessionstart(session):

@@ -40,7 +40,8 @@ def without_markup(make: Callable) -> Callable:
                   if isinstance(axis.get_major_formatter(), LogFormatter)]  # fmt: skip
         markup = {text for axis in powers for text in axis.findobj(Text) if text is not axis.label}
         for text in set(figure.findobj(Text)) - markup:
-            text.set(parse_math=False, usetex=False)
+            text.set_parse_math(False)  # `text.set` would list all properties of its class
+            text.set_usetex(False)
         return figure
 
     return draw

@@ -12,6 +12,7 @@ import numpy as np
 from fvsolve.errors import article
 
 Law = Callable[[np.ndarray], np.ndarray]  # values at times
+PLACES, WEIGHTS = np.polynomial.legendre.leggauss(5)  # Gauss points on -1 to 1, see `averages`
 
 
 class Exact(NamedTuple):
@@ -117,12 +118,11 @@ def averages(f: Callable, edges: np.ndarray, cuts: np.ndarray | None = None) -> 
     """
     cuts = edges if cuts is None else cuts
     width, middle = np.diff(cuts), 0.5 * (cuts[1:] + cuts[:-1])
-    places, weights = np.polynomial.legendre.leggauss(5)
-    x = middle[:, None] + 0.5 * width[:, None] * places
+    x = middle[:, None] + 0.5 * width[:, None] * PLACES
     cell = np.clip(np.searchsorted(edges, middle) - 1, 0, len(edges) - 2)
     result = []
     for values in f(x.ravel()):
-        parts = np.broadcast_to(values, x.size).reshape(x.shape) @ (0.5 * weights) * width
+        parts = np.broadcast_to(values, x.size).reshape(x.shape) @ (0.5 * WEIGHTS) * width
         result.append(np.bincount(cell, parts, len(edges) - 1) / np.diff(edges))
     return tuple(result)
 

@@ -30,7 +30,7 @@ POOL = {
 PROBES = ["pool.near.head", "near.flow", "pool.depth@1.1,1.3", "pool.u@3,2.9"]
 
 
-def water(link=VALVE, basin=None, end=0.4, probes=PROBES, **numerics):
+def water(link=VALVE, basin=None, end=0.2, probes=PROBES, **numerics):
     numerics = {"scheme": "muscl", "method": "ssp-rk2", **numerics}
     numerics |= {} if {"step", "rtol"} & {*numerics} else {"courant": 0.5}
     nodes = {"pool": POOL | (basin or {})} | ({"river": reservoir(AMBIENT + 2e3)} if link else {})
@@ -52,7 +52,7 @@ def liquid(law="linear", scheme="muscl", boundary="open", **mesh):
     numerics = {"scheme": scheme, "method": "ssp-rk3", "courant": 0.8, "initial": "rest"}
     probes = ["near.flow", "pool.pressure@0.2,0.3", "pool.near.pressure"]
     fluid = {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2300.0}
-    return scene({"pool": block, "river": reservoir(2e7)}, {"near": valve}, 6e-4, numerics, probes, every=1e-4,
+    return scene({"pool": block, "river": reservoir(2e7)}, {"near": valve}, 3e-4, numerics, probes, every=1e-4,
                  fluid=fluid | {"law": law})  # fmt: skip
 
 
@@ -69,13 +69,13 @@ def carried(scheme="muscl", diffusivity=0.0):
              "scalars": {"dye": "exp(-20*((x-0.3)^2+(y-0.5)^2))"}}  # fmt: skip
     numerics = {"scheme": scheme, "method": "ssp-rk3", "courant": 0.8}
     dye = {"unit": "mg/l", "diffusivity": diffusivity}
-    return scene({"sheet": sheet}, {}, 0.5, numerics, ["sheet.dye@0.3,0.5"], every=0.1, scalars={"dye": dye})
+    return scene({"sheet": sheet}, {}, 0.25, numerics, ["sheet.dye@0.3,0.5"], every=0.05, scalars={"dye": dye})
 
 
 def lined(**numerics):
     """Case of delay lines between a basin, a chamber and a demand that stops, with jumps within steps."""
     case = water(
-        PIPE | {"pipe_model": "delay-line", "to": "air"}, end=0.6, probes=["pool.near.head", "air.pressure"], **numerics
+        PIPE | {"pipe_model": "delay-line", "to": "air"}, end=0.3, probes=["pool.near.head", "air.pressure"], **numerics
     )
     del case["nodes"]["river"]
     case["nodes"] |= {
@@ -128,10 +128,10 @@ SCENES = {
     "given steps": water(step=2e-3),
     "a tolerance": water(rtol=1e-3, method="bogacki-shampine", probes=()),
     "a tolerance, first same as last": water(rtol=1e-4, method="dormand-prince"),
-    "a pipe": water(PIPE, end=0.2, probes=["pool.near.head", "pool.depth@1.1,1.3"]),
+    "a pipe": water(PIPE, end=0.1, probes=["pool.near.head", "pool.depth@1.1,1.3"]),
     "delay lines": lined(),
     "delay lines, given steps": lined(step=2e-3, method="rk4"),
-    "dense output of its own": water(method="rk4", end=0.3),
+    "dense output of its own": water(method="rk4"),
     "a liquid": liquid(),
     "a liquid between walls": liquid(boundary="wall"),
     "a liquid, upwind5": liquid(scheme="upwind5"),
@@ -145,7 +145,7 @@ SCENES = {
     "a mesh": with_maxima(water(basin=MESH), "pool"),
     "a mesh, upwind, euler": water(basin=MESH, scheme="upwind", method="euler"),
     "a mesh, a tolerance": water(basin=MESH, rtol=1e-3, method="bogacki-shampine", probes=()),
-    "a mesh, a pipe": water(PIPE, MESH, end=0.2, probes=["pool.near.head", "pool.depth@1.1,1.3"]),
+    "a mesh, a pipe": water(PIPE, MESH, end=0.1, probes=["pool.near.head", "pool.depth@1.1,1.3"]),
     "a liquid on a mesh": liquid(**HOLLOW),
     "a liquid on a mesh, log": liquid("log", **HOLLOW),
 }
