@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from fvsolve.case import bodies
+from fvsolve.case.raster_meshes import raster_extent, rasters_with_holes
 from fvsolve.case.resource_checks import BASIN_CELL, byte_text, free_memory, name_faults
 from fvsolve.case.sections import Output
 from fvsolve.errors import MeshError, article, did_you_mean, listing
@@ -389,19 +390,22 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
     from fvsolve.mesh import read, rectangle
 
     try:
-        if basin.mesh is None:
-            count = math.prod(basin.cells or ())
+        if basin.is_rectangle:
+            size, cells, corner = raster_extent(basin, setting) if basin.mesh else (basin.size, basin.cells, (0.0, 0.0))
+            count = math.prod(cells or ())
             if count * BASIN_CELL > free_memory():
                 text = f"{count:.3g} cells take about {byte_text(count * BASIN_CELL)} of memory"
-                raise ValueFault(
-                    [(("cells",), f"{text}, and {byte_text(free_memory())} are free; expected fewer cells")]
-                )
+                text += f", and {byte_text(free_memory())} are free; expected fewer cells"
+                raise ValueFault([(("mesh", "cell") if basin.mesh else ("cells",), text)])
             sides = {name: (item.side, *item.span) if item.span else item.side for name, item in basin.patches.items()}
             grading = basin.grading or (1.0, 1.0)
-            return rectangle(basin.size, basin.cells, grading=grading, patches=sides, holes=basin.holes or ())
+            lacks = [raster.lacks for raster in rasters_with_holes(basin, setting)]
+            return rectangle(size, cells, corner, grading, sides, basin.holes or (), lacks)
+        if rasters_with_holes(basin, setting):
+            raise ValueFault([((), "`outside` of a raster applies to rectangles; leave it out, or cut the mesh file")])
         return read(setting.files[basin.mesh.file], basin.mesh.unit)
     except MeshError as error:
-        if basin.mesh is not None:  # the faults are in the mesh file, not in keys of the case
+        if not basin.is_rectangle:  # the faults are in the mesh file, not in keys of the case
             name, places = Path(basin.mesh.file).name, [item.place == "unit" for item in error.faults]
             raise ValueFault([(("mesh", "unit"), item.message) if key else (("mesh",), f"{name}: {item}")
                           for key, item in zip(places, error.faults, strict=True)]) from None  # fmt: skip
@@ -540,7 +544,7 @@ def places_on_bodies(nodes: dict[str, Any], meshes: dict[str, Mesh]) -> dict[str
 
 def _patch_hint(basin: Basin, known: tuple[str, ...], name: str) -> str:
     """Text that lists the patches `known`, or explains how to give the patch `name` its name in the mesh file."""
-    if known or basin.mesh is None:
+    if known or basin.is_rectangle:
         return f"patches are {listing(known) or 'none'}"
     file = Path(basin.mesh.file).name
     return (
