@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from fvsolve.case import bodies
+from fvsolve.case.output_grids import grid_faults
 from fvsolve.case.raster_meshes import raster_extent, rasters_with_holes
 from fvsolve.case.resource_checks import BASIN_CELL, byte_text, free_memory, name_faults
 from fvsolve.case.sections import Output
@@ -322,6 +323,7 @@ class BasinFields:
 
     has_maxima : True if its greatest values in cells can be recorded; what : text about the basin, for messages
     quantities : quantities of the whole basin (name -> dimension); gauges : named points [m]
+    basin : keys of the basin
     """
 
     fields: dict[str, str]
@@ -330,6 +332,7 @@ class BasinFields:
     what: str = ""
     quantities: dict[str, str] = field(default_factory=dict)
     gauges: dict[str, tuple[float, float]] = field(default_factory=dict)
+    basin: Any = None
     kind: ClassVar[str] = "basin"
 
     def point(self, label: str, place: str | None) -> tuple[float, float]:
@@ -382,7 +385,7 @@ def probe_kinds(name: str, basin: Basin, mesh: Mesh | None, lumped: Mesh | None,
     fields = own.fields | (dict.fromkeys(scalars, "number") if own.carries else {})
     patches = {f"{name}.{patch}": place_kind(basin, patch) for patch in patch_names(mesh)}
     what = f"{name} has the physics {show(own.name)}"
-    return {name: BasinFields(fields, mesh, bool(own.maxima), what, own.totals), **patches}
+    return {name: BasinFields(fields, mesh, bool(own.maxima), what, own.totals, basin=basin), **patches}
 
 
 def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
@@ -424,7 +427,7 @@ def fault_keys(place: str) -> tuple:
 
 
 def output_faults(output: Output, nodes: dict[str, Any]) -> Faults:
-    """Faults (key path, message) of the tables of `[output]` for basins: `lines`, `maxima` and `run_up`.
+    """Faults (key path, message) of the tables of `[output]` for basins: `lines`, `maxima`, `run_up`, `grids`.
 
     nodes : name -> class of the node, the `BasinFields` of a basin, or None for a faulty node
     """
@@ -435,6 +438,12 @@ def output_faults(output: Output, nodes: dict[str, Any]) -> Faults:
             yield from _basin_faults((*key, "basin"), line.basin, nodes, group == "run_up")
             for end, text in _end_faults(line, nodes.get(line.basin), group == "lines"):
                 yield (*key, end), text
+    for name, grid in output.grids.items():
+        key, pool = ("output", "grids", name), nodes.get(grid.basin)
+        yield from ((key, text) for text in name_faults(name))
+        yield from _basin_faults((*key, "basin"), grid.basin, nodes, False)
+        if isinstance(pool, BasinFields) and pool.basin is not None:
+            yield from (((*key, *below), text) for below, text in grid_faults(grid, pool, output.fields))
     for k, name in enumerate(output.maxima):
         yield from _basin_faults(("output", "maxima", k), name, nodes, True)
     if output.lines and output.fields == 0:
