@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -15,7 +15,7 @@ import numpy as np
 
 from fvsolve.case import bodies
 from fvsolve.case.output_grids import grid_faults
-from fvsolve.case.raster_meshes import raster_extent, rasters_with_holes
+from fvsolve.case.raster_meshes import raster_extent, rasters_with_holes, terrace_notes
 from fvsolve.case.resource_checks import BASIN_CELL, byte_text, free_memory, name_faults
 from fvsolve.case.sections import Output
 from fvsolve.errors import MeshError, article, did_you_mean, listing
@@ -403,7 +403,8 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
             sides = {name: (item.side, *item.span) if item.span else item.side for name, item in basin.patches.items()}
             grading = basin.grading or (1.0, 1.0)
             lacks = [raster.lacks for raster in rasters_with_holes(basin, setting)]
-            return rectangle(size, cells, corner, grading, sides, basin.holes or (), lacks)
+            mesh = rectangle(size, cells, corner, grading, sides, basin.holes or (), lacks)
+            return replace(mesh, notes=terrace_notes(basin, mesh.grid))
         if rasters_with_holes(basin, setting):
             raise ValueFault([((), "`outside` of a raster applies to rectangles; leave it out, or cut the mesh file")])
         return read(setting.files[basin.mesh.file], basin.mesh.unit)

@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fvsolve.parts.formula import SpatialField
 from fvsolve.parts.raster import Raster
 from fvsolve.parts.raster_files import Pixels, check_count, read_pixels
@@ -32,7 +34,7 @@ def raster_extent(basin: Any, setting: ReadContext) -> tuple[tuple, tuple, tuple
     path, pixels = mesh_pixels(basin, setting)
     wide = [count * step for count, step in zip(pixels.values.shape[::-1], (pixels.dx, pixels.dy), strict=True)]
     cells = tuple(math.floor(length / basin.mesh.cell * (1.0 + NEAR)) for length in wide)
-    text = f"{path.name} measures {wide[0]:g} m by {wide[1]:g} m; expected smaller cells"
+    text = f"{path.name} measures {wide[0]:g} m by {wide[1]:g} m; expected smaller cells{pixels.hint}"
     faults = [(("mesh", "cell"), text)] if min(cells) < 1 else []
     try:
         check_count("the basin", *cells)
@@ -53,6 +55,16 @@ def rasters_with_holes(basin: Any, setting: ReadContext) -> list[Raster]:
         path, pixels = mesh_pixels(basin, setting)
         fields.append(Raster(path.name, pixels, True))
     return [raster for raster in fields if raster.holes]
+
+
+def terrace_notes(basin: Any, grid: Any) -> tuple[str, ...]:
+    """Remark on a bed whose pixels are larger than the cells of a rectangle; () without one."""
+    raster = getattr(getattr(basin, "bed", None), "rule", None)
+    least = float(min(np.diff(grid.x).min(), np.diff(grid.y).min()))
+    if not isinstance(raster, Raster) or least > (1.0 - 1e-6) * min(raster.pixels.dx, raster.pixels.dy):
+        return ()
+    text = f"cells of {least:g} m are smaller than the pixels of {raster.name}, so the bed has terraces"
+    return (f"{text}, on which thin films are too slow; expected cells at least as large as pixels",)
 
 
 def fields_of(table: Table) -> Iterator[SpatialField]:

@@ -48,8 +48,19 @@ class Raster:
         return np.pad(values, 1, mode="edge")
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Bilinear values between the centres of pixels; points outside have the value of the nearest pixel."""
-        (j, b), (i, a) = ((at, to - at) for to, n in zip((self.row(y), self.column(x)), self.filled.shape, strict=True)
+        """Bilinear values between the centres of pixels. Raises ValueError for a point outside the raster."""
+        row, column = self.row(y), self.column(x)
+        outside = np.maximum(np.abs(2.0 * row / self.pixels.values.shape[0] - 1.0),
+                             np.abs(2.0 * column / self.pixels.values.shape[1] - 1.0)) > 1.0 + FULL  # fmt: skip
+        if outside.any():
+            k = int(np.argmax(outside))
+            text = f"{self.name} does not cover x = {x[k]:.6g} m, y = {y[k]:.6g} m"
+            raise ValueError(f"{text}; expected a raster over the whole basin, or another `origin`{self.pixels.hint}")
+        return self.bilinear(row, column)
+
+    def bilinear(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+        """Bilinear values at positions in pixels; those outside have the value of the nearest pixel."""
+        (j, b), (i, a) = ((at, to - at) for to, n in zip((row, column), self.filled.shape, strict=True)
                           for to in [np.clip(to + 0.5, 0.0, n - 1.0)]
                           for at in [np.minimum(to.astype(int), n - 2)])  # fmt: skip
         first = j * self.filled.shape[1] + i  # south-west of the four centres around a point
@@ -101,10 +112,11 @@ class Raster:
             along, other = at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]
             area = 0.5 * (along[:, 0] * other[:, 1] - along[:, 1] * other[:, 0])
             x, y = np.einsum("pk,nkd->dnp", CENTRES, at)
-            i, j = np.floor(self.column(x)).astype(int), np.floor(self.row(y)).astype(int)
+            row, column = self.row(y), self.column(x)
+            i, j = np.floor(column).astype(int), np.floor(row).astype(int)
             inside = (i >= 0) & (j >= 0) & (i < self.pixels.values.shape[1]) & (j < self.pixels.values.shape[0])
             known = inside & np.isfinite(self.pixels.values[np.where(inside, j, 0), np.where(inside, i, 0)])
-            mean[own] += area * self(x, y).mean(axis=1)
+            mean[own] += area * self.bilinear(row, column).mean(axis=1)
             data[own] += area * known.mean(axis=1)
             whole[own] += area
         return mean / whole, data / whole
@@ -133,7 +145,8 @@ class Raster:
         if min(*self.column(low[:1]), *self.row(low[1:])) < 0.0 or high[0] > east or high[1] > north:
             text = f"{self.name} does not cover {first}: in the coordinates of the basin it reaches from "
             text += f"{pixels.x:g},{pixels.y:g} to {east:g},{north:g} m, the basin from {low[0]:g},{low[1]:g} to "
-            return f"{text}{high[0]:g},{high[1]:g} m; expected a raster over the whole basin, or another `origin`"
+            text += f"{high[0]:g},{high[1]:g} m; expected a raster over the whole basin, or another `origin`"
+            return text + pixels.hint
         if self.classes is not None and np.isnan(pixels.values[np.isfinite(self.classes)]).any():
             lost = np.unique(self.classes[np.isnan(pixels.values) & np.isfinite(self.classes)])
             number = f"{listing([f'{value:g}' for value in lost], 10)}"

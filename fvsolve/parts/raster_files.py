@@ -16,6 +16,7 @@ from fvsolve.parts.csv_rows import read_text
 from fvsolve.units import show
 
 MOST_CELLS = 1e8  # of a grid
+SMALL = 0.01  # [m] or degrees: pixels of rasters in degrees are smaller
 EVEN = 1e-4  # of the spacing: greatest distance of a coordinate from an even grid
 AUTHORITY = re.compile(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d+)"?\]')  # in the text of a CRS; the last is its own
 REFERENCE = "expected a raster with coordinates in metres, for example written by GDAL or QGIS"
@@ -35,6 +36,12 @@ class Pixels(NamedTuple):
     dy: float
     unit: str = ""
     crs: str = ""
+
+    @property
+    def hint(self) -> str:
+        """Remark on pixels whose numbers look like degrees; "" for others."""
+        far = max(abs(self.x), abs(self.y)) <= 180.0 and self.dx < SMALL
+        return "; are its coordinates in degrees?" if far else ""
 
     def to_basin(self, name: str, origin: tuple[float, float] | None, crs: str | None) -> "Pixels":
         """Pixels in the coordinates of a basin. Raises ValueError if the file `name` states another CRS.
@@ -83,7 +90,8 @@ def _read(path: Path, changed: int, size: int, band: int, variable: str) -> Pixe
         result = read_geotiff(path, band)
     else:
         result = read_ascii_grid(path)
-    if not np.isfinite(result.values).any():
+    result.values[~np.isfinite(result.values)] = np.nan
+    if np.isnan(result.values).all():
         raise ValueError(f"{path.name} has no data in any pixel; expected a raster with data")
     result.values.flags.writeable = False
     return result
@@ -226,7 +234,6 @@ def _pixels_of(file: str, known: dict[str, NetcdfVariable], name: str) -> Pixels
         raise ValueError(f"{file}: {name or planes[0]} has {np.prod(item.shape[:-2]):.0f} planes; expected one")
     values = item.read().reshape(item.shape[-2:])
     values = (values.T if turned else values)[:: -1 if dy < 0.0 else 1, :: -1 if dx < 0.0 else 1].copy()
-    values[~np.isfinite(values)] = np.nan
     holder = known.get(str(item.attributes.get("grid_mapping", "")))
     text = "" if holder is None else str(holder.attributes.get("crs_wkt") or holder.attributes.get("spatial_ref", ""))
     try:

@@ -197,6 +197,13 @@ def test_a_basin_over_a_raster_has_holes_where_it_lacks_data(tmp_path):
     assert "2 pieces that share no face, 23 of 45 cells in the largest" in str(refused(case))
 
 
+def test_cells_smaller_than_pixels_are_noticed(tmp_path):
+    bed = {"raster": str(ascii_grid(tmp_path / "dem.asc", heights()))}
+    texts = [str(fvsolve.run(pond(bed, cells=cells)).warnings) for cells in ([20, 12], [40, 24])]
+    assert "terraces" not in texts[0]
+    assert "cells of 0.25 m are smaller than the pixels of dem.asc, so the bed has terraces" in texts[1]
+
+
 def test_faults_of_rasters_name_place_and_remedy(tmp_path):
     values = heights()
     path = ascii_grid(tmp_path / "dem.asc", values)
@@ -218,8 +225,9 @@ def test_faults_of_rasters_name_place_and_remedy(tmp_path):
             {"raster": str(netcdf(tmp_path / "utm.nc", values))}, crs="EPSG:25832"),
         '"UTM 33" is not a coordinate reference system': pond(0.0, crs="UTM 33"),
         "cell is missing": pond({"raster": str(path)}, **none, mesh={"raster": str(path)}),
-        "expected smaller cells": pond(0.0, **none, mesh={"raster": str(path), "cell": 20.0}),
+        "measures 10 m by 6 m; expected smaller cells": pond(0.0, **none, mesh={"raster": str(path), "cell": 20.0}),
         "file and raster are given": pond(0.0, **none, mesh={"raster": str(path), "file": "a.msh"}),
+        "are its coordinates in degrees?": pond(grid("deg.asc", cellsize=0.0008)),
         "gives only the outline": pond(None, **none, mesh={"raster": str(path), "cell": 1.0}),
         "is not the number of a class": pond(0.0, manning={"raster": str(path), "table": {"a": 1}}),
     }  # fmt: skip
@@ -228,6 +236,19 @@ def test_faults_of_rasters_name_place_and_remedy(tmp_path):
     values[3, 4] = np.nan
     text = str(refused(pond(grid("gap.asc", values))))
     assert "gap.asc has no data under 1 of 60 cells, first at 2.5,1.5 m; expected data, or `outside" in text
+
+
+def test_a_given_velocity_may_be_a_raster_that_covers_the_basin(tmp_path):
+    path = ascii_grid(tmp_path / "u.asc", np.ones((12, 20)))
+    own = {"type": "basin", "physics": "transport", "size": [10.0, 6.0], "cells": [10, 6],
+           "velocity": {"u": {"raster": str(path)}},
+           "patches": {side: {"side": side, "scalars": {"dye": 1.0}} for side in ("west", "east")}}  # fmt: skip
+    case = scene({"pond": own}, {}, 1.0, {"scheme": "upwind"}, ["pond.dye@1,3"], scalars={"dye": {"unit": "mg/l"}})
+    same = case | {"nodes": {"pond": own | {"velocity": {"u": 1.0}}}}
+    rows, expected = (fvsolve.run(one)["pond.dye@1,3"] for one in (case, same))
+    assert rows == approx(expected, rel=1e-12) and rows[-1] > 0.1
+    own["size"] = [12.0, 6.0]
+    assert "u.asc does not cover x = 10.8 m, y = 0.5 m" in str(refused(case | {"nodes": {"pond": own}}))
 
 
 def test_faults_of_geotiffs(tmp_path):
