@@ -417,7 +417,9 @@ class OutputGrid(Table):
     fields: Annotated[Any, NameList(
         "fields", '["max_depth"]', "greatest values at the end of the run, or fields of frames (the last in a GeoTIFF)",
     )]  # fmt: skip
-    format: Annotated[str, Choice("format", ("geotiff", "netcdf"), "file format: geotiff, or netcdf (NetCDF-3)")]
+    format: Annotated[
+        str, Choice("format", ("geotiff", "netcdf"), "file format: geotiff, or netcdf (NetCDF-3)", changes=VALUE)
+    ]
     cell: Annotated[float, Quantity("length", positive, "side of a pixel [m]", changes=VALUE)]
 
 
