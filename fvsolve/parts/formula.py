@@ -232,6 +232,7 @@ def bracket_fault(text: str) -> str:
     return "a bracket is not closed" if depth else ""
 
 
+RASTER_SUFFIXES = (".asc", ".nc", ".tif", ".tiff")
 BLOCK = 2**16  # points per evaluation: limits the memory of intermediate values
 # Three Gauss points in each direction of a rectangle, at 0 and +-sqrt(3 / 5) of its half: centre, corners, sides.
 GAUSS = (0, 0), (-1, -1), (1, 1), (-1, 1), (1, -1), (-1, 0), (1, 0), (0, -1), (0, 1)
@@ -316,6 +317,8 @@ class SpatialFieldKey(Value):
             raise ValueError(f'{text}, or {{ raster = "NAME.tif" }}')
         try:
             path = find_file(given["file"], setting)
+            if path.suffix.lower() in RASTER_SUFFIXES:
+                raise ValueError(f"{show(given['file'])} is a raster; expected {{ raster = {show(given['file'])} }}")
             columns = read_points(path, self.dimension)
         except ValueError as error:
             raise ValueFault([(("file",), str(error))]) from None

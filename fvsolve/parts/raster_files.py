@@ -17,6 +17,7 @@ from fvsolve.units import show
 
 MOST_CELLS = 1e8  # of a grid
 SMALL = 0.01  # [m] or degrees: pixels of rasters in degrees are smaller
+HEAD = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "dx", "dy", "nodata_value")
 EVEN = 1e-4  # of the spacing: greatest distance of a coordinate from an even grid
 AUTHORITY = re.compile(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d+)"?\]')  # in the text of a CRS; the last is its own
 REFERENCE = "expected a raster with coordinates in metres, for example written by GDAL or QGIS"
@@ -118,7 +119,7 @@ def read_ascii_grid(path: Path) -> Pixels:
     """Pixels of an ESRI ASCII grid; a file .prj beside it may state its CRS."""
     text, keys, at = read_text(path), {}, 0
     for match in re.finditer(r"[ \t]*([A-Za-z_]+)[ \t]+(\S+)[ \t]*\r?\n", text):
-        if match.start() != at:
+        if match.start() != at or match[1].lower() not in HEAD:
             break
         keys[match[1].lower()], at = match[2], match.end()
     if "ncols" not in keys:

@@ -215,6 +215,7 @@ def test_faults_of_rasters_name_place_and_remedy(tmp_path):
     faults = {
         "does not cover 12 of 72 cells, first at 10.5,0.5 m": pond(grid("dem.asc"), size=[12.0, 6.0], cells=[12, 6]),
         "or another `origin`": pond({"raster": str(path)}, origin=[1.0, 0.0]),
+        "is a raster; expected { raster = ": pond({"file": str(path)}),
         "no such file; a relative": pond({"raster": "dom.asc"}),
         "1000000000 x 1 cells, more than 1e+08": pond(grid("big.asc", ncols=10**9, nrows=1)),
         "no georeference: no lines `xllcorner`": pond(grid("free.asc", xllcorner=None)),
