@@ -15,7 +15,6 @@ from fvsolve.fluid import LAWS
 from fvsolve.fluid.coolprop import OIL_WORDS
 from fvsolve.fluid.oils import ASTM_D341
 from fvsolve.parts import value as val
-from fvsolve.parts.basin import Physics
 from fvsolve.parts.csv_rows import copy_name, find_file
 from fvsolve.parts.pipe.part import LINES
 from fvsolve.parts.table_model import NamedTables, Table, check_table, read_keys
@@ -458,8 +457,12 @@ class Output(Table):
     @property
     def basins_with_maxima(self) -> tuple[str, ...]:
         """Names of the basins whose greatest values are recorded: of `maxima`, run-ups and grids that need them."""
-        recorded = {key for physics in Physics.kinds.values() for key in physics.maxima}
-        drawn = (spec.basin for spec in self.grids.values() if recorded.intersection(map(str, spec.fields)))
+        drawn: list[str] = []
+        if self.grids:
+            from fvsolve.parts.basin import Physics
+
+            recorded = {key for physics in Physics.kinds.values() for key in physics.maxima}
+            drawn += [spec.basin for spec in self.grids.values() if recorded.intersection(map(str, spec.fields))]
         return tuple(dict.fromkeys([*self.maxima, *(spec.basin for spec in self.run_up.values()), *drawn]))
 
     def table(self) -> dict[str, Any]:

@@ -23,7 +23,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "benchmarks": (6543, 49),
     "fvsolve/assembly": (1965, 10),
     "fvsolve/basins": (10135, 48),
-    "fvsolve/case": (7711, 27),
+    "fvsolve/case": (7714, 27),
     "fvsolve/cli": (3523, 17),
     "fvsolve/compile": (1343, 7),
     "fvsolve/data": (12, 1),
