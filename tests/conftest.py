@@ -164,5 +164,8 @@ def surroundings(module) -> tuple:
         for name, value in vars(module).items()
         if isinstance(value, (dict, list, set)) and name[0] != "_"
     }
-    variables = {name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"}
+    variables = {  # the first import of rasterio, by WNTR too, sets bundles of certificates
+        name: value for name, value in os.environ.items()
+        if name != "PYTEST_CURRENT_TEST" and not name.endswith("_CURL_CA_BUNDLE")
+    }  # fmt: skip
     return os.getcwd(), variables, tables

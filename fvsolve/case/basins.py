@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from fvsolve.case import bodies
+from fvsolve.case.output_grids import grid_faults
+from fvsolve.case.raster_meshes import raster_extent, rasters_with_holes, terrace_notes
 from fvsolve.case.resource_checks import BASIN_CELL, byte_text, free_memory, name_faults
 from fvsolve.case.sections import Output
 from fvsolve.errors import MeshError, article, did_you_mean, listing
@@ -321,6 +323,7 @@ class BasinFields:
 
     has_maxima : True if its greatest values in cells can be recorded; what : text about the basin, for messages
     quantities : quantities of the whole basin (name -> dimension); gauges : named points [m]
+    basin : keys of the basin
     """
 
     fields: dict[str, str]
@@ -329,6 +332,7 @@ class BasinFields:
     what: str = ""
     quantities: dict[str, str] = field(default_factory=dict)
     gauges: dict[str, tuple[float, float]] = field(default_factory=dict)
+    basin: Any = None
     kind: ClassVar[str] = "basin"
 
     def point(self, label: str, place: str | None) -> tuple[float, float]:
@@ -381,7 +385,7 @@ def probe_kinds(name: str, basin: Basin, mesh: Mesh | None, lumped: Mesh | None,
     fields = own.fields | (dict.fromkeys(scalars, "number") if own.carries else {})
     patches = {f"{name}.{patch}": place_kind(basin, patch) for patch in patch_names(mesh)}
     what = f"{name} has the physics {show(own.name)}"
-    return {name: BasinFields(fields, mesh, bool(own.maxima), what, own.totals), **patches}
+    return {name: BasinFields(fields, mesh, bool(own.maxima), what, own.totals, basin=basin), **patches}
 
 
 def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
@@ -389,19 +393,23 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
     from fvsolve.mesh import read, rectangle
 
     try:
-        if basin.mesh is None:
-            count = math.prod(basin.cells or ())
+        if basin.is_rectangle:
+            size, cells, corner = raster_extent(basin, setting) if basin.mesh else (basin.size, basin.cells, (0.0, 0.0))
+            count = math.prod(cells or ())
             if count * BASIN_CELL > free_memory():
                 text = f"{count:.3g} cells take about {byte_text(count * BASIN_CELL)} of memory"
-                raise ValueFault(
-                    [(("cells",), f"{text}, and {byte_text(free_memory())} are free; expected fewer cells")]
-                )
+                text += f", and {byte_text(free_memory())} are free; expected fewer cells"
+                raise ValueFault([(("mesh", "cell") if basin.mesh else ("cells",), text)])
             sides = {name: (item.side, *item.span) if item.span else item.side for name, item in basin.patches.items()}
             grading = basin.grading or (1.0, 1.0)
-            return rectangle(basin.size, basin.cells, grading=grading, patches=sides, holes=basin.holes or ())
+            lacks = [raster.lacks for raster in rasters_with_holes(basin, setting)]
+            mesh = rectangle(size, cells, corner, grading, sides, basin.holes or (), lacks)
+            return replace(mesh, notes=terrace_notes(basin, mesh.grid))
+        if rasters_with_holes(basin, setting):
+            raise ValueFault([((), "`outside` of a raster applies to rectangles; leave it out, or cut the mesh file")])
         return read(setting.files[basin.mesh.file], basin.mesh.unit)
     except MeshError as error:
-        if basin.mesh is not None:  # the faults are in the mesh file, not in keys of the case
+        if not basin.is_rectangle:  # the faults are in the mesh file, not in keys of the case
             name, places = Path(basin.mesh.file).name, [item.place == "unit" for item in error.faults]
             raise ValueFault([(("mesh", "unit"), item.message) if key else (("mesh",), f"{name}: {item}")
                           for key, item in zip(places, error.faults, strict=True)]) from None  # fmt: skip
@@ -420,7 +428,7 @@ def fault_keys(place: str) -> tuple:
 
 
 def output_faults(output: Output, nodes: dict[str, Any]) -> Faults:
-    """Faults (key path, message) of the tables of `[output]` for basins: `lines`, `maxima` and `run_up`.
+    """Faults (key path, message) of the tables of `[output]` for basins: `lines`, `maxima`, `run_up`, `grids`.
 
     nodes : name -> class of the node, the `BasinFields` of a basin, or None for a faulty node
     """
@@ -431,6 +439,12 @@ def output_faults(output: Output, nodes: dict[str, Any]) -> Faults:
             yield from _basin_faults((*key, "basin"), line.basin, nodes, group == "run_up")
             for end, text in _end_faults(line, nodes.get(line.basin), group == "lines"):
                 yield (*key, end), text
+    for name, grid in output.grids.items():
+        key, pool = ("output", "grids", name), nodes.get(grid.basin)
+        yield from ((key, text) for text in name_faults(name))
+        yield from _basin_faults((*key, "basin"), grid.basin, nodes, False)
+        if isinstance(pool, BasinFields) and pool.basin is not None:
+            yield from (((*key, *below), text) for below, text in grid_faults(grid, pool, output.fields))
     for k, name in enumerate(output.maxima):
         yield from _basin_faults(("output", "maxima", k), name, nodes, True)
     if output.lines and output.fields == 0:
@@ -514,7 +528,7 @@ def may_have_faces(basin: Basin) -> bool:
 
 
 def patches_with_faces(nodes: dict[str, Any], links: dict[str, Any], lines: str, meshes: dict) -> frozenset[str]:
-    """Patches, by full name, through whose faces the flow of their links passes; the cells behind other patches take it.
+    """Full names of the patches through whose faces the flow of their links passes; cells take it at other patches.
 
     These are patches of fixed basins that may have closures, unless a delay line or a rigid column joins them.
     lines : model of pipes that state none
@@ -584,7 +598,7 @@ def places_on_bodies(nodes: dict[str, Any], meshes: dict[str, Mesh]) -> dict[str
 
 def _patch_hint(basin: Basin, known: tuple[str, ...], name: str) -> str:
     """Text that lists the patches `known`, or explains how to give the patch `name` its name in the mesh file."""
-    if known or basin.mesh is None:
+    if known or basin.is_rectangle:
         return f"patches are {listing(known) or 'none'}"
     file = Path(basin.mesh.file).name
     return (

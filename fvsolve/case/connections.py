@@ -144,7 +144,7 @@ def kind_name(part: Any, group: str = "nodes") -> str | None:
 
 
 def has_mesh_file(node: Any) -> bool:
-    """True if a node is a basin with its mesh in a file."""
+    """True if a node is a basin with its mesh in a file, a raster included."""
     return _dict(node).get("type") == "basin" and "mesh" in node
 
 

@@ -11,13 +11,13 @@ from typing import Any
 
 from fvsolve.case.load import TOP
 from fvsolve.case.pipe_routes import Route
-from fvsolve.case.sections import FluidSpec, Numerics, Output, OutputLine, RunUp
+from fvsolve.case.sections import FluidSpec, Numerics, Output, OutputGrid, OutputLine, RunUp
 from fvsolve.case.text import inline
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.parts import KINDS, Friction, Node, Scalar
 from fvsolve.parts.accumulator.part import Compressor
 from fvsolve.parts.attitude_keys import Attitude
-from fvsolve.parts.basin import BasinStart, Patch
+from fvsolve.parts.basin import BasinMesh, BasinStart, Patch
 from fvsolve.parts.body import Joint
 from fvsolve.parts.connection import Connection
 from fvsolve.parts.control import Control
@@ -35,6 +35,7 @@ TABLES: dict[str, type[Table]] = {
     "every node": Node, "riding": PlaceOnBody, "every link": TwoPort, "friction": Friction, "connection": Connection,
     "compressor": Compressor, "dry friction": DryFriction,
     "wall": Wall, "lining": Lining, "patch": Patch, "start": BasinStart, "line": OutputLine, "run-up": RunUp,
+    "grid": OutputGrid, "mesh": BasinMesh,
     "scalar": Scalar, "reaction": Reaction,
     "fluid": FluidSpec, "numerics": Numerics, "output": Output, "route": Route, "joint": Joint, "attitude": Attitude,
 }  # fmt: skip

@@ -409,6 +409,19 @@ class Gauge(Table):
     at: Annotated[tuple[float, float], val.Rows("length", length=2, about="x, y of the point [m]", changes=VALUE)]
 
 
+class OutputGrid(Table):
+    """Table of fields of a basin on square pixels, as files `grids/NAME-FIELD.tif` or `grids/NAME.nc`."""
+
+    basin: Annotated[str, val.Text("name of the basin")]
+    fields: Annotated[Any, NameList(
+        "fields", '["max_depth"]', "greatest values at the end of the run, or fields of frames (the last in a GeoTIFF)",
+    )]  # fmt: skip
+    format: Annotated[
+        str, Choice("format", ("geotiff", "netcdf"), "file format: geotiff, or netcdf (NetCDF-3)", changes=VALUE)
+    ]
+    cell: Annotated[float, Quantity("length", positive, "side of a pixel [m]", changes=VALUE)]
+
+
 class Output(Table):
     """Table `[output]`: recorded quantities, output times and units."""
 
@@ -436,12 +449,21 @@ class Output(Table):
         Any, NamedTables(RunUp, "named run-ups: { shore = { basin, about } } or { beach = { basin, from, to } }")
     ] = {}
     gauges: Annotated[Any, NamedTables(Gauge, "named points of basins for probes: { kerb = { basin, at } }")] = {}
+    grids: Annotated[
+        Any, NamedTables(OutputGrid, "fields of basins on pixels: { flood = { basin, fields, format, cell } }")
+    ] = {}
     units: Annotated[dict[str, str], OutputUnits()] = {}
 
     @property
     def basins_with_maxima(self) -> tuple[str, ...]:
-        """Names of the basins whose greatest values are recorded: those of `maxima`, and those with a run-up."""
-        return tuple(dict.fromkeys([*self.maxima, *(spec.basin for spec in self.run_up.values())]))
+        """Names of the basins whose greatest values are recorded: of `maxima`, run-ups and grids that need them."""
+        drawn: list[str] = []
+        if self.grids:
+            from fvsolve.parts.basin import Physics
+
+            recorded = {key for physics in Physics.kinds.values() for key in physics.maxima}
+            drawn += [spec.basin for spec in self.grids.values() if recorded.intersection(map(str, spec.fields))]
+        return tuple(dict.fromkeys([*self.maxima, *(spec.basin for spec in self.run_up.values()), *drawn]))
 
     def table(self) -> dict[str, Any]:
         """Keys and values as in a case file."""

@@ -1,7 +1,7 @@
 """Meshes of rectangles: graded grids of cells with holes, and patches on their sides."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -21,6 +21,7 @@ def rectangle(
     grading: Sequence[float] = (1.0, 1.0),
     patches: Mapping[str, Side] | None = None,
     holes: Sequence[Sequence[float]] = (),
+    lacks: Sequence[Callable[[np.ndarray, np.ndarray], np.ndarray]] = (),
 ) -> Mesh:
     """Mesh of a rectangle of a size [m] from its south-west corner, `origin` [m]; cells are numbered row by row.
 
@@ -28,6 +29,7 @@ def rectangle(
     grading : ratio of last to first spacing of grid lines; it changes geometrically between them
     patches : name -> a side ("west", "east", "south" or "north"), or (side, from, to) with coordinates along it [m]
     holes : rectangles (x0, y0, x1, y1) [m] on grid lines, without cells; faces must connect the remaining cells
+    lacks : functions of the grid lines along x and y : bool[ny, nx], True for cells that are holes too
     Raises MeshError with all faults.
     """
     faults = _bad_numbers(size, cells, origin, grading)
@@ -40,14 +42,19 @@ def rectangle(
     solid = np.ones((cells[1], cells[0]), bool)
     for k, hole in enumerate(holes):
         faults += _cut(solid, lines, f"holes[{k}]", hole)
+    for empty in lacks:
+        solid &= ~empty(*lines)
     if faults or not solid.any():
         raise MeshError(faults or [Fault("holes", "the holes leave no cell; expected smaller holes")], "rectangle")
     index = np.where(solid, np.cumsum(solid).reshape(solid.shape) - 1, -1)
     points, corners = _corners(lines, solid)
     edges = edges_of(corners, len(points))
-    pieces = np.bincount(edges.pieces(len(corners)))
+    piece = edges.pieces(len(corners))
+    pieces = np.bincount(piece)
     if pieces.size > 1:
-        faults.append(Fault("holes", f"the holes leave {pieces.size} pieces that share no face; expected one piece"))
+        text = f"the holes leave {pieces.size} pieces that share no face, {pieces.max()} of {pieces.sum()} cells in the"
+        x, y = points[corners[np.argmax(piece != np.argmax(pieces)), 0]]
+        faults.append(Fault("holes", f"{text} largest, another piece at {x:.6g},{y:.6g} m; expected one piece"))
     names, patch = _patches(patches or {}, lines, solid, points, edges, faults)
     if faults:
         raise MeshError(faults, "rectangle")

@@ -142,9 +142,7 @@ class Couplings:
         if i in self.patches and self.patches[i]["closure"] == rec.LINKED:
             row = self.patches[i]
             second = self.integers[row["second"] : row["second"] + row["faces"]]
-            return unique_states(
-                self.behind(i), pattern.cell_states(self.basins[row["basin"]], np.unique(second))
-            )
+            return unique_states(self.behind(i), pattern.cell_states(self.basins[row["basin"]], np.unique(second)))
         if i in self.patches:
             return unique_states(self.behind(i, 1), *(self.walls["y"][self.walls["basin"] == self.patches[i]["basin"]]))
         given = self.blocks.schedule(self.nodes["schedule"][i])

@@ -13,6 +13,7 @@ from fvsolve.errors import RunError
 from fvsolve.output import csv_files
 from fvsolve.output.csv_files import read_envelope, read_table
 from fvsolve.output.fields import FieldSeries, ParallelBasinWriter
+from fvsolve.output.grid_files import GRID_FILES, write_grids
 from fvsolve.output.maxima_files import (
     MAXIMA_FILES,
     RUN_UP_FILES,
@@ -165,6 +166,7 @@ class RunDirectory:
         with self.report_write_errors():
             self.history.close()
             write_maxima(self.folder, self.model, summary.maxima)
+            write_grids(self.folder, self.model, summary.t, summary.maxima)
             for name, table in summary.run_ups.items():
                 write_run_up(self.folder / f"run_up-{name}.csv", table, self.model.case)
             if summary.envelope:
@@ -211,7 +213,9 @@ class RunDirectory:
         """Sorted names of the existing files of the run, with summary.json and without pictures."""
         names = [*RUN_FILES, *self.model.case.copies]
         existing = [name for name in dict.fromkeys(names) if (self.folder / name).is_file()]
-        return sorted([*existing, *(path.name for path in maxima_paths(self.folder)), SUMMARY_FILE])
+        return sorted(
+            [*existing, *(path.relative_to(self.folder).as_posix() for path in maxima_paths(self.folder)), SUMMARY_FILE]
+        )
 
     def _checkpoint(self) -> Restart | None:
         path = self.folder / "restart.npz"
@@ -286,8 +290,8 @@ def picture_paths(folder: Path) -> list[Path]:
 
 
 def maxima_paths(folder: Path) -> list[Path]:
-    """Paths of the existing files of greatest values in basins, and of run-ups, in a run directory."""
-    return sorted([*folder.glob(MAXIMA_FILES), *folder.glob(RUN_UP_FILES)])
+    """Paths of the existing files of greatest values in basins, run-ups and grids, in a run directory."""
+    return sorted([*folder.glob(MAXIMA_FILES), *folder.glob(RUN_UP_FILES), *folder.glob(GRID_FILES)])
 
 
 def existing_pictures(folder: Path) -> list[str]:

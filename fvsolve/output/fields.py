@@ -34,7 +34,7 @@ VTU_HEAD = """<?xml version="1.0"?>
 <VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian" header_type="UInt64" \
 compressor="vtkZLibDataCompressor">
 <UnstructuredGrid>
-<Piece NumberOfPoints="{points}" NumberOfCells="{cells}">
+{reference}<Piece NumberOfPoints="{points}" NumberOfCells="{cells}">
 """
 VTU_TAIL = "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
 FILE_ATTRIBUTE = re.compile('file="([^"]+)"')
@@ -134,6 +134,7 @@ class FieldSeries:
         self.basins = {
             basin.name: (*basin_geometry(basin, self.places[basin.name]), units[basin.name]) for basin in model.basins
         }
+        self.references = {basin.name: reference_xml(basin) for basin in model.basins}
         self.bodies = BodyLines(model) if model.body_names else None
         self.pipes = [pipe.name for pipe in model.pipes]
         self.units = FIELD_UNITS | carried
@@ -204,9 +205,9 @@ class FieldSeries:
     def grid(self, part: str, points: np.ndarray, cells: list, fixed: bool) -> str:
         """Result of `grid_xml`, kept under the name `part` if the points are fixed."""
         if not fixed:
-            return grid_xml(points, cells)
+            return grid_xml(points, cells, self.references.get(part, ""))
         if part not in self.fixed_grids:
-            self.fixed_grids[part] = grid_xml(points, cells)
+            self.fixed_grids[part] = grid_xml(points, cells, self.references.get(part, ""))
         return self.fixed_grids[part]
 
     def points_at(self, frame: dict) -> np.ndarray:
@@ -233,10 +234,23 @@ def write_frame(path: Path, grid: str, data: dict[str, list], units: dict[str, s
     path.write_text(f"{grid}<CellData>\n{text}</CellData>\n{VTU_TAIL}", encoding="utf-8")
 
 
-def grid_xml(points: np.ndarray, cells: list) -> str:
+def reference_xml(basin) -> str:
+    """XML text of the key `origin` [m] and the number of the key `crs` of a basin; "" if it has neither."""
+    part = basin.part
+    if part.origin is None and part.crs is None:
+        return ""
+    arrays = [("Float64", "origin", part.origin or (0.0, 0.0))]
+    arrays += [("Int32", "epsg", (int(part.crs.removeprefix("EPSG:")),))] if part.crs else []
+    text = "".join(f'<DataArray type="{kind}" Name="{name}" NumberOfTuples="{len(values)}" format="ascii">'
+                   f"{' '.join(map(repr, values))}</DataArray>\n" for kind, name, values in arrays)  # fmt: skip
+    return f"<FieldData>\n{text}</FieldData>\n"
+
+
+def grid_xml(points: np.ndarray, cells: list, reference: str = "") -> str:
     """Begin of the text of a .vtu file, with points and cells.
 
     points : float64[p, 3]; cells : blocks (type of `CELL_TYPES`, int[cells, corners])
+    reference : result of `reference_xml`
     """
     corners = [np.asarray(block, dtype=np.int64) for _, block in cells]
     ends = np.cumsum(np.concatenate([np.full(len(block), block.shape[1], dtype=np.int64) for block in corners]))
@@ -246,7 +260,7 @@ def grid_xml(points: np.ndarray, cells: list) -> str:
         "Cells": [("connectivity", np.concatenate([block.ravel() for block in corners])), ("offsets", ends),
                   ("types", types)],
     }  # fmt: skip
-    text = VTU_HEAD.format(points=len(points), cells=len(types))
+    text = VTU_HEAD.format(points=len(points), cells=len(types), reference=reference)
     for group, arrays in groups.items():
         text += f"<{group}>\n{''.join(array_xml(name, values, {}) for name, values in arrays)}</{group}>\n"
     return text
@@ -444,7 +458,8 @@ def write_piece(path: Path, basin, origin, rows, k: int, values: dict, units: di
     points = drawn_points(basin, origin, basin.mesh.points[first : last + 1])
     blocks = {key: [array] for key, array in values.items()}
     try:
-        write_frame(piece_path(path, k), grid_xml(points, [("quad", corners - first)]), blocks, units)
+        grid = grid_xml(points, [("quad", corners - first)], reference_xml(basin))
+        write_frame(piece_path(path, k), grid, blocks, units)
     except OSError as error:
         return error.errno, error.strerror or str(error), str(error.filename or piece_path(path, k))
     return ()

@@ -6,7 +6,7 @@ import numpy as np
 
 from fvsolve.errors import RunError
 from fvsolve.output.csv_files import csv_quoted
-from fvsolve.output.fields import basin_geometry, grid_xml, split_blocks, write_frame
+from fvsolve.output.fields import basin_geometry, grid_xml, reference_xml, split_blocks, write_frame
 from fvsolve.output.unit_columns import UnitColumn, column, to_column_units
 
 MAXIMA_FILES, RUN_UP_FILES = "maxima-*.vtu", "run_up-*.csv"
@@ -19,7 +19,8 @@ def write_maxima(folder: Path, model, maxima: dict[str, dict[str, np.ndarray]]) 
         if basin.name in maxima:
             points, cells = basin_geometry(basin, np.array(basin.part.position or (0.0, 0.0)))
             blocks = {key: split_blocks(values, cells) for key, values in maxima[basin.name].items()}
-            write_frame(folder / f"maxima-{basin.name}.vtu", grid_xml(points, cells), blocks, basin.units_of_maxima)
+            grid = grid_xml(points, cells, reference_xml(basin))
+            write_frame(folder / f"maxima-{basin.name}.vtu", grid, blocks, basin.units_of_maxima)
 
 
 def read_maxima(folder: Path) -> dict[str, dict[str, np.ndarray]]:

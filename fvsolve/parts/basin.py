@@ -1,6 +1,8 @@
 """Basins, their patches, and the base class for the equations of basins (`Physics`)."""
 
+import re
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from copy import copy
 from typing import Annotated, Any, ClassVar
 
@@ -28,6 +30,8 @@ from fvsolve.parts.value import (
     Text,
     UsualRange,
     Value,
+    Whole,
+    between,
     nonnegative,
     positive,
 )
@@ -168,6 +172,8 @@ class Holes(Value):
 class File(Value):
     """Key that gives the path of a file; its value as read is the name of the copy in the run directory."""
 
+    takes = "path"
+
     def __init__(self, about: str) -> None:
         self.about = about
 
@@ -178,11 +184,52 @@ class File(Value):
         return {"type": "string"}
 
 
-class MeshFile(Table):
-    """A mesh of triangles and quadrilaterals; its groups of lines are patches."""
+class BasinMesh(Table):
+    """A mesh of triangles and quadrilaterals, whose groups of lines are patches; or square cells over a raster."""
 
-    file: Annotated[str, File("mesh file that meshio reads, path relative to the case")]
-    unit: Annotated[str, Text("unit of the coordinates")] = "m"
+    raster_keys: ClassVar[tuple[str, ...]] = ("cell", "outside", "band", "variable")
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("file", "raster"), ("unit", "raster"))
+    needs: ClassVar[tuple[tuple[str, ...], ...]] = (("file", "raster"),)
+
+    file: Annotated[str | None, File("mesh file that meshio reads, path relative to the case")] = None
+    unit: Annotated[str, Text("unit of the coordinates of the file")] = "m"
+    raster: Annotated[str | None, File("raster that the cells cover, instead of a mesh file")] = None
+    cell: Annotated[
+        float | None, Quantity("length", positive, "side of the cells over the raster [m]", changes=SHAPE)
+    ] = None
+    outside: Annotated[
+        str | None, Choice("choice", ("hole",), "hole: cells without data in the raster are left out")
+    ] = None
+    band: Annotated[int, Whole(between(1, 1e6), "band of a GeoTIFF")] = 1
+    variable: Annotated[str, Text("variable of a NetCDF file; the only one if left out")] = ""
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
+        faults = super().key_faults(given)
+        if "raster" in given:
+            return faults + (
+                [] if "cell" in given else [((), "cell is missing, the side of the cells over the raster")]
+            )
+        text = "applies to the cells over a `raster`; give `raster` instead of `file`, or leave this key out"
+        return faults + [((key,), text) for key in cls.raster_keys if key in given]
+
+    def table(self) -> dict[str, Any]:
+        """Keys and values as in a case file: those of a mesh file, or those of a raster."""
+        others = ("unit",) if self.raster else self.raster_keys
+        return {key: value for key, value in super().table().items() if key not in others and value != ""}
+
+
+class ReferenceSystem(Text):
+    """Value of a case file for a coordinate reference system, by its number."""
+
+    def read(self, given: Any, setting: ReadContext) -> str:
+        if re.fullmatch(r"EPSG:\d+", text := super().read(given, setting)) is None:
+            raise ValueError(f'{show(given)} is not a coordinate reference system; expected for example "EPSG:32633"')
+        return text
+
+
+ORIGIN = Rows("length", length=2, about="easting and northing of x = 0, y = 0, for rasters [m]; default [0, 0]",
+              changes=SHAPE)  # fmt: skip
 
 
 class VelocityStart(Table):
@@ -364,8 +411,12 @@ class Basin(PlaceOnBody, kind="basin"):
     )] = None  # fmt: skip
     holes: Annotated[Any, Holes()] = None
     mesh: Annotated[
-        MeshFile | None,
-        Nested(MeshFile, "mesh file (any format of meshio) and the unit of its coordinates, instead of a rectangle"),
+        BasinMesh | None,
+        Nested(BasinMesh, "mesh file (any format of meshio), or square cells over a raster, instead of a rectangle"),
+    ] = None
+    origin: Annotated[tuple[float, float] | None, ORIGIN] = None
+    crs: Annotated[
+        str | None, ReferenceSystem("coordinate reference system of `origin` and of rasters, such as EPSG:32633")
     ] = None
     patches: Annotated[Any, NamedTables(Patch, "named parts of the boundary: { outlet = { side, span } }")] = {}
     start: Annotated[BasinStart | None, Nested(
@@ -392,6 +443,7 @@ class Basin(PlaceOnBody, kind="basin"):
         physics = given.get("physics", cls.model_fields["physics"].default)
         known = isinstance(physics, str) and physics in Physics.kinds
         faults = Physics.kinds[physics].own_faults(given) if known else []
+        rectangle = "mesh" not in given or (isinstance(given["mesh"], dict) and "raster" in given["mesh"])
         if "mesh" in given:
             text = "is a key of rectangles, but this basin has a `mesh`; remove this key or `mesh`"
             faults += [((key,), text) for key in RECTANGLE_KEYS if key in given]
@@ -399,11 +451,18 @@ class Basin(PlaceOnBody, kind="basin"):
             faults += [((), f"{key} is missing") for key in RECTANGLE_KEYS[:2] if key not in given]
         for name, patch in given["patches"].items() if isinstance(given.get("patches"), dict) else ():
             side = isinstance(patch, dict) and "side" in patch
-            if side and "mesh" in given:
+            if side and not rectangle:
                 faults.append((("patches", name), "takes its faces from the mesh; remove the keys `side` and `span`"))
-            elif isinstance(patch, dict) and not side and "mesh" not in given:
+            elif isinstance(patch, dict) and not side and rectangle:
                 faults.append((("patches", name), "side is missing"))
         return faults
+
+    @classmethod
+    def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
+        setting.frame = (0.0, 0.0), str(given.get("crs") or "")  # for the rasters of the other keys
+        with suppress(ValueError):  # a fault of the key itself
+            setting.frame = ORIGIN.read(given.get("origin") or (0.0, 0.0), setting), setting.frame[1]
+        return given
 
     @classmethod
     def own_places(cls, given: dict[str, Any]) -> tuple[str, ...] | None:
@@ -414,6 +473,11 @@ class Basin(PlaceOnBody, kind="basin"):
     def rotation(self) -> np.ndarray:
         """Rotation matrix from the axes of the basin to those of its body : float64[3, 3]."""
         return np.eye(3) if self.attitude is None else self.attitude.rotation
+
+    @property
+    def is_rectangle(self) -> bool:
+        """True if the mesh is a rectangle of cells: from its keys, or over a raster."""
+        return self.mesh is None or self.mesh.raster is not None
 
     @property
     def lumped(self) -> bool:

@@ -1,4 +1,4 @@
-"""Values over a plane: a number, a formula of x and y, or interpolated points of a file; their means over cells.
+"""Values over a plane: a number, a formula of x and y, points of a file or a raster; their means over cells.
 
 A formula is parsed into a list of steps that act on arrays of floats.
 """
@@ -16,6 +16,7 @@ import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.csv_rows import copy_name, find_file, read_rows
+from fvsolve.parts.raster import Raster, read_raster
 from fvsolve.parts.value import PROFILE, Quantity, Range, ReadContext, Value, ValueFault, anything
 from fvsolve.units import show
 
@@ -231,6 +232,7 @@ def bracket_fault(text: str) -> str:
     return "a bracket is not closed" if depth else ""
 
 
+RASTER_SUFFIXES = (".asc", ".nc", ".tif", ".tiff")
 BLOCK = 2**16  # points per evaluation: limits the memory of intermediate values
 # Three Gauss points in each direction of a rectangle, at 0 and +-sqrt(3 / 5) of its half: centre, corners, sides.
 GAUSS = (0, 0), (-1, -1), (1, 1), (-1, 1), (1, -1), (-1, 0), (1, 0), (0, -1), (0, 1)
@@ -276,7 +278,7 @@ def uniform(value: float) -> SpatialField:
 
 @dataclass(frozen=True)
 class SpatialFieldKey(Value):
-    """Value of a case file for a field over a plane: a quantity, a formula of x and y in SI, or points of a file.
+    """Value of a case file for a field over a plane: a quantity, a formula of x and y in SI, a file or a raster.
 
     A file has the columns x, y and the value.
     """
@@ -303,11 +305,20 @@ class SpatialFieldKey(Value):
             return SpatialField(given, Arithmetic(given, str(error)))
 
     def _samples(self, given: dict, setting: ReadContext) -> SpatialField:
+        if "raster" in given:
+            try:
+                return SpatialField(*read_raster(given, self.dimension, self.range, setting))
+            except ValueFault:
+                raise
+            except ValueError as error:
+                raise ValueFault([(("raster",), str(error))]) from None
         if set(given) != {"file"} or not isinstance(given["file"], str):
             text = f'{show(given)} is not a field; expected {{ file = "NAME.csv" }} with columns x, y and the value'
-            raise ValueError(text)
+            raise ValueError(f'{text}, or {{ raster = "NAME.tif" }}')
         try:
             path = find_file(given["file"], setting)
+            if path.suffix.lower() in RASTER_SUFFIXES:
+                raise ValueError(f"{show(given['file'])} is a raster; expected {{ raster = {show(given['file'])} }}")
             columns = read_points(path, self.dimension)
         except ValueError as error:
             raise ValueFault([(("file",), str(error))]) from None
@@ -315,12 +326,12 @@ class SpatialFieldKey(Value):
 
     @property
     def takes(self) -> str:
-        return f"{Quantity(self.dimension, self.range).takes}; formula"
+        return f"{Quantity(self.dimension, self.range).takes}; formula; raster"
 
 
 @dataclass(frozen=True)
 class NumberOrField(Value):
-    """Value of a case file for a number, or a field over a plane as a formula of x and y or points of a file."""
+    """Value of a case file for a number, or a field over a plane: a formula of x and y, a file or a raster."""
 
     schema: ClassVar[dict[str, Any]] = {"type": ["number", "string", "object"]}
 
@@ -336,7 +347,7 @@ class NumberOrField(Value):
 
     @property
     def takes(self) -> str:
-        return f"{self.number.takes}; formula"
+        return f"{self.number.takes}; formula; raster"
 
 
 def read_points(path: Path, dimension: str) -> np.ndarray:
@@ -425,8 +436,11 @@ def samples(shape: SpatialField | None, mesh: Any) -> np.ndarray:
     """Values of a formula at points in the n cells of a mesh : float64[points, n]; zeros if `shape` is None.
 
     On full rectangular grids there are nine Gauss points per cell, in the order of `GAUSS`; on other meshes there is
-    only the centre.
+    only the centre. The values of a raster are its means over the cells, at all points.
     """
+    if shape is not None and isinstance(shape.rule, Raster):
+        mean = shape.rule.over(mesh)
+        return np.broadcast_to(mean, (len(GAUSS) if is_grid(mesh) else 1, mean.size))
     x, y = np.ascontiguousarray(mesh.centre.T)
     if not is_grid(mesh):
         places = np.array([x]), np.array([y])

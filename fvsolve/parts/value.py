@@ -106,6 +106,7 @@ class ReadContext:
     block_units: tuple[str, str] = ("number", "number")
     span: tuple[float, float] | None = None  # start and end of the run [s]; None if unknown
     step: float | None = None  # given step of the run [s]; None without one
+    frame: tuple[tuple[float, float], str] = ((0.0, 0.0), "")  # easting and northing [m] of the basin, and its CRS
 
 
 def context_of(info: Any) -> ReadContext:

@@ -14,6 +14,7 @@ import numpy as np
 from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.model.delay_lines import line_methods, slowest_pipe
 from fvsolve.parts import Basin, Pipe
+from fvsolve.parts.formula import is_grid
 from fvsolve.schemes import SCHEMES
 from fvsolve.studies.outcome import study_model
 
@@ -184,7 +185,7 @@ def greatest_wave_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> flo
 def scheme_order(case) -> int:
     """Order of the scheme in smooth flow, the least of all parts with cells."""
     scheme = SCHEMES[case.numerics.scheme]
-    of_basins = [scheme.for_basin(bool(basin.cells) and not basin.holes) for basin in basins(case).values()]
+    of_basins = [scheme.for_basin(is_grid(mesh)) for mesh in case.meshes.values()]
     return min(entry.order for entry in (scheme, *of_basins))
 
 

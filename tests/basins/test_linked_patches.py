@@ -117,7 +117,9 @@ def on_mesh(case: dict, side: str, folder) -> dict:
 
 @pytest.mark.parametrize("ground, head", [("0", 2.5), ("0", 1.0), ("0.05*x + 0.1*sin(3*x)", 2.2)])
 def test_volume_passes_from_lake_to_basin_and_no_depth_is_negative(ground, head):
-    case = channel({"time": [0, 2, 4, 6], "value": [head, head, 1.5, 2.0]}, 3.0, 8.0, bed=ground, side="west", level=1.8)
+    case = channel(
+        {"time": [0, 2, 4, 6], "value": [head, head, 1.5, 2.0]}, 3.0, 8.0, bed=ground, side="west", level=1.8
+    )
     found = fvsolve.run(case)
     assert found.ok and abs(found.ledger["mass"]["relative"]) < 1e-12
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from fvsolve.errors import listing
 from fvsolve.parts.basin import VELOCITY_FIELDS, Physics, VelocityStart
-from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.formula import NumberOrField, SpatialField, SpatialFieldKey, samples
+from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import Nested, Table
 from fvsolve.parts.value import SHAPE, VALUE, Choice, Quantity, UsualRange, anything, between, nonnegative

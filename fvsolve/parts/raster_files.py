@@ -1,0 +1,259 @@
+"""Files of pixels on a regular grid: ESRI ASCII grid, NetCDF and GeoTIFF."""
+
+import re
+import warnings
+from collections.abc import Callable
+from functools import lru_cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fvsolve import units
+from fvsolve.errors import did_you_mean, listing
+from fvsolve.parts.csv_rows import read_text
+from fvsolve.units import show
+
+MOST_CELLS = 1e8  # of a grid
+SMALL = 0.01  # [m] or degrees: pixels of rasters in degrees are smaller
+HEAD = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "dx", "dy", "nodata_value")
+EVEN = 1e-4  # of the spacing: greatest distance of a coordinate from an even grid
+AUTHORITY = re.compile(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d+)"?\]')  # in the text of a CRS; the last is its own
+REFERENCE = "expected a raster with coordinates in metres, for example written by GDAL or QGIS"
+
+
+class Pixels(NamedTuple):
+    """Values of pixels on a regular grid in the coordinates of its file.
+
+    values : float64[ny, nx]  rows from south to north, NaN without data
+    x, y : south-west corner [m]; dx, dy : size of a pixel [m]; unit, crs : as stated, "" if unknown
+    """
+
+    values: np.ndarray
+    x: float
+    y: float
+    dx: float
+    dy: float
+    unit: str = ""
+    crs: str = ""
+
+    @property
+    def hint(self) -> str:
+        """Remark on pixels whose numbers look like degrees; "" for others."""
+        far = max(abs(self.x), abs(self.y)) <= 180.0 and self.dx < SMALL
+        return "; are its coordinates in degrees?" if far else ""
+
+    def to_basin(self, name: str, origin: tuple[float, float] | None, crs: str | None) -> "Pixels":
+        """Pixels in the coordinates of a basin. Raises ValueError if the file `name` states another CRS.
+
+        origin : easting and northing of the basin [m]; crs : CRS of the basin, if it is stated
+        """
+        if crs and self.crs and self.crs != crs:
+            text = f"{name} has the CRS {self.crs}, and the basin {crs}"
+            raise ValueError(f"{text}; expected a raster in {crs}, for example by gdalwarp -t_srs {crs}")
+        east, north = origin or (0.0, 0.0)
+        return self._replace(x=self.x - east, y=self.y - north)
+
+
+def import_library(name: str, what: str) -> Any:
+    """Import a module of the extra `gis`. Raises ValueError with the command to install it if it is missing.
+
+    what : subject of the message
+    """
+    try:
+        return import_module(name)
+    except ImportError:
+        raise ValueError(f'{what} needs {name.partition(".")[0]}: pip install "fvsolve[gis]"') from None
+
+
+def read_pixels(path: Path, band: int = 1, variable: str = "") -> Pixels:
+    """Pixels of a file, whose format follows from its first bytes. The last two files are kept.
+
+    band : number of the band of a GeoTIFF; variable : name in a NetCDF file, "" for the only one
+    Raises ValueError if the file is not a raster with metric coordinates and data.
+    """
+    try:
+        stat = path.stat()
+        return _read(path, stat.st_mtime_ns, stat.st_size, band, variable)
+    except OSError as error:
+        raise ValueError(f"{path.name}: {error.strerror or error}") from None
+
+
+@lru_cache(maxsize=2)
+def _read(path: Path, changed: int, size: int, band: int, variable: str) -> Pixels:
+    """Pixels of a file; changed, size : of the file, which differ for an edited file"""
+    with open(path, "rb") as file:
+        head = file.read(4)
+    if head[:3] == b"CDF" or head == b"\x89HDF":
+        result = read_netcdf(path, variable, head[:3] == b"CDF")
+    elif head[:2] in (b"II", b"MM"):
+        result = read_geotiff(path, band)
+    else:
+        result = read_ascii_grid(path)
+    result.values[~np.isfinite(result.values)] = np.nan
+    if np.isnan(result.values).all():
+        raise ValueError(f"{path.name} has no data in any pixel; expected a raster with data")
+    result.values.flags.writeable = False
+    return result
+
+
+def check_count(name: str, nx: float, ny: float) -> None:
+    """Raise ValueError for a grid of too many cells; name : subject of the message"""
+    if nx * ny > MOST_CELLS:
+        text = f"{name} has {nx:.0f} x {ny:.0f} cells, more than {MOST_CELLS:.0e}"
+        raise ValueError(f"{text}; expected larger cells, or a part of it")
+
+
+def epsg_code(text: str) -> str:
+    """Code such as "EPSG:32633" of the text of a CRS (WKT or code), "" if none. Raises ValueError for degrees."""
+    if text.lstrip().startswith(("GEOGCS", "GEOGCRS")):
+        raise ValueError(f"is in degrees; {REFERENCE}")
+    if text.startswith("EPSG:"):
+        return text
+    codes = AUTHORITY.findall(text)
+    return f"EPSG:{codes[-1]}" if codes else ""
+
+
+def read_ascii_grid(path: Path) -> Pixels:
+    """Pixels of an ESRI ASCII grid; a file .prj beside it may state its CRS."""
+    text, keys, at = read_text(path), {}, 0
+    for match in re.finditer(r"[ \t]*([A-Za-z_]+)[ \t]+(\S+)[ \t]*\r?\n", text):
+        if match.start() != at or match[1].lower() not in HEAD:
+            break
+        keys[match[1].lower()], at = match[2], match.end()
+    if "ncols" not in keys:
+        raise ValueError(f"{path.name} is neither a GeoTIFF, NetCDF nor ESRI ASCII grid; {REFERENCE}")
+    for key in ("ncols", "nrows", "cellsize" if "dx" not in keys else "dy"):
+        if key not in keys:
+            raise ValueError(f"{path.name} has no line `{key}`; expected an ESRI ASCII grid with this line")
+    corner = [next((key for key in (f"{axis}llcorner", f"{axis}llcenter") if key in keys), "") for axis in "xy"]
+    if "" in corner:
+        raise ValueError(f"{path.name} has no georeference: no lines `xllcorner` and `yllcorner`; {REFERENCE}")
+    sizes = [keys.get(key, keys.get("cellsize")) for key in ("dx", "dy")]
+    try:
+        nx, ny = int(keys["ncols"]), int(keys["nrows"])
+        (x, y), (dx, dy) = (float(keys[key]) for key in corner), map(float, sizes)
+        missing = float(keys.get("nodata_value", "-9999"))
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {error}; expected numbers in its first lines") from None
+    check_count(path.name, nx, ny)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # texts that are not numbers: reported by their count
+        values = np.fromstring(text[at:], sep=" ")
+    if min(nx, ny) < 1 or min(dx, dy) <= 0.0 or values.size != nx * ny:
+        text = f"{path.name} has {values.size} numbers up to its end or its first text that is not a number"
+        raise ValueError(f"{text}; expected {nx} x {ny}")
+    values[values == missing] = np.nan
+    x, y = (low - 0.5 * wide * key.endswith("center") for low, wide, key in zip((x, y), (dx, dy), corner, strict=True))
+    projection = path.with_suffix(".prj")
+    try:
+        crs = epsg_code(read_text(projection)) if projection.is_file() else ""
+    except ValueError as error:
+        raise ValueError(f"{path.name} {error}") from None
+    return Pixels(values.reshape(ny, nx)[::-1].copy(), x, y, dx, dy, crs=crs)
+
+
+def read_geotiff(path: Path, band: int) -> Pixels:
+    """Pixels of a band of a GeoTIFF, through rasterio."""
+    rasterio = import_library("rasterio", f"{path.name} is a GeoTIFF, and a GeoTIFF")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
+            file = rasterio.open(path)
+    except rasterio.errors.RasterioError as error:
+        raise ValueError(f"{path.name} cannot be read: {error}") from None
+    with file:
+        to, crs = file.transform, file.crs
+        if to.is_identity:
+            raise ValueError(f"{path.name} has no georeference; {REFERENCE}")
+        if not (to.a > 0.0 > to.e and to.b == to.d == 0.0):
+            raise ValueError(f"{path.name} is turned or mirrored; expected rows along x, and north up")
+        if crs is not None and (crs.is_geographic or crs.linear_units_factor[1] != 1.0):
+            unit = "degrees" if crs.is_geographic else crs.linear_units
+            raise ValueError(f"{path.name} is in {unit}; {REFERENCE}")
+        if not 1 <= band <= file.count:
+            raise ValueError(f"{path.name} has {file.count} bands; expected `band` from 1 to {file.count}")
+        check_count(path.name, file.width, file.height)
+        data = file.read(band, masked=True).astype(float).filled(np.nan)
+        data = data * file.scales[band - 1] + file.offsets[band - 1]
+        code = crs.to_epsg() if crs is not None else None
+        return Pixels(data[::-1].copy(), to.c, to.f + file.height * to.e, to.a, -to.e, file.units[band - 1] or "",
+                      f"EPSG:{code}" if code else "")  # fmt: skip
+
+
+class NetcdfVariable(NamedTuple):
+    """Variable of a NetCDF file: names of its dimensions, shape, attributes, and function that reads its values."""
+
+    dimensions: tuple[str, ...]
+    shape: tuple[int, ...]
+    attributes: dict[str, Any]
+    read: Callable[[], np.ndarray]
+
+
+def read_netcdf(path: Path, name: str, classic: bool) -> Pixels:
+    """Pixels of a variable over x and y; classic : True for NetCDF-3, which needs no extra package"""
+    try:
+        if classic:
+            from scipy.io import netcdf_file
+
+            with netcdf_file(path, "r", mmap=False, maskandscale=True) as file:
+                known = {key: NetcdfVariable(item.dimensions, item.shape, _texts(item._attributes),
+                                       lambda item=item: np.ma.filled(np.ma.asarray(item[:], float), np.nan))
+                         for key, item in file.variables.items()}  # fmt: skip
+                return _pixels_of(path.name, known, name)
+        import_library("h5netcdf", f"{path.name} is a NetCDF-4 file, and NetCDF-4")
+        xarray = import_library("xarray", f"{path.name} is a NetCDF-4 file, and NetCDF-4")
+        with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
+            known = {str(key): NetcdfVariable(item.dims, item.shape, dict(item.attrs),
+                                        lambda item=item: np.asarray(item.values, float))
+                     for key, item in file.variables.items()}  # fmt: skip
+            return _pixels_of(path.name, known, name)
+    except (OSError, TypeError, KeyError, IndexError) as error:
+        raise ValueError(f"{path.name} cannot be read as NetCDF: {error}") from None
+
+
+def _texts(attributes: dict[str, Any]) -> dict[str, Any]:
+    """Attributes of a variable with texts in place of bytes."""
+    return {key: item.decode(errors="replace") if isinstance(item, bytes) else item for key, item in attributes.items()}
+
+
+def _pixels_of(file: str, known: dict[str, NetcdfVariable], name: str) -> Pixels:
+    """Pixels of the variable `name` of a NetCDF file, "" for the only one; known : its variables by name"""
+    planes = [key for key, item in known.items() if len(item.dimensions) > 1]
+    if name not in known and (name or len(planes) != 1):
+        text = f"has no variable {show(name)}{did_you_mean(name, planes)}" if name else f"has {len(planes)} variables"
+        raise ValueError(f"{file} {text}; expected `variable`, of {listing(planes) or 'a file with a plane of values'}")
+    item = known[name or planes[0]]
+    turned = len(item.dimensions) > 1 and item.dimensions[-1] == "y"
+    across, along = item.dimensions[-2:] if not turned else item.dimensions[:-3:-1]
+    if not {across, along} <= known.keys():
+        raise ValueError(f"{file} has no georeference: no variables {across} and {along} with coordinates; {REFERENCE}")
+    check_count(file, *item.shape[-2:])
+    (x, dx), (y, dy) = (_even(file, key, known[key]) for key in (along, across))
+    if np.prod(item.shape[:-2]) != 1:
+        raise ValueError(f"{file}: {name or planes[0]} has {np.prod(item.shape[:-2]):.0f} planes; expected one")
+    values = item.read().reshape(item.shape[-2:])
+    values = (values.T if turned else values)[:: -1 if dy < 0.0 else 1, :: -1 if dx < 0.0 else 1].copy()
+    holder = known.get(str(item.attributes.get("grid_mapping", "")))
+    text = "" if holder is None else str(holder.attributes.get("crs_wkt") or holder.attributes.get("spatial_ref", ""))
+    try:
+        crs = epsg_code(text)
+    except ValueError as error:
+        raise ValueError(f"{file} {error}") from None
+    return Pixels(values, x, y, abs(dx), abs(dy), str(item.attributes.get("units", "")), crs)
+
+
+def _even(file: str, name: str, item: NetcdfVariable) -> tuple[float, float]:
+    """(lower edge, signed spacing) [m] of the pixels along a coordinate, whose values are their centres."""
+    unit, at = str(item.attributes.get("units", "m")), item.read()
+    if unit.startswith("degree"):
+        raise ValueError(f"{file} is in degrees; {REFERENCE}")
+    try:
+        at = at if unit in ("m", "") else units.find(unit, "length").si(at)
+    except ValueError as error:
+        raise ValueError(f"{file}, {name}: {error}") from None
+    wide = (at[-1] - at[0]) / (at.size - 1) if at.size > 1 else 0.0
+    if not wide or np.abs(at - (at[0] + wide * np.arange(at.size))).max() > EVEN * abs(wide):
+        raise ValueError(f"{file}: {name} is not evenly spaced; expected two or more centres of equal pixels")
+    return float(min(at[0], at[-1]) - 0.5 * abs(wide)), float(wide)
