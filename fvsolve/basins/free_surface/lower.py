@@ -24,6 +24,7 @@ from fvsolve.basins.free_surface.bed_friction import RATE_CAP, add_friction
 from fvsolve.basins.free_surface.surface_patches import DEPTH, TOTALS
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
+from fvsolve.case.basins import patch_names
 from fvsolve.case.bodies import free_joints
 from fvsolve.case.sloshing import slowest
 from fvsolve.errors import Notice
@@ -449,7 +450,7 @@ class FreeSurfaceRows(BasinRows):
         if self.rains:
             return True
         joined = {place for link in self.case.links.values() for place in link.ports.values()}
-        return any(name in self.driven or f"{self.name}.{name}" in joined for name in self.part.patches)
+        return any(name in self.driven or f"{self.name}.{name}" in joined for name in patch_names(self.mesh))
 
     @property
     def rubs(self) -> bool:
