@@ -1,0 +1,137 @@
+"""Structures between two water levels (weirs, gates, culverts, manholes): Newton step, slopes and regime of their flow.
+
+The law of a structure is its function `rule`, from which these templates are made:
+(flow [m3/s], regime) = rule(floats, at, setting, ahead, z, fall), the flow from the higher to the lower level.
+floats[at:] : numbers of the structure; setting : its scheduled crest or opening [m]; ahead : True if its end `from` has
+the higher level; z : higher level above datum [m]; fall : difference of the levels, at least LINEAR_FALL [m]
+Below LINEAR_FALL the flow is proportional to the fall, so that its slope is bounded, and zero at equal levels.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.restrictions import head_drop
+from fvsolve.kernels.schedule_pieces import schedule_value
+
+LINEAR_FALL = 1e-3  # fall of the levels below which the flow is proportional to it [m]
+NONE, FREE, DROWNED = 0, 1, 2  # regimes
+CHANGE = 1e-6  # change of a level for its slope [m]
+NEAR = 1e-6  # relative difference of flows below which the tangent replaces the chord
+CHORD_ERROR = 1e-2  # error of the fall at the present flow, over the length of the chord
+SWEEPS = 40
+LEAST_SLOPE = 1e-9  # least slope of Newton's method, so that dry structures leave a level determined [m2/s]
+RULE = FLOW = SLOPES = LINE = None  # constants of the templates
+
+
+def flow_template(floats, at, setting, ahead, z, fall):
+    """(volume flow [m3/s], regime) of a structure; arguments as for a `rule`, with any fall of at least 0."""
+    if fall >= LINEAR_FALL:
+        return RULE(floats, at, setting, ahead, z, fall)
+    flow, regime = RULE(floats, at, setting, ahead, z, LINEAR_FALL)
+    flow *= fall / LINEAR_FALL
+    return flow, regime if flow > 0.0 else NONE
+
+
+def slopes_template(floats, at, setting, ahead, z, fall):
+    """Derivatives [m2/s] of the flow by the fall at a constant higher level, and by this level at a constant fall."""
+    low, high = max(fall - CHANGE, 0.0), fall + CHANGE
+    by_fall = FLOW(floats, at, setting, ahead, z, high)[0] - FLOW(floats, at, setting, ahead, z, low)[0]
+    by_level = FLOW(floats, at, setting, ahead, z + CHANGE, fall)[0]
+    by_level -= FLOW(floats, at, setting, ahead, z - CHANGE, fall)[0]
+    return by_fall / (high - low), by_level / (2.0 * CHANGE)
+
+
+def line_template(floats, at, setting, z, fall, present):
+    """(flow [m3/s], its slope over the fall, its slope over the level `z` [m2/s]) for the next step of Newton's method.
+
+    z, fall : level at the end `from`, and fall from there to the end `to`, of any sign [m]; present : flow before [m3/s]
+    The slope over the fall is that of the chord between the present flow and the flow at this fall: the flow of the
+    law is concave in the fall, so that tangents might alternate between both signs.
+    """
+    ahead, size, m = fall >= 0.0, abs(fall), present if fall >= 0.0 else -present
+    high = z if ahead else z - fall
+    flow = FLOW(floats, at, setting, ahead, high, size)[0]
+    by_fall, by_level = SLOPES(floats, at, setting, ahead, high, size)
+    if abs(flow - m) > NEAR * (abs(flow) + abs(m)):
+        own = 0.0  # fall at the present flow
+        if m != 0.0:
+            side, low, top = 1.0 if m > 0.0 else -1.0, 0.0, max(size, LINEAR_FALL)
+            while top < 1e6 and FLOW(floats, at, setting, ahead, high, top)[0] < abs(m):
+                low, top = top, 2.0 * top
+            for _ in range(SWEEPS):
+                own = 0.5 * (low + top)
+                found = FLOW(floats, at, setting, ahead, high, own)[0]
+                if abs(found - abs(m)) <= CHORD_ERROR * abs(flow - m):
+                    break
+                low, top = (own, top) if found < abs(m) else (low, own)
+            own *= side
+        by_fall = (flow - m) / (size - own) if size != own else by_fall
+    by_fall, by_level = max(by_fall, LEAST_SLOPE), max(by_level, 0.0)
+    if ahead:
+        return flow, by_fall, by_level
+    return -flow, by_fall + by_level, -by_level
+
+
+@njit
+def level_at(tables, out, i):
+    """Level of the water at node i above datum [m], without velocity head."""
+    st, node = tables.settings[0], tables.nodes[i]
+    pressure = node["pressure"] + out[tables.layout[0]["pressure"] + i]
+    return (pressure - st["ambient"]) / (st["rho"] * st["gravity"]) + node["elevation"]
+
+
+@njit
+def higher_level(tables, out, k, drop):
+    """(True if the end `from` has the higher level, this level [m], fall to the other [m]) of structure k.
+
+    drop : drop of potential [Pa]
+    """
+    ahead, valve, weight = drop >= 0.0, tables.valves[k], tables.settings[0]["rho"] * tables.settings[0]["gravity"]
+    return ahead, level_at(tables, out, valve["from_node"] if ahead else valve["to_node"]), abs(drop) / weight
+
+
+@njit
+def setting_of(tables, out, k):
+    """Present crest or opening of structure k [m]."""
+    return out[tables.layout[0]["drive"] + k]
+
+
+@njit
+def set_structure(t, y, out, tables, device):
+    """Write the scheduled crest or opening of a structure [m], and its conductance, to `out`."""
+    k, layout = device["valve"], tables.layout[0]
+    out[layout["conductance"] + k] = tables.valves[k]["conductance"]
+    if device["schedule"] >= 0:
+        out[layout["drive"] + k] = schedule_value(tables, device["schedule"], t)
+
+
+def step_template(out, tables, k, g, m, drop, denser, wide):
+    """(a [kg/s], s [kg/s/Pa]) of the next Newton step dM = a + s d(drop); arguments as for `restriction_step`."""
+    st, at, rho = tables.settings[0], tables.valves[k]["data"], tables.settings[0]["rho"] * denser
+    z, fall = level_at(tables, out, tables.valves[k]["from_node"]), drop / (st["rho"] * st["gravity"])
+    flow, by_fall, _ = LINE(tables.floats, at, setting_of(tables, out, k), z, fall, m / rho)
+    return rho * flow - m, denser * by_fall / st["gravity"]
+
+
+def lift_template(out, tables, k, g, drop, denser, wide):
+    """Derivative [kg/s/Pa] of the mass flow of structure k by the pressure at `from`, at constant drop.
+
+    Arguments as for `restriction_step`.
+    """
+    ahead, z, fall = higher_level(tables, out, k, drop)
+    by_level = SLOPES(tables.floats, tables.valves[k]["data"], setting_of(tables, out, k), ahead, z, fall)[1]
+    by_level = denser * max(by_level, 0.0) / tables.settings[0]["gravity"]
+    return by_level if ahead else -by_level
+
+
+def slope_template(out, tables, k, g, drop):
+    """Greatest derivative [kg/s/Pa] of the mass flow of structure k by a pressure at its ends; drop : [Pa]"""
+    ahead, z, fall = higher_level(tables, out, k, drop)
+    slopes = SLOPES(tables.floats, tables.valves[k]["data"], setting_of(tables, out, k), ahead, z, fall)
+    return (max(slopes[0], 0.0) + max(slopes[1], 0.0)) / tables.settings[0]["gravity"]
+
+
+def regime_template(t, y, out, tables, device, quantity):
+    """Regime of a structure: NONE without flow, FREE if the lower level does not change its flow, else DROWNED."""
+    k = device["valve"]
+    ahead, z, fall = higher_level(tables, out, k, head_drop(tables, out, k)[1])
+    found = FLOW(tables.floats, tables.valves[k]["data"], setting_of(tables, out, k), ahead, z, fall)
+    return float(found[1])
