@@ -4,10 +4,12 @@ The law of a structure is its function `rule`, from which these templates are ma
 (flow [m3/s], regime) = rule(floats, at, setting, ahead, z, fall), the flow from the higher to the lower level.
 floats[at:] : numbers of the structure; setting : its scheduled crest or opening [m]; ahead : True if its end `from` has
 the higher level; z : higher level above datum [m]; fall : difference of the levels, at least LINEAR_FALL [m]
+Each copy of a template needs a name of its own, because stored code is found by the file of the template and the name.
 Below LINEAR_FALL the flow is proportional to the fall, so that its slope is bounded, and zero at equal levels.
 """
 
 from fvsolve.jit import njit
+from fvsolve.kernels.isolated_nodes import inner_row
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedule_pieces import schedule_value
 
@@ -42,7 +44,8 @@ def slopes_template(floats, at, setting, ahead, z, fall):
 def line_template(floats, at, setting, z, fall, present):
     """(flow [m3/s], its slope over the fall, its slope over the level `z` [m2/s]) for the next step of Newton's method.
 
-    z, fall : level at the end `from`, and fall from there to the end `to`, of any sign [m]; present : flow before [m3/s]
+    z, fall : level at the end `from`, and fall from there to the end `to`, of any sign [m]
+    present : flow before the step [m3/s]
     The slope over the fall is that of the chord between the present flow and the flow at this fall: the flow of the
     law is concave in the fall, so that tangents might alternate between both signs.
     """
@@ -89,6 +92,13 @@ def higher_level(tables, out, k, drop):
 
 
 @njit
+def ends_at_junction(tables, k):
+    """True if a level at an end of structure k follows from flows."""
+    nodes, valve = tables.nodes, tables.valves[k]
+    return inner_row(nodes, valve["from_node"]) >= 0 or inner_row(nodes, valve["to_node"]) >= 0
+
+
+@njit
 def setting_of(tables, out, k):
     """Present crest or opening of structure k [m]."""
     return out[tables.layout[0]["drive"] + k]
@@ -105,9 +115,14 @@ def set_structure(t, y, out, tables, device):
 
 def step_template(out, tables, k, g, m, drop, denser, wide):
     """(a [kg/s], s [kg/s/Pa]) of the next Newton step dM = a + s d(drop); arguments as for `restriction_step`."""
-    st, at, rho = tables.settings[0], tables.valves[k]["data"], tables.settings[0]["rho"] * denser
+    st, floats, at, setting = tables.settings[0], tables.floats, tables.valves[k]["data"], setting_of(tables, out, k)
+    rho = st["rho"] * denser
+    if not ends_at_junction(tables, k):
+        ahead, z, fall = higher_level(tables, out, k, drop)
+        flow = rho * FLOW(floats, at, setting, ahead, z, fall)[0]
+        return (flow if ahead else -flow) - m, 0.0
     z, fall = level_at(tables, out, tables.valves[k]["from_node"]), drop / (st["rho"] * st["gravity"])
-    flow, by_fall, _ = LINE(tables.floats, at, setting_of(tables, out, k), z, fall, m / rho)
+    flow, by_fall, _ = LINE(floats, at, setting, z, fall, m / rho)
     return rho * flow - m, denser * by_fall / st["gravity"]
 
 
@@ -116,6 +131,8 @@ def lift_template(out, tables, k, g, drop, denser, wide):
 
     Arguments as for `restriction_step`.
     """
+    if not ends_at_junction(tables, k):
+        return 0.0
     ahead, z, fall = higher_level(tables, out, k, drop)
     by_level = SLOPES(tables.floats, tables.valves[k]["data"], setting_of(tables, out, k), ahead, z, fall)[1]
     by_level = denser * max(by_level, 0.0) / tables.settings[0]["gravity"]

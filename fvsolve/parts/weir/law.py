@@ -10,7 +10,6 @@ from math import exp, expm1, log, log1p, sqrt
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels import structures
 from fvsolve.kernels.structures import DROWNED, FREE, NONE
-from fvsolve.kernels.structures import set_structure as set
 
 SIZE = 0  # index of its number
 
@@ -35,10 +34,13 @@ def rule(floats, at, setting, ahead, z, fall):
     return weir_flow(floats[at + SIZE], z - setting, fall)
 
 
-flow = specialise(structures.flow_template, "flow", RULE=rule, __name__=__name__)
-slopes = specialise(structures.slopes_template, "slopes", FLOW=flow, __name__=__name__)
-line = specialise(structures.line_template, "line", FLOW=flow, SLOPES=slopes, __name__=__name__)
-step = specialise(structures.step_template, "step", LINE=line, __name__=__name__)
-lift = specialise(structures.lift_template, "lift", SLOPES=slopes, __name__=__name__)
-slope = specialise(structures.slope_template, "slope", SLOPES=slopes, __name__=__name__)
-value = specialise(structures.regime_template, "value", FLOW=flow, __name__=__name__)
+set = structures.set_structure
+flow = weir_law_flow = specialise(structures.flow_template, "weir_law_flow", RULE=rule, __name__=__name__)
+slopes = weir_law_slopes = specialise(structures.slopes_template, "weir_law_slopes", FLOW=flow, __name__=__name__)
+line = weir_law_line = specialise(
+    structures.line_template, "weir_law_line", FLOW=flow, SLOPES=slopes, __name__=__name__
+)
+step = weir_law_step = specialise(structures.step_template, "weir_law_step", FLOW=flow, LINE=line, __name__=__name__)
+lift = weir_law_lift = specialise(structures.lift_template, "weir_law_lift", SLOPES=slopes, __name__=__name__)
+slope = weir_law_slope = specialise(structures.slope_template, "weir_law_slope", SLOPES=slopes, __name__=__name__)
+value = weir_law_value = specialise(structures.regime_template, "weir_law_value", FLOW=flow, __name__=__name__)
