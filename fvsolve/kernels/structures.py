@@ -9,6 +9,8 @@ Below LINEAR_FALL the flow is proportional to the fall, so that its slope is bou
 """
 
 from fvsolve.jit import njit
+from fvsolve.kernels.density import enthalpy
+from fvsolve.kernels.dtypes import LAW_LINEAR
 from fvsolve.kernels.isolated_nodes import inner_row
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedule_pieces import schedule_value
@@ -20,7 +22,8 @@ NEAR = 1e-6  # relative difference of flows below which the tangent replaces the
 CHORD_ERROR = 1e-2  # error of the fall at the present flow, over the length of the chord
 SWEEPS = 40
 LEAST_SLOPE = 1e-9  # least slope of Newton's method, so that dry structures leave a level determined [m2/s]
-RULE = FLOW = SLOPES = LINE = None  # constants of the templates
+FARTHEST = 1e6  # greatest fall of the search for a flow [m]
+RULE = FLOW = SLOPES = CHORD = LINE = None  # constants of the templates
 
 
 def flow_template(floats, at, setting, ahead, z, fall):
@@ -41,33 +44,51 @@ def slopes_template(floats, at, setting, ahead, z, fall):
     return by_fall / (high - low), by_level / (2.0 * CHANGE)
 
 
+def chord_template(floats, at, setting, ahead, z, fall, flow, present, by_level):
+    """Slope [m2/s] of the chord between the flow at a level and a fall and the present flow, over one of both.
+
+    by_level : True for the chord over the level at a constant fall, False for that over the fall at a constant level
+    The slope is 0 if the present flow is greater than any flow of the law.
+    """
+    wanted = max(present, 0.0) if by_level else abs(present)
+    begin, reach, x = z if by_level else fall, max(fall, LINEAR_FALL), 0.0
+    low, high, found = begin if by_level else 0.0, begin, flow
+    while by_level and found > wanted and reach < FARTHEST:
+        low, reach = low - reach, 2.0 * reach
+        found = FLOW(floats, at, setting, ahead, low, fall)[0]
+    found = flow
+    while found < wanted and reach < FARTHEST:
+        low, high, reach = high, high + reach, 2.0 * reach
+        found = FLOW(floats, at, setting, ahead, high if by_level else z, fall if by_level else high)[0]
+    if found < wanted:
+        return 0.0
+    for _ in range(SWEEPS):
+        x = 0.5 * (low + high)
+        found = FLOW(floats, at, setting, ahead, x if by_level else z, fall if by_level else x)[0]
+        if abs(found - wanted) <= CHORD_ERROR * abs(flow - present):
+            break
+        low, high = (x, high) if found < wanted else (low, x)
+    own = -x if present < 0.0 and not by_level else x
+    return (flow - present) / (begin - own) if own != begin else 0.0
+
+
 def line_template(floats, at, setting, z, fall, present):
     """(flow [m3/s], its slope over the fall, its slope over the level `z` [m2/s]) for the next step of Newton's method.
 
     z, fall : level at the end `from`, and fall from there to the end `to`, of any sign [m]
     present : flow before the step [m3/s]
-    The slope over the fall is that of the chord between the present flow and the flow at this fall: the flow of the
-    law is concave in the fall, so that tangents might alternate between both signs.
+    Laws are concave in the fall and partly in the level, so that tangents might alternate. Therefore the slope over the
+    fall is that of the chord, plus the excess of the chord over the level above the tangent.
     """
     ahead, size, m = fall >= 0.0, abs(fall), present if fall >= 0.0 else -present
     high = z if ahead else z - fall
     flow = FLOW(floats, at, setting, ahead, high, size)[0]
     by_fall, by_level = SLOPES(floats, at, setting, ahead, high, size)
+    by_level = max(by_level, 0.0)
     if abs(flow - m) > NEAR * (abs(flow) + abs(m)):
-        own = 0.0  # fall at the present flow
-        if m != 0.0:
-            side, low, top = 1.0 if m > 0.0 else -1.0, 0.0, max(size, LINEAR_FALL)
-            while top < 1e6 and FLOW(floats, at, setting, ahead, high, top)[0] < abs(m):
-                low, top = top, 2.0 * top
-            for _ in range(SWEEPS):
-                own = 0.5 * (low + top)
-                found = FLOW(floats, at, setting, ahead, high, own)[0]
-                if abs(found - abs(m)) <= CHORD_ERROR * abs(flow - m):
-                    break
-                low, top = (own, top) if found < abs(m) else (low, own)
-            own *= side
-        by_fall = (flow - m) / (size - own) if size != own else by_fall
-    by_fall, by_level = max(by_fall, LEAST_SLOPE), max(by_level, 0.0)
+        by_fall = CHORD(floats, at, setting, ahead, high, size, flow, m, False)
+        by_fall += max(CHORD(floats, at, setting, ahead, high, size, flow, m, True) - by_level, 0.0)
+    by_fall = max(by_fall, LEAST_SLOPE)
     if ahead:
         return flow, by_fall, by_level
     return -flow, by_fall + by_level, -by_level
@@ -78,7 +99,23 @@ def level_at(tables, out, i):
     """Level of the water at node i above datum [m], without velocity head."""
     st, node = tables.settings[0], tables.nodes[i]
     pressure = node["pressure"] + out[tables.layout[0]["pressure"] + i]
-    return (pressure - st["ambient"]) / (st["rho"] * st["gravity"]) + node["elevation"]
+    if st["law"] == LAW_LINEAR:
+        return (pressure - st["ambient"]) / (st["rho"] * st["gravity"]) + node["elevation"]
+    above = enthalpy(st, tables.floats, pressure) - enthalpy(st, tables.floats, st["ambient"])
+    return above / st["gravity"] + node["elevation"]
+
+
+@njit
+def level_and_fall(tables, out, k, drop):
+    """(level at the end `from` of structure k, fall of the levels to its end `to`) [m]; drop : drop of potential [Pa]
+
+    Under the density law `linear` the fall is that of the drop, which is zero to the bit at rest.
+    """
+    st, valve = tables.settings[0], tables.valves[k]
+    z = level_at(tables, out, valve["from_node"])
+    if st["law"] == LAW_LINEAR:
+        return z, drop / (st["rho"] * st["gravity"])
+    return z, z - level_at(tables, out, valve["to_node"])
 
 
 @njit
@@ -87,8 +124,8 @@ def higher_level(tables, out, k, drop):
 
     drop : drop of potential [Pa]
     """
-    ahead, valve, weight = drop >= 0.0, tables.valves[k], tables.settings[0]["rho"] * tables.settings[0]["gravity"]
-    return ahead, level_at(tables, out, valve["from_node"] if ahead else valve["to_node"]), abs(drop) / weight
+    z, fall = level_and_fall(tables, out, k, drop)
+    return fall >= 0.0, z if fall >= 0.0 else level_at(tables, out, tables.valves[k]["to_node"]), abs(fall)
 
 
 @njit
@@ -121,7 +158,7 @@ def step_template(out, tables, k, g, m, drop, denser, wide):
         ahead, z, fall = higher_level(tables, out, k, drop)
         flow = rho * FLOW(floats, at, setting, ahead, z, fall)[0]
         return (flow if ahead else -flow) - m, 0.0
-    z, fall = level_at(tables, out, tables.valves[k]["from_node"]), drop / (st["rho"] * st["gravity"])
+    z, fall = level_and_fall(tables, out, k, drop)
     flow, by_fall, _ = LINE(floats, at, setting, z, fall, m / rho)
     return rho * flow - m, denser * by_fall / st["gravity"]
 

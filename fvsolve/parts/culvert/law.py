@@ -198,8 +198,9 @@ def rule(floats, at, setting, ahead, z, fall):
 set = structures.set_structure
 flow = culvert_law_flow = specialise(structures.flow_template, "culvert_law_flow", RULE=rule, __name__=__name__)
 slopes = culvert_law_slopes = specialise(structures.slopes_template, "culvert_law_slopes", FLOW=flow, __name__=__name__)
+chord = culvert_law_chord = specialise(structures.chord_template, "culvert_law_chord", FLOW=flow, __name__=__name__)
 line = culvert_law_line = specialise(
-    structures.line_template, "culvert_law_line", FLOW=flow, SLOPES=slopes, __name__=__name__
+    structures.line_template, "culvert_law_line", FLOW=flow, SLOPES=slopes, CHORD=chord, __name__=__name__
 )
 step = culvert_law_step = specialise(
     structures.step_template, "culvert_law_step", FLOW=flow, LINE=line, __name__=__name__

@@ -31,8 +31,9 @@ def rule(floats, at, setting, ahead, z, fall):
 set = structures.set_structure
 flow = manhole_law_flow = specialise(structures.flow_template, "manhole_law_flow", RULE=rule, __name__=__name__)
 slopes = manhole_law_slopes = specialise(structures.slopes_template, "manhole_law_slopes", FLOW=flow, __name__=__name__)
+chord = manhole_law_chord = specialise(structures.chord_template, "manhole_law_chord", FLOW=flow, __name__=__name__)
 line = manhole_law_line = specialise(
-    structures.line_template, "manhole_law_line", FLOW=flow, SLOPES=slopes, __name__=__name__
+    structures.line_template, "manhole_law_line", FLOW=flow, SLOPES=slopes, CHORD=chord, __name__=__name__
 )
 step = manhole_law_step = specialise(
     structures.step_template, "manhole_law_step", FLOW=flow, LINE=line, __name__=__name__

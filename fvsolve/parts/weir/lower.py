@@ -49,11 +49,13 @@ class StructureRows(Device, kind=""):
 
         The slopes are those over the drop, and over the potential at a constant drop.
         """
-        row, rho, weight = start.valves[k], start.draft.fluid.density, start.weight
+        row, weight = start.valves[k], start.weight
+        rho = start.draft.fluid.density * start.density_ratios.get(k, (1.0, 1.0))[0]
+        ambient = start.law.potential_of(start.case.ambient_pressure, 0.0)
         floats, at, setting = start.draft.tables.floats, int(row["data"]), float(row["drive"])
 
         def linear(flow, drop, potential):
-            z = (potential - start.case.ambient_pressure) / weight
+            z = (potential - ambient) / weight
             q, *slopes = self.law.line(floats, at, setting, float(z), float(drop / weight), float(flow / rho))
             return rho * q, *(slope / start.case.gravity for slope in slopes)
 
