@@ -50,24 +50,24 @@ def chord_template(floats, at, setting, ahead, z, fall, flow, present, by_level)
     by_level : True for the chord over the level at a constant fall, False for that over the fall at a constant level
     The slope is 0 if the present flow is greater than any flow of the law.
     """
-    wanted = max(present, 0.0) if by_level else abs(present)
+    sought = max(present, 0.0) if by_level else abs(present)
     begin, reach, x = z if by_level else fall, max(fall, LINEAR_FALL), 0.0
     low, high, found = begin if by_level else 0.0, begin, flow
-    while by_level and found > wanted and reach < FARTHEST:
+    while by_level and found > sought and reach < FARTHEST:
         low, reach = low - reach, 2.0 * reach
         found = FLOW(floats, at, setting, ahead, low, fall)[0]
     found = flow
-    while found < wanted and reach < FARTHEST:
+    while found < sought and reach < FARTHEST:
         low, high, reach = high, high + reach, 2.0 * reach
         found = FLOW(floats, at, setting, ahead, high if by_level else z, fall if by_level else high)[0]
-    if found < wanted:
+    if found < sought:
         return 0.0
     for _ in range(SWEEPS):
         x = 0.5 * (low + high)
         found = FLOW(floats, at, setting, ahead, x if by_level else z, fall if by_level else x)[0]
-        if abs(found - wanted) <= CHORD_ERROR * abs(flow - present):
+        if abs(found - sought) <= CHORD_ERROR * abs(flow - present):
             break
-        low, high = (x, high) if found < wanted else (low, x)
+        low, high = (x, high) if found < sought else (low, x)
     own = -x if present < 0.0 and not by_level else x
     return (flow - present) / (begin - own) if own != begin else 0.0
 

@@ -21,6 +21,7 @@ from fvsolve.parts.culvert.part import Culvert, inlets
 from fvsolve.parts.manhole import law as manhole_law
 from fvsolve.parts.sluice_gate import law as gate_law
 from fvsolve.parts.weir import law as weir_law
+from fvsolve.studies.energy_balance import energy
 from fvsolve.studies.linearise import linearise
 
 G = reference.G
@@ -218,6 +219,15 @@ def test_a_structure_drawn_the_other_way_has_the_opposite_flow(name):
     one = fvsolve.run(ponds(link, levels, METHODS[1], end))
     other = fvsolve.run(ponds({**link, "from": "b", "to": "a"}, levels, METHODS[1], end))
     assert one["x.flow"] == approx(-other["x.flow"], abs=1e-9) and one["a.level"] == approx(other["a.level"], abs=1e-9)
+
+
+def test_the_energy_of_ponds_is_dissipated():
+    found = energy(ponds(SPILL, (2.0, 0.2), {"method": "dormand-prince", "rtol": 1e-9}, 120.0))
+    weight, (a, b) = 1000.0 * G, AREAS
+    end = (2.0 * a + 0.2 * b) / (a + b)
+    lost = 0.5 * weight * (a * 2.0**2 + b * 0.2**2 - (a + b) * end**2)
+    assert found.ok and found.relative < 1e-9
+    assert sum(found.dissipated[name][-1] for name in found.dissipated) == approx(lost, rel=1e-8)
 
 
 def test_units_of_keys():

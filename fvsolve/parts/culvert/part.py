@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 from fvsolve.data import read_table
 from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.value import Choice, Number, Quantity, Rows, UsualRange, Whole, between, nonnegative, positive
-from fvsolve.parts.weir.part import Structure
+from fvsolve.parts.weir.part import HydraulicStructure
 
 SIZES = UsualRange(0.1, 15.0, "drains of fields to bridges over streams")
 LENGTHS = UsualRange(0.5, 1000.0, "drives of farms to embankments")
@@ -57,7 +57,7 @@ class InletNames(Mapping):
         return len(inlets())
 
 
-class Culvert(Structure, kind="culvert"):
+class Culvert(HydraulicStructure, kind="culvert"):
     """Culvert, the lesser of inlet control and outlet control of HDS-5; see docs/structures.md.
 
     The barrels are circles, with `diameter`, or boxes, with `width` and `height`. Both ends have the same inlet. Where
@@ -65,7 +65,7 @@ class Culvert(Structure, kind="culvert"):
     none. Dissipated power: dp q [W].
     """
 
-    quantities: ClassVar[dict[str, str]] = {**Structure.quantities, "control": "number"}
+    quantities: ClassVar[dict[str, str]] = {**HydraulicStructure.quantities, "control": "number"}
     on_request: ClassVar[tuple[str, ...]] = ("regime", "control")
 
     diameter: Annotated[float | None, Quantity("length", positive, "diameter of a circular barrel [m]", SIZES)] = None

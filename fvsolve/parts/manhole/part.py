@@ -3,13 +3,13 @@
 from typing import Annotated
 
 from fvsolve.parts.value import Number, Quantity, UsualRange, anything, positive
-from fvsolve.parts.weir.part import Structure
+from fvsolve.parts.weir.part import HydraulicStructure
 
 AREAS, PERIMETERS = UsualRange(0.01, 4.0, "gullies to shafts"), UsualRange(0.3, 10.0, "gullies to shafts")
 COEFFICIENTS = UsualRange(0.05, 2.1, "Rubinato et al. 2018, Itzi")
 
 
-class Manhole(Structure, kind="manhole"):
+class Manhole(HydraulicStructure, kind="manhole"):
     """Lid through which water falls from a street (`from`) into a shaft (`to`), or rises from a full shaft.
 
     Down: the lesser of a weir, 2/3 Cw P sqrt(2 g) h^1.5, times (1 - r^1.5)^0.385 while the shaft is above the crest,

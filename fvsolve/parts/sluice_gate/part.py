@@ -6,10 +6,10 @@ from pydantic import Field
 
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.value import Choice, Number, Quantity, anything, between, nonnegative, positive
-from fvsolve.parts.weir.part import COEFFICIENTS, WIDTHS, Structure
+from fvsolve.parts.weir.part import COEFFICIENTS, WIDTHS, HydraulicStructure
 
 
-class SluiceGate(Structure, kind="sluice-gate"):
+class SluiceGate(HydraulicStructure, kind="sluice-gate"):
     """Gate above a sill, with energy up to its jet of depth y = Cc a, Cc the contraction, a the opening.
 
     Free: q = y h sqrt(2 g / (h + y)), per width, h the depth of the higher level above the sill. Drowned: energy to the

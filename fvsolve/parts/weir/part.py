@@ -13,14 +13,14 @@ WEIR_COEFFICIENTS = UsualRange(0.3, 0.85, "rough broad crests to rounded crests 
 COEFFICIENTS = {"sharp": 0.62, "broad": 0.577}  # kind of the crest -> coefficient
 
 
-class Structure(TwoPort):
+class HydraulicStructure(TwoPort):
     """Base of structures, whose flow follows the water levels at both ends: their heads, without velocity head."""
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "regime": "number"}
     on_request: ClassVar[tuple[str, ...]] = ("regime",)
 
 
-class Weir(Structure, kind="weir"):
+class Weir(HydraulicStructure, kind="weir"):
     """Weir, q = 2/3 C sqrt(2 g) b h^1.5, times (1 - r^1.5)^0.385 while the lower level is above the crest.
 
     h is the height of the higher level above the crest, r that of the lower level over h, b the width, C the
