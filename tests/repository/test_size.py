@@ -36,7 +36,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/mesh": (1077, 4),
     "fvsolve/model": (9251, 27),
     "fvsolve/output": (1683, 10),
-    "fvsolve/parts": (17880, 142),
+    "fvsolve/parts": (17893, 142),
     "fvsolve/report": (2041, 7),
     "fvsolve/run": (1691, 7),
     "fvsolve/solve": (2681, 11),

@@ -6,7 +6,18 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 from fvsolve.data import read_table
 from fvsolve.parts.table_model import CaseContext, Faults
-from fvsolve.parts.value import Choice, Number, Quantity, Rows, UsualRange, Whole, between, nonnegative, positive
+from fvsolve.parts.value import (
+    PROFILE,
+    Choice,
+    Number,
+    Quantity,
+    Rows,
+    UsualRange,
+    Whole,
+    between,
+    nonnegative,
+    positive,
+)
 from fvsolve.parts.weir.part import HydraulicStructure
 
 SIZES = UsualRange(0.1, 15.0, "drains of fields to bridges over streams")
@@ -76,12 +87,14 @@ class Culvert(HydraulicStructure, kind="culvert"):
         tuple[float, float], Rows("length", length=2, about="heights of the inverts at `from` and `to` above datum [m]")
     ]
     manning: Annotated[float, Number(positive, "Manning's n of the barrels [s/m^(1/3)]", ROUGHNESSES)]
-    inlet: Annotated[str, Choice("inlet", InletNames(), "[inlet](structures.md#inlets-of-culverts) by HDS-5")]
+    inlet: Annotated[
+        str, Choice("inlet", InletNames(), "[inlet](structures.md#inlets-of-culverts) by HDS-5", changes=PROFILE)
+    ]
     entrance_loss: Annotated[
         float | None, Number(nonnegative, "loss coefficient of the inlet; that of `inlet` if left out", LOSSES)
     ] = None
     exit_loss: Annotated[float, Number(nonnegative, "loss coefficient of the outlet", LOSSES)] = 1.0
-    barrels: Annotated[int, Whole(between(1, 1000), "number of equal barrels")] = 1
+    barrels: Annotated[int, Whole(between(1, 1000), "number of equal barrels", PROFILE)] = 1
     blockage: Annotated[float, Number(between(0, 1), "share of the flow that debris blocks, below 1")] = 0.0
 
     @classmethod

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled
-from fvsolve.parts.value import Choice, Number, Quantity, UsualRange, anything, positive
+from fvsolve.parts.value import PROFILE, Choice, Number, Quantity, UsualRange, anything, positive
 
 WIDTHS = UsualRange(0.05, 1000.0, "notches of flumes to spillways of dams")
 WEIR_COEFFICIENTS = UsualRange(0.3, 0.85, "rough broad crests to rounded crests of spillways")
@@ -36,8 +36,8 @@ class Weir(HydraulicStructure, kind="weir"):
         float | None, Number(positive, "coefficient C; that of `kind` if left out", WEIR_COEFFICIENTS)
     ] = None
     crest_kind: Annotated[
-        str, Choice("kind of crest", tuple(COEFFICIENTS), "kind of the crest, C = 0.62 sharp, 0.577 broad"),
-        Field(alias="kind"),
+        str, Choice("kind of crest", tuple(COEFFICIENTS), "kind of the crest, C = 0.62 sharp, 0.577 broad",
+                    changes=PROFILE), Field(alias="kind"),
     ] = "sharp"  # fmt: skip
 
     @property
