@@ -100,6 +100,29 @@ def test_full_culverts_have_the_printed_loss():
     assert halved(5.2, 5.0) == approx(1.5 * full(5.2, 5.0), rel=1e-12)
 
 
+def test_outlets_of_culverts_control_long_barrels():
+    """Levels for a given flow by critical depth at the outlet and the losses of a full, or of a partly full barrel."""
+    law, diameter, factor = culvert_of(length=100.0, manning=0.024), 1.2, 19.63 * 0.024**2 * 100.0
+
+    def loss(flow, depth):
+        area, _, perimeter = reference.circle(diameter, depth)
+        return (1.5 + factor * (perimeter / area) ** (4.0 / 3.0)) * (flow / area) ** 2 / (2.0 * G)
+
+    def missing(level, flow, critical):
+        return level - critical - loss(flow, 0.5 * (level + critical))
+
+    for flow in (1.5, 3.0):
+        critical = reference.critical_depth(diameter, flow)
+        full = 0.5 * (critical + diameter) + loss(flow, diameter)
+        assert full > diameter and law(full, -1.0) == law(full, 0.4) == approx(flow, rel=1e-9)
+    for flow in (0.1, 0.4):
+        critical = reference.critical_depth(diameter, flow)
+        partly = brentq(missing, critical, diameter, args=(flow, critical), xtol=1e-14)
+        assert partly < 0.75 * diameter and law(partly, -1.0) == approx(flow, rel=1e-9)
+        tail = 0.5 * (critical + partly)
+        assert law(partly, tail) == approx(((partly - tail) / loss(1.0, 0.5 * (partly + tail))) ** 0.5, rel=1e-9)
+
+
 def test_manholes_fall_as_weirs_and_orifices_and_rise_as_orifices():
     law = reference.manhole(0.2, 0.28, 1.9)
     for levels in ((0.25, -1.0), (0.6, -1.0), (0.6, 0.5), (0.25, 0.24), (0.2, 0.7), (0.3, 0.7), (0.1, 0.19)):

@@ -58,7 +58,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/mesh": (411, 1),
     "tests/model": (3017, 10),
     "tests/output": (518, 2),
-    "tests/parts": (17552, 47),
+    "tests/parts": (17575, 47),
     "tests/reference": (3438, 33),
     "tests/report": (851, 4),
     "tests/repository": (3166, 18),
