@@ -343,6 +343,16 @@ def test_inputs_of_a_linear_model():
     assert found.d[0, 0] == approx((flows[0] - flows[1]) / (2.0 * change), rel=1e-4)
 
 
+@pytest.mark.parametrize("link", [SPILL, SLUICE, UNDER, LID], ids=lambda link: link["type"])
+def test_a_structure_that_water_never_reaches_gives_one_notice(link):
+    def notices(level: float) -> list[str]:
+        nodes = {"a": lake({"time": [0.0, 1.0], "value": [-1.0, level]}), "b": lake(-1.0)}
+        model = fvsolve.build(fvsolve.load(scene(nodes, {"x": {**link, **ENDS}}, 1.0, METHODS[0])))
+        return [notice.text for notice in model.warnings if "never reach" in notice.text]
+
+    assert len(notices(-0.1)) == 1 and notices(3.0) == []
+
+
 def fault(**keys) -> str:
     return str(refused(ponds(keys, (2.0, 1.0), METHODS[1], 1.0)))
 

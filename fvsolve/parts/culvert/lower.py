@@ -16,7 +16,10 @@ class CulvertRows(StructureRows, kind="culvert"):
     """Conversion to table rows of culverts."""
 
     law = law
-    quantities = ("regime", "control")
+    quantities, bottom_key = ("regime", "control"), "inverts"
+
+    def bottoms(self, part) -> tuple[float, float]:
+        return part.inverts
 
     def size(self, draft, part) -> float:
         return part.barrels * barrel_area(part) * math.sqrt(2.0 * draft.case.gravity)

@@ -12,6 +12,9 @@ class ManholeRows(StructureRows, kind="manhole"):
 
     law = law
 
+    def bottoms(self, part) -> tuple[float, float]:
+        return part.crest, part.crest
+
     def size(self, draft, part) -> float:
         return part.orifice_coefficient * part.area * math.sqrt(2.0 * draft.case.gravity)
 

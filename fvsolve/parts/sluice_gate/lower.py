@@ -10,7 +10,10 @@ from . import law
 class SluiceGateRows(StructureRows, kind="sluice-gate"):
     """Conversion to table rows of sluice gates."""
 
-    law, setting, setting_input = law, "opening", GATE_OPENING
+    law, setting, setting_input, bottom_key = law, "opening", GATE_OPENING, "sill"
+
+    def bottoms(self, part) -> tuple[float, float]:
+        return part.sill, part.sill
 
     def size(self, draft, part) -> float:
         return weir_size(draft, part.width, COEFFICIENTS[part.weir_kind])

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 
 from fvsolve.assembly.lowering import CREST, TYPICAL_DROP, Device, Input
+from fvsolve.errors import Notice
 from fvsolve.kernels.structures import LINEAR_FALL
 from fvsolve.steady import Edge
 
@@ -16,10 +17,11 @@ class StructureRows(Device, kind=""):
     """Base of the conversion to table rows of structures between two water levels.
 
     setting : key of the scheduled crest or opening, "" for none; setting_input : its kind of input
+    bottom_key : key of the levels at which water enters, see `bottoms`
     """
 
     quantities = ("regime",)
-    setting, setting_input = "", CREST
+    setting, setting_input, bottom_key = "", CREST, "crest"
 
     def size(self, draft, part) -> float:
         """Flow [m3/s] at a head of about 1 m, by which small flows are measured."""
@@ -32,6 +34,20 @@ class StructureRows(Device, kind=""):
         row["transition"] = math.sqrt(row["conductance"] * weight * LINEAR_FALL)
         ends = (draft.case.places[end] for end in (link.from_, link.to))
         row["chained"] = any(node.kind == "junction" for node in ends)  # which limit the rate of its flow
+
+    def bottoms(self, part) -> tuple[float, float]:
+        """Least levels [m] at which water enters the structure at its ends `from` and `to`."""
+        raise NotImplementedError
+
+    def begin(self, start, part, row) -> list[str]:
+        """Add a notice to a structure between reservoirs whose levels never reach it."""
+        ends = [start.case.nodes.get(end) for end in (part.from_, part.to)]
+        levels = [float(node.head.value.max()) for node in ends if getattr(node, "head", None) is not None]
+        if len(levels) == 2 and all(level <= low for level, low in zip(levels, self.bottoms(part), strict=True)):
+            name, key = start.draft.valve_names[row["valve"]], self.bottom_key
+            text = f"{name}: the heads of {part.from_} and {part.to} never reach its `{key}`, so that no water flows"
+            start.draft.warnings.append(Notice("range", f"links.{name}", text, key))
+        return []
 
     def schedule(self, draft, name, part) -> None:
         """Write the index of the scheduled setting to the row of the device."""
@@ -90,6 +106,9 @@ class WeirRows(StructureRows, kind="weir"):
     """Conversion to table rows of weirs."""
 
     law, setting = law, "crest"
+
+    def bottoms(self, part) -> tuple[float, float]:
+        return (float(part.crest.value.min()),) * 2
 
     def size(self, draft, part) -> float:
         return weir_size(draft, part.width, part.discharge_coefficient)
