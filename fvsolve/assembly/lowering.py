@@ -47,6 +47,8 @@ FLOW = InputKind("m3/s", "a finite number [m3/s]", small=1e-3)
 FORCE = InputKind("N", "a finite number [N]", small=1e3)
 TORQUE = InputKind("N m", "a finite number [N m]")
 VALUE = InputKind("-", "a finite number")
+CREST = InputKind("m", "a height above datum [m]")
+GATE_OPENING = InputKind("m", "an opening of at least 0 [m]", 0.0)
 
 
 class Input(NamedTuple):
@@ -432,7 +434,8 @@ def lower_devices(draft) -> None:
             row["valve"] = draft.valve_names.index(name)
             for valve in draft.valve_table[row["valve"] :][: device.rows]:
                 valve["device"] = k if calls.hook_of(device.law, "set") is not None else -1  # it sets the opening
-                valve["event"], valve["data"] = row["event"], row["data"] if valve["data"] < 0 else valve["data"]
+                valve["event"] = row["event"] if device.events else -1
+                valve["data"] = row["data"] if valve["data"] < 0 else valve["data"]
         elif name in draft.node_index:
             row["node"] = draft.node_index[name]
             row["row"] = draft.node_table[row["node"]]["row"]

@@ -21,6 +21,7 @@ from fvsolve.parts.basin import BasinMesh, BasinStart, Patch
 from fvsolve.parts.body import Joint
 from fvsolve.parts.connection import Connection
 from fvsolve.parts.control import Control
+from fvsolve.parts.culvert.part import inlets
 from fvsolve.parts.cylinder import DryFriction
 from fvsolve.parts.nodes_and_links import PlaceOnBody, TwoPort
 from fvsolve.parts.pipe.pipe_wall import SI, Lining, Wall, materials
@@ -55,6 +56,8 @@ def key_table(name: str) -> str:
     """Markdown table of the keys of a part or of another table of the case. Raises FvsolveError for unknown names."""
     if name == "materials":
         return materials_table()
+    if name == "culvert inlets":
+        return inlets_table()
     if name == "case":
         top = {"ambient_pressure": (Quantity("pressure", about="absolute ambient pressure"), 101325.0), **TOP}
         rows = [row(key, value, default) for key, (value, default) in top.items()]
@@ -74,6 +77,13 @@ def materials_table() -> str:
         spans = ["" if figure is None else figure.span(" to ") for figure in figures]
         read = dict.fromkeys(source for figure in figures if figure for source in figure.sources)
         rows.append((f"`{name}`", *spans, ", ".join(read)))
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in rows)
+
+
+def inlets_table() -> str:
+    """Markdown table of the inlets of culverts, in the order of HDS-5."""
+    head = ("inlet", "chart", "scale", "form", "K", "M", "c", "Y", "ke", "shape and edge")
+    rows = [head, ("---",) * len(head), *((f"`{name}`", *map(str, inlet)) for name, inlet in inlets().items())]
     return "".join(f"| {' | '.join(cells)} |\n" for cells in rows)
 
 

@@ -315,13 +315,13 @@ def root_slope(tables, k, g, drop):
 def is_lifted(tables, k):
     """True if a pressure can lift restriction k by its law: the restriction is neither closed nor fully open.
 
-    Its flags armed[event] and armed[event + 2] are zero.
+    Its flags armed[event] and armed[event + 2] are zero, or it has no flags: a structure between two water levels.
     """
     valve = tables.valves[k]
     if valve["hooks"] < 0 or tables.hooks[valve["hooks"], LIFT] == 0:
         return False
     at = valve["event"]
-    return tables.armed[at] == 0.0 and tables.armed[at + 2] == 0.0
+    return at < 0 or (tables.armed[at] == 0.0 and tables.armed[at + 2] == 0.0)
 
 
 @njit
@@ -346,7 +346,7 @@ def is_sensing(tables, k):
 @njit
 def has_lifted_backflow(tables, k, m):
     """True if the upstream pressure lifts restriction k and its flow m [kg/s] is negative."""
-    return m < 0.0 and is_lifted(tables, k)
+    return m < 0.0 and tables.valves[k]["event"] >= 0 and is_lifted(tables, k)
 
 
 @njit

@@ -106,6 +106,16 @@ LINKS = {
             ramp, between(0.1, 0.4), between(0.05, 0.4), st.just(100.0), NONE)), "leakage": between(1e-8, 1e-7)},
         {"setting": between(-1.0, 1.0), "setting_time": between(0.02, 0.5), "friction_torque": between(0.0, 5.0)},
     ) for kind in ("pump", "motor")},
+    "weir": of("weir", {"width": between(0.01, 0.1), "crest": between(10.0, 25.0)}, {"kind": st.just("broad")}),
+    "sluice-gate": of(
+        "sluice-gate", {"width": between(0.01, 0.1), "sill": between(10.0, 25.0), "opening": between(0.01, 1.0)}
+    ),
+    "culvert": of("culvert", {
+        "diameter": between(0.02, 0.1), "length": between(2.0, 10.0), "manning": st.just(0.012),
+        "inverts": st.sampled_from([[15.0, 15.0], [19.0, 18.5], [22.0, 22.5]]),
+        "inlet": st.sampled_from(["circular-concrete-square-edge", "circular-metal-mitred"]),
+    }),
+    "manhole": of("manhole", {"crest": between(15.0, 24.0), "area": st.just(1e-3), "perimeter": st.just(0.1)}),
     "leak": of("leak", {"coefficient": between(1e-7, 1e-5), "opening": OPENING}, {"exponent": between(0.5, 1.5)}),
 }  # fmt: skip
 NODES = {

@@ -50,7 +50,7 @@ def stray(model, t: float, y: np.ndarray) -> float:
         moved[j] += 1e-2 * model.scale[j]
         change[:, k] = np.abs(rates(model, t, moved) - base)
     known = np.max(change * pattern, axis=1)
-    rounding = 1e-10 * np.max(known)  # for rates that do not change
+    rounding = max(1e-10 * np.max(known), 1e-300)  # for rates that do not change
     return float(np.max(np.max(change * ~pattern, axis=1) / np.maximum(known, rounding)))
 
 
