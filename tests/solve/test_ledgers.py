@@ -178,7 +178,10 @@ def test_what_a_dry_tank_is_asked_for_is_as_accurate_as_what_it_holds(method):
 
 
 def sucked(method: str, scheme: str = "muscl", rtol: float = 1e-6, **more):
-    """Run of a basin on a slope whose shallow side runs dry by suction at a patch that continues to draw."""
+    """Run of a basin on a slope whose shallow side runs dry by suction at a patch that continues to draw.
+
+    The basin carries a scalar, so its cells take the flow of the link, not the faces of the patch.
+    """
     outlet = {"outlet": {"side": "east", "span": [0.0, 4.0]}}
     nodes = {
         "pool": {"type": "basin", "size": [6.0, 4.0], "cells": [6, 4], "level": 0.2, "elevation": 0.0, "bed": "0.02*x",
@@ -186,7 +189,8 @@ def sucked(method: str, scheme: str = "muscl", rtol: float = 1e-6, **more):
         "out": reservoir(AMBIENT - 1e4, elevation=0.0),
     }  # fmt: skip
     numerics = {"scheme": scheme, "method": method, "rtol": rtol}
-    return fvsolve.run(scene(nodes, {"tap": valve("pool.outlet", "out", 0.05)}, 10.0, numerics, ["tap.flow"], 0.01))
+    links = {"tap": valve("pool.outlet", "out", 0.05)}
+    return fvsolve.run(scene(nodes, links, 10.0, numerics, ["tap.flow"], 0.01, scalars={"dye": {}}))
 
 
 ISLAND = [[1.0, 1.0, 2.0, 2.0]]
