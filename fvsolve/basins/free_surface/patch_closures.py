@@ -256,8 +256,9 @@ def level_of_patch(tables, patch, g, faces, t, out):
     """(level of a patch above the level at rest [m], given inflow [m3/s]); 0 for closures of single faces."""
     empty = tables.plane[:0]
     if patch["closure"] == LINKED:
-        target = out[tables.layout[0]["valve"] + patch["valve"]] / tables.settings[0]["rho"]
-        return solve_level(g, faces, target, 0.0, empty, empty), target
+        st, layout, valve = tables.settings[0], tables.layout[0], tables.valves[patch["valve"]]
+        pressure = valve["drop"] + out[layout["pressure"] + valve["from_node"]]
+        return patch["lowest"] + pressure / (st["rho"] * g), out[layout["valve"] + patch["valve"]] / st["rho"]
     if patch["closure"] == STAGE:
         return schedule_value(tables, patch["drive"], t) - patch["rest"], 0.0
     if patch["closure"] == DISCHARGE:
@@ -298,9 +299,10 @@ def close_patch(tables, patch, t, y, out):
     given = schedule_value(tables, patch["depth"], t) if patch["depth"] >= 0 else 0.0
     for m in range(h.size):
         k = tables.integers[patch["ring"] + m]
-        q, depth = close_face(tables.plane, patch, m, g, z, h[m], e[m], u[m])
         if shut:
             q, depth = 0.0, depth_at_wall(g, h[m], u[m])
+        else:
+            q, depth = close_face(tables.plane, patch, m, g, z, h[m], e[m], u[m])
         if given > 0.0:
             depth = given
         rows[FLOW, k], rows[SURFACE, k] = q, e[m] + (depth - h[m])
