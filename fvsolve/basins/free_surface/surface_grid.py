@@ -365,9 +365,9 @@ def put_fluxes_along(grid, j, first, last, rows, flows, moves, faces):
         close_fixed_walls(grid.reflect[ny + j : ny + j + 1], along[n:], 1)
     if faces is not None:
         kx, ky, top = grid.kx, grid.ky[j : j + 1], rows.top[GHOSTS:]
-        if first == 0:
+        if first == 0 and faces.values[SPEED, j] > 0.0:
             close_driven(g, faces.values[:, j : j + 1], 1.0, NORTH, after, kx[:1], ky, right, along, top)
-        if last == nx:
+        if last == nx and faces.values[SPEED, ny + j] > 0.0:
             east, end = faces.values[:, ny + j : ny + j + 1], n - 1
             close_driven(g, east, -1.0, NORTH, after[end:], kx[nx - 1 :], ky, left[n:], along[n:], top[end:])
     if flows.x.size > 0:
