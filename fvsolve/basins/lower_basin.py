@@ -413,7 +413,8 @@ class BasinRows:
         reflections = self.reflections()
         row["reflect"], row["outer_given"] = draft.to_plane(reflections), reflections.size
         row["outer"] = mesh.left.size - mesh.inner
-        row["through"] = draft.to_work(reflections.size) if reflections.size else -1
+        passes = any(self.reflection(patch) != 1.0 for patch in self.part.patches.values())
+        row["through"] = draft.to_work(reflections.size) if passes else -1
         has_boundary_rates = reflections.size or self.moves or self.part.on
         row["boundary_rates"] = draft.to_work(len(self.quantities) * self.n if has_boundary_rates else 0)
         row["carried"] = row["flows"] = -1

@@ -22,7 +22,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests": (966, 7),
     "benchmarks": (6543, 49),
     "fvsolve/assembly": (1968, 10),
-    "fvsolve/basins": (10320, 49),
+    "fvsolve/basins": (10321, 49),
     "fvsolve/case": (7776, 27),
     "fvsolve/cli": (3523, 17),
     "fvsolve/compile": (1343, 7),

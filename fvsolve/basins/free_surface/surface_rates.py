@@ -170,7 +170,7 @@ def grid_rates(tables, b, y, rates, out, moves, faces):
     basin, work, bands = tables.basins[b], tables.work, tables.bands
     n, o, f, through, grid = basin["n"], basin["y"], basin["flows"], basin["through"], grid_of(tables, basin)
     flow_x, flow_y, count = work[:0], work[:0], grid.ny * (grid.nx + 1)
-    passing, scratch = work[through : through + basin["outer_given"]], work[basin["work"] :]
+    passing, scratch = work[max(through, 0) :][: basin["outer_given"] if through >= 0 else 0], work[basin["work"] :]
     states = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
     if moves is None and sums_of.requested_mode(tables, b) != sums_of.OFF:
         flows = surface_grid.FaceFlows(flow_x, flow_y, passing)
@@ -210,7 +210,7 @@ def mesh_rates(tables, b, y, rates, out, moves, faces):
     water = surface_mesh.MeshWater(grid.g, basin["scheme"], basin["wide"], grid.plan, faces)
     floats, integers = tables.plane[basin["mesh"] :], tables.integers[basin["links"] :]
     states = seen[o : o + n], seen[o + n : o + 2 * n], seen[o + 2 * n : o + 3 * n]
-    passing, scratch = work[through : through + basin["outer_given"]], work[basin["work"] :]
+    passing, scratch = work[max(through, 0) :][: basin["outer_given"] if through >= 0 else 0], work[basin["work"] :]
     band, reflect = band_cells(tables, b), grid.reflect
     rate = water_mesh_rates(water, floats, integers, reflect, states, flow, passing, scratch, rates, band, moves, None)
     if basin["friction"] != NO_DRAG:
