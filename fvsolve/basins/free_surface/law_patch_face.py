@@ -9,7 +9,7 @@ from fvsolve.jit import njit
 
 LEAST_SLOPE = 1e-12  # least derivative of the flow by the level [m2/s]; critical outflow does not depend on the level
 SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
-DRY_SPEED = 0.1  # the same for dry faces, over their length: speed of waves in a millimetre of water [m/s]
+DRY_SPEED = 0.1  # derivative at dry faces over their length: speed of waves in a millimetre of water [m/s]
 
 
 @njit

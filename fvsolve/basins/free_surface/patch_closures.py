@@ -156,7 +156,7 @@ def solve_level(g, faces, target, rest, levels, flows):
         rise = LEAST_RISE
         while excess(g, high, faces, target, rest, levels, flows)[0] < 0.0 and rise < 1e9:
             low, high, rise = high, high + rise, 4.0 * rise
-        if rise >= 1e9:  # water leaves faster than waves, whatever the level
+        if rise >= 1e9:  # the flow is not finite
             return z
     else:
         for m in range(h.size):
