@@ -157,7 +157,7 @@ def test_a_grid_and_the_same_cells_as_a_mesh_give_the_same(tmp_path):
 
 def test_street_manhole_shaft_and_sewer_keep_their_volume_and_the_flow_turns_once():
     street = {"type": "basin", "size": [40.0, 8.0], "cells": [40, 8], "level": 0.05, "elevation": 0.0,
-              "bed": "0.002*(40 - x)", "manning": 0.015, "patches": {"hole": {"at": [35.5, 4.5], "area": 1.0}}}  # fmt: skip
+              "bed": "0.002*(40 - x)", "manning": 0.015, "patches": {"hole": {"at": [35, 4], "area": 4}}}  # fmt: skip
     tide = {"time": [0, 60, 180, 300, 360], "value": [-1.5, -1.5, 1.0, 1.0, -1.5]}
     nodes = {"street": street, "shaft": {"type": "tank", "area": 0.8, "elevation": -2.0, "level": 0.5},
              "river": lake(tide, elevation=0.0)}  # fmt: skip
