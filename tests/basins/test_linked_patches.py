@@ -10,6 +10,7 @@ from reference.basins import assert_equal_files, ended, model_of, on_sides, run_
 from reference.meshes import boundary, triangles, write
 from reference.scenes import GRAVITY as G
 from reference.scenes import lake, scene
+from scipy.integrate import solve_ivp
 
 import fvsolve
 
@@ -166,3 +167,30 @@ def test_two_links_at_a_patch_are_one_of_both_areas():
     found, one = fvsolve.run(case), fvsolve.run(channel(head))
     assert found["gate.flow"] == approx(0.4 * one["gate.flow"], rel=1e-9, abs=1e-9)
     assert found["reach.end.level"] == approx(one["reach.end.level"], rel=1e-12)
+
+
+PLACES = {"sides": ({"side": "east"}, {"side": "west"}),
+          "interior": ({"at": [10, 5], "area": 4.0}, {"at": [6, 4], "area": 8.0})}  # fmt: skip
+
+
+@pytest.mark.parametrize("method", ["ssp-rk2", "rodas-5p", "radau-iia-5"])
+@pytest.mark.parametrize("where", PLACES)
+def test_a_pump_lifts_water_from_one_basin_to_another(where, method):
+    """Levels of two basins, and of two tanks with the pump's curve H = 2 m - 800 q^2, by SciPy."""
+    low, high = ({"type": "basin", "size": [size, 10.0], "cells": [int(size / 2), 5], "level": level, "elevation": 0.0,
+                  "patches": {"end": patch}}
+                 for size, level, patch in zip((20.0, 12.0), (1.0, 1.5), PLACES[where], strict=True))  # fmt: skip
+    pump = {"type": "pump", "from": "low.end", "to": "high.end", "curve": {"coefficients": [2.0, 0.0, -800.0]}}
+    own = {"rtol": 1e-6} if method != "ssp-rk2" else {"courant": 0.9}
+    numerics = {"scheme": "upwind", "method": method, **own}
+    found = fvsolve.run(scene({"low": low, "high": high}, {"pump": pump}, 200.0, numerics,
+                              ["pump.flow", "low.volume", "high.volume"], 5.0))  # fmt: skip
+
+    def lifted(t, volumes):
+        q = math.sqrt((2.0 - (volumes[1] / 120.0 - volumes[0] / 200.0)) / 800.0)
+        return [-q, q]
+
+    tanks = solve_ivp(lifted, (0.0, 200.0), [200.0, 180.0], rtol=1e-9, t_eval=found.t)
+    assert found["low.volume"] == approx(tanks.y[0], rel=1e-4)
+    assert found["low.volume"] + found["high.volume"] == approx(380.0, rel=1e-12)
+    assert found.ok and abs(found.ledger["mass"]["relative"]) < 1e-12
