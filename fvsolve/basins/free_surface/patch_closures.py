@@ -42,6 +42,9 @@ FLOW, MOMENTUM, SURFACE, SPEED, ROWS = range(5)
 ITERATIONS = 100
 ROUNDING = 1e-15  # relative error of a flow at which a level is accepted
 HELD = 1e-9  # relative difference of a discharge from its schedule above which it counts as held
+# Level of the links of a patch below its bed [m], farther than any network falls, from which on they may draw more than
+# critical outflow (`law_patch_face`); the rest is supplied from outside.
+DEEPEST = 2e3
 LEAST_RISE = 1e-3  # first rise of the level in the search for an upper bound [m]
 
 
@@ -151,12 +154,20 @@ def first_level(g, faces, target):
 
 
 @njit
+def lowest_bed(faces):
+    """Lowest bed at the faces of a patch, above the level at rest [m]. faces : as for `patch_flow`"""
+    low = faces[1][0] - faces[0][0]
+    for m in range(faces[0].size):
+        low = min(low, faces[1][m] - faces[0][m])
+    return low
+
+
+@njit
 def solve_level(g, faces, target, rest, levels, flows):
     """Level at which a patch has its discharge or rated flow; the lowest bed if the outflow would be above critical.
 
     Newton's method within bounds; other arguments as for `excess`.
     """
-    h, e, _, lengths = faces
     z = first_level(g, faces, target)
     f, slope = excess(g, z, faces, target, rest, levels, flows)
     if f == 0.0:
@@ -169,8 +180,7 @@ def solve_level(g, faces, target, rest, levels, flows):
         if rise >= 1e9:  # the flow is not finite
             return z
     else:
-        for m in range(h.size):
-            low = min(low, e[m] - h[m])
+        low = min(low, lowest_bed(faces))
         if excess(g, low, faces, target, rest, levels, flows)[0] >= 0.0:
             return low
     for _ in range(ITERATIONS):
@@ -319,6 +329,7 @@ def close_patch(tables, patch, t, y, out):
 
     Faces whose links are shut are walls. A level, equal at all faces, would let water pass from one to another.
     During outflow above critical the fraction of the discharge that leaves is written to the node's outflow fraction.
+    What links draw beyond critical outflow is supplied from outside.
     """
     layout, basin, node = tables.layout[0], tables.basins[patch["basin"]], tables.nodes[patch["node"]]
     g, faces, (first, outer) = tables.settings[0]["gravity"], read_faces(tables, patch, y), driven_range(basin)
@@ -342,13 +353,16 @@ def close_patch(tables, patch, t, y, out):
             wet += lengths[m]
             surface += lengths[m] * rows[SURFACE, k]
     if patch["closure"] == DISCHARGE or patch["closure"] == LINKED:
-        held = put_discharge(tables, patch, rows, total, target, wide, given)
+        may_hold = z < lowest_bed(faces) - DEEPEST if patch["closure"] == LINKED else given == 0.0
+        held = put_discharge(tables, patch, rows, total, target, wide, given, may_hold)
     for m in range(h.size):
         k = tables.integers[patch["ring"] + m]
         q, depth = rows[FLOW, k], h[m] + (rows[SURFACE, k] - e[m])
         u_face = q / depth if depth > 0.0 else 0.0
         rows[MOMENTUM, k], rows[SPEED, k] = q * u_face, abs(u_face) + sqrt(g * max(depth, 0.0))
     if patch["closure"] == LINKED:
+        if held < 1.0:
+            out[layout["supply"] + patch["node"]] = tables.settings[0]["rho"] * (held - 1.0) * target
         return
     rise = (surface / wet if wet > 0.0 else z) - patch["lowest"]
     out[layout["pressure"] + patch["node"]] = tables.settings[0]["rho"] * g * rise
@@ -356,14 +370,13 @@ def close_patch(tables, patch, t, y, out):
 
 
 @njit
-def put_discharge(tables, patch, rows, total, target, wide, given):
+def put_discharge(tables, patch, rows, total, target, wide, given, may_hold):
     """Correct the flows of faces so that their sum is the discharge; return the fraction that leaves, else 1.
 
     total : sum of the flows [m3/s]; target : discharge [m3/s]; wide : length of all faces [m]; given : depth of a
-    supercritical inflow [m], or 0
+    supercritical inflow [m], or 0; may_hold : True if an outflow above critical is possible
     """
-    is_held = patch["closure"] == DISCHARGE and given == 0.0 and target < total and total - target > HELD * abs(target)
-    if is_held:
+    if may_hold and target < total and total - target > HELD * abs(target):
         return total / target
     for m in range(patch["faces"] if total != target or given > 0.0 else 0):
         k = tables.integers[patch["ring"] + m]
