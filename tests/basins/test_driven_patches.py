@@ -207,6 +207,16 @@ def test_probes_of_a_driven_patch_are_its_level_head_and_froude_number():
     assert froude == approx(np.abs(flow) / (2.0 * level * np.sqrt(G * level)), rel=1e-9)
 
 
+def test_the_level_of_a_tide_is_that_of_its_schedule_while_banks_drain():
+    """The bank beside a channel is above the tide; its film leaves by critical flow, at a surface above the tide."""
+    bed = "where(y < 1, 0, 1.2)"
+    case = reach({"sea": {"side": "west", "stage": {"time": [0, 40], "value": [1.5, 0.5]}}}, end=40.0, bed=bed,
+                 level=1.5, cells=(30, 4), probes=["reach.sea.level", "reach.depth@0.5,1.75"])  # fmt: skip
+    found = fvsolve.run(case)
+    assert found["reach.sea.level"] == approx(1.5 - found.t / 40.0, rel=1e-12)
+    assert 1e-3 < found["reach.depth@0.5,1.75"][found.t == 16.0][0] < 0.2
+
+
 @pytest.mark.parametrize("path", ["turned", "mirrored", "north", "mesh"])
 def test_a_restated_reach_gives_the_same(path, tmp_path):
     """Discharge in the west and rating in the east; the same along y, against x, and as a mesh (upwind)."""

@@ -295,7 +295,7 @@ def close_patch(tables, patch, t, y, out):
     rows, (h, e, u, lengths) = tables.work[first : first + ROWS * outer].reshape((ROWS, outer)), faces
     z, target = level_of_patch(tables, patch, g, faces, t, out)
     shut = patch["closure"] == LINKED and target == 0.0
-    total, surface, wet, wide, held = 0.0, 0.0, 0.0, 0.0, 1.0
+    total, surface, wet, wide, held, low = 0.0, 0.0, 0.0, 0.0, 1.0, z
     given = schedule_value(tables, patch["depth"], t) if patch["depth"] >= 0 else 0.0
     for m in range(h.size):
         k = tables.integers[patch["ring"] + m]
@@ -308,6 +308,7 @@ def close_patch(tables, patch, t, y, out):
         rows[FLOW, k], rows[SURFACE, k] = q, e[m] + (depth - h[m])
         total += lengths[m] * q
         wide += lengths[m]
+        low = min(low, e[m] - h[m])
         if depth > 0.0:
             wet += lengths[m]
             surface += lengths[m] * rows[SURFACE, k]
@@ -320,7 +321,8 @@ def close_patch(tables, patch, t, y, out):
         rows[MOMENTUM, k], rows[SPEED, k] = q * u_face, abs(u_face) + sqrt(g * max(depth, 0.0))
     if patch["closure"] == LINKED:
         return
-    rise = (surface / wet if wet > 0.0 else z) - patch["lowest"]
+    own = patch["closure"] == CRITICAL or patch["closure"] == NORMAL_SLOPE or given > 0.0 or z <= low
+    rise = (surface / wet if own and wet > 0.0 else z) - patch["lowest"]
     out[layout["pressure"] + patch["node"]] = tables.settings[0]["rho"] * g * rise
     out[layout["outflow_fraction"] + node["row"]] = held
 
