@@ -194,6 +194,14 @@ def test_more_outflow_than_critical_is_held_there_and_the_volume_that_lacks_is_s
     assert mark.volume == approx(40.0 + np.trapezoid(flow, found.t), rel=1e-3)
 
 
+def test_no_water_passes_a_patch_of_zero_discharge():
+    """A slosh lies against it as at a wall: the flow is zero to rounding, and nothing is held."""
+    case = reach({"shut": {"side": "east", "discharge": 0.0}}, (20.0, 2.0), (40, 3), 6.0, probes=["reach.shut.flow"],
+                 start={"level": "1 + 0.2*cos(0.3*x)", "u": "0.3*sin(x)"})  # fmt: skip
+    found = fvsolve.run(case)
+    assert found.ok and abs(found["reach.shut.flow"]).max() < 1e-15
+
+
 def test_a_discharge_within_critical_flow_has_no_mark():
     assert fvsolve.run(reach({"out": {"side": "east", "discharge": -0.5}}, end=1.0)).ok
 

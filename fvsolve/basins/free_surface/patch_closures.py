@@ -334,7 +334,7 @@ def put_discharge(tables, patch, rows, total, target, wide, given):
     total : sum of the flows [m3/s]; target : discharge [m3/s]; wide : length of all faces [m]; given : depth of a
     supercritical inflow [m], or 0
     """
-    is_held = patch["closure"] == DISCHARGE and given == 0.0 and target < total and total - target > HELD * abs(target)
+    is_held = patch["closure"] == DISCHARGE and given == 0.0 and target < 0.0 and total - target > -HELD * target
     if is_held:
         return total / target
     for m in range(patch["faces"] if total != target or given > 0.0 else 0):
