@@ -1,5 +1,6 @@
 """Interior patches: gullies, manholes and springs inside a basin, against closed forms and other arrangements."""
 
+import math
 from importlib import import_module
 
 import numpy as np
@@ -8,6 +9,7 @@ from pytest import approx
 from reference import structures
 from reference.basins import assert_equal_files, ended, model_of, run_in_two_parts
 from reference.meshes import boundary, triangles, write
+from reference.scenes import GRAVITY as G
 from reference.scenes import lake, scene
 from scipy.integrate import solve_ivp
 
@@ -174,6 +176,29 @@ def test_street_manhole_shaft_and_sewer_keep_their_volume_and_the_flow_turns_onc
     turns = np.flatnonzero(np.diff(np.sign(flow[1:]))) + 1
     assert turns.size == 2 and flow[turns[0]] > 0.0 > flow[turns[1]] and flow[-1] > 0.0
     assert (flow * drive >= 0.0).all()  # the flow turns at equal heads
+
+
+@pytest.mark.parametrize("method", ["ssp-rk2", "radau-iia-5", "rodas-5p"])
+@pytest.mark.parametrize("drawn_by", ["discharge", "demand"])
+def test_more_than_critical_outflow_is_held_with_a_mark(drawn_by, method):
+    """The pond loses its initial volume at most; the rest of the demand has a line in the ledger."""
+    asked, own = 8.0, {"rtol": 1e-6, "courant": None} if method != "ssp-rk2" else {}
+    numerics = {"scheme": "upwind", "method": method, **own}
+    if drawn_by == "discharge":
+        case = pond(None, end=20.0, hole={**HOLE, "discharge": -asked}, level=0.5, numerics=numerics)
+    else:
+        shaft = {"type": "junction", "elevation": 0.0, "demand": asked}
+        case = pond(WIDE, shaft, end=20.0, level=0.5, numerics=numerics, probes=["pond.volume"])
+    found = fvsolve.run(case)
+    mark, left = found.marks[-1], found["pond.volume"]
+    assert found.reason == "finished" and not found.ok
+    assert mark.what == "discharge held" and mark.place == "nodes.pond.hole"
+    assert mark.volume == approx(asked * 20.0 - (left[0] - left[-1]), rel=1e-9) and left.min() >= 0.0
+    assert abs(found.ledger["mass"]["relative"]) < 1e-12
+    early = (
+        -np.diff(left)[0] / 0.4
+    )  # critical outflow of still water through four faces of one metre, until waves return
+    assert early == approx(4.0 * 8.0 / 27.0 * math.sqrt(G) * 0.5**1.5, rel=0.2)
 
 
 FAULTS = {

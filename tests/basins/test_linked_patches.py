@@ -216,7 +216,7 @@ def test_a_demand_beyond_critical_outflow_is_held_there_with_a_mark(method):
     assert found["reach.end.flow"][-1] == approx(-CRITICAL, rel=1e-3)
     mark = next(mark for mark in found.marks if mark.what == "discharge held")
     assert mark.place == "nodes.reach.end" and mark.time == 0.0
-    assert "the flow that its links draw is more than critical flow" in mark.text
+    assert "the flow drawn from it is more than critical flow" in mark.text
     assert mark.volume == approx((ASKED - CRITICAL) * 4.0, rel=1e-3)
     ledger = found.ledger["mass"]
     assert ledger["nodes"]["reach.end.inside"]["made_up"] == approx(mark.volume * 1000.0, rel=1e-3)

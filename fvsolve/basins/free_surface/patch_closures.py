@@ -295,7 +295,7 @@ def read_faces_around(tables, patch, y):
 def level_of_patch(tables, patch, g, faces, t, out):
     """(level of a patch above the level at rest [m], given inflow [m3/s]); 0 for closures of single faces."""
     empty = tables.plane[:0]
-    if patch["closure"] == LINKED:
+    if patch["closure"] == LINKED or patch["closure"] == INTERIOR:
         st, layout, valve = tables.settings[0], tables.layout[0], tables.valves[patch["valve"]]
         pressure = valve["drop"] + out[layout["pressure"] + valve["from_node"]]
         return patch["lowest"] + pressure / (st["rho"] * g), out[layout["valve"] + patch["valve"]] / st["rho"]
@@ -336,7 +336,7 @@ def close_patch(tables, patch, t, y, out):
     rows, (h, e, u, lengths) = tables.work[first : first + ROWS * outer].reshape((ROWS, outer)), faces
     z, target = level_of_patch(tables, patch, g, faces, t, out)
     shut = patch["closure"] == LINKED and target == 0.0
-    total, surface, wet, wide, held = 0.0, 0.0, 0.0, 0.0, 1.0
+    total, surface, wet, wide, held, low = 0.0, 0.0, 0.0, 0.0, 1.0, z
     given = schedule_value(tables, patch["depth"], t) if patch["depth"] >= 0 else 0.0
     for m in range(h.size):
         k = tables.integers[patch["ring"] + m]
@@ -349,6 +349,7 @@ def close_patch(tables, patch, t, y, out):
         rows[FLOW, k], rows[SURFACE, k] = q, e[m] + (depth - h[m])
         total += lengths[m] * q
         wide += lengths[m]
+        low = min(low, e[m] - h[m])
         if depth > 0.0:
             wet += lengths[m]
             surface += lengths[m] * rows[SURFACE, k]
@@ -364,7 +365,8 @@ def close_patch(tables, patch, t, y, out):
         if held < 1.0:
             out[layout["supply"] + patch["node"]] = tables.settings[0]["rho"] * (held - 1.0) * target
         return
-    rise = (surface / wet if wet > 0.0 else z) - patch["lowest"]
+    own = patch["closure"] == CRITICAL or patch["closure"] == NORMAL_SLOPE or given > 0.0 or z <= low
+    rise = (surface / wet if own and wet > 0.0 else z) - patch["lowest"]
     out[layout["pressure"] + patch["node"]] = tables.settings[0]["rho"] * g * rise
     out[layout["outflow_fraction"] + node["row"]] = held
 
@@ -376,7 +378,7 @@ def put_discharge(tables, patch, rows, total, target, wide, given, may_hold):
     total : sum of the flows [m3/s]; target : discharge [m3/s]; wide : length of all faces [m]; given : depth of a
     supercritical inflow [m], or 0; may_hold : True if an outflow above critical is possible
     """
-    if may_hold and target < total and total - target > HELD * abs(target):
+    if may_hold and target < 0.0 and total - target > -HELD * target:
         return total / target
     for m in range(patch["faces"] if total != target or given > 0.0 else 0):
         k = tables.integers[patch["ring"] + m]
