@@ -45,6 +45,7 @@ HELD = 1e-9  # relative difference of a discharge from its schedule above which 
 # Level of the links of a patch below its bed [m], farther than any network falls, from which on they may draw more than
 # critical outflow (`law_patch_face`); the rest is supplied from outside.
 DEEPEST = 2e3
+LEAST_SPEED = 1e-12  # speed of waves that stands for a dry face of a driven patch [m/s]
 LEAST_RISE = 1e-3  # first rise of the level in the search for an upper bound [m]
 
 
@@ -360,7 +361,8 @@ def close_patch(tables, patch, t, y, out):
         k = tables.integers[patch["ring"] + m]
         q, depth = rows[FLOW, k], h[m] + (rows[SURFACE, k] - e[m])
         u_face = q / depth if depth > 0.0 else 0.0
-        rows[MOMENTUM, k], rows[SPEED, k] = q * u_face, abs(u_face) + sqrt(g * max(depth, 0.0))
+        rows[MOMENTUM, k] = q * u_face
+        rows[SPEED, k] = max(abs(u_face) + sqrt(g * max(depth, 0.0)), LEAST_SPEED)  # a dry face is driven too
     if patch["closure"] == LINKED:
         if held < 1.0:
             out[layout["supply"] + patch["node"]] = tables.settings[0]["rho"] * (held - 1.0) * target
