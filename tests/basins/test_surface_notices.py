@@ -12,7 +12,7 @@ def notices(end=1.0, links=None, nodes=None, **basin) -> list[str]:
     """Texts of the notices of the range and of cells of a run with a basin of 20 m x 4 m."""
     pool = {"type": "basin", "elevation": 0.0, "size": [20.0, 4.0], "cells": [20, 4], "level": 0.5, "patches": {}}
     case = scene({"pool": pool | basin, **(nodes or {})}, links or {}, end, {"courant": 0.9}, ["pool.volume"], end)
-    return [notice.text for notice in fvsolve.run(case).warnings if notice.kind in ("range", "cells")]
+    return [notice.text for notice in fvsolve.run(case).warnings if notice.kind in ("range", "cells", "slope")]
 
 
 def inflow(**keys) -> dict:

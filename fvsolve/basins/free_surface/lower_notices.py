@@ -27,7 +27,7 @@ def unusual_values(basin) -> Iterator[Notice]:
     if slope > STEEP:
         text = f"{basin.name}: rain falls on a bed with slopes up to {slope:.3g}, between adjacent cells"
         text += f"; shallow-water theory, with vertical depths, is for slopes below {STEEP:g}"
-        yield Notice("range", place, text, "bed", slope, STEEP)
+        yield Notice("slope", place, text, "bed", slope, STEEP)
     for name, patch in basin.part.patches.items():
         if patch.depth is not None and "control" not in (patch.depth.kind, patch.discharge.kind):
             yield from subcritical_inflow(basin, name, patch)
