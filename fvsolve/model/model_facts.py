@@ -33,10 +33,11 @@ STIFF_RATIO = 3.0  # ratio of steps to those that waves need, above which an imp
 def checks(model) -> dict[str, Any]:
     """Facts about pipes, basins, nodes, the step and its cause, the number of steps and the expected run time; SI."""
     rho, viscosity = model.case.properties.density, model.case.properties.viscosity
+    cells = {f"{place}.inside" for place in model.case.patches_with_faces}  # behind patches; no part of the case
     nodes = {
         name: {"elevation": row["elevation"].item(), "pressure": row["pressure"].item(),
                "head": float(model.head(row["pressure"], row["elevation"]))}
-        for name, row in zip(model.node_names, model.tables.nodes, strict=True)
+        for name, row in zip(model.node_names, model.tables.nodes, strict=True) if name not in cells
     }  # fmt: skip
     masses = {
         name: {"position": row["position"].item(), "velocity": row["velocity"].item(), "force": row["force"].item()}

@@ -21,6 +21,7 @@ from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
 from fvsolve.basins.free_surface import law_patch_face, patch_closures, surface_grid, surface_maxima, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import RATE_CAP, add_friction
+from fvsolve.basins.free_surface.lower_notices import inflow_watches, unusual_values
 from fvsolve.basins.free_surface.surface_patches import DEPTH, TOTALS
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
@@ -597,7 +598,7 @@ class FreeSurfaceRows(BasinRows):
 
     def notices(self, y: np.ndarray) -> list[Notice]:
         films = [notice(self, error) for look, notice in film_checks(self) if (error := look(self, y))[0] > FILM_ERROR]
-        return [*wave_notices(self, y), *body_notices(self), *films]
+        return [*wave_notices(self, y), *body_notices(self), *films, *unusual_values(self)]
 
     def watches(self, y: np.ndarray) -> list[Any]:
         """Check for short waves, unless `wave_notices` reports them at y, and one check for each pair of `film_checks`.
@@ -607,6 +608,7 @@ class FreeSurfaceRows(BasinRows):
         waves = ErrorWatch(self, partial(surface_waves, seen=LEAST_IN_RUN), wave_notice, WAVE_ERROR)
         films = [ErrorWatch(self, look, notice, max(FILM_ERROR, REPEAT_FACTOR * look(self, y)[0]))
                  for look, notice in film_checks(self)]  # fmt: skip
+        films += inflow_watches(self)
         return films if wave_notices(self, y) else [waves, *films]
 
     def depth_of(self, y: np.ndarray) -> np.ndarray:

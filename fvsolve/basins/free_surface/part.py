@@ -119,7 +119,7 @@ class FreeSurface(Physics, name="free-surface"):
     manning: Annotated[
         float | SpatialField | None,
         NumberOrField(
-            Quantity("number", nonnegative, usual=UsualRange(0.005, 0.5, "glass to dense brush")),
+            Quantity("number", nonnegative, usual=UsualRange(0.008, 0.3, "smooth plastic to dense grass")),
             "Manning's n of the bed of a free surface [s/m^(1/3)]; default: no friction", VALUE,
         ),
     ] = None  # fmt: skip
