@@ -7,7 +7,6 @@ import numpy as np
 
 from fvsolve.mesh.mesh import Mesh, cross
 
-
 BESIDE = 1e-9  # of the extent of the mesh: distance from faces of a segment that lies on them
 
 

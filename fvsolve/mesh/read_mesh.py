@@ -234,7 +234,7 @@ def assign_patches(
         if missing.any():
             text = f"lines that are not boundary faces: {missing.sum()} of {members.size}"
             location = _line_location(sketch, edges, lines[members][missing][0])
-            faults.append(Fault(place, f"{text}; {location}; expected a curve of the boundary"))
+            faults.append(Fault(place, f"{text}; {location}; expected a curve of the boundary, or `group` of a wall"))
         spot = spot[~missing]
         taken = spot[(patch[spot] >= 0) & (patch[spot] != names.index(name))]
         if taken.size:

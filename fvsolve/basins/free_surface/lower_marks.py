@@ -10,7 +10,6 @@ from fvsolve.basins.free_surface.marked_faces import KEPT
 from fvsolve.basins.lower_motion import sides_of_cells
 from fvsolve.errors import Notice
 
-
 MOST_STRETCH = 2.0  # greatest factor on the flow over a wall by which its faces pass that over its line
 
 
