@@ -199,6 +199,10 @@ class BasinRows:
         """Notices on the deviations y of cells at the start of a run."""
         return []
 
+    def chain_texts(self) -> list[str]:
+        """Texts on its walls on faces and its sections, for the command `check`."""
+        return []
+
     def watches(self, y: np.ndarray) -> list[Any]:
         """Checks (`ErrorWatch`) of a run that starts from the deviations y of cells."""
         return []

@@ -409,7 +409,7 @@ class Gauge(Table):
     at: Annotated[tuple[float, float], val.Rows("length", length=2, about="x, y of the point [m]", changes=VALUE)]
 
 
-class Section(Table):
+class OutputSection(Table):
     """Table of a section: a line across a basin of water, with the probe `SECTION.flow` of the flow through it."""
 
     basin: Annotated[str, val.Text("name of the basin")]
@@ -468,7 +468,7 @@ class Output(Table):
     ] = {}
     gauges: Annotated[Any, NamedTables(Gauge, "named points of basins for probes: { kerb = { basin, at } }")] = {}
     sections: Annotated[
-        Any, NamedTables(Section, "lines across basins for probes of the flow: { bridge = { basin, from, to } }")
+        Any, NamedTables(OutputSection, "lines across basins for probes of the flow: { bridge = { basin, from, to } }")
     ] = {}
     grids: Annotated[
         Any, NamedTables(OutputGrid, "fields of basins on pixels: { flood = { basin, fields, format, cell } }")

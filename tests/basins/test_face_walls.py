@@ -61,7 +61,7 @@ def depth(model, state) -> np.ndarray:
     return model.basins[0].depth + model.basins[0].deviations(state.y)[0]
 
 
-LINES = {"across": ACROSS, "oblique": [[9.0, 0.0], [15.0, 6.0]], "steep": [[10.0, 6.0], [14.0, 0.0]]}
+LINES = {"across": ACROSS, "oblique": [[9.0, 0.0], [15.0, 6.0]], "steep": [[10.5, 6.0], [13.5, 0.0]]}
 
 
 @pytest.mark.parametrize("triangular", [False, True], ids=["grid", "triangles"])
@@ -70,7 +70,9 @@ LINES = {"across": ACROSS, "oblique": [[9.0, 0.0], [15.0, 6.0]], "steep": [[10.0
 def test_steady_flow_over_a_wall_has_the_levels_of_villemonte(line, tail, turned, triangular, tmp_path):
     ends = {"discharge": 3.6}, {"stage": f"{tail} m"}
     patches = dict(zip(("down", "up") if turned else ("up", "down"), ends, strict=True))
-    case = pool(LINES[line], patches, (48, 12), 150.0, start={"level": 1.9}, probes=["reach.depth@3,3", "reach.depth@21,3"])
+    case = pool(
+        LINES[line], patches, (48, 12), 150.0, start={"level": 1.9}, probes=["reach.depth@3,3", "reach.depth@21,3"]
+    )
     result = fvsolve.run(on_triangles(case, tmp_path, 0.8) if triangular else case)
     upper, lower = sorted((result["reach.depth@3,3"][-1], result["reach.depth@21,3"][-1]), reverse=True)
     length = math.dist(*LINES[line])
@@ -242,3 +244,72 @@ def test_a_section_changes_no_bit(scheme, triangular, tmp_path):
     case = on_triangles(case, tmp_path) if triangular else case
     plain = ended(case)[1].y
     assert np.array_equal(ended(case | {"output": case["output"] | {"sections": BRIDGE}})[1].y, plain)
+
+
+FAULTS = {
+    "outside": ({"line": [[30, 0], [30, 6]], "crest": 2}, "levee.line: cuts no face between two cells.*24, 6"),
+    "point": ({"line": [[3, 0]], "crest": 2}, "not a line; expected two or more points"),
+    "equal": ({"line": [[3, 0], [3, 0]], "crest": 2}, "two equal points"),
+    "both": ({"line": ACROSS, "group": "a", "crest": 2}, "line.*group"),
+    "neither": ({"crest": 2}, "line.*group"),
+    "crest": ({"line": ACROSS}, "crest is missing"),
+    "group": ({"group": "levee", "crest": 2}, "a rectangle has no groups; expected `line`"),
+    "coefficient": ({"line": ACROSS, "crest": 2, "coefficient": 1.5}, "coefficient.*1.5"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faulty_walls_are_named(fault):
+    wall, text = FAULTS[fault]
+    refused(pool(walls={"levee": wall}), text)
+
+
+def test_walls_that_cannot_be_are_named(tmp_path):
+    refused(pool(patches={"up": {}}, walls={"up": {"line": ACROSS, "crest": 2}}), "up is also the name of a patch")
+    refused(pool(walls={"a b": {"line": ACROSS, "crest": 2}}), "not a valid name")
+    moving = pool(patches={"up": {"travel": 0.0}})
+    refused(moving, "walls: is not supported for a basin with a moving wall")
+    mesh = on_triangles(pool(patches={"up": {}, "down": {}}), tmp_path)
+    mesh["nodes"]["reach"]["walls"] = {"levee": {"group": "leve", "crest": 2}}
+    refused(mesh, "no such group in t.msh; groups of its outline are down and up|no such group in t.msh")
+    mesh["nodes"]["reach"] |= {"walls": {"levee": {"group": "up", "crest": 2}}, "patches": {}}
+    refused(mesh, "levee.group: cuts no face")
+    liquid = {"type": "basin", "physics": "liquid", "size": [1, 1], "cells": [2, 2], "pressure": 1e5, "thickness": 1}
+    refused(scene({"a": liquid | {"walls": {}}}, {}, 1.0, NUMERICS), "walls: is not a key of physics")
+    sections = {"s": {"basin": "a", "from": [0.5, 0], "to": [0.5, 1]}}
+    refused(scene({"a": liquid}, {}, 1.0, NUMERICS, output={"sections": sections}), "a has the physics .liquid.; exp")
+
+
+def test_a_wall_below_the_bed_is_noted_and_changes_no_bit():
+    case = pool(start={"level": "where(x < 12, 1.5, 1)"}, bed="0.2", end=2.0)
+    case["nodes"]["reach"]["walls"]["levee"]["crest"] = 0.1
+    model, state = ended(case)
+    assert ["levee has no effect" in note.text for note in model.warnings] == [True]
+    assert np.array_equal(state.y, ended(case | {"nodes": {"reach": case["nodes"]["reach"] | {"walls": {}}}})[1].y)
+
+
+SECTIONS = {
+    "outside": ({"basin": "reach", "from": [3, -1], "to": [3, 6]}, "bridge.from: 3,-1 m lies outside the mesh"),
+    "in a hole": (
+        {"basin": "reach", "from": [8.5, 2.5], "to": [3, 6]},
+        "bridge.from: 8.5,2.5 m lies outside the mesh or",
+    ),
+    "short": ({"basin": "reach", "from": [3.1, 1.1], "to": [3.2, 1.2]}, "cuts no face between two cells"),
+    "nowhere": ({"basin": "reech", "from": [3, 0], "to": [3, 6]}, "no basin named .reech.; did you mean .reach"),
+    "point": ({"basin": "reach", "from": [3, 0], "to": [3, 0]}, "also the start of the line"),
+}
+
+
+@pytest.mark.parametrize("fault", SECTIONS)
+def test_faulty_sections_are_named(fault):
+    section, text = SECTIONS[fault]
+    refused(pool(sections={"bridge": section}, holes=[[8, 2, 10, 4]]), text)
+
+
+def test_names_of_sections_differ_from_those_of_parts_and_their_probes_are_known():
+    section = {"basin": "reach", "from": [3, 0], "to": [3, 6]}
+    refused(pool(sections={"reach": section}), "reach is also a name in `nodes`; expected another name")
+    refused(pool(sections={"bridge": section}, probes=["brige.flow"]), "no part named .brige.*did you mean .bridge")
+    refused(pool(sections={"bridge": section}, probes=["bridge.depth"]), "section, which has no .depth.; it has flow")
+    case = pool(sections={"bridge": section}, end=0.1)
+    assert "bridge.flow" in fvsolve.run(case).probes  # by default

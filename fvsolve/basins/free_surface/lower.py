@@ -21,7 +21,7 @@ from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
 from fvsolve.basins.free_surface import law_patch_face, patch_closures, surface_grid, surface_maxima, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import RATE_CAP, add_friction
-from fvsolve.basins.free_surface.lower_marks import Marks, lower_marks, marks_of
+from fvsolve.basins.free_surface.lower_marks import Marks, chain_texts, lower_marks, marks_of
 from fvsolve.basins.free_surface.surface_patches import DEPTH, TOTALS
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
@@ -356,6 +356,9 @@ class FreeSurfaceRows(BasinRows):
     def marks(self) -> Marks:
         """Faces of walls and sections."""
         return marks_of(self)
+
+    def chain_texts(self) -> list[str]:
+        return list(chain_texts(self))
 
     @property
     def forms_stages(self) -> bool:

@@ -1,12 +1,13 @@
 """Rows of the tables of a model for walls on faces, and for faces of sections."""
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from fvsolve.basins.cell_sides import BLOCK
-from fvsolve.basins.free_surface.marked_faces import KEPT
+from fvsolve.basins.free_surface.marked_faces import SUM_COUNT
 from fvsolve.basins.lower_motion import sides_of_cells
 from fvsolve.errors import Notice
 
@@ -66,7 +67,7 @@ def lower_marks(draft, basin, row) -> None:
     size = 2.0 / 3.0 * math.sqrt(2.0 * basin.case.gravity) * marks.coefficient
     numbers = marks.crest - basin.part.level, marks.height, size, marks.cosine, marks.sine
     row["crests"] = draft.to_plane(np.array(numbers))
-    row["marked_work"] = draft.to_work(marks.faces.size + max(marks.faces.size, KEPT * BLOCK))
+    row["marked_work"] = draft.to_work(marks.faces.size + max(marks.faces.size, SUM_COUNT * BLOCK))
 
 
 def rows_of_grid(basin) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
@@ -84,3 +85,16 @@ def rows_of_mesh(basin) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     marked = np.isin(np.where(face >= 0, face, ~face), basin.marks.faces)
     number = np.where(face >= 0, number, ~number)
     return (4 * (own // BLOCK) + side)[marked], (own % BLOCK)[marked], number[marked], 4 * -(-basin.n // BLOCK)
+
+
+def chain_texts(basin) -> Iterator[str]:
+    """Yield a text on each wall and each section of a basin: its faces, and heights of a crest above the bed."""
+    amount, marks = basin.case.amount, basin.marks
+    for name, wall in basin.part.walls.items():
+        faces, _, cosine, _, stretch = wall.chain(basin.mesh)
+        length = amount(stretch * float(basin.mesh.length[faces] @ cosine), "length", 3)
+        height = marks.height[np.isin(marks.faces, faces)] if np.isin(faces, marks.faces).any() else np.zeros(1)
+        low, high = (amount(value, "length", 3) for value in (height.min(), height.max()))
+        yield f"wall {name}: {faces.size} faces, {length} long, crest {low} to {high} above the bed"
+    for name, chain in basin.sections.items():
+        yield f"section {name}: {chain.faces.size} faces"

@@ -23,7 +23,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 WEIR_ENDS, FLUX_BEGINS = 0.9, 0.95  # lesser over greater depth above the crest
 LOW_ENDS, HIGH_BEGINS = 1.0, 1.5  # lesser depth above the crest over the height of the wall
-KEPT = 5  # values of a cell of a mesh before a side is added, see `keep_marked`
+SUM_COUNT = 5  # values of a cell of a mesh before a side is added, see `save_sums`
 
 
 class MarkedFaces(NamedTuple):
@@ -37,7 +37,7 @@ class MarkedFaces(NamedTuple):
     size : 2/3 C sqrt(2 g) [m^0.5/s]; cosine, sine : normal of the wall across the face and along it, to the left of
     the normal of the face; all float64[faces]
     flows : float64[faces]  computed flows through the faces, per length [m2/s]
-    kept : work array; on a grid momentum along the faces on the side after them minus that before [m3/s2]
+    spare : work array; on a grid momentum along the faces on the side after them minus that before [m3/s2]
     """
 
     first: np.ndarray
@@ -49,7 +49,7 @@ class MarkedFaces(NamedTuple):
     cosine: np.ndarray
     sine: np.ndarray
     flows: np.ndarray
-    kept: np.ndarray
+    spare: np.ndarray
 
 
 @njit
@@ -125,10 +125,10 @@ def flux_of_weir(q, cosine, sine, before, after):
     mass, push = cosine * q, cosine * (first + abs(first) + c) * (h * first - q)
     pull = cosine * (second - abs(second) - d) * (k * second - q)
     change = mass * drift
-    one, other = (0.0, -change) if q > 0.0 else (change, 0.0)
+    lost, gained = (0.0, -change) if q > 0.0 else (change, 0.0)
     return (
-        mass, mass * u - one * sine + push * cosine, mass * v - other * sine + pull * cosine,
-        mass * s + one * cosine + push * sine, mass * t + other * cosine + pull * sine,
+        mass, mass * u - lost * sine + push * cosine, mass * v - gained * sine + pull * cosine,
+        mass * s + lost * cosine + push * sine, mass * t + gained * cosine + pull * sine,
     )  # fmt: skip
 
 
@@ -178,11 +178,11 @@ def flatten_across(marks, ny, j, first, last, before, here, after, sides):
     """
     if marks is not None:
         for row in range(min(max(j, 1), ny - 1), max(min(j + 1, ny - 1), 1) + 1):  # rows -1 and ny are mirror images
-            other = after if (row == j + 1 and j >= 0) or j == ny else before
+            next_row = after if (row == j + 1 and j >= 0) or j == ny else before
             for m in range(marks.first[row], marks.first[row + 1]):
                 k, n = marks.place[m] - first, marks.number[m]
                 if 0 <= k < last - first:
-                    e, beyond = here[k + SURFACE], other[k + SURFACE]
+                    e, beyond = here[k + SURFACE], next_row[k + SURFACE]
                     flatten(share_without(marks.crest[n], marks.height[n], e, beyond), here, k, sides, k)
 
 
@@ -210,15 +210,17 @@ def flatten_along(marks, row, nx, first, last, cells, sides):
 
 
 @njit
-def close_marked(g, marks, row, first, count, normal, along, left, right, l, r, f, kx, ky, top):
+def close_marked(g, marks, row, first, count, axes, sides, f, kx, ky, top):
     """Replace the fluxes through marked faces of a row of faces of a grid that are walls, and write all marked flows.
 
     count : number of faces, the first in column `first`; kx : 1 / widths of all columns [1/m]
     ky : 1 / height of the row of cells, or of the rows on both sides of a row of faces normal to y [1/m]
-    top : greatest rates, from the column before `first` on; other arguments as for `surface_rows.put_fluxes`
+    axes, sides : (normal, along) and (left, right, l, r) of `surface_rows.put_fluxes`; f : as there
+    top : greatest rates, from the column before `first` on
     """
     if marks is None:
         return
+    (normal, along), (left, right, l, r) = axes, sides
     turn = 1.0 if normal == EAST else -1.0  # y is to the left of x, -x to the left of y
     for m in range(marks.first[row], marks.first[row + 1]):
         i, k, n = marks.place[m], marks.place[m] - first, marks.number[m]
@@ -234,14 +236,14 @@ def close_marked(g, marks, row, first, count, normal, along, left, right, l, r, 
                 before, after, low, high,
             )  # fmt: skip
             f[k], f[k + BEFORE], f[k + AFTER], f[k + ALONG], beyond = flux
-            marks.kept[n] = beyond - f[k + ALONG]
+            marks.spare[n] = beyond - f[k + ALONG]
             if speed > 0.0:
-                one, other = abs(l[k + along]) + l[k + WAVE], abs(r[k + along]) + r[k + WAVE]
+                west, east = abs(l[k + along]) + l[k + WAVE], abs(r[k + along]) + r[k + WAVE]
                 if normal == EAST:
-                    top[k] = max(top[k], speed * kx[i - 1] + one * ky[0])
-                    top[k + 1] = max(top[k + 1], speed * kx[i] + other * ky[0])
+                    top[k] = max(top[k], speed * kx[i - 1] + west * ky[0])
+                    top[k + 1] = max(top[k + 1], speed * kx[i] + east * ky[0])
                 else:
-                    top[k + 1] = max(top[k + 1], speed * max(ky[0], ky[1]) + max(one, other) * kx[i])
+                    top[k + 1] = max(top[k + 1], speed * max(ky[0], ky[1]) + max(west, east) * kx[i])
         marks.flows[n] = f[k]
 
 
@@ -255,7 +257,7 @@ def add_forces_along(marks, row, first, last, k, rates):
         for m in range(marks.first[row], marks.first[row + 1]):
             i, n = marks.place[m] - first, marks.number[m]
             if 0 <= i < last - first and marks.height[n] > 0.0:
-                rates[i] += k[min(i, k.size - 1)] * marks.kept[n]
+                rates[i] += k[min(i, k.size - 1)] * marks.spare[n]
 
 
 @njit
@@ -278,15 +280,15 @@ def flatten_cells(marks, mesh, j, cells, sides):
 
 
 @njit
-def keep_marked(marks, row, w, rows):
+def save_sums(marks, row, w, rows):
     """Keep the sums of cells at marked sides of a row of sides of a mesh.
 
     w : scratch of the block; rows : offsets of the five sums there
     """
     if marks is not None:
         for m in range(marks.first[row], marks.first[row + 1]):
-            for k in range(KEPT):
-                marks.kept[k * BLOCK + m - marks.first[row]] = w[rows[k] + marks.place[m]]
+            for k in range(SUM_COUNT):
+                marks.spare[k * BLOCK + m - marks.first[row]] = w[rows[k] + marks.place[m]]
 
 
 @njit

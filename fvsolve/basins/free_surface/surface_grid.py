@@ -344,7 +344,7 @@ def put_fluxes_across(grid, j, first, last, rows, flows, moves, faces):
         ky, kx, top = grid.ky[min(j, ny - 1) : min(j, ny - 1) + 1], grid.kx[first:last], rows.top[GHOSTS:]
         close_driven(g, faces.values[:, at : at + n], turn, EAST, cells, ky, kx, side, north, top)
     ky, top = grid.ky[max(j - 1, 0) : j + 1], rows.top[GHOSTS - 1 :]
-    close_marked(g, grid.marks, j, first, n, NORTH, EAST, under, low, l, r, north, grid.kx, ky, top)
+    close_marked(g, grid.marks, j, first, n, (NORTH, EAST), (under, low, l, r), north, grid.kx, ky, top)
     if flows.y.size > 0:
         copy(north, flows.y[j * nx + first : j * nx + last])
     if flows.through.size > 0 and is_side:
@@ -386,7 +386,7 @@ def put_fluxes_along(grid, j, first, last, rows, flows, moves, faces):
             east, end = faces.values[:, ny + j : ny + j + 1], n - 1
             close_driven(g, east, -1.0, NORTH, after[end:], kx[nx - 1 :], ky, left[n:], along[n:], top[end:])
     ky, top = grid.ky[j : j + 1], rows.top[GHOSTS - 1 :]
-    close_marked(g, grid.marks, ny + 1 + j, first, n + 1, EAST, NORTH, left, right, l, r, along, grid.kx, ky, top)
+    close_marked(g, grid.marks, ny + 1 + j, first, n + 1, (EAST, NORTH), (left, right, l, r), along, grid.kx, ky, top)
     if flows.x.size > 0:
         copy(along, flows.x[j * (nx + 1) + first : j * (nx + 1) + last + 1])
     if flows.through.size > 0 and first == 0:

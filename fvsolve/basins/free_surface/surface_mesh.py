@@ -13,7 +13,7 @@ import numpy as np
 
 from fvsolve.basins import cell_sides as side
 from fvsolve.basins.cell_sides import BLOCK, HUGE, INDICES, MEASURES, TINY, gather, limited_sides, ring_place
-from fvsolve.basins.free_surface.marked_faces import MarkedFaces, flatten_cells, flux_over_wall, keep_marked
+from fvsolve.basins.free_surface.marked_faces import MarkedFaces, flatten_cells, flux_over_wall, save_sums
 from fvsolve.basins.free_surface.patch_closures import FLOW, MOMENTUM, SPEED, DrivenFaces
 from fvsolve.basins.free_surface.patch_closures import SURFACE as DRIVEN_SURFACE
 from fvsolve.basins.free_surface.surface_rows import THIN
@@ -131,7 +131,7 @@ def add_side(water, mesh, j, k, first, last, reflect, cells, sides, w, moves, ph
         w[_U + i], w[_V + i] = mirrored_velocity(mesh, q, reflect, sides[2, own + i], sides[3, own + i], moves)
     centre = cells[0, o:], cells[1, o:], cells[4, o:]
     edges, number = mesh.edges[first:last], mesh.number[first:last]
-    keep_marked(water.marks, 4 * j + k, w, SUMS)
+    save_sums(water.marks, 4 * j + k, w, SUMS)
     if moves is None:
         add_side_fluxes(water.g, centre, inside, geo, w, None)
     else:
@@ -234,7 +234,7 @@ def close_marked(g, marks, row, centre, inside, geo, w):
         i, k = marks.place[m], max(marks.number[m], ~marks.number[m])
         if marks.height[k] > 0.0:
             for q in range(len(SUMS)):
-                w[SUMS[q] + i] = marks.kept[q * BLOCK + m - marks.first[row]]
+                w[SUMS[q] + i] = marks.spare[q * BLOCK + m - marks.first[row]]
             nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
             before = h[i], e[i], u[i] * nx + v[i] * ny, v[i] * nx - u[i] * ny, c0[i]
             beyond, along = w[_U + i] * nx + w[_V + i] * ny, w[_V + i] * nx - w[_U + i] * ny
