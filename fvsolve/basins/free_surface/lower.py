@@ -389,13 +389,17 @@ class FreeSurfaceRows(BasinRows):
         cells = draft.integers[row["first"] : row["first"] + row["count"]]
         row["rest"], row["depth"] = self.part.level, -1
         row["lowest"] = max(float(self.bed[cells].min()) - self.part.level, 0.0)
-        if patch not in self.driven:
+        has_faces, is_interior = f"{self.name}.{patch}" in self.case.patches_with_faces, patch in self.mesh.interior
+        if is_interior and not has_faces:
+            row["faces"] = 0  # links see its cells only
+        if patch not in self.driven and not has_faces:
             return
         behind = np.array(draft.integers[row["ring"] + row["faces"] :][: row["faces"]])
         row["second"], row["inside"] = len(draft.integers), draft.to_work(4 * int(row["faces"]))
-        draft.integers += self.second_cells(patch, behind).tolist()
-        if patch in self.linked:
-            row["closure"], row["valve"] = rec.LINKED, draft.valve_names.index(f"{self.name}.{patch}.face")
+        draft.integers += (self.mesh.faces(patch).inside if is_interior else self.second_cells(patch, behind)).tolist()
+        if has_faces:
+            row["closure"] = rec.INTERIOR if is_interior else rec.LINKED
+            row["valve"] = draft.valve_names.index(f"{self.name}.{patch}.face")
             return
         stated = self.part.patches[patch]
         row["closure"] = CLOSURES[stated.closure]
@@ -410,10 +414,9 @@ class FreeSurfaceRows(BasinRows):
 
     def faces_at_rest(self, patch: str) -> tuple[np.ndarray, ...]:
         """(depth, surface above the level at rest, inward velocity, length) of the faces of a patch at rest."""
-        faces = self.mesh.patch(patch)
-        cells = self.mesh.left[faces]
-        surface = np.maximum(self.bed - self.part.level, 0.0)[cells]
-        return self.depth[cells], surface, np.zeros(cells.size), self.mesh.length[faces]
+        faces, cells, inside, _ = self.mesh.faces(patch)
+        bed = np.maximum(self.bed[cells], self.bed[inside]) - self.part.level
+        return np.maximum(-bed, 0.0), np.maximum(bed, 0.0), np.zeros(cells.size), self.mesh.length[faces]
 
     def second_cells(self, patch: str, behind: np.ndarray) -> np.ndarray:
         """Cells next inside the cells `behind` the faces of a patch; the same cells on a mesh, and with upwind."""

@@ -21,7 +21,17 @@ from fvsolve.basins.cell_sides import deviations_of
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.jit import njit
 from fvsolve.kernels.cube_root import cube_root_reciprocal
-from fvsolve.kernels.dtypes import CRITICAL, DISCHARGE, LINKED, NO_CLOSURE, NORMAL_SLOPE, PATCH_FROUDE, RATING, STAGE
+from fvsolve.kernels.dtypes import (
+    CRITICAL,
+    DISCHARGE,
+    INTERIOR,
+    LINKED,
+    NO_CLOSURE,
+    NORMAL_SLOPE,
+    PATCH_FROUDE,
+    RATING,
+    STAGE,
+)
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
 
@@ -252,6 +262,26 @@ def read_faces(tables, patch, y):
 
 
 @njit
+def read_faces_around(tables, patch, y):
+    """Write the state inside the faces of an interior patch to its work array: that of the cells around it.
+
+    A face has the higher of the beds of both cells. Its depth is at most twice that of the cell of the patch, from
+    which its flow comes. y : deviations of cells
+    """
+    basin, plane, integers = tables.basins[patch["basin"]], tables.plane, tables.integers
+    count, at, beds = patch["faces"], patch["normals"], tables.basins[patch["basin"]]["plan"]
+    h, e, u, lengths = faces_inside(tables, patch)
+    for m in range(count):
+        k, own = integers[patch["ring"] + count + m], integers[patch["second"] + m]
+        depth, surface, u[m] = read_cell(plane, basin, k, plane[at + m], plane[at + count + m], y)
+        step = (plane[beds + basin["n"] + own] - plane[beds + own]) - (plane[beds + basin["n"] + k] - plane[beds + k])
+        above = depth - max(step, 0.0)  # of the surface over the bed of the face
+        within = max(plane[beds + own] + y[basin["y"] + own], 0.0)
+        h[m], e[m] = min(max(above, 0.0), 2.0 * within), surface + max(-above, 0.0)
+        lengths[m] = plane[at + 2 * count + m] * plane[basin["area"] + k]
+
+
+@njit
 def level_of_patch(tables, patch, g, faces, t, out):
     """(level of a patch above the level at rest [m], given inflow [m3/s]); 0 for closures of single faces."""
     empty = tables.plane[:0]
@@ -353,7 +383,7 @@ def close_patches(t, y, dydt, out, handle):
     for k in range(tables.patches.size):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
-        if basin["kind"] == OWN_CODE and patch["closure"] != NO_CLOSURE:
+        if basin["kind"] == OWN_CODE and patch["closure"] != NO_CLOSURE and patch["closure"] != INTERIOR:
             close_patch(tables, patch, t, deviations_of(basin, tables.seen, y), out)
 
 
