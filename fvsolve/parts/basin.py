@@ -388,6 +388,11 @@ class Physics(Table):
         raise NotImplementedError
 
     @classmethod
+    def has_fifth_order(cls, basin: "Basin", rectangle: bool) -> bool:
+        """True if schemes above second order apply to a basin; rectangle : True if its mesh is a full rectangle"""
+        return rectangle
+
+    @classmethod
     def has_friction(cls, basin: "Basin") -> bool:
         """True if friction of the bed or of walls acts on the flow of a basin."""
         return False

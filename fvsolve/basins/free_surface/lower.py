@@ -22,6 +22,7 @@ from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
 from fvsolve.basins.free_surface import law_patch_face, patch_closures, surface_grid, surface_maxima, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import RATE_CAP, add_friction
 from fvsolve.basins.free_surface.lower_notices import inflow_watches, unusual_values
+from fvsolve.basins.free_surface.lower_marks import Marks, chain_texts, lower_marks, marks_of
 from fvsolve.basins.free_surface.surface_patches import DEPTH, TOTALS
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
@@ -331,8 +332,11 @@ class FreeSurfaceRows(BasinRows):
 
     def pieces(self, valves: bool) -> Iterator[RhsTerms]:
         kind = f"{'moving_' if self.moves else ''}{'grids' if self.is_grid else 'meshes'}"
-        yield RhsTerms(package=PACKAGE, rates=f"surface_rates: water_{'driven_' if self.driven else ''}{kind}")
+        of_faces = "marked_" if self.marks.faces.size else "driven_" if self.driven else ""
+        yield RhsTerms(package=PACKAGE, rates=f"surface_rates: water_{of_faces}{kind}")
         yield WATER_TERMS
+        if self.sections:
+            yield RhsTerms(package=PACKAGE, observe="marked_faces: observe_sections")
         if self.driven:
             yield DRIVEN_TERMS
         if self.part.on is not None:
@@ -348,6 +352,14 @@ class FreeSurfaceRows(BasinRows):
         yield SHORTAGES
         if valves:
             yield RhsTerms(package=PACKAGE, rate_limits="surface_patches: limit_inflow_rate")
+
+    @cached_property
+    def marks(self) -> Marks:
+        """Faces of walls and sections."""
+        return marks_of(self)
+
+    def chain_texts(self) -> list[str]:
+        return list(chain_texts(self))
 
     @property
     def forms_stages(self) -> bool:
@@ -452,7 +464,9 @@ class FreeSurfaceRows(BasinRows):
         else:
             row["work"] = draft.to_work(mesh_blocks.work_size(surface_mesh, self.integers))
         row["plan"] = draft.to_plane(plan)
-        row["driven"] = draft.to_work(patch_closures.ROWS * int(row["outer"])) if self.driven else -1
+        lower_marks(draft, self, row)
+        has_faces = self.driven or self.marks.faces.size
+        row["driven"] = draft.to_work(patch_closures.ROWS * int(row["outer"])) if has_faces else -1
         row["wet_depth"] = self.case.output.wet_depth
         if self.records_maxima:
             rows = max(int(row["ny"]), 1)
