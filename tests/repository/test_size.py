@@ -45,7 +45,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/studies": (14875, 51),
     "fvsolve/validation": (1463, 11),
     "tests/attitude": (447, 2),
-    "tests/basins": (8153, 27),
+    "tests/basins": (8313, 27),
     "tests/case": (4474, 15),
     "tests/cli": (1130, 8),
     "tests/draw": (217, 2),
