@@ -17,7 +17,7 @@ from fvsolve.basins.basin_patches import physics_code
 from fvsolve.basins.cell_sides import BLOCK, HEAD, INDICES
 from fvsolve.basins.fifth_order import fifth_order_work
 from fvsolve.basins.lower_motion import lower_mesh
-from fvsolve.case.basins import boundary_cells, patch_names
+from fvsolve.case.basins import boundary_cells
 from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
@@ -268,7 +268,8 @@ class BasinRows:
         """
         mesh, coefficients = self.mesh, np.ones(self.mesh.left.size)
         for name, patch in self.part.patches.items():
-            coefficients[mesh.patch(name)] = self.reflection(patch)
+            if not patch.is_interior:
+                coefficients[mesh.patch(name)] = self.reflection(patch)
         for name in self.linked:
             coefficients[mesh.patch(name)] = 0.0
         outer = coefficients[mesh.inner :]
@@ -285,6 +286,13 @@ class BasinRows:
         south, at = normal[:, 1] < -0.5, np.where(np.abs(normal[:, 0]) > 0.5, row, column)
         side = np.where(west, 0, np.where(east, 1, np.where(south, 2, 3)))
         return np.lexsort((at, side))
+
+    def ring_numbers(self, patch: str) -> np.ndarray:
+        """Numbers of the faces of a patch in the order of boundary faces of the kernels; -1 for an interior patch."""
+        faces = self.mesh.faces(patch).index - self.mesh.inner
+        if patch in self.mesh.interior:
+            return np.full(faces.size, -1)
+        return np.argsort(self.ring())[faces] if self.is_grid else faces
 
     def reflection(self, patch) -> float:
         """Reflection coefficient of waves at a patch: 0 if it is open, 1 for a wall, other values for impedances."""
@@ -307,8 +315,11 @@ class BasinRows:
 
     @cached_property
     def linked(self) -> list[str]:
-        """Names of the patches whose faces pass the flow of links, see `case.basins.patches_with_faces`."""
-        return [name for name in patch_names(self.mesh) if f"{self.name}.{name}" in self.case.patches_with_faces]
+        """Names of the patches whose faces pass the flow of links, see `case.basins.patches_with_faces`.
+
+        Interior patches are left out.
+        """
+        return [name for name in self.mesh.patches if f"{self.name}.{name}" in self.case.patches_with_faces]
 
     @property
     def opening(self) -> str | None:
@@ -535,10 +546,9 @@ class BasinRows:
         cells = boundary_cells(self.mesh, patch)
         row["first"], row["count"] = len(draft.integers), cells.size
         draft.integers += cells.tolist()
-        faces, outer = np.arange(self.mesh.left.size)[self.mesh.patch(patch)], self.mesh.inner
-        numbers = np.argsort(self.ring())[faces - outer] if self.is_grid else faces - outer
-        row["ring"], row["faces"], cells_of_faces = len(draft.integers), faces.size, self.mesh.left[faces]
-        draft.integers += [*numbers.tolist(), *cells_of_faces.tolist()]
+        faces, behind, _, normal = self.mesh.faces(patch)
+        row["ring"], row["faces"] = len(draft.integers), faces.size
+        draft.integers += [*self.ring_numbers(patch).tolist(), *behind.tolist()]
         length = self.mesh.length[faces]
         sizes = [self.mesh.area[cells].sum(), length.sum()]
         if self.deep and self.part.on is not None:
@@ -546,8 +556,8 @@ class BasinRows:
 
             sizes += position_in_frame(draft, self, patch)
         row["sizes"] = draft.to_plane(np.array(sizes))
-        per_area = [length / self.mesh.area[cells_of_faces]] * (2 if self.moves else 1)
-        row["normals"] = draft.to_plane(np.array([*self.mesh.normal[faces].T, *per_area]))
+        per_area = [length / self.mesh.area[behind]] * (2 if self.moves else 1)
+        row["normals"] = draft.to_plane(np.array([*normal.T, *per_area]))
         stated = self.part.patches.get(patch)
         row["open"], row["moves"] = self.is_open(patch), patch in self.walls
         given = stated.scalars if stated is not None else {}

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from fvsolve.case import bodies
+from fvsolve.case.interior_patches import interior_patches
 from fvsolve.case.output_grids import grid_faults
 from fvsolve.case.raster_meshes import raster_extent, rasters_with_holes, terrace_notes
 from fvsolve.case.resource_checks import BASIN_CELL, byte_text, free_memory, name_faults
@@ -400,14 +401,17 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
                 text = f"{count:.3g} cells take about {byte_text(count * BASIN_CELL)} of memory"
                 text += f", and {byte_text(free_memory())} are free; expected fewer cells"
                 raise ValueFault([(("mesh", "cell") if basin.mesh else ("cells",), text)])
-            sides = {name: (item.side, *item.span) if item.span else item.side for name, item in basin.patches.items()}
+            sides = {name: (item.side, *item.span) if item.span else item.side
+                     for name, item in basin.patches.items() if not item.is_interior}  # fmt: skip
             grading = basin.grading or (1.0, 1.0)
             lacks = [raster.lacks for raster in rasters_with_holes(basin, setting)]
             mesh = rectangle(size, cells, corner, grading, sides, basin.holes or (), lacks)
-            return replace(mesh, notes=terrace_notes(basin, mesh.grid))
+            mesh = replace(mesh, notes=terrace_notes(basin, mesh.grid))
+            return replace(mesh, interior=interior_patches(basin, mesh))
         if rasters_with_holes(basin, setting):
             raise ValueFault([((), "`outside` of a raster applies to rectangles; leave it out, or cut the mesh file")])
-        return read(setting.files[basin.mesh.file], basin.mesh.unit)
+        mesh = read(setting.files[basin.mesh.file], basin.mesh.unit)
+        return replace(mesh, interior=interior_patches(basin, mesh))
     except MeshError as error:
         if not basin.is_rectangle:  # the faults are in the mesh file, not in keys of the case
             name, places = Path(basin.mesh.file).name, [item.place == "unit" for item in error.faults]
@@ -504,12 +508,12 @@ def _end_faults(line: Any, pool: Any, inside: bool) -> Iterator[tuple[str, str]]
 
 def patch_names(mesh: Mesh) -> tuple[str, ...]:
     """Names of the patches of a mesh that a case may use: all but the last, which holds the faces without a name."""
-    return mesh.patches[:-1]
+    return (*mesh.patches[:-1], *mesh.interior)
 
 
 def boundary_cells(mesh: Mesh, patch: str) -> np.ndarray:
-    """Indices of the cells that have a face in a patch : int64[count], sorted."""
-    return np.unique(mesh.left[mesh.patch(patch)])
+    """Indices of the cells that have a face in a patch, or of those in an interior patch : int64[count], sorted."""
+    return np.unique(mesh.faces(patch).inside) if patch not in mesh.interior else mesh.interior[patch]
 
 
 def place_kind(basin: Basin, patch: str) -> type[PatchNode]:
@@ -541,7 +545,13 @@ def patches_with_faces(nodes: dict[str, Any], links: dict[str, Any], lines: str,
         (others if is_other else joined).update(link.ports.values())
     fixed = [name for name in meshes if may_have_faces(nodes[name])]
     names = {f"{name}.{patch}" for name in fixed for patch in patch_names(meshes[name])}
-    return frozenset(names & (joined - others))
+    given = {f"{name}.{patch}" for name in fixed for patch, keys in nodes[name].patches.items() if is_source(keys)}
+    return frozenset(names & ((joined | given) - others))
+
+
+def is_source(patch: Any) -> bool:
+    """True for an interior patch with a given inflow."""
+    return patch is not None and patch.is_interior and patch.discharge is not None
 
 
 def places(
@@ -564,7 +574,8 @@ def places(
         kind, place = place_kind(basin, patch), f"{name}.{patch}"
         keys = {"position": None, "basin": name, "patch": patch, **rest}
         if place in with_faces:
-            result[place] = PatchJunction.model_construct(**keys)
+            inflow = {"flow": basin.patches[patch].discharge} if is_source(basin.patches.get(patch)) else {}
+            result[place] = PatchJunction.model_construct(**keys, **inflow)
             place = f"{place}.inside"
         result[place] = kind.model_construct(**keys)
     return result
@@ -577,7 +588,7 @@ def face_links(nodes: dict[str, Any], meshes: dict, with_faces: frozenset[str]) 
         for patch in patch_names(mesh):
             place = f"{name}.{patch}"
             if place in with_faces:
-                length = float(mesh.length[mesh.patch(patch)].sum())
+                length = float(mesh.length[mesh.faces(patch).index].sum())
                 ends = {"from_": place, "to": f"{place}.inside", "basin": name, "patch": patch, "length": length}
                 result[f"{place}.face"] = nodes[name].physics_type.face_type().model_construct(**ends)
     return result

@@ -627,7 +627,9 @@ PATCHES = record(
     open=i8,  # 1 if it is not a wall and joins no link: its flow is that of the boundary
     moves=i8,  # 1 if it is a moving wall
     values=i8,  # offset in `integers` of schedules of inflow values, for each scalar; -1: its initial value
-    second=i8,  # offset in `integers` of the cells next inside those behind its faces; a cell itself if there is none
+    # Offset in `integers` of the cells next inside those behind its faces, a cell itself if there is none; of an
+    # interior patch, its own cells at the faces around it.
+    second=i8,
     closure=i8,  # NO_CLOSURE, or the closure of a driven patch
     drive=i8,  # schedule of its stage or discharge
     depth=i8,  # schedule of the depth of supercritical inflow; -1 for none
@@ -639,7 +641,7 @@ PATCHES = record(
     rest=f8,  # level at rest above the elevation of the basin [m]
     lowest=f8,  # lowest bed of its cells above the level at rest, at least 0 [m]
 )
-NO_CLOSURE, STAGE, DISCHARGE, RATING, CRITICAL, NORMAL_SLOPE, LINKED = range(7)
+NO_CLOSURE, STAGE, DISCHARGE, RATING, CRITICAL, NORMAL_SLOPE, LINKED, INTERIOR = range(8)
 
 WALL = record(
     basin=i8,

@@ -131,9 +131,9 @@ def basin_facts(basin) -> dict[str, Any]:
     """Facts about a basin: mesh, waves at the start, and patches (length of faces, area of the cells behind them)."""
     mesh, patches = basin.mesh, {}
     for name in patch_names(mesh):
-        faces, part = mesh.patch(name), basin.part.patches.get(name)
+        faces, part = mesh.faces(name).index, basin.part.patches.get(name)
         patches[name] = {
-            "faces": faces.stop - faces.start, "length": float(mesh.length[faces].sum()),
+            "faces": faces.size, "length": float(mesh.length[faces].sum()),
             "area": float(mesh.area[boundary_cells(mesh, name)].sum()),
             "reflects": 1.0 if part is None else basin.reflection(part),
         }  # fmt: skip

@@ -209,3 +209,99 @@ def test_a_culvert_under_a_road_does_not_chatter():
     found = fvsolve.run(CASES / "road-culvert.toml")
     rising = (found.t > 240.0) & (found.t <= 1440.0)
     assert np.diff(found["under.flow"][rising]).min() > 0.0 and found.ok
+
+
+PLACES = {"sides": ({"side": "east"}, {"side": "west"}),
+          "interior": ({"at": [10, 5], "area": 4.0}, {"at": [6, 4], "area": 8.0})}  # fmt: skip
+
+
+@pytest.mark.parametrize("method", ["ssp-rk2", "rodas-5p", "radau-iia-5"])
+@pytest.mark.parametrize("where", PLACES)
+def test_a_pump_lifts_water_from_one_basin_to_another(where, method):
+    """Levels of two basins, and of two tanks with the pump's curve H = 2 m - 800 q^2, by SciPy."""
+    low, high = ({"type": "basin", "size": [size, 10.0], "cells": [int(size / 2), 5], "level": level, "elevation": 0.0,
+                  "patches": {"end": patch}}
+                 for size, level, patch in zip((20.0, 12.0), (1.0, 1.5), PLACES[where], strict=True))  # fmt: skip
+    pump = {"type": "pump", "from": "low.end", "to": "high.end", "curve": {"coefficients": [2.0, 0.0, -800.0]}}
+    own = {"rtol": 1e-6} if method != "ssp-rk2" else {"courant": 0.9}
+    numerics = {"scheme": "upwind", "method": method, **own}
+    found = fvsolve.run(scene({"low": low, "high": high}, {"pump": pump}, 200.0, numerics,
+                              ["pump.flow", "low.volume", "high.volume"], 5.0))  # fmt: skip
+
+    def lifted(t, volumes):
+        q = math.sqrt((2.0 - (volumes[1] / 120.0 - volumes[0] / 200.0)) / 800.0)
+        return [-q, q]
+
+    tanks = solve_ivp(lifted, (0.0, 200.0), [200.0, 180.0], rtol=1e-9, t_eval=found.t)
+    assert found["low.volume"] == approx(tanks.y[0], rel=1e-4)
+    assert found["low.volume"] + found["high.volume"] == approx(380.0, rel=1e-12)
+    assert found.ok and abs(found.ledger["mass"]["relative"]) < 1e-12
+
+
+ASKED, CRITICAL = 20.0, WIDE * 8.0 / 27.0 * math.sqrt(G) * DEEP**1.5  # [m3/s]
+
+
+def drawn(side="east", turned=False, **rest) -> dict:
+    """Channel with a demand of ASKED behind an orifice, more than critical outflow."""
+    case = channel(0.0, side=side, turned=turned, **rest)
+    case["nodes"]["lake"] = {"type": "junction", "elevation": 0.0, "demand": ASKED}
+    return case
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_demand_beyond_critical_outflow_is_held_there_with_a_mark(method):
+    """Critical outflow of a simple wave from still water (Ritter's at the dam); the rest has a line in the ledger."""
+    numerics = {"method": method, **METHODS[method]}
+    found = fvsolve.run(drawn(numerics=numerics, cells=(240, 1), probes=["reach.end.flow", "gate.flow"]))
+    assert found.reason == "finished" and not found.ok
+    assert abs(found["gate.flow"]) == approx(ASKED)
+    assert found["reach.end.flow"][-1] == approx(-CRITICAL, rel=1e-3)
+    mark = next(mark for mark in found.marks if mark.what == "discharge held")
+    assert mark.place == "nodes.reach.end" and mark.time == 0.0
+    assert "the flow drawn from it is more than critical flow" in mark.text
+    assert mark.volume == approx((ASKED - CRITICAL) * 4.0, rel=1e-3)
+    ledger = found.ledger["mass"]
+    assert ledger["nodes"]["reach.end.inside"]["made_up"] == approx(mark.volume * 1000.0, rel=1e-3)
+    assert ledger["nodes"]["lake"]["outflow"] == approx(ASKED * 4.0 * 1000.0, rel=1e-3)
+    assert abs(ledger["relative"]) < 1e-12
+
+
+@pytest.mark.parametrize("path", ["north", "west", "turned", "threads"])
+def test_a_restated_demand_beyond_critical_outflow_is_held_equally(path):
+    probes = ["reach.end.flow"]
+    here = fvsolve.run(drawn(cells=(120, 12), probes=probes))
+    if path == "threads":
+        there = fvsolve.run(drawn(cells=(120, 12), probes=probes), threads=3)
+        assert (there["reach.end.flow"] == here["reach.end.flow"]).all() and there.summary["threads"] == 3
+    else:
+        turned = path == "turned"
+        side = "east" if turned else path
+        there = fvsolve.run(drawn(side, turned, cells=(120, 12), probes=probes))
+        assert there["reach.end.flow"] == approx(here["reach.end.flow"], rel=1e-9)
+    assert there.marks[-1].volume == approx(here.marks[-1].volume, rel=1e-9)
+
+
+def test_a_demand_that_grows_beyond_critical_outflow_and_back_is_met_again():
+    """At a patch with a scheduled discharge the same outflow leaves."""
+    probes, schedule = ["reach.end.flow"], {"time": [0, 1, 2, 3], "value": [2.0, 2.0, ASKED, 2.0]}
+    case = drawn(probes=probes)
+    case["nodes"]["lake"]["demand"] = schedule
+    found = fvsolve.run(case)
+    scheduled = drawn(probes=probes)
+    del scheduled["nodes"]["lake"], scheduled["links"]["gate"]
+    discharge = {"time": schedule["time"], "value": [-q for q in schedule["value"]]}
+    scheduled["nodes"]["reach"]["patches"]["end"]["discharge"] = discharge
+    other = fvsolve.run(scheduled)
+    assert found["reach.end.flow"] == approx(other["reach.end.flow"], rel=2e-3)
+    assert found["reach.end.flow"][-1] == approx(-2.0)
+    volumes = [next(m.volume for m in run.marks if m.what == "discharge held") for run in (found, other)]
+    assert volumes[0] == approx(volumes[1], rel=5e-3)
+
+
+def test_a_basin_drained_by_a_demand_runs_dry_at_its_patch():
+    """The volume of the basin and the volume from outside are together the demand."""
+    case = drawn(cells=(8, 1), end=40.0)
+    found = fvsolve.run(case)
+    mark, ledger = found.marks[-1], found.ledger["mass"]
+    assert found.reason == "finished" and abs(ledger["relative"]) < 1e-12
+    assert mark.volume == approx(ASKED * 40.0 - (ledger["initial"] - ledger["final"]) / ledger["initial"] * 240.0)

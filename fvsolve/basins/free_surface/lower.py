@@ -377,13 +377,18 @@ class FreeSurfaceRows(BasinRows):
         cells = draft.integers[row["first"] : row["first"] + row["count"]]
         row["rest"], row["depth"] = self.part.level, -1
         row["lowest"] = max(float(self.bed[cells].min()) - self.part.level, 0.0)
-        if patch not in self.driven:
+        has_faces, is_interior = f"{self.name}.{patch}" in self.case.patches_with_faces, patch in self.mesh.interior
+        if is_interior and not has_faces:
+            row["faces"] = 0  # links see its cells only
+            self.check_interior_patch(draft, patch)
+        if patch not in self.driven and not has_faces:
             return
         behind = np.array(draft.integers[row["ring"] + row["faces"] :][: row["faces"]])
         row["second"], row["inside"] = len(draft.integers), draft.to_work(4 * int(row["faces"]))
-        draft.integers += self.second_cells(patch, behind).tolist()
-        if patch in self.linked:
-            row["closure"], row["valve"] = rec.LINKED, draft.valve_names.index(f"{self.name}.{patch}.face")
+        draft.integers += (self.mesh.faces(patch).inside if is_interior else self.second_cells(patch, behind)).tolist()
+        if has_faces:
+            row["closure"] = rec.INTERIOR if is_interior else rec.LINKED
+            row["valve"] = draft.valve_names.index(f"{self.name}.{patch}.face")
             return
         stated = self.part.patches[patch]
         row["closure"] = CLOSURES[stated.closure]
@@ -396,12 +401,26 @@ class FreeSurfaceRows(BasinRows):
         if stated.normal_slope is not None:
             row["conveyance"] = draft.to_plane(math.sqrt(stated.normal_slope) / self.roughness[behind])
 
+    def check_interior_patch(self, draft, patch: str) -> None:
+        """Report an interior patch without faces: a fault if it has a discharge, a notice if no link joins it."""
+        place, joined = f"nodes.{self.name}.patches.{patch}", self.places_of_links
+        if self.part.patches[patch].discharge is not None:
+            text = "needs the faces around the patch, which it does not have in cases with scalars, or where a rigid "
+            draft.fault(f"{place}.discharge", f"{text}column or a delay line joins it; leave this key out")
+        elif f"{self.name}.{patch}" not in joined:
+            text = f"basin {self.name}: no link joins the interior patch {patch}, so no water flows through it"
+            draft.warnings.append(Notice("patch", place, text, None))
+
+    @property
+    def places_of_links(self) -> set[str]:
+        """Full names of the places that links join."""
+        return {place for link in self.case.links.values() for place in link.ports.values()}
+
     def faces_at_rest(self, patch: str) -> tuple[np.ndarray, ...]:
         """(depth, surface above the level at rest, inward velocity, length) of the faces of a patch at rest."""
-        faces = self.mesh.patch(patch)
-        cells = self.mesh.left[faces]
-        surface = np.maximum(self.bed - self.part.level, 0.0)[cells]
-        return self.depth[cells], surface, np.zeros(cells.size), self.mesh.length[faces]
+        faces, cells, inside, _ = self.mesh.faces(patch)
+        bed = np.maximum(self.bed[cells], self.bed[inside]) - self.part.level
+        return np.maximum(-bed, 0.0), np.maximum(bed, 0.0), np.zeros(cells.size), self.mesh.length[faces]
 
     def second_cells(self, patch: str, behind: np.ndarray) -> np.ndarray:
         """Cells next inside the cells `behind` the faces of a patch; the same cells on a mesh, and with upwind."""
@@ -449,8 +468,9 @@ class FreeSurfaceRows(BasinRows):
         """True if rain, a driven patch or a link can bring water into the basin."""
         if self.rains:
             return True
-        joined = {place for link in self.case.links.values() for place in link.ports.values()}
-        return any(name in self.driven or f"{self.name}.{name}" in joined for name in patch_names(self.mesh))
+        joined, sources = self.places_of_links, self.case.patches_with_faces
+        places = (f"{self.name}.{name}" for name in patch_names(self.mesh))
+        return bool(self.closed) or any(place in joined or place in sources for place in places)
 
     @property
     def rubs(self) -> bool:
