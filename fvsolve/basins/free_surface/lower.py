@@ -21,8 +21,8 @@ from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
 from fvsolve.basins.free_surface import law_patch_face, patch_closures, surface_grid, surface_maxima, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import RATE_CAP, add_friction
-from fvsolve.basins.free_surface.lower_notices import inflow_watches, unusual_values
 from fvsolve.basins.free_surface.lower_marks import Marks, chain_texts, lower_marks, marks_of
+from fvsolve.basins.free_surface.lower_notices import inflow_watches, unusual_values
 from fvsolve.basins.free_surface.surface_patches import DEPTH, TOTALS
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
