@@ -45,7 +45,7 @@ def steepest(basin) -> float:
 
 def froude(basin, name: str, flow: np.ndarray, depth: np.ndarray) -> np.ndarray:
     """Froude numbers of an inflow [m3/s] with a depth [m] through a patch."""
-    wide = basin.mesh.length[basin.mesh.patch(name)].sum()
+    wide = basin.mesh.length[basin.mesh.faces(name).index].sum()
     return flow / (wide * depth * np.sqrt(basin.case.gravity * depth))
 
 
@@ -69,7 +69,7 @@ def subcritical_inflow(basin, name: str, patch) -> Iterator[Notice]:
 
 def narrow_structures(basin, name: str) -> Iterator[Notice]:
     """Notice of structures at a patch that are narrower than its cells, over which their flow spreads."""
-    place, side, narrow = f"{basin.name}.{name}", float(basin.mesh.length[basin.mesh.patch(name)].min()), []
+    place, side, narrow = f"{basin.name}.{name}", float(basin.mesh.length[basin.mesh.faces(name).index].min()), []
     for link, part in basin.case.links.items():
         if isinstance(part, HydraulicStructure) and place in part.ports.values():
             width = getattr(part, "width", None) or getattr(part, "diameter", None) or np.inf
@@ -91,11 +91,11 @@ class InflowWatch:
 
     def __init__(self, basin, name: str) -> None:
         self.basin, self.name, self.greatest = basin, name, np.zeros(3)
-        faces = basin.mesh.patch(name)
+        faces = basin.mesh.faces(name)
         self.cells, self.normal, self.length = (
-            basin.mesh.left[faces],
-            basin.mesh.normal[faces],
-            basin.mesh.length[faces],
+            faces.behind,
+            faces.normal,
+            basin.mesh.length[faces.index],
         )
 
     def check(self, t: float, y: np.ndarray) -> None:
@@ -125,4 +125,5 @@ class InflowWatch:
 def inflow_watches(basin) -> list[InflowWatch]:
     """Watches of the scheduled inflows without `depth`; the output of a control is not known in advance."""
     return [InflowWatch(basin, name) for name, patch in basin.part.patches.items()
-            if patch.discharge is not None and patch.depth is None and patch.discharge.kind != "control"]  # fmt: skip
+            if not patch.is_interior and patch.discharge is not None and patch.depth is None
+            and patch.discharge.kind != "control"]  # fmt: skip
