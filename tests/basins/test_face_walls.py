@@ -314,3 +314,19 @@ def test_names_of_sections_differ_from_those_of_parts_and_their_probes_are_known
     refused(pool(sections={"bridge": section}, probes=["bridge.depth"]), "section, which has no .depth.; it has flow")
     case = pool(sections={"bridge": section}, end=0.1)
     assert "bridge.flow" in fvsolve.run(case).probes  # by default
+
+
+def test_a_basin_has_walls_and_interior_patches_together():
+    """Water behind a wall drains through a gully; the other side keeps its level, at rest to the bit."""
+    gully = {"at": [1.5, 1.5], "area": 1.0}
+    basin = {"type": "basin", "size": [10.0, 4.0], "cells": [20, 8], "level": 0.5, "elevation": 0.0,
+             "walls": {"bund": {"line": [[5, -1], [5, 5]], "crest": 0.8}}, "patches": {"gully": gully}}  # fmt: skip
+    lid = {"type": "manhole", "from": "yard.gully", "to": "shaft", "crest": 0.0, "area": 0.28, "perimeter": 1.9}
+    nodes = {"yard": basin, "shaft": {"type": "tank", "area": 2.0, "elevation": -2.0, "level": 0.5}}
+    numerics = {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.9}
+    found = fvsolve.run(
+        scene(nodes, {"lid": lid}, 30.0, numerics, ["yard.depth@8,2", "yard.volume", "shaft.level"], 1.0)
+    )
+    assert (found["yard.depth@8,2"] == 0.5).all()
+    assert found["yard.volume"] + 2.0 * found["shaft.level"] == approx(20.0 + 1.0, rel=1e-12)
+    assert found["shaft.level"][-1] > 1.0 and abs(found.ledger["mass"]["relative"]) < 1e-12
