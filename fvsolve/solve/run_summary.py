@@ -11,7 +11,7 @@ from fvsolve.model import Model, RunData
 from fvsolve.solve.run_up import RunUpTable, run_up_table
 
 INTEGRATION_TIMES = 10001  # times at which a scheduled flow is integrated, beside its own
-HELD = (rec.DISCHARGE, rec.LINKED)  # closures of patches whose outflow is held at critical flow
+HELD = (rec.DISCHARGE, rec.LINKED, rec.INTERIOR)  # closures of patches whose outflow is held at critical flow
 DRIFT = 1e-6  # deviation of the length of Euler parameters from 1 above which a notice is given
 
 
@@ -166,7 +166,10 @@ def held_discharges(run_data: RunData, start: float, t: float, entered: np.ndarr
         name, time = model.node_names[row["node"]].removesuffix(".inside"), float(times[row["node"]])
         if np.isfinite(time):
             basin, _, patch = name.partition(".")
-            volume, linked = float(entered[row["node"]]) / model.case.properties.density, row["closure"] == rec.LINKED
+            volume, linked = (
+                float(entered[row["node"]]) / model.case.properties.density,
+                row["closure"] != rec.DISCHARGE,
+            )
             if not linked:
                 volume -= scheduled_volume(model.case.nodes[basin].patches[patch].discharge, start, t)
             lack, when = (model.case.amount(x, kind, 4) for x, kind in ((volume, "volume"), (time, "time")))

@@ -292,13 +292,20 @@ def read_faces_around(tables, patch, y):
 
 
 @njit
+def level_of_links(tables, patch, g, out):
+    """Level at the junction of the links of a patch, above the level at rest [m]."""
+    valve = tables.valves[patch["valve"]]
+    pressure = valve["drop"] + out[tables.layout[0]["pressure"] + valve["from_node"]]
+    return patch["lowest"] + pressure / (tables.settings[0]["rho"] * g)
+
+
+@njit
 def level_of_patch(tables, patch, g, faces, t, out):
     """(level of a patch above the level at rest [m], given inflow [m3/s]); 0 for closures of single faces."""
     empty = tables.plane[:0]
     if patch["closure"] == LINKED:
-        st, layout, valve = tables.settings[0], tables.layout[0], tables.valves[patch["valve"]]
-        pressure = valve["drop"] + out[layout["pressure"] + valve["from_node"]]
-        return patch["lowest"] + pressure / (st["rho"] * g), out[layout["valve"] + patch["valve"]] / st["rho"]
+        flow = out[tables.layout[0]["valve"] + patch["valve"]] / tables.settings[0]["rho"]
+        return level_of_links(tables, patch, g, out), flow
     if patch["closure"] == STAGE:
         return schedule_value(tables, patch["drive"], t) - patch["rest"], 0.0
     if patch["closure"] == DISCHARGE:
@@ -387,6 +394,20 @@ def put_discharge(tables, patch, rows, total, target, wide, given, may_hold):
         else:
             rows[FLOW, k] += (target - total) / wide
     return 1.0
+
+
+@njit
+def held_outflow(tables, patch, flow, out):
+    """(inflow, volume that lacks) [m3/s] of a patch whose links draw an outflow: at most critical outflow leaves.
+
+    flow : inflow of the links, negative [m3/s]
+    """
+    faces, g = faces_inside(tables, patch), tables.settings[0]["gravity"]
+    z = level_of_links(tables, patch, g, out)
+    if z >= lowest_bed(faces) - DEEPEST:
+        return flow, 0.0
+    greatest = patch_flow(g, z, faces)[0]
+    return (greatest, greatest - flow) if greatest > flow else (flow, 0.0)
 
 
 @njit
