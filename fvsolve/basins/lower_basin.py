@@ -29,6 +29,7 @@ from fvsolve.units import DIMENSIONS
 
 if TYPE_CHECKING:
     from fvsolve.kernels.rhs_assembly import RhsTerms
+    from fvsolve.mesh.face_chains import FaceChain
     from fvsolve.mesh.mesh import MeshPoints
 
 ROUNDING = 1e-12  # relative error of rates
@@ -143,7 +144,12 @@ class BasinRows:
     @property
     def scheme(self) -> str:
         """Name of the scheme that the basin uses."""
-        return SCHEMES[self.case.numerics.scheme].for_basin(self.is_grid).name
+        return SCHEMES[self.case.numerics.scheme].for_basin(self.has_fifth_order).name
+
+    @property
+    def has_fifth_order(self) -> bool:
+        """True if schemes above second order apply to the basin."""
+        return self.part.physics_type.has_fifth_order(self.part, self.is_grid)
 
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
         """Fill the row of a probe of a velocity in cells; each type of basin adds its other quantities.
@@ -191,6 +197,10 @@ class BasinRows:
 
     def notices(self, y: np.ndarray) -> list[Notice]:
         """Notices on the deviations y of cells at the start of a run."""
+        return []
+
+    def chain_texts(self) -> list[str]:
+        """Texts on its walls on faces and its sections, for the command `check`."""
         return []
 
     def watches(self, y: np.ndarray) -> list[Any]:
@@ -349,6 +359,12 @@ class BasinRows:
         """True if the greatest values of its cells are recorded."""
         return self.name in self.case.output.basins_with_maxima
 
+    @cached_property
+    def sections(self) -> dict[str, FaceChain]:
+        """Faces of its sections, by name."""
+        stated = self.case.output.sections.items()
+        return {name: section.chain(self.mesh) for name, section in stated if section.basin == self.name}
+
     @property
     def walls(self) -> list[str]:
         """Names of the patches that are moving walls."""
@@ -414,26 +430,27 @@ class BasinRows:
             row["nx"], row["ny"] = grid.nx, grid.ny
             row["spacing"] = draft.to_plane(np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)]))
         else:
-            if self.scheme != SCHEMES[numerics.scheme].for_basin(True).name:
-                text = f"basin {self.name}: {numerics.scheme} needs a full rectangle as mesh; muscl is used here"
-                draft.warnings.append(Notice("scheme", f"nodes.{self.name}", text, "scheme"))
             floats, self.integers = lower_mesh(mesh)
             row["mesh"], row["faces"] = draft.to_plane(floats), mesh.left.size
             row["links"] = len(draft.integers)
             draft.integers += self.integers.tolist()
+        if self.scheme != SCHEMES[numerics.scheme].for_basin(True).name:
+            needs = "does not support walls on faces" if self.is_grid else "needs a full rectangle as mesh"
+            text = f"basin {self.name}: {numerics.scheme} {needs}; muscl is used here"
+            draft.warnings.append(Notice("scheme", f"nodes.{self.name}", text, "scheme"))
         reflections = self.reflections()
         row["reflect"], row["outer_given"] = draft.to_plane(reflections), reflections.size
         row["outer"] = mesh.left.size - mesh.inner
         passes = any(self.reflection(patch) != 1.0 for patch in self.part.patches.values())
         row["through"] = draft.to_work(reflections.size) if passes else -1
-        has_boundary_rates = reflections.size or self.moves or self.part.on
+        has_boundary_rates = reflections.size or self.moves or self.part.on or self.sections
         row["boundary_rates"] = draft.to_work(len(self.quantities) * self.n if has_boundary_rates else 0)
         row["carried"] = row["flows"] = -1
         if self.moves:
             from fvsolve.basins.lower_motion import lower_lines
 
             lower_lines(draft, self, row)
-        row["body"] = row["frame"] = row["maxima"] = row["driven"] = -1
+        row["body"] = row["frame"] = row["maxima"] = row["driven"] = row["marked"] = -1
         self.lower(draft, row)
         if self.part.on is not None:
             from fvsolve.basins.lower_motion import lower_frame

@@ -119,11 +119,30 @@ def closure_faults(basin: Any, options: Any) -> Faults:
 
 
 def source_faults(basin: Any) -> Faults:
-    """Faults (key path within the basin, message) of rain and infiltration on a basin that moves or is deformed."""
-    for key in ("rain", "infiltration"):
-        if getattr(basin, key, None) is not None and (basin.on is not None or moving_walls(basin)):
+    """Faults (key path within the basin, message) of rain, infiltration and walls in a basin that moves or deforms."""
+    for key in ("rain", "infiltration", "walls"):
+        if getattr(basin, key, None) and (basin.on is not None or moving_walls(basin)):
             where = "a basin on a body" if basin.on is not None else "a basin with a moving wall"
             yield (key,), f"is not supported for {where}; expected a fixed basin, or leave this key out"
+
+
+def face_wall_faults(basin: Any, mesh: Any) -> Faults:
+    """Faults (key path within the basin, message) of the walls on faces between cells of a basin."""
+    for name, wall in (getattr(basin, "walls", None) or {}).items():
+        yield from ((("walls", name), text) for text in name_faults(name))
+        if name in patch_names(mesh):
+            yield ("walls", name), f"{name} is also the name of a patch; expected another name"
+        if wall.group is not None and wall.group not in mesh.groups:
+            what = "a rectangle has no groups; expected `line`"
+            if not basin.is_rectangle:
+                known = patch_names(mesh)
+                what = f"no such group in {Path(basin.mesh.file).name}{did_you_mean(wall.group, known)}"
+                what += f"; groups of its outline are {listing(known) or 'none'}"
+            yield ("walls", name, "group"), what
+        elif not wall.chain(mesh).faces.size:
+            low, high = (", ".join(f"{x:.6g}" for x in end) for end in (mesh.points.min(0), mesh.points.max(0)))
+            text = f"cuts no face between two cells; the basin reaches from ({low}) m to ({high}) m"
+            yield ("walls", name, "line" if wall.group is None else "group"), text
 
 
 def rating_faults(basin: Any, mesh: Any, patch: str) -> Faults:
@@ -410,7 +429,8 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
             return replace(mesh, interior=interior_patches(basin, mesh))
         if rasters_with_holes(basin, setting):
             raise ValueFault([((), "`outside` of a raster applies to rectangles; leave it out, or cut the mesh file")])
-        mesh = read(setting.files[basin.mesh.file], basin.mesh.unit)
+        groups = [wall.group for wall in getattr(basin, "walls", {}).values()]
+        mesh = read(setting.files[basin.mesh.file], basin.mesh.unit, groups)
         return replace(mesh, interior=interior_patches(basin, mesh))
     except MeshError as error:
         if not basin.is_rectangle:  # the faults are in the mesh file, not in keys of the case
@@ -474,10 +494,41 @@ def add_gauges(output: Output, nodes: dict[str, Any]) -> Faults:
                 yield (*key, "at"), str(error)
 
 
+@dataclass(frozen=True)
+class SectionKind:
+    """Quantities that probes of a section record (name -> dimension)."""
+
+    quantities: ClassVar[dict[str, str]] = {"flow": "flow"}
+    kind: ClassVar[str] = "section"
+
+
+def section_kinds(output: Output, kinds: dict[str, Any]) -> tuple[dict[str, SectionKind | None], list]:
+    """(kinds of the sections of `[output]` for probes, None for a faulty section; faults (key path, message)).
+
+    kinds : kinds of all parts, as for `read_probe`
+    """
+    result, faults = {}, []
+    for name, section in output.sections.items():
+        key, pool = ("output", "sections", name), kinds["nodes"].get(section.basin)
+        found = [(key, text) for text in name_faults(name)]
+        groups = [group for group in ("nodes", "links", "controls", "routes") if name in kinds.get(group, ())]
+        found += [(key, f"{name} is also a name in `{group}`; expected another name") for group in groups]
+        found += _basin_faults((*key, "basin"), section.basin, kinds["nodes"], True)
+        found += [((*key, end), text) for end, text in _end_faults(section, pool, True)]
+        if isinstance(pool, BasinFields) and not found:
+            if pool.basin.on is not None or moving_walls(pool.basin):
+                found.append(((*key, "basin"), f"{section.basin} moves or has a moving wall; expected a fixed basin"))
+            elif not section.chain(pool.mesh).faces.size:
+                found.append((key, "cuts no face between two cells; expected a longer line"))
+        result[name] = None if found or pool is None else SectionKind()
+        faults += found
+    return result, faults
+
+
 def _basin_faults(key: tuple, name: Any, nodes: dict[str, Any], recorded: bool) -> Faults:
     """Yield a fault with the key path `key` if `name` is not a suitable basin; nodes : as for `output_faults`.
 
-    recorded : True if greatest values of the basin are recorded
+    recorded : True if greatest values of the basin are recorded, or flows through sections
     """
     pool = nodes.get(name, name) if isinstance(name, str) else name
     if pool is not None and not isinstance(pool, BasinFields):
@@ -664,7 +715,8 @@ def find_faults(
             for other in sorted(basin.start.model_fields_set - set(own.starts.model_fields)):
                 yield (*key, "start", other), f"does not apply to physics {show(basin.physics)}; leave this key out"
         shapes += [(("scalars", scalar), shape, None) for scalar, shape in basin.scalars.items()]
-        yield from (((*key, *below), text) for below, text in source_faults(basin))
+        below_faults = [*source_faults(basin), *face_wall_faults(basin, meshes[name])]
+        yield from (((*key, *below), text) for below, text in below_faults)
         for below, shape, points in shapes:
             try:
                 if points is not None:

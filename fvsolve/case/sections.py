@@ -437,6 +437,24 @@ class Gauges(NamedTables):
         return tables
 
 
+class OutputSection(Table):
+    """Table of a section: a line across a basin of water, with the probe `SECTION.flow` of the flow through it."""
+
+    basin: Annotated[str, val.Text("name of the basin")]
+    from_: Annotated[tuple[float, float], val.Rows(
+        "length", length=2, about="x, y of the start of the line [m]", changes=SHAPE,
+    ), Field(alias="from")]  # fmt: skip
+    to: Annotated[tuple[float, float], val.Rows(
+        "length", length=2, about="x, y of the end of the line [m]; flow to the left of it is positive", changes=SHAPE,
+    )]  # fmt: skip
+
+    def chain(self, mesh: Any) -> Any:
+        """`FaceChain` of the section in a mesh."""
+        from fvsolve.mesh.face_chains import chain_along
+
+        return chain_along(mesh, (self.from_, self.to))
+
+
 class OutputGrid(Table):
     """Table of fields of a basin on square pixels, as files `grids/NAME-FIELD.tif` or `grids/NAME.nc`."""
 
@@ -479,6 +497,9 @@ class Output(Table):
     gauges: Annotated[
         Any,
         Gauges(Gauge, 'named points of basins for probes: { kerb = { basin, at } }, or { file = "gauges.csv" }'),
+    ] = {}
+    sections: Annotated[
+        Any, NamedTables(OutputSection, "lines across basins for probes of the flow: { bridge = { basin, from, to } }")
     ] = {}
     grids: Annotated[
         Any, NamedTables(OutputGrid, "fields of basins on pixels: { flood = { basin, fields, format, cell } }")

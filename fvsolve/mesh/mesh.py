@@ -1,6 +1,6 @@
 """Data of a plane mesh, all SI: cells, faces and named patches, quality measures, search for points, and weights."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -41,6 +41,7 @@ class Mesh:
     middle : float64[f, 2]  middles of faces [m]; ends : int64[f, 2]  points of faces, anticlockwise around left
     patches : names of the patches, the last one always "wall"; grid : grid lines, None if the mesh is not a rectangle
     notes : remarks about the mesh file for the user; interior : cells of each interior patch, name -> int64[count]
+    groups : name -> int64[:] faces between cells that a group of the mesh file contains, of groups that are walls
     """
 
     points: np.ndarray
@@ -57,6 +58,7 @@ class Mesh:
     grid: Grid | None = None
     notes: tuple[str, ...] = ()
     interior: dict[str, np.ndarray] = field(default_factory=dict)
+    groups: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def inner(self) -> int:

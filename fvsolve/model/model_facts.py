@@ -129,7 +129,10 @@ def cost_notices(model, steps: int | None, set_by: str) -> list[Notice]:
 
 
 def basin_facts(basin) -> dict[str, Any]:
-    """Facts about a basin: mesh, waves at the start, and patches (length of faces, area of the cells behind them)."""
+    """Facts about a basin: mesh, waves at the start, walls and sections, and patches.
+
+    Facts of a patch are the length of its faces, and the area of the cells behind them.
+    """
     mesh, patches = basin.mesh, {}
     for name in patch_names(mesh):
         faces, part = mesh.faces(name).index, basin.part.patches.get(name)
@@ -142,6 +145,7 @@ def basin_facts(basin) -> dict[str, Any]:
         "physics": basin.part.physics, "cells": basin.n, "path": "grid" if basin.is_grid else "faces",
         "area": float(mesh.area.sum()), "least_width": float(np.sqrt(mesh.area.min())),
         **{key: list(limits) for key, limits in basin.ranges().items()}, "memory": basin.memory, "patches": patches,
+        "chains": basin.chain_texts(),
     }  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic.fields import FieldInfo
 
-from fvsolve.assembly.lowering import Lowering
+from fvsolve.assembly.lowering import FLOW, STAGE, Input, Lowering
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import Attitude
@@ -388,6 +388,11 @@ class Physics(Table):
         raise NotImplementedError
 
     @classmethod
+    def has_fifth_order(cls, basin: "Basin", rectangle: bool) -> bool:
+        """True if schemes above second order apply to a basin; rectangle : True if its mesh is a full rectangle"""
+        return rectangle
+
+    @classmethod
     def has_friction(cls, basin: "Basin") -> bool:
         """True if friction of the bed or of walls acts on the flow of a basin."""
         return False
@@ -565,6 +570,12 @@ class PatchRows(Lowering, kind="patch"):
 
     def motion_text(self, name, node, row, inflow, flow, amount) -> str:
         return f"basin {name}: {amount(flow, 'flow')} flow in"
+
+    def inputs(self, model, name, part):
+        patches, schedules = model.tables.patches, {rec.STAGE: ("stage", STAGE), rec.DISCHARGE: ("discharge", FLOW)}
+        row = patches[patches["node"] == model.node_names.index(name)][0]
+        key, sort = schedules.get(int(row["closure"]), ("", None))
+        return {key: Input(sort, int(row["drive"]))} if key else {}
 
     def probe(self, draft, name, probe, row) -> None:
         if probe.quantity in ("force", "power", "travel"):

@@ -220,7 +220,7 @@ def single_thread_reason(model: Model) -> str:
         return "parts of rotation, electricity and heat read the whole state"
     meshes = model.case.meshes
     for probe in (*model.probes, *model.watched):
-        if probe.name in meshes and probe.quantity in READ_ALL_CELLS:
+        if (probe.name in meshes and probe.quantity in READ_ALL_CELLS) or probe.part == "sections":
             return f"the probe {probe.text} reads all cells"
     if not model.basins:
         return "the case has no basin; only rows of basins are distributed over threads"

@@ -15,11 +15,11 @@ HELD = (rec.DISCHARGE, rec.LINKED, rec.INTERIOR)  # closures of patches whose ou
 DRIFT = 1e-6  # deviation of the length of Euler parameters from 1 above which a notice is given
 
 
-HELD_TEXTS = (  # of a scheduled outflow, and of an outflow through links
+HELD_TEXTS = (  # of a scheduled outflow, and of an outflow through links or from an interior patch
     ("the scheduled outflow", "less than scheduled have left; give less outflow, or `stage` or `rating`"),
     (
-        "the flow that its links draw",
-        "were added for them (`made_up` in the mass balance); draw less, or widen the patch",
+        "the flow drawn from it",
+        "were added to meet it (`made_up` in the mass balance); draw less, or widen the patch",
     ),
 )
 

@@ -1,5 +1,6 @@
 """Interior patches: gullies, manholes and springs inside a basin, against closed forms and other arrangements."""
 
+import math
 from importlib import import_module
 
 import numpy as np
@@ -8,6 +9,7 @@ from pytest import approx
 from reference import structures
 from reference.basins import assert_equal_files, ended, model_of, run_in_two_parts
 from reference.meshes import boundary, triangles, write
+from reference.scenes import GRAVITY as G
 from reference.scenes import lake, scene
 from scipy.integrate import solve_ivp
 
@@ -176,6 +178,29 @@ def test_street_manhole_shaft_and_sewer_keep_their_volume_and_the_flow_turns_onc
     assert (flow * drive >= 0.0).all()  # the flow turns at equal heads
 
 
+@pytest.mark.parametrize("method", ["ssp-rk2", "radau-iia-5", "rodas-5p"])
+@pytest.mark.parametrize("drawn_by", ["discharge", "demand"])
+def test_more_than_critical_outflow_is_held_with_a_mark(drawn_by, method):
+    """The pond loses its initial volume at most; the rest of the demand has a line in the ledger."""
+    asked, own = 8.0, {"rtol": 1e-6, "courant": None} if method != "ssp-rk2" else {}
+    numerics = {"scheme": "upwind", "method": method, **own}
+    if drawn_by == "discharge":
+        case = pond(None, end=20.0, hole={**HOLE, "discharge": -asked}, level=0.5, numerics=numerics)
+    else:
+        shaft = {"type": "junction", "elevation": 0.0, "demand": asked}
+        case = pond(WIDE, shaft, end=20.0, level=0.5, numerics=numerics, probes=["pond.volume"])
+    found = fvsolve.run(case)
+    mark, left = found.marks[-1], found["pond.volume"]
+    assert found.reason == "finished" and not found.ok
+    assert mark.what == "discharge held" and mark.place == "nodes.pond.hole"
+    assert mark.volume == approx(asked * 20.0 - (left[0] - left[-1]), rel=1e-9) and left.min() >= 0.0
+    assert abs(found.ledger["mass"]["relative"]) < 1e-12
+    early = (
+        -np.diff(left)[0] / 0.4
+    )  # critical outflow of still water through four faces of one metre, until waves return
+    assert early == approx(4.0 * 8.0 / 27.0 * math.sqrt(G) * 0.5**1.5, rel=0.2)
+
+
 FAULTS = {
     "outside": ({"at": [12.0, 5.0], "area": 1.0}, {}, "lies outside the mesh or in a hole"),
     "in a hole": (HOLE, {"holes": [[4, 5, 5, 6]]}, "lies outside the mesh or in a hole"),
@@ -214,3 +239,18 @@ def test_outflow_of_an_interior_patch_is_at_most_critical(fall):
     held = [mark for mark in result.marks if mark.what == "discharge held"]
     assert bool(held) is not fall
     assert not held or 13.0 < held[0].volume < 30.0 * 0.5
+
+
+def test_an_interior_patch_without_a_link_gives_a_notice():
+    model = model_of(pond(None, probes=["pond.volume"]))
+    assert any("no link joins the interior patch hole" in notice.text for notice in model.warnings)
+
+
+def test_with_scalars_links_see_the_cells_of_an_interior_patch_and_a_discharge_is_refused():
+    dye = {"scalars": {"dye": {"initial": 1.0}}}
+    found = fvsolve.run(pond(numerics={"scheme": "upwind"}) | dye)
+    plain = fvsolve.run(pond(numerics={"scheme": "upwind"}))
+    assert found["shaft.level"][-1] == approx(plain["shaft.level"][-1], rel=1e-2)
+    assert all(abs(found.ledger[name]["relative"]) < 1e-12 for name in ("mass", "dye"))
+    with pytest.raises(CaseError, match="needs the faces around the patch"):
+        model_of(pond(None, hole={**HOLE, "discharge": 0.1}, probes=["pond.volume"]) | dye)

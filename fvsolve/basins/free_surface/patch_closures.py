@@ -45,6 +45,7 @@ HELD = 1e-9  # relative difference of a discharge from its schedule above which 
 # Level of the links of a patch below its bed [m], farther than any network falls, from which on they may draw more than
 # critical outflow (`law_patch_face`); the rest is supplied from outside.
 DEEPEST = 2e3
+LEAST_SPEED = 1e-12  # speed of waves that stands for a dry face of a driven patch [m/s]
 LEAST_RISE = 1e-3  # first rise of the level in the search for an upper bound [m]
 
 
@@ -292,20 +293,13 @@ def read_faces_around(tables, patch, y):
 
 
 @njit
-def level_of_links(tables, patch, g, out):
-    """Level at the junction of the links of a patch, above the level at rest [m]."""
-    valve = tables.valves[patch["valve"]]
-    pressure = valve["drop"] + out[tables.layout[0]["pressure"] + valve["from_node"]]
-    return patch["lowest"] + pressure / (tables.settings[0]["rho"] * g)
-
-
-@njit
 def level_of_patch(tables, patch, g, faces, t, out):
     """(level of a patch above the level at rest [m], given inflow [m3/s]); 0 for closures of single faces."""
     empty = tables.plane[:0]
-    if patch["closure"] == LINKED:
-        flow = out[tables.layout[0]["valve"] + patch["valve"]] / tables.settings[0]["rho"]
-        return level_of_links(tables, patch, g, out), flow
+    if patch["closure"] == LINKED or patch["closure"] == INTERIOR:
+        st, layout, valve = tables.settings[0], tables.layout[0], tables.valves[patch["valve"]]
+        pressure = valve["drop"] + out[layout["pressure"] + valve["from_node"]]
+        return patch["lowest"] + pressure / (st["rho"] * g), out[layout["valve"] + patch["valve"]] / st["rho"]
     if patch["closure"] == STAGE:
         return schedule_value(tables, patch["drive"], t) - patch["rest"], 0.0
     if patch["closure"] == DISCHARGE:
@@ -343,7 +337,7 @@ def close_patch(tables, patch, t, y, out):
     rows, (h, e, u, lengths) = tables.work[first : first + ROWS * outer].reshape((ROWS, outer)), faces
     z, target = level_of_patch(tables, patch, g, faces, t, out)
     shut = patch["closure"] == LINKED and target == 0.0
-    total, surface, wet, wide, held = 0.0, 0.0, 0.0, 0.0, 1.0
+    total, surface, wet, wide, held, low = 0.0, 0.0, 0.0, 0.0, 1.0, z
     given = schedule_value(tables, patch["depth"], t) if patch["depth"] >= 0 else 0.0
     for m in range(h.size):
         k = tables.integers[patch["ring"] + m]
@@ -356,6 +350,7 @@ def close_patch(tables, patch, t, y, out):
         rows[FLOW, k], rows[SURFACE, k] = q, e[m] + (depth - h[m])
         total += lengths[m] * q
         wide += lengths[m]
+        low = min(low, e[m] - h[m])
         if depth > 0.0:
             wet += lengths[m]
             surface += lengths[m] * rows[SURFACE, k]
@@ -366,12 +361,14 @@ def close_patch(tables, patch, t, y, out):
         k = tables.integers[patch["ring"] + m]
         q, depth = rows[FLOW, k], h[m] + (rows[SURFACE, k] - e[m])
         u_face = q / depth if depth > 0.0 else 0.0
-        rows[MOMENTUM, k], rows[SPEED, k] = q * u_face, abs(u_face) + sqrt(g * max(depth, 0.0))
+        rows[MOMENTUM, k] = q * u_face
+        rows[SPEED, k] = max(abs(u_face) + sqrt(g * max(depth, 0.0)), LEAST_SPEED)  # a dry face is driven too
     if patch["closure"] == LINKED:
         if held < 1.0:
             out[layout["supply"] + patch["node"]] = tables.settings[0]["rho"] * (held - 1.0) * target
         return
-    rise = (surface / wet if wet > 0.0 else z) - patch["lowest"]
+    own = patch["closure"] == CRITICAL or patch["closure"] == NORMAL_SLOPE or given > 0.0 or z <= low
+    rise = (surface / wet if own and wet > 0.0 else z) - patch["lowest"]
     out[layout["pressure"] + patch["node"]] = tables.settings[0]["rho"] * g * rise
     out[layout["outflow_fraction"] + node["row"]] = held
 
@@ -383,7 +380,7 @@ def put_discharge(tables, patch, rows, total, target, wide, given, may_hold):
     total : sum of the flows [m3/s]; target : discharge [m3/s]; wide : length of all faces [m]; given : depth of a
     supercritical inflow [m], or 0; may_hold : True if an outflow above critical is possible
     """
-    if may_hold and target < total and total - target > HELD * abs(target):
+    if may_hold and target < 0.0 and total - target > -HELD * target:
         return total / target
     for m in range(patch["faces"] if total != target or given > 0.0 else 0):
         k = tables.integers[patch["ring"] + m]
@@ -394,20 +391,6 @@ def put_discharge(tables, patch, rows, total, target, wide, given, may_hold):
         else:
             rows[FLOW, k] += (target - total) / wide
     return 1.0
-
-
-@njit
-def held_outflow(tables, patch, flow, out):
-    """(inflow, volume that lacks) [m3/s] of a patch whose links draw an outflow: at most critical outflow leaves.
-
-    flow : inflow of the links, negative [m3/s]
-    """
-    faces, g = faces_inside(tables, patch), tables.settings[0]["gravity"]
-    z = level_of_links(tables, patch, g, out)
-    if z >= lowest_bed(faces) - DEEPEST:
-        return flow, 0.0
-    greatest = patch_flow(g, z, faces)[0]
-    return (greatest, greatest - flow) if greatest > flow else (flow, 0.0)
 
 
 @njit

@@ -7,7 +7,15 @@ from fvsolve.basins.basin_frames import potential_coefficients
 from fvsolve.basins.basin_output import FIRST_OWN, velocity_value
 from fvsolve.basins.basin_patches import add_link_momentum, normal_gravity, physics_code
 from fvsolve.basins.cell_sides import deviations_of, stretch_of_cell
-from fvsolve.basins.free_surface.patch_closures import held_outflow, read_faces, read_faces_around
+from fvsolve.basins.free_surface.patch_closures import (
+    DEEPEST,
+    faces_inside,
+    level_of_patch,
+    lowest_bed,
+    patch_flow,
+    read_faces,
+    read_faces_around,
+)
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.free_surface.water_sources import infiltrate, rain_rate, sum_of_products
 from fvsolve.jit import njit
@@ -104,24 +112,35 @@ def patch_pressures(t, y, dydt, out, handle):
 def patch_flows(t, y, dydt, out, handle):
     """Add the mass and momentum of flows through patches of water to the rates of the cells next to them."""
     tables = open_tables(handle)
+    layout = tables.layout[0]
     for k in range(tables.patches.size):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
         if basin["kind"] != OWN_CODE or patch["closure"] == LINKED:
             continue
-        inflow, seen = out[tables.layout[0]["net"] + patch["node"]], deviations_of(basin, tables.seen, y)
+        inflow, seen = out[layout["net"] + patch["node"]], deviations_of(basin, tables.seen, y)
         if patch["closure"] == INTERIOR:
-            add_interior_flow(tables, patch, inflow, seen, dydt, out)
+            put_held_outflow(tables, patch, t, out)
+            add_interior_flow(tables, patch, inflow + out[layout["supply"] + patch["node"]], seen, dydt, out)
         else:
             add_patch_flow(tables, patch, inflow, seen, dydt, out)
+
+
+@njit
+def put_held_outflow(tables, patch, t, out):
+    """Write what links draw from an interior patch beyond critical outflow to `out`, as a supply from outside."""
+    st, faces = tables.settings[0], faces_inside(tables, patch)
+    z, target = level_of_patch(tables, patch, st["gravity"], faces, t, out)
+    if z < lowest_bed(faces) - DEEPEST:
+        critical = patch_flow(st["gravity"], z, faces)[0]
+        out[tables.layout[0]["supply"] + patch["node"]] = st["rho"] * max(critical - target, 0.0)
 
 
 @njit
 def add_interior_flow(tables, patch, inflow, y, dydt, out):
     """Add the mass flow [kg/s] into an interior patch to the rates of its cells: inflow by area, outflow by volume.
 
-    The outflow takes its momentum along; the inflow has none. An outflow is at most critical around the patch; the rest
-    is supplied from outside. During outflow out[RATE], which limits the step, is
+    The outflow takes its momentum along; the inflow has none. During outflow out[RATE], which limits the step, is
     raised to the fraction of the water that leaves in a second.
     """
     plane, basin, leaves = tables.plane, tables.basins[patch["basin"]], inflow < 0.0
@@ -131,8 +150,6 @@ def add_interior_flow(tables, patch, inflow, y, dydt, out):
         volume += plane[basin["area"] + i] * near.depth_at_patch(plane, basin, i, y)
     flow = inflow / tables.settings[0]["rho"]
     if leaves:
-        flow, lacks = held_outflow(tables, patch, flow, out)
-        out[tables.layout[0]["supply"] + patch["node"]] += tables.settings[0]["rho"] * lacks
         out[RATE] = max(out[RATE], -2.0 * flow / max(volume, near.LEAST_DEPTH * near.patch_area(tables, patch)))
     for m in range(patch["count"] if dydt.size > 0 else 0):
         i = tables.integers[patch["first"] + m]
