@@ -221,6 +221,26 @@ def test_a_faulty_interior_patch_is_named(name):
     assert "patches" in str(error.value)
 
 
+@pytest.mark.parametrize("fall", [False, True], ids=["demand", "deep fall"])
+def test_outflow_of_an_interior_patch_is_at_most_critical(fall):
+    """The rim of four cells of 1 m passes Ritter's flow at first; a demand has a mark, a deep fall has none."""
+    pool = {"type": "basin", "elevation": 0.0, "size": [20.0, 20.0], "cells": [20, 20], "level": 0.5,
+            "patches": {"gully": {"at": [10.0, 10.0], "area": 4.0}}}  # fmt: skip
+    low = {"type": "reservoir", "head": -50.0, "elevation": -60.0}
+    use = low if fall else {"type": "junction", "elevation": -1.0, "demand": 30.0}
+    gate = {"type": "orifice", "from": "pool.gully", "to": "use", "area": 100.0, "discharge_coefficient": 0.6}
+    numerics = {"courant": 0.5, "end": 0.5}
+    result = fvsolve.run({"schema": 1, "title": "fall", "fluid": {"name": "Water", "temperature": 293.15},
+                          "nodes": {"pool": pool, "use": use}, "links": {"gate": gate}, "numerics": numerics,
+                          "output": {"every": 0.5, "probes": ["pool.gully.flow"]}})  # fmt: skip
+    assert result["pool.gully.flow"][0] == pytest.approx(-8.0 * 8.0 / 27.0 * (9.80665 * 0.5**3) ** 0.5, rel=1e-6)
+    assert result.reason == "finished" and result.ok is fall
+    assert abs(result.ledger["mass"]["relative"]) < 1e-12
+    held = [mark for mark in result.marks if mark.what == "discharge held"]
+    assert bool(held) is not fall
+    assert not held or 13.0 < held[0].volume < 30.0 * 0.5
+
+
 def test_an_interior_patch_without_a_link_gives_a_notice():
     model = model_of(pond(None, probes=["pond.volume"]))
     assert any("no link joins the interior patch hole" in notice.text for notice in model.warnings)

@@ -45,7 +45,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/studies": (14876, 51),
     "fvsolve/validation": (1463, 11),
     "tests/attitude": (447, 2),
-    "tests/basins": (9065, 30),
+    "tests/basins": (9085, 30),
     "tests/case": (4527, 16),
     "tests/cli": (1130, 8),
     "tests/draw": (217, 2),
