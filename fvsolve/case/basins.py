@@ -429,7 +429,7 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
             return replace(mesh, interior=interior_patches(basin, mesh))
         if rasters_with_holes(basin, setting):
             raise ValueFault([((), "`outside` of a raster applies to rectangles; leave it out, or cut the mesh file")])
-        groups = [wall.group for wall in getattr(basin, "walls", {}).values()]
+        groups = [wall.group for wall in (getattr(basin, "walls", None) or {}).values()]
         mesh = read(setting.files[basin.mesh.file], basin.mesh.unit, groups)
         return replace(mesh, interior=interior_patches(basin, mesh))
     except MeshError as error:

@@ -406,7 +406,7 @@ class Gauge(Table):
     """Table of a named point of a basin, at which probes may record fields: `BASIN.depth@GAUGE`."""
 
     basin: Annotated[str, val.Text("name of the basin", VALUE)]
-    at: Annotated[tuple[float, float], val.Rows("length", length=2, about="x, y of the point [m]", changes=VALUE)]
+    at: Annotated[tuple[float, float], val.Rows("length", length=2, about="x, y of the point [m]", changes=SHAPE)]
 
 
 class Gauges(NamedTables):

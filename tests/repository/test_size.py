@@ -22,7 +22,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests": (966, 7),
     "benchmarks": (6678, 50),
     "fvsolve/assembly": (1969, 10),
-    "fvsolve/basins": (11196, 52),
+    "fvsolve/basins": (11197, 52),
     "fvsolve/case": (7983, 28),
     "fvsolve/cli": (3524, 17),
     "fvsolve/compile": (1343, 7),

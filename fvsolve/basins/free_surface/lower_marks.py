@@ -35,7 +35,7 @@ def marks_of(basin) -> Marks:
     mesh = basin.mesh
     beds = np.maximum(*(basin.bed[cells[: mesh.inner]] for cells in (mesh.left, mesh.right)))
     crest, marked, (factor, cosine, sine) = beds.copy(), np.zeros(mesh.inner, bool), np.zeros((3, mesh.inner))
-    for wall in basin.part.walls.values():
+    for wall in (basin.part.walls or {}).values():
         chain = wall.chain(mesh)
         highest = wall.crest > crest[chain.faces]
         faces = chain.faces[highest]
@@ -50,7 +50,7 @@ def marks_of(basin) -> Marks:
 
 def lower_marks(draft, basin, row) -> None:
     """Fill the columns of the row of a basin for marked faces; add notices for walls below the bed."""
-    for name, wall in basin.part.walls.items():
+    for name, wall in (basin.part.walls or {}).items():
         faces = wall.chain(basin.mesh).faces
         if not np.isin(faces, basin.marks.faces[basin.marks.height > 0.0]).any():
             text = f"basin {basin.name}: wall {name} has no effect, its crest is nowhere above the bed or another wall"
@@ -90,7 +90,7 @@ def rows_of_mesh(basin) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
 def chain_texts(basin) -> Iterator[str]:
     """Yield a text on each wall and each section of a basin: its faces, and heights of a crest above the bed."""
     amount, marks = basin.case.amount, basin.marks
-    for name, wall in basin.part.walls.items():
+    for name, wall in (basin.part.walls or {}).items():
         faces, _, cosine, _, stretch = wall.chain(basin.mesh)
         length = amount(stretch * float(basin.mesh.length[faces] @ cosine), "length", 3)
         height = marks.height[np.isin(marks.faces, faces)] if np.isin(faces, marks.faces).any() else np.zeros(1)

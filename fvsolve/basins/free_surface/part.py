@@ -207,7 +207,7 @@ class FreeSurface(Physics, name="free-surface"):
     ] = None
     walls: Annotated[
         Any, NamedTables(FaceWall, "walls on faces between cells: { levee = { line, crest } } or { group, crest }")
-    ] = {}
+    ] = None
 
     @classmethod
     def formulas(cls, basin, mesh):

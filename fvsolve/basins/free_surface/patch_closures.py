@@ -37,7 +37,8 @@ from fvsolve.kernels.table_handle import open_tables
 
 OWN_CODE = physics_code(__package__)
 # Rows of the work array of driven faces: inflow per width, its momentum q^2 / h_b, surface above the level at rest,
-# greatest wave speed |u_b| + c_b (0 at faces that are not driven), all in the order of boundary faces.
+# greatest wave speed |u_b| + c_b (0 at faces that are not driven, DRY_FACE at dry faces), all in the order of boundary
+# faces.
 FLOW, MOMENTUM, SURFACE, SPEED, ROWS = range(5)
 ITERATIONS = 100
 ROUNDING = 1e-15  # relative error of a flow at which a level is accepted
@@ -45,7 +46,7 @@ HELD = 1e-9  # relative difference of a discharge from its schedule above which 
 # Level of the links of a patch below its bed [m], farther than any network falls, from which on they may draw more than
 # critical outflow (`law_patch_face`); the rest is supplied from outside.
 DEEPEST = 2e3
-LEAST_SPEED = 1e-12  # speed of waves that stands for a dry face of a driven patch [m/s]
+DRY_FACE = -1.0  # entry in the row SPEED of a dry face of a driven patch
 LEAST_RISE = 1e-3  # first rise of the level in the search for an upper bound [m]
 
 
@@ -362,7 +363,7 @@ def close_patch(tables, patch, t, y, out):
         q, depth = rows[FLOW, k], h[m] + (rows[SURFACE, k] - e[m])
         u_face = q / depth if depth > 0.0 else 0.0
         rows[MOMENTUM, k] = q * u_face
-        rows[SPEED, k] = max(abs(u_face) + sqrt(g * max(depth, 0.0)), LEAST_SPEED)  # a dry face is driven too
+        rows[SPEED, k] = abs(u_face) + sqrt(g * depth) if depth > 0.0 else DRY_FACE
     if patch["closure"] == LINKED:
         if held < 1.0:
             out[layout["supply"] + patch["node"]] = tables.settings[0]["rho"] * (held - 1.0) * target
@@ -419,7 +420,7 @@ def observe_froude(t, y, out, handle, values):
                 k = at + tables.integers[patch["ring"] + m]
                 cell = tables.integers[patch["ring"] + patch["faces"] + m]
                 q, square = tables.work[k + FLOW * basin["outer"]], tables.work[k + MOMENTUM * basin["outer"]]
-                wave = tables.work[k + SPEED * basin["outer"]] - (square / abs(q) if q != 0.0 else 0.0)
+                wave = max(tables.work[k + SPEED * basin["outer"]], 0.0) - (square / abs(q) if q != 0.0 else 0.0)
                 length = lengths[m] * tables.plane[basin["area"] + cell]
                 total += length * q
                 critical += length * wave * wave * wave / g

@@ -168,13 +168,13 @@ def put_row(grid, j, first, last, states, rows, moves, faces):
         rows_of.put_ghost_end(fields, reach, grid.reflect[j] if walls else 1.0, block, GHOSTS, -1, nx)
         if moves is not None and moves.speed_x.size > 0:
             rows_of.correct_ghost_end(fields, reach, moves.speed_x[0], block, GHOSTS, -1)
-        if faces is not None and faces.values[SPEED, j] > 0.0 and nx > 1:
+        if faces is not None and faces.values[SPEED, j] != 0.0 and nx > 1:
             rows_of.extrapolate_ghosts(fields, reach, block, GHOSTS, -1)
     if right == nx:
         rows_of.put_ghost_end(fields, reach, grid.reflect[ny + j] if walls else 1.0, block, end, 1, nx)
         if moves is not None and moves.speed_x.size > 0:
             rows_of.correct_ghost_end(fields, reach, moves.speed_x[nx], block, end, 1)
-        if faces is not None and faces.values[SPEED, ny + j] > 0.0 and nx > 1:
+        if faces is not None and faces.values[SPEED, ny + j] != 0.0 and nx > 1:
             rows_of.extrapolate_ghosts(fields, reach, block, end, 1)
 
 
@@ -199,7 +199,7 @@ def put_row_beyond(grid, j, first, last, fields, rows, moves, faces):
         beyond, outer, inner = (-j, 0, 1) if j < 0 else (j - ny + 1, ny - 1, ny - 2)
         here, inside = rows.cells[ring_offset(outer, 0) :], rows.cells[ring_offset(inner, 0) :]
         for i in range(n):
-            if faces.values[SPEED, at + i] > 0.0:
+            if faces.values[SPEED, at + i] != 0.0:
                 rows_of.extrapolate_across(fields, i, beyond, here, inside, cells)
 
 
@@ -239,7 +239,7 @@ def close_driven(g, driven, turn, tangent, cells, kn, kt, side, f, top):
     """
     for i in range(driven.shape[1]):
         speed, q = driven[SPEED, i], turn * driven[FLOW, i]
-        if speed > 0.0:
+        if speed != 0.0:
             h, e = side[i], side[i + rows_of.SURFACE]
             depth = max(h + (driven[SURFACE, i] - e), 0.0)
             flow = driven[MOMENTUM, i] + 0.5 * g * ((depth - h) * (depth + h))
@@ -380,9 +380,9 @@ def put_fluxes_along(grid, j, first, last, rows, flows, moves, faces):
         close_fixed_walls(grid.reflect[ny + j : ny + j + 1], along[n:], 1)
     if faces is not None:
         kx, ky, top = grid.kx, grid.ky[j : j + 1], rows.top[GHOSTS:]
-        if first == 0 and faces.values[SPEED, j] > 0.0:
+        if first == 0 and faces.values[SPEED, j] != 0.0:
             close_driven(g, faces.values[:, j : j + 1], 1.0, NORTH, after, kx[:1], ky, right, along, top)
-        if last == nx and faces.values[SPEED, ny + j] > 0.0:
+        if last == nx and faces.values[SPEED, ny + j] != 0.0:
             east, end = faces.values[:, ny + j : ny + j + 1], n - 1
             close_driven(g, east, -1.0, NORTH, after[end:], kx[nx - 1 :], ky, left[n:], along[n:], top[end:])
     ky, top = grid.ky[j : j + 1], rows.top[GHOSTS - 1 :]

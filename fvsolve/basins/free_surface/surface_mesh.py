@@ -207,7 +207,7 @@ def close_driven(g, faces, edges, number, inside, waves, geo, w):
         driven = faces.values
         for q in range(edges.size):
             i, k = edges[q] % BLOCK, number[q]
-            if driven[SPEED, k] > 0.0:
+            if driven[SPEED, k] != 0.0:
                 nx, ny, reach, flow = geo[_NX + i], geo[_NY + i], geo[_REACH + i], -driven[FLOW, k]
                 across, along = u[i] * nx + v[i] * ny, v[i] * nx - u[i] * ny
                 depth = max(h[i] + (driven[DRIVEN_SURFACE, k] - e[i]), 0.0)
