@@ -156,7 +156,7 @@ FAULTS = [
         "dydt[o + i] += flow * near.flow_weight(",
         "dydt[o + i] -= flow * near.flow_weight(",
     ),
-    Fault("parts/conduit.py", "DN_NPS.get(number, number / 25.0)", "DN_NPS.get(number, number / 25.4)"),
+    Fault("parts/full_pipe.py", "DN_NPS.get(number, number / 25.0)", "DN_NPS.get(number, number / 25.4)"),
     Fault(
         "parts/accumulator/law.py",
         "rho * (n * p * compressibility * (total - volume) + volume)",

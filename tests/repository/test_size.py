@@ -36,7 +36,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/mesh": (1084, 4),
     "fvsolve/model": (9255, 27),
     "fvsolve/output": (1871, 11),
-    "fvsolve/parts": (18510, 144),
+    "fvsolve/parts": (18513, 144),
     "fvsolve/report": (2041, 7),
     "fvsolve/run": (1691, 7),
     "fvsolve/solve": (2681, 11),
