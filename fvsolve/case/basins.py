@@ -541,7 +541,8 @@ def patches_with_faces(nodes: dict[str, Any], links: dict[str, Any], lines: str,
         (others if is_other else joined).update(link.ports.values())
     fixed = [name for name in meshes if may_have_faces(nodes[name])]
     names = {f"{name}.{patch}" for name in fixed for patch in patch_names(meshes[name])}
-    return frozenset(names & (joined - others))
+    ends = {f"{name}.{patch}" for name in fixed if nodes[name].added for patch in patch_names(meshes[name])}
+    return frozenset(names & (joined - others) | ends)
 
 
 def places(
@@ -563,7 +564,7 @@ def places(
             rest = bodies.on_body(basin, mesh, patch, rest, pose)
         kind, place = place_kind(basin, patch), f"{name}.{patch}"
         keys = {"position": None, "basin": name, "patch": patch, **rest}
-        if place in with_faces:
+        if place in with_faces and not basin.added:
             result[place] = PatchJunction.model_construct(**keys)
             place = f"{place}.inside"
         result[place] = kind.model_construct(**keys)
@@ -575,11 +576,9 @@ def face_links(nodes: dict[str, Any], meshes: dict, with_faces: frozenset[str]) 
     result = {}
     for name, mesh in meshes.items():
         for patch in patch_names(mesh):
-            place = f"{name}.{patch}"
-            if place in with_faces:
+            if f"{name}.{patch}" in with_faces:
                 length = float(mesh.length[mesh.patch(patch)].sum())
-                ends = {"from_": place, "to": f"{place}.inside", "basin": name, "patch": patch, "length": length}
-                result[f"{place}.face"] = nodes[name].physics_type.face_type().model_construct(**ends)
+                result[f"{name}.{patch}.face"] = nodes[name].face_link(name, patch, length)
     return result
 
 

@@ -26,6 +26,7 @@ class Part(Table):
     kinds: ClassVar[Kinds] = Kinds()
     no_scalars: ClassVar[str] = ""  # reason why a case with scalars cannot have this part yet
     own_scalars: ClassVar[str] = ""
+    added: ClassVar[bool] = False  # True if another part adds it to the case: it is not in the file
     type_in_file: ClassVar[str] = ""  # type in the case file of a variant with a kind of its own
 
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
