@@ -19,6 +19,7 @@ class ConduitRows(Lowering, kind="conduit"):
         if probe.quantity == "flow" and probe.fraction in (0.0, 1.0, None):
             end = "to" if probe.fraction == 1.0 else "from"
             row["kind"], row["index"] = rec.VALVE_FLOW, draft.valve_names.index(f"{name}.{end}.face")
+            row["side"] = -1 if end == "to" else 0
             return
         (k, basin), = ((k, basin) for k, basin in enumerate(draft.basins) if basin.name == name)
         at = min(max(probe.fraction * basin.n - 0.5, 0.0), basin.n - 1.0)

@@ -39,6 +39,7 @@ class Conduit(TwoPort, kind="conduit"):
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow"}
     along: ClassVar[dict[str, str]] = {"depth": "level", "filling": "number", "flow": "flow", "head": "head"}
+    fixes_pressure: ClassVar[bool] = True
     no_scalars: ClassVar[str] = "its cells carry no scalars yet; leave out this part, or `[scalars]`"
 
     diameter: Annotated[float, Quantity("length", positive, "inner diameter [m]", DIAMETERS, SHAPE)]
