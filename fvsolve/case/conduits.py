@@ -2,6 +2,9 @@
 
 from typing import Any
 
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
 from fvsolve.mesh.rectangles import rectangle
 from fvsolve.parts.nodes_and_links import is_kind
 
@@ -22,20 +25,26 @@ def stated_head(nodes: dict[str, Any], place: str, ambient: float, weight: float
 
 
 def heads_at_start(conduits: dict[str, Any], stated: dict[str, float | None]) -> dict[str, float | None]:
-    """Heads of the nodes of conduits; a node without a stated head has the least of those that conduits join to it.
+    """Heads of the nodes of conduits; unknown heads are interpolated along the lengths of conduits.
 
     stated : head of each node, None if it is not known [m]
     """
-    heads = dict(stated)
-    for _ in heads:
-        found: dict[str, float] = {}
-        for link in conduits.values():
-            for here, there in ((link.from_, link.to), (link.to, link.from_)):
-                if heads[here] is None and heads[there] is not None:
-                    found[here] = min(heads[there], found.get(here, heads[there]))
-        if not found:
-            break
-        heads |= found
+    heads, names = dict(stated), list(stated)
+    graph = np.zeros((len(names), len(names)))
+    for link in conduits.values():
+        i, j = names.index(link.from_), names.index(link.to)
+        graph[i, j] += 1.0 / link.length
+        graph[j, i] += 1.0 / link.length
+    _, group = connected_components(graph)
+    for k in range(group.max() + 1):
+        known = [i for i in np.flatnonzero(group == k) if heads[names[i]] is not None]
+        free = [i for i in np.flatnonzero(group == k) if heads[names[i]] is None]
+        if known and free:
+            given = np.array([heads[names[i]] for i in known])
+            matrix = np.diag(graph.sum(axis=1)) - graph
+            found = np.linalg.solve(matrix[np.ix_(free, free)], graph[np.ix_(free, known)] @ given)
+            found = np.clip(found, given.min(), given.max())  # equal heads remain equal to the bit
+            heads |= dict(zip((names[i] for i in free), found.tolist(), strict=True))
     return heads
 
 
@@ -52,14 +61,18 @@ def water_of_conduits(
         return {}, {}
     from fvsolve.parts.conduit.part import ConduitWater
 
-    ends = {place: stated_head(nodes, place, ambient, weight) for link in conduits.values() for place in link.ports.values()}
+    places = {place for link in conduits.values() for place in link.ports.values()}
+    ends = {place: stated_head(nodes, place, ambient, weight) for place in sorted(places)}
     known = heads_at_start(conduits, ends)
     waters, meshes = {}, {}
     for name, link in conduits.items():
         heads = known[link.from_], known[link.to]
         rests = heads[0] is not None and heads[0] == heads[1] and link.initial_depth is None
         level = heads[0] if rests else min(link.inverts)
-        waters[name] = ConduitWater.model_construct(physics="conduit", level=level, conduit=link, heads=heads)
+        stated = None not in (ends[link.from_], ends[link.to])
+        waters[name] = ConduitWater.model_construct(
+            physics="conduit", level=level, conduit=link, heads=heads, stated=stated
+        )
         sides = {"from": "west", "to": "east"}
         meshes[name] = rectangle((link.length, link.diameter), (link.cells, 1), patches=sides)
     return waters, meshes

@@ -91,9 +91,7 @@ def _port_faults(
             yield keys, f"joins {show(place)} to itself"
 
 
-def _island_faults(
-    groups: list[list[str]], nodes: dict[str, Any], places: dict[str, Any], held: set[str]
-) -> Faults:
+def _island_faults(groups: list[list[str]], nodes: dict[str, Any], places: dict[str, Any], held: set[str]) -> Faults:
     """Faults of several islands (groups of connected names), and of islands in which nothing fixes the pressure.
 
     places : names that links can join -> domain; held : places at which a link fixes the pressure

@@ -6,7 +6,7 @@ use the higher invert (Audusse et al. 2004). Fluxes are those of Harten, Lax and
 Momentum fluxes are differences from the thrust g I of each side, so that water at rest stays at rest to the bit.
 """
 
-from math import inf, sqrt
+from math import inf, pi, sqrt
 
 from fvsolve.basins.basin_patches import physics_code
 from fvsolve.jit import njit
@@ -50,9 +50,13 @@ def velocity_factor(section, area):
 
 @njit
 def drag_per_flow(section, n, h, area):
-    """Decay rate of the flow by friction over the flow |Q| [1/m3]; n : Manning's number."""
-    full = min(area, section.area)
-    return section.g * n * n * velocity_factor(section, area) * hydraulic_radius_power(section, h, full)
+    """Decay rate of the flow by friction over the flow |Q| [1/m3]; n : Manning's number.
+
+    The slot has weight, but no velocity: in the full section the slope of friction is that at the velocity Q / A_f.
+    """
+    full = 0.25 * pi * section.diameter * section.diameter
+    share = velocity_factor(section, area) if area < full else area / (full * full)
+    return section.g * n * n * share * hydraulic_radius_power(section, h, min(area, full))
 
 
 @njit

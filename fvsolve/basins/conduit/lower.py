@@ -103,16 +103,28 @@ class ConduitWaterRows(BasinRows):
         full = 0.25 * math.pi * self.conduit.diameter**2
         return [SMALL * full, SMALL * full * math.sqrt(self.case.gravity * self.conduit.diameter)]
 
+    def levels_at_start(self) -> list[float]:
+        """Levels at both ends at the start [m]: heads of the nodes, where they are above the invert.
+
+        Otherwise it is the level of the water at the other end, at most the invert.
+        """
+        ends = list(zip(self.part.heads, self.conduit.inverts, strict=True))
+        reached = [None if head is None or head < bed else head for head, bed in ends]
+        return [
+            head if head is not None else bed if other is None else min(other, bed)
+            for head, other, (_, bed) in zip(reached, reached[::-1], ends, strict=True)
+        ]
+
     def start(self, attitude: Any = None) -> np.ndarray:
         conduit, heads = self.conduit, self.part.heads
-        low, high = (bed if head is None else max(head, bed) for head, bed in zip(heads, conduit.inverts, strict=True))
+        low, high = self.levels_at_start()
         depth = np.maximum(low + (high - low) * (np.arange(self.n) + 0.5) / self.n - self.bed, 0.0)
         if conduit.initial_depth is not None:
             depth = np.full(self.n, conduit.initial_depth)
         change = np.zeros(self.n) if np.array_equal(depth, self.depth) else self.areas(depth) - self.area
         flow, crowns = conduit.initial_flow, [bed + conduit.diameter for bed in conduit.inverts]
         if flow is None:
-            known = None not in heads and all(head >= crown for head, crown in zip(heads, crowns, strict=True))
+            known = self.part.stated and all(head >= crown for head, crown in zip(heads, crowns, strict=True))
             flow = conduit.full_flow(heads[0] - heads[1]) if known else 0.0
         return np.array([change, np.where(self.area + change > 0.0, flow, 0.0)])
 

@@ -26,6 +26,7 @@ SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
 DRY_CELERITY = 0.1  # celerity at a dry end for its least derivative [m/s]
 ROUNDING = 1e-14  # relative error of depths that solve an equation
 SWEEPS = 100
+CHORD = 1e-6  # error of the flow, over that of the full section at sqrt(g D), above which a chord replaces the tangent
 
 
 @njit
@@ -96,7 +97,7 @@ def end_flow(section, z, h, e, u):
 
 @njit
 def passing_head(section, target, h, e, u):
-    """Head of the node at which an end passes the inflow `target` [m3/s], above its critical outflow."""
+    """Head of the node at which an end passes the inflow `target` [m3/s]; that of a dry end for lower flows."""
     low, rise = e - h, 1e-3 * section.diameter
     z, high = e, e + rise
     while end_flow(section, high, h, e, u)[0] < target and rise < 1e9:
@@ -118,21 +119,22 @@ def passing_head(section, target, h, e, u):
 
 @njit
 def level_step(section, z, target, h, e, u):
-    """(change of the flow from `target` [m3/s], its derivative by the head [m2/s]) in Newton's step from the head z.
+    """(change of the flow from `target` [m3/s], slope over the head [m2/s]) in Newton's step from the head z.
 
-    At critical outflow the flow has no derivative by the head. If the target is greater, the step leads to the head at
-    which it passes. h, e, u : state inside
+    Far from the target the slope is at least that of the chord to the head at which the target passes: the slope
+    changes by the factor T_s / D at the crown and vanishes at critical outflow, where tangents would alternate.
+    h, e, u : state inside
     """
     q, slope, _ = end_flow(section, z, h, e, u)
-    if slope > 0.0:
+    if slope > 0.0 and abs(q - target) <= CHORD * section.area * sqrt(section.g * section.diameter):
         return q - target, slope
-    if q == 0.0 and not target > 0.0:
-        return q - target, DRY_CELERITY * section.diameter
-    if not target > q + SAME_FLOW * abs(q):
-        return q - target, LEAST_SLOPE
-    level = passing_head(section, target, h, e, u)
-    slope = max(end_flow(section, level, h, e, u)[1], LEAST_SLOPE)
-    return slope * (z - level), slope
+    least = end_flow(section, e - h, h, e, u)[0]
+    if not target > least + SAME_FLOW * abs(least):
+        if slope > 0.0:
+            return q - target, slope
+        return q - target, DRY_CELERITY * section.diameter if q == 0.0 else LEAST_SLOPE
+    reach = z - passing_head(section, target, h, e, u)
+    return q - target, max(slope, (q - target) / reach if reach != 0.0 else 0.0, LEAST_SLOPE)
 
 
 @njit

@@ -21,7 +21,7 @@ class ConduitRows(Lowering, kind="conduit"):
             row["kind"], row["index"] = rec.VALVE_FLOW, draft.valve_names.index(f"{name}.{end}.face")
             row["side"] = -1 if end == "to" else 0
             return
-        (k, basin), = ((k, basin) for k, basin in enumerate(draft.basins) if basin.name == name)
+        ((k, basin),) = ((k, basin) for k, basin in enumerate(draft.basins) if basin.name == name)
         at = min(max(probe.fraction * basin.n - 0.5, 0.0), basin.n - 1.0)
         first = min(int(at), max(basin.n - 2, 0))
         cells, weights = [first, min(first + 1, basin.n - 1)], [1.0 - (at - first), at - first]

@@ -9,7 +9,6 @@ from fvsolve.parts.basin import Basin, Physics
 from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.value import (
-    BY_CELLS,
     PROFILE,
     SHAPE,
     Number,
@@ -59,8 +58,8 @@ class Conduit(TwoPort, kind="conduit"):
         "levels of both nodes if left out [m]", changes=PROFILE,
     )] = None  # fmt: skip
     initial_flow: Annotated[float | None, Quantity(
-        "flow", about="flow at the start; that of the full conduit between the levels of both nodes if both are above "
-        "its crowns, otherwise 0, if left out [m3/s]", changes=PROFILE,
+        "flow", about="flow at the start; if left out, the steady flow of the full conduit if its nodes state levels above "
+        "its crowns, otherwise 0 [m3/s]", changes=PROFILE,
     )] = None  # fmt: skip
 
     def celerity(self, gravity: float) -> float:
@@ -137,12 +136,14 @@ class ConduitWater(Basin):
     """Basin of a row of cells that represents the water of a conduit.
 
     level : level of the water at rest above datum [m]; heads : of both nodes at the start, None if unknown [m]
+    stated : True if keys of both nodes give these heads
     """
 
     added: ClassVar[bool] = True
     level: float
     conduit: Conduit
     heads: tuple[float | None, float | None]
+    stated: bool
 
     @property
     def physics_type(self) -> type[Physics]:
