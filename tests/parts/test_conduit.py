@@ -5,10 +5,13 @@ from math import pi
 import numpy as np
 import pytest
 from pytest import approx
+from model.test_sparsity import stray
+from reference.basins import assert_equal_files, run_in_two_parts
 from reference.conduits import DamBreak, backwater, bore, uniform_depth
 from reference.scenes import WATER
 
 import fvsolve
+from fvsolve.studies.energy_balance import energy
 
 TANK = {"type": "tank", "elevation": 0.0}
 
@@ -202,6 +205,28 @@ def test_methods_agree():
     for run in runs:
         assert run["a.level"] == approx(runs[0]["a.level"], abs=2e-3)
         assert run.ledger["mass"]["relative"] < 1e-12
+
+
+def test_a_resumed_run_is_the_whole_run(tmp_path):
+    case = two_tanks(0.0, 1.2, cells=200)
+    case["output"]["every"] = 0.05
+    run_in_two_parts(case, tmp_path, 8.0)
+    assert_equal_files(tmp_path, ["history.csv"])
+
+
+def test_rates_depend_on_the_states_of_the_pattern_only():
+    """Between tanks, and through a junction, free and full."""
+    case = two_tanks(0.3)
+    case["nodes"]["m"] = {"type": "junction", "elevation": 0.0}
+    case["links"] = {"s": pipe("a", "m", inverts=[0.2, 0.0], cells=7), "r": pipe("m", "b", cells=6)}
+    case["output"]["probes"] = ["a.level"]
+    model = fvsolve.build(fvsolve.load(case))
+    assert stray(model, 0.0, model.start) < 1e-9
+
+
+def test_energy_is_refused_by_name():
+    with pytest.raises(fvsolve.FvsolveError, match=r"the energy of conduits \(s\) is not supported"):
+        energy(two_tanks(0.3))
 
 
 FAULTS = {

@@ -56,7 +56,7 @@ def backwater(q: float, n: float, slope: float, d: float, end: float, x: np.ndar
 
 
 def bore(h: float, q: float, d: float, a: float) -> tuple[float, float]:
-    """(head behind the bore, its speed) where a flow q of depth h is shut at once; slot of celerity a from the crown."""
+    """(head behind the bore, its speed) after a flow q of depth h is shut; slot of celerity a from the crown."""
     full, before = 0.25 * pi * d * d, area(h, d)
     slot = G * full / a**2
     crown, low = thrust(d, d), thrust(h, d)

@@ -58,8 +58,8 @@ class Conduit(TwoPort, kind="conduit"):
         "levels of both nodes if left out [m]", changes=PROFILE,
     )] = None  # fmt: skip
     initial_flow: Annotated[float | None, Quantity(
-        "flow", about="flow at the start; if left out, the steady flow of the full conduit if its nodes state levels above "
-        "its crowns, otherwise 0 [m3/s]", changes=PROFILE,
+        "flow", about="flow at the start; if left out, that of the full conduit if its nodes state levels above its crowns, "
+        "otherwise 0 [m3/s]", changes=PROFILE,
     )] = None  # fmt: skip
 
     def celerity(self, gravity: float) -> float:
@@ -117,6 +117,7 @@ class ConduitFlow(Physics, name=""):
 
     package: ClassVar[str] = "fvsolve.basins.conduit"
     states: ClassVar[dict[str, str]] = {"area": "m2", "flow": "m3/s"}
+    fields: ClassVar[dict[str, str]] = {"depth": "level", "surface": "level", "bed": "level"}
     laws: ClassVar[tuple[str, ...]] = ("linear",)
     carries: ClassVar[bool] = False
     has_shocks: ClassVar[bool] = True
