@@ -162,9 +162,9 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     case = Case(
         name=raw.name, path=raw.path, folder=raw.folder, raw=raw.table, **general, ambient_pressure=setting.ambient,
         fluid=fluid, properties=state, nodes=parts.nodes | waters, links=links, meshes=parts.meshes | lines,
-        lumped=parts.lumped, signals=dict(setting.used), scalars=scalars, numerics=numerics, output=output, expect=expect, compare=compare,
-        routes=routes, limits=limits, controls=blocks, reactions=reactions, exact=named, copies=dict(setting.files),
-        read=reading.read, validation=validation,
+        lumped=parts.lumped, signals=dict(setting.used), scalars=scalars, numerics=numerics, output=output,
+        expect=expect, compare=compare, routes=routes, limits=limits, controls=blocks, reactions=reactions,
+        exact=named, copies=dict(setting.files), read=reading.read, validation=validation,
     )  # fmt: skip
     return case if named is None else with_exact(reading, case)
 

@@ -4,8 +4,8 @@ from math import pi
 
 import numpy as np
 import pytest
-from pytest import approx
 from model.test_sparsity import stray
+from pytest import approx
 from reference.basins import assert_equal_files, run_in_two_parts
 from reference.conduits import DamBreak, backwater, bore, uniform_depth
 from reference.scenes import WATER

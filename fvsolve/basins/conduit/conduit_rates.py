@@ -33,7 +33,7 @@ EVEN = 1e-6  # relative change of depth within a cell below which its mean area 
 TINY = 1e-300
 
 
-@njit
+@njit(forceinline=True)
 def fastest(section, area, c):
     """Speed of waves that limits the step [m/s]: that of the slot from the share NEARLY_FULL of the full section on."""
     if area < NEARLY_FULL * section.area:
@@ -41,14 +41,14 @@ def fastest(section, area, c):
     return max(c, sqrt(section.g * section.area / section.slot))
 
 
-@njit
+@njit(forceinline=True)
 def velocity_factor(section, area):
     """Velocity over flow [1/m2]: 1 / area, but towards 0 in thin water."""
     wet = max(area, THIN * section.area)
     return 2.0 * area / (area * area + wet * wet)
 
 
-@njit
+@njit(forceinline=True)
 def drag_per_flow(section, n, h, area):
     """Decay rate of the flow by friction over the flow |Q| [1/m3]; n : Manning's number.
 
@@ -59,7 +59,7 @@ def drag_per_flow(section, n, h, area):
     return section.g * n * n * share * hydraulic_radius_power(section, h, min(area, full))
 
 
-@njit
+@njit(forceinline=True)
 def read_cell(tables, basin, section, y, i):
     """(area, depth, surface above the level at rest, velocity) of cell i of a conduit."""
     n, plane, at, o = basin["n"], tables.plane, basin["plan"], basin["y"]
@@ -119,7 +119,7 @@ def read_ends(t, y, dydt, out, handle):
         out[layout["stiffness"] + tables.nodes[node]["row"]] = 0.0
 
 
-@njit
+@njit(forceinline=True)
 def numerical_flux(section, hl, ul, hr, ur, left, right):
     """(flow [m3/s], momentum flux minus the thrust of the left side, and minus that of the right side [m4/s2]).
 
@@ -148,7 +148,7 @@ def numerical_flux(section, hl, ul, hr, ur, left, right):
     return flow, ql * ul + low * per * (high * d_flow - jump), qr * ur + high * per * (low * d_flow - jump)
 
 
-@njit
+@njit(forceinline=True)
 def side(section, h):
     """(area, width, thrust integral) at a depth h."""
     area = area_of(section, h)
@@ -156,7 +156,7 @@ def side(section, h):
     return area, width, thrust
 
 
-@njit
+@njit(forceinline=True)
 def face_flux(section, hl, el, ul, left, hr, er, ur, right):
     """`numerical_flux` at a face at which both sides use the higher invert; e : surfaces; others as there.
 
@@ -171,7 +171,7 @@ def face_flux(section, hl, el, ul, left, hr, er, ur, right):
     return numerical_flux(section, h, ul, hr, ur, other, right)
 
 
-@njit
+@njit(forceinline=True)
 def thrust_change(section, hl, el, left, hr, er, right):
     """Change of thrust minus weight along the invert within a cell, g A (e_r - e_l) with the mean area A [m4/s2]."""
     rise = er - el
@@ -182,7 +182,7 @@ def thrust_change(section, hl, el, left, hr, er, right):
     return section.g * area_of(section, 0.5 * (hl + hr)) * rise
 
 
-@njit
+@njit(forceinline=True)
 def slopes(work, n, i, first_order, limiter):
     """Half the changes of depth, surface and velocity within cell i; one-sided at the ends of a conduit."""
     if first_order or n == 1:

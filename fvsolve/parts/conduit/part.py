@@ -58,8 +58,8 @@ class Conduit(TwoPort, kind="conduit"):
         "levels of both nodes if left out [m]", changes=PROFILE,
     )] = None  # fmt: skip
     initial_flow: Annotated[float | None, Quantity(
-        "flow", about="flow at the start; if left out, that of the full conduit if its nodes state levels above its crowns, "
-        "otherwise 0 [m3/s]", changes=PROFILE,
+        "flow", about="flow at the start; that of the full conduit if its nodes state levels above its crowns, else 0, "
+        "if left out [m3/s]", changes=PROFILE,
     )] = None  # fmt: skip
 
     def celerity(self, gravity: float) -> float:
