@@ -5,21 +5,21 @@ Riemann function phi of `law_section`. At a head z of the node the depth in the 
 u_b = u + phi(h_b) - phi(h), and the inflow q = A_b u_b, with dq/dz = T_b (u_b + c_b). Outflow is at most critical:
 then phi(h_b) + c(h_b) = phi(h) - u, which is the free overfall. Inflow is at most critical too. An outflow faster than
 waves takes the state of the cell. A dry end passes nothing unless the head is above its invert. The numbers of an end
-are those of its `Section`, and the row of its patch.
+are those of its `SlottedSection`, and the row of its patch.
 """
 
 from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.parts.conduit.law_section import (
-    Section,
+    SlottedSection,
     area_of,
     celerity,
     riemann_function,
     width_and_thrust,
 )
 
-NUMBERS = len(Section._fields)  # of a section
+NUMBERS = len(SlottedSection._fields)  # of a section
 INSIDE = 3  # numbers of the state inside an end: depth [m], surface above the level at rest [m], inward velocity [m/s]
 LEAST_SLOPE = 1e-12  # least derivative of the flow by the head [m2/s]; critical outflow does not depend on the head
 SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
@@ -31,8 +31,8 @@ CHORD = 1e-6  # error of the flow, over that of the full section at sqrt(g D), a
 
 @njit
 def section_at(floats, at):
-    """`Section` whose numbers are floats[at:]."""
-    return Section(
+    """`SlottedSection` whose numbers are floats[at:]."""
+    return SlottedSection(
         floats[at], floats[at + 1], floats[at + 2], floats[at + 3], floats[at + 4], floats[at + 5], floats[at + 6]
     )
 

@@ -20,7 +20,7 @@ INTERVALS = 512  # of each table
 HALF_ROOT = 0.5 ** (1.0 / 3.0)  # s of the half full section
 
 
-class Section(NamedTuple):
+class SlottedSection(NamedTuple):
     """Numbers of a circular section with a slot: seven floats, in SI.
 
     g : gravity; diameter; slot : width T_s; depth, area, thrust, phi : h_s, A, I and phi at the begin of the slot,
@@ -177,12 +177,12 @@ def hydraulic_radius_power(section, h, area):
     return (r * r) * (r * r)
 
 
-def section_of(gravity: float, diameter: float, surcharge_celerity: float) -> Section:
-    """`Section` of a conduit; gravity [m/s2], diameter [m], surcharge celerity [m/s]"""
+def section_of(gravity: float, diameter: float, surcharge_celerity: float) -> SlottedSection:
+    """`SlottedSection` of a conduit; gravity [m/s2], diameter [m], surcharge celerity [m/s]"""
     full = 0.25 * pi * diameter**2
     slot = gravity * full / surcharge_celerity**2
     depth = 0.5 * diameter * (1.0 + sqrt(1.0 - (slot / diameter) ** 2))
-    blank = Section(gravity, diameter, slot, 2.0 * diameter, full, 0.0, 0.0)
+    blank = SlottedSection(gravity, diameter, slot, 2.0 * diameter, full, 0.0, 0.0)
     area = area_of(blank, depth)
     thrust = width_and_thrust(blank, depth, area)[1]
-    return Section(gravity, diameter, slot, depth, area, thrust, riemann_function(blank, depth))
+    return SlottedSection(gravity, diameter, slot, depth, area, thrust, riemann_function(blank, depth))

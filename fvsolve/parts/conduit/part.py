@@ -50,16 +50,15 @@ class Conduit(TwoPort, kind="conduit"):
     manning: Annotated[float, Number(nonnegative, "Manning's n of the wall [s/m^(1/3)]", MANNINGS, PROFILE)]
     cells: Annotated[int, Whole(between(1, 10**6), "number of cells", SHAPE)] = DEFAULT_CELLS
     surcharge_celerity: Annotated[float | None, Quantity(
-        "velocity", positive, "speed of waves in the full conduit; that of a slot of 1 % of the diameter if left out: "
-        "28 sqrt(diameter) [m/s]", UsualRange(1.0, 400.0, "wide slots to elastic pipes"), SHAPE,
+        "velocity", positive, "speed of waves in the full conduit [m/s]; 28 sqrt(diameter), by a slot of 1 % of it, "
+        "if left out", UsualRange(1.0, 400.0, "wide slots to elastic pipes"), SHAPE,
     )] = None  # fmt: skip
     initial_depth: Annotated[float | None, Quantity(
-        "length", nonnegative, "depth of water at the start, above the diameter under pressure; a level between the "
-        "levels of both nodes if left out [m]", changes=PROFILE,
+        "length", nonnegative, "depth of water at the start, above the diameter under pressure [m]; a level between the "
+        "levels of both nodes if left out", changes=PROFILE,
     )] = None  # fmt: skip
     initial_flow: Annotated[float | None, Quantity(
-        "flow", about="flow at the start; that of the full conduit if its nodes state levels above its crowns, else 0, "
-        "if left out [m3/s]", changes=PROFILE,
+        "flow", about="flow at the start [m3/s]; that of the full conduit between levels above its crowns, else 0 if left out", changes=PROFILE,
     )] = None  # fmt: skip
 
     def celerity(self, gravity: float) -> float:
@@ -91,7 +90,7 @@ class Conduit(TwoPort, kind="conduit"):
         elif around.gravity is not None:
             least = math.sqrt(0.25 * math.pi * around.gravity * self.diameter / WIDEST_SLOT)
             if self.surcharge_celerity is not None and self.surcharge_celerity < least:
-                text = f"{self.surcharge_celerity:g} m/s is no more than waves on a nearly full section have"
+                text = f"{self.surcharge_celerity:g} m/s is slower than waves in a nearly full section"
                 yield ("surcharge_celerity",), f"{text}; expected at least {least:.3g} m/s"
         if around.fluid is not None and not ConduitFlow.accepts_law(around.fluid.law):
             text = f'density law "{around.fluid.law}" does not apply to conduits; expected fluid.law = "linear"'
