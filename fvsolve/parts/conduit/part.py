@@ -50,15 +50,16 @@ class Conduit(TwoPort, kind="conduit"):
     manning: Annotated[float, Number(nonnegative, "Manning's n of the wall [s/m^(1/3)]", MANNINGS, PROFILE)]
     cells: Annotated[int, Whole(between(1, 10**6), "number of cells", SHAPE)] = DEFAULT_CELLS
     surcharge_celerity: Annotated[float | None, Quantity(
-        "velocity", positive, "speed of waves in the full conduit [m/s]; 28 sqrt(diameter), by a slot of 1 % of it, "
+        "velocity", positive, "speed of waves in the full conduit [m/s]; 28 sqrt(diameter), by a slot of 1 % of it "
         "if left out", UsualRange(1.0, 400.0, "wide slots to elastic pipes"), SHAPE,
     )] = None  # fmt: skip
     initial_depth: Annotated[float | None, Quantity(
-        "length", nonnegative, "depth of water at the start, above the diameter under pressure [m]; a level between the "
-        "levels of both nodes if left out", changes=PROFILE,
+        "length", nonnegative, "depth of water at the start, above the diameter under pressure [m]; a level between "
+        "those of both nodes if left out", changes=PROFILE,
     )] = None  # fmt: skip
     initial_flow: Annotated[float | None, Quantity(
-        "flow", about="flow at the start [m3/s]; that of the full conduit between levels above its crowns, else 0 if left out", changes=PROFILE,
+        "flow", about="flow at the start [m3/s]; that of the full conduit between levels above its crowns, else 0 "
+        "if left out", changes=PROFILE,
     )] = None  # fmt: skip
 
     def celerity(self, gravity: float) -> float:
