@@ -18,7 +18,7 @@ with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):  # its i
         logging.disable(logging.INFO)
 
 FIELDS = {"vc_advection_2D": 1}  # fields of a state; three for all others
-GIVEN = {"vc_advection_2D": 2, "shallow_bathymetry_fwave_2D": 1}  # auxiliary fields
+GIVEN = {"vc_advection_2D": 2, "shallow_bathymetry_fwave_2D": 1, "sw_aug_2D": 1}  # auxiliary fields
 
 
 def classic(flux: str, split: bool, limited: bool = True):

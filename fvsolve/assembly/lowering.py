@@ -47,6 +47,7 @@ FLOW = InputKind("m3/s", "a finite number [m3/s]", small=1e-3)
 FORCE = InputKind("N", "a finite number [N]", small=1e3)
 TORQUE = InputKind("N m", "a finite number [N m]")
 VALUE = InputKind("-", "a finite number")
+STAGE = InputKind("m", "a level above the elevation of the basin [m]", small=0.1)
 CREST = InputKind("m", "a height above datum [m]")
 GATE_OPENING = InputKind("m", "an opening of at least 0 [m]", 0.0)
 

@@ -28,8 +28,8 @@ def normal_gravity(st, plane, basin):
 
 @njit(forceinline=True)
 def needs_rates(basin, dydt):
-    """True if rates of a basin are requested (dydt is not empty) or needed for flows at open patches or for frames."""
-    return dydt.size > 0 or basin["through"] >= 0 or basin["frame"] >= 0
+    """True if rates of a basin are requested (dydt is not empty) or needed for open patches, sections or frames."""
+    return dydt.size > 0 or basin["through"] >= 0 or basin["frame"] >= 0 or basin["sections"] == 1
 
 
 @njit

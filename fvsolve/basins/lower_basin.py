@@ -17,7 +17,7 @@ from fvsolve.basins.basin_patches import physics_code
 from fvsolve.basins.cell_sides import BLOCK, HEAD, INDICES
 from fvsolve.basins.fifth_order import fifth_order_work
 from fvsolve.basins.lower_motion import lower_mesh
-from fvsolve.case.basins import boundary_cells, patch_names
+from fvsolve.case.basins import boundary_cells
 from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
@@ -29,6 +29,7 @@ from fvsolve.units import DIMENSIONS
 
 if TYPE_CHECKING:
     from fvsolve.kernels.rhs_assembly import RhsTerms
+    from fvsolve.mesh.face_chains import FaceChain
     from fvsolve.mesh.mesh import MeshPoints
 
 ROUNDING = 1e-12  # relative error of rates
@@ -143,7 +144,12 @@ class BasinRows:
     @property
     def scheme(self) -> str:
         """Name of the scheme that the basin uses."""
-        return SCHEMES[self.case.numerics.scheme].for_basin(self.is_grid).name
+        return SCHEMES[self.case.numerics.scheme].for_basin(self.has_fifth_order).name
+
+    @property
+    def has_fifth_order(self) -> bool:
+        """True if schemes above second order apply to the basin."""
+        return self.part.physics_type.has_fifth_order(self.part, self.is_grid)
 
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
         """Fill the row of a probe of a velocity in cells; each type of basin adds its other quantities.
@@ -191,6 +197,10 @@ class BasinRows:
 
     def notices(self, y: np.ndarray) -> list[Notice]:
         """Notices on the deviations y of cells at the start of a run."""
+        return []
+
+    def chain_texts(self) -> list[str]:
+        """Texts on its walls on faces and its sections, for the command `check`."""
         return []
 
     def watches(self, y: np.ndarray) -> list[Any]:
@@ -268,7 +278,8 @@ class BasinRows:
         """
         mesh, coefficients = self.mesh, np.ones(self.mesh.left.size)
         for name, patch in self.part.patches.items():
-            coefficients[mesh.patch(name)] = self.reflection(patch)
+            if not patch.is_interior:
+                coefficients[mesh.patch(name)] = self.reflection(patch)
         for name in self.linked:
             coefficients[mesh.patch(name)] = 0.0
         outer = coefficients[mesh.inner :]
@@ -285,6 +296,13 @@ class BasinRows:
         south, at = normal[:, 1] < -0.5, np.where(np.abs(normal[:, 0]) > 0.5, row, column)
         side = np.where(west, 0, np.where(east, 1, np.where(south, 2, 3)))
         return np.lexsort((at, side))
+
+    def ring_numbers(self, patch: str) -> np.ndarray:
+        """Numbers of the faces of a patch in the order of boundary faces of the kernels; -1 for an interior patch."""
+        faces = self.mesh.faces(patch).index - self.mesh.inner
+        if patch in self.mesh.interior:
+            return np.full(faces.size, -1)
+        return np.argsort(self.ring())[faces] if self.is_grid else faces
 
     def reflection(self, patch) -> float:
         """Reflection coefficient of waves at a patch: 0 if it is open, 1 for a wall, other values for impedances."""
@@ -307,8 +325,11 @@ class BasinRows:
 
     @cached_property
     def linked(self) -> list[str]:
-        """Names of the patches whose faces pass the flow of links, see `case.basins.patches_with_faces`."""
-        return [name for name in patch_names(self.mesh) if f"{self.name}.{name}" in self.case.patches_with_faces]
+        """Names of the patches whose faces pass the flow of links, see `case.basins.patches_with_faces`.
+
+        Interior patches are left out.
+        """
+        return [name for name in self.mesh.patches if f"{self.name}.{name}" in self.case.patches_with_faces]
 
     @property
     def opening(self) -> str | None:
@@ -337,6 +358,12 @@ class BasinRows:
     def records_maxima(self) -> bool:
         """True if the greatest values of its cells are recorded."""
         return self.name in self.case.output.basins_with_maxima
+
+    @cached_property
+    def sections(self) -> dict[str, FaceChain]:
+        """Faces of its sections, by name."""
+        stated = self.case.output.sections.items()
+        return {name: section.chain(self.mesh) for name, section in stated if section.basin == self.name}
 
     @property
     def walls(self) -> list[str]:
@@ -403,26 +430,27 @@ class BasinRows:
             row["nx"], row["ny"] = grid.nx, grid.ny
             row["spacing"] = draft.to_plane(np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)]))
         else:
-            if self.scheme != SCHEMES[numerics.scheme].for_basin(True).name:
-                text = f"basin {self.name}: {numerics.scheme} needs a full rectangle as mesh; muscl is used here"
-                draft.warnings.append(Notice("scheme", f"nodes.{self.name}", text, "scheme"))
             floats, self.integers = lower_mesh(mesh)
             row["mesh"], row["faces"] = draft.to_plane(floats), mesh.left.size
             row["links"] = len(draft.integers)
             draft.integers += self.integers.tolist()
+        if self.scheme != SCHEMES[numerics.scheme].for_basin(True).name:
+            needs = "does not support walls on faces" if self.is_grid else "needs a full rectangle as mesh"
+            text = f"basin {self.name}: {numerics.scheme} {needs}; muscl is used here"
+            draft.warnings.append(Notice("scheme", f"nodes.{self.name}", text, "scheme"))
         reflections = self.reflections()
         row["reflect"], row["outer_given"] = draft.to_plane(reflections), reflections.size
         row["outer"] = mesh.left.size - mesh.inner
         passes = any(self.reflection(patch) != 1.0 for patch in self.part.patches.values())
         row["through"] = draft.to_work(reflections.size) if passes else -1
-        has_boundary_rates = reflections.size or self.moves or self.part.on
+        has_boundary_rates = reflections.size or self.moves or self.part.on or self.sections
         row["boundary_rates"] = draft.to_work(len(self.quantities) * self.n if has_boundary_rates else 0)
         row["carried"] = row["flows"] = -1
         if self.moves:
             from fvsolve.basins.lower_motion import lower_lines
 
             lower_lines(draft, self, row)
-        row["body"] = row["frame"] = row["maxima"] = row["driven"] = -1
+        row["body"] = row["frame"] = row["maxima"] = row["driven"] = row["marked"] = -1
         self.lower(draft, row)
         if self.part.on is not None:
             from fvsolve.basins.lower_motion import lower_frame
@@ -535,10 +563,9 @@ class BasinRows:
         cells = boundary_cells(self.mesh, patch)
         row["first"], row["count"] = len(draft.integers), cells.size
         draft.integers += cells.tolist()
-        faces, outer = np.arange(self.mesh.left.size)[self.mesh.patch(patch)], self.mesh.inner
-        numbers = np.argsort(self.ring())[faces - outer] if self.is_grid else faces - outer
-        row["ring"], row["faces"], cells_of_faces = len(draft.integers), faces.size, self.mesh.left[faces]
-        draft.integers += [*numbers.tolist(), *cells_of_faces.tolist()]
+        faces, behind, _, normal = self.mesh.faces(patch)
+        row["ring"], row["faces"] = len(draft.integers), faces.size
+        draft.integers += [*self.ring_numbers(patch).tolist(), *behind.tolist()]
         length = self.mesh.length[faces]
         sizes = [self.mesh.area[cells].sum(), length.sum()]
         if self.deep and self.part.on is not None:
@@ -546,8 +573,8 @@ class BasinRows:
 
             sizes += position_in_frame(draft, self, patch)
         row["sizes"] = draft.to_plane(np.array(sizes))
-        per_area = [length / self.mesh.area[cells_of_faces]] * (2 if self.moves else 1)
-        row["normals"] = draft.to_plane(np.array([*self.mesh.normal[faces].T, *per_area]))
+        per_area = [length / self.mesh.area[behind]] * (2 if self.moves else 1)
+        row["normals"] = draft.to_plane(np.array([*normal.T, *per_area]))
         stated = self.part.patches.get(patch)
         row["open"], row["moves"] = self.is_open(patch), patch in self.walls
         given = stated.scalars if stated is not None else {}

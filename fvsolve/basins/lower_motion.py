@@ -24,7 +24,7 @@ def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     Cells and faces keep their numbers.
     """
     n, f, inner = len(mesh.area), len(mesh.left), mesh.inner
-    slots, face, own, side = _sides(mesh)
+    slots, face, own, side = sides_of_cells(mesh)
     block, lane, count = own // BLOCK, own % BLOCK, -(-n // BLOCK)
     slot, at = (4 * block + side) * BLOCK + lane, (slots * block + side) * BLOCK + lane
     other = np.concatenate([f + np.arange(inner), np.arange(inner, f), np.arange(inner)])  # the side beyond, or itself
@@ -59,7 +59,7 @@ def lower_ends(mesh: Mesh, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     For the order in `ends` see `moving_meshes`. moves : bool[corners]  True if a corner moves
     """
     n, inner = len(mesh.area), mesh.inner
-    slots, face, own, side = _sides(mesh)
+    slots, face, own, side = sides_of_cells(mesh)
     at, count = (slots * (own // BLOCK) + side) * BLOCK + own % BLOCK, -(-n // BLOCK)
     number, left = np.where(face >= 0, face, ~face), face >= 0
     ends = np.zeros((moving_meshes.ENDS, count * slots * BLOCK), np.int64)
@@ -77,7 +77,7 @@ def lower_ends(mesh: Mesh, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return moving_blocks.astype(np.int64), np.concatenate(pairs)
 
 
-def _sides(mesh: Mesh) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
+def sides_of_cells(mesh: Mesh) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
     """(slots, face, own, side): 3 or 4 sides per cell, then for each side its face, its cell, its number in the cell.
 
     The entry of `face` is ~f where the cell is to the right of face f.

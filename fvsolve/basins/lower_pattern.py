@@ -6,6 +6,7 @@ from scipy.sparse import coo_array, csr_array, eye_array, kron
 from fvsolve.kernels import dtypes as rec
 
 STENCIL_RADIUS = 3  # stencil radius of the fifth order
+THROUGH_FACES = (rec.LINKED, rec.INTERIOR)  # closures of patches through whose faces the flow of links passes
 
 
 def interior_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
@@ -69,6 +70,12 @@ def all_states(basin) -> np.ndarray:
     own = int(basin.row["y"]) + np.arange(len(basin.quantities) * basin.n)
     carried = int(basin.row["carried"]) + np.arange(len(basin.scalars) * basin.n)
     return np.concatenate([own, carried, basin.source_states])
+
+
+def cells_at_faces(integers: np.ndarray, patch) -> np.ndarray:
+    """Cells whose states the flow through the faces of a patch reads, besides its own; patch : its row of the table"""
+    behind, second, count = int(patch["ring"] + patch["faces"]), int(patch["second"]), int(patch["faces"])
+    return np.unique([*integers[behind : behind + count], *integers[second : second + count]]).astype(np.int64)
 
 
 def source_pattern(basin, ledger: int) -> tuple[np.ndarray, np.ndarray]:

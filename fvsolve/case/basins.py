@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from fvsolve.case import bodies
+from fvsolve.case.interior_patches import interior_patches
 from fvsolve.case.output_grids import grid_faults
 from fvsolve.case.raster_meshes import raster_extent, rasters_with_holes, terrace_notes
 from fvsolve.case.resource_checks import BASIN_CELL, byte_text, free_memory, name_faults
@@ -118,11 +119,30 @@ def closure_faults(basin: Any, options: Any) -> Faults:
 
 
 def source_faults(basin: Any) -> Faults:
-    """Faults (key path within the basin, message) of rain and infiltration on a basin that moves or is deformed."""
-    for key in ("rain", "infiltration"):
-        if getattr(basin, key, None) is not None and (basin.on is not None or moving_walls(basin)):
+    """Faults (key path within the basin, message) of rain, infiltration and walls in a basin that moves or deforms."""
+    for key in ("rain", "infiltration", "walls"):
+        if getattr(basin, key, None) and (basin.on is not None or moving_walls(basin)):
             where = "a basin on a body" if basin.on is not None else "a basin with a moving wall"
             yield (key,), f"is not supported for {where}; expected a fixed basin, or leave this key out"
+
+
+def face_wall_faults(basin: Any, mesh: Any) -> Faults:
+    """Faults (key path within the basin, message) of the walls on faces between cells of a basin."""
+    for name, wall in (getattr(basin, "walls", None) or {}).items():
+        yield from ((("walls", name), text) for text in name_faults(name))
+        if name in patch_names(mesh):
+            yield ("walls", name), f"{name} is also the name of a patch; expected another name"
+        if wall.group is not None and wall.group not in mesh.groups:
+            what = "a rectangle has no groups; expected `line`"
+            if not basin.is_rectangle:
+                known = patch_names(mesh)
+                what = f"no such group in {Path(basin.mesh.file).name}{did_you_mean(wall.group, known)}"
+                what += f"; groups of its outline are {listing(known) or 'none'}"
+            yield ("walls", name, "group"), what
+        elif not wall.chain(mesh).faces.size:
+            low, high = (", ".join(f"{x:.6g}" for x in end) for end in (mesh.points.min(0), mesh.points.max(0)))
+            text = f"cuts no face between two cells; the basin reaches from ({low}) m to ({high}) m"
+            yield ("walls", name, "line" if wall.group is None else "group"), text
 
 
 def rating_faults(basin: Any, mesh: Any, patch: str) -> Faults:
@@ -400,14 +420,18 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
                 text = f"{count:.3g} cells take about {byte_text(count * BASIN_CELL)} of memory"
                 text += f", and {byte_text(free_memory())} are free; expected fewer cells"
                 raise ValueFault([(("mesh", "cell") if basin.mesh else ("cells",), text)])
-            sides = {name: (item.side, *item.span) if item.span else item.side for name, item in basin.patches.items()}
+            sides = {name: (item.side, *item.span) if item.span else item.side
+                     for name, item in basin.patches.items() if not item.is_interior}  # fmt: skip
             grading = basin.grading or (1.0, 1.0)
             lacks = [raster.lacks for raster in rasters_with_holes(basin, setting)]
             mesh = rectangle(size, cells, corner, grading, sides, basin.holes or (), lacks)
-            return replace(mesh, notes=terrace_notes(basin, mesh.grid))
+            mesh = replace(mesh, notes=terrace_notes(basin, mesh.grid))
+            return replace(mesh, interior=interior_patches(basin, mesh))
         if rasters_with_holes(basin, setting):
             raise ValueFault([((), "`outside` of a raster applies to rectangles; leave it out, or cut the mesh file")])
-        return read(setting.files[basin.mesh.file], basin.mesh.unit)
+        groups = [wall.group for wall in getattr(basin, "walls", {}).values()]
+        mesh = read(setting.files[basin.mesh.file], basin.mesh.unit, groups)
+        return replace(mesh, interior=interior_patches(basin, mesh))
     except MeshError as error:
         if not basin.is_rectangle:  # the faults are in the mesh file, not in keys of the case
             name, places = Path(basin.mesh.file).name, [item.place == "unit" for item in error.faults]
@@ -470,10 +494,41 @@ def add_gauges(output: Output, nodes: dict[str, Any]) -> Faults:
                 yield (*key, "at"), str(error)
 
 
+@dataclass(frozen=True)
+class SectionKind:
+    """Quantities that probes of a section record (name -> dimension)."""
+
+    quantities: ClassVar[dict[str, str]] = {"flow": "flow"}
+    kind: ClassVar[str] = "section"
+
+
+def section_kinds(output: Output, kinds: dict[str, Any]) -> tuple[dict[str, SectionKind | None], list]:
+    """(kinds of the sections of `[output]` for probes, None for a faulty section; faults (key path, message)).
+
+    kinds : kinds of all parts, as for `read_probe`
+    """
+    result, faults = {}, []
+    for name, section in output.sections.items():
+        key, pool = ("output", "sections", name), kinds["nodes"].get(section.basin)
+        found = [(key, text) for text in name_faults(name)]
+        groups = [group for group in ("nodes", "links", "controls", "routes") if name in kinds.get(group, ())]
+        found += [(key, f"{name} is also a name in `{group}`; expected another name") for group in groups]
+        found += _basin_faults((*key, "basin"), section.basin, kinds["nodes"], True)
+        found += [((*key, end), text) for end, text in _end_faults(section, pool, True)]
+        if isinstance(pool, BasinFields) and not found:
+            if pool.basin.on is not None or moving_walls(pool.basin):
+                found.append(((*key, "basin"), f"{section.basin} moves or has a moving wall; expected a fixed basin"))
+            elif not section.chain(pool.mesh).faces.size:
+                found.append((key, "cuts no face between two cells; expected a longer line"))
+        result[name] = None if found or pool is None else SectionKind()
+        faults += found
+    return result, faults
+
+
 def _basin_faults(key: tuple, name: Any, nodes: dict[str, Any], recorded: bool) -> Faults:
     """Yield a fault with the key path `key` if `name` is not a suitable basin; nodes : as for `output_faults`.
 
-    recorded : True if greatest values of the basin are recorded
+    recorded : True if greatest values of the basin are recorded, or flows through sections
     """
     pool = nodes.get(name, name) if isinstance(name, str) else name
     if pool is not None and not isinstance(pool, BasinFields):
@@ -504,12 +559,12 @@ def _end_faults(line: Any, pool: Any, inside: bool) -> Iterator[tuple[str, str]]
 
 def patch_names(mesh: Mesh) -> tuple[str, ...]:
     """Names of the patches of a mesh that a case may use: all but the last, which holds the faces without a name."""
-    return mesh.patches[:-1]
+    return (*mesh.patches[:-1], *mesh.interior)
 
 
 def boundary_cells(mesh: Mesh, patch: str) -> np.ndarray:
-    """Indices of the cells that have a face in a patch : int64[count], sorted."""
-    return np.unique(mesh.left[mesh.patch(patch)])
+    """Indices of the cells that have a face in a patch, or of those in an interior patch : int64[count], sorted."""
+    return np.unique(mesh.faces(patch).inside) if patch not in mesh.interior else mesh.interior[patch]
 
 
 def place_kind(basin: Basin, patch: str) -> type[PatchNode]:
@@ -541,8 +596,14 @@ def patches_with_faces(nodes: dict[str, Any], links: dict[str, Any], lines: str,
         (others if is_other else joined).update(link.ports.values())
     fixed = [name for name in meshes if may_have_faces(nodes[name])]
     names = {f"{name}.{patch}" for name in fixed for patch in patch_names(meshes[name])}
+    given = {f"{name}.{patch}" for name in fixed for patch, keys in nodes[name].patches.items() if is_source(keys)}
     ends = {f"{name}.{patch}" for name in fixed if nodes[name].added for patch in patch_names(meshes[name])}
-    return frozenset(names & (joined - others) | ends)
+    return frozenset(names & ((joined | given) - others) | ends)
+
+
+def is_source(patch: Any) -> bool:
+    """True for an interior patch with a given inflow."""
+    return patch is not None and patch.is_interior and patch.discharge is not None
 
 
 def places(
@@ -565,7 +626,8 @@ def places(
         kind, place = place_kind(basin, patch), f"{name}.{patch}"
         keys = {"position": None, "basin": name, "patch": patch, **rest}
         if place in with_faces and not basin.added:
-            result[place] = PatchJunction.model_construct(**keys)
+            inflow = {"flow": basin.patches[patch].discharge} if is_source(basin.patches.get(patch)) else {}
+            result[place] = PatchJunction.model_construct(**keys, **inflow)
             place = f"{place}.inside"
         result[place] = kind.model_construct(**keys)
     return result
@@ -577,7 +639,7 @@ def face_links(nodes: dict[str, Any], meshes: dict, with_faces: frozenset[str]) 
     for name, mesh in meshes.items():
         for patch in patch_names(mesh):
             if f"{name}.{patch}" in with_faces:
-                length = float(mesh.length[mesh.patch(patch)].sum())
+                length = float(mesh.length[mesh.faces(patch).index].sum())
                 result[f"{name}.{patch}.face"] = nodes[name].face_link(name, patch, length)
     return result
 
@@ -652,7 +714,8 @@ def find_faults(
             for other in sorted(basin.start.model_fields_set - set(own.starts.model_fields)):
                 yield (*key, "start", other), f"does not apply to physics {show(basin.physics)}; leave this key out"
         shapes += [(("scalars", scalar), shape, None) for scalar, shape in basin.scalars.items()]
-        yield from (((*key, *below), text) for below, text in source_faults(basin))
+        below_faults = [*source_faults(basin), *face_wall_faults(basin, meshes[name])]
+        yield from (((*key, *below), text) for below, text in below_faults)
         for below, shape, points in shapes:
             try:
                 if points is not None:

@@ -22,6 +22,7 @@ ALLOWED_RATIO = 1.2
 WALL_KEYS = ("diameter", "nominal", "schedule", "class", "material", "lining")  # keys that define a wall
 MAX_ENTRIES = 20  # entries of a hand-written schedule; longer schedules are records, of which a run may use a part
 MAX_CLASS_FRACTION = 3.0  # largest plausible limit, as a multiple of the pressure class
+SHOWN = {"rainfall": "mm/h"}  # dimension -> unit of its numbers in notices, where SI is not usual
 MAX_CACHED = 10_000  # cached parts
 CACHE: dict[int, tuple[Table, Any, list]] = {}  # id -> part, its raw table, its unusual values
 TWO_ENTRIES = (
@@ -126,9 +127,11 @@ def _beyond(declared: Any, value: Any, given: Any) -> tuple[float, float, str] |
     for x in _numbers(value) if usual else ():
         if x == 0.0 or not math.isfinite(x) or usual.least <= x <= usual.greatest:
             continue
-        unit = "" if declared.dimension == "number" else f" {DIMENSIONS[declared.dimension].si}"
-        given = f"{x:g}{unit}" if not isinstance(given, str) else given
-        span = f"{usual.least:g} to {usual.greatest:g}{unit}, {usual.source}"
+        shown = SHOWN.get(declared.dimension, DIMENSIONS[declared.dimension].si)
+        unit = "" if declared.dimension == "number" else f" {shown}"
+        per = units.convert(1.0, declared.dimension, shown) if declared.dimension in SHOWN else 1.0
+        given = f"{per * x:g}{unit}" if not isinstance(given, str) else given
+        span = f"{per * usual.least:g} to {per * usual.greatest:g}{unit}, {usual.source}"
         hint = units.likely(given, declared.dimension, usual.least, usual.greatest)
         return x, usual.least if x < usual.least else usual.greatest, f"{given} is outside {span}{hint}"
     return None

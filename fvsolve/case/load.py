@@ -321,6 +321,8 @@ def read_output(reading: Reading, numerics: Numerics | None, kinds: dict[str, An
     output = reading.table("output", Output)
     valid = output if output is not None else reading.valid_keys("output", Output)
     reading.add(basins.add_gauges(valid, kinds["nodes"]))
+    kinds["sections"], faults = basins.section_kinds(valid, kinds)
+    reading.add(faults)
     if valid.probes is None:
         probes = default_probes(kinds)
     else:

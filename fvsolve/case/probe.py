@@ -21,6 +21,7 @@ _PROBE = re.compile(r"(?:(nodes|links)\.)?([^.@]+(?:\.[^.@]+)?)\.([^.@]+)(?:@(.*
 
 DEFAULT_OF_NODES = ("pressure", "head", "level", "position", "velocity", "angle", "travel")
 DEFAULT_OF_LINKS = ("flow", "flow_P", "flow_T", "flow_A", "flow_B", "force")
+PROBED = ("nodes", "links", "controls", "reactions", "sections")
 ALL = {"pipes": "links", "nodes": "nodes"}  # words for all parts of a kind
 OF_PRESSURE = {"pressure": "pressure", "gauge_pressure": "gauge_pressure", "head": "head", "pressure_head": "head"}
 
@@ -30,7 +31,7 @@ class Probe:
     """Recorded quantity of a part.
 
     text : text of the probe in the case, such as "main.pressure@0.5"
-    part, name : "nodes", "links", "controls" or "reactions", and name of the part, block or reaction
+    part, name : "nodes", "links", "controls", "reactions" or "sections", and name of the part, block, reaction, section
     quantity, dimension : such as "level" and "length"
     fraction : distance from the `from` end of a pipe over its length [-], else None
     point : x, y in a basin [m], else None
@@ -39,7 +40,7 @@ class Probe:
     """
 
     text: str
-    part: str  # "nodes" | "links" | "controls" | "reactions"
+    part: str  # "nodes" | "links" | "controls" | "reactions" | "sections"
     name: str
     quantity: str
     fraction: float | None
@@ -57,14 +58,14 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     """Probe from its text, such as "gate.pressure"; None if the part is faulty. Raises ValueError.
 
     kinds : "nodes" and "links" -> class of each part by name (None if faulty, `BasinFields` for a basin);
-    "scalars" -> scalars; "routes" -> (legs, links) of each route; "pipes" -> pipes;
-    "uncut" -> faulty parts with unknown points, patches or pieces
+    "sections" -> `SectionKind` of each section; "scalars" -> scalars; "pipes" -> pipes
+    "routes" -> (legs, links) of each route; "uncut" -> faulty parts with unknown points, patches or pieces
     """
     match = _PROBE.fullmatch(given.strip()) if isinstance(given, str) else None
     if match is None:
         raise ValueError(f'{show(given)} is not a probe; expected NAME.QUANTITY, for example "gate.pressure"')
     part, name, quantity, place = match.groups()
-    parts = [part] if part else ["nodes", "links", "controls", "reactions"]
+    parts = [part] if part else PROBED
     parts = [part for part in parts if name in kinds.get(part, ())]
     if not parts and part != "nodes" and name in kinds.get("routes", {}):
         return route_probe(given.strip(), name, quantity, place, kinds)
@@ -73,7 +74,7 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     if not parts and may_be_piece(name, kinds):
         return None
     if not parts:
-        groups = ("nodes", "links", "controls", "reactions") if part is None else (part,)
+        groups = PROBED if part is None else (part,)
         names = [name for group in groups for name in kinds.get(group, ())]
         noun = {"nodes": "node", "links": "link"}.get(part or "", "part")
         raise ValueError(f"no {noun} named {show(name)}; {noun}s are {listing(names)}{did_you_mean(name, names)}")
@@ -164,7 +165,7 @@ def default_probes(kinds: Kinds) -> list[Probe]:
             for quantity in [*own, *_scalars_of(kind, kinds, "quantities")] if own else []:
                 text = f"{part}.{name}.{quantity}" if name in other else f"{name}.{quantity}"
                 probes.append(_probe(text, part, name, quantity, None, kinds))
-    for group, quantity in (("controls", "output"), ("reactions", "rate")):
+    for group, quantity in (("controls", "output"), ("reactions", "rate"), ("sections", "flow")):
         for name, kind in kinds.get(group, {}).items():
             if kind is not None:
                 probes.append(_probe(f"{name}.{quantity}", group, name, quantity, None, kinds))

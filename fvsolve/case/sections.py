@@ -15,7 +15,7 @@ from fvsolve.fluid import LAWS
 from fvsolve.fluid.coolprop import OIL_WORDS
 from fvsolve.fluid.oils import ASTM_D341
 from fvsolve.parts import value as val
-from fvsolve.parts.csv_rows import copy_name, find_file
+from fvsolve.parts.csv_rows import CsvError, copy_name, find_file, read_rows
 from fvsolve.parts.pipe.part import LINES
 from fvsolve.parts.table_model import NamedTables, Table, check_table, read_keys
 from fvsolve.parts.value import BY_CELLS, SHAPE, VALUE, Choice, Number, Quantity, ReadContext, positive
@@ -409,6 +409,52 @@ class Gauge(Table):
     at: Annotated[tuple[float, float], val.Rows("length", length=2, about="x, y of the point [m]", changes=VALUE)]
 
 
+class Gauges(NamedTables):
+    """Value of a case file for gauges: tables by name, or a CSV file with a row for each gauge."""
+
+    columns = ("name", "basin", "x", "y")
+    schema = {"type": "object", "additionalProperties": {"type": ["object", "string"]}}
+
+    def read(self, given: Any, setting: ReadContext) -> dict[str, Any]:
+        if isinstance(given, dict) and isinstance(given.get("file"), str):
+            if len(given) > 1:
+                other = next(key for key in given if key != "file")
+                raise ValueError(f"file and {other} are given; expected all gauges in the file, or all in this table")
+            given = self.rows(given["file"], setting)
+        return super().read(given, setting)
+
+    def rows(self, file: str, setting: ReadContext) -> dict[str, Any]:
+        """Tables of the gauges of a file by name. Raises ValueError for faults of the file."""
+        rows = read_rows(find_file(file, setting))
+        name, basin, x, y = (rows.column(column, 0) for column in self.columns)
+        tables: dict[str, Any] = {}
+        points = zip(rows.numbers(x, "length").tolist(), rows.numbers(y, "length").tolist(), strict=True)
+        for row, line, point in zip(rows.cells, rows.lines, points, strict=True):
+            if row[name] in tables or not row[name]:
+                fault = f"{show(row[name])} is the name of two gauges" if row[name] else "a gauge has no name"
+                raise CsvError(rows.file, f"{fault}; expected a name of its own for each", line)
+            tables[row[name]] = {"basin": row[basin], "at": list(point)}
+        return tables
+
+
+class OutputSection(Table):
+    """Table of a section: a line across a basin of water, with the probe `SECTION.flow` of the flow through it."""
+
+    basin: Annotated[str, val.Text("name of the basin")]
+    from_: Annotated[tuple[float, float], val.Rows(
+        "length", length=2, about="x, y of the start of the line [m]", changes=SHAPE,
+    ), Field(alias="from")]  # fmt: skip
+    to: Annotated[tuple[float, float], val.Rows(
+        "length", length=2, about="x, y of the end of the line [m]; flow to the left of it is positive", changes=SHAPE,
+    )]  # fmt: skip
+
+    def chain(self, mesh: Any) -> Any:
+        """`FaceChain` of the section in a mesh."""
+        from fvsolve.mesh.face_chains import chain_along
+
+        return chain_along(mesh, (self.from_, self.to))
+
+
 class OutputGrid(Table):
     """Table of fields of a basin on square pixels, as files `grids/NAME-FIELD.tif` or `grids/NAME.nc`."""
 
@@ -448,7 +494,13 @@ class Output(Table):
     run_up: Annotated[
         Any, NamedTables(RunUp, "named run-ups: { shore = { basin, about } } or { beach = { basin, from, to } }")
     ] = {}
-    gauges: Annotated[Any, NamedTables(Gauge, "named points of basins for probes: { kerb = { basin, at } }")] = {}
+    gauges: Annotated[
+        Any,
+        Gauges(Gauge, 'named points of basins for probes: { kerb = { basin, at } }, or { file = "gauges.csv" }'),
+    ] = {}
+    sections: Annotated[
+        Any, NamedTables(OutputSection, "lines across basins for probes of the flow: { bridge = { basin, from, to } }")
+    ] = {}
     grids: Annotated[
         Any, NamedTables(OutputGrid, "fields of basins on pixels: { flood = { basin, fields, format, cell } }")
     ] = {}

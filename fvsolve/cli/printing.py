@@ -159,6 +159,7 @@ def check_text(case, facts: dict, every: bool = False) -> Iterator:
         notes += [f"{name} has cells: {part['line_why']}" for name, part in facts["pipes"].items() if name not in lines]
     notes += [f"reaction {name}: {item['equation']}, rate {item['law']} [mol/m3/s]; {item['rate']:.4g} mol/s at the "
               "start" for name, item in facts["reactions"].items()]  # fmt: skip
+    notes += [f"{name}: {text}" for name, part in basins.items() for text in part["chains"]]
     yield from _first([*notes, *_network_lines(facts["network"])], every)
     yield from _first([f"moves from the start: {text}" for text in facts["moving"]], every)
     yield from _notices(facts["warnings"], every)

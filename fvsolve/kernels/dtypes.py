@@ -541,6 +541,7 @@ MOLAR_RATE, CHEMICAL_POWER, AFFINITY = 0, 1, 2
 # this place lies below the line between the nodes [Pa]
 PRESSURE_BETWEEN = 31
 PATCH_FROUDE = 32  # Froude number of the flow through driven patch `index`
+SECTION_FLOW = 33  # through a section of basin `index`, by `count` marked faces
 
 BASIN = record(
     kind=i8,  # code of its physics, see `basins.basin_patches`
@@ -610,6 +611,13 @@ BASIN = record(
     maxima=i8,  # offset in `maxima` of greatest values of its cells, see `free_surface.surface_maxima`; -1 for none
     maxima_row=i8,  # number of these for each row of cells; a mesh is one row
     wet_depth=f8,  # depth above which a cell counts as wet there [m]
+    marked=i8,  # offset in `integers` of faces with walls or in sections, see `free_surface.marked_faces`; -1 for none
+    mark_rows=i8,  # number of rows of faces there
+    marks=i8,  # number of marks; on a mesh each face has two
+    marked_faces=i8,  # number of marked faces
+    crests=i8,  # offset in `plane` of their crests, heights and sizes
+    marked_work=i8,  # offset in `work` of flows through marked faces
+    sections=i8,  # 1 if there are sections, whose flows rows need
 )
 NO_SOIL, CONSTANT_RATE, HORTON, GREEN_AMPT = range(4)
 NO_DRAG, MANNING, DARCY = 0, 1, 2
@@ -627,7 +635,9 @@ PATCHES = record(
     open=i8,  # 1 if it is not a wall and joins no link: its flow is that of the boundary
     moves=i8,  # 1 if it is a moving wall
     values=i8,  # offset in `integers` of schedules of inflow values, for each scalar; -1: its initial value
-    second=i8,  # offset in `integers` of the cells next inside those behind its faces; a cell itself if there is none
+    # Offset in `integers` of the cells next inside those behind its faces, a cell itself if there is none; of an
+    # interior patch, its own cells at the faces around it.
+    second=i8,
     closure=i8,  # NO_CLOSURE, or the closure of a driven patch
     drive=i8,  # schedule of its stage or discharge
     depth=i8,  # schedule of the depth of supercritical inflow; -1 for none
@@ -639,7 +649,7 @@ PATCHES = record(
     rest=f8,  # level at rest above the elevation of the basin [m]
     lowest=f8,  # lowest bed of its cells above the level at rest, at least 0 [m]
 )
-NO_CLOSURE, STAGE, DISCHARGE, RATING, CRITICAL, NORMAL_SLOPE, LINKED = range(7)
+NO_CLOSURE, STAGE, DISCHARGE, RATING, CRITICAL, NORMAL_SLOPE, LINKED, INTERIOR = range(8)
 
 WALL = record(
     basin=i8,

@@ -8,6 +8,8 @@ Each copy of a template needs a name of its own, because stored code is found by
 Below LINEAR_FALL the flow is proportional to the fall, so that its slope is bounded, and zero at equal levels.
 """
 
+from math import exp, expm1, log, log1p, sqrt
+
 from fvsolve.jit import njit
 from fvsolve.kernels.density import enthalpy
 from fvsolve.kernels.dtypes import LAW_LINEAR
@@ -24,6 +26,20 @@ SWEEPS = 40
 LEAST_SLOPE = 1e-9  # least slope of Newton's method, so that dry structures leave a level determined [m2/s]
 FARTHEST = 1e6  # greatest fall of the search for a flow [m]
 RULE = FLOW = SLOPES = CHORD = LINE = None  # constants of the templates
+
+
+@njit
+def weir_flow(size, h, fall):
+    """(flow [m3/s], regime) over a weir at a depth h above its crest and a fall of the levels [m].
+
+    size : 2/3 C sqrt(2 g) b [m^1.5/s]
+    """
+    if h <= 0.0:
+        return 0.0, NONE
+    free = size * h * sqrt(h)
+    if fall >= h:
+        return free, FREE
+    return free * exp(0.385 * log(-expm1(1.5 * log1p(-fall / h)))), DROWNED
 
 
 def flow_template(floats, at, setting, ahead, z, fall):

@@ -1,8 +1,9 @@
 """Data of a plane mesh, all SI: cells, faces and named patches, quality measures, search for points, and weights."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -39,7 +40,8 @@ class Mesh:
     normal : float64[f, 2]  unit vectors, from left to right or outward; length : float64[f]  lengths of faces [m]
     middle : float64[f, 2]  middles of faces [m]; ends : int64[f, 2]  points of faces, anticlockwise around left
     patches : names of the patches, the last one always "wall"; grid : grid lines, None if the mesh is not a rectangle
-    notes : remarks about the mesh file for the user
+    notes : remarks about the mesh file for the user; interior : cells of each interior patch, name -> int64[count]
+    groups : name -> int64[:] faces between cells that a group of the mesh file contains, of groups that are walls
     """
 
     points: np.ndarray
@@ -55,6 +57,8 @@ class Mesh:
     patches: tuple[str, ...]
     grid: Grid | None = None
     notes: tuple[str, ...] = ()
+    interior: dict[str, np.ndarray] = field(default_factory=dict)
+    groups: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def inner(self) -> int:
@@ -71,6 +75,34 @@ class Mesh:
         k = self.patches.index(name)
         first, last = np.searchsorted(-self.right, [k + 1, k + 2])  # -right of inner faces is 0 or less, in any order
         return slice(int(first), int(last))
+
+    def faces(self, name: str) -> "PatchFaces":
+        """Faces of a patch: on the boundary, or around an interior patch."""
+        if name not in self.interior:
+            own, count = self.patch(name), self.left.size
+            faces = np.arange(count)[own]
+            return PatchFaces(faces, self.left[own], self.left[own], self.normal[own])
+        within = np.zeros(self.area.size, bool)
+        within[self.interior[name]] = True
+        inner = self.inner
+        left, right = self.left[:inner], self.right[:inner]
+        faces = np.flatnonzero(within[left] != within[right])
+        leaves = within[right[faces]]  # from the left cell into the patch
+        outside, inside = np.where(leaves, left[faces], right[faces]), np.where(leaves, right[faces], left[faces])
+        return PatchFaces(faces, outside, inside, np.where(leaves, 1.0, -1.0)[:, None] * self.normal[faces])
+
+
+class PatchFaces(NamedTuple):
+    """Faces of a patch: indices; cells behind them, and of the patch; unit normals out of the cells behind.
+
+    The cells behind an interior patch are those around it. On the boundary the cells of the patch are those behind.
+    index, behind, inside : int64[faces]; normal : float64[faces, 2]
+    """
+
+    index: np.ndarray
+    behind: np.ndarray
+    inside: np.ndarray
+    normal: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ import contextlib
 import io
 import re
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -234,7 +234,7 @@ def assign_patches(
         if missing.any():
             text = f"lines that are not boundary faces: {missing.sum()} of {members.size}"
             location = _line_location(sketch, edges, lines[members][missing][0])
-            faults.append(Fault(place, f"{text}; {location}; expected a curve of the boundary"))
+            faults.append(Fault(place, f"{text}; {location}; expected a curve of the boundary, or `group` of a wall"))
         spot = spot[~missing]
         taken = spot[(patch[spot] >= 0) & (patch[spot] != names.index(name))]
         if taken.size:
@@ -282,12 +282,12 @@ class Content:
     notes: tuple[str, ...]
 
 
-def read(path: str | Path, unit: str = "m") -> Mesh:
+def read(path: str | Path, unit: str = "m", walls: Collection[str] = ()) -> Mesh:
     """Read a plane mesh from a file of any format of meshio, with coordinates in `unit`.
 
     Triangles and quadrilaterals are cells, renumbered so that neighbours are close; physical groups of lines are
-    patches. The file, its coordinates, its cells and its boundary are checked in this order; MeshError is raised with
-    all faults of the first of these checks that fails.
+    patches, except `walls`: names of groups whose lines may lie between cells. The file, its coordinates, its cells and
+    its boundary are checked in this order; MeshError is raised with all faults of the first of these checks that fails.
     """
     path = Path(path)
     factor = _factor(unit, path)
@@ -314,7 +314,14 @@ def read(path: str | Path, unit: str = "m") -> Mesh:
     faults += overlap_faults(sketch, edges, number)
     if faults:
         raise MeshError(faults, path.name)
-    faults, names, patch = assign_patches(sketch, edges, lines, content.groups)
+    outline = {name: members for name, members in content.groups.items() if name not in walls}
+    faults, names, patch = assign_patches(sketch, edges, lines, outline)
+    chains = {name: key_of(lines[members], len(sketch.points)) for name, members in content.groups.items()
+              if name in walls}  # fmt: skip
+    for name, keys in chains.items():
+        if (missing := ~np.isin(keys, edges.key)).any():
+            where = _line_location(sketch, edges, lines[content.groups[name]][missing][0])
+            faults.append(Fault(f"groups.{name}", f"{where}; expected sides of cells, as the group is a wall"))
     touching = contact_faults(sketch, edges, patch >= 0)
     faults += touching or piece_faults(sketch, edges)
     if faults:
@@ -322,9 +329,11 @@ def read(path: str | Path, unit: str = "m") -> Mesh:
     notes += _notes(sketch, factor, patch, bool(content.groups))
     cells = cells[edges.order(len(cells))]
     sketch, edges = Sketch(sketch.points, cells, unit), edges_of(cells, len(sketch.points))
-    patch = assign_patches(sketch, edges, lines, content.groups)[2]
+    patch = assign_patches(sketch, edges, lines, outline)[2]
     patch = np.where(patch < 0, len(names) - 1, patch)
-    return assemble(factor * sketch.points, cells, edges, names, patch, notes=notes)
+    mesh = assemble(factor * sketch.points, cells, edges, names, patch, notes=notes)
+    between = key_of(mesh.ends[: mesh.inner], len(sketch.points))
+    return replace(mesh, groups={name: np.flatnonzero(np.isin(between, keys)) for name, keys in chains.items()})
 
 
 def _factor(unit: str, path: Path) -> float:

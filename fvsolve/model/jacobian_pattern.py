@@ -102,9 +102,10 @@ class Couplings:
             if row["open"]:
                 cells = pattern.cells_read(pattern.neighbours(basin), self.integers[behind : behind + row["faces"]])
                 yield pairs_of(unique_states(self.size + i), pattern.cell_states(basin, cells))
-            if row["closure"] in (rec.DISCHARGE, rec.RATING, rec.LINKED):  # one level for all faces
-                second = self.integers[row["second"] : row["second"] + row["faces"]]
-                read = unique_states(self.behind(i), pattern.cell_states(basin, np.unique(second)))
+            if row["closure"] in (rec.DISCHARGE, rec.RATING, *pattern.THROUGH_FACES):  # one level for all faces
+                read = unique_states(
+                    self.behind(i), pattern.cell_states(basin, pattern.cells_at_faces(self.integers, row))
+                )
                 yield pairs_of(self.behind(i), read)
 
     # nodes ------------------------------------------------------------------------------------------------------
@@ -139,10 +140,10 @@ class Couplings:
         For a node they are its mass, positions of pistons and states of its device. For a patch they are the first
         quantity of the cells behind it, and the travels of walls of its basin.
         """
-        if i in self.patches and self.patches[i]["closure"] == rec.LINKED:
+        if i in self.patches and self.patches[i]["closure"] in pattern.THROUGH_FACES:
             row = self.patches[i]
-            second = self.integers[row["second"] : row["second"] + row["faces"]]
-            return unique_states(self.behind(i), pattern.cell_states(self.basins[row["basin"]], np.unique(second)))
+            read = pattern.cells_at_faces(self.integers, row)
+            return unique_states(self.behind(i), pattern.cell_states(self.basins[row["basin"]], read))
         if i in self.patches:
             return unique_states(self.behind(i, 1), *(self.walls["y"][self.walls["basin"] == self.patches[i]["basin"]]))
         given = self.blocks.schedule(self.nodes["schedule"][i])

@@ -33,10 +33,11 @@ STIFF_RATIO = 3.0  # ratio of steps to those that waves need, above which an imp
 def checks(model) -> dict[str, Any]:
     """Facts about pipes, basins, nodes, the step and its cause, the number of steps and the expected run time; SI."""
     rho, viscosity = model.case.properties.density, model.case.properties.viscosity
+    cells = {f"{place}.inside" for place in model.case.patches_with_faces}  # behind patches; no part of the case
     nodes = {
         name: {"elevation": row["elevation"].item(), "pressure": row["pressure"].item(),
                "head": float(model.head(row["pressure"], row["elevation"]))}
-        for name, row in zip(model.node_names, model.tables.nodes, strict=True)
+        for name, row in zip(model.node_names, model.tables.nodes, strict=True) if name not in cells
     }  # fmt: skip
     masses = {
         name: {"position": row["position"].item(), "velocity": row["velocity"].item(), "force": row["force"].item()}
@@ -128,12 +129,15 @@ def cost_notices(model, steps: int | None, set_by: str) -> list[Notice]:
 
 
 def basin_facts(basin) -> dict[str, Any]:
-    """Facts about a basin: mesh, waves at the start, and patches (length of faces, area of the cells behind them)."""
+    """Facts about a basin: mesh, waves at the start, walls and sections, and patches.
+
+    Facts of a patch are the length of its faces, and the area of the cells behind them.
+    """
     mesh, patches = basin.mesh, {}
     for name in patch_names(mesh):
-        faces, part = mesh.patch(name), basin.part.patches.get(name)
+        faces, part = mesh.faces(name).index, basin.part.patches.get(name)
         patches[name] = {
-            "faces": faces.stop - faces.start, "length": float(mesh.length[faces].sum()),
+            "faces": faces.size, "length": float(mesh.length[faces].sum()),
             "area": float(mesh.area[boundary_cells(mesh, name)].sum()),
             "reflects": 1.0 if part is None else basin.reflection(part),
         }  # fmt: skip
@@ -141,6 +145,7 @@ def basin_facts(basin) -> dict[str, Any]:
         "physics": basin.part.physics, "cells": basin.n, "path": "grid" if basin.is_grid else "faces",
         "area": float(mesh.area.sum()), "least_width": float(np.sqrt(mesh.area.min())),
         **{key: list(limits) for key, limits in basin.ranges().items()}, "memory": basin.memory, "patches": patches,
+        "chains": basin.chain_texts(),
     }  # fmt: skip
 
 

@@ -29,6 +29,8 @@ def fill_probes(draft, probes: list) -> np.ndarray:
             row["side"] = BLOCK_QUANTITIES.index(probe.quantity)
         elif probe.part == "reactions":
             lower_reaction_probe(draft, row, probe)
+        elif probe.part == "sections":
+            lower_section(draft, row, probe)
         elif probe.point is not None:
             lower_basin_point(draft, row, probe)
         elif probe.part == "nodes" and probe.name in case.meshes:
@@ -101,6 +103,18 @@ def lower_basin_point(draft, row, probe) -> None:
     else:
         row["kind"] = rec.CELL_FIELD
         basin.lower_probe(row, probe.quantity, cells, weights)
+
+
+def lower_section(draft, row, probe) -> None:
+    """Fill the row of a probe of the flow through a section: its marked faces, and their lengths with signs."""
+    name = draft.case.output.sections[probe.name].basin
+    k = list(draft.case.meshes).index(name)
+    basin = draft.basins[k]
+    chain = basin.sections[probe.name]
+    row["kind"], row["index"], row["count"] = rec.SECTION_FLOW, k, chain.faces.size
+    row["cell"], row["weights"] = len(draft.integers), len(draft.floats)
+    draft.integers += np.searchsorted(basin.marks.faces, chain.faces).tolist()
+    draft.floats += (chain.turn * basin.mesh.length[chain.faces]).tolist()
 
 
 def lower_surface(draft, row, probe) -> None:

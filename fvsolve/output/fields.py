@@ -302,7 +302,9 @@ def pipe_geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.nd
     places = {name: plan[network_layout.place(name)] for name in model.node_names}
     for basin in model.basins:
         for patch in patch_names(basin.mesh):
-            places[f"{basin.name}.{patch}"] = plan[basin.name] + basin.mesh.middle[basin.mesh.patch(patch)].mean(axis=0)
+            places[f"{basin.name}.{patch}"] = plan[basin.name] + basin.mesh.middle[basin.mesh.faces(patch).index].mean(
+                axis=0
+            )
     bends = network_layout.link_bends(model.case.links)
     ends = list(dict.fromkeys(end for pipe in model.pipes for end in (pipe.from_, pipe.to)))
     index = {name: i for i, name in enumerate(ends)}

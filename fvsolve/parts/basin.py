@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic.fields import FieldInfo
 
-from fvsolve.assembly.lowering import Lowering
+from fvsolve.assembly.lowering import FLOW, STAGE, Input, Lowering
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import Attitude
@@ -34,6 +34,7 @@ from fvsolve.parts.value import (
     between,
     nonnegative,
     positive,
+    read_each,
 )
 from fvsolve.units import show
 
@@ -70,6 +71,21 @@ class Rating(Table):
 
 
 CLOSURES = ("stage", "discharge", "rating", "normal_slope")  # keys that close a driven patch
+INTERIOR_KEYS = ("at", "area", "polygon", "discharge")  # keys of interior patches
+
+
+class Corners(Value):
+    """Corners of an interior patch."""
+
+    about = "corners of an interior patch, instead of `at`: the cells with their centre in it, one at least"
+    takes = "list of [x, y], m"
+
+    def read(self, given: Any, setting: ReadContext) -> tuple[tuple[float, ...], ...]:
+        if not isinstance(given, (list, tuple)) or len(given) < 3:
+            text = f"{show(given)} is not a list of three or more points"
+            raise ValueError(f"{text}; expected for example {show([[0, 0], [2, 0], [2, 1]])}")
+        point = Rows("length", length=2)
+        return tuple(read_each(enumerate(given), lambda entry: point.read(entry, setting)).values())
 
 
 class Patch(Table):
@@ -81,6 +97,14 @@ class Patch(Table):
         str | None,
         Choice("side", SIDES, "side of the rectangle, required for a rectangle; a mesh file names its own patches"),
     ] = None
+    at: Annotated[tuple[float, float] | None, Rows(
+        "length", length=2, about="middle of an interior patch, a square of the size `area` [m]", changes=SHAPE,
+    )] = None  # fmt: skip
+    area: Annotated[
+        float | None,
+        Quantity("area", positive, "area about `at`: the cells with their centre in it, one at least", changes=SHAPE),
+    ] = None
+    polygon: Annotated[tuple[tuple[float, ...], ...] | None, Corners()] = None
     span: Annotated[tuple[float, float] | None, Rows(
         "length", nonnegative, length=2,
         about="start and end along the side, on grid lines [m]; the whole side if left out", changes=SHAPE,
@@ -125,11 +149,31 @@ class Patch(Table):
     scalars: Annotated[
         dict[str, Any], ScalarValues("scalar values of the inflow, for a given velocity or an open boundary")
     ] = {}
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("boundary", "impedance", *CLOSURES), ("body", "travel"))
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("boundary", "impedance", *CLOSURES), ("body", "travel"), ("side", "at", "polygon"),
+    )  # fmt: skip
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
+        faults = super().key_faults(given)
+        if ("at" in given) != ("area" in given):
+            present, missing = ("at", "area") if "at" in given else ("area", "at")
+            faults.append(((), f"{missing} is missing, which an interior patch with `{present}` needs"))
+        if "at" in given or "polygon" in given:
+            text = "applies to patches of the boundary, and this is an interior patch; leave this key out"
+            faults += [((key,), text) for key in given if key in cls.keys() and key not in INTERIOR_KEYS]
+        return faults
+
+    @property
+    def is_interior(self) -> bool:
+        """True if the patch lies inside the basin and not on its boundary."""
+        return self.at is not None or self.polygon is not None
 
     @property
     def closure(self) -> str | None:
-        """Key of the closure of a driven patch, or "critical"; None for other patches."""
+        """Key of the closure of a driven patch, or "critical"; None for other patches, and for interior patches."""
+        if self.is_interior:
+            return None
         stated = next((key for key in CLOSURES if getattr(self, key) is not None), None)
         return self.boundary if stated is None and self.boundary == "critical" else stated
 
@@ -271,7 +315,7 @@ class PatchJunction(PatchNode):
     fixes_pressure: ClassVar[bool] = False
     kind: ClassVar[str] = "patch-junction"
     quantities: ClassVar[dict[str, str]] = DrivenPatch.quantities
-    flow: ClassVar[Schedule] = constant(0.0)  # given inflow
+    flow: Schedule = constant(0.0)  # given inflow
 
 
 class MovingWall(PatchNode):
@@ -346,6 +390,11 @@ class Physics(Table):
     def face_type(cls) -> type:
         """Class of the link that represents the faces of a patch."""
         raise NotImplementedError
+
+    @classmethod
+    def has_fifth_order(cls, basin: "Basin", rectangle: bool) -> bool:
+        """True if schemes above second order apply to a basin; rectangle : True if its mesh is a full rectangle"""
+        return rectangle
 
     @classmethod
     def has_friction(cls, basin: "Basin") -> bool:
@@ -454,8 +503,8 @@ class Basin(PlaceOnBody, kind="basin"):
         else:
             faults += [((), f"{key} is missing") for key in RECTANGLE_KEYS[:2] if key not in given]
         for name, patch in given["patches"].items() if isinstance(given.get("patches"), dict) else ():
-            side = isinstance(patch, dict) and "side" in patch
-            if side and not rectangle:
+            side = isinstance(patch, dict) and not {"side", "at", "polygon"}.isdisjoint(patch)
+            if side and "side" in patch and not rectangle:
                 faults.append((("patches", name), "takes its faces from the mesh; remove the keys `side` and `span`"))
             elif isinstance(patch, dict) and not side and rectangle:
                 faults.append((("patches", name), "side is missing"))
@@ -531,6 +580,12 @@ class PatchRows(Lowering, kind="patch"):
     def motion_text(self, name, node, row, inflow, flow, amount) -> str:
         return f"basin {name}: {amount(flow, 'flow')} flow in"
 
+    def inputs(self, model, name, part):
+        patches, schedules = model.tables.patches, {rec.STAGE: ("stage", STAGE), rec.DISCHARGE: ("discharge", FLOW)}
+        row = patches[patches["node"] == model.node_names.index(name)][0]
+        key, sort = schedules.get(int(row["closure"]), ("", None))
+        return {key: Input(sort, int(row["drive"]))} if key else {}
+
     def probe(self, draft, name, probe, row) -> None:
         if probe.quantity in ("force", "power", "travel"):
             row["kind"], row["index"] = rec.WALL_VALUE, draft.wall_names.index(name)
@@ -538,9 +593,11 @@ class PatchRows(Lowering, kind="patch"):
         elif probe.quantity == "froude":
             row["kind"] = rec.PATCH_FROUDE
             row["index"] = k = draft.patch_table["node"].tolist().index(draft.node_index[name])
-            if draft.patch_table["closure"][k] == rec.NO_CLOSURE:
-                text = f"{name} has no Froude number: a delay line or rigid column joins it, or no part at all"
-                draft.fault("output.probes", f"{text}; expected a pipe of finite volumes, a restriction or a closure")
+            if draft.patch_table["closure"][k] in (rec.NO_CLOSURE, rec.INTERIOR):
+                reason = "a delay line or rigid column joins it, or no part at all"
+                reason = reason if draft.patch_table["closure"][k] == rec.NO_CLOSURE else "it lies inside the basin"
+                expected = "a patch of the boundary with a closure, a pipe of finite volumes or a restriction"
+                draft.fault("output.probes", f"{name} has no Froude number: {reason}; expected {expected}")
         elif probe.quantity != "flow":
             super().probe(draft, name, probe, row)
         else:
@@ -557,7 +614,7 @@ class PatchJunctionRows(Lowering, kind="patch-junction"):
     """Conversion to table rows of the places of links at patches: junctions."""
 
     def place(self, draft, name, node, row) -> None:
-        row["kind"], row["schedule"] = rec.JUNCTION, draft.schedules.add_constant(0.0)
+        row["kind"], row["schedule"] = rec.JUNCTION, draft.schedules.add(node.flow, -draft.fluid.density)
 
     def probe(self, draft, name, probe, row) -> None:
         if probe.quantity in ("flow", "froude"):

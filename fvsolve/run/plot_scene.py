@@ -130,7 +130,7 @@ def _anchors(case, plan: dict[str, np.ndarray]) -> dict[str, tuple[float, float,
     anchors = {}
     for name, mesh in case.meshes.items():
         for patch in patch_names(mesh):
-            middle = plan[name] + mesh.middle[mesh.patch(patch)].mean(axis=0)
+            middle = plan[name] + mesh.middle[mesh.faces(patch).index].mean(axis=0)
             anchors[f"{name}.{patch}"] = (*map(float, middle), case.elevations.get(f"{name}.{patch}", 0.0))
     return anchors
 
@@ -154,8 +154,12 @@ def _about_basins(case) -> dict[str, np.ndarray]:
 
 
 def _outward(case, basin: str, patch: str) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vector out of a basin at a patch, and the midpoint of the patch [m] : float64[2] each."""
+    """Unit vector out of a basin at a patch, and the midpoint of the patch [m] : float64[2] each.
+
+    At an interior patch the vector leads away from the middle of the basin.
+    """
     mesh = case.meshes[basin]
-    middle = mesh.middle[mesh.patch(patch)].mean(axis=0)
-    inside = mesh.centre[mesh.left[mesh.patch(patch)]].mean(axis=0)
-    return (middle - inside) / np.linalg.norm(middle - inside), middle
+    middle = mesh.middle[mesh.faces(patch).index].mean(axis=0)
+    inside = mesh.centroid if patch in mesh.interior else mesh.centre[mesh.faces(patch).behind].mean(axis=0)
+    length = np.linalg.norm(middle - inside)
+    return (middle - inside) / length if length > 0.0 else np.array([1.0, 0.0]), middle

@@ -11,6 +11,7 @@ import numpy as np
 
 from fvsolve.basins.boundary_cells import BAND_MARGIN
 from fvsolve.basins.cell_sides import BLOCK
+from fvsolve.basins.lower_pattern import cells_at_faces
 from fvsolve.errors import FvsolveError, Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import stage_sums
@@ -166,7 +167,7 @@ def common_cells(model: Model, b: int):
     for patch in model.tables.patches[model.tables.patches["basin"] == b]:
         yield integers[patch["first"] : patch["first"] + patch["count"]]
         if patch["closure"] != rec.NO_CLOSURE:
-            yield integers[patch["second"] : patch["second"] + patch["faces"]]
+            yield cells_at_faces(integers, patch)
     probes = model.tables.probes
     for probe in probes[np.isin(probes["kind"], (rec.CELL_FIELD, rec.CELL_SCALAR)) & (probes["index"] == b)]:
         yield integers[probe["cell"] : probe["cell"] + probe["count"]]
@@ -219,7 +220,7 @@ def single_thread_reason(model: Model) -> str:
         return "parts of rotation, electricity and heat read the whole state"
     meshes = model.case.meshes
     for probe in (*model.probes, *model.watched):
-        if probe.name in meshes and probe.quantity in READ_ALL_CELLS:
+        if (probe.name in meshes and probe.quantity in READ_ALL_CELLS) or probe.part == "sections":
             return f"the probe {probe.text} reads all cells"
     if not model.basins:
         return "the case has no basin; only rows of basins are distributed over threads"

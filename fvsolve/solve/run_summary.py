@@ -11,7 +11,17 @@ from fvsolve.model import Model, RunData
 from fvsolve.solve.run_up import RunUpTable, run_up_table
 
 INTEGRATION_TIMES = 10001  # times at which a scheduled flow is integrated, beside its own
+HELD = (rec.DISCHARGE, rec.LINKED, rec.INTERIOR)  # closures of patches whose outflow is held at critical flow
 DRIFT = 1e-6  # deviation of the length of Euler parameters from 1 above which a notice is given
+
+
+HELD_TEXTS = (  # of a scheduled outflow, and of an outflow through links or from an interior patch
+    ("the scheduled outflow", "less than scheduled have left; give less outflow, or `stage` or `rating`"),
+    (
+        "the flow drawn from it",
+        "were added to meet it (`made_up` in the mass balance); draw less, or widen the patch",
+    ),
+)
 
 
 @dataclass(frozen=True)
@@ -115,7 +125,7 @@ def find_marks(run_data: RunData) -> list[Mark]:
     kinds = [("below vapor pressure", f"links.{pipe.name}") for pipe in pipes]
     kinds += [(kind, f"nodes.{name}") for kind in ("below vapor pressure", "dry", "spilling") for name in nodes]
     kinds = [(kind, place.removesuffix(".inside")) for kind, place in kinds]
-    for node in model.tables.patches["node"][model.tables.patches["closure"] == rec.DISCHARGE]:
+    for node in model.tables.patches["node"][np.isin(model.tables.patches["closure"], HELD)]:
         kinds[len(pipes) + len(nodes) + node] = "", ""  # of `held_discharges`
     kinds += [("stopped dead", f"links.{name}") for name in model.column_names]
     kinds += [("beyond its stroke", f"links.{name}") for name in model.piston_names]
@@ -146,21 +156,25 @@ def find_marks(run_data: RunData) -> list[Mark]:
 
 
 def held_discharges(run_data: RunData, start: float, t: float, entered: np.ndarray) -> list[Mark]:
-    """Marks of patches whose scheduled outflow is more than critical flow, which leaves instead.
+    """Marks of patches whose scheduled outflow, or that of their links, is more than critical flow, which leaves.
 
     start, t : times of start and end [s]; entered : float64[nodes]  mass that has entered at each node [kg]
     """
     model, marks = run_data.model, []
     times = run_data.marks[len(model.pipes) + len(model.node_names) :]
-    for row in model.tables.patches[model.tables.patches["closure"] == rec.DISCHARGE]:
-        name, time = model.node_names[row["node"]], float(times[row["node"]])
+    for row in model.tables.patches[np.isin(model.tables.patches["closure"], HELD)]:
+        name, time = model.node_names[row["node"]].removesuffix(".inside"), float(times[row["node"]])
         if np.isfinite(time):
             basin, _, patch = name.partition(".")
-            schedule = model.case.nodes[basin].patches[patch].discharge
-            volume = float(entered[row["node"]]) / model.case.properties.density - scheduled_volume(schedule, start, t)
+            volume, linked = (
+                float(entered[row["node"]]) / model.case.properties.density,
+                row["closure"] != rec.DISCHARGE,
+            )
+            if not linked:
+                volume -= scheduled_volume(model.case.nodes[basin].patches[patch].discharge, start, t)
             lack, when = (model.case.amount(x, kind, 4) for x, kind in ((volume, "volume"), (time, "time")))
-            text = (f"{name}: from {when} on the scheduled outflow is more than critical flow, which leaves instead; "
-                    f"{lack} less than scheduled have left; give less outflow, or `stage` or `rating`")  # fmt: skip
+            drawn, result = HELD_TEXTS[int(linked)]
+            text = f"{name}: from {when} on {drawn} is more than critical flow, which leaves instead; {lack} {result}"
             marks.append(Mark("discharge held", f"nodes.{name}", time, text, volume))
     return marks
 

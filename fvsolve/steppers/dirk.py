@@ -6,7 +6,7 @@ from fvsolve.jit import inline, njit
 from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers import newton as iterations
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
-from fvsolve.steppers.run_handle import REAL_SOLVE, call_solve, open_run, stage_rates, store_ledger_rates
+from fvsolve.steppers.run_handle import REAL_SOLVE, call_solve, note_stage, open_run, stage_rates, store_ledger_rates
 from fvsolve.steppers.step_operations import combine, copy, error_norm
 
 
@@ -71,6 +71,7 @@ def try_stages(handle, r, t, h, now):
         combine(0, y.size, y, h, row, i, k, base)
         if row[i] == 0.0:
             stage_rates(handle, r, t + c[i] * h, base, ki)
+            note_stage(r)
             store_ledger_rates(r, i)
             continue
         shift = 1.0 / (h * row[i])

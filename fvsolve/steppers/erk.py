@@ -13,7 +13,7 @@ from fvsolve.kernels.calls import damp_in_turn
 from fvsolve.kernels.stage_sums import CHECKED, EDGES, MODE, OFF, OTHERS, STAGE, STAGE_AND_END, request_sums, sum_runs
 from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers.coefficients import nodes_of, row_of, weights_of
-from fvsolve.steppers.run_handle import evaluate, open_run, stage_rates, store_ledger_rates
+from fvsolve.steppers.run_handle import evaluate, note_stage, open_run, stage_rates, store_ledger_rates
 from fvsolve.steppers.step_operations import BEGIN, STOP, combine, copy, error_of_bands
 
 CHUNK = 512  # number of states of a vector loop whose operands stay in the cache
@@ -69,6 +69,7 @@ def attempt(handle, run, t, h, now, new):
             evaluate(handle, r, t + c[i] * h, target, k[i])
         else:
             stage_rates(handle, r, t + c[i] * h, target, k[i])
+        note_stage(r)
         if blocked:
             structure[MODE] = OFF
         store_ledger_rates(r, i)
@@ -141,6 +142,7 @@ def damped_attempt(handle, run, t, h, now, new):
     for i in range(2, s):
         form_sum(r, h, row_of(r.coefficients, s, i), i, now, r.y[3])
         stage_rates(handle, r, t + c[i] * h, r.y[3], k[i])
+        note_stage(r)
         store_ledger_rates(r, i)
         damp_in_turn(h, r.y[3], k[i], early if i == 2 else late, handle)
     for m in range(row_blocks.shape[0]):

@@ -258,13 +258,20 @@ def solve_blocks(r):
 
 @inline
 def evaluate_stages(handle, r, t, h, now):
-    """Write the rates F at all implicit stages to `transformed`, and the ledger rates there."""
-    q, y_stage, rows = r.k.shape[0] - 1, r.y[3], r.transformed
+    """Write the rates F at all implicit stages to `transformed`, and the ledger rates there.
+
+    `out` receives the status of the last stage whose rates are not valid.
+    """
+    q, y_stage, rows, status, where = r.k.shape[0] - 1, r.y[3], r.transformed, 0.0, -1.0
     c, t_matrix = nodes_of(r.coefficients, q + 1), matrix(r.coefficients, q + 1, T)
     for i in range(q):
         blend(1.0, r.y[now], t_matrix, i * q, q, W * q, rows, y_stage)
         stage_rates(handle, r, t + c[i + 1] * h, y_stage, rows[F * q + i])
         store_ledger_rates(r, i + 1)
+        if r.out[rec.STATUS] != 0.0:
+            status, where = r.out[rec.STATUS], r.out[rec.PLACE]
+    if status != 0.0:
+        r.out[rec.STATUS], r.out[rec.PLACE] = status, where
     r.state[0]["newton"] += 1.0
 
 

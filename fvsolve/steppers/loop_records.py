@@ -40,8 +40,12 @@ CONTROL = _record(
 # Kept between calls while rows remain to be written: phase; 1 after a step; rows of y with the present and the last
 # state; number of rows; 1 if the rhs switches at the end of the last step. Kept from a step to the next within a call:
 # 1 if the last stage is the first stage of the next step; 1 if `g_new` belongs to the end of the last step; 1 if
-# compensated sums have changed the new state; 1 if the next step is not solved in sweeps; end of the step [s].
-PROGRESS = _record("phase has_last_step now old rows switch_pending reuse event_known changed no_sweeps", "t_new")
+# compensated sums have changed the new state; 1 if the next step is not solved in sweeps; status of the first stage of
+# the last step whose rates are not valid, 0 if all are, and the place of this fault; end of the step [s].
+PROGRESS = _record(
+    "phase has_last_step now old rows switch_pending reuse event_known changed no_sweeps stage_status stage_where",
+    "t_new",
+)
 # 1 with a Jacobian; step at which it was computed; number of earlier steps known (2: or more); step of the present
 # stages; shift of the last factors (0: none; negative: a resumed run has to factor again); greatest ratio of successive
 # increments of a step; last ratio / (1 - ratio); last step with damping; size of a factor.

@@ -203,16 +203,18 @@ def convergence(r, turn, size, before):
     """(True to stop after Newton iteration `turn`, CONVERGED or FAILED).
 
     size, before : norms of this and of the previous increment, in units of the tolerance
-    The greatest ratio of increments and the convergence factor are stored.
+    The greatest ratio of increments and the convergence factor are stored. A stage whose rates are not valid (its
+    status in `out`) is not solved.
     """
     newton, (enough, rounded) = r.newton[0], stop_limits(r.control[0])
+    valid = CONVERGED if r.out[rec.STATUS] == 0.0 else FAILED
     if not size < np.inf:
         return True, FAILED
     if turn > 0:
         ratio = size / before if before > 0.0 else 0.0
         newton["increment_ratio"] = max(newton["increment_ratio"], ratio)
         if ratio >= 0.3 and size <= rounded:
-            return True, CONVERGED
+            return True, valid
         if ratio >= 0.99:
             return True, FAILED
         factor = ratio / (1.0 - ratio)
@@ -223,8 +225,8 @@ def convergence(r, turn, size, before):
         factor = max(newton["convergence_factor"], 1e-4) ** 0.8
         newton["convergence_factor"] = factor
     if factor * size <= enough:
-        return True, CONVERGED
-    return turn == MOST - 1, CONVERGED if turn > 0 and factor * size <= rounded else FAILED
+        return True, valid
+    return turn == MOST - 1, valid if turn > 0 and factor * size <= rounded else FAILED
 
 
 @inline
@@ -259,8 +261,10 @@ def damped_increment(handle, r, t, h_gamma, i):
     The increment is stored in `increment`; `rate` contains the rates of the stage. -1 : the matrix is singular.
     """
     d, f, ki, shift, newton = r.increment, r.rate, r.k[i], 1.0 / h_gamma, r.newton[0]
+    status, where = r.out[rec.STATUS], r.out[rec.PLACE]
     store_ledger_rates(r, i)
     renew(handle, r, t, r.y[3], f, r.ledger_rates[i], d)
+    r.out[rec.STATUS], r.out[rec.PLACE] = status, where  # the Jacobian needs rates at other states
     r.state[0]["factorisations"] += 1.0
     if run_handle.call_factor(r.calls[run_handle.REAL_FACTOR], r.structure, r.jacobian, shift, r.factors) != 0:
         return -1.0
@@ -315,6 +319,8 @@ def damped_newton(handle, r, t, h_gamma, i):
             part, tried, length = damped_update(handle, r, t, h_gamma, i, size, rounded)
         if part != tried and size <= floor and length < np.inf:  # rounding, or a kink between the iterates
             done = True
+        if done and r.out[rec.STATUS] != 0.0:
+            break
         if done:
             for j in range(ki.size):
                 ki[j] += shift * (1.0 - tried) * d[j]

@@ -9,7 +9,7 @@ from fvsolve.jit import inline, njit
 from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers.coefficients import nodes_of, row_of, weights_of
 from fvsolve.steppers.newton import factor_for, follow_stages, renew_at_start, spectral_radius
-from fvsolve.steppers.run_handle import REAL_SOLVE, call_solve, open_run, stage_rates
+from fvsolve.steppers.run_handle import REAL_SOLVE, call_solve, note_stage, open_run, stage_rates
 from fvsolve.steppers.step_operations import combine, copy, error_norm
 from fvsolve.steppers.structure import multiply
 
@@ -74,6 +74,7 @@ def evaluate_stage(handle, r, t, h, i, now):
     s, y = r.k.shape[0], r.y[now]
     combine(0, y.size, y, h, row_of(r.coefficients, s, i), i, r.k, r.y[3])
     stage_rates(handle, r, t + nodes_of(r.coefficients, s)[i] * h, r.y[3], r.rate)
+    note_stage(r)
 
 
 @njit

@@ -152,6 +152,13 @@ def stage_rates(handle, r, t, y, dydt):
 
 
 @njit(forceinline=True)
+def note_stage(r):
+    """Store the status of a stage with faulty rates, and its place, unless an earlier stage of the step has a fault."""
+    if r.out[rec.STATUS] != 0.0 and r.progress[0]["stage_status"] == 0:
+        r.progress[0]["stage_status"], r.progress[0]["stage_where"] = int(r.out[rec.STATUS]), int(r.out[rec.PLACE])
+
+
+@njit(forceinline=True)
 def store_ledger_rates(r, i):
     """Store the ledger rates in `r.out` as those of stage i."""
     out, rates, offset = r.out, r.ledger_rates, r.control[0]["ledger_offset"]

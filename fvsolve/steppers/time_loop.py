@@ -8,7 +8,7 @@ due : time of an output row at which it has to end [s], see `step_control.row_st
 tolerance.
 """
 
-from math import isfinite
+from math import isfinite, nan
 
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.calls import compile_as
@@ -109,6 +109,7 @@ def locate(handle, run, r, h, now, new, e):
             guess = 0.5 * (low + high)
         if done:
             guess = high
+        r.progress[0]["stage_status"] = 0
         e = call_attempt(r.calls[STEP], handle, run, t, guess, now, new)
         if e == rec.NEWTON_FAILED:
             break
@@ -207,10 +208,12 @@ def evaluate_state(handle, r):
 
 @inline
 def check_state(r):
-    """Book the last step in the ledger if the present state is valid; returns DONE, BAD_VALUE or BAD_STATUS."""
+    """Book the last step in the ledger if its stages and its end are valid; returns DONE, BAD_VALUE or BAD_STATUS."""
     out, state, control = r.out, r.state[0], r.control[0]
     if out[rec.STATUS] == rec.NOT_FINITE or not isfinite(out[rec.RATE]):
         return rec.BAD_VALUE
+    if r.progress[0]["stage_status"] != 0:
+        report_stage(r)
     if out[rec.STATUS] != 0.0:
         return rec.BAD_STATUS
     if state["unbooked"] > 0.0:
@@ -219,6 +222,12 @@ def check_state(r):
         book(state["unbooked"], b, r.ledger_rates, r.dense, use_slope, known, out[control["ledger_offset"] :], r.ledger)
         state["unbooked"] = 0.0
     return rec.DONE
+
+
+@inline
+def report_stage(r):
+    """Write the status of the faulty stage of the last step, and its place, to `out`."""
+    r.out[rec.STATUS], r.out[rec.PLACE] = float(r.progress[0]["stage_status"]), float(r.progress[0]["stage_where"])
 
 
 @inline
@@ -348,21 +357,24 @@ def find_step(handle, run, r, h, full, due, new):
             h, last = step_control.APPROACH * rest, False
         elif last:
             h = rest
-        if too_short(control, state, h) and (not last or failure == rec.NEWTON_STUCK):
+        if too_short(control, state, h) and (not last or failure != rec.TINY_STEP):
             return failure, h, last
         near_kink = rest <= 1e3 * step_control.shortest(control, state)
         r.progress[0]["no_sweeps"] = 1 if state["last"] > 0.0 and failures < unswept and not near_kink else 0
         e, length, last = try_step(handle, run, r, h, last, due, now, new, near_kink)
         if e == rec.NEWTON_FAILED:
-            failure = rec.NEWTON_STUCK
+            failure = rec.NEWTON_STUCK if r.out[rec.STATUS] == 0.0 else rec.BAD_STATUS
             failures += 1
             h = full = step_control.after_failure(control, state, h)
         elif acceptable(e, near_kink):
             if control["mode"] == rec.TOLERANCE:
                 shortened = last or length == due - state["t"] or length < full
-                step_control.store_next(control, state, length, e, shortened, failure == rec.NEWTON_STUCK, rate)
+                step_control.store_next(control, state, length, e, shortened, failures > 0, rate)
             return rec.DONE, length, last
         else:
+            if r.progress[0]["stage_status"] != 0:
+                failure = rec.BAD_STATUS
+                report_stage(r)
             state["rejections"] += 1.0
             h = full = length * step_control.reduced(control, e)
             state["step"] = h
@@ -373,9 +385,11 @@ def find_step(handle, run, r, h, full, due, new):
 def try_step(handle, run, r, h, last, due, now, new, near_kink):
     """Attempt a step, and shorten it to the first event within it; returns (its error, its length, `last`).
 
+    The error is NaN under error control if the rates of a stage are not valid.
     near_kink : True if the segment ends so soon that rounding dominates
     """
     state, progress, g = r.state[0], r.progress[0], r.g
+    progress["stage_status"] = 0
     e = error_with_ledger(r, h, run_handle.call_attempt(r.calls[run_handle.STEP], handle, run, state["t"], h, now, new))
     if e == rec.NEWTON_FAILED or not acceptable(e, near_kink):
         return e, h, last
@@ -384,14 +398,20 @@ def try_step(handle, run, r, h, last, due, now, new, near_kink):
     if g.size > 0:
         run_handle.call_events(r.calls[run_handle.EVENT_FUNCTIONS], progress["t_new"], r.y[new], handle, r.g_new)
     if not crossed(g, r.g_new):
-        return e, h, last
+        return nan if has_faulty_stage(r) else e, h, last
     progress["event_known"] = 0
     length, e = locate(handle, run, r, h, now, new, e)
     if e == rec.NEWTON_FAILED:
         return e, h, last
     state["step"], state["split_remainder"] = 0.0, 0.0
     last = last and state["t"] + length >= r.control[0]["end"]
-    return error_with_ledger(r, length, e), length, last
+    return nan if has_faulty_stage(r) else error_with_ledger(r, length, e), length, last
+
+
+@inline
+def has_faulty_stage(r):
+    """True if a stage of a step under error control has rates that are not valid: a shorter step may avoid it."""
+    return r.control[0]["mode"] == rec.TOLERANCE and r.progress[0]["stage_status"] != 0
 
 
 @inline

@@ -186,7 +186,8 @@ def greatest_wave_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> flo
 def scheme_order(case) -> int:
     """Order of the scheme in smooth flow, the least of all parts with cells."""
     scheme = SCHEMES[case.numerics.scheme]
-    of_basins = [scheme.for_basin(is_grid(mesh)) for mesh in case.meshes.values()]
+    of_basins = [scheme.for_basin(pool.physics_type.has_fifth_order(pool, is_grid(case.meshes[name])))
+                 for name, pool in basins(case).items()]  # fmt: skip
     return min(entry.order for entry in (scheme, *of_basins))
 
 

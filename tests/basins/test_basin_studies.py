@@ -266,12 +266,13 @@ def test_a_basin_that_drains_gives_the_valve_what_its_tank_gives():
     assert 0.0 < basin.numerical_remainder[-1] < 1e-4 * basin.throughput
 
 
+@pytest.mark.parametrize("patch", [{"side": "west"}, {"at": [5.0, 1.5], "area": 8.0}], ids=["side", "interior"])
 @pytest.mark.parametrize("head", [0.5, 3.0], ids=["out", "in"])
-def test_what_passes_a_patch_is_no_loss_of_the_scheme(head):
+def test_what_passes_a_patch_is_no_loss_of_the_scheme(head, patch):
     """The power lost by the scheme in a state is equal to rounding with the valve at the patch open and closed."""
     found = []
     for opening in (0.0, 1.0):
-        basin = pool((6, 4), patches={"west": {"side": "west"}}, elevation=0.0, bed="0.1*x")
+        basin = pool((6, 4), patches={"west": patch}, elevation=0.0, bed="0.1*x")
         nodes = {"pool": basin, "lake": {"type": "reservoir", "head": head, "elevation": 0.0}}
         links = {"tap": valve("pool.west", "lake", 0.2) | {"opening": opening}}
         model = model_of(scene(nodes, links, 1.0, PLANE | {"scheme": "upwind"}, ["tap.flow"]))

@@ -9,6 +9,7 @@ from reference.basins import ended, model_of, on_sides
 from reference.meshes import boundary, corner_lists, triangles, write
 from reference.scenes import GRAVITY as G
 from reference.scenes import scene
+from scipy.integrate import solve_ivp
 
 import fvsolve
 from fvsolve.mesh.rectangles import rectangle
@@ -131,15 +132,29 @@ def test_the_volume_that_enters_is_the_integral_of_the_discharge(method, ground,
     assert gained == approx(volume, rel=1e-12) and depths(model, state).min() >= 0.0
 
 
+@pytest.mark.parametrize("method, order", [("euler", 1), ("ssp-rk2", 2), ("rk4", 4)])
+def test_the_volume_of_a_smooth_discharge_has_the_order_of_the_method(method, order):
+    """Integral of 1 + sin(t)^2 over 4 s."""
+    errors, exact = [], 4.0 + 2.0 - 0.25 * math.sin(8.0)
+    for step in (0.1, 0.05):
+        case = reach({"up": {"side": "west", "discharge": {"formula": "1 + sin(t)^2"}}}, cells=(15, 1))
+        case["numerics"] = {"end": 4.0, "scheme": "muscl", "method": method, "step": step}
+        model, state = ended(case)
+        errors.append(abs(np.sum(model.basins[0].mesh.area * model.basins[0].deviations(state.y)[0]) - exact))
+    assert math.log2(errors[0] / errors[1]) == approx(order, abs=0.1)
+
+
 DRIVEN = {"up": {"side": "west", "discharge": {"start": 0, "duration": 20, "value": [0, 15]}},
           "down": {"side": "east", "stage": {"start": 0, "duration": 20, "value": [2, 2.2]}}}  # fmt: skip
 
 
-def test_driven_patches_take_the_steps_of_open_sides():
-    counts = []
-    for patches in (DRIVEN, {name: {"side": patch["side"], "boundary": "open"} for name, patch in DRIVEN.items()}):
-        found = fvsolve.run(reach(patches, (100.0, 10.0), (100, 10), 20.0, level=2.0))
-        counts.append(found.summary["steps"])
+@pytest.mark.parametrize("end", [{}, {"rating": {"level": [2.0, 3.0], "flow": [0.0, 20.0]}}], ids=["stage", "rating"])
+def test_driven_patches_take_the_steps_of_open_sides(end):
+    counts, driven = [], DRIVEN | ({"down": {"side": "east", **end}} if end else {})
+    for patches in (driven, {name: {"side": patch["side"], "boundary": "open"} for name, patch in driven.items()}):
+        case = reach(patches, (100.0, 10.0), (100, 10), 20.0, level=2.0)
+        counts.append(fvsolve.run(case).summary["steps"])
+        assert 0.5 < model_of(case).checks["steps"] / counts[-1] < 2.0
     assert counts[0] < 1.1 * counts[1]
 
 
@@ -184,6 +199,102 @@ def test_backwater_is_gradually_varied_flow(kind):
     assert kind == "normal_slope" or math.log2(errors[0] / errors[1]) > 1.8
 
 
+@pytest.mark.parametrize("end", [{"stage": 2.5}, {"rating": {"level": [1.5, 3.5], "flow": [0.0, 4.0]}}], ids=["z", "R"])
+def test_water_behind_a_weir_on_a_steep_slope_is_gradually_varied_flow(end):
+    """S1 : above the critical depth of 0.467 m, itself above the uniform depth of 0.394 m."""
+    long, slope, errors = 50.0, 0.02, []
+    law = solve_ivp(lambda x, h: (slope - (ROUGHNESS * UNIT) ** 2 * h ** (-10 / 3)) / (1 - UNIT**2 / (G * h**3)),
+                    (long, 0.0), [2.5], rtol=1e-11, atol=1e-12, dense_output=True)  # fmt: skip
+    for n in (50, 100):
+        patches = {"up": {"side": "west", "discharge": 2.0 * UNIT}, "down": {"side": "east", **end}}
+        case = reach(patches, (long, 2.0), (n, 1), 3000.0, level=2.5, start={"level": 2.5, "u": 0.5},
+                     bed=f"{slope}*({long}-x)", manning=ROUGHNESS)  # fmt: skip
+        model, state = ended(case)
+        errors.append(np.abs(depths(model, state) / law.sol(model.basins[0].x)[0] - 1.0).max())
+    assert errors[1] < 1e-5 and math.log2(errors[0] / errors[1]) > 1.8
+
+
+def short_channel(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(depth, slope of the bed) of MacDonald's channel of 150 m with 2 m2/s, n 0.03; Froude numbers to 0.9."""
+    bell = 0.2 * np.exp(-33.75 * (x / 150.0 - 0.5) ** 2)
+    h, rise = 0.8 + bell, bell * -67.5 * (x / 150.0 - 0.5) / 150.0
+    return h, (4.0 / (G * h**3) - 1.0) * rise - 4.0 * ROUGHNESS**2 / h ** (10.0 / 3.0)
+
+
+SHORT_ENDS = {"stage": {"stage": 0.8}, "rating": {"rating": {"level": [0.4, 1.2], "flow": [0.0, 8.0]}},
+              "normal_slope": {"normal_slope": 4.0 * ROUGHNESS**2 / 0.8 ** (10.0 / 3.0)}}  # fmt: skip
+
+
+@pytest.mark.parametrize("end", SHORT_ENDS)
+def test_the_short_channel_of_macdonald_has_its_depths(end, tmp_path):
+    """The bed is the integral of its slope. The error is 7.8e-5 of the depth on 200 cells, 2.0e-5 on 400."""
+    x, middle = np.linspace(0.0, 150.0, 3001), np.linspace(0.025, 149.975, 3000)
+    slope, between = short_channel(x)[1], short_channel(middle)[1]
+    bed = np.concatenate([[0.0], np.cumsum(0.05 / 6.0 * (slope[:-1] + 4.0 * between + slope[1:]))])
+    rows = [f"{a:.10g},{y},{b:.12g}\n" for a, b in zip(x, bed - bed[-1], strict=True) for y in (0, 2)]
+    (tmp_path / "bed.csv").write_text("x,y,bed\n" + "".join(rows))
+    errors = []
+    for n in (100, 200):
+        patches = {"up": {"side": "west", "discharge": 4.0}, "down": {"side": "east", **SHORT_ENDS[end]}}
+        case = reach(patches, (150.0, 2.0), (n, 1), 3000.0, level=0.0, bed={"file": str(tmp_path / "bed.csv")},
+                     manning=ROUGHNESS, start={"level": f"{-bed[-1]}*(1 - x/150) + 0.85", "u": 2.4})  # fmt: skip
+        model, state = ended(case)
+        errors.append(np.abs(depths(model, state) / short_channel(model.basins[0].x)[0] - 1.0).max())
+    assert errors[1] < 1e-4 and math.log2(errors[0] / errors[1]) > 1.8
+
+
+def returned(end: dict, speed: float, cells: int = 480, bed="0", **more) -> float:
+    """Volume that a small pulse brings back from an end, over its own, times the ratio of speeds (c + u) / (c - u).
+
+    The duration of the pulse is kept, so this ratio of lengths leaves that of heights. The pulse is the difference of
+    two runs; it starts at 70 m in a flow of the given speed, 1 m deep, and returns there from 120 m.
+    """
+    c, fields = math.sqrt(G), []
+    for height in (0.0, 1e-3):
+        level = f"(1 + {height}*exp(-((x-70)/6)^2))"
+        start = {"level": level, "u": f"{speed} + 2*(sqrt({G}*{level}) - {c})"}
+        patches = {"up": {"side": "west", "boundary": "open"}, "down": {"side": "east", **end}}
+        end_time = 50.0 / (c + speed) + 50.0 / (c - speed)
+        case = reach(patches, (120.0, 2.0), (cells, 1), end_time, level=1.0, start=start, bed=bed, **more)
+        model, state = ended(case)
+        fields.append(depths(model, state))
+    x = model.basins[0].x
+    volume = np.sum((fields[1] - fields[0])[(x > 40.0) & (x < 110.0)]) * 120.0 / cells
+    return volume / (1e-3 * 6.0 * math.sqrt(math.pi)) * (c + speed) / (c - speed)
+
+
+def reflected(by_depth: float, by_speed: float) -> float:
+    """Ratio of heights of the returned and the incoming small wave, 1 m deep, for an end with F(h, u) = 0.
+
+    by_depth, by_speed : derivatives F_h [1/m] and F_u [s/m] of F
+    """
+    k = math.sqrt(G)
+    return -(by_depth + k * by_speed) / (by_depth - k * by_speed)
+
+
+RETURNED = {  # end, speed, ratio of heights
+    "stage at rest": ({"stage": 1.0}, 0.0, -1.0), "stage": ({"stage": 1.0}, 1.0, -1.0),
+    "normal_slope": ({"normal_slope": 1e-8}, 1.0, reflected(-2.0 / 3.0, 1.0)),  # u - sqrt(S) h^(2/3) / n
+    "rating": ({"rating": {"level": [0.5, 1.5], "flow": [0.0, 4.0]}}, 1.0, reflected(-1.0, 1.0)),  # h u - 2 (h - 1/2)
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", RETURNED)
+def test_a_pulse_returns_with_the_height_of_its_closed_form(kind):
+    end, speed, ratio = RETURNED[kind]
+    more = {"manning": 1e-4} if kind == "normal_slope" else {}
+    assert returned(end, speed, **more) == approx(ratio, abs=0.01)
+
+
+def test_a_pulse_returns_from_a_free_overfall_over_a_sill():
+    """Critical flow on the sill : E = h + u^2 / 2g - sill = 3/2 (q^2 / g)^(1/3), whose waves stand still there."""
+    critical = (1.0 / G) ** (1.0 / 3.0)
+    sill = 1.0 + 0.5 / G - 1.5 * critical
+    ratio = reflected(1.0 - critical, 1.0 / G - critical)
+    bed = f"{sill}*min(max((x - 117)/2, 0), 1)"
+    assert returned({"boundary": "critical"}, 1.0, 960, bed) == approx(ratio, abs=0.015)
+
+
 def test_more_outflow_than_critical_is_held_there_and_the_volume_that_lacks_is_stated():
     case = reach({"out": {"side": "east", "discharge": -10.0}}, (20.0, 2.0), (40, 2), 4.0, probes=["reach.out.flow"])
     found = fvsolve.run(case)
@@ -192,6 +303,26 @@ def test_more_outflow_than_critical_is_held_there_and_the_volume_that_lacks_is_s
     critical = 2.0 * math.sqrt(G) * (2.0 / 3.0) ** 3  # of still water, c_b = 2 c / 3
     assert flow[0] == approx(-critical, rel=1e-12)
     assert mark.volume == approx(40.0 + np.trapezoid(flow, found.t), rel=1e-3)
+
+
+@pytest.mark.parametrize("path", ["grid", "triangles"])
+@pytest.mark.parametrize("end", [{"boundary": "critical"}, {"stage": "-1 m"}, {"discharge": 0.0}])
+def test_no_water_enters_behind_a_film_that_runs_away_from_its_patch(end, path, tmp_path):
+    """Water that moves inward faster than 2 sqrt(g h) leaves the faces of the patch dry."""
+    start = {"level": "0.02", "u": 3.0}
+    case = reach({"west": {"side": "west", **end}}, end=2.0, level=0.0, start=start, probes=["reach.west.flow"])
+    model, state = ended(case if path == "grid" else on_mesh(case, (LONG, 2.0), 0.5, ["west"], tmp_path))
+    volume, start = model.basins[0].mesh.area @ depths(model, state), 0.02 * LONG * 2.0
+    assert volume == approx(start, rel=1e-12 if "discharge" in end else 1e-6)  # a little may leave later
+    assert volume < start * (1.0 + 1e-12)
+
+
+def test_no_water_passes_a_patch_of_zero_discharge():
+    """A slosh lies against it as at a wall: the flow is zero to rounding, and nothing is held."""
+    case = reach({"shut": {"side": "east", "discharge": 0.0}}, (20.0, 2.0), (40, 3), 6.0, probes=["reach.shut.flow"],
+                 start={"level": "1 + 0.2*cos(0.3*x)", "u": "0.3*sin(x)"})  # fmt: skip
+    found = fvsolve.run(case)
+    assert found.ok and abs(found["reach.shut.flow"]).max() < 1e-15
 
 
 def test_a_discharge_within_critical_flow_has_no_mark():
@@ -205,6 +336,22 @@ def test_probes_of_a_driven_patch_are_its_level_head_and_froude_number():
     level, head, froude, flow = (found[probe] for probe in probes)
     assert level == approx(1.0 + 0.05 * found.t, rel=1e-12) and head == approx(5.0 + level, rel=1e-12)
     assert froude == approx(np.abs(flow) / (2.0 * level * np.sqrt(G * level)), rel=1e-9)
+
+
+def test_a_slow_tide_fills_a_basin_to_its_stage():
+    stage = {"start": 0.0, "duration": 300.0, "value": [1.0, 1.1]}
+    model, state = ended(reach({"sea": {"side": "west", "stage": stage}}, end=400.0, cells=(30, 2), manning=0.1))
+    assert np.mean(depths(model, state)) == approx(1.1, abs=1e-4)
+
+
+def test_the_level_of_a_tide_is_that_of_its_schedule_while_banks_drain():
+    """The bank beside a channel is above the tide; its film leaves by critical flow, at a surface above the tide."""
+    bed = "where(y < 1, 0, 1.2)"
+    case = reach({"sea": {"side": "west", "stage": {"time": [0, 40], "value": [1.5, 0.5]}}}, end=40.0, bed=bed,
+                 level=1.5, cells=(30, 4), probes=["reach.sea.level", "reach.depth@0.5,1.75"])  # fmt: skip
+    found = fvsolve.run(case)
+    assert found["reach.sea.level"] == approx(1.5 - found.t / 40.0, rel=1e-12)
+    assert 1e-3 < found["reach.depth@0.5,1.75"][found.t == 16.0][0] < 0.2
 
 
 @pytest.mark.parametrize("path", ["turned", "mirrored", "north", "mesh"])

@@ -6,10 +6,13 @@ from importlib import import_module
 import numpy as np
 import pytest
 from pytest import approx
+from reference import structures
 from reference.basins import assert_equal_files, ended, model_of, on_sides, run_in_two_parts
+from reference.folders import CASES
 from reference.meshes import boundary, triangles, write
 from reference.scenes import GRAVITY as G
 from reference.scenes import lake, scene
+from scipy.integrate import solve_ivp
 
 import fvsolve
 
@@ -166,3 +169,139 @@ def test_two_links_at_a_patch_are_one_of_both_areas():
     found, one = fvsolve.run(case), fvsolve.run(channel(head))
     assert found["gate.flow"] == approx(0.4 * one["gate.flow"], rel=1e-9, abs=1e-9)
     assert found["reach.end.level"] == approx(one["reach.end.level"], rel=1e-12)
+
+
+SIZES = {"a": ((30.0, 20.0), "east"), "b": ((20.0, 20.0), "west")}
+PONDS = {  # link, its law in plain Python, levels at the start, end [s]
+    "weir": ({"type": "weir", "width": 0.8, "crest": 1.0}, structures.weir(0.8, 1.0), (2.0, 1.2), 1500.0),
+    "gate": ({"type": "sluice-gate", "width": 0.6, "sill": 0.5, "opening": 0.3}, structures.gate(0.6, 0.5, 0.3),
+             (3.0, 2.0), 2400.0),
+    "culvert": (LINKS["culvert"] | {"diameter": 0.6, "inverts": [0.0, 0.0], "manning": 0.012},
+                structures.culvert_drowned(0.6, 20.0, 0.012, 1.5), (2.4, 1.2), 1500.0),
+}  # fmt: skip
+POND_METHODS = {"ssp-rk2": {"courant": 0.9}, "rodas-5p": {"rtol": 1e-6}, "radau-iia-5": {"rtol": 1e-6}}
+
+
+@pytest.mark.in_turn
+@pytest.mark.parametrize("method", POND_METHODS)
+@pytest.mark.parametrize("name", PONDS)
+def test_basins_come_to_equal_levels_as_tanks_do(name, method):
+    """Basins of 600 and 400 m2 beside a pair of tanks with the same law, by SciPy."""
+    link, law, levels, end = PONDS[name]
+    nodes = {pond: {"type": "basin", "size": list(size), "cells": [3, 2], "level": level, "elevation": 0.0,
+                    "manning": 0.05, "patches": {"end": {"side": side}}}
+             for (pond, (size, side)), level in zip(SIZES.items(), levels, strict=True)}  # fmt: skip
+    numerics = {"scheme": "muscl", "method": method} | POND_METHODS[method]
+    joined = {"x": {"from": "a.end", "to": "b.end", **link}}
+    found = fvsolve.run(scene(nodes, joined, end, numerics, ["a.volume", "b.volume"], end / 30))
+    areas = np.array([600.0, 400.0])
+    tanks = solve_ivp(lambda t, z: law(*z) * np.array([-1.0, 1.0]) / areas, (0.0, end), levels, method="LSODA",
+                      t_eval=found.t, rtol=1e-8, atol=1e-10)  # fmt: skip
+    change = abs(levels[0] - levels[1])
+    assert found["a.volume"] / 600.0 == approx(tanks.y[0], abs=1e-3 * change)
+    assert found["b.volume"] / 400.0 == approx(tanks.y[1], abs=1e-3 * change)
+    total = found["a.volume"] + found["b.volume"]
+    assert np.ptp(total) < 1e-12 * total[0] and abs(found.ledger["mass"]["relative"]) < 1e-12
+
+
+def test_a_culvert_under_a_road_does_not_chatter():
+    """While the flood rises, the flow of the culvert rises, through all its controls and over the road."""
+    found = fvsolve.run(CASES / "road-culvert.toml")
+    rising = (found.t > 240.0) & (found.t <= 1440.0)
+    assert np.diff(found["under.flow"][rising]).min() > 0.0 and found.ok
+
+
+PLACES = {"sides": ({"side": "east"}, {"side": "west"}),
+          "interior": ({"at": [10, 5], "area": 4.0}, {"at": [6, 4], "area": 8.0})}  # fmt: skip
+
+
+@pytest.mark.parametrize("method", ["ssp-rk2", "rodas-5p", "radau-iia-5"])
+@pytest.mark.parametrize("where", PLACES)
+def test_a_pump_lifts_water_from_one_basin_to_another(where, method):
+    """Levels of two basins, and of two tanks with the pump's curve H = 2 m - 800 q^2, by SciPy."""
+    low, high = ({"type": "basin", "size": [size, 10.0], "cells": [int(size / 2), 5], "level": level, "elevation": 0.0,
+                  "patches": {"end": patch}}
+                 for size, level, patch in zip((20.0, 12.0), (1.0, 1.5), PLACES[where], strict=True))  # fmt: skip
+    pump = {"type": "pump", "from": "low.end", "to": "high.end", "curve": {"coefficients": [2.0, 0.0, -800.0]}}
+    own = {"rtol": 1e-6} if method != "ssp-rk2" else {"courant": 0.9}
+    numerics = {"scheme": "upwind", "method": method, **own}
+    found = fvsolve.run(scene({"low": low, "high": high}, {"pump": pump}, 200.0, numerics,
+                              ["pump.flow", "low.volume", "high.volume"], 5.0))  # fmt: skip
+
+    def lifted(t, volumes):
+        q = math.sqrt((2.0 - (volumes[1] / 120.0 - volumes[0] / 200.0)) / 800.0)
+        return [-q, q]
+
+    tanks = solve_ivp(lifted, (0.0, 200.0), [200.0, 180.0], rtol=1e-9, t_eval=found.t)
+    assert found["low.volume"] == approx(tanks.y[0], rel=1e-4)
+    assert found["low.volume"] + found["high.volume"] == approx(380.0, rel=1e-12)
+    assert found.ok and abs(found.ledger["mass"]["relative"]) < 1e-12
+
+
+ASKED, CRITICAL = 20.0, WIDE * 8.0 / 27.0 * math.sqrt(G) * DEEP**1.5  # [m3/s]
+
+
+def drawn(side="east", turned=False, **rest) -> dict:
+    """Channel with a demand of ASKED behind an orifice, more than critical outflow."""
+    case = channel(0.0, side=side, turned=turned, **rest)
+    case["nodes"]["lake"] = {"type": "junction", "elevation": 0.0, "demand": ASKED}
+    return case
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_demand_beyond_critical_outflow_is_held_there_with_a_mark(method):
+    """Critical outflow of a simple wave from still water (Ritter's at the dam); the rest has a line in the ledger."""
+    numerics = {"method": method, **METHODS[method]}
+    found = fvsolve.run(drawn(numerics=numerics, cells=(240, 1), probes=["reach.end.flow", "gate.flow"]))
+    assert found.reason == "finished" and not found.ok
+    assert abs(found["gate.flow"]) == approx(ASKED)
+    assert found["reach.end.flow"][-1] == approx(-CRITICAL, rel=1e-3)
+    mark = next(mark for mark in found.marks if mark.what == "discharge held")
+    assert mark.place == "nodes.reach.end" and mark.time == 0.0
+    assert "the flow drawn from it is more than critical flow" in mark.text
+    assert mark.volume == approx((ASKED - CRITICAL) * 4.0, rel=1e-3)
+    ledger = found.ledger["mass"]
+    assert ledger["nodes"]["reach.end.inside"]["made_up"] == approx(mark.volume * 1000.0, rel=1e-3)
+    assert ledger["nodes"]["lake"]["outflow"] == approx(ASKED * 4.0 * 1000.0, rel=1e-3)
+    assert abs(ledger["relative"]) < 1e-12
+
+
+@pytest.mark.parametrize("path", ["north", "west", "turned", "threads"])
+def test_a_restated_demand_beyond_critical_outflow_is_held_equally(path):
+    probes = ["reach.end.flow"]
+    here = fvsolve.run(drawn(cells=(120, 12), probes=probes))
+    if path == "threads":
+        there = fvsolve.run(drawn(cells=(120, 12), probes=probes), threads=3)
+        assert (there["reach.end.flow"] == here["reach.end.flow"]).all() and there.summary["threads"] == 3
+    else:
+        turned = path == "turned"
+        side = "east" if turned else path
+        there = fvsolve.run(drawn(side, turned, cells=(120, 12), probes=probes))
+        assert there["reach.end.flow"] == approx(here["reach.end.flow"], rel=1e-9)
+    assert there.marks[-1].volume == approx(here.marks[-1].volume, rel=1e-9)
+
+
+def test_a_demand_that_grows_beyond_critical_outflow_and_back_is_met_again():
+    """At a patch with a scheduled discharge the same outflow leaves."""
+    probes, schedule = ["reach.end.flow"], {"time": [0, 1, 2, 3], "value": [2.0, 2.0, ASKED, 2.0]}
+    case = drawn(probes=probes)
+    case["nodes"]["lake"]["demand"] = schedule
+    found = fvsolve.run(case)
+    scheduled = drawn(probes=probes)
+    del scheduled["nodes"]["lake"], scheduled["links"]["gate"]
+    discharge = {"time": schedule["time"], "value": [-q for q in schedule["value"]]}
+    scheduled["nodes"]["reach"]["patches"]["end"]["discharge"] = discharge
+    other = fvsolve.run(scheduled)
+    assert found["reach.end.flow"] == approx(other["reach.end.flow"], rel=2e-3)
+    assert found["reach.end.flow"][-1] == approx(-2.0)
+    volumes = [next(m.volume for m in run.marks if m.what == "discharge held") for run in (found, other)]
+    assert volumes[0] == approx(volumes[1], rel=5e-3)
+
+
+def test_a_basin_drained_by_a_demand_runs_dry_at_its_patch():
+    """The volume of the basin and the volume from outside are together the demand."""
+    case = drawn(cells=(8, 1), end=40.0)
+    found = fvsolve.run(case)
+    mark, ledger = found.marks[-1], found.ledger["mass"]
+    assert found.reason == "finished" and abs(ledger["relative"]) < 1e-12
+    assert mark.volume == approx(ASKED * 40.0 - (ledger["initial"] - ledger["final"]) / ledger["initial"] * 240.0)

@@ -4,7 +4,7 @@ Its number is the row of the patch. The pressure of the cells is their mean, so 
 rest is the sum of this pressure and the drop over rho g. The flow is that of `patch_closures.patch_flow`.
 """
 
-from fvsolve.basins.free_surface.patch_closures import faces_inside, patch_flow, solve_level
+from fvsolve.basins.free_surface.patch_closures import DEEPEST, faces_inside, lowest_bed, patch_flow, solve_level
 from fvsolve.jit import njit
 
 LEAST_SLOPE = 1e-12  # least derivative of the flow by the level [m2/s]; critical outflow does not depend on the level
@@ -25,7 +25,7 @@ def level_step(g, faces, z, target):
     """(change of the flow from `target` [m3/s], its derivative by the level [m2/s]) in Newton's step from the level z.
 
     At or below critical outflow the flow has no derivative by the level. If the target is greater, the step is that
-    from the level at which it passes.
+    from the level at which it passes. A smaller target has the level of `DEEPEST`.
     g : gravity; faces : as for `patch_flow`
     """
     q, change = patch_flow(g, z, faces)
@@ -37,7 +37,8 @@ def level_step(g, faces, z, target):
     if q == 0.0 and target >= 0.0:
         return q - target, DRY_SPEED * long
     if not target > q + SAME_FLOW * abs(q):
-        return q - target, LEAST_SLOPE
+        deeper = z - (lowest_bed(faces) - DEEPEST)
+        return (q + DRY_SPEED * long * deeper - target, DRY_SPEED * long) if deeper < 0.0 else (q - target, LEAST_SLOPE)
     level = solve_level(g, faces, target, 0.0, faces[0][:0], faces[0][:0])
     change = max(patch_flow(g, level, faces)[1], LEAST_SLOPE)
     return change * (z - level), change

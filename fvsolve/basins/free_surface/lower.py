@@ -21,6 +21,8 @@ from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
 from fvsolve.basins.free_surface import law_patch_face, patch_closures, surface_grid, surface_maxima, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import RATE_CAP, add_friction
+from fvsolve.basins.free_surface.lower_marks import Marks, chain_texts, lower_marks, marks_of
+from fvsolve.basins.free_surface.lower_notices import inflow_watches, unusual_values
 from fvsolve.basins.free_surface.surface_patches import DEPTH, TOTALS
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
@@ -330,8 +332,11 @@ class FreeSurfaceRows(BasinRows):
 
     def pieces(self, valves: bool) -> Iterator[RhsTerms]:
         kind = f"{'moving_' if self.moves else ''}{'grids' if self.is_grid else 'meshes'}"
-        yield RhsTerms(package=PACKAGE, rates=f"surface_rates: water_{'driven_' if self.driven else ''}{kind}")
+        of_faces = "marked_" if self.marks.faces.size else "driven_" if self.driven else ""
+        yield RhsTerms(package=PACKAGE, rates=f"surface_rates: water_{of_faces}{kind}")
         yield WATER_TERMS
+        if self.sections:
+            yield RhsTerms(package=PACKAGE, observe="marked_faces: observe_sections")
         if self.driven:
             yield DRIVEN_TERMS
         if self.part.on is not None:
@@ -347,6 +352,14 @@ class FreeSurfaceRows(BasinRows):
         yield SHORTAGES
         if valves:
             yield RhsTerms(package=PACKAGE, rate_limits="surface_patches: limit_inflow_rate")
+
+    @cached_property
+    def marks(self) -> Marks:
+        """Faces of walls and sections."""
+        return marks_of(self)
+
+    def chain_texts(self) -> list[str]:
+        return list(chain_texts(self))
 
     @property
     def forms_stages(self) -> bool:
@@ -377,13 +390,18 @@ class FreeSurfaceRows(BasinRows):
         cells = draft.integers[row["first"] : row["first"] + row["count"]]
         row["rest"], row["depth"] = self.part.level, -1
         row["lowest"] = max(float(self.bed[cells].min()) - self.part.level, 0.0)
-        if patch not in self.driven:
+        has_faces, is_interior = f"{self.name}.{patch}" in self.case.patches_with_faces, patch in self.mesh.interior
+        if is_interior and not has_faces:
+            row["faces"] = 0  # links see its cells only
+            self.check_interior_patch(draft, patch)
+        if patch not in self.driven and not has_faces:
             return
         behind = np.array(draft.integers[row["ring"] + row["faces"] :][: row["faces"]])
         row["second"], row["inside"] = len(draft.integers), draft.to_work(4 * int(row["faces"]))
-        draft.integers += self.second_cells(patch, behind).tolist()
-        if patch in self.linked:
-            row["closure"], row["valve"] = rec.LINKED, draft.valve_names.index(f"{self.name}.{patch}.face")
+        draft.integers += (self.mesh.faces(patch).inside if is_interior else self.second_cells(patch, behind)).tolist()
+        if has_faces:
+            row["closure"] = rec.INTERIOR if is_interior else rec.LINKED
+            row["valve"] = draft.valve_names.index(f"{self.name}.{patch}.face")
             return
         stated = self.part.patches[patch]
         row["closure"] = CLOSURES[stated.closure]
@@ -396,12 +414,26 @@ class FreeSurfaceRows(BasinRows):
         if stated.normal_slope is not None:
             row["conveyance"] = draft.to_plane(math.sqrt(stated.normal_slope) / self.roughness[behind])
 
+    def check_interior_patch(self, draft, patch: str) -> None:
+        """Report an interior patch without faces: a fault if it has a discharge, a notice if no link joins it."""
+        place, joined = f"nodes.{self.name}.patches.{patch}", self.places_of_links
+        if self.part.patches[patch].discharge is not None:
+            text = "needs the faces around the patch, which it does not have in cases with scalars, or where a rigid "
+            draft.fault(f"{place}.discharge", f"{text}column or a delay line joins it; leave this key out")
+        elif f"{self.name}.{patch}" not in joined:
+            text = f"basin {self.name}: no link joins the interior patch {patch}, so no water flows through it"
+            draft.warnings.append(Notice("patch", place, text, None))
+
+    @property
+    def places_of_links(self) -> set[str]:
+        """Full names of the places that links join."""
+        return {place for link in self.case.links.values() for place in link.ports.values()}
+
     def faces_at_rest(self, patch: str) -> tuple[np.ndarray, ...]:
         """(depth, surface above the level at rest, inward velocity, length) of the faces of a patch at rest."""
-        faces = self.mesh.patch(patch)
-        cells = self.mesh.left[faces]
-        surface = np.maximum(self.bed - self.part.level, 0.0)[cells]
-        return self.depth[cells], surface, np.zeros(cells.size), self.mesh.length[faces]
+        faces, cells, inside, _ = self.mesh.faces(patch)
+        bed = np.maximum(self.bed[cells], self.bed[inside]) - self.part.level
+        return np.maximum(-bed, 0.0), np.maximum(bed, 0.0), np.zeros(cells.size), self.mesh.length[faces]
 
     def second_cells(self, patch: str, behind: np.ndarray) -> np.ndarray:
         """Cells next inside the cells `behind` the faces of a patch; the same cells on a mesh, and with upwind."""
@@ -432,7 +464,9 @@ class FreeSurfaceRows(BasinRows):
         else:
             row["work"] = draft.to_work(mesh_blocks.work_size(surface_mesh, self.integers))
         row["plan"] = draft.to_plane(plan)
-        row["driven"] = draft.to_work(patch_closures.ROWS * int(row["outer"])) if self.driven else -1
+        lower_marks(draft, self, row)
+        has_faces = self.driven or self.marks.faces.size
+        row["driven"] = draft.to_work(patch_closures.ROWS * int(row["outer"])) if has_faces else -1
         row["wet_depth"] = self.case.output.wet_depth
         if self.records_maxima:
             rows = max(int(row["ny"]), 1)
@@ -449,8 +483,9 @@ class FreeSurfaceRows(BasinRows):
         """True if rain, a driven patch or a link can bring water into the basin."""
         if self.rains:
             return True
-        joined = {place for link in self.case.links.values() for place in link.ports.values()}
-        return any(name in self.driven or f"{self.name}.{name}" in joined for name in patch_names(self.mesh))
+        joined, sources = self.places_of_links, self.case.patches_with_faces
+        places = (f"{self.name}.{name}" for name in patch_names(self.mesh))
+        return bool(self.closed) or any(place in joined or place in sources for place in places)
 
     @property
     def rubs(self) -> bool:
@@ -577,7 +612,7 @@ class FreeSurfaceRows(BasinRows):
 
     def notices(self, y: np.ndarray) -> list[Notice]:
         films = [notice(self, error) for look, notice in film_checks(self) if (error := look(self, y))[0] > FILM_ERROR]
-        return [*wave_notices(self, y), *body_notices(self), *films]
+        return [*wave_notices(self, y), *body_notices(self), *films, *unusual_values(self)]
 
     def watches(self, y: np.ndarray) -> list[Any]:
         """Check for short waves, unless `wave_notices` reports them at y, and one check for each pair of `film_checks`.
@@ -587,6 +622,7 @@ class FreeSurfaceRows(BasinRows):
         waves = ErrorWatch(self, partial(surface_waves, seen=LEAST_IN_RUN), wave_notice, WAVE_ERROR)
         films = [ErrorWatch(self, look, notice, max(FILM_ERROR, REPEAT_FACTOR * look(self, y)[0]))
                  for look, notice in film_checks(self)]  # fmt: skip
+        films += inflow_watches(self)
         return films if wave_notices(self, y) else [waves, *films]
 
     def depth_of(self, y: np.ndarray) -> np.ndarray:

@@ -9,8 +9,24 @@ from fvsolve.parts.basin import VELOCITY_FIELDS, Physics, VelocityStart
 from fvsolve.parts.formula import NumberOrField, SpatialField, SpatialFieldKey, samples
 from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled
-from fvsolve.parts.table_model import Nested, Table
-from fvsolve.parts.value import SHAPE, VALUE, Choice, Quantity, UsualRange, anything, between, nonnegative
+from fvsolve.parts.table_model import NamedTables, Nested, Table
+from fvsolve.parts.value import (
+    SHAPE,
+    VALUE,
+    Choice,
+    Number,
+    Quantity,
+    ReadContext,
+    Rows,
+    Text,
+    UsualRange,
+    Value,
+    anything,
+    between,
+    nonnegative,
+    read_each,
+)
+from fvsolve.parts.weir.part import COEFFICIENTS, WEIR_COEFFICIENTS
 from fvsolve.units import show
 
 
@@ -72,6 +88,53 @@ class Infiltration(Table):
         return [*(getattr(self, key) for key in self.fields), None, None][:3]
 
 
+class Polyline(Value):
+    """Value of a case file: a line through points of a plane."""
+
+    takes = "list of [m, m]"
+
+    def __init__(self, about: str) -> None:
+        self.about = about
+
+    def read(self, given: Any, setting: ReadContext) -> tuple[tuple[float, ...], ...]:
+        if not isinstance(given, (list, tuple)) or len(given) < 2:
+            raise ValueError(f"{show(given)} is not a line; expected two or more points, [[x, y], [x, y]]")
+        read_point = Rows("length", length=2).read
+        points = tuple(read_each(enumerate(given), lambda point: read_point(point, setting)).values())
+        if any(start == stop for start, stop in zip(points, points[1:], strict=False)):
+            raise ValueError(f"{show(given)} has two equal points in succession; expected different points")
+        return points
+
+    def json(self) -> dict[str, Any]:
+        return {"type": "array", "items": Rows("length", length=2).json(), "minItems": 2}
+
+
+class FaceWall(Table):
+    """A wall on faces between cells, over which water may flow."""
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("line", "group"),)
+    needs: ClassVar[tuple[tuple[str, ...], ...]] = (("line", "group"),)
+
+    line: Annotated[
+        tuple[tuple[float, float], ...] | None,
+        Polyline("points of a line; the wall is on the faces between the cells on both of its sides"),
+    ] = None
+    group: Annotated[str | None, Text("group of lines of the mesh file on which the wall is, instead of `line`")] = None
+    crest: Annotated[float, Quantity("level", anything, "height of its crest above the elevation of the basin [m]")]
+    coefficient: Annotated[float, Number(between(0.01, 1.0), "coefficient C of the weir [-]", WEIR_COEFFICIENTS)] = (
+        COEFFICIENTS["broad"]
+    )
+
+    def chain(self, mesh) -> Any:
+        """`FaceChain` of the wall in a mesh; without faces for an unknown group."""
+        from fvsolve.mesh.face_chains import FaceChain, chain_along
+
+        if self.line is not None:
+            return chain_along(mesh, self.line)
+        faces = mesh.groups.get(self.group, np.zeros(0, int))
+        return FaceChain(faces, np.ones(faces.size), np.ones(faces.size), np.zeros(faces.size))
+
+
 class PatchFace(TwoPort):
     """Faces of a patch of water, from the junction of its links to its cells.
 
@@ -119,7 +182,7 @@ class FreeSurface(Physics, name="free-surface"):
     manning: Annotated[
         float | SpatialField | None,
         NumberOrField(
-            Quantity("number", nonnegative, usual=UsualRange(0.005, 0.5, "glass to dense brush")),
+            Quantity("number", nonnegative, usual=UsualRange(0.008, 0.3, "smooth plastic to dense grass")),
             "Manning's n of the bed of a free surface [s/m^(1/3)]; default: no friction", VALUE,
         ),
     ] = None  # fmt: skip
@@ -142,6 +205,9 @@ class FreeSurface(Physics, name="free-surface"):
     infiltration: Annotated[
         Infiltration | None, Nested(Infiltration, "soil into which water infiltrates; default: none")
     ] = None
+    walls: Annotated[
+        Any, NamedTables(FaceWall, "walls on faces between cells: { levee = { line, crest } } or { group, crest }")
+    ] = {}
 
     @classmethod
     def formulas(cls, basin, mesh):
@@ -159,6 +225,10 @@ class FreeSurface(Physics, name="free-surface"):
             yield f"is {worst:g} in a cell; expected {'0 to 1' if greatest == 1.0 else 'no values below 0'}"
         elif place[-1] == "initial" and (values < samples(basin.infiltration.final, mesh)).any():
             yield "is below `final` in a cell; expected a capacity that decreases"
+
+    @classmethod
+    def has_fifth_order(cls, basin, rectangle):
+        return rectangle and not basin.walls
 
     @classmethod
     def face_type(cls):

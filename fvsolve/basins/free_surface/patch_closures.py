@@ -21,7 +21,17 @@ from fvsolve.basins.cell_sides import deviations_of
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.jit import njit
 from fvsolve.kernels.cube_root import cube_root_reciprocal
-from fvsolve.kernels.dtypes import CRITICAL, DISCHARGE, LINKED, NO_CLOSURE, NORMAL_SLOPE, PATCH_FROUDE, RATING, STAGE
+from fvsolve.kernels.dtypes import (
+    CRITICAL,
+    DISCHARGE,
+    INTERIOR,
+    LINKED,
+    NO_CLOSURE,
+    NORMAL_SLOPE,
+    PATCH_FROUDE,
+    RATING,
+    STAGE,
+)
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
 
@@ -32,6 +42,10 @@ FLOW, MOMENTUM, SURFACE, SPEED, ROWS = range(5)
 ITERATIONS = 100
 ROUNDING = 1e-15  # relative error of a flow at which a level is accepted
 HELD = 1e-9  # relative difference of a discharge from its schedule above which it counts as held
+# Level of the links of a patch below its bed [m], farther than any network falls, from which on they may draw more than
+# critical outflow (`law_patch_face`); the rest is supplied from outside.
+DEEPEST = 2e3
+LEAST_SPEED = 1e-12  # speed of waves that stands for a dry face of a driven patch [m/s]
 LEAST_RISE = 1e-3  # first rise of the level in the search for an upper bound [m]
 
 
@@ -141,12 +155,20 @@ def first_level(g, faces, target):
 
 
 @njit
+def lowest_bed(faces):
+    """Lowest bed at the faces of a patch, above the level at rest [m]. faces : as for `patch_flow`"""
+    low = faces[1][0] - faces[0][0]
+    for m in range(faces[0].size):
+        low = min(low, faces[1][m] - faces[0][m])
+    return low
+
+
+@njit
 def solve_level(g, faces, target, rest, levels, flows):
     """Level at which a patch has its discharge or rated flow; the lowest bed if the outflow would be above critical.
 
     Newton's method within bounds; other arguments as for `excess`.
     """
-    h, e, _, lengths = faces
     z = first_level(g, faces, target)
     f, slope = excess(g, z, faces, target, rest, levels, flows)
     if f == 0.0:
@@ -159,8 +181,7 @@ def solve_level(g, faces, target, rest, levels, flows):
         if rise >= 1e9:  # the flow is not finite
             return z
     else:
-        for m in range(h.size):
-            low = min(low, e[m] - h[m])
+        low = min(low, lowest_bed(faces))
         if excess(g, low, faces, target, rest, levels, flows)[0] >= 0.0:
             return low
     for _ in range(ITERATIONS):
@@ -252,10 +273,30 @@ def read_faces(tables, patch, y):
 
 
 @njit
+def read_faces_around(tables, patch, y):
+    """Write the state inside the faces of an interior patch to its work array: that of the cells around it.
+
+    A face has the higher of the beds of both cells. Its depth is at most twice that of the cell of the patch, from
+    which its flow comes. y : deviations of cells
+    """
+    basin, plane, integers = tables.basins[patch["basin"]], tables.plane, tables.integers
+    count, at, beds = patch["faces"], patch["normals"], tables.basins[patch["basin"]]["plan"]
+    h, e, u, lengths = faces_inside(tables, patch)
+    for m in range(count):
+        k, own = integers[patch["ring"] + count + m], integers[patch["second"] + m]
+        depth, surface, u[m] = read_cell(plane, basin, k, plane[at + m], plane[at + count + m], y)
+        step = (plane[beds + basin["n"] + own] - plane[beds + own]) - (plane[beds + basin["n"] + k] - plane[beds + k])
+        above = depth - max(step, 0.0)  # of the surface over the bed of the face
+        within = max(plane[beds + own] + y[basin["y"] + own], 0.0)
+        h[m], e[m] = min(max(above, 0.0), 2.0 * within), surface + max(-above, 0.0)
+        lengths[m] = plane[at + 2 * count + m] * plane[basin["area"] + k]
+
+
+@njit
 def level_of_patch(tables, patch, g, faces, t, out):
     """(level of a patch above the level at rest [m], given inflow [m3/s]); 0 for closures of single faces."""
     empty = tables.plane[:0]
-    if patch["closure"] == LINKED:
+    if patch["closure"] == LINKED or patch["closure"] == INTERIOR:
         st, layout, valve = tables.settings[0], tables.layout[0], tables.valves[patch["valve"]]
         pressure = valve["drop"] + out[layout["pressure"] + valve["from_node"]]
         return patch["lowest"] + pressure / (st["rho"] * g), out[layout["valve"] + patch["valve"]] / st["rho"]
@@ -289,13 +330,14 @@ def close_patch(tables, patch, t, y, out):
 
     Faces whose links are shut are walls. A level, equal at all faces, would let water pass from one to another.
     During outflow above critical the fraction of the discharge that leaves is written to the node's outflow fraction.
+    What links draw beyond critical outflow is supplied from outside.
     """
     layout, basin, node = tables.layout[0], tables.basins[patch["basin"]], tables.nodes[patch["node"]]
     g, faces, (first, outer) = tables.settings[0]["gravity"], read_faces(tables, patch, y), driven_range(basin)
     rows, (h, e, u, lengths) = tables.work[first : first + ROWS * outer].reshape((ROWS, outer)), faces
     z, target = level_of_patch(tables, patch, g, faces, t, out)
     shut = patch["closure"] == LINKED and target == 0.0
-    total, surface, wet, wide, held = 0.0, 0.0, 0.0, 0.0, 1.0
+    total, surface, wet, wide, held, low = 0.0, 0.0, 0.0, 0.0, 1.0, z
     given = schedule_value(tables, patch["depth"], t) if patch["depth"] >= 0 else 0.0
     for m in range(h.size):
         k = tables.integers[patch["ring"] + m]
@@ -308,32 +350,37 @@ def close_patch(tables, patch, t, y, out):
         rows[FLOW, k], rows[SURFACE, k] = q, e[m] + (depth - h[m])
         total += lengths[m] * q
         wide += lengths[m]
+        low = min(low, e[m] - h[m])
         if depth > 0.0:
             wet += lengths[m]
             surface += lengths[m] * rows[SURFACE, k]
     if patch["closure"] == DISCHARGE or patch["closure"] == LINKED:
-        held = put_discharge(tables, patch, rows, total, target, wide, given)
+        may_hold = z < lowest_bed(faces) - DEEPEST if patch["closure"] == LINKED else given == 0.0
+        held = put_discharge(tables, patch, rows, total, target, wide, given, may_hold)
     for m in range(h.size):
         k = tables.integers[patch["ring"] + m]
         q, depth = rows[FLOW, k], h[m] + (rows[SURFACE, k] - e[m])
         u_face = q / depth if depth > 0.0 else 0.0
-        rows[MOMENTUM, k], rows[SPEED, k] = q * u_face, abs(u_face) + sqrt(g * max(depth, 0.0))
+        rows[MOMENTUM, k] = q * u_face
+        rows[SPEED, k] = max(abs(u_face) + sqrt(g * max(depth, 0.0)), LEAST_SPEED)  # a dry face is driven too
     if patch["closure"] == LINKED:
+        if held < 1.0:
+            out[layout["supply"] + patch["node"]] = tables.settings[0]["rho"] * (held - 1.0) * target
         return
-    rise = (surface / wet if wet > 0.0 else z) - patch["lowest"]
+    own = patch["closure"] == CRITICAL or patch["closure"] == NORMAL_SLOPE or given > 0.0 or z <= low
+    rise = (surface / wet if own and wet > 0.0 else z) - patch["lowest"]
     out[layout["pressure"] + patch["node"]] = tables.settings[0]["rho"] * g * rise
     out[layout["outflow_fraction"] + node["row"]] = held
 
 
 @njit
-def put_discharge(tables, patch, rows, total, target, wide, given):
+def put_discharge(tables, patch, rows, total, target, wide, given, may_hold):
     """Correct the flows of faces so that their sum is the discharge; return the fraction that leaves, else 1.
 
     total : sum of the flows [m3/s]; target : discharge [m3/s]; wide : length of all faces [m]; given : depth of a
-    supercritical inflow [m], or 0
+    supercritical inflow [m], or 0; may_hold : True if an outflow above critical is possible
     """
-    is_held = patch["closure"] == DISCHARGE and given == 0.0 and target < total and total - target > HELD * abs(target)
-    if is_held:
+    if may_hold and target < 0.0 and total - target > -HELD * target:
         return total / target
     for m in range(patch["faces"] if total != target or given > 0.0 else 0):
         k = tables.integers[patch["ring"] + m]
@@ -353,7 +400,7 @@ def close_patches(t, y, dydt, out, handle):
     for k in range(tables.patches.size):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
-        if basin["kind"] == OWN_CODE and patch["closure"] != NO_CLOSURE:
+        if basin["kind"] == OWN_CODE and patch["closure"] != NO_CLOSURE and patch["closure"] != INTERIOR:
             close_patch(tables, patch, t, deviations_of(basin, tables.seen, y), out)
 
 

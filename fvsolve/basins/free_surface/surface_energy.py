@@ -8,13 +8,13 @@ from math import sqrt
 
 from fvsolve.basins.basin_output import basin_first_row, rest_potential
 from fvsolve.basins.basin_patches import physics_code
-from fvsolve.basins.boundary_cells import flow_weight, patch_area, patch_length, weighted_volume
+from fvsolve.basins.boundary_cells import depth_at_patch, flow_weight, patch_area, patch_length, weighted_volume
 from fvsolve.basins.free_surface.bed_friction import drag_per_flow
 from fvsolve.basins.free_surface.patch_closures import FLOW, MOMENTUM, SURFACE, driven_faces, faces_inside
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.moving_walls import area_growth_rate
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import LINKED, NO_DRAG
+from fvsolve.kernels.dtypes import INTERIOR, LINKED, NO_DRAG
 from fvsolve.kernels.network_energy import total_pressure
 from fvsolve.kernels.table_handle import open_tables
 
@@ -41,8 +41,12 @@ def add_power(t, y, dydt, out, handle, power):
         patch, node = patches[k], patches[k]["node"]
         if tables.basins[patch["basin"]]["kind"] == OWN_CODE and patch["moves"] == 0:
             flow = out[layout["net"] + node] + out[layout["supply"] + node]
-            linked = patch["closure"] == LINKED
-            loss = face_loss(tables, patch, flow, y, out) if linked else patch_loss(tables, patch, flow, y)
+            if patch["closure"] == LINKED:
+                loss = face_loss(tables, patch, flow, y, out)
+            elif patch["closure"] == INTERIOR:
+                loss = interior_loss(tables, patch, flow, y, dydt, out)
+            else:
+                loss = patch_loss(tables, patch, flow, y)
             power[basin_first_row(tables, power, patch["basin"]) + 1] += loss
 
 
@@ -132,6 +136,29 @@ def face_loss(tables, patch, flow, y, out):
         level = rest + rho * (g * (plane[basin["plan"] + n + i] + y[o + i]) - 0.5 * square)
         total += lengths[m] * (q * level + rho * (inward * push + min(q, 0.0) * (square - inward * inward)))
     return total_pressure(tables, out, patch["node"]) * flow / rho - total
+
+
+@njit
+def interior_loss(tables, patch, flow, y, dydt, out):
+    """Power lost [W] in the cells of an interior patch: power of its inflow minus the rate of storage by this inflow.
+
+    flow : mass flow into the cells [kg/s]. Its power is that at the pressure of the cells, as in `face_loss`.
+    """
+    st, basin, plane = tables.settings[0], tables.basins[patch["basin"]], tables.plane
+    n, o, g, rho, total, volume = basin["n"], basin["y"], st["gravity"], st["rho"], 0.0, 0.0
+    rest, leaves = rest_potential(st, basin), flow < 0.0
+    for m in range(patch["count"]):
+        i = tables.integers[patch["first"] + m]
+        volume += plane[basin["area"] + i] * (depth_at_patch(plane, basin, i, y) if leaves else 1.0)
+    for m in range(patch["count"] if volume > 0.0 else 0):
+        i = tables.integers[patch["first"] + m]
+        depth = depth_at_patch(plane, basin, i, y)
+        share = velocity_factor(depth)
+        square = share * share * (y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2)
+        level = rest + rho * g * (plane[basin["plan"] + n + i] + y[o + i])
+        part = plane[basin["area"] + i] * (depth if leaves else 1.0) / volume
+        total += part * (level + (0.5 if leaves else -0.5) * rho * square)
+    return (total_pressure(tables, out, patch["node"]) - total) * flow / rho
 
 
 @njit

@@ -19,10 +19,17 @@ import numpy as np
 from fvsolve.basins.basin_patches import put_inward
 from fvsolve.basins.cell_sides import fill
 from fvsolve.basins.free_surface import surface_rows as rows_of
+from fvsolve.basins.free_surface.marked_faces import (
+    MarkedFaces,
+    add_forces_along,
+    close_marked,
+    flatten_across,
+    flatten_along,
+)
 from fvsolve.basins.free_surface.patch_closures import FLOW, MOMENTUM, SPEED, SURFACE
 from fvsolve.basins.free_surface.surface_rows import EAST, GHOSTS, HIGH, MAX_COLUMNS, NORTH, STRIDE
 from fvsolve.jit import inline, njit
-from fvsolve.kernels.dtypes import LINEAR, WENO5
+from fvsolve.kernels.dtypes import LINEAR, MUSCL, WENO5
 
 PLANS = 2  # rows of `plan`: depth and surface of the profile
 RING = 8  # stored rows of cells
@@ -39,6 +46,7 @@ class WaterGrid(NamedTuple):
     kx, ky : float64[nx], float64[ny]  1 / widths of columns, 1 / heights of rows [1/m]
     reflect : float64[2 (nx + ny)]  1 for a wall and 0 for open, in the order west, east, south, north; empty: all walls
     plan : float64[PLANS, n]  depth at rest and surface at rest above the level [m]
+    marks : None, or the `MarkedFaces` of walls and sections
     """
 
     g: float
@@ -50,6 +58,7 @@ class WaterGrid(NamedTuple):
     ky: np.ndarray
     reflect: np.ndarray
     plan: np.ndarray
+    marks: MarkedFaces | None = None
 
 
 class FaceFlows(NamedTuple):
@@ -284,6 +293,8 @@ def column_rates(grid, begin, stop, fresh, first, last, states, flows, work, rat
         d, e = rows.cells[ring_offset(j + 1, 0) :], rows.cells[ring_offset(j + 2, 0) :]
         c, sides = rows.cells[ring_offset(j, 0) :], rows.sides[(j & 1) * SIDE :]
         put_values(grid, last - first, a, b, c, d, e, sides, rows.deep)
+        if grid.scheme == MUSCL:
+            flatten_across(grid.marks, grid.ny, j, first, last, b, c, d, sides)
         if j >= begin:
             put_fluxes_across(grid, j, first, last, rows, flows, moves, faces)
         if j > begin:
@@ -332,6 +343,8 @@ def put_fluxes_across(grid, j, first, last, rows, flows, moves, faces):
         cells, side, turn = (here, low, 1.0) if j == 0 else (before, under, -1.0)
         ky, kx, top = grid.ky[min(j, ny - 1) : min(j, ny - 1) + 1], grid.kx[first:last], rows.top[GHOSTS:]
         close_driven(g, faces.values[:, at : at + n], turn, EAST, cells, ky, kx, side, north, top)
+    ky, top = grid.ky[max(j - 1, 0) : j + 1], rows.top[GHOSTS - 1 :]
+    close_marked(g, grid.marks, j, first, n, (NORTH, EAST), (under, low, l, r), north, grid.kx, ky, top)
     if flows.y.size > 0:
         copy(north, flows.y[j * nx + first : j * nx + last])
     if flows.through.size > 0 and is_side:
@@ -349,6 +362,8 @@ def put_fluxes_along(grid, j, first, last, rows, flows, moves, faces):
     a, b, e = rows.cells[ring_offset(j, -3) :], rows.cells[ring_offset(j, -2) :], rows.cells[ring_offset(j, 1) :]
     count = (n + 8) // 8 * 8
     put_values(grid, (n + 9) // 8 * 8, a, b, cell, after, e, rows.ends, rows.deep)  # padded to whole vectors
+    if grid.scheme == MUSCL:
+        flatten_along(grid.marks, ny + 1 + j, nx, first, last, b, rows.ends)
     along, left, right = rows.along, rows.ends[HIGH:], rows.ends[1:]
     l, r = (left, right) if fifth else (cell, after)  # cells that bound wave speeds
     if moves is None or moves.speed_x.size == 0:
@@ -370,6 +385,8 @@ def put_fluxes_along(grid, j, first, last, rows, flows, moves, faces):
         if last == nx and faces.values[SPEED, ny + j] > 0.0:
             east, end = faces.values[:, ny + j : ny + j + 1], n - 1
             close_driven(g, east, -1.0, NORTH, after[end:], kx[nx - 1 :], ky, left[n:], along[n:], top[end:])
+    ky, top = grid.ky[j : j + 1], rows.top[GHOSTS - 1 :]
+    close_marked(g, grid.marks, ny + 1 + j, first, n + 1, (EAST, NORTH), (left, right, l, r), along, grid.kx, ky, top)
     if flows.x.size > 0:
         copy(along, flows.x[j * (nx + 1) + first : j * (nx + 1) + last + 1])
     if flows.through.size > 0 and first == 0:
@@ -391,3 +408,5 @@ def put_row_rates(grid, j, first, last, rows, rates, moves):
     else:
         wide, _ = factors_of(j, first, last, moves, rows.factors)
         rows_of.put_rates(grid.g, kx, ky, push_x, push_y, rows.along, south, north, wide, to_h, to_x, to_y)
+    add_forces_along(grid.marks, j, first, last, grid.ky[j : j + 1], to_x)
+    add_forces_along(grid.marks, grid.ny + 1 + j, first, last, kx, to_y)

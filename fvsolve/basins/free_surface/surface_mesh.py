@@ -13,6 +13,7 @@ import numpy as np
 
 from fvsolve.basins import cell_sides as side
 from fvsolve.basins.cell_sides import BLOCK, HUGE, INDICES, MEASURES, TINY, gather, limited_sides, ring_place
+from fvsolve.basins.free_surface.marked_faces import MarkedFaces, flatten_cells, flux_over_wall, save_sums
 from fvsolve.basins.free_surface.patch_closures import FLOW, MOMENTUM, SPEED, DrivenFaces
 from fvsolve.basins.free_surface.patch_closures import SURFACE as DRIVEN_SURFACE
 from fvsolve.basins.free_surface.surface_rows import THIN
@@ -28,6 +29,7 @@ _NX, _NY, _REACH = side.NX * BLOCK, side.NY * BLOCK, side.REACH * BLOCK
 TOP, _SHORE = 11 * BLOCK, 12 * BLOCK  # greatest rates; allowed differences of the surface, see `put_shores`
 _PUSH = 13 * BLOCK  # of moving sides: thrust minus that of the cell's own depth
 ROWS = 14
+SUMS = _RH, _RX, _RY, _FAST, _OUTFLOW
 
 
 class MeshWater(NamedTuple):
@@ -36,7 +38,7 @@ class MeshWater(NamedTuple):
     g : gravity normal to the basin [m/s2]; scheme : UPWIND or MUSCL
     wide_by : factor on the range of the neighbours that limits values at sides; with 1 they stay within that range
     plan : float64[2, n]  depth at rest and surface at rest above the level [m]
-    faces : None, or the `DrivenFaces` of driven patches
+    faces : None, or the `DrivenFaces` of driven patches; marks : None, or the `MarkedFaces` of walls and sections
     """
 
     g: float
@@ -44,6 +46,7 @@ class MeshWater(NamedTuple):
     wide_by: float
     plan: np.ndarray
     faces: DrivenFaces | None
+    marks: MarkedFaces | None = None
 
 
 @inline
@@ -92,6 +95,7 @@ def put_sides(water, mesh, j, first, last, reflect, cells, sides, shown, w, move
     # Velocities differ by no more than the wave speed: next to a thin fast cell, a linear field would reverse the flow.
     limited_sides(j, floats, integers, cells[2], wide_by, c, su, edges, w, sides[2])
     limited_sides(j, floats, integers, cells[3], wide_by, c, sv, edges, w, sides[3])
+    flatten_cells(water.marks, mesh, j, cells, sides)
 
 
 @njit(forceinline=True)
@@ -127,6 +131,7 @@ def add_side(water, mesh, j, k, first, last, reflect, cells, sides, w, moves, ph
         w[_U + i], w[_V + i] = mirrored_velocity(mesh, q, reflect, sides[2, own + i], sides[3, own + i], moves)
     centre = cells[0, o:], cells[1, o:], cells[4, o:]
     edges, number = mesh.edges[first:last], mesh.number[first:last]
+    save_sums(water.marks, 4 * j + k, w, SUMS)
     if moves is None:
         add_side_fluxes(water.g, centre, inside, geo, w, None)
     else:
@@ -134,6 +139,7 @@ def add_side(water, mesh, j, k, first, last, reflect, cells, sides, w, moves, ph
         rest = water.plan[DEPTH, j * BLOCK :]
         close_walls(water.g, edges, number, reflect, rest, cells[0, o:], geo, w, moves.thrust)
     close_driven(water.g, water.faces, edges, number, inside, cells[4, o:], geo, w)
+    close_marked(water.g, water.marks, 4 * j + k, centre, inside, geo, w)
 
 
 @njit
@@ -212,6 +218,42 @@ def close_driven(g, faces, edges, number, inside, waves, geo, w):
                 w[_RY + i] -= reach * (push * ny + drift * nx)
                 w[_FAST + i] += reach * max(driven[SPEED, k] - (abs(across) + waves[i]), 0.0)
                 w[MASS + i] = flow
+
+
+@njit
+def close_marked(g, marks, row, centre, inside, geo, w):
+    """Replace the fluxes through walls on one side of the cells of a block, and write the flows through marked faces.
+
+    row : row of sides of `marks`; centre : depth, surface and wave speed of cells; other arguments as for
+    `add_side_fluxes`
+    """
+    if marks is None:
+        return
+    (h0, e0, c0), (h, e, u, v) = centre, inside
+    for m in range(marks.first[row], marks.first[row + 1]):
+        i, k = marks.place[m], max(marks.number[m], ~marks.number[m])
+        if marks.height[k] > 0.0:
+            for q in range(len(SUMS)):
+                w[SUMS[q] + i] = marks.spare[q * BLOCK + m - marks.first[row]]
+            nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
+            before = h[i], e[i], u[i] * nx + v[i] * ny, v[i] * nx - u[i] * ny, c0[i]
+            beyond, along = w[_U + i] * nx + w[_V + i] * ny, w[_V + i] * nx - w[_U + i] * ny
+            after = w[i], w[_E + i], beyond, along, w[_C + i]
+            c = max(c0[i], w[_C + i])
+            low, high = min(min(before[2], beyond) - c, 0.0), max(max(before[2], beyond) + c, 0.0)
+            (mass, push, _, drift, _), speed = flux_over_wall(
+                g, marks.crest[k], marks.height[k], marks.size[k], marks.cosine[k], marks.sine[k], before, after, low,
+                high,
+            )  # fmt: skip
+            push += 0.5 * g * (h[i] + h0[i]) * (e[i] - e0[i])
+            w[_RH + i] -= reach * mass
+            w[_RX + i] -= reach * (push * nx - drift * ny)
+            w[_RY + i] -= reach * (push * ny + drift * nx)
+            w[_FAST + i] += reach * max(max(high, -low), speed)
+            w[_OUTFLOW + i] += reach * (high * (before[2] - low) / (high - low + TINY))
+            w[MASS + i] = mass
+        if marks.number[m] >= 0:
+            marks.flows[k] = w[MASS + i]
 
 
 @njit

@@ -7,11 +7,19 @@ from fvsolve.basins.basin_frames import potential_coefficients
 from fvsolve.basins.basin_output import FIRST_OWN, velocity_value
 from fvsolve.basins.basin_patches import add_link_momentum, normal_gravity, physics_code
 from fvsolve.basins.cell_sides import deviations_of, stretch_of_cell
-from fvsolve.basins.free_surface.patch_closures import read_faces
+from fvsolve.basins.free_surface.patch_closures import (
+    DEEPEST,
+    faces_inside,
+    level_of_patch,
+    lowest_bed,
+    patch_flow,
+    read_faces,
+    read_faces_around,
+)
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.free_surface.water_sources import infiltrate, rain_rate, sum_of_products
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import CELL_FIELD, GN, LINKED, NO_SOIL, PATCH, RATE
+from fvsolve.kernels.dtypes import CELL_FIELD, GN, INTERIOR, LINKED, NO_SOIL, PATCH, RATE
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.table_handle import open_tables
 
@@ -85,6 +93,8 @@ def patch_pressures(t, y, dydt, out, handle):
         node, seen = tables.nodes[patch["node"]], deviations_of(basin, tables.seen, y)
         if patch["closure"] == LINKED:
             read_faces(tables, patch, seen)
+        elif patch["closure"] == INTERIOR:
+            read_faces_around(tables, patch, seen)
         stored, depth, volume, squares = water_at_patch(tables, patch, seen)
         area = near.patch_area(tables, patch)
         slope, content = st["rho"] * normal_gravity(st, tables.plane, basin), st["rho"] * area
@@ -102,12 +112,54 @@ def patch_pressures(t, y, dydt, out, handle):
 def patch_flows(t, y, dydt, out, handle):
     """Add the mass and momentum of flows through patches of water to the rates of the cells next to them."""
     tables = open_tables(handle)
+    layout = tables.layout[0]
     for k in range(tables.patches.size):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
-        if basin["kind"] == OWN_CODE and patch["closure"] != LINKED:
-            inflow, seen = out[tables.layout[0]["net"] + patch["node"]], deviations_of(basin, tables.seen, y)
+        if basin["kind"] != OWN_CODE or patch["closure"] == LINKED:
+            continue
+        inflow, seen = out[layout["net"] + patch["node"]], deviations_of(basin, tables.seen, y)
+        if patch["closure"] == INTERIOR:
+            put_held_outflow(tables, patch, t, out)
+            add_interior_flow(tables, patch, inflow + out[layout["supply"] + patch["node"]], seen, dydt, out)
+        else:
             add_patch_flow(tables, patch, inflow, seen, dydt, out)
+
+
+@njit
+def put_held_outflow(tables, patch, t, out):
+    """Write what links draw from an interior patch beyond critical outflow to `out`, as a supply from outside."""
+    st, faces = tables.settings[0], faces_inside(tables, patch)
+    z, target = level_of_patch(tables, patch, st["gravity"], faces, t, out)
+    if z < lowest_bed(faces) - DEEPEST:
+        critical = patch_flow(st["gravity"], z, faces)[0]
+        out[tables.layout[0]["supply"] + patch["node"]] = st["rho"] * max(critical - target, 0.0)
+
+
+@njit
+def add_interior_flow(tables, patch, inflow, y, dydt, out):
+    """Add the mass flow [kg/s] into an interior patch to the rates of its cells: inflow by area, outflow by volume.
+
+    The outflow takes its momentum along; the inflow has none. During outflow out[RATE], which limits the step, is
+    raised to the fraction of the water that leaves in a second.
+    """
+    plane, basin, leaves = tables.plane, tables.basins[patch["basin"]], inflow < 0.0
+    n, o, volume = basin["n"], basin["y"], 0.0
+    for m in range(patch["count"] if leaves else 0):
+        i = tables.integers[patch["first"] + m]
+        volume += plane[basin["area"] + i] * near.depth_at_patch(plane, basin, i, y)
+    flow = inflow / tables.settings[0]["rho"]
+    if leaves:
+        out[RATE] = max(out[RATE], -2.0 * flow / max(volume, near.LEAST_DEPTH * near.patch_area(tables, patch)))
+    for m in range(patch["count"] if dydt.size > 0 else 0):
+        i = tables.integers[patch["first"] + m]
+        if leaves:
+            rate = flow / max(volume, near.LEAST_DEPTH * near.patch_area(tables, patch))
+            dydt[o + i] += rate * near.depth_at_patch(plane, basin, i, y)
+            dydt[o + n + i] += rate * y[o + n + i]
+            dydt[o + 2 * n + i] += rate * y[o + 2 * n + i]
+        else:
+            dydt[o + i] += flow / near.patch_area(tables, patch)
 
 
 @njit

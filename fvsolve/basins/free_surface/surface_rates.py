@@ -8,6 +8,7 @@ from fvsolve.basins.boundary_cells import band_cells
 from fvsolve.basins.cell_sides import deviations_of
 from fvsolve.basins.free_surface import surface_grid, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import add_capped_friction, add_friction, damp_flows
+from fvsolve.basins.free_surface.marked_faces import marked_faces, no_marks
 from fvsolve.basins.free_surface.patch_closures import driven_faces
 from fvsolve.basins.free_surface.surface_rows import GHOSTS, MAX_COLUMNS
 from fvsolve.basins.free_surface.water_sources import DRAIN_TIME, add_infiltration, add_rain, begin_rain
@@ -143,13 +144,13 @@ def by_blocks(tables, b, grid, states, flows, work, y, rates, out, faces):
 
 
 @njit(forceinline=True)
-def grid_of(tables, basin):
-    """`surface_grid.WaterGrid` of a basin."""
+def grid_of(tables, basin, marks):
+    """`surface_grid.WaterGrid` of a basin. marks : None, or its `MarkedFaces`"""
     plane, n, at, k, nx, ny = tables.plane, basin["n"], basin["plan"], basin["spacing"], basin["nx"], basin["ny"]
     plan = plane[at : at + surface_grid.PLANS * n].reshape((surface_grid.PLANS, n))
     reflect = plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]]
     g, kx, ky = normal_gravity(tables.settings[0], plane, basin), plane[k : k + nx], plane[k + nx : k + nx + ny]
-    return surface_grid.WaterGrid(g, basin["scheme"], basin["limiter"], nx, ny, kx, ky, reflect, plan)
+    return surface_grid.WaterGrid(g, basin["scheme"], basin["limiter"], nx, ny, kx, ky, reflect, plan, marks)
 
 
 @njit(forceinline=True)
@@ -160,15 +161,16 @@ def rates_of(tables, basin, dydt):
 
 
 @njit
-def grid_rates(tables, b, y, rates, out, moves, faces):
+def grid_rates(tables, b, y, rates, out, moves, faces, marks):
     """Write the rates of basin b, whose mesh is a grid; return the greatest rate of its cells [1/s].
 
     rates : as for `add_bed_friction`; moves : None, or the `GridMotion` of moving walls
+    faces, marks : None, or `DrivenFaces` and `MarkedFaces`
     If walls move, the states are those of `basins.cell_sides`. Flows through faces (for scalars) and boundary
     faces are written too.
     """
     basin, work, bands = tables.basins[b], tables.work, tables.bands
-    n, o, f, through, grid = basin["n"], basin["y"], basin["flows"], basin["through"], grid_of(tables, basin)
+    n, o, f, through, grid = basin["n"], basin["y"], basin["flows"], basin["through"], grid_of(tables, basin, marks)
     flow_x, flow_y, count = work[:0], work[:0], grid.ny * (grid.nx + 1)
     passing, scratch = work[max(through, 0) :][: basin["outer_given"] if through >= 0 else 0], work[basin["work"] :]
     states = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
@@ -196,18 +198,18 @@ def add_rain_to_band(tables, b, rates):
 
 
 @njit
-def mesh_rates(tables, b, y, rates, out, moves, faces):
+def mesh_rates(tables, b, y, rates, out, moves, faces, marks):
     """Write the rates of basin b, whose mesh is not a grid; return the greatest rate of its cells [1/s].
 
     moves : None, or `MeshMotion`; otherwise as for `grid_rates`
     """
-    work, basin, grid = tables.work, tables.basins[b], grid_of(tables, tables.basins[b])
+    work, basin, grid = tables.work, tables.basins[b], grid_of(tables, tables.basins[b], marks)
     n, o, f, through = basin["n"], basin["y"], basin["flows"], basin["through"]
     seen = deviations_of(basin, tables.seen, y)
     flow = work[:0]
     if f >= 0:  # needed for scalars
         flow = work[f : f + basin["faces"]]
-    water = surface_mesh.MeshWater(grid.g, basin["scheme"], basin["wide"], grid.plan, faces)
+    water = surface_mesh.MeshWater(grid.g, basin["scheme"], basin["wide"], grid.plan, faces, marks)
     floats, integers = tables.plane[basin["mesh"] :], tables.integers[basin["links"] :]
     states = seen[o : o + n], seen[o + n : o + 2 * n], seen[o + 2 * n : o + 3 * n]
     passing, scratch = work[max(through, 0) :][: basin["outer_given"] if through >= 0 else 0], work[basin["work"] :]
@@ -230,9 +232,10 @@ def no_faces(tables, basin):
     """Return None: no patch is driven."""
 
 
-# Constants of the template: True for grids, for moving walls, and for driven patches; functions for the rates, for the
-# motion of walls, and for the driven faces.
-GRIDS, MOVING, DRIVEN, CELLS, MOTION, FACES = True, False, False, grid_rates, no_motion, no_faces
+# Constants of the template: True for grids, for moving walls, for driven patches, and for walls and sections on faces;
+# functions for the rates, for the motion of walls, for the driven faces, and for the marked faces.
+GRIDS, MOVING, DRIVEN, MARKED = True, False, False, False
+CELLS, MOTION, FACES, MARKS = grid_rates, no_motion, no_faces, no_marks
 
 
 def _rates(t, y, dydt, out, handle):
@@ -245,11 +248,14 @@ def _rates(t, y, dydt, out, handle):
         basin = tables.basins[b]
         if basin["kind"] != OWN_CODE or (basin["nx"] > 0) != GRIDS or (basin["walls"] > 0) != MOVING:
             continue
-        if (basin["driven"] >= 0) != DRIVEN:
+        if (basin["driven"] >= 0) != DRIVEN or (basin["marked"] >= 0) != MARKED:
             continue
         begin_rain(tables, basin, t, dydt, out)
         if MOVING or needs_rates(basin, dydt):
-            rate = CELLS(tables, b, y, rates_of(tables, basin, dydt), out, MOTION(tables, basin), FACES(tables, basin))
+            rate = CELLS(
+                tables, b, y, rates_of(tables, basin, dydt), out, MOTION(tables, basin), FACES(tables, basin),
+                MARKS(tables, basin),
+            )  # fmt: skip
             put_open_flows(tables, b, tables.settings[0]["rho"], out)
             if basin["soil"] != NO_SOIL:  # steps keep all depths above 0
                 add_infiltration(tables, basin, t, y, dydt, out)
@@ -273,4 +279,11 @@ water_driven_moving_grids = specialise(
 water_driven_moving_meshes = specialise(
     _rates, "water_driven_moving_meshes", GRIDS=False, MOVING=True, DRIVEN=True, CELLS=mesh_rates, MOTION=mesh_motion,
     FACES=driven_faces,
+)  # fmt: skip
+water_marked_grids = specialise(
+    _rates, "water_marked_grids", DRIVEN=True, MARKED=True, FACES=driven_faces, MARKS=marked_faces
+)
+water_marked_meshes = specialise(
+    _rates, "water_marked_meshes", GRIDS=False, DRIVEN=True, MARKED=True, CELLS=mesh_rates, FACES=driven_faces,
+    MARKS=marked_faces,
 )  # fmt: skip

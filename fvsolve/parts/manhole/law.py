@@ -8,8 +8,7 @@ from math import sqrt
 
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels import structures
-from fvsolve.kernels.structures import DROWNED, FREE, LINEAR_FALL, NONE
-from fvsolve.parts.weir.law import weir_flow
+from fvsolve.kernels.structures import DROWNED, FREE, LINEAR_FALL, NONE, weir_flow
 
 CREST, WEIR, ORIFICE = range(3)  # numbers: height [m], 2/3 Cw P sqrt(2 g) [m^1.5/s], Co A sqrt(2 g) [m^2.5/s]
 

@@ -11,8 +11,7 @@ from math import sqrt
 
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels import structures
-from fvsolve.kernels.structures import DROWNED, FREE
-from fvsolve.parts.weir.law import weir_flow
+from fvsolve.kernels.structures import DROWNED, FREE, weir_flow
 
 # Numbers: width [m], sill [m], contraction Cc, 2/3 C sqrt(2 g) b of the weir [m^1.5/s], gravity [m/s2]
 WIDTH, SILL, CONTRACTION, WEIR, GRAVITY = range(5)

@@ -5,27 +5,11 @@ The scheduled setting is the crest. Its only number is 2/3 C sqrt(2 g) b [m^1.5/
 Source: Villemonte 1947, Submerged-weir discharge studies, Engineering News-Record 139.
 """
 
-from math import exp, expm1, log, log1p, sqrt
-
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels import structures
-from fvsolve.kernels.structures import DROWNED, FREE, NONE
+from fvsolve.kernels.structures import weir_flow
 
 SIZE = 0  # index of its number
-
-
-@njit
-def weir_flow(size, h, fall):
-    """(flow [m3/s], regime) over a weir at a depth h above its crest and a fall of the levels [m].
-
-    size : 2/3 C sqrt(2 g) b [m^1.5/s]
-    """
-    if h <= 0.0:
-        return 0.0, NONE
-    free = size * h * sqrt(h)
-    if fall >= h:
-        return free, FREE
-    return free * exp(0.385 * log(-expm1(1.5 * log1p(-fall / h)))), DROWNED
 
 
 @njit

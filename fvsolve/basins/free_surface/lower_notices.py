@@ -1,0 +1,129 @@
+"""Notices of unusual values of water with a free surface: roughness, slopes under rain, inflows, narrow structures."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fvsolve.errors import Notice, listing
+from fvsolve.parts.formula import SpatialField
+from fvsolve.parts.weir.part import HydraulicStructure
+
+LEAST_MANNING, GREATEST_MANNING = 0.008, 0.3  # smooth glass or plastic to dense grass
+STEEP = 0.1  # slope above which rain runs off otherwise than shallow-water theory assumes
+TIMES = 1001  # times at which a scheduled inflow is compared with critical flow, beside its own
+
+
+def unusual_values(basin) -> Iterator[Notice]:
+    """Notices that the case of a basin determines, without its states."""
+    place = f"nodes.{basin.name}"
+    if isinstance(basin.part.manning, SpatialField):
+        low, high = float(basin.roughness.min()), float(basin.roughness.max())
+        odd = low if 0.0 < low < LEAST_MANNING else high
+        if 0.0 < odd < LEAST_MANNING or odd > GREATEST_MANNING:
+            text = f"{place}.manning: {odd:.3g} s/m^(1/3) in a cell is outside {LEAST_MANNING} to {GREATEST_MANNING}"
+            limit = LEAST_MANNING if odd < LEAST_MANNING else GREATEST_MANNING
+            yield Notice("range", place, f"{text}, smooth plastic to dense grass", "manning", odd, limit)
+    slope = steepest(basin) if basin.rains else 0.0
+    if slope > STEEP:
+        text = f"{basin.name}: rain falls on a bed with slopes up to {slope:.3g}, between adjacent cells"
+        text += f"; shallow-water theory, with vertical depths, is for slopes below {STEEP:g}"
+        yield Notice("slope", place, text, "bed", slope, STEEP)
+    for name, patch in basin.part.patches.items():
+        if patch.depth is not None and "control" not in (patch.depth.kind, patch.discharge.kind):
+            yield from subcritical_inflow(basin, name, patch)
+    for name in basin.linked:
+        yield from narrow_structures(basin, name)
+
+
+def steepest(basin) -> float:
+    """Greatest slope of the bed between the centres of adjacent cells."""
+    mesh = basin.mesh
+    left, right = mesh.left[: mesh.inner], mesh.right[: mesh.inner]
+    far = np.hypot(*(mesh.centre[right] - mesh.centre[left]).T)
+    return float(np.max(np.abs(basin.bed[right] - basin.bed[left]) / far, initial=0.0))
+
+
+def froude(basin, name: str, flow: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    """Froude numbers of an inflow [m3/s] with a depth [m] through a patch."""
+    wide = basin.mesh.length[basin.mesh.faces(name).index].sum()
+    return flow / (wide * depth * np.sqrt(basin.case.gravity * depth))
+
+
+def subcritical_inflow(basin, name: str, patch) -> Iterator[Notice]:
+    """Notice of a stated depth at which the inflow is slower than waves, so that the basin determines the depth."""
+    from fvsolve.exact.solution import value
+
+    numerics, amount = basin.case.numerics, basin.case.amount
+    t = np.union1d(np.linspace(numerics.start, numerics.end, TIMES), [*patch.discharge.time, *patch.depth.time])
+    t = t[(t >= numerics.start) & (t <= numerics.end)]
+    flow, depth = value(patch.discharge, t), value(patch.depth, t)
+    inward = (flow > 0.0) & (depth > 0.0)
+    number = np.where(inward, froude(basin, name, flow, np.where(inward, depth, 1.0)), np.inf)
+    k = int(np.argmin(number))
+    if number[k] < 1.0:
+        given = f"{amount(flow[k], 'flow')} at a depth of {amount(depth[k], 'length')}"
+        text = (f"{basin.name}.{name}: the inflow of {given} is subcritical at {amount(t[k], 'time')} (Froude number "
+                f"{number[k]:.3g}); leave out `depth`, which the water in the basin determines")  # fmt: skip
+        yield Notice("range", f"nodes.{basin.name}", text, f"patches.{name}.depth", float(number[k]), 1.0)
+
+
+def narrow_structures(basin, name: str) -> Iterator[Notice]:
+    """Notice of structures at a patch that are narrower than its cells, over which their flow spreads."""
+    place, side, narrow = f"{basin.name}.{name}", float(basin.mesh.length[basin.mesh.faces(name).index].min()), []
+    for link, part in basin.case.links.items():
+        if isinstance(part, HydraulicStructure) and place in part.ports.values():
+            width = getattr(part, "width", None) or getattr(part, "diameter", None) or np.inf
+            if width * getattr(part, "barrels", 1) < side * (1.0 - 1e-9):
+                narrow.append(link)
+    if narrow:
+        verb, size = "is" if len(narrow) == 1 else "are", basin.case.amount(side, "length")
+        text = f"{listing(narrow)} {verb} narrower than the cells at {place}, {size}: the flow spreads over the cells; "
+        yield Notice(
+            "cells", f"links.{narrow[0]}", text + "use smaller cells where velocities beside it matter", "width"
+        )
+
+
+class InflowWatch:
+    """Scheduled inflow through a patch without `depth`, where only critical inflow balances the water inside.
+
+    greatest : float64[3]  time [s], inflow [m3/s], and greatest inflow slower than waves [m3/s] at the last check
+    """
+
+    def __init__(self, basin, name: str) -> None:
+        self.basin, self.name, self.greatest = basin, name, np.zeros(3)
+        faces = basin.mesh.faces(name)
+        self.cells, self.normal, self.length = (
+            faces.behind,
+            faces.normal,
+            basin.mesh.length[faces.index],
+        )
+
+    def check(self, t: float, y: np.ndarray) -> None:
+        """Store the inflow and its limit for a state y of the model at time t [s]."""
+        from fvsolve.exact.solution import value
+
+        basin, states = self.basin, self.basin.deviations(y)
+        depth = basin.depth_of(states)[self.cells]
+        outward = (states[1][self.cells], states[2][self.cells]) * self.normal.T
+        u = -outward.sum(axis=0) / np.maximum(depth, 1e-9)
+        c = np.sqrt(basin.case.gravity * depth)
+        limit = float(np.sum(self.length * np.maximum(2.0 * c - u, 0.0) ** 3) / basin.case.gravity)
+        self.greatest[:] = t, float(value(basin.part.patches[self.name].discharge, np.array([t]))[0]), limit
+
+    def notices(self) -> list[Notice]:
+        """List with the notice of an inflow held at critical flow at the end; empty if it is slower than waves."""
+        t, flow, limit = self.greatest.tolist()
+        if not flow > limit:
+            return []
+        basin, amount = self.basin, self.basin.case.amount
+        text = (f"{basin.name}.{self.name}: the inflow of {amount(flow, 'flow')} at {amount(t, 'time')} enters at "
+                "critical depth, because the water inside runs off faster than waves or is shallow; give the `depth` "
+                "of a supercritical inflow")  # fmt: skip
+        return [Notice("range", f"nodes.{basin.name}", text, f"patches.{self.name}.discharge", flow, limit)]
+
+
+def inflow_watches(basin) -> list[InflowWatch]:
+    """Watches of the scheduled inflows without `depth`; the output of a control is not known in advance."""
+    return [InflowWatch(basin, name) for name, patch in basin.part.patches.items()
+            if not patch.is_interior and patch.discharge is not None and patch.depth is None
+            and patch.discharge.kind != "control"]  # fmt: skip
