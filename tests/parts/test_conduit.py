@@ -207,6 +207,28 @@ def test_methods_agree():
         assert run.ledger["mass"]["relative"] < 1e-12
 
 
+def pond(level: float) -> dict:
+    """Basin whose water runs through a conduit from its patch into a tank."""
+    pool = {"type": "basin", "size": [6.0, 4.0], "cells": [12, 4], "level": 1.0, "elevation": 0.0,
+            "patches": {"out": {"side": "east", "span": [1.0, 3.0]}}}  # fmt: skip
+    nodes = {"pool": pool, "b": {**TANK, "area": 4.0, "level": level}}
+    links = {"s": pipe("pool.out", "b", inverts=[0.2, 0.1])}
+    return sewer(nodes, links, ["b.level", "s.flow", "pool.depth@3,2", "pool.out.flow", "s.depth@0.5"], 30.0)
+
+
+def test_a_basin_runs_through_a_conduit_into_a_tank():
+    """At rest with equal levels; otherwise the volume is constant to 1e-12, by each method, and levels meet."""
+    rest = fvsolve.run(pond(1.0))
+    assert all(np.ptp(rest[probe.text]) == 0.0 for probe in rest.case.probes)
+    runs = [
+        fvsolve.run({**(case := pond(0.3)), "numerics": case["numerics"] | keys}) for keys in (METHODS[0], METHODS[3])
+    ]
+    for run in runs:
+        assert run.ledger["mass"]["relative"] < 1e-12 and run["b.level"][-1] > 0.5
+        assert run["s.flow"] == approx(-run["pool.out.flow"], abs=1e-9)
+    assert runs[1]["b.level"] == approx(runs[0]["b.level"], abs=5e-3)
+
+
 def test_a_resumed_run_is_the_whole_run(tmp_path):
     case = two_tanks(0.0, 1.2, cells=200)
     case["output"]["every"] = 0.05
