@@ -140,6 +140,7 @@ FAULTS = [
         "gain = richest.seconds / cheapest.seconds",
         "gain = cheapest.seconds / richest.seconds",
     ),
+    Fault("basins/conduit/conduit_rates.py", "section.g * n * n * share", "section.g * n * share"),
     Fault("basins/frame_forces.py", "spin + f1 - p1 * z", "spin + f1 + p1 * z"),
     Fault(
         "basins/liquid/liquid_mesh.py",
@@ -156,7 +157,7 @@ FAULTS = [
         "dydt[o + i] += flow * near.flow_weight(",
         "dydt[o + i] -= flow * near.flow_weight(",
     ),
-    Fault("parts/conduit.py", "DN_NPS.get(number, number / 25.0)", "DN_NPS.get(number, number / 25.4)"),
+    Fault("parts/full_pipe.py", "DN_NPS.get(number, number / 25.0)", "DN_NPS.get(number, number / 25.4)"),
     Fault(
         "parts/accumulator/law.py",
         "rho * (n * p * compressibility * (total - volume) + volume)",

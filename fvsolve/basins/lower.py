@@ -30,7 +30,7 @@ def rows_class(physics: type) -> type:
 
     It is in the module `lower` of the package that declares the type. physics : class with the keys of the type
     """
-    home = physics.__module__.rpartition(".")[0]
+    home = physics.package or physics.__module__.rpartition(".")[0]
     import_module(f"{home}.lower")
     return import_module("fvsolve.basins.lower_basin").BasinRows.physics[home]
 

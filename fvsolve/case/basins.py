@@ -597,7 +597,8 @@ def patches_with_faces(nodes: dict[str, Any], links: dict[str, Any], lines: str,
     fixed = [name for name in meshes if may_have_faces(nodes[name])]
     names = {f"{name}.{patch}" for name in fixed for patch in patch_names(meshes[name])}
     given = {f"{name}.{patch}" for name in fixed for patch, keys in nodes[name].patches.items() if is_source(keys)}
-    return frozenset(names & ((joined | given) - others))
+    ends = {f"{name}.{patch}" for name in fixed if nodes[name].added for patch in patch_names(meshes[name])}
+    return frozenset(names & ((joined | given) - others) | ends)
 
 
 def is_source(patch: Any) -> bool:
@@ -624,7 +625,7 @@ def places(
             rest = bodies.on_body(basin, mesh, patch, rest, pose)
         kind, place = place_kind(basin, patch), f"{name}.{patch}"
         keys = {"position": None, "basin": name, "patch": patch, **rest}
-        if place in with_faces:
+        if place in with_faces and not basin.added:
             inflow = {"flow": basin.patches[patch].discharge} if is_source(basin.patches.get(patch)) else {}
             result[place] = PatchJunction.model_construct(**keys, **inflow)
             place = f"{place}.inside"
@@ -637,11 +638,9 @@ def face_links(nodes: dict[str, Any], meshes: dict, with_faces: frozenset[str]) 
     result = {}
     for name, mesh in meshes.items():
         for patch in patch_names(mesh):
-            place = f"{name}.{patch}"
-            if place in with_faces:
+            if f"{name}.{patch}" in with_faces:
                 length = float(mesh.length[mesh.faces(patch).index].sum())
-                ends = {"from_": place, "to": f"{place}.inside", "basin": name, "patch": patch, "length": length}
-                result[f"{place}.face"] = nodes[name].physics_type.face_type().model_construct(**ends)
+                result[f"{name}.{patch}.face"] = nodes[name].face_link(name, patch, length)
     return result
 
 

@@ -323,7 +323,7 @@ class Case(Displayable):
             "ambient_pressure": self.ambient_pressure,
             "gravity": self.gravity,
             "fluid": self.fluid.table(),
-            "nodes": {name: {"type": node.kind, **node.table()} for name, node in self.nodes.items()},
+            "nodes": {name: {"type": node.kind, **node.table()} for name, node in self.nodes.items() if not node.added},
             "links": {
                 name: {"type": link.type_in_file or link.kind, **link.table()} for name, link in self.links.items()
             },

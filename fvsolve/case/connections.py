@@ -59,7 +59,10 @@ def network(table: dict[str, Any]) -> Faults:
     own = {name: [name, *ties] if name in places else ties for name, ties in tied.items() if ties}
     own |= {f"{name}.": [name, *points] for name, node in nodes.items() if (points := points_of(name, node))}
     own |= {f"{k}..": group for k, group in enumerate(hanging)}
-    yield from _island_faults(islands(own | {f"links.{name}": places for name, places in ends.items()}), nodes, places)
+    held = {place for name, joined in ends.items() for place in joined
+            if getattr(kind_of("links", links[name]), "fixes_pressure", False)}  # fmt: skip
+    groups = islands(own | {f"links.{name}": places for name, places in ends.items()})
+    yield from _island_faults(groups, nodes, places, held)
     yield from _rigid_junctions(nodes, links, ends)
 
 
@@ -88,10 +91,10 @@ def _port_faults(
             yield keys, f"joins {show(place)} to itself"
 
 
-def _island_faults(groups: list[list[str]], nodes: dict[str, Any], places: dict[str, Any]) -> Faults:
+def _island_faults(groups: list[list[str]], nodes: dict[str, Any], places: dict[str, Any], held: set[str]) -> Faults:
     """Faults of several islands (groups of connected names), and of islands in which nothing fixes the pressure.
 
-    places : names that links can join -> domain
+    places : names that links can join -> domain; held : places at which a link fixes the pressure
     """
     groups = [island for island in groups if not is_apart({places[name] for name in island})]
     if len(groups) > 1:
@@ -101,7 +104,7 @@ def _island_faults(groups: list[list[str]], nodes: dict[str, Any], places: dict[
     for island in groups:
         wet = [name for name in island if places[name] in ("hydraulic", None)]
         kinds = [kind_of("nodes", nodes[name]) if name in nodes else Chamber for name in wet]
-        if kinds and all(kind is not None and not kind.fixes_pressure for kind in kinds):
+        if held.isdisjoint(wet) and kinds and all(kind is not None and not kind.fixes_pressure for kind in kinds):
             where = "" if len(groups) == 1 else f" of {listing(island, 6)}"
             yield ("nodes",), f"nothing fixes the pressure{where}; expected a reservoir, tank or chamber"
 

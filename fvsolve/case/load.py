@@ -11,6 +11,7 @@ from fvsolve import exact, units
 from fvsolve.argument_checks import TABLE, validated
 from fvsolve.case import basins, chainage, checks, claims, connections, part_reading, resource_checks, shipped
 from fvsolve.case.case import Case, wave_speed
+from fvsolve.case.conduits import water_of_conduits
 from fvsolve.case.controls import read_controls
 from fvsolve.case.part_reading import Parts
 from fvsolve.case.pipe_routes import legs, read_routes
@@ -151,15 +152,19 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     links = part_reading.fill_cells(reading, parts.links, state, numerics)
     if None not in (numerics, output, state) and not reading.faults:
         reading.add(size_faults(numerics, output, links, parts.meshes, state))
+    waters, lines = {}, {}
+    if state is not None and not reading.faults:
+        weight = state.density * general["gravity"]
+        waters, lines = water_of_conduits(parts.nodes, links, reading.setting.ambient, weight)
     named = reading.table("exact", ExactSpec) if "exact" in reading.raw.table else None
     reading.stop()
     setting, raw = reading.setting, reading.raw
     case = Case(
         name=raw.name, path=raw.path, folder=raw.folder, raw=raw.table, **general, ambient_pressure=setting.ambient,
-        fluid=fluid, properties=state, nodes=parts.nodes, links=links, meshes=parts.meshes, lumped=parts.lumped,
-        signals=dict(setting.used), scalars=scalars, numerics=numerics, output=output, expect=expect, compare=compare,
-        routes=routes, limits=limits, controls=blocks, reactions=reactions, exact=named, copies=dict(setting.files),
-        read=reading.read, validation=validation,
+        fluid=fluid, properties=state, nodes=parts.nodes | waters, links=links, meshes=parts.meshes | lines,
+        lumped=parts.lumped, signals=dict(setting.used), scalars=scalars, numerics=numerics, output=output,
+        expect=expect, compare=compare, routes=routes, limits=limits, controls=blocks, reactions=reactions,
+        exact=named, copies=dict(setting.files), read=reading.read, validation=validation,
     )  # fmt: skip
     return case if named is None else with_exact(reading, case)
 
@@ -308,7 +313,7 @@ def check_unused_signals(reading: Reading) -> None:
 def has_cells(table: dict[str, Any]) -> bool:
     """True if a case has pipes or basins, or parts of unknown type. table : nested dicts of the case"""
     kinds = [kind for group in ("nodes", "links") for kind in part_reading.table_kinds(table, group).values()]
-    return any(kind in (Pipe, None) or is_kind(kind, "basin") for kind in kinds)
+    return any(kind in (Pipe, None) or is_kind(kind, "basin") or is_kind(kind, "conduit") for kind in kinds)
 
 
 def read_output(reading: Reading, numerics: Numerics | None, kinds: dict[str, Any]) -> Output | None:
@@ -402,6 +407,7 @@ def fill_numerics(
     pools = [parts.nodes[name] for name in parts.meshes]
     carries = bool(scalars) and any(pool.physics_type.carries for pool in pools)
     rubs = any(pool.physics_type.has_friction(pool) for pool in pools)
+    rubs = rubs or any(getattr(link, "manning", 0.0) for link in parts.links.values() if is_kind(link, "conduit"))
     return numerics.filled(cells, carries, rubs, checks.follows_cavities(fluid, cells))
 
 

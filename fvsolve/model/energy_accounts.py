@@ -199,6 +199,8 @@ class Accounts:
         if driven := [f"{basin.name}.{name}" for basin in model.basins for name in basin.closed]:
             raise FvsolveError(f"the energy of water through driven patches ({listing(driven)}) is not supported; "
                                "expected walls, open sides, or links")  # fmt: skip
+        if conduits := [name for name, link in case.links.items() if link.kind == "conduit"]:
+            raise FvsolveError(f"the energy of conduits ({listing(conduits)}) is not supported; expected other links")
         if model.basins and not case.law.linear:
             raise FvsolveError('the energy of basins is computed for law = "linear" only; expected this density law')
         self.power, self.stored = model.functions.energies

@@ -157,7 +157,8 @@ def linear_offsets(draft, start, row, probe) -> None:
     weight = draft.fluid.density * draft.case.gravity
     row["scale"], row["offset"] = 1.0, 0.0
     if row["kind"] in (rec.VALVE_FLOW, rec.COLUMN_FLOW, rec.PIPE_FLOW, rec.SPOOL_FLOW):
-        row["scale"] = 1.0 / draft.fluid.density
+        leaves = row["kind"] == rec.VALVE_FLOW and row["side"] < 0  # out of the end `to` of a conduit
+        row["scale"] = (-1.0 if leaves else 1.0) / draft.fluid.density
         if probe.quantity == "velocity":
             is_pipe, floats = row["kind"] == rec.PIPE_FLOW, draft.tables.floats
             row["scale"] /= draft.pipe_table[row["index"]]["area"] if is_pipe else floats[row["weights"]]

@@ -14,7 +14,7 @@ _MODULES = {
     "EndStop": "translational",
     "Force": "translational",
     "Frame": "translational",
-    "Friction": "conduit",
+    "Friction": "full_pipe",
     "Inflow": "hydraulic_nodes",
     "Junction": "hydraulic_nodes",
     "Leak": "outlet.part",

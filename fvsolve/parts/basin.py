@@ -344,6 +344,7 @@ class Physics(Table):
 
     kinds: ClassVar[Kinds] = Kinds()
     name: ClassVar[str] = ""
+    package: ClassVar[str] = ""  # that fills rows of tables; that of the declaration if empty
     states: ClassVar[dict[str, str]] = {}
     fields: ClassVar[dict[str, str]] = {}
     maxima: ClassVar[dict[str, str]] = {}
@@ -364,10 +365,13 @@ class Physics(Table):
     def __init_subclass__(cls, name: str, **rest: Any) -> None:
         super().__init_subclass__(**rest)
         cls.name = name
-        Physics.kinds.declare(name, cls, "physics", "basin")  # whose modules are those of all physics
+        if name:  # otherwise no basin of a case file may have these equations
+            Physics.kinds.declare(name, cls, "physics", "basin")  # whose modules are those of all physics
 
     @classmethod
     def __pydantic_init_subclass__(cls, **rest: Any) -> None:
+        if not cls.name:
+            return
         both = (BasinStart, optional_keys(cls.starts)), (Basin, optional_keys(cls))
         for table, keys in both:
             for key in (key for key in keys if key in table.model_fields):
@@ -535,6 +539,11 @@ class Basin(PlaceOnBody, kind="basin"):
 
     def inner(self, name: str) -> tuple[dict[str, Node], dict[str, Any]]:
         return {}, {}
+
+    def face_link(self, name: str, patch: str, length: float) -> Any:
+        """Link from the junction `name`.`patch` of the links at a patch to its cells; length : of the faces [m]"""
+        ends = {"from_": f"{name}.{patch}", "to": f"{name}.{patch}.inside", "basin": name, "patch": patch}
+        return self.physics_type.face_type().model_construct(**ends, length=length)
 
     @classmethod
     def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:

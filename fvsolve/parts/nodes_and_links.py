@@ -26,6 +26,7 @@ class Part(Table):
     kinds: ClassVar[Kinds] = Kinds()
     no_scalars: ClassVar[str] = ""  # reason why a case with scalars cannot have this part yet
     own_scalars: ClassVar[str] = ""
+    added: ClassVar[bool] = False  # True if another part adds it to the case: it is not in the file
     type_in_file: ClassVar[str] = ""  # type in the case file of a variant with a kind of its own
 
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
@@ -131,6 +132,7 @@ class Link(Part):
     in_network: ClassVar[bool] = False  # True if it is an element of a network of rotation, electricity or heat
     network_ports: ClassVar[tuple[str, ...]] = ()  # its only ports in such a network, if it is a part of the fluid too
     main_quantities: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded where a case has no probes
+    fixes_pressure: ClassVar[bool] = False  # True if it determines the pressures at its ends, by its free surface
     may_lack: ClassVar[tuple[str, ...]] = ()  # ports that may join nothing
     owns: ClassVar[dict[str, str]] = {}  # own place, `LINK.PLACE` for other parts -> domain
 

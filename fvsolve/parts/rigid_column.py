@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar
 
 from fvsolve.assembly.lowering import Lowering
 from fvsolve.kernels import dtypes as rec
-from fvsolve.parts.conduit import Conduit
+from fvsolve.parts.full_pipe import FullPipe
 from fvsolve.parts.value import ReadContext, Rows, Value, ValueFault
 from fvsolve.units import show
 
@@ -37,7 +37,7 @@ class Way(Value):
         return {"type": "array", "items": Rows("position", length=3).json()}
 
 
-class RigidColumn(Conduit, kind="rigid-column"):
+class RigidColumn(FullPipe, kind="rigid-column"):
     """An incompressible pipe, (rho length / A) dq/dt = drop of p + rho g z minus friction; its flow q is a state.
 
     A is the area, p the pressure and z the elevation. Ports: from, to. Stored energy: rho length q^2 / (2 A) [J].

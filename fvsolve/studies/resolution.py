@@ -95,16 +95,17 @@ def pipes_with_cells(case) -> dict[str, Pipe]:
 
 
 def basins(case) -> dict[str, Basin]:
-    """Basins of a case that have cells, by name."""
-    return {name: case.nodes[name] for name in case.meshes}
+    """Basins of a case that have cells, by name, without the water of conduits."""
+    return {name: case.nodes[name] for name in case.meshes if not case.nodes[name].added}
 
 
 def cell_counts(case) -> Counts:
-    """Numbers of cells that a study can refine: of pipes that are not delay lines, and of rectangular basins.
+    """Numbers of cells that a study can refine: of pipes that are not delay lines, conduits, and rectangular basins.
 
     Returns dotted key, such as "links.main.cells" -> (cells,) of a pipe, or (cells along x, cells along y) of a basin.
     """
     numbers: Counts = {f"links.{name}.cells": (pipe.cells,) for name, pipe in pipes_with_cells(case).items()}
+    numbers |= {f"links.{name}.cells": (link.cells,) for name, link in case.links.items() if link.kind == "conduit"}
     return numbers | {f"nodes.{name}.cells": basin.cells for name, basin in basins(case).items() if basin.cells}
 
 

@@ -13,7 +13,7 @@ from reference.scenes import AMBIENT, WATER, junction, lake, pipe, reservoir, sc
 import fvsolve
 from fvsolve import load
 from fvsolve.errors import CaseError
-from fvsolve.parts.conduit import FITTINGS, fittings_loss, pipe_bore
+from fvsolve.parts.full_pipe import FITTINGS, fittings_loss, pipe_bore
 from fvsolve.parts.pipe.catalogue import class_size, ductile
 from fvsolve.parts.pipe.pipe_wall import Wall, materials, restraint_factor, sources
 

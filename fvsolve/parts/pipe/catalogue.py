@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from fvsolve.data import read_table
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts.conduit import DARCY, KEYS_OF_MODEL, pipe_size
+from fvsolve.parts.full_pipe import DARCY, KEYS_OF_MODEL, pipe_size
 from fvsolve.parts.pipe.pipe_wall import HEAT_KEYS, OF_WALL, Material, materials
 from fvsolve.parts.value import ValueFault
 from fvsolve.units import parse, show

@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from fvsolve.parts.carried_scalar import ScalarValues
-from fvsolve.parts.conduit import LENGTH, Conduit
+from fvsolve.parts.full_pipe import LENGTH, FullPipe
 from fvsolve.parts.pipe.elevation_profile import Profile, ProfileValue
 from fvsolve.parts.pipe.pipe_wall import (
     MODULI,
@@ -56,7 +56,7 @@ SOFT_WALLS = (  # (modulus [Pa], least wall over bore of such a pipe, text); the
 )
 
 
-class Pipe(Conduit, kind="pipe"):
+class Pipe(FullPipe, kind="pipe"):
     """A pipe, straight or along a profile: balances of mass and momentum along the axis, wave speed sqrt(K / rho).
 
     K is the effective bulk modulus of fluid and wall. Ports: from, to; each end has one outgoing characteristic. Stored
@@ -69,7 +69,7 @@ class Pipe(Conduit, kind="pipe"):
     on_request: ClassVar[tuple[str, ...]] = ("force",)
     own_scalars: ClassVar[str] = "along"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
-        *Conduit.alternatives, ("wave_speed", "wall"), ("diameter", "class"), ("schedule", "class"),
+        *FullPipe.alternatives, ("wave_speed", "wall"), ("diameter", "class"), ("schedule", "class"),
         ("wave_speed", "restraint"),
     )  # fmt: skip
     along: ClassVar[dict[str, str]] = {
@@ -77,7 +77,7 @@ class Pipe(Conduit, kind="pipe"):
         "flow": "flow",
     }  # fmt: skip
 
-    needs: ClassVar[tuple[tuple[str, ...], ...]] = (*Conduit.needs, ("length", "profile"))
+    needs: ClassVar[tuple[tuple[str, ...], ...]] = (*FullPipe.needs, ("length", "profile"))
 
     length: Annotated[float, LENGTH] = None  # the length of profile is its default
     profile: Annotated[Profile | None, ProfileValue()] = None

@@ -217,8 +217,11 @@ class Fittings(Value):
         return {"type": "array", "items": {"enum": list(FITTINGS)}}
 
 
-class Conduit(TwoPort):
-    """Base of pipe and rigid column; `nominal` and `fittings` are read as `diameter`, `thickness` and `minor_loss`."""
+class FullPipe(TwoPort):
+    """Base of pipe and rigid column, which are full of fluid.
+
+    `nominal` and `fittings` are read as `diameter`, `thickness` and `minor_loss`.
+    """
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("diameter", "nominal"), ("diameter", "schedule"))
 

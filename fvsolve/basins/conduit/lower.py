@@ -1,0 +1,177 @@
+"""Rows of the tables of a model for the water of conduits."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from fvsolve.basins.basin_terms import SHORTAGES
+from fvsolve.basins.conduit import conduit_rates
+from fvsolve.basins.conduit.conduit_rates import NEARLY_FULL, OF_AREA, OF_DEPTH, OF_FLOW
+from fvsolve.basins.free_surface.bed_friction import RATE_CAP
+from fvsolve.basins.free_surface.lower import COURANT_FACTOR, NO_CAP
+from fvsolve.basins.lower_basin import BasinRows
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.rhs_assembly import RhsTerms
+from fvsolve.parts.conduit.law_section import area_of, celerity, depth_of, section_of, width_and_thrust
+from fvsolve.steppers.analysis.stability_properties import in_euler_steps
+from fvsolve.steppers.tableau import AUTO, METHODS
+
+PACKAGE = __package__
+QUANTITIES = {"depth": OF_DEPTH, "head": OF_DEPTH, "filling": OF_AREA, "flow": OF_FLOW}
+SMALL = 0.1  # small deviation of the filling, for scales of states
+
+
+class ConduitWaterRows(BasinRows):
+    """Rows of the water of a conduit; states are deviation of the area from rest [m2] and flow [m3/s]."""
+
+    units = {"depth": "m", "surface": "m", "bed": "m", "velocity": "m/s"}
+    has_wide_closure = False
+
+    def __init__(self, case, name: str) -> None:
+        super().__init__(case, name)
+        self.conduit, self.bed = self.part.conduit, self.part.bed_at_centres()
+        self.section = section_of(case.gravity, self.conduit.diameter, self.conduit.celerity(case.gravity))
+        self.depth = np.maximum(self.part.level - self.bed, 0.0)
+        self.area = self.areas(self.depth)
+
+    def areas(self, depth: np.ndarray) -> np.ndarray:
+        """Areas of cells at their depths : float64[n] [m2]."""
+        return np.array([area_of(self.section, h) for h in depth.tolist()])
+
+    def pieces(self, valves: bool) -> Iterator[RhsTerms]:
+        yield RhsTerms(
+            package=PACKAGE,
+            prepare="conduit_rates: read_ends",
+            rates="conduit_rates: conduit_rates",
+            observe="conduit_rates: observe_conduits",
+            damp="conduit_rates: damp_conduits" if self.damped else "",
+        )
+        yield SHORTAGES
+
+    @property
+    def scheme(self) -> str:
+        return "upwind" if self.case.numerics.scheme == "upwind" else "muscl"
+
+    @property
+    def undivided_reason(self) -> str:
+        return "it is a conduit"
+
+    @property
+    def damped(self) -> bool:
+        """True if the rates of Runge-Kutta stages are divided by 1 + h R for friction."""
+        method = METHODS.get(self.case.numerics.method)
+        return self.conduit.manning > 0.0 and method is not None and in_euler_steps(method)
+
+    @property
+    def rate_cap(self) -> float:
+        """Cap of the decay rate of flows by friction [1/s], see `FreeSurfaceRows.rate_cap`."""
+        method = METHODS.get(self.case.numerics.method)
+        if self.conduit.manning > 0.0 and method is not None and method.explicit and not self.damped:
+            return RATE_CAP
+        return NO_CAP if self.case.numerics.method == AUTO else math.inf
+
+    def end_at_rest(self, patch: str) -> tuple[float, float]:
+        """(depth, surface above the level at rest) inside an end of the water at rest."""
+        i, inner = (0, 1) if patch == "from" else (-1, -2)
+        h, bed = float(self.depth[i]), self.conduit.inverts[i]
+        if h > 0.0 and self.n > 1 and self.scheme != "upwind" and self.depth[inner] > 0.0:
+            h = 0.5 * (h + max(2.0 * h - float(self.depth[inner]), 0.0))
+        return h, 0.0 if h > 0.0 else bed - self.part.level
+
+    def lower(self, draft, row) -> None:
+        surface = np.maximum(self.bed - self.part.level, 0.0)
+        row["plan"] = draft.to_plane(np.array([self.area, self.depth, surface]))
+        row["table"], row["work"] = draft.to_plane(np.array(self.section)), draft.to_work(conduit_rates.WORK * self.n)
+        row["rest"] = self.case.properties.density * self.case.gravity * self.part.level
+        row["friction"] = rec.MANNING if self.conduit.manning > 0.0 else rec.NO_DRAG
+        row["roughness"] = draft.to_plane(np.array([self.conduit.manning]))
+        row["held"], row["damped"], row["unsplit"] = self.rate_cap, self.damped, COURANT_FACTOR
+
+    def lower_patch(self, draft, patch: str, row) -> None:
+        super().lower_patch(draft, patch, row)
+        i = 0 if patch == "from" else -1
+        level = self.part.level
+        row["closure"], row["valve"] = rec.LINKED, draft.valve_names.index(f"{self.name}.{patch}.face")
+        row["rest"], row["lowest"] = self.conduit.inverts[i] - level, max(self.bed[i] - level, 0.0)
+        row["depth"], row["inside"], row["second"] = -1, draft.to_work(3), len(draft.integers)
+        inner = min(1, self.n - 1) if patch == "from" else max(self.n - 2, 0)
+        draft.integers.append(inner)
+
+    def scales(self) -> list[float]:
+        full = 0.25 * math.pi * self.conduit.diameter**2
+        return [SMALL * full, SMALL * full * math.sqrt(self.case.gravity * self.conduit.diameter)]
+
+    def levels_at_start(self) -> list[float]:
+        """Levels at both ends at the start [m]: heads of the nodes, where they are above the invert.
+
+        Otherwise it is the level of the water at the other end, at most the invert.
+        """
+        ends = list(zip(self.part.heads, self.conduit.inverts, strict=True))
+        reached = [None if head is None or head < bed else head for head, bed in ends]
+        return [
+            head if head is not None else bed if other is None else min(other, bed)
+            for head, other, (_, bed) in zip(reached, reached[::-1], ends, strict=True)
+        ]
+
+    def start(self, attitude: Any = None) -> np.ndarray:
+        conduit, heads = self.conduit, self.part.heads
+        low, high = self.levels_at_start()
+        depth = np.maximum(low + (high - low) * (np.arange(self.n) + 0.5) / self.n - self.bed, 0.0)
+        if conduit.initial_depth is not None:
+            depth = np.full(self.n, conduit.initial_depth)
+        change = np.zeros(self.n) if np.array_equal(depth, self.depth) else self.areas(depth) - self.area
+        flow, crowns = conduit.initial_flow, [bed + conduit.diameter for bed in conduit.inverts]
+        if flow is None:
+            known = self.part.stated and all(head >= crown for head, crown in zip(heads, crowns, strict=True))
+            flow = conduit.full_flow(heads[0] - heads[1]) if known else 0.0
+        return np.array([change, np.where(self.area + change > 0.0, flow, 0.0)])
+
+    def depths(self, y: np.ndarray) -> np.ndarray:
+        """Depths of cells at deviations y : float64[n] [m]."""
+        return np.array([depth_of(self.section, area) for area in np.maximum(self.area + y[0], 0.0).tolist()])
+
+    def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
+        depth, area = self.depths(y), np.maximum(self.area + y[0], 0.0)
+        speed = np.array([conduit_rates.velocity_factor(self.section, wet) for wet in area.tolist()]) * y[1]
+        velocity = np.column_stack([speed, np.zeros((self.n, 2))])
+        return {"depth": depth, "bed": self.bed, "surface": self.bed + depth, "velocity": velocity}
+
+    def speeds(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        fields, section = self.fields(y), self.section
+        surcharge = math.sqrt(section.g * section.area / section.slot)
+        waves = []
+        for h, area in zip(fields["depth"].tolist(), (self.area + y[0]).tolist(), strict=True):
+            c = celerity(section, width_and_thrust(section, h, area)[0], area)
+            waves.append(max(c, surcharge) if area >= NEARLY_FULL * section.area else c)
+        return fields["velocity"], np.array(waves)
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        y = self.start()
+        depth, speed = self.depths(y), self.speeds(y)[1]
+        return {"depth": (depth.min(), depth.max()), "wave_speed": (speed.min(), speed.max())}
+
+    def ground(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        first, last = self.conduit.inverts
+        return first + (last - first) * x / self.conduit.length
+
+    def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
+        row["side"], row["scale"] = QUANTITIES[field], 1.0
+        if field == "filling":
+            row["scale"] = 1.0 / (0.25 * math.pi * self.conduit.diameter**2)
+        elif field == "head":
+            row["offset"] = float(weights @ self.bed[cells])
+
+    def at_rest(self) -> np.ndarray:
+        return self.area
+
+    def mass(self) -> tuple[float, np.ndarray]:
+        per = np.full(self.n, self.case.properties.density * self.conduit.length / self.n)
+        return float(np.sum(per * self.area)), per
+
+    def weights(self, y: np.ndarray) -> np.ndarray:
+        per = 0.5 * self.mass()[1]
+        area = np.maximum(self.area + y[0], 1e-6 * self.section.area)
+        width = np.array([width_and_thrust(self.section, h, a)[0] for h, a in zip(self.depths(y), area, strict=True)])
+        return np.array([per * self.case.gravity / np.maximum(width, self.section.slot), per / area])

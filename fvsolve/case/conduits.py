@@ -1,0 +1,78 @@
+"""Basins that represent the water of conduits, with the heads of their nodes at the start."""
+
+from typing import Any
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+from fvsolve.mesh.rectangles import rectangle
+from fvsolve.parts.nodes_and_links import is_kind
+
+
+def stated_head(nodes: dict[str, Any], place: str, ambient: float, weight: float) -> float | None:
+    """Head [m] that a place of a case has at the start, None if its keys do not give it.
+
+    ambient : pressure [Pa]; weight : density times gravity [N/m3]
+    """
+    node = nodes.get(place.partition(".")[0])
+    height = getattr(node, "elevation", None) or 0.0
+    if is_kind(node, "reservoir"):
+        if node.head is not None:
+            return float(node.head.value[0])
+        return height + (float(node.pressure.value[0]) - ambient) / weight
+    level = getattr(node, "level", None)
+    return height + level if isinstance(level, float) else None
+
+
+def heads_at_start(conduits: dict[str, Any], stated: dict[str, float | None]) -> dict[str, float | None]:
+    """Heads of the nodes of conduits; unknown heads are interpolated along the lengths of conduits.
+
+    stated : head of each node, None if it is not known [m]
+    """
+    heads, names = dict(stated), list(stated)
+    graph = np.zeros((len(names), len(names)))
+    for link in conduits.values():
+        i, j = names.index(link.from_), names.index(link.to)
+        graph[i, j] += 1.0 / link.length
+        graph[j, i] += 1.0 / link.length
+    _, group = connected_components(graph)
+    for k in range(group.max() + 1):
+        known = [i for i in np.flatnonzero(group == k) if heads[names[i]] is not None]
+        free = [i for i in np.flatnonzero(group == k) if heads[names[i]] is None]
+        if known and free:
+            given = np.array([heads[names[i]] for i in known])
+            matrix = np.diag(graph.sum(axis=1)) - graph
+            found = np.linalg.solve(matrix[np.ix_(free, free)], graph[np.ix_(free, known)] @ given)
+            found = np.clip(found, given.min(), given.max())  # equal heads remain equal to the bit
+            heads |= dict(zip((names[i] for i in free), found.tolist(), strict=True))
+    return heads
+
+
+def water_of_conduits(
+    nodes: dict[str, Any], links: dict[str, Any], ambient: float, weight: float
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """(basins, their meshes) of the water of all conduits, by the names of the conduits.
+
+    The level of the water at rest is that of both nodes, if these are equal and give the level at the start; otherwise
+    a conduit is dry at rest.
+    """
+    conduits = {name: link for name, link in links.items() if is_kind(link, "conduit")}
+    if not conduits:
+        return {}, {}
+    from fvsolve.parts.conduit.part import ConduitWater
+
+    places = {place for link in conduits.values() for place in link.ports.values()}
+    ends = {place: stated_head(nodes, place, ambient, weight) for place in sorted(places)}
+    known = heads_at_start(conduits, ends)
+    waters, meshes = {}, {}
+    for name, link in conduits.items():
+        heads = known[link.from_], known[link.to]
+        rests = heads[0] is not None and heads[0] == heads[1] and link.initial_depth is None
+        level = heads[0] if rests else min(link.inverts)
+        stated = None not in (ends[link.from_], ends[link.to])
+        waters[name] = ConduitWater.model_construct(
+            physics="conduit", level=level, conduit=link, heads=heads, stated=stated
+        )
+        sides = {"from": "west", "to": "east"}
+        meshes[name] = rectangle((link.length, link.diameter), (link.cells, 1), patches=sides)
+    return waters, meshes

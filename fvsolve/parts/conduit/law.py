@@ -1,0 +1,166 @@
+"""Flow through the end of a conduit from the node there, by the head of the node.
+
+The cell at the end, with depth h, surface e and inward velocity u, sends the invariant u - phi(h) outward, with the
+Riemann function phi of `law_section`. At a head z of the node the depth in the end is h_b = h + z - e, the velocity
+u_b = u + phi(h_b) - phi(h), and the inflow q = A_b u_b, with dq/dz = T_b (u_b + c_b). Outflow is at most critical:
+then phi(h_b) + c(h_b) = phi(h) - u, which is the free overfall. Inflow is at most critical too. An outflow faster than
+waves takes the state of the cell. A dry end passes nothing unless the head is above its invert. The numbers of an end
+are those of its `SlottedSection`, and the row of its patch.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.parts.conduit.law_section import (
+    SlottedSection,
+    area_of,
+    celerity,
+    riemann_function,
+    width_and_thrust,
+)
+
+NUMBERS = len(SlottedSection._fields)  # of a section
+INSIDE = 3  # numbers of the state inside an end: depth [m], surface above the level at rest [m], inward velocity [m/s]
+LEAST_SLOPE = 1e-12  # least derivative of the flow by the head [m2/s]; critical outflow does not depend on the head
+SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
+DRY_CELERITY = 0.1  # celerity at a dry end for its least derivative [m/s]
+ROUNDING = 1e-14  # relative error of depths that solve an equation
+SWEEPS = 100
+CHORD = 1e-6  # error of the flow, over that of the full section at sqrt(g D), above which a chord replaces the tangent
+
+
+@njit
+def section_at(floats, at):
+    """`SlottedSection` whose numbers are floats[at:]."""
+    return SlottedSection(
+        floats[at], floats[at + 1], floats[at + 2], floats[at + 3], floats[at + 4], floats[at + 5], floats[at + 6]
+    )
+
+
+@njit
+def invariant_and_slope(section, h):
+    """(phi + c, its derivative by h) at a depth h above 0 [m/s, 1/s]."""
+    area = area_of(section, h)
+    width = width_and_thrust(section, h, area)[0]
+    c = celerity(section, width, area)
+    narrowing = 2.0 * (section.diameter - 2.0 * h) / width if h < section.depth else 0.0  # dT / dh
+    return riemann_function(section, h) + c, section.g / c * (1.5 - 0.5 * area * narrowing / (width * width))
+
+
+@njit
+def critical_depth(section, target, high):
+    """Depth from 0 to `high` [m] at which phi + c is `target` [m/s]; 0 for a target of 0 or less."""
+    if not target > 0.0:
+        return 0.0
+    low, h = 0.0, 0.5 * high
+    for _ in range(SWEEPS):
+        found, slope = invariant_and_slope(section, h)
+        if found > target:
+            high = h
+        else:
+            low = h
+        new = h - (found - target) / slope
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        if abs(new - h) <= ROUNDING * high:
+            return new
+        h = new
+    return h
+
+
+@njit
+def end_flow(section, z, h, e, u):
+    """(inflow q [m3/s], dq/dz [m2/s], depth [m]) of an end with the head z of its node.
+
+    h, e, u : state inside; z and e count from the level at rest
+    """
+    area = area_of(section, h)
+    phi, c = riemann_function(section, h), celerity(section, width_and_thrust(section, h, area)[0], area)
+    depth = max(h + (z - e), 0.0)
+    area_b = area_of(section, depth)
+    width_b = width_and_thrust(section, depth, area_b)[0]
+    speed, own = celerity(section, width_b, area_b), u
+    if depth != h:
+        own = u + (riemann_function(section, depth) - phi)
+    if h > 0.0 and -u >= c and (own < -speed or area_b * own <= area * u):
+        return area * u, 0.0, h
+    if own < -speed:
+        depth = critical_depth(section, phi - u, h)
+        area_b = area_of(section, depth)
+        width_b = width_and_thrust(section, depth, area_b)[0]
+        return -area_b * celerity(section, width_b, area_b), 0.0, depth
+    if own > speed:
+        slope = invariant_and_slope(section, depth)[1] - section.g / speed  # of c
+        return area_b * speed, width_b * speed + area_b * slope, depth
+    return area_b * own, width_b * (own + speed), depth
+
+
+@njit
+def passing_head(section, target, h, e, u):
+    """Head of the node at which an end passes the inflow `target` [m3/s]; that of a dry end for lower flows."""
+    low, rise = e - h, 1e-3 * section.diameter
+    z, high = e, e + rise
+    while end_flow(section, high, h, e, u)[0] < target and rise < 1e9:
+        low, high, rise = high, high + rise, 4.0 * rise
+    for _ in range(SWEEPS):
+        q, slope, _ = end_flow(section, z, h, e, u)
+        if q < target:
+            low = max(low, z)
+        else:
+            high = min(high, z)
+        new = z + (target - q) / slope if slope > 0.0 else low
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        if abs(new - z) <= ROUNDING * section.diameter:
+            return new
+        z = new
+    return z
+
+
+@njit
+def level_step(section, z, target, h, e, u):
+    """(change of the flow from `target` [m3/s], slope over the head [m2/s]) in Newton's step from the head z.
+
+    Far from the target the slope is at least that of the chord to the head at which the target passes: the slope
+    changes by the factor T_s / D at the crown and vanishes at critical outflow, where tangents would alternate.
+    h, e, u : state inside
+    """
+    q, slope, _ = end_flow(section, z, h, e, u)
+    if slope > 0.0 and abs(q - target) <= CHORD * section.area * sqrt(section.g * section.diameter):
+        return q - target, slope
+    least = end_flow(section, e - h, h, e, u)[0]
+    if not target > least + SAME_FLOW * abs(least):
+        if slope > 0.0:
+            return q - target, slope
+        return q - target, DRY_CELERITY * section.diameter if q == 0.0 else LEAST_SLOPE
+    reach = z - passing_head(section, target, h, e, u)
+    return q - target, max(slope, (q - target) / reach if reach != 0.0 else 0.0, LEAST_SLOPE)
+
+
+@njit
+def head_at_end(out, tables, k, drop):
+    """(offset of the section in `floats`, offset of the state inside in `work`, head above the level at rest [m]).
+
+    k : restriction of the end; drop : of the pressure, to the cell [Pa]
+    """
+    at, st = tables.valves[k]["data"], tables.settings[0]
+    patch = tables.patches[int(tables.floats[at + NUMBERS])]
+    pressure = out[tables.layout[0]["pressure"] + patch["node"]] + drop
+    return at, patch["inside"], pressure / (st["rho"] * st["gravity"]) + patch["lowest"]
+
+
+@njit
+def step(out, tables, k, g, m, drop, denser, wide):
+    """(a, s) of `restrictions.restriction_step`: Newton's step."""
+    at, inside, z = head_at_end(out, tables, k, drop)
+    rho, h, e, u = tables.settings[0]["rho"], tables.work[inside], tables.work[inside + 1], tables.work[inside + 2]
+    a, s = level_step(section_at(tables.floats, at), z, m / rho, h, e, u)
+    return rho * a, s / tables.settings[0]["gravity"]
+
+
+@njit
+def slope(out, tables, k, g, drop):
+    """Derivative of the mass flow by the drop [kg/s/Pa]."""
+    at, inside, z = head_at_end(out, tables, k, drop)
+    h, e, u = tables.work[inside], tables.work[inside + 1], tables.work[inside + 2]
+    return end_flow(section_at(tables.floats, at), z, h, e, u)[1] / tables.settings[0]["gravity"]

@@ -1,0 +1,286 @@
+"""Conduits: rest, bores, free and surcharged flow, filling and draining, in other words and by other methods."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from model.test_sparsity import stray
+from pytest import approx
+from reference.basins import assert_equal_files, run_in_two_parts
+from reference.conduits import DamBreak, backwater, bore, uniform_depth
+from reference.scenes import WATER
+
+import fvsolve
+from fvsolve.studies.energy_balance import energy
+
+TANK = {"type": "tank", "elevation": 0.0}
+
+
+def sewer(nodes, links, probes, end, rows=20, **numerics):
+    numerics = {"end": end, "scheme": "muscl", "limiter": "van-leer", **numerics}
+    output = {"every": end / rows, "probes": probes}
+    return {"fluid": dict(WATER), "nodes": nodes, "links": links, "numerics": numerics, "output": output}
+
+
+def pipe(start="a", stop="b", **keys):
+    return {"type": "conduit", "from": start, "to": stop, "manning": 0.013, "diameter": 0.5, "length": 20.0,
+            "inverts": [0.0, 0.0], "cells": 20, **keys}  # fmt: skip
+
+
+def two_tanks(low, high=1.0, **keys):
+    keys = {"inverts": [0.2, 0.1], **keys}
+    nodes = {"a": {**TANK, "area": 2.0, "level": high}, "b": {**TANK, "area": 1.0, "level": low}}
+    probes = ["a.level", "b.level", "s.flow", "s.flow@1", "s.depth@0.3", "s.head@0.9", "s.filling@0.5"]
+    return sewer(nodes, {"s": pipe(**keys)}, probes, 20.0)
+
+
+METHODS = [{"method": "ssp-rk2"}, {"method": "rk4"}, {"method": "radau-iia-3", "courant": 0.9}, {"method": "rodas-5p"}]
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl"])
+@pytest.mark.parametrize("numerics", METHODS, ids=lambda keys: keys["method"])
+@pytest.mark.parametrize("level", [0.05, 0.45, 0.9, 3.0])
+def test_water_at_rest_does_not_move_by_one_bit(level, numerics, scheme):
+    """On a slope through the crown, with a dry end, and full."""
+    case = two_tanks(level, level, inverts=[0.8, 0.0])
+    case["numerics"] |= {"end": 5.0, "scheme": scheme, **numerics}
+    run = fvsolve.run(case)
+    assert all(np.ptp(run[probe.text]) == 0.0 for probe in run.case.probes)
+    assert not run["s.flow"].any() and not run["s.flow@1"].any()
+
+
+def shut_gate(cells, celerity=20.0, **numerics):
+    """Flow of 5 l/s, 0.08 m deep, whose end is shut at once; probes of depths along the pipe."""
+    head, speed = bore(0.08, 0.005, 0.1, celerity)
+    nodes = {"a": {"type": "inflow", "flow": 0.005}, "b": {"type": "junction"}}
+    link = pipe(diameter=0.1, length=10.0, manning=0.0, cells=cells, surcharge_celerity=celerity,
+                initial_depth=0.08, initial_flow=0.005)  # fmt: skip
+    x = (np.arange(cells) + 0.5) / cells
+    probes = [f"s.depth@{at:.12g}" for at in x]
+    run = fvsolve.run(sewer(nodes, {"s": link}, probes, 6.0 / speed, **{"method": "ssp-rk2", **numerics}))
+    return run, head, speed, np.array([run[text] for text in probes])
+
+
+def test_a_bore_runs_back_from_a_shut_gate():
+    """Head behind it to 0.2 %, speed to 0.5 % by Rankine and Hugoniot, with a slot from the crown; volume 1e-12."""
+    run, head, speed, depth = shut_gate(200)
+    assert head == approx(0.40404, abs=1e-5) and speed == approx(4.24888, abs=1e-5)
+    assert depth[120:, -1].mean() == approx(head, rel=2e-3)
+    ways = ((depth - 0.08) / (head - 0.08)).sum(axis=0) * 10.0 / len(depth)
+    assert (ways[-1] - ways[5]) / (run.t[-1] - run.t[5]) == approx(speed, rel=5e-3)
+    assert run.ledger["mass"]["relative"] < 1e-12
+
+
+@pytest.mark.parametrize("numerics", METHODS[2:], ids=lambda keys: keys["method"])
+def test_implicit_methods_give_the_same_bore(numerics):
+    run, head, _, depth = shut_gate(50, **numerics)
+    assert depth[35:, -1].mean() == approx(head, rel=5e-3)
+    assert run.ledger["mass"]["relative"] < 1e-12
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("numerics", [METHODS[0], METHODS[3]], ids=lambda keys: keys["method"])
+def test_steady_surcharged_flow_follows_manning(turned, numerics):
+    """A fall of the head of 10.29 n^2 Q^2 L / D^(16/3); a slot changes it by (V / a)^2."""
+    nodes = {"a": {"type": "reservoir", "head": 2.0}, "b": {"type": "reservoir", "head": 1.2}}
+    ends = ("b", "a") if turned else ("a", "b")
+    case = sewer(nodes, {"s": pipe(*ends, length=100.0)}, ["s.flow", "s.head@0.25", "s.head@0.75"], 400.0, **numerics)
+    run = fvsolve.run(case)
+    flow = abs(run["s.flow"][-1])
+    fall = abs(run["s.head@0.25"][-1] - run["s.head@0.75"][-1])
+    assert run["s.flow"][-1] * (-1.0 if turned else 1.0) > 0.0
+    exact = 0.013**2 * flow**2 * 50.0 / ((pi * 0.5**2 / 4.0) ** 2 * (0.5 / 4.0) ** (4.0 / 3.0))
+    assert exact == approx(10.29 * 0.013**2 * flow**2 * 50.0 / 0.5 ** (16.0 / 3.0), rel=1e-3)
+    assert fall == approx(exact, rel=1e-2)
+    celerity = (0.25 * pi * 9.80665 * 0.5 / 0.01) ** 0.5  # the water in the slot has no friction, but velocity
+    assert fall * (1.0 - (flow / (pi * 0.5**2 / 4.0) / celerity) ** 2) == approx(exact, rel=1e-3)
+
+
+def test_uniform_flow_has_the_depth_of_manning():
+    depth = uniform_depth(0.1, 0.013, 0.005, 0.5)
+    nodes = {"a": {"type": "inflow", "flow": 0.1}, "b": {"type": "reservoir", "head": depth}}
+    link = pipe(length=200.0, inverts=[1.0, 0.0], cells=50, initial_depth=depth, initial_flow=0.1)
+    run = fvsolve.run(sewer(nodes, {"s": link}, ["s.depth@0.2", "s.depth@0.5"], 600.0))
+    assert run["s.depth@0.5"][-1] == approx(depth, rel=2e-3) and run["s.depth@0.2"][-1] == approx(depth, rel=2e-3)
+
+
+def backwater_error(cells: int, **numerics) -> float:
+    """Greatest error of the depth over the depth at the end, M1 backwater in a mild sewer."""
+    flow, slope, length, d = 0.05, 0.001, 200.0, 0.5
+    nodes = {"a": {"type": "inflow", "flow": flow}, "b": {"type": "reservoir", "head": 0.4}}
+    link = pipe(length=length, diameter=d, inverts=[length * slope, 0.0], cells=cells, initial_depth=0.35,
+                initial_flow=flow)  # fmt: skip
+    x = (np.arange(cells) + 0.5)[1:-1] / cells
+    probes = [f"s.depth@{at:.12g}" for at in x]
+    run = fvsolve.run(sewer(nodes, {"s": link}, probes, 3000.0, **numerics))
+    exact = backwater(flow, 0.013, slope, d, 0.4, length * (1.0 - x[::-1]))
+    found = np.array([run[text][-1] for text in probes])
+    return float(abs(found - np.interp(x, x, exact[np.argsort(np.argsort(1.0 - x))])).max() / 0.4)
+
+
+def test_backwater_is_gradually_varied_flow():
+    errors = [backwater_error(cells) for cells in (25, 50)]
+    assert errors[1] < 2e-3
+    assert np.log2(errors[0] / errors[1]) > 1.6
+
+
+def dam_break_error(cells: int, right: float) -> float:
+    """Mean error of the depth after a dam break over the difference of depths, 1 m wide pipe."""
+    exact, time = DamBreak(0.7, right, 1.0), 2.0
+    nodes = {"a": {"type": "junction"}, "m": {"type": "junction"}, "b": {"type": "junction"}}
+    own = {"diameter": 1.0, "length": 10.0, "manning": 0.0, "cells": cells}
+    links = {"p": pipe("a", "m", **own, initial_depth=0.7), "q": pipe("m", "b", **own, initial_depth=right)}
+    x = (np.arange(cells) + 0.5) / cells
+    probes = [f"{name}.depth@{at:.12g}" for name in "pq" for at in x]
+    run = fvsolve.run(sewer(nodes, links, probes, time, method="ssp-rk2"))
+    found = np.array([run[text][-1] for text in probes])
+    true = [exact.depth(at / time) for at in np.concatenate([10.0 * x - 10.0, 10.0 * x])]
+    assert run.ledger["mass"]["relative"] < 1e-12
+    return float(abs(found - true).mean() / (0.7 - right))
+
+
+def test_a_dam_break_is_exact_to_first_order():
+    errors = [dam_break_error(cells, 0.2) for cells in (50, 100)]
+    assert errors[1] < 6e-3 and np.log2(errors[0] / errors[1]) > 0.75
+
+
+def test_it_fills_from_dry_and_drains():
+    """No depth below zero, the volume of both tanks and the pipe constant to 1e-12, at rest at the end."""
+    case = two_tanks(0.0, 1.2, manning=0.05)
+    case["numerics"]["end"] = 900.0
+    case["output"]["probes"] += ["s.depth@0", "s.depth@1"]
+    run = fvsolve.run(case)
+    assert run.ledger["mass"]["relative"] < 1e-12 and run.ok
+    assert min(run[f"s.depth@{at}"].min() for at in ("0", "0.3", "1")) >= 0.0
+    assert run["s.depth@0.3"].max() > 0.5
+    assert run["a.level"][-1] == approx(run["b.level"][-1], abs=2e-3)
+
+
+def test_it_drains_over_a_free_overfall():
+    """Into a low reservoir: what leaves is booked, the water in the pipe falls to a film, never below zero."""
+    nodes = {"a": {"type": "junction"}, "b": {"type": "reservoir", "head": -1.0}}
+    case = sewer(nodes, {"s": pipe(inverts=[0.4, 0.2], initial_depth=0.7)}, ["s.depth@0.1", "s.flow@1"], 300.0)
+    run = fvsolve.run(case)
+    assert 0.0 <= run["s.depth@0.1"][-1] < 0.01 and run["s.flow@1"].min() >= 0.0
+    assert run.ledger["mass"]["relative"] < 1e-12 and run.ledger["mass"]["outflow"] > 3.5e3
+
+
+def test_drawn_the_other_way_it_is_the_same():
+    one, other = two_tanks(0.3), two_tanks(0.3, inverts=[0.1, 0.2])
+    other["links"]["s"] |= {"from": "b", "to": "a"}
+    one, other = fvsolve.run(one), fvsolve.run(other)
+    assert other["a.level"] == approx(one["a.level"], abs=1e-11)
+    assert other["s.flow@1"] == approx(-one["s.flow"], abs=1e-10)
+
+
+def series_error(cells: int) -> float:
+    """Greatest difference of a level [m] between a pipe and the pipe cut in the middle by a junction."""
+    one, two = two_tanks(0.3, cells=cells), two_tanks(0.3)
+    two["nodes"]["m"] = {"type": "junction", "elevation": 0.15}
+    half = {"length": 10.0, "cells": cells // 2}
+    two["links"] = {"s": pipe("a", "m", inverts=[0.2, 0.15], **half), "r": pipe("m", "b", inverts=[0.15, 0.1], **half)}
+    two["output"]["probes"] = ["a.level", "b.level", "s.flow", "r.flow@1"]
+    one, two = fvsolve.run(one), fvsolve.run(two)
+    return max(abs(two[level] - one[level]).max() for level in ("a.level", "b.level"))
+
+
+def test_two_in_series_are_one():
+    errors = [series_error(cells) for cells in (20, 80)]
+    assert errors[0] < 4e-3 and errors[1] < 1e-3
+
+
+def test_in_other_units_it_is_the_same():
+    one, other = two_tanks(0.3), two_tanks(0.3)
+    other["links"]["s"] |= {"diameter": "500 mm", "length": "2000 cm", "inverts": ["20 cm", "100 mm"]}
+    one, other = fvsolve.run(one), fvsolve.run(other)
+    assert other["a.level"] == approx(one["a.level"], abs=1e-11)
+
+
+def test_methods_agree():
+    case = two_tanks(0.3)
+    runs = []
+    for numerics in METHODS:
+        case["numerics"] = {"end": 20.0, "scheme": "muscl", **numerics}
+        runs.append(fvsolve.run(case))
+    for run in runs:
+        assert run["a.level"] == approx(runs[0]["a.level"], abs=2e-3)
+        assert run.ledger["mass"]["relative"] < 1e-12
+
+
+def pond(level: float) -> dict:
+    """Basin whose water runs through a conduit from its patch into a tank."""
+    pool = {"type": "basin", "size": [6.0, 4.0], "cells": [12, 4], "level": 1.0, "elevation": 0.0,
+            "patches": {"out": {"side": "east", "span": [1.0, 3.0]}}}  # fmt: skip
+    nodes = {"pool": pool, "b": {**TANK, "area": 4.0, "level": level}}
+    links = {"s": pipe("pool.out", "b", inverts=[0.2, 0.1])}
+    return sewer(nodes, links, ["b.level", "s.flow", "pool.depth@3,2", "pool.out.flow", "s.depth@0.5"], 30.0)
+
+
+def test_a_basin_runs_through_a_conduit_into_a_tank():
+    """At rest with equal levels; otherwise the volume is constant to 1e-12, by each method, and levels meet."""
+    rest = fvsolve.run(pond(1.0))
+    assert all(np.ptp(rest[probe.text]) == 0.0 for probe in rest.case.probes)
+    runs = [
+        fvsolve.run({**(case := pond(0.3)), "numerics": case["numerics"] | keys}) for keys in (METHODS[0], METHODS[3])
+    ]
+    for run in runs:
+        assert run.ledger["mass"]["relative"] < 1e-12 and run["b.level"][-1] > 0.5
+        assert run["s.flow"] == approx(-run["pool.out.flow"], abs=1e-9)
+    assert runs[1]["b.level"] == approx(runs[0]["b.level"], abs=5e-3)
+
+
+def test_a_resumed_run_is_the_whole_run(tmp_path):
+    case = two_tanks(0.0, 1.2, cells=200)
+    case["output"]["every"] = 0.05
+    run_in_two_parts(case, tmp_path, 8.0)
+    assert_equal_files(tmp_path, ["history.csv"])
+
+
+def test_rates_depend_on_the_states_of_the_pattern_only():
+    """Between tanks, and through a junction, free and full."""
+    case = two_tanks(0.3)
+    case["nodes"]["m"] = {"type": "junction", "elevation": 0.0}
+    case["links"] = {"s": pipe("a", "m", inverts=[0.2, 0.0], cells=7), "r": pipe("m", "b", cells=6)}
+    case["output"]["probes"] = ["a.level"]
+    model = fvsolve.build(fvsolve.load(case))
+    assert stray(model, 0.0, model.start) < 1e-9
+
+
+def test_energy_is_refused_by_name():
+    with pytest.raises(fvsolve.FvsolveError, match=r"the energy of conduits \(s\) is not supported"):
+        energy(two_tanks(0.3))
+
+
+FAULTS = {
+    "diameter": (-1.0, "-1"),
+    "inverts": ([30.0, 0.0], "expected a slope below 1"),
+    "manning": (-0.01, "manning"),
+    "cells": (0, "cells"),
+    "surcharge_celerity": (2.0, "expected at least 6.21 m/s"),
+    "initial_depth": (-0.1, "initial_depth"),
+}
+
+
+@pytest.mark.parametrize("key", FAULTS)
+def test_bad_keys_are_named(key):
+    value, text = FAULTS[key]
+    with pytest.raises(fvsolve.CaseError, match="links.s") as error:
+        fvsolve.load(two_tanks(0.3, **{key: value}))
+    assert text in str(error.value)
+
+
+def test_an_invert_below_the_bottom_of_a_tank_is_named():
+    with pytest.raises(fvsolve.CaseError, match=r"links.s.inverts\[?.?0\]?: -0.1 m is below the bottom of a at 0 m"):
+        fvsolve.load(two_tanks(0.3, inverts=[-0.1, 0.0]))
+
+
+def test_scalars_are_refused_by_name():
+    case = two_tanks(0.3)
+    case["scalars"] = {"dye": {}}
+    with pytest.raises(fvsolve.CaseError, match="its cells carry no scalars yet"):
+        fvsolve.load(case)
+
+
+def test_an_unusual_manning_gives_a_notice():
+    case = fvsolve.load(two_tanks(0.3, manning=0.5))
+    assert any("manning" in str(notice.text) or notice.key == "manning" for notice in case.notices)
