@@ -3,9 +3,7 @@
 from typing import Any
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
 
-from fvsolve.mesh.rectangles import rectangle
 from fvsolve.parts.nodes_and_links import is_kind
 
 
@@ -29,6 +27,8 @@ def heads_at_start(conduits: dict[str, Any], stated: dict[str, float | None]) ->
 
     stated : head of each node, None if it is not known [m]
     """
+    from scipy.sparse.csgraph import connected_components
+
     heads, names = dict(stated), list(stated)
     graph = np.zeros((len(names), len(names)))
     for link in conduits.values():
@@ -59,6 +59,7 @@ def water_of_conduits(
     conduits = {name: link for name, link in links.items() if is_kind(link, "conduit")}
     if not conduits:
         return {}, {}
+    from fvsolve.mesh.rectangles import rectangle
     from fvsolve.parts.conduit.part import ConduitWater
 
     places = {place for link in conduits.values() for place in link.ports.values()}
