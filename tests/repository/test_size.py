@@ -23,7 +23,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "benchmarks": (6718, 51),
     "fvsolve/assembly": (1969, 10),
     "fvsolve/basins": (11713, 55),
-    "fvsolve/case": (8069, 29),
+    "fvsolve/case": (8070, 29),
     "fvsolve/cli": (3524, 17),
     "fvsolve/compile": (1343, 7),
     "fvsolve/data": (12, 1),
