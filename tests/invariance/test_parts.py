@@ -153,6 +153,7 @@ pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings
 ELSEWHERE = {
     "basin", "mass", "frame", "body", "cylinder", "damper", "end-stop", "force", "spring", "spool-valve", "torque",
     "pin", "bushing", "shuttle", "altitude-valve",  # it needs a tank, see parts/test_altitude_valve.py
+    "conduit",  # in parts/test_conduit.py
     "solenoid",  # in parts/test_solenoid.py
     # of networks of rotation, electricity and heat, in parts/test_networks.py
     "shaft", "housing", "gear", "torsion-spring", "bearing", "clutch", "rack", "terminal", "ground", "voltage-source",

@@ -53,7 +53,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/exact": (475, 2),
     "tests/fluid": (1063, 4),
     "tests/fmi": (396, 2),
-    "tests/invariance": (2068, 12),
+    "tests/invariance": (2069, 12),
     "tests/kernels": (1297, 8),
     "tests/mesh": (411, 1),
     "tests/model": (3017, 10),
