@@ -41,17 +41,17 @@ class Conduit(TwoPort, kind="conduit"):
     fixes_pressure: ClassVar[bool] = True
     no_scalars: ClassVar[str] = "its cells carry no scalars yet; leave out this part, or `[scalars]`"
 
-    diameter: Annotated[float, Quantity("length", positive, "inner diameter [m]", DIAMETERS, SHAPE)]
-    length: Annotated[float, Quantity("length", positive, "length along its axis [m]", changes=SHAPE)]
+    diameter: Annotated[float, Quantity("length", positive, "inner diameter [m]", DIAMETERS, PROFILE)]
+    length: Annotated[float, Quantity("length", positive, "length along its axis [m]", changes=PROFILE)]
     inverts: Annotated[
         tuple[float, float],
-        Rows("length", length=2, about="height of the invert above datum at `from` and at `to` [m]", changes=SHAPE),
+        Rows("length", length=2, about="height of the invert above datum at `from` and at `to` [m]", changes=PROFILE),
     ]
     manning: Annotated[float, Number(nonnegative, "Manning's n of the wall [s/m^(1/3)]", MANNINGS, PROFILE)]
     cells: Annotated[int, Whole(between(1, 10**6), "number of cells", SHAPE)] = DEFAULT_CELLS
     surcharge_celerity: Annotated[float | None, Quantity(
         "velocity", positive, "speed of waves in the full conduit [m/s]; 28 sqrt(diameter), by a slot of 1 % of it "
-        "if left out", UsualRange(1.0, 400.0, "wide slots to elastic pipes"), SHAPE,
+        "if left out", UsualRange(1.0, 400.0, "wide slots to elastic pipes"), PROFILE,
     )] = None  # fmt: skip
     initial_depth: Annotated[float | None, Quantity(
         "length", nonnegative, "depth of water at the start, above the diameter under pressure [m]; a level between "
