@@ -10,7 +10,7 @@ from fvsolve.basins import basin_frames as frame
 from fvsolve.basins import cell_sides, moving_meshes
 from fvsolve.basins.cell_sides import BLOCK
 from fvsolve.basins.moving_walls import VECTOR_MARGIN
-from fvsolve.case import basins as case
+from fvsolve.case import moving_walls as case
 from fvsolve.case.bodies import carriers, free_joints, level_over
 from fvsolve.kernels import dtypes as rec
 

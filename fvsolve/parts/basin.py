@@ -38,6 +38,7 @@ from fvsolve.parts.value import (
 )
 from fvsolve.units import show
 
+MANNING_RANGE = UsualRange(0.008, 0.3, "smooth plastic to dense grass")
 SIDES = ("west", "east", "south", "north")
 RECTANGLE_KEYS = ("size", "cells", "grading", "holes")  # keys of rectangles
 SLOSHING_MODELS = ("frozen", "modes", "cells")
@@ -74,18 +75,26 @@ CLOSURES = ("stage", "discharge", "rating", "normal_slope")  # keys that close a
 INTERIOR_KEYS = ("at", "area", "polygon", "discharge")  # keys of interior patches
 
 
-class Corners(Value):
-    """Corners of an interior patch."""
+class PointList(Value):
+    """Value of a case file: a list of points of a plane. least : least number of points"""
 
-    about = "corners of an interior patch, instead of `at`: the cells with their centre in it, one at least"
     takes = "list of [x, y], m"
 
+    def __init__(self, least: int, about: str) -> None:
+        self.least, self.about = least, about
+
     def read(self, given: Any, setting: ReadContext) -> tuple[tuple[float, ...], ...]:
-        if not isinstance(given, (list, tuple)) or len(given) < 3:
-            text = f"{show(given)} is not a list of three or more points"
-            raise ValueError(f"{text}; expected for example {show([[0, 0], [2, 0], [2, 1]])}")
-        point = Rows("length", length=2)
-        return tuple(read_each(enumerate(given), lambda entry: point.read(entry, setting)).values())
+        if not isinstance(given, (list, tuple)) or len(given) < self.least:
+            text = f"{show(given)} is not a list of {self.least} or more points"
+            raise ValueError(f"{text}; expected for example {show([[0, 0], [2, 0], [2, 1]][: self.least])}")
+        read_point = Rows("length", length=2).read
+        points = tuple(read_each(enumerate(given), lambda point: read_point(point, setting)).values())
+        if any(start == stop for start, stop in zip(points, points[1:], strict=False)):
+            raise ValueError(f"{show(given)} has two equal points in succession; expected different points")
+        return points
+
+    def json(self) -> dict[str, Any]:
+        return {"type": "array", "items": Rows("length", length=2).json(), "minItems": self.least}
 
 
 class Patch(Table):
@@ -104,7 +113,10 @@ class Patch(Table):
         float | None,
         Quantity("area", positive, "area about `at`: the cells with their centre in it, one at least", changes=SHAPE),
     ] = None
-    polygon: Annotated[tuple[tuple[float, ...], ...] | None, Corners()] = None
+    polygon: Annotated[
+        tuple[tuple[float, ...], ...] | None,
+        PointList(3, "corners of an interior patch, instead of `at`: the cells with their centre in it, one at least"),
+    ] = None
     span: Annotated[tuple[float, float] | None, Rows(
         "length", nonnegative, length=2,
         about="start and end along the side, on grid lines [m]; the whole side if left out", changes=SHAPE,

@@ -11,7 +11,8 @@ from reference.folders import CASES
 from reference.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.basins.free_surface.lower import FreeSurfaceRows, on_grid, on_mesh, surface_waves
+from fvsolve.basins.free_surface.lower import FreeSurfaceRows
+from fvsolve.basins.free_surface.lower_error_checks import on_grid, on_mesh, surface_waves
 from fvsolve.errors import FvsolveError
 from fvsolve.model import RunData
 from fvsolve.model.energy_accounts import Accounts

@@ -207,7 +207,7 @@ FAULTS = {
     "without area": ({"at": [4.5, 5.5]}, {}, "area is missing"),
     "with a side": ({**HOLE, "side": "west"}, {}, "keep one"),
     "with a closure": ({**HOLE, "stage": "1 m"}, {}, "this is an interior patch; leave this key out"),
-    "two corners": ({"polygon": [[1, 1], [2, 2]]}, {}, "list of three or more points"),
+    "two corners": ({"polygon": [[1, 1], [2, 2]]}, {}, "list of 3 or more points"),
     "the whole basin": ({"at": [5.0, 5.0], "area": 200.0}, {}, "contains all cells"),
     "overlap": (HOLE, {"patches": {"hole": HOLE, "other": {"at": [4.8, 5.8], "area": 0.1}}}, "has a cell of hole too"),
 }

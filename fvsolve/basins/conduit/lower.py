@@ -9,21 +9,18 @@ import numpy as np
 from fvsolve.basins.basin_terms import SHORTAGES
 from fvsolve.basins.conduit import conduit_rates
 from fvsolve.basins.conduit.conduit_rates import NEARLY_FULL, OF_AREA, OF_DEPTH, OF_FLOW
-from fvsolve.basins.free_surface.bed_friction import RATE_CAP
-from fvsolve.basins.free_surface.lower import COURANT_FACTOR, NO_CAP
-from fvsolve.basins.lower_basin import BasinRows
+from fvsolve.basins.free_surface.lower import COURANT_FACTOR
+from fvsolve.basins.lower_friction import RowsWithFriction
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import RhsTerms
 from fvsolve.parts.conduit.law_section import area_of, celerity, depth_of, section_of, width_and_thrust
-from fvsolve.steppers.analysis.stability_properties import in_euler_steps
-from fvsolve.steppers.tableau import AUTO, METHODS
 
 PACKAGE = __package__
 QUANTITIES = {"depth": OF_DEPTH, "head": OF_DEPTH, "filling": OF_AREA, "flow": OF_FLOW}
 SMALL = 0.1  # small deviation of the filling, for scales of states
 
 
-class ConduitWaterRows(BasinRows):
+class ConduitWaterRows(RowsWithFriction):
     """Rows of the water of a conduit; states are deviation of the area from rest [m2] and flow [m3/s]."""
 
     units = {"depth": "m", "surface": "m", "bed": "m", "velocity": "m/s"}
@@ -57,20 +54,6 @@ class ConduitWaterRows(BasinRows):
     @property
     def undivided_reason(self) -> str:
         return "it is a conduit"
-
-    @property
-    def damped(self) -> bool:
-        """True if the rates of Runge-Kutta stages are divided by 1 + h R for friction."""
-        method = METHODS.get(self.case.numerics.method)
-        return self.conduit.manning > 0.0 and method is not None and in_euler_steps(method)
-
-    @property
-    def rate_cap(self) -> float:
-        """Cap of the decay rate of flows by friction [1/s], see `FreeSurfaceRows.rate_cap`."""
-        method = METHODS.get(self.case.numerics.method)
-        if self.conduit.manning > 0.0 and method is not None and method.explicit and not self.damped:
-            return RATE_CAP
-        return NO_CAP if self.case.numerics.method == AUTO else math.inf
 
     def end_at_rest(self, patch: str) -> tuple[float, float]:
         """(depth, surface above the level at rest) inside an end of the water at rest."""

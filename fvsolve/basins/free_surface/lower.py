@@ -1,17 +1,9 @@
-"""Rows of the tables of a model for water with a free surface over a bed, and checks of this water.
-
-States deviate from the lake at rest. Waves of wavenumber k [1/m] in water of depth h have the speed sqrt(g tanh(k h) /
-k), in shallow-water theory sqrt(g h). The wavenumber of a surface follows from its elevation e above that at rest,
-minus the mean: 1 / k^2 = mean |grad psi|^2 / mean e^2, where -div grad psi = e with zero normal slope at walls. This is
-the mean of 1 / k^2 over the waves of the surface, weighted by the squares of their amplitudes, so a steep front does
-not count as a short wave. Thin films of water have a wrong speed with `upwind` on steep beds, or with a cap on
-friction.
-"""
+"""Rows of the tables of a model for water with a free surface over a bed; states deviate from the lake at rest."""
 
 import math
 from collections.abc import Iterator
-from functools import cached_property, partial
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -20,228 +12,19 @@ from fvsolve.assembly.state_names import Numbered
 from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
 from fvsolve.basins.free_surface import law_patch_face, patch_closures, surface_grid, surface_maxima, surface_mesh
-from fvsolve.basins.free_surface.bed_friction import RATE_CAP, add_friction
+from fvsolve.basins.free_surface.lower_error_checks import error_notices, error_watches
 from fvsolve.basins.free_surface.lower_marks import Marks, chain_texts, lower_marks, marks_of
 from fvsolve.basins.free_surface.lower_notices import inflow_watches, unusual_values
 from fvsolve.basins.free_surface.surface_patches import DEPTH, TOTALS
 from fvsolve.basins.free_surface.surface_rows import THIN
-from fvsolve.basins.lower_basin import BasinRows
+from fvsolve.basins.lower_friction import RowsWithFriction
 from fvsolve.case.basins import patch_names
-from fvsolve.case.bodies import free_joints
-from fvsolve.case.sloshing import slowest
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.dtypes import DARCY, MANNING
 from fvsolve.kernels.rhs_assembly import RhsTerms
 from fvsolve.parts.formula import SpatialField, means, samples
-from fvsolve.steppers.analysis.stability_properties import in_euler_steps
-from fvsolve.steppers.tableau import AUTO, METHODS
 
-WAVE_ERROR = 0.01  # relative error of the speed of waves above which there is a notice
-LEAST_AT_START = 1e-6  # least root mean square of the surface over depth at the start,
-LEAST_IN_RUN = 1e-3  # and during a run
-DRY_DEPTH = 1e-4  # depth [m] of films below which water is ignored
-FILM_ERROR = 0.005  # relative error of the speed of films above which there is a notice
-REPEAT_FACTOR = 1.2  # factor on the error at the start above which a run gives another notice
-
-
-class ErrorWatch:
-    """Greatest error of one kind in a basin during a run.
-
-    by(basin, y) : function for the error and two related values at deviations y
-    notice(basin, values, when) : function for the notice of these three values; when : text of the time
-    least : error up to which no notice is given
-    greatest : float64[4]  time [s], error and both related values at the greatest error; nan before any error
-    """
-
-    def __init__(self, basin, by, notice, least: float) -> None:
-        self.basin, self.by, self.notice, self.least, self.greatest = basin, by, notice, least, np.full(4, np.nan)
-
-    def check(self, t: float, y: np.ndarray) -> None:
-        """Update the greatest error with the error of a state y of the model at time t [s]."""
-        error = self.by(self.basin, self.basin.deviations(y))
-        if error[0] > 0.0 and not error[0] <= self.greatest[1]:
-            self.greatest[:] = t, *error
-
-    def notices(self) -> list[Notice]:
-        """List with the notice of the greatest error; empty if this error is not above `least`."""
-        t, *error = self.greatest.tolist()
-        if not error[0] > self.least:
-            return []
-        return [self.notice(self.basin, error, f" at {self.basin.case.amount(t, 'time')}")]
-
-
-FILLING_DEPTH = 0.1  # [m]
-
-
-class SurfaceWaves(NamedTuple):
-    """Properties of the waves on the free surface of a basin, see `surface_waves`.
-
-    speed_error : fraction by which real waves are slower than in shallow-water theory; k : wavenumber [1/m]
-    depth : mean depth of wet cells [m]
-    """
-
-    speed_error: float
-    k: float
-    depth: float
-
-
-NO_WAVES = SurfaceWaves(0.0, math.nan, math.nan)
-
-
-def surface_waves(basin, y: np.ndarray, seen: float = LEAST_AT_START) -> SurfaceWaves:
-    """Properties of the waves of a basin at deviations y of its cells from rest.
-
-    They are `NO_WAVES` if the root mean square of the surface is not above `seen` times the mean depth, or not finite,
-    or if all cells are dry.
-    y : float64[quantities, n]
-    """
-    depth, area = basin.depth + y[0], basin.mesh.area
-    wet = depth > 0.0
-    if not wet.any():
-        return NO_WAVES
-    mean, reached = float(np.average(depth[wet], weights=area[wet])), wet | (basin.depth > 0.0)
-    surface = np.where(reached, y[0] - np.average(y[0][reached], weights=area[reached]), 0.0)
-    with np.errstate(over="ignore"):  # in an unstable run
-        square = float(np.average(surface**2, weights=area))
-    if not seen * mean < math.sqrt(square) < math.inf:
-        return NO_WAVES
-    inverse = on_grid(basin, surface) if is_even(basin) else on_mesh(basin, surface)
-    k = math.sqrt(square / inverse)
-    return SurfaceWaves(1.0 - math.sqrt(math.tanh(k * mean) / (k * mean)), k, mean)
-
-
-def is_even(basin) -> bool:
-    """True if the mesh is a full rectangle of equal rectangular cells."""
-    grid = basin.mesh.grid
-    return basin.is_grid and all(np.ptp(np.diff(lines)) < 1e-9 * (lines[-1] - lines[0]) for lines in (grid.x, grid.y))
-
-
-def on_grid(basin, surface: np.ndarray) -> float:
-    """Area mean of |grad psi|^2 with -div grad psi = surface, on a grid of equal rectangles, by a cosine transform."""
-    from scipy.fft import dctn
-
-    grid = basin.mesh.grid
-    square = dctn(surface.reshape(grid.ny, grid.nx), norm="ortho") ** 2 / surface.size
-    kx, ky = (np.pi * np.arange(n) / (lines[-1] - lines[0]) for n, lines in ((grid.nx, grid.x), (grid.ny, grid.y)))
-    k = kx**2 + ky[:, None] ** 2
-    square[0, 0], k[0, 0] = 0.0, 1.0
-    return float(np.sum(square / k))
-
-
-def on_mesh(basin, surface: np.ndarray) -> float:
-    """Area mean of |grad psi|^2 with -div grad psi = surface, on a mesh of any cells, by differences across faces."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.linalg import spsolve
-
-    mesh, inner = basin.mesh, basin.mesh.inner
-    left, right, n = mesh.left[:inner], mesh.right[:inner], basin.n
-    distance = np.abs(np.sum((mesh.centre[right] - mesh.centre[left]) * mesh.normal[:inner], axis=1))
-    per = mesh.length[:inner] / distance
-    rows, columns = np.concatenate([left, right, left, right]), np.concatenate([left, right, right, left])
-    matrix = coo_array((np.concatenate([per, per, -per, -per]), (rows, columns)), shape=(n, n)).tocsc()
-    own = mesh.area * (surface - np.average(surface, weights=mesh.area))
-    psi = np.zeros(n)
-    psi[1:] = spsolve(matrix[1:, 1:], own[1:])
-    return float(own @ psi / mesh.area.sum())
-
-
-def wave_notice(basin, waves: tuple[float, float, float], when: str = "") -> Notice:
-    """Notice that waves are too short for shallow-water theory. waves : a `SurfaceWaves`; when : text of the time"""
-    wrong, k, depth = waves
-    long, deep = (basin.case.amount(value, "length", 3) for value in (2.0 * math.pi / k, depth))
-    text = (
-        f"{basin.name}: waves about {long} long in {deep} of water (k h = {k * depth:.2g}): real waves are "
-        f"{100.0 * wrong:.2g} % slower than in shallow-water theory{when and ','}{when}"
-    )
-    return Notice("dispersion", f"nodes.{basin.name}", text, None, wrong, WAVE_ERROR)
-
-
-def wave_notices(basin, y: np.ndarray) -> list[Notice]:
-    """List with the notice that waves at deviations y are too short for shallow-water theory; empty if they are not."""
-    state = surface_waves(basin, y)
-    return [wave_notice(basin, state)] if state.speed_error > WAVE_ERROR else []
-
-
-def body_notices(basin) -> list[Notice]:
-    """List with the notice that water in a basin on a body is too deep for shallow-water theory; empty if it is not."""
-    mode = slowest(basin.part, basin.mesh) if basin.part.on else None
-    if mode is None or mode.excess <= 100.0 * WAVE_ERROR:
-        return []
-    text = (
-        f"{basin.name}: in shallow-water theory the slowest wave is {mode.excess:.2g} % too fast "
-        f'(k h = {mode.kh:.2g}); sloshing = "modes" is correct for small waves'
-    )
-    return [Notice("dispersion", f"nodes.{basin.name}", text, "sloshing", 0.01 * mode.excess, WAVE_ERROR)]
-
-
-def slow_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
-    """Error of the deepest film that is too slow at deviations y, as three numbers; (0, nan, nan) without such a film.
-
-    They are 1 - speed / correct speed, depth [m], and fall of the bed to the next cell [m]. Both sides of a face use
-    the higher bed. So the force on a film of depth h above a fall d > h is g h^2 / 2 instead of g h d, and its speed is
-    sqrt(h / (2 d)) of the correct one (Delestre et al. 2012, arXiv 1206.4986).
-    """
-    mesh, depth = basin.mesh, basin.depth_of(y)
-    left, right = mesh.left[: mesh.inner], mesh.right[: mesh.inner]
-    down = basin.bed[left] > basin.bed[right]
-    upper, lower = np.where(down, left, right), np.where(down, right, left)
-    fall, deep = basin.bed[upper] - basin.bed[lower], depth[upper]
-    film = (deep > DRY_DEPTH) & (depth[lower] > DRY_DEPTH) & (fall > deep) & (fall + deep - depth[lower] > deep)
-    if not film.any():
-        return 0.0, math.nan, math.nan
-    at = int(np.argmax(np.where(film, deep, 0.0)))
-    return 1.0 - math.sqrt(deep[at] / (2.0 * fall[at])), float(deep[at]), float(fall[at])
-
-
-def fast_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
-    """Mean error of films that are too fast at deviations y, as three numbers; (0, nan, nan) without flow.
-
-    They are speed / correct speed - 1, depth [m], and decay rate of the flow by friction [1/s], all averaged with unit
-    flow times cell area as weight. If friction at the rate r = C u balances a slope and is capped as
-    r / (1 + r / RATE_CAP), then u^2 is too great by the factor 1 + r / RATE_CAP.
-    """
-    depth, part = basin.depth_of(y), basin.part
-    flow = np.where(depth > DRY_DEPTH, np.hypot(y[1], y[2]) * basin.mesh.area, 0.0)
-    if not flow.any():
-        return 0.0, math.nan, math.nan
-    law = DARCY if part.manning is None else MANNING
-    rate, zeros, gravity = np.zeros(depth.size), np.zeros(depth.size), basin.case.gravity
-    flows, contents = (y[1], y[2]), (zeros - 1.0, zeros)
-    add_friction(law, gravity, basin.roughness, depth, zeros, flows, contents, (rate, zeros))
-    error = np.sqrt(1.0 + rate / RATE_CAP) - 1.0
-    return tuple(float(np.average(values, weights=flow)) for values in (error, depth, rate))
-
-
-def slow_film_notice(basin, error: tuple[float, float, float], when: str = "") -> Notice:
-    """Notice that films are too slow. error : result of `slow_film_error`; when : text of the time"""
-    deep, fall = (basin.case.amount(value, "length", 3) for value in error[1:])
-    text = (
-        f"{basin.name}: with upwind, a film {deep} deep flows {100.0 * error[0]:.2g} % too slowly{when} down a slope "
-        f'where the bed falls by {fall} from cell to cell; use scheme = "muscl", or cells so small that the bed '
-        "falls by less than the depth"
-    )
-    return Notice("film", f"nodes.{basin.name}", text, "scheme", error[0], FILM_ERROR)
-
-
-def fast_film_notice(basin, error: tuple[float, float, float], when: str = "") -> Notice:
-    """Notice that films are too fast. error : result of `fast_film_error`; when : text of the time"""
-    remedy = 'method = "rodas-5p"' if basin.part.on is not None else 'method = "ssp-rk3" or "ssp-rk2"'
-    deep, method = basin.case.amount(error[1], "length", 3), basin.case.numerics.method
-    text = (
-        f"{basin.name}: water runs {100.0 * error[0]:.2g} % too fast{when}: with {method} the decay rate by friction, "
-        f"{error[2]:.2g} 1/s in {deep} of water, is capped below {RATE_CAP:g} 1/s; "
-        f"use {remedy}, where the rate has no cap"
-    )
-    return Notice("friction", f"nodes.{basin.name}", text, "method", error[0], FILM_ERROR)
-
-
-def film_checks(basin) -> list[tuple]:
-    """(function for the error, function for its notice) of each check for films that applies to a basin."""
-    pairs = [(slow_film_error, slow_film_notice)] if basin.scheme == "upwind" else []
-    return [*pairs, (fast_film_error, fast_film_notice)] if basin.has_rate_cap else pairs
-
-
+FILLING_DEPTH = 0.1  # depth of water that flows into dry cells, for the first step [m]
 PACKAGE = __package__
 WATER_TERMS = RhsTerms(
     package=PACKAGE,
@@ -265,7 +48,6 @@ CLOSURES = {  # key of a driven patch, or word of its key `boundary` -> code
     "stage": rec.STAGE, "discharge": rec.DISCHARGE, "rating": rec.RATING, "normal_slope": rec.NORMAL_SLOPE,
     "critical": rec.CRITICAL,
 }  # fmt: skip
-NO_CAP = 1e100  # rate of friction [1/s] above all possible rates
 COURANT_FACTOR = 2.0  # Courant numbers of water refer to half cells, so that no depth falls below zero at 1,
 SHORE_COURANT_FACTOR = 6.0  # and to sixths of cells under fifth order with a shore
 
@@ -319,7 +101,7 @@ class PatchFaceRows(Restriction, kind="patch-face"):
         return step
 
 
-class FreeSurfaceRows(BasinRows):
+class FreeSurfaceRows(RowsWithFriction):
     """Rows of the tables of a model for shallow water; states are deviation of depth [m] and flows per width [m2/s]."""
 
     units = {"depth": "m", "surface": "m", "bed": "m", "velocity": "m/s"}
@@ -487,42 +269,11 @@ class FreeSurfaceRows(BasinRows):
         places = (f"{self.name}.{name}" for name in patch_names(self.mesh))
         return bool(self.closed) or any(place in joined or place in sources for place in places)
 
-    @property
-    def rubs(self) -> bool:
-        """True if the bed has friction."""
-        return self.part.physics_type.has_friction(self.part)
-
     @cached_property
     def roughness(self) -> np.ndarray:
         """Manning's n, or the friction factor, in cells : float64[n]."""
         stated = self.part.factor if self.part.manning is None else self.part.manning
         return self.formula(stated) if isinstance(stated, SpatialField) else np.full(self.n, stated)
-
-    @property
-    def damped(self) -> bool:
-        """True if the rates of Runge-Kutta stages are divided by 1 + h R for bed friction, see `damp_flows`.
-
-        This is the case for SSP methods, unless forces move the body that carries the basin.
-        """
-        method, on = METHODS.get(self.case.numerics.method), self.part.on
-        is_moved_by_forces = on is not None and any(free_joints(on, self.case.nodes))
-        return self.rubs and method is not None and in_euler_steps(method) and not is_moved_by_forces
-
-    @property
-    def has_rate_cap(self) -> bool:
-        """True if the decay rate of flows by friction is capped at RATE_CAP, so that explicit steps can follow it."""
-        method = METHODS.get(self.case.numerics.method)
-        return self.rubs and method is not None and method.explicit and not self.damped
-
-    @property
-    def rate_cap(self) -> float:
-        """Cap of the decay rate of flows by friction [1/s]; without a cap inf, or NO_CAP with the method `auto`.
-
-        A finite cap also makes friction limit the time step.
-        """
-        if self.has_rate_cap:
-            return RATE_CAP
-        return NO_CAP if self.case.numerics.method == AUTO else math.inf
 
     def start(self, attitude: np.ndarray | None = None) -> np.ndarray:
         states, given = np.zeros((3, self.n)), self.part.start
@@ -611,19 +362,10 @@ class FreeSurfaceRows(BasinRows):
         return math.inf if deep else size / math.sqrt(self.case.gravity * depth)
 
     def notices(self, y: np.ndarray) -> list[Notice]:
-        films = [notice(self, error) for look, notice in film_checks(self) if (error := look(self, y))[0] > FILM_ERROR]
-        return [*wave_notices(self, y), *body_notices(self), *films, *unusual_values(self)]
+        return [*error_notices(self, y), *unusual_values(self)]
 
     def watches(self, y: np.ndarray) -> list[Any]:
-        """Check for short waves, unless `wave_notices` reports them at y, and one check for each pair of `film_checks`.
-
-        A check for films reports errors above FILM_ERROR and above REPEAT_FACTOR times the error at y.
-        """
-        waves = ErrorWatch(self, partial(surface_waves, seen=LEAST_IN_RUN), wave_notice, WAVE_ERROR)
-        films = [ErrorWatch(self, look, notice, max(FILM_ERROR, REPEAT_FACTOR * look(self, y)[0]))
-                 for look, notice in film_checks(self)]  # fmt: skip
-        films += inflow_watches(self)
-        return films if wave_notices(self, y) else [waves, *films]
+        return [*error_watches(self, y), *inflow_watches(self)]
 
     def depth_of(self, y: np.ndarray) -> np.ndarray:
         return np.maximum(self.depth + y[0], 0.0)

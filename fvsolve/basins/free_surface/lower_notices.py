@@ -5,10 +5,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from fvsolve.errors import Notice, listing
+from fvsolve.parts.basin import MANNING_RANGE
 from fvsolve.parts.formula import SpatialField
 from fvsolve.parts.weir.part import HydraulicStructure
 
-LEAST_MANNING, GREATEST_MANNING = 0.008, 0.3  # smooth glass or plastic to dense grass
 STEEP = 0.1  # slope above which rain runs off otherwise than shallow-water theory assumes
 TIMES = 1001  # times at which a scheduled inflow is compared with critical flow, beside its own
 
@@ -18,11 +18,11 @@ def unusual_values(basin) -> Iterator[Notice]:
     place = f"nodes.{basin.name}"
     if isinstance(basin.part.manning, SpatialField):
         low, high = float(basin.roughness.min()), float(basin.roughness.max())
-        odd = low if 0.0 < low < LEAST_MANNING else high
-        if 0.0 < odd < LEAST_MANNING or odd > GREATEST_MANNING:
-            text = f"{place}.manning: {odd:.3g} s/m^(1/3) in a cell is outside {LEAST_MANNING} to {GREATEST_MANNING}"
-            limit = LEAST_MANNING if odd < LEAST_MANNING else GREATEST_MANNING
-            yield Notice("range", place, f"{text}, smooth plastic to dense grass", "manning", odd, limit)
+        least, greatest, meaning = MANNING_RANGE
+        odd = low if 0.0 < low < least else high
+        if 0.0 < odd < least or odd > greatest:
+            text = f"{place}.manning: {odd:.3g} s/m^(1/3) in a cell is outside {least} to {greatest}, {meaning}"
+            yield Notice("range", place, text, "manning", odd, least if odd < least else greatest)
     slope = steepest(basin) if basin.rains else 0.0
     if slope > STEEP:
         text = f"{basin.name}: rain falls on a bed with slopes up to {slope:.3g}, between adjacent cells"

@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from fvsolve.errors import listing
-from fvsolve.parts.basin import VELOCITY_FIELDS, Physics, VelocityStart
+from fvsolve.parts.basin import MANNING_RANGE, VELOCITY_FIELDS, Physics, PointList, VelocityStart
 from fvsolve.parts.formula import NumberOrField, SpatialField, SpatialFieldKey, samples
 from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled
@@ -16,15 +16,11 @@ from fvsolve.parts.value import (
     Choice,
     Number,
     Quantity,
-    ReadContext,
-    Rows,
     Text,
     UsualRange,
-    Value,
     anything,
     between,
     nonnegative,
-    read_each,
 )
 from fvsolve.parts.weir.part import COEFFICIENTS, WEIR_COEFFICIENTS
 from fvsolve.units import show
@@ -88,27 +84,6 @@ class Infiltration(Table):
         return [*(getattr(self, key) for key in self.fields), None, None][:3]
 
 
-class Polyline(Value):
-    """Value of a case file: a line through points of a plane."""
-
-    takes = "list of [m, m]"
-
-    def __init__(self, about: str) -> None:
-        self.about = about
-
-    def read(self, given: Any, setting: ReadContext) -> tuple[tuple[float, ...], ...]:
-        if not isinstance(given, (list, tuple)) or len(given) < 2:
-            raise ValueError(f"{show(given)} is not a line; expected two or more points, [[x, y], [x, y]]")
-        read_point = Rows("length", length=2).read
-        points = tuple(read_each(enumerate(given), lambda point: read_point(point, setting)).values())
-        if any(start == stop for start, stop in zip(points, points[1:], strict=False)):
-            raise ValueError(f"{show(given)} has two equal points in succession; expected different points")
-        return points
-
-    def json(self) -> dict[str, Any]:
-        return {"type": "array", "items": Rows("length", length=2).json(), "minItems": 2}
-
-
 class FaceWall(Table):
     """A wall on faces between cells, over which water may flow."""
 
@@ -117,7 +92,7 @@ class FaceWall(Table):
 
     line: Annotated[
         tuple[tuple[float, float], ...] | None,
-        Polyline("points of a line; the wall is on the faces between the cells on both of its sides"),
+        PointList(2, "points of a line; the wall is on the faces between the cells on both of its sides"),
     ] = None
     group: Annotated[str | None, Text("group of lines of the mesh file on which the wall is, instead of `line`")] = None
     crest: Annotated[float, Quantity("level", anything, "height of its crest above the elevation of the basin [m]")]
@@ -182,7 +157,7 @@ class FreeSurface(Physics, name="free-surface"):
     manning: Annotated[
         float | SpatialField | None,
         NumberOrField(
-            Quantity("number", nonnegative, usual=UsualRange(0.008, 0.3, "smooth plastic to dense grass")),
+            Quantity("number", nonnegative, usual=MANNING_RANGE),
             "Manning's n of the bed of a free surface [s/m^(1/3)]; default: no friction", VALUE,
         ),
     ] = None  # fmt: skip

@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.parts.basin import Basin, Physics
+from fvsolve.parts.basin import MANNING_RANGE, Basin, Physics
 from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.value import (
@@ -21,7 +21,6 @@ from fvsolve.parts.value import (
     positive,
 )
 
-MANNINGS = UsualRange(0.008, 0.3, "glass to overgrown channels")
 DIAMETERS = UsualRange(0.05, 14.0, "house drains to tunnels")
 DEFAULT_CELLS = 50
 SLOT = 0.01  # width of the slot over the diameter by default, as in EPA SWMM
@@ -47,7 +46,7 @@ class Conduit(TwoPort, kind="conduit"):
         tuple[float, float],
         Rows("length", length=2, about="height of the invert above datum at `from` and at `to` [m]", changes=PROFILE),
     ]
-    manning: Annotated[float, Number(nonnegative, "Manning's n of the wall [s/m^(1/3)]", MANNINGS, PROFILE)]
+    manning: Annotated[float, Number(nonnegative, "Manning's n of the wall [s/m^(1/3)]", MANNING_RANGE, PROFILE)]
     cells: Annotated[int, Whole(between(1, 10**6), "number of cells", SHAPE)] = DEFAULT_CELLS
     surcharge_celerity: Annotated[float | None, Quantity(
         "velocity", positive, "speed of waves in the full conduit [m/s]; 28 sqrt(diameter), by a slot of 1 % of it "
