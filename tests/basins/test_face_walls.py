@@ -249,7 +249,7 @@ def test_a_section_changes_no_bit(scheme, triangular, tmp_path):
 
 FAULTS = {
     "outside": ({"line": [[30, 0], [30, 6]], "crest": 2}, "levee.line: cuts no face between two cells.*24, 6"),
-    "point": ({"line": [[3, 0]], "crest": 2}, "not a line; expected two or more points"),
+    "point": ({"line": [[3, 0]], "crest": 2}, "is not a list of 2 or more points"),
     "equal": ({"line": [[3, 0], [3, 0]], "crest": 2}, "two equal points"),
     "both": ({"line": ACROSS, "group": "a", "crest": 2}, "line.*group"),
     "neither": ({"crest": 2}, "line.*group"),
