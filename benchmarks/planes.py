@@ -2,7 +2,7 @@
 
 speed: million cell-steps per second of each physics on grids of 64^2 to 1024^2 and on triangles.
 error: CPU time to an L1 error of a swirl that turns back, a hump of water that spreads and a round pulse of pressure.
-driven: cost of driven sides, rain, soils and maxima; a driven flood beside PyClaw and ANUGA.
+driven: cost of driven sides, rain, soils, maxima, walls and sections; a driven flood beside PyClaw and ANUGA.
 start: first run of each physics on a machine, functions that a scene without basins compiles, memory per cell.
 
 `--quick` runs one small grid of water, without `start`, which planes_start.py contains. One thread, CPU time, the best

@@ -20,7 +20,7 @@ BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")  # fields of state
 FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve": (1796, 11),
     "tests": (967, 7),
-    "benchmarks": (6718, 51),
+    "benchmarks": (6726, 51),
     "fvsolve/assembly": (1969, 10),
     "fvsolve/basins": (11696, 57),
     "fvsolve/case": (8083, 30),
