@@ -1,4 +1,4 @@
-"""Cost of driven sides, rain, soils, maxima, walls and sections of basins, and a driven flood compared with PyClaw and ANUGA."""
+"""Cost of what a case adds to a basin, such as driven sides and rain; a driven flood beside PyClaw and ANUGA."""
 
 from __future__ import annotations
 
