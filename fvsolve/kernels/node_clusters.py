@@ -25,7 +25,7 @@ wide : True while valves that a pressure lifts are held wide open, see `restrict
 space : work arrays of `node_work`
 """
 
-from math import sqrt
+from math import inf, sqrt
 
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels.dtypes import NO_SOLUTION, NOT_CONVERGED, STATUS, WHERE
@@ -42,6 +42,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 BAR = 1e5
 ROUNDING = 1e-15  # relative rounding of pressures; of a flow, relative to the flow at 1 Pa
+NEARLY_CONVERGED = 1e-9  # relative change of Newton below which it may be rounding
 FAILED_CHANGE = 1e-5  # relative change of flow above which Newton has failed; smaller changes may be rounding
 # Errors of valve flows against their laws up to this fraction of the node's imbalance cannot reverse a Newton step.
 FLOW_ERROR = 0.01
@@ -129,7 +130,7 @@ def clear_pattern(a, n, integers, at):
 @njit(forceinline=True)
 def has_converged(change, last_change):
     """True if the last relative change of Newton is rounding: below 1e-14, or below 1e-9 and no longer falling."""
-    return change <= 1e-14 or (change <= 1e-9 and change >= 0.5 * last_change)
+    return change <= 1e-14 or (change <= NEARLY_CONVERGED and change >= 0.5 * last_change)
 
 
 @njit
@@ -631,6 +632,27 @@ def write_clusters(out, tables, space):
 
 
 @njit
+def keep_in_bracket(cluster, tables, out, m, work, low, high):
+    """Bracket (low, high) [Pa] of the pressure of a cluster of a single node after a step, which it bisects if needed.
+
+    m : flows of valves; work : work array of the step; low, high : bracket before the step
+    The inflow falls with the pressure, so the root is in the direction of the step. An empty bracket begins anew.
+    """
+    at, k = tables.layout[0]["pressure"] + tables.integers[cluster["first_node"]], m.size
+    _, right, _, slopes, _ = step_arrays(1, k, work)
+    end, step = out[at], right[0]
+    low, high = (end - step, high) if step > 0.0 else (low, end - step)
+    if not high > low:
+        return -inf, inf
+    if high - low < inf and not low < end < high:
+        out[at] = 0.5 * (low + high)
+        for e in range(k):
+            valve = tables.valves[tables.integers[cluster["first_valve"] + e]]
+            m[e] += (slopes[e] if inner_row(tables.nodes, valve["from_node"]) == 0 else -slopes[e]) * (out[at] - end)
+    return low, high
+
+
+@njit
 def solve_cluster(out, tables, index):
     """Solve the pressures of cluster number `index` and the flows of its valves under the density law `linear`.
 
@@ -644,7 +666,7 @@ def solve_cluster(out, tables, index):
     undisturbed = total_inflows(cluster, tables, out, c) and unchanged
     find_connected(cluster, tables, g, connected)
     zero_isolated(cluster, tables, g, m, connected)
-    change, wide = 1e300, True
+    change, wide, low, high = 1e300, True, -inf, inf
     for _ in range(MAX_SWEEPS):
         if undisturbed:
             change = 0.0
@@ -652,6 +674,8 @@ def solve_cluster(out, tables, index):
         last_change = change
         slope = c  # not used under this law
         change = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, rest)[0]
+        if cluster["bracketed"] == 1 and change > NEARLY_CONVERGED:
+            low, high = keep_in_bracket(cluster, tables, out, m, rest, low, high)
         if has_converged(change, last_change):
             if not (wide and has_backflow(cluster, tables, m)):
                 break

@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 from model.test_sparsity import stray
 from pytest import approx
+from reference import conduits as exact_section
 from reference.basins import assert_equal_files, run_in_two_parts
 from reference.conduits import DamBreak, backwater, bore, uniform_depth
 from reference.scenes import WATER
 
 import fvsolve
+from fvsolve.kernels.dtypes import OK, STATUS
+from fvsolve.parts.conduit.law_section import depth_of, riemann_function, section_at_depth, section_of
 from fvsolve.studies.energy_balance import energy
 
 TANK = {"type": "tank", "elevation": 0.0}
@@ -47,6 +50,17 @@ def test_water_at_rest_does_not_move_by_one_bit(level, numerics, scheme):
     run = fvsolve.run(case)
     assert all(np.ptp(run[probe.text]) == 0.0 for probe in run.case.probes)
     assert not run["s.flow"].any() and not run["s.flow@1"].any()
+
+
+def test_the_section_is_a_circle():
+    """Area, width, thrust and phi by closed forms and quadrature, and the depth of an area, below the slot."""
+    section = section_of(9.80665, 0.5, 28.0)
+    for h in 0.5 * np.array([1e-3, 0.02, 0.3, 0.4999999, 0.5, 0.51, 0.8, 0.97]):
+        area, width, thrust = section_at_depth(section, float(h))
+        assert area == approx(exact_section.area(h, 0.5), rel=1e-9) and depth_of(section, area) == approx(h, rel=1e-13)
+        assert width == approx(exact_section.width(h, 0.5), rel=1e-12)
+        assert thrust * 9.80665 == approx(exact_section.thrust(h, 0.5), rel=1e-9, abs=1e-13)
+        assert riemann_function(section, float(h)) == approx(exact_section.riemann(h, 0.5), rel=1e-9)
 
 
 def shut_gate(cells, celerity=20.0, **numerics):
@@ -154,6 +168,53 @@ def test_it_fills_from_dry_and_drains():
     assert min(run[f"s.depth@{at}"].min() for at in ("0", "0.3", "1")) >= 0.0
     assert run["s.depth@0.3"].max() > 0.5
     assert run["a.level"][-1] == approx(run["b.level"][-1], abs=2e-3)
+
+
+@pytest.mark.parametrize("numerics", [*METHODS, {"method": "dormand-prince"}], ids=lambda keys: keys["method"])
+@pytest.mark.parametrize("other", [0.0, 1.0])
+def test_a_dry_conduit_fills_from_heads_above_its_crown(other, numerics):
+    """From one end and from both: inflow of Torricelli at the start, volume to 1e-12, one result for all methods."""
+    case = two_tanks(other, 1.0, initial_depth=0.0)
+    case["numerics"] |= {"end": 3.0, **numerics}
+    run = fvsolve.run(case)
+    assert run.ok and run.ledger["mass"]["relative"] < 1e-12
+    assert run["s.flow"][0] == approx(0.25 * pi * 0.5**2 * (2.0 * 9.80665 * 0.8) ** 0.5, rel=0.01)  # of the slot
+    assert run["a.level"][-1] == approx(0.4307, abs=2e-3) and run["b.level"][-1] == approx(0.2445 * other, abs=2e-3)
+    assert max(run["a.level"].max(), run["b.level"].max()) <= 1.0 and np.all(np.diff(run["a.level"]) < 0.0)
+
+
+def junction_of_conduits(rng) -> dict:
+    """Junction between one to four conduits of random diameters, inverts and directions."""
+    nodes, links = {"m": {"type": "junction", "elevation": 0.0, "demand": -rng.choice([0.0, 0.05])}}, {}
+    for i in range(rng.integers(1, 5)):
+        nodes[f"t{i}"] = {**TANK, "area": 100.0, "level": 0.0}
+        ends, inverts = ("m", f"t{i}"), [rng.choice([0.0, rng.uniform(0.0, 1.0)]), 0.0]
+        turn = int(rng.choice([1, -1]))
+        keys = {"diameter": float(rng.choice([0.2, 0.5, 1.0, 1.5])), "length": 10.0, "cells": 3}
+        links[f"s{i}"] = pipe(*ends[::turn], inverts=[float(z) for z in inverts[::turn]], **keys)
+    return sewer(nodes, links, ["t0.level"], 1.0, initial="rest")
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_flows_of_any_junction_balance(seed):
+    """Dry, free and full cells beside each other, flows up to 8 m/s in both directions: Newton converges."""
+    rng = np.random.default_rng(seed)
+    for _ in range(10):
+        model = fvsolve.build(fvsolve.load(junction_of_conduits(rng)))
+        demand = float(model.case.nodes["m"].demand.value[0])
+        for _ in range(100):
+            y = model.start.copy()
+            for basin in model.basins:
+                at, n, full = int(basin.row["y"]), basin.n, basin.section.area
+                kind = rng.choice(4, size=n, p=[0.1, 0.5, 0.2, 0.2])
+                area = full * np.choose(kind, [np.zeros(n), *(rng.uniform(low, high, n) for low, high in
+                                                              ((0.0, 1.0), (0.97, 1.003), (1.0, 1.03)))])  # fmt: skip
+                y[at : at + n], y[at + n : at + 2 * n] = area - basin.area, area * rng.uniform(-8.0, 8.0, n)
+            out = model.evaluate(0.0, y)[1]
+            flows = out[model.layout["valve"] : model.layout["valve"] + len(model.valve_names)] / 1000.0
+            own = [k for k, name in enumerate(model.valve_names) if model.case.conduits[name].from_ == "m"]
+            assert out[STATUS] == OK
+            assert flows[own].sum() == approx(-demand, abs=1e-9 * max(abs(flows).max(), 1.0))
 
 
 def test_it_drains_over_a_free_overfall():

@@ -70,9 +70,11 @@ def bore(h: float, q: float, d: float, a: float) -> tuple[float, float]:
 
 
 def riemann(h: float, d: float) -> float:
-    """Integral of sqrt(g T / A) over the depth, with the depth w^2."""
+    """Integral of sqrt(g T / A) over the depth w^2; its lowest part with T / A = 1.5 / h (1 - h / 5 d)."""
     rate = lambda w: 2.0 * w * sqrt(G * width(w * w, d) / area(w * w, d))  # noqa: E731
-    return quad(rate, 0.0, sqrt(h), epsabs=1e-12, epsrel=1e-12)[0]
+    low = 1e-2 * sqrt(d)
+    lowest = 2.0 * sqrt(1.5 * G) * low * (1.0 - low * low / (30.0 * d))
+    return lowest + quad(rate, low, sqrt(h), epsabs=1e-12, epsrel=1e-12)[0]
 
 
 class DamBreak:

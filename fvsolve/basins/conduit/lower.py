@@ -8,12 +8,13 @@ import numpy as np
 
 from fvsolve.basins.basin_terms import SHORTAGES
 from fvsolve.basins.conduit import conduit_rates
-from fvsolve.basins.conduit.conduit_rates import NEARLY_FULL, OF_AREA, OF_DEPTH, OF_FLOW
+from fvsolve.basins.conduit.conduit_cells import fastest, velocity_factor
+from fvsolve.basins.conduit.conduit_rates import OF_AREA, OF_DEPTH, OF_FLOW
 from fvsolve.basins.free_surface.lower import COURANT_FACTOR
 from fvsolve.basins.lower_friction import RowsWithFriction
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import RhsTerms
-from fvsolve.parts.conduit.law_section import area_of, celerity, depth_of, section_of, width_and_thrust
+from fvsolve.parts.conduit.law_section import area_of, celerity, depth_of, section_at_depth, section_of
 
 PACKAGE = __package__
 QUANTITIES = {"depth": OF_DEPTH, "head": OF_DEPTH, "filling": OF_AREA, "flow": OF_FLOW}
@@ -66,7 +67,7 @@ class ConduitWaterRows(RowsWithFriction):
     def lower(self, draft, row) -> None:
         surface = np.maximum(self.bed - self.part.level, 0.0)
         row["plan"] = draft.to_plane(np.array([self.area, self.depth, surface]))
-        row["table"], row["work"] = draft.to_plane(np.array(self.section)), draft.to_work(conduit_rates.WORK * self.n)
+        row["table"], row["work"] = draft.to_plane(np.array(self.section)), draft.to_work(conduit_rates.WORK)
         row["rest"] = self.case.properties.density * self.case.gravity * self.part.level
         row["friction"] = rec.MANNING if self.conduit.manning > 0.0 else rec.NO_DRAG
         row["roughness"] = draft.to_plane(np.array([self.conduit.manning]))
@@ -117,17 +118,15 @@ class ConduitWaterRows(RowsWithFriction):
 
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
         depth, area = self.depths(y), np.maximum(self.area + y[0], 0.0)
-        speed = np.array([conduit_rates.velocity_factor(self.section, wet) for wet in area.tolist()]) * y[1]
+        speed = np.array([velocity_factor(self.section, wet) for wet in area.tolist()]) * y[1]
         velocity = np.column_stack([speed, np.zeros((self.n, 2))])
         return {"depth": depth, "bed": self.bed, "surface": self.bed + depth, "velocity": velocity}
 
     def speeds(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        fields, section = self.fields(y), self.section
-        surcharge = math.sqrt(section.g * section.area / section.slot)
-        waves = []
+        fields, waves = self.fields(y), []
         for h, area in zip(fields["depth"].tolist(), (self.area + y[0]).tolist(), strict=True):
-            c = celerity(section, width_and_thrust(section, h, area)[0], area)
-            waves.append(max(c, surcharge) if area >= NEARLY_FULL * section.area else c)
+            c = celerity(self.section, section_at_depth(self.section, h)[1], area)
+            waves.append(fastest(self.section, area, c))
         return fields["velocity"], np.array(waves)
 
     def ranges(self) -> dict[str, tuple[float, float]]:
@@ -156,5 +155,5 @@ class ConduitWaterRows(RowsWithFriction):
     def weights(self, y: np.ndarray) -> np.ndarray:
         per = 0.5 * self.mass()[1]
         area = np.maximum(self.area + y[0], 1e-6 * self.section.area)
-        width = np.array([width_and_thrust(self.section, h, a)[0] for h, a in zip(self.depths(y), area, strict=True)])
+        width = np.array([section_at_depth(self.section, h)[1] for h in self.depths(y).tolist()])
         return np.array([per * self.case.gravity / np.maximum(width, self.section.slot), per / area])

@@ -3,27 +3,22 @@
 The cell at the end, with depth h, surface e and inward velocity u, sends the invariant u - phi(h) outward, with the
 Riemann function phi of `law_section`. At a head z of the node the depth in the end is h_b = h + z - e, the velocity
 u_b = u + phi(h_b) - phi(h), and the inflow q = A_b u_b, with dq/dz = T_b (u_b + c_b). Outflow is at most critical:
-then phi(h_b) + c(h_b) = phi(h) - u, which is the free overfall. Inflow is at most critical too. An outflow faster than
-waves takes the state of the cell. A dry end passes nothing unless the head is above its invert. The numbers of an end
-are those of its `SlottedSection`, and the row of its patch.
+then phi(h_b) + c(h_b) = phi(h) - u, which is the free overfall. Inflow is at most critical too, and at most that of
+Torricelli, u_b^2 = 2 g h_b, which is lower in a full section. An outflow faster than waves takes the state of the cell.
+A dry end passes nothing unless the head is above its invert. The numbers of an end are those of its `SlottedSection`,
+and the row of its patch.
 """
 
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.parts.conduit.law_section import (
-    SlottedSection,
-    area_of,
-    celerity,
-    riemann_function,
-    width_and_thrust,
-)
+from fvsolve.parts.conduit.law_section import SlottedSection, celerity, riemann_function, section_at_depth
 
 NUMBERS = len(SlottedSection._fields)  # of a section
 INSIDE = 3  # numbers of the state inside an end: depth [m], surface above the level at rest [m], inward velocity [m/s]
 LEAST_SLOPE = 1e-12  # least derivative of the flow by the head [m2/s]; critical outflow does not depend on the head
 SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
-DRY_CELERITY = 0.1  # celerity at a dry end for its least derivative [m/s]
+DRY_CELERITY = 1e-4  # celerity at a dry end for its least derivative [m/s]; far below that of films of water
 ROUNDING = 1e-14  # relative error of depths that solve an equation
 SWEEPS = 100
 CHORD = 1e-6  # error of the flow, over that of the full section at sqrt(g D), above which a chord replaces the tangent
@@ -40,8 +35,7 @@ def section_at(floats, at):
 @njit
 def invariant_and_slope(section, h):
     """(phi + c, its derivative by h) at a depth h above 0 [m/s, 1/s]."""
-    area = area_of(section, h)
-    width = width_and_thrust(section, h, area)[0]
+    area, width, _ = section_at_depth(section, h)
     c = celerity(section, width, area)
     narrowing = 2.0 * (section.diameter - 2.0 * h) / width if h < section.depth else 0.0  # dT / dh
     return riemann_function(section, h) + c, section.g / c * (1.5 - 0.5 * area * narrowing / (width * width))
@@ -74,11 +68,10 @@ def end_flow(section, z, h, e, u):
 
     h, e, u : state inside; z and e count from the level at rest
     """
-    area = area_of(section, h)
-    phi, c = riemann_function(section, h), celerity(section, width_and_thrust(section, h, area)[0], area)
+    area, width, _ = section_at_depth(section, h)
+    phi, c = riemann_function(section, h), celerity(section, width, area)
     depth = max(h + (z - e), 0.0)
-    area_b = area_of(section, depth)
-    width_b = width_and_thrust(section, depth, area_b)[0]
+    area_b, width_b, _ = section_at_depth(section, depth)
     speed, own = celerity(section, width_b, area_b), u
     if depth != h:
         own = u + (riemann_function(section, depth) - phi)
@@ -86,9 +79,13 @@ def end_flow(section, z, h, e, u):
         return area * u, 0.0, h
     if own < -speed:
         depth = critical_depth(section, phi - u, h)
-        area_b = area_of(section, depth)
-        width_b = width_and_thrust(section, depth, area_b)[0]
+        area_b, width_b, _ = section_at_depth(section, depth)
         return -area_b * celerity(section, width_b, area_b), 0.0, depth
+    if not depth > 0.0:
+        return 0.0, 0.0, 0.0
+    jet = sqrt(2.0 * section.g * depth)
+    if own > jet and jet < speed:
+        return area_b * jet, width_b * jet + area_b * section.g / jet, depth
     if own > speed:
         slope = invariant_and_slope(section, depth)[1] - section.g / speed  # of c
         return area_b * speed, width_b * speed + area_b * slope, depth
