@@ -52,6 +52,7 @@ class BasinRows:
     has_wide_closure: ClassVar[bool] = True  # True if outgoing waves are extrapolated by a polynomial of five cells
     banded: ClassVar[bool] = False  # True if threads can step bands of rows of a grid
     banded_mesh: ClassVar[bool] = False  # True if threads can step bands of blocks of cells of another mesh
+    full_rate: float = 0.0  # rate of the waves of a full conduit, which limits steps as `out[RATE]` does [1/s]
     max_divergence: float = 0.0  # greatest divergence of a given velocity [1/s]
 
     def __init_subclass__(cls) -> None:

@@ -48,6 +48,15 @@ def heads_at_start(conduits: dict[str, Any], stated: dict[str, float | None]) ->
     return heads
 
 
+def inflow_at_start(nodes: dict[str, Any], links: dict[str, Any], conduit: Any) -> float | None:
+    """Flow of a conduit at the start [m3/s] by a node of type `inflow` that no other link joins; None without it."""
+    for place, way in zip(conduit.ports.values(), (1.0, -1.0), strict=True):
+        node, joined = nodes.get(place), sum(place in link.ports.values() for link in links.values())
+        if is_kind(node, "inflow") and joined == 1:
+            return way * float(node.flow.value[0])
+    return None
+
+
 def water_of_conduits(
     nodes: dict[str, Any], links: dict[str, Any], ambient: float, weight: float
 ) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -72,7 +81,12 @@ def water_of_conduits(
         level = heads[0] if rests else min(link.inverts)
         stated = None not in (ends[link.from_], ends[link.to])
         waters[name] = ConduitWater.model_construct(
-            physics="conduit", level=level, conduit=link, heads=heads, stated=stated
+            physics="conduit",
+            level=level,
+            conduit=link,
+            heads=heads,
+            stated=stated,
+            inflow=inflow_at_start(nodes, links, link),
         )
         sides = {"from": "west", "to": "east"}
         meshes[name] = rectangle((link.length, link.diameter), (link.cells, 1), patches=sides)

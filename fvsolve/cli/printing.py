@@ -338,7 +338,8 @@ def _step_text(case, facts: dict) -> str:
     expected = facts["expected_seconds"]
     cost = "" if expected is None else f", about {expected:.2g} s of computing time"
     step = f"step at the start {case.step_amount(facts['step'])}, set by {facts['step_set_by']}"
-    return f"{step}; {facts['steps']} steps of this size in the run{cost}"
+    full = "" if facts["steps_if_full"] is None else f" ({facts['steps_if_full']} with full conduits)"
+    return f"{step}; {facts['steps']} steps of this size in the run{full}{cost}"
 
 
 def _expectation_text(claim: dict, summary: dict) -> str:

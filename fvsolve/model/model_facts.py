@@ -69,6 +69,8 @@ def checks(model) -> dict[str, Any]:
     step, set_by = step_and_reason(model)
     numerics = model.case.numerics
     steps = math.ceil((numerics.end - numerics.start) / step) if step else None
+    full = max((basin.full_rate for basin in model.basins), default=0.0) * (numerics.end - numerics.start)
+    steps_if_full = math.ceil(full / numerics.courant) if steps and numerics.courant is not None else 0
     method = method_named(first_method(numerics.method))
     timed = steps is not None and method.explicit
     expected = steps * (SECONDS_PER_STEP + method.stages * rhs_seconds(model)) if timed else None
@@ -76,6 +78,7 @@ def checks(model) -> dict[str, Any]:
         "fluid": model.case.properties.plain(), "nodes": nodes, "masses": masses, "bodies": bodies,
         "pipes": pipes, "basins": {item.name: basin_facts(item) for item in model.basins},
         "states": model.y_size, "cells": model.all_cells, "step": step, "step_set_by": set_by, "steps": steps,
+        "steps_if_full": steps_if_full if steps_if_full > (steps or 0) else None,
         "network": None if model.network is None else model.network.facts(), "reactions": reaction_facts(model),
         "expected_seconds": expected, "moving": model.steady["moving"],
         "warnings": [item.plain() for item in (*model.warnings, *cost_notices(model, steps, set_by))],

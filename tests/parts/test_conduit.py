@@ -31,7 +31,7 @@ def pipe(start="a", stop="b", **keys):
 
 
 def two_tanks(low, high=1.0, **keys):
-    keys = {"inverts": [0.2, 0.1], **keys}
+    keys = {"inverts": [0.2, 0.1], "initial_flow": 0.0, **keys}
     nodes = {"a": {**TANK, "area": 2.0, "level": high}, "b": {**TANK, "area": 1.0, "level": low}}
     probes = ["a.level", "b.level", "s.flow", "s.flow@1", "s.depth@0.3", "s.head@0.9", "s.filling@0.5"]
     return sewer(nodes, {"s": pipe(**keys)}, probes, 20.0)
@@ -138,6 +138,39 @@ def test_backwater_is_gradually_varied_flow():
     assert np.log2(errors[0] / errors[1]) > 1.8
 
 
+STARTS = {  # head or inflow above, head below, fall, other keys, greatest change of a depth
+    "mild": ({"flow": 0.05}, 0.3, 0.1, {}, 2e-4),
+    "overfall": ({"flow": 0.05}, -1.0, 0.1, {}, 2e-3),
+    "steep": ({"flow": 0.05}, -1.0, 4.0, {}, 2e-3),
+    "jump": ({"flow": 0.05}, 0.45, 1.0, {}, 1e-2),
+    "full": ({"flow": 0.3}, 1.0, 0.1, {}, 1e-5),
+    "between reservoirs": ({"head": 2.0}, 1.0, 0.1, {}, 1e-5),
+    "free between reservoirs": ({"head": 0.4}, 0.25, 0.1, {}, 5e-4),
+    "critical": ({"head": 4.3}, 0.25, 4.0, {}, 5e-3),
+}
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("name", STARTS)
+def test_a_run_starts_in_gradually_varied_flow(name, turned):
+    """The flow is that of the inflow, or follows from both heads; no depth changes much, nor does the flow."""
+    above, head, fall, keys, change = STARTS[name]
+    kind = "inflow" if "flow" in above else "reservoir"
+    nodes = {"a": {"type": kind, **above}, "b": {"type": "reservoir", "head": head}}
+    ends, inverts = (("b", "a"), [0.0, fall]) if turned else (("a", "b"), [fall, 0.0])
+    link = pipe(*ends, length=100.0, inverts=inverts, cells=50, **keys)
+    if kind == "inflow":
+        nodes["a"]["elevation"] = 0.0
+    x = [0.1, 0.3, 0.5, 0.7, 0.9]
+    run = fvsolve.run(sewer(nodes, {"s": link}, ["s.flow", "s.flow@0.5", *(f"s.depth@{at}" for at in x)], 200.0))
+    depths = np.array([run[f"s.depth@{at}"] for at in x])
+    assert abs(run["s.flow"]).min() > 0.04 and np.ptp(run["s.flow@0.5"]) < 2.0 * change
+    assert np.ptp(depths, axis=1).max() < change
+    if name == "mild":
+        exact = backwater(0.05, 0.013, 0.001, 0.5, 0.3, 100.0 * np.array(x))
+        assert depths[:, 0] == approx(exact if turned else exact[::-1], abs=1e-5)
+
+
 def dam_break_error(cells: int, right: float) -> float:
     """Mean error of the depth after a dam break over the difference of depths, 1 m wide pipe."""
     exact, time = DamBreak(0.7, right, 1.0), 2.0
@@ -238,7 +271,7 @@ def series_error(cells: int) -> float:
     """Greatest difference of a level [m] between a pipe and the pipe cut in the middle by a junction."""
     one, two = two_tanks(0.3, cells=cells), two_tanks(0.3)
     two["nodes"]["m"] = {"type": "junction", "elevation": 0.15}
-    half = {"length": 10.0, "cells": cells // 2}
+    half = {"length": 10.0, "cells": cells // 2, "initial_flow": 0.0}
     two["links"] = {"s": pipe("a", "m", inverts=[0.2, 0.15], **half), "r": pipe("m", "b", inverts=[0.15, 0.1], **half)}
     two["output"]["probes"] = ["a.level", "b.level", "s.flow", "r.flow@1"]
     one, two = fvsolve.run(one), fvsolve.run(two)
@@ -333,6 +366,32 @@ def test_bad_keys_are_named(key):
 def test_an_invert_below_the_bottom_of_a_tank_is_named():
     with pytest.raises(fvsolve.CaseError, match=r"links.s.inverts\[?.?0\]?: -0.1 m is below the bottom of a at 0 m"):
         fvsolve.load(two_tanks(0.3, inverts=[-0.1, 0.0]))
+
+
+def test_check_foresees_the_steps_of_full_conduits():
+    """Within 15 % (their speed is |u| + a) for a sewer that a flood fills; none for a conduit full at the start."""
+    flood = {"time": [0.0, 1.0], "value": [0.02, 0.35]}
+    nodes = {"a": {"type": "inflow", "flow": flood, "elevation": 0.0}, "b": {"type": "reservoir", "head": 0.3}}
+    case = sewer(nodes, {"s": pipe(inverts=[0.02, 0.0], manning=0.02)}, ["s.depth@0.5"], 60.0)
+    facts, run = fvsolve.build(fvsolve.load(case)).checks, fvsolve.run(case)
+    assert facts["steps"] < 0.5 * run.summary["steps"]
+    assert facts["steps_if_full"] == approx(run.summary["steps"], rel=0.15)
+    assert fvsolve.build(fvsolve.load(two_tanks(2.0, 2.0))).checks["steps_if_full"] is None
+
+
+def test_the_cap_of_friction_gives_a_notice():
+    """With rk4 a film at the decay rate r is too fast by sqrt(1 + r / 20) - 1; methods without cap give none."""
+    nodes = {"a": {"type": "inflow", "flow": 2e-4, "elevation": 0.0}, "b": {"type": "reservoir", "head": -1.0}}
+    texts = []
+    for method in ("rk4", "ssp-rk2"):
+        case = sewer(nodes, {"s": pipe(inverts=[4.0, 0.0], length=100.0, cells=50)}, ["s.depth@0.5"], 20.0)
+        case["numerics"]["method"] = method
+        texts.append([notice for notice in fvsolve.run(case).warnings if notice.kind == "friction"])
+    depth = uniform_depth(2e-4, 0.013, 0.04, 0.5)
+    decay = 9.80665 * 0.04 * exact_section.area(depth, 0.5) / 2e-4  # of uniform flow
+    ((notice,), none) = texts
+    assert notice.place == "links.s" and not none
+    assert notice.value == approx((1.0 + decay / 20.0) ** 0.5 - 1.0, rel=0.03)
 
 
 def test_scalars_are_refused_by_name():

@@ -2,16 +2,19 @@
 
 import math
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from fvsolve.basins.basin_terms import SHORTAGES
 from fvsolve.basins.conduit import conduit_rates
-from fvsolve.basins.conduit.conduit_cells import fastest, velocity_factor
+from fvsolve.basins.conduit.conduit_cells import drag_per_flow, fastest, velocity_factor
 from fvsolve.basins.conduit.conduit_rates import OF_AREA, OF_DEPTH, OF_FLOW
+from fvsolve.basins.conduit.steady_profile import put_profile, steady_flow
 from fvsolve.basins.free_surface.lower import COURANT_FACTOR
-from fvsolve.basins.lower_friction import RowsWithFriction
+from fvsolve.basins.lower_friction import RowsWithFriction, cap_checks, run_checks, start_notices
+from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import RhsTerms
 from fvsolve.parts.conduit.law_section import area_of, celerity, depth_of, section_at_depth, section_of
@@ -26,6 +29,7 @@ class ConduitWaterRows(RowsWithFriction):
 
     units = {"depth": "m", "surface": "m", "bed": "m", "velocity": "m/s"}
     has_wide_closure = False
+    table = "links"
 
     def __init__(self, case, name: str) -> None:
         super().__init__(case, name)
@@ -33,6 +37,7 @@ class ConduitWaterRows(RowsWithFriction):
         self.section = section_of(case.gravity, self.conduit.diameter, self.conduit.celerity(case.gravity))
         self.depth = np.maximum(self.part.level - self.bed, 0.0)
         self.area = self.areas(self.depth)
+        self.full_rate = COURANT_FACTOR * self.conduit.celerity(case.gravity) * self.n / self.conduit.length
 
     def areas(self, depth: np.ndarray) -> np.ndarray:
         """Areas of cells at their depths : float64[n] [m2]."""
@@ -100,17 +105,36 @@ class ConduitWaterRows(RowsWithFriction):
         ]
 
     def start(self, attitude: Any = None) -> np.ndarray:
-        conduit, heads = self.conduit, self.part.heads
-        low, high = self.levels_at_start()
-        depth = np.maximum(low + (high - low) * (np.arange(self.n) + 0.5) / self.n - self.bed, 0.0)
+        conduit, (low, high) = self.conduit, self.levels_at_start()
+        depth, flow = self.steady_start
         if conduit.initial_depth is not None:
             depth = np.full(self.n, conduit.initial_depth)
+        elif depth is None:
+            depth = np.maximum(low + (high - low) * (np.arange(self.n) + 0.5) / self.n - self.bed, 0.0)
         change = np.zeros(self.n) if np.array_equal(depth, self.depth) else self.areas(depth) - self.area
-        flow, crowns = conduit.initial_flow, [bed + conduit.diameter for bed in conduit.inverts]
-        if flow is None:
-            known = self.part.stated and all(head >= crown for head, crown in zip(heads, crowns, strict=True))
-            flow = conduit.full_flow(heads[0] - heads[1]) if known else 0.0
         return np.array([change, np.where(self.area + change > 0.0, flow, 0.0)])
+
+    @cached_property
+    def steady_start(self) -> tuple[np.ndarray | None, float]:
+        """(depths of gradually varied flow in cells [m], None without flow; flow [m3/s]) at the start.
+
+        The flow is `initial_flow`, else that of an inflow, else the steady flow between heads that both nodes state.
+        """
+        conduit, flow = self.conduit, self.conduit.initial_flow
+        starts = self.case.numerics.initial != "rest" and conduit.initial_depth is None
+        heads = [-math.inf if head is None else head for head in self.part.heads]
+        if flow is None and starts:
+            flow = self.part.inflow
+        seeks = flow is None and starts and self.part.stated and heads[0] != heads[1]
+        turn = -1 if (heads[0] < heads[1] if seeks else (flow or 0.0) < 0.0) else 1
+        (upper, lower), (begin, end) = heads[::turn], conduit.inverts[::turn]
+        depths, sizes = np.zeros(self.n + 2), (conduit.manning, begin - end, conduit.length)
+        if seeks and upper > begin:
+            flow = turn * steady_flow(self.section, *sizes, upper - begin, max(lower - end, 0.0), depths)
+        if not flow:
+            return None, 0.0
+        put_profile(self.section, abs(flow), *sizes, max(lower - end, 0.0), depths)
+        return depths[1:-1][::turn].copy(), flow
 
     def depths(self, y: np.ndarray) -> np.ndarray:
         """Depths of cells at deviations y : float64[n] [m]."""
@@ -128,6 +152,17 @@ class ConduitWaterRows(RowsWithFriction):
             c = celerity(self.section, section_at_depth(self.section, h)[1], area)
             waves.append(fastest(self.section, area, c))
         return fields["velocity"], np.array(waves)
+
+    def friction_in_cells(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        pairs = zip(self.depths(y).tolist(), (self.area + y[0]).tolist(), strict=True)
+        per = [drag_per_flow(self.section, self.conduit.manning, h, max(area, 0.0)) for h, area in pairs]
+        return self.depths(y), np.abs(y[1]), np.array(per) * np.abs(y[1])
+
+    def notices(self, y: np.ndarray) -> list[Notice]:
+        return start_notices(self, y, cap_checks(self))
+
+    def watches(self, y: np.ndarray) -> list[Any]:
+        return run_checks(self, y, cap_checks(self))
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         y = self.start()

@@ -12,6 +12,7 @@ from fvsolve.assembly.state_names import Numbered
 from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
 from fvsolve.basins.free_surface import law_patch_face, patch_closures, surface_grid, surface_maxima, surface_mesh
+from fvsolve.basins.free_surface.bed_friction import add_friction
 from fvsolve.basins.free_surface.lower_error_checks import error_notices, error_watches
 from fvsolve.basins.free_surface.lower_marks import Marks, chain_texts, lower_marks, marks_of
 from fvsolve.basins.free_surface.lower_notices import inflow_watches, unusual_values
@@ -369,6 +370,12 @@ class FreeSurfaceRows(RowsWithFriction):
 
     def depth_of(self, y: np.ndarray) -> np.ndarray:
         return np.maximum(self.depth + y[0], 0.0)
+
+    def friction_in_cells(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        depth, zeros, law = self.depth_of(y), np.zeros(self.n), rec.DARCY if self.part.manning is None else rec.MANNING
+        rate, flows, contents = np.zeros(self.n), (y[1], y[2]), (zeros - 1.0, zeros)
+        add_friction(law, self.case.gravity, self.roughness, depth, zeros, flows, contents, (rate, zeros))
+        return depth, np.hypot(y[1], y[2]) * self.mesh.area, rate
 
     def mass_per_depth(self) -> np.ndarray:
         return self.case.properties.density * self.mesh.area

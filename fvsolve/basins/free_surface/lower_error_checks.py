@@ -13,43 +13,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fvsolve.basins.free_surface.bed_friction import RATE_CAP, add_friction
+from fvsolve.basins.lower_friction import (
+    DRY_DEPTH,
+    FILM_ERROR,
+    ErrorWatch,
+    cap_checks,
+    run_checks,
+    start_notices,
+)
 from fvsolve.case.sloshing import slowest
 from fvsolve.errors import Notice
-from fvsolve.kernels.dtypes import DARCY, MANNING
 
 WAVE_ERROR = 0.01  # relative error of the speed of waves above which there is a notice
 LEAST_AT_START = 1e-6  # least root mean square of the surface over depth at the start,
 LEAST_IN_RUN = 1e-3  # and during a run
-DRY_DEPTH = 1e-4  # depth [m] of films below which water is ignored
-FILM_ERROR = 0.005  # relative error of the speed of films above which there is a notice
-REPEAT_FACTOR = 1.2  # factor on the error at the start above which a run gives another notice
-
-
-class ErrorWatch:
-    """Greatest error of one kind in a basin during a run.
-
-    by(basin, y) : function for the error and two related values at deviations y
-    notice(basin, values, when) : function for the notice of these three values; when : text of the time
-    least : error up to which no notice is given
-    greatest : float64[4]  time [s], error and both related values at the greatest error; nan before any error
-    """
-
-    def __init__(self, basin, by, notice, least: float) -> None:
-        self.basin, self.by, self.notice, self.least, self.greatest = basin, by, notice, least, np.full(4, np.nan)
-
-    def check(self, t: float, y: np.ndarray) -> None:
-        """Update the greatest error with the error of a state y of the model at time t [s]."""
-        error = self.by(self.basin, self.basin.deviations(y))
-        if error[0] > 0.0 and not error[0] <= self.greatest[1]:
-            self.greatest[:] = t, *error
-
-    def notices(self) -> list[Notice]:
-        """List with the notice of the greatest error; empty if this error is not above `least`."""
-        t, *error = self.greatest.tolist()
-        if not error[0] > self.least:
-            return []
-        return [self.notice(self.basin, error, f" at {self.basin.case.amount(t, 'time')}")]
 
 
 class SurfaceWaves(NamedTuple):
@@ -172,25 +149,6 @@ def slow_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
     return 1.0 - math.sqrt(deep[at] / (2.0 * fall[at])), float(deep[at]), float(fall[at])
 
 
-def fast_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
-    """Mean error of films that are too fast at deviations y, as three numbers; (0, nan, nan) without flow.
-
-    They are speed / correct speed - 1, depth [m], and decay rate of the flow by friction [1/s], all averaged with unit
-    flow times cell area as weight. If friction at the rate r = C u balances a slope and is capped as
-    r / (1 + r / RATE_CAP), then u^2 is too great by the factor 1 + r / RATE_CAP.
-    """
-    depth, part = basin.depth_of(y), basin.part
-    flow = np.where(depth > DRY_DEPTH, np.hypot(y[1], y[2]) * basin.mesh.area, 0.0)
-    if not flow.any():
-        return 0.0, math.nan, math.nan
-    law = DARCY if part.manning is None else MANNING
-    rate, zeros, gravity = np.zeros(depth.size), np.zeros(depth.size), basin.case.gravity
-    flows, contents = (y[1], y[2]), (zeros - 1.0, zeros)
-    add_friction(law, gravity, basin.roughness, depth, zeros, flows, contents, (rate, zeros))
-    error = np.sqrt(1.0 + rate / RATE_CAP) - 1.0
-    return tuple(float(np.average(values, weights=flow)) for values in (error, depth, rate))
-
-
 def slow_film_notice(basin, error: tuple[float, float, float], when: str = "") -> Notice:
     """Notice that films are too slow. error : result of `slow_film_error`; when : text of the time"""
     deep, fall = (basin.case.amount(value, "length", 3) for value in error[1:])
@@ -202,36 +160,19 @@ def slow_film_notice(basin, error: tuple[float, float, float], when: str = "") -
     return Notice("film", f"nodes.{basin.name}", text, "scheme", error[0], FILM_ERROR)
 
 
-def fast_film_notice(basin, error: tuple[float, float, float], when: str = "") -> Notice:
-    """Notice that films are too fast. error : result of `fast_film_error`; when : text of the time"""
-    remedy = 'method = "rodas-5p"' if basin.part.on is not None else 'method = "ssp-rk3" or "ssp-rk2"'
-    deep, method = basin.case.amount(error[1], "length", 3), basin.case.numerics.method
-    text = (
-        f"{basin.name}: water runs {100.0 * error[0]:.2g} % too fast{when}: with {method} the decay rate by friction, "
-        f"{error[2]:.2g} 1/s in {deep} of water, is capped below {RATE_CAP:g} 1/s; "
-        f"use {remedy}, where the rate has no cap"
-    )
-    return Notice("friction", f"nodes.{basin.name}", text, "method", error[0], FILM_ERROR)
-
-
 def film_checks(basin) -> list[tuple]:
     """(function for the error, function for its notice) of each check for films that applies to a basin."""
     pairs = [(slow_film_error, slow_film_notice)] if basin.scheme == "upwind" else []
-    return [*pairs, (fast_film_error, fast_film_notice)] if basin.has_rate_cap else pairs
+    return [*pairs, *cap_checks(basin)]
 
 
 def error_notices(basin, y: np.ndarray) -> list[Notice]:
     """Notices of short waves and thin films at deviations y."""
-    films = [notice(basin, error) for look, notice in film_checks(basin) if (error := look(basin, y))[0] > FILM_ERROR]
-    return [*wave_notices(basin, y), *body_notices(basin), *films]
+    return [*wave_notices(basin, y), *body_notices(basin), *start_notices(basin, y, film_checks(basin))]
 
 
 def error_watches(basin, y: np.ndarray) -> list[Any]:
-    """Check for short waves, unless `wave_notices` reports them at y, and one check for each pair of `film_checks`.
-
-    A check for films reports errors above FILM_ERROR and above REPEAT_FACTOR times the error at y.
-    """
+    """Check for short waves, unless `wave_notices` reports them at y, and one check for each pair of `film_checks`."""
     waves = ErrorWatch(basin, partial(surface_waves, seen=LEAST_IN_RUN), wave_notice, WAVE_ERROR)
-    films = [ErrorWatch(basin, look, notice, max(FILM_ERROR, REPEAT_FACTOR * look(basin, y)[0]))
-             for look, notice in film_checks(basin)]  # fmt: skip
+    films = run_checks(basin, y, film_checks(basin))
     return films if wave_notices(basin, y) else [waves, *films]

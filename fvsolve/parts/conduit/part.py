@@ -53,25 +53,17 @@ class Conduit(TwoPort, kind="conduit"):
         "if left out", UsualRange(1.0, 400.0, "wide slots to elastic pipes"), PROFILE,
     )] = None  # fmt: skip
     initial_depth: Annotated[float | None, Quantity(
-        "length", nonnegative, "depth of water at the start, above the diameter under pressure [m]; a level between "
-        "those of both nodes if left out", changes=PROFILE,
+        "length", nonnegative, "depth of water at the start, above the diameter under pressure [m]; that of gradually "
+        "varied flow, without flow a level between those of both nodes, if left out", changes=PROFILE,
     )] = None  # fmt: skip
     initial_flow: Annotated[float | None, Quantity(
-        "flow", about="flow at the start [m3/s]; that of the full conduit between levels above its crowns, else 0 "
-        "if left out", changes=PROFILE,
+        "flow", about="flow at the start [m3/s]; that of an inflow at an end, or the steady flow between the heads "
+        "of both nodes, 0 where these are not known, if left out", changes=PROFILE,
     )] = None  # fmt: skip
 
     def celerity(self, gravity: float) -> float:
         """Speed of waves in the full conduit [m/s]."""
         return self.surcharge_celerity or math.sqrt(0.25 * math.pi * gravity * self.diameter / SLOT)
-
-    def full_flow(self, fall: float) -> float:
-        """Steady flow of the full conduit at a fall of the head [m3/s], by Manning; 0 without friction."""
-        if self.manning == 0.0:
-            return 0.0
-        radius = 0.25 * self.diameter
-        speed = math.sqrt(abs(fall) / self.length) * radius ** (2.0 / 3.0) / self.manning
-        return math.copysign(0.25 * math.pi * self.diameter**2 * speed, fall)
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if name in around.nodes:
@@ -136,7 +128,7 @@ class ConduitWater(Basin):
     """Basin of a row of cells that represents the water of a conduit.
 
     level : level of the water at rest above datum [m]; heads : of both nodes at the start, None if unknown [m]
-    stated : True if keys of both nodes give these heads
+    stated : True if keys of both nodes give these heads; inflow : flow at the start of an inflow [m3/s], or None
     """
 
     added: ClassVar[bool] = True
@@ -144,6 +136,7 @@ class ConduitWater(Basin):
     conduit: Conduit
     heads: tuple[float | None, float | None]
     stated: bool
+    inflow: float | None
 
     @property
     def physics_type(self) -> type[Physics]:
