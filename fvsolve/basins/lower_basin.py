@@ -50,6 +50,7 @@ class BasinRows:
     deep: ClassVar[bool] = False  # True if its first quantity is a depth (minus that in `plan`) that contains scalars
     given: ClassVar[bool] = False  # True if flows through its faces are those of a given velocity
     has_wide_closure: ClassVar[bool] = True  # True if outgoing waves are extrapolated by a polynomial of five cells
+    no_fifth_order: ClassVar[str] = "does not support walls on faces"  # reason on a grid
     banded: ClassVar[bool] = False  # True if threads can step bands of rows of a grid
     banded_mesh: ClassVar[bool] = False  # True if threads can step bands of blocks of cells of another mesh
     full_rate: float = 0.0  # rate of the waves of a full conduit, which limits steps as `out[RATE]` does [1/s]
@@ -436,7 +437,7 @@ class BasinRows:
             row["links"] = len(draft.integers)
             draft.integers += self.integers.tolist()
         if self.scheme != SCHEMES[numerics.scheme].for_basin(True).name:
-            needs = "does not support walls on faces" if self.is_grid else "needs a full rectangle as mesh"
+            needs = self.no_fifth_order if self.is_grid else "needs a full rectangle as mesh"
             text = f"basin {self.name}: {numerics.scheme} {needs}; muscl is used here"
             draft.warnings.append(Notice("scheme", f"nodes.{self.name}", text, "scheme"))
         reflections = self.reflections()

@@ -447,12 +447,25 @@ class SteadyStart:
         drop, denser = self.valve_drive(k)
         return float(self.valves[k]["conductance"]) * denser, drop
 
+    def use_start_flows(self, net: np.ndarray) -> None:
+        """Replace the flows of dry conduits by those at the start, in the net inflows of nodes [kg/s]."""
+        basins = {basin.name: basin for basin in self.draft.basins}
+        for name, row in zip(self.draft.valve_names, self.valves, strict=True):
+            link = self.case.conduits[name]
+            if link.kind == "conduit-end":
+                net[row["to_node"]] = 0.0
+                if self.nodes[row["from_node"]]["y"] >= 0:
+                    flow = self.draft.fluid.density * basins[link.conduit].start_flow(link.patch)
+                    net[row["from_node"]] += row["flow"] - flow
+        net[abs(net) <= 1e-12 * self.flow_scale] = 0.0
+
     def report(self) -> dict[str, Any]:
         moving = start_masses(self.draft, self) + start_bodies(self.draft, self)
         moving += driven_at_start(self.draft, self) + self.moving + start_network(self.draft, self)
         fluid, net = self.draft.fluid, self.nodes["inflow"].copy()
         for row in self.pistons:
             net[[row["a"], row["b"]]] -= row["speed"] * np.array([row["sweep_a"], row["sweep_b"]])
+        self.use_start_flows(net)
         for (name, node), row, inflow in zip(self.case.places.items(), self.nodes, net, strict=True):
             name = name.removesuffix(".inside")
             if inflow != 0.0:

@@ -169,15 +169,16 @@ def is_valid(case, cells_by_key: Counts) -> bool:
 def greatest_wave_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> float:
     """Greatest wave rate of a case with these numbers of cells: cells that a wave crosses per second [1/s].
 
-    With basins the result is at least the step-limiting rate of all parts at the start (`Model.wave_rate`), times the
-    greatest factor by which a basin is refined. With delay lines it is at least the number of cells of the slowest
-    line divided by the travel time of a wave along it.
+    With basins or conduits the result is at least the step-limiting rate of all parts at the start
+    (`Model.wave_rate`), times the greatest factor by which one is refined. With delay lines it is at least the number
+    of cells of the slowest line divided by the travel time of a wave along it.
     """
     rates = [case.wave_speed(name) * cells_by_key[f"links.{name}.cells"][0] / pipe.length
              for name, pipe in pipes_with_cells(case).items()]  # fmt: skip
     rates += [method.rate for method in line_methods(case).values() if method.pipe_model == "delay-line"]
-    if basins(case):
-        own_cells = {key: numbers for key, numbers in cell_counts(case).items() if key.startswith("nodes.")}
+    if case.meshes:
+        lines = {f"links.{name}.cells" for name in pipes_with_cells(case)}
+        own_cells = {key: numbers for key, numbers in cell_counts(case).items() if key not in lines}
         factor = max((max(cells_by_key[key]) / max(numbers) for key, numbers in own_cells.items()), default=1.0)
         rates.append(factor * study_model(case).wave_rate)
     return max(rates)

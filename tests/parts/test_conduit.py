@@ -14,6 +14,7 @@ from reference.scenes import WATER
 import fvsolve
 from fvsolve.kernels.dtypes import OK, STATUS
 from fvsolve.parts.conduit.law_section import depth_of, riemann_function, section_at_depth, section_of
+from fvsolve.studies.accuracy.order import order
 from fvsolve.studies.energy_balance import energy
 
 TANK = {"type": "tank", "elevation": 0.0}
@@ -377,6 +378,22 @@ def test_check_foresees_the_steps_of_full_conduits():
     assert facts["steps"] < 0.5 * run.summary["steps"]
     assert facts["steps_if_full"] == approx(run.summary["steps"], rel=0.15)
     assert fvsolve.build(fvsolve.load(two_tanks(2.0, 2.0))).checks["steps_if_full"] is None
+
+
+def test_check_states_how_fast_tanks_move_at_the_start():
+    case = two_tanks(0.3)
+    del case["links"]["s"]["initial_flow"]
+    model = fvsolve.build(fvsolve.load(case))
+    rates = dict(zip(("a", "b"), model.rhs(0.0, model.start)[:2] / 1000.0 / np.array([2.0, 1.0]), strict=True))
+    falls, rises = model.checks["moving"]
+    assert "tank a falls" in falls and float(falls.split()[-2]) == approx(-1e3 * rates["a"], rel=0.02)
+    assert "tank b rises" in rises and float(rises.split()[-2]) == approx(1e3 * rates["b"], rel=0.02)
+
+
+def test_a_study_of_order_refines_a_conduit():
+    case = two_tanks(0.9, cells=8)
+    case["numerics"]["end"] = 1.0
+    assert len(order(case, levels=3).rows) == 3
 
 
 def test_the_cap_of_friction_gives_a_notice():

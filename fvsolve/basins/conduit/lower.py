@@ -29,6 +29,7 @@ class ConduitWaterRows(RowsWithFriction):
 
     units = {"depth": "m", "surface": "m", "bed": "m", "velocity": "m/s"}
     has_wide_closure = False
+    no_fifth_order = "does not support conduits"
     table = "links"
 
     def __init__(self, case, name: str) -> None:
@@ -113,6 +114,11 @@ class ConduitWaterRows(RowsWithFriction):
             depth = np.maximum(low + (high - low) * (np.arange(self.n) + 0.5) / self.n - self.bed, 0.0)
         change = np.zeros(self.n) if np.array_equal(depth, self.depth) else self.areas(depth) - self.area
         return np.array([change, np.where(self.area + change > 0.0, flow, 0.0)])
+
+    def start_flow(self, patch: str) -> float:
+        """Flow into the end `patch` at the start [m3/s]."""
+        flows = self.start()[1]
+        return float(flows[0] if patch == "from" else -flows[-1])
 
     @cached_property
     def steady_start(self) -> tuple[np.ndarray | None, float]:
