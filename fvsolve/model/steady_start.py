@@ -454,10 +454,10 @@ class SteadyStart:
             link = self.case.conduits[name]
             if link.kind == "conduit-end":
                 net[row["to_node"]] = 0.0
-                if self.nodes[row["from_node"]]["y"] >= 0:
-                    flow = self.draft.fluid.density * basins[link.conduit].start_flow(link.patch)
-                    net[row["from_node"]] += row["flow"] - flow
-        net[abs(net) <= 1e-12 * self.flow_scale] = 0.0
+                node, flow = row["from_node"], basins[link.conduit].start_flow(link.patch)
+                if self.nodes[node]["y"] >= 0:
+                    net[node] += row["flow"] - self.draft.fluid.density * flow
+                    net[node] *= abs(net[node]) > 1e-12 * self.flow_scale  # without rounding
 
     def report(self) -> dict[str, Any]:
         moving = start_masses(self.draft, self) + start_bodies(self.draft, self)
