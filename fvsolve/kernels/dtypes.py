@@ -607,6 +607,7 @@ BASIN = record(
     rained=i8,  # state: height of rain since the start [m]
     soil=i8,  # NO_SOIL, CONSTANT_RATE, HORTON, HORTON_FIELDS (decay by cells) or GREEN_AMPT
     soil_numbers=i8,  # offset in `plane` of numbers of the soil in cells, see `free_surface.water_sources`
+    soil_row=i8,  # length of each row of these numbers: the number of cells, or less for a uniform soil
     soil_work=i8,  # offset in `work` of rates of infiltration in cells, for probes
     infiltrated=i8,  # first state of infiltrated heights of cells [m]
     source=i8,  # first of its rows in the ledger of rain and infiltration

@@ -271,7 +271,10 @@ def _frame_times(file: str, name: str, known: dict[str, NetcdfVariable]) -> np.n
         text = f'{file}: {name} has the unit {show(unit)}; expected for example "seconds since start"'
         raise ValueError(f'{text} or "minutes since 2026-01-01"')
     times = known[name].read()
-    check_increasing(times, times.tolist(), f"{file}: times")
+    try:
+        check_increasing(times, times.tolist(), "times")
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from None
     first = 0.0 if match[2].strip().lower() == "start" else times[0]
     return units.find({"s": "s", "m": "min", "h": "h", "d": "d"}[match[1][0].lower()], "time").si(times - first)
 

@@ -61,19 +61,19 @@ SHORE_COURANT_FACTOR = 6.0  # and to sixths of cells under fifth order with a sh
 
 
 def soil_numbers(model: str, fields: list[np.ndarray]) -> tuple[int, np.ndarray]:
-    """(code of a soil, its numbers in cells) as `water_sources.limit_infiltration` reads them.
+    """(code of a soil, its numbers : float64[rows, cells]) as `water_sources.limit_infiltration` reads them.
 
-    fields : values of the keys of its model in cells
+    fields : values of the keys of its model in cells. The numbers of a uniform soil are those of CHUNK cells.
     """
+    if all(np.ptp(values) == 0.0 for values in fields):
+        fields = [np.full(water_sources.CHUNK, values[0]) for values in fields]
     if model == "constant":
-        return rec.CONSTANT_RATE, fields[0]
+        return rec.CONSTANT_RATE, np.array(fields)
     if model == "green-ampt":
         conductivity, suction, deficit = fields
-        return rec.GREEN_AMPT, np.concatenate([conductivity, conductivity * suction * deficit])
+        return rec.GREEN_AMPT, np.array([conductivity, conductivity * suction * deficit])
     initial, final, decay = fields
-    uniform = np.ptp(decay) == 0.0
-    code, decay = (rec.HORTON, decay[:1]) if uniform else (rec.HORTON_FIELDS, decay)
-    return code, np.concatenate([final, initial - final, decay])
+    return rec.HORTON if np.ptp(decay) == 0.0 else rec.HORTON_FIELDS, np.array([final, initial - final, decay])
 
 
 def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
@@ -183,7 +183,7 @@ class FreeSurfaceRows(RowsWithFriction):
         row["present"], row["source"] = draft.to_work(water_sources.PRESENT_NUMBERS), draft.sources
         if self.soil is not None:  # right after the states of cells
             row["soil"], numbers = soil_numbers(self.soil.model, [self.formula(shape) for shape in self.soil.shapes])
-            row["soil_numbers"] = draft.to_plane(numbers)
+            row["soil_numbers"], row["soil_row"] = draft.to_plane(numbers), numbers.shape[1]
             row["soil_work"] = draft.to_work(self.n)
             row["infiltrated"] = draft.states(Numbered(f"{self.name}.infiltrated", self.n), HEIGHT_SCALE)
         rain = self.part.rain

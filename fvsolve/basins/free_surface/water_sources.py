@@ -19,6 +19,7 @@ TINY = 1e-300
 # since the start of the run [s]
 RATE_OF_RAIN, POSITION, FACTOR = range(3)
 PRESENT_NUMBERS = 3
+CHUNK = 512  # cells for which all loops run in turn, so that their arrays stay in the first-level cache
 
 
 @njit
@@ -35,7 +36,7 @@ def write_present_sources(tables, basin, t):
     if basin["frames"] > 0:
         present[POSITION] = schedule_value(tables, basin["frame_position"], t)
     if basin["soil"] == HORTON:
-        present[FACTOR] = exp(-tables.plane[numbers + 2 * basin["n"]] * time)
+        present[FACTOR] = exp(-tables.plane[numbers + 2 * basin["soil_row"]] * time)
     elif basin["soil"] == HORTON_FIELDS:
         present[FACTOR] = time
 
@@ -99,16 +100,21 @@ def limit_infiltration(kind, soil, factor, depth0, dh, heights, rates):
 
 @njit
 def put_infiltration(tables, basin, first, y, rates):
-    """Write the rates of infiltration in cells from number `first` on [m/s], after `write_present_sources`."""
-    plane, n, count, at = tables.plane, basin["n"], rates.size, basin["soil_numbers"] + first
-    soil = plane[at : at + count], plane[at + n : at + n + count], plane[at + 2 * n : at + 2 * n + count]
+    """Write the rates of infiltration in at most CHUNK cells from number `first` on [m/s].
+
+    `write_present_sources` must run before. Numbers of a uniform soil are those of CHUNK cells.
+    """
+    plane, row, count, present = tables.plane, basin["soil_row"], rates.size, tables.work[basin["present"] :]
+    at = basin["soil_numbers"] + (first if row == basin["n"] else 0)
+    soil = plane[at : at + count], plane[at + row : at + row + count], plane[at + 2 * row : at + 2 * row + count]
     depth0, dh = plane[basin["plan"] + first :][:count], y[basin["y"] + first :][:count]
     for i in range(count):
         rates[i] = 0.0
     if basin["rain"] >= 0:
         add_rain(tables, basin, first, rates)
-    factor, heights = tables.work[basin["present"] + FACTOR], y[basin["infiltrated"] + first :][:count]
-    limit_infiltration(basin["soil"], soil, factor, depth0, dh, heights, rates)
+    limit_infiltration(
+        basin["soil"], soil, present[FACTOR], depth0, dh, y[basin["infiltrated"] + first :][:count], rates
+    )
 
 
 @njit
@@ -118,13 +124,15 @@ def add_sources(tables, b, a, z, y, rates):
     rates : of depth, of both unit flows, and of infiltrated heights (empty without a soil) in all cells, four arrays
     """
     basin = tables.basins[b]
-    if basin["rain"] >= 0:
-        add_rain(tables, basin, a, rates[0][a:z])
-    if rates[3].size > 0:
-        to_depth, taken = rates[0][a:z], rates[3][a:z]
-        put_infiltration(tables, basin, a, y, taken)
-        for i in range(taken.size):
-            to_depth[i] -= taken[i]
+    for first in range(a, z, CHUNK):
+        last = min(first + CHUNK, z)
+        if basin["rain"] >= 0:
+            add_rain(tables, basin, first, rates[0][first:last])
+        if rates[3].size > 0:
+            to_depth, taken = rates[0][first:last], rates[3][first:last]
+            put_infiltration(tables, basin, first, y, taken)
+            for i in range(taken.size):
+                to_depth[i] -= taken[i]
 
 
 @njit
@@ -133,7 +141,8 @@ def infiltration(tables, basin, t, y):
     n = basin["n"]
     rates = tables.work[basin["soil_work"] :][:n]
     write_present_sources(tables, basin, t)
-    put_infiltration(tables, basin, 0, y, rates)
+    for first in range(0, n, CHUNK):
+        put_infiltration(tables, basin, first, y, rates[first : min(first + CHUNK, n)])
     return sum_of_products(rates, tables.plane[basin["area"] : basin["area"] + n])
 
 
