@@ -18,7 +18,7 @@ OF_PLACE = re.compile(r"\b[xy]\b")  # in a formula
 
 
 @dataclass(frozen=True, eq=False)
-class FieldSeries:
+class SpatialSeries:
     """Field over a plane at several times [SI]; it is constant before the first and after the last.
 
     given : value as in the case file; times : float64[frames]  since the start of the run [s]
@@ -41,13 +41,13 @@ class FieldSeries:
         return self.given
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, FieldSeries) and self.given == other.given
+        return isinstance(other, SpatialSeries) and self.given == other.given
 
     def __hash__(self) -> int:
         return hash(str(self.given))
 
 
-def read_series(given: dict[str, Any], dimension: str, setting: ReadContext) -> FieldSeries:
+def read_series(given: dict[str, Any], dimension: str, setting: ReadContext) -> SpatialSeries:
     """Series of the frames of a raster, or a single frame; given : table of a case file
 
     Raises ValueError, or ValueFault with all faults of the table.
@@ -61,19 +61,19 @@ def read_series(given: dict[str, Any], dimension: str, setting: ReadContext) -> 
     frames, holes = values.reshape(-1, *values.shape[-2:]), keys["outside"] == "hole"
     least, *fields = (SpatialField(stated, Raster(name, pixels._replace(values=plane), holes))
                       for plane in (frames.min(axis=0), *frames))  # fmt: skip
-    return FieldSeries(stated, np.zeros(1) if pixels.times is None else pixels.times, tuple(fields), least,
+    return SpatialSeries(stated, np.zeros(1) if pixels.times is None else pixels.times, tuple(fields), least,
                        float(np.nanmax(frames)))  # fmt: skip
 
 
 class ScheduledField(Scheduled):
     """Value of a case file that may change with time, as `Scheduled`; or a formula of x and y, or a raster."""
 
-    def read(self, given: Any, setting: ReadContext) -> Schedule | FieldSeries:
-        if isinstance(given, FieldSeries):
+    def read(self, given: Any, setting: ReadContext) -> Schedule | SpatialSeries:
+        if isinstance(given, SpatialSeries):
             return given
         if isinstance(given, str) and OF_PLACE.search(given):
             field = SpatialFieldKey(self.dimension).read(given, setting)
-            return FieldSeries(given, np.zeros(1), (field,), field)
+            return SpatialSeries(given, np.zeros(1), (field,), field)
         if not (isinstance(given, dict) and "raster" in given):
             return super().read(given, setting)
         try:

@@ -29,7 +29,7 @@ from fvsolve.case.basins import patch_names
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import RhsTerms
-from fvsolve.parts.field_series import FieldSeries
+from fvsolve.parts.field_series import SpatialSeries
 from fvsolve.parts.formula import SpatialField, means, samples
 from fvsolve.parts.schedule import Schedule
 
@@ -188,7 +188,7 @@ class FreeSurfaceRows(RowsWithFriction):
             row["infiltrated"] = draft.states(Numbered(f"{self.name}.infiltrated", self.n), HEIGHT_SCALE)
         rain = self.part.rain
         if self.rains:
-            if isinstance(rain, FieldSeries):
+            if isinstance(rain, SpatialSeries):
                 frames, times = rain.over(self.mesh), rain.times + self.case.numerics.start
                 row["frames"], row["frame_rates"] = len(frames), draft.to_plane(frames)
                 kind = "linear" if len(frames) > 1 else "constant"

@@ -6,7 +6,7 @@ import numpy as np
 
 from fvsolve.errors import listing
 from fvsolve.parts.basin import MANNING_RANGE, VELOCITY_FIELDS, Physics, PointList, VelocityStart
-from fvsolve.parts.field_series import FieldSeries, ScheduledField
+from fvsolve.parts.field_series import SpatialSeries, ScheduledField
 from fvsolve.parts.formula import NumberOrField, SpatialField, SpatialFieldKey, samples
 from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.schedule import Schedule
@@ -172,7 +172,7 @@ class FreeSurface(Physics, name="free-surface"):
     ] = None  # fmt: skip
 
     rain: Annotated[
-        Schedule | FieldSeries | None,
+        Schedule | SpatialSeries | None,
         ScheduledField(
             "rainfall", nonnegative, "rate of rain on the basin [m/s]; default: none",
             UsualRange(1e-9, 500 / 3.6e6, "drizzle to cloudburst"), needs_unit=True,
@@ -190,7 +190,7 @@ class FreeSurface(Physics, name="free-surface"):
         yield from super().formulas(basin, mesh)
         for key in basin.infiltration.fields if basin.infiltration is not None else ():
             yield ("infiltration", key), getattr(basin.infiltration, key), None
-        if isinstance(basin.rain, FieldSeries):
+        if isinstance(basin.rain, SpatialSeries):
             yield ("rain",), basin.rain.least, None
 
     @classmethod
