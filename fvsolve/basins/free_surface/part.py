@@ -6,7 +6,7 @@ import numpy as np
 
 from fvsolve.errors import listing
 from fvsolve.parts.basin import MANNING_RANGE, VELOCITY_FIELDS, Physics, PointList, VelocityStart
-from fvsolve.parts.field_series import SpatialSeries, ScheduledField
+from fvsolve.parts.field_series import ScheduledField, SpatialSeries
 from fvsolve.parts.formula import NumberOrField, SpatialField, SpatialFieldKey, samples
 from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.schedule import Schedule
