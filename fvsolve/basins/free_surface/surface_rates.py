@@ -11,7 +11,7 @@ from fvsolve.basins.free_surface.bed_friction import add_capped_friction, add_fr
 from fvsolve.basins.free_surface.marked_faces import marked_faces, no_marks
 from fvsolve.basins.free_surface.patch_closures import driven_faces
 from fvsolve.basins.free_surface.surface_rows import GHOSTS, MAX_COLUMNS
-from fvsolve.basins.free_surface.water_sources import DRAIN_TIME, add_sources, begin_sources
+from fvsolve.basins.free_surface.water_sources import DRAIN_TIME, add_sources, begin_sources, has_sources
 from fvsolve.basins.moving_meshes import mesh_motion
 from fvsolve.basins.moving_walls import grid_motion
 from fvsolve.jit import njit, specialise
@@ -106,7 +106,7 @@ def finish_block(tables, b, row, block_stop, first, last, y, rates, out):
             add_bed_friction(tables, b, nx * row, nx * block_stop, y, rates, out)
         for j in range(row, block_stop if last - first < nx else row):
             add_bed_friction(tables, b, nx * j + first, nx * j + last, y, rates, out)
-    if basin["rain"] >= 0 or basin["soil"] != NO_SOIL:
+    if has_sources(basin):
         if first == 0 and last == nx:
             add_sources(tables, b, nx * row, nx * block_stop, y, rates)
         for j in range(row, block_stop if last - first < nx else row):
@@ -198,7 +198,8 @@ def grid_rates(tables, b, y, rates, out, moves, faces, marks):
     a, z = band_cells(tables, b)
     if basin["friction"] != NO_DRAG:
         add_bed_friction(tables, b, a, z, y, rates, out)
-    add_sources(tables, b, a, z, y, rates)
+    if has_sources(basin):
+        add_sources(tables, b, a, z, y, rates)
     return rate
 
 
@@ -223,7 +224,8 @@ def mesh_rates(tables, b, y, rates, out, moves, faces, marks):
     a, z = band
     if basin["friction"] != NO_DRAG:
         add_bed_friction(tables, b, a, z, y, rates, out)
-    add_sources(tables, b, a, z, y, rates)
+    if has_sources(basin):
+        add_sources(tables, b, a, z, y, rates)
     return rate
 
 

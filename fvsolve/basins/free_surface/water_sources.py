@@ -22,6 +22,12 @@ PRESENT_NUMBERS = 3
 CHUNK = 512  # cells for which all loops run in turn, so that their arrays stay in the first-level cache
 
 
+@njit(forceinline=True)
+def has_sources(basin):
+    """True if rain falls on a basin, or a soil takes its water."""
+    return basin["rain"] >= 0 or basin["soil"] != NO_SOIL
+
+
 @njit
 def rain_rate(tables, basin, t):
     """Mean rate of rain on a basin at time t [m/s]."""
@@ -44,7 +50,7 @@ def write_present_sources(tables, basin, t):
 @njit
 def begin_sources(tables, basin, t, dydt, out):
     """Write the numbers of rain and soil to `work`, the mass flow of rain to the ledger, and the rate of its height."""
-    if basin["rain"] >= 0 or basin["soil"] != NO_SOIL:
+    if has_sources(basin):
         write_present_sources(tables, basin, t)
     if basin["rain"] >= 0:
         rate = tables.work[basin["present"] + RATE_OF_RAIN]
@@ -54,16 +60,17 @@ def begin_sources(tables, basin, t, dydt, out):
 
 
 @njit
-def add_rain(tables, basin, first, rates):
-    """Add the rate of rain to rates [m/s] of cells from number `first` on."""
-    n, count, present = basin["n"], rates.size, tables.work[basin["present"] :]
-    if basin["frames"] == 0:
-        rate = present[RATE_OF_RAIN]
-        for i in range(count):
-            rates[i] += rate
-        return
-    k = int(present[POSITION])
-    share, at = min(present[POSITION] - k, 1.0), basin["frame_rates"] + first
+def uniform_rate(tables, basin):
+    """Rate of rain that is the same in all cells [m/s], after `write_present_sources`; 0 for frames."""
+    return tables.work[basin["present"] + RATE_OF_RAIN] if basin["rain"] >= 0 and basin["frames"] == 0 else 0.0
+
+
+@njit
+def add_frames(tables, basin, first, rates):
+    """Add the rate of rain between two frames to rates [m/s] of cells from number `first` on."""
+    n, count, position = basin["n"], rates.size, tables.work[basin["present"] + POSITION]
+    k = int(position)
+    share, at = min(position - k, 1.0), basin["frame_rates"] + first
     before = tables.plane[at + k * n : at + k * n + count]
     k = min(k + 1, basin["frames"] - 1)
     after, rest = tables.plane[at + k * n : at + k * n + count], 1.0 - share
@@ -108,13 +115,12 @@ def put_infiltration(tables, basin, first, y, rates):
     at = basin["soil_numbers"] + (first if row == basin["n"] else 0)
     soil = plane[at : at + count], plane[at + row : at + row + count], plane[at + 2 * row : at + 2 * row + count]
     depth0, dh = plane[basin["plan"] + first :][:count], y[basin["y"] + first :][:count]
+    rate, heights = uniform_rate(tables, basin), y[basin["infiltrated"] + first :][:count]
     for i in range(count):
-        rates[i] = 0.0
-    if basin["rain"] >= 0:
-        add_rain(tables, basin, first, rates)
-    limit_infiltration(
-        basin["soil"], soil, present[FACTOR], depth0, dh, y[basin["infiltrated"] + first :][:count], rates
-    )
+        rates[i] = rate
+    if basin["frames"] > 0:
+        add_frames(tables, basin, first, rates)
+    limit_infiltration(basin["soil"], soil, present[FACTOR], depth0, dh, heights, rates)
 
 
 @njit
@@ -124,15 +130,19 @@ def add_sources(tables, b, a, z, y, rates):
     rates : of depth, of both unit flows, and of infiltrated heights (empty without a soil) in all cells, four arrays
     """
     basin = tables.basins[b]
+    rate = uniform_rate(tables, basin)
     for first in range(a, z, CHUNK):
         last = min(first + CHUNK, z)
-        if basin["rain"] >= 0:
-            add_rain(tables, basin, first, rates[0][first:last])
-        if rates[3].size > 0:
-            to_depth, taken = rates[0][first:last], rates[3][first:last]
+        to_depth, taken = rates[0][first:last], rates[3][first:last]
+        if basin["frames"] > 0:
+            add_frames(tables, basin, first, to_depth)
+        if taken.size > 0:
             put_infiltration(tables, basin, first, y, taken)
             for i in range(taken.size):
-                to_depth[i] -= taken[i]
+                to_depth[i] += rate - taken[i]
+        else:
+            for i in range(to_depth.size):
+                to_depth[i] += rate
 
 
 @njit
