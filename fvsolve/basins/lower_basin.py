@@ -197,6 +197,10 @@ class BasinRows:
     def lower_sources(self, draft, row) -> None:
         """Fill the columns of rain and infiltration, and add their states."""
 
+    def mass_in_soil(self, y: np.ndarray) -> float:
+        """Mass of the infiltrated water at the states y of the model [kg]."""
+        return 0.0
+
     def notices(self, y: np.ndarray) -> list[Notice]:
         """Notices on the deviations y of cells at the start of a run."""
         return []
@@ -230,8 +234,6 @@ class BasinRows:
             return "its walls move"
         if self.part.on is not None:
             return "it is on a body"
-        if self.soil is not None:
-            return "its soil takes water"
         if self.scalars and self.is_fifth_order:
             return f"its scalars use the scheme {self.scheme}"
         if self.scalars and self.opening is not None:

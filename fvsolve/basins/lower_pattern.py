@@ -78,14 +78,10 @@ def cells_at_faces(integers: np.ndarray, patch) -> np.ndarray:
     return np.unique([*integers[behind : behind + count], *integers[second : second + count]]).astype(np.int64)
 
 
-def source_pattern(basin, ledger: int) -> tuple[np.ndarray, np.ndarray]:
-    """(rates, states) as indices in y: rates of depth, infiltrated height and ledger, and heights on which they depend.
-
-    ledger : row of the infiltration in the ledger, after the states
-    """
+def source_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
+    """(rates, states) as indices in y: rates of depth and infiltrated height, and heights on which they depend."""
     depth, height = int(basin.row["y"]) + np.arange(basin.n), int(basin.row["infiltrated"]) + np.arange(basin.n)
-    total = np.full(basin.n, ledger)
-    return np.concatenate([depth, height, height, total, total]), np.concatenate([height, depth, height, depth, height])
+    return np.concatenate([depth, height, height]), np.concatenate([height, depth, height])
 
 
 def neighbours(basin) -> csr_array:

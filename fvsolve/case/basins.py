@@ -47,8 +47,15 @@ def closure_faults(basin: Any, options: Any) -> Faults:
         yield (below, key), text
 
 
-def source_faults(basin: Any) -> Faults:
-    """Faults (key path within the basin, message) of rain, infiltration and walls in a basin that moves or deforms."""
+def source_faults(basin: Any, mesh: Any) -> Faults:
+    """Faults (key path within the basin, message) of rain, infiltration and walls in a basin that moves or deforms.
+
+    A series of rain with too many frames is a fault too.
+    """
+    frames = len(getattr(getattr(basin, "rain", None), "frames", ()))
+    if (size := 2 * 8 * frames * len(mesh.cells)) > free_memory():  # copied once
+        text = f"{frames} frames on {len(mesh.cells)} cells take about {byte_text(size)} of memory, and "
+        yield ("rain",), f"{text}{byte_text(free_memory())} are free; expected fewer frames or cells"
     for key in ("rain", "infiltration", "walls"):
         if getattr(basin, key, None) and (basin.on is not None or moving_walls(basin)):
             where = "a basin on a body" if basin.on is not None else "a basin with a moving wall"
@@ -470,7 +477,7 @@ def find_faults(
             for other in sorted(basin.start.model_fields_set - set(own.starts.model_fields)):
                 yield (*key, "start", other), f"does not apply to physics {show(basin.physics)}; leave this key out"
         shapes += [(("scalars", scalar), shape, None) for scalar, shape in basin.scalars.items()]
-        below_faults = [*source_faults(basin), *face_wall_faults(basin, meshes[name])]
+        below_faults = [*source_faults(basin, meshes[name]), *face_wall_faults(basin, meshes[name])]
         yield from (((*key, *below), text) for below, text in below_faults)
         for below, shape, points in shapes:
             try:

@@ -77,5 +77,5 @@ def fields_of(table: Table) -> Iterator[SpatialField]:
 
 
 def _entries(value: Any) -> list[Any]:
-    """Values of a dict; a list of the value itself for other values."""
-    return [*value.values()] if isinstance(value, dict) else [value]
+    """Values of a dict; for others a list of the value itself, or of the field of least values of a series."""
+    return [*value.values()] if isinstance(value, dict) else [getattr(value, "least", value)]

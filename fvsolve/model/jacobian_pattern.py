@@ -80,8 +80,7 @@ class Couplings:
         for basin in self.basins:
             yield pattern.interior_pattern(basin)
             if basin.soil is not None:
-                first = int(self.model.layout["source"] - self.model.layout["supply"])
-                yield pattern.source_pattern(basin, self.size + first + int(basin.row["source"]) + basin.rains)
+                yield pattern.source_pattern(basin)
         yield from self.boundary_pairs()
         yield from self.stored()
         for column in self.columns:

@@ -205,8 +205,7 @@ def read_raster(given: dict[str, Any], dimension: str, range: Range, setting: Re
     dimension, range : of the values. Raises ValueError, or ValueFault with all faults of the table.
     """
     keys = read_keys(given, raster_keys(Quantity(dimension, range)), setting)
-    path = find_file(keys["raster"], setting)
-    pixels = read_pixels(path, keys["band"], keys["variable"]).to_basin(path.name, *setting.frame)
+    stated, name, pixels = open_raster(given, keys, setting)
     values, classes, unit = pixels.values, None, keys["unit"] or pixels.unit
     if keys["table"] is not None:
         classes, values = values, np.full_like(values, np.nan)
@@ -214,5 +213,14 @@ def read_raster(given: dict[str, Any], dimension: str, range: Range, setting: Re
             values[classes == number] = value
     elif unit and (keys["unit"] or dimension != "number"):
         values = units.find(unit, dimension).si(values)
-    stated = {**given, "raster": copy_name(path, setting)}
-    return stated, Raster(path.name, pixels._replace(values=values), keys["outside"] == "hole", classes)
+    return stated, Raster(name, pixels._replace(values=values), keys["outside"] == "hole", classes)
+
+
+def open_raster(given: dict[str, Any], keys: dict[str, Any], setting: ReadContext, series: bool = False) -> tuple:
+    """(table for the resolved case, name of the file, its `Pixels` in the coordinates of the basin that is read).
+
+    given, keys : table of a case file as given and as read; series : True if the file may have several frames
+    """
+    path = find_file(keys["raster"], setting)
+    pixels = read_pixels(path, keys["band"], keys["variable"], series).to_basin(path.name, *setting.frame)
+    return {**given, "raster": copy_name(path, setting)}, path.name, pixels

@@ -13,12 +13,14 @@ import numpy as np
 from fvsolve import units
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.csv_rows import read_text
+from fvsolve.parts.value import check_increasing
 from fvsolve.units import show
 
 MOST_CELLS = 1e8  # of a grid
 SMALL = 0.01  # [m] or degrees: pixels of rasters in degrees are smaller
 HEAD = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "dx", "dy", "nodata_value")
 EVEN = 1e-4  # of the spacing: greatest distance of a coordinate from an even grid
+SINCE = re.compile(r"\s*(s|min|h|d|sec|hr|second|minute|hour|day)s?\s+since\s+(\S.*)", re.IGNORECASE)  # after CF
 AUTHORITY = re.compile(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d+)"?\]')  # in the text of a CRS; the last is its own
 REFERENCE = "expected a raster with coordinates in metres, for example written by GDAL or QGIS"
 
@@ -28,6 +30,7 @@ class Pixels(NamedTuple):
 
     values : float64[ny, nx]  rows from south to north, NaN without data
     x, y : south-west corner [m]; dx, dy : size of a pixel [m]; unit, crs : as stated, "" if unknown
+    times : float64[frames]  of a series of frames since the start of the run [s], with values : float64[frames, ny, nx]
     """
 
     values: np.ndarray
@@ -37,6 +40,7 @@ class Pixels(NamedTuple):
     dy: float
     unit: str = ""
     crs: str = ""
+    times: np.ndarray | None = None
 
     @property
     def hint(self) -> str:
@@ -67,26 +71,27 @@ def import_library(name: str, what: str) -> Any:
         raise ValueError(f'{what} needs {name.partition(".")[0]}: pip install "fvsolve[gis]"') from None
 
 
-def read_pixels(path: Path, band: int = 1, variable: str = "") -> Pixels:
+def read_pixels(path: Path, band: int = 1, variable: str = "", series: bool = False) -> Pixels:
     """Pixels of a file, whose format follows from its first bytes. The last two files are kept.
 
     band : number of the band of a GeoTIFF; variable : name in a NetCDF file, "" for the only one
+    series : True if a variable of a NetCDF file may have several frames
     Raises ValueError if the file is not a raster with metric coordinates and data.
     """
     try:
         stat = path.stat()
-        return _read(path, stat.st_mtime_ns, stat.st_size, band, variable)
+        return _read(path, stat.st_mtime_ns, stat.st_size, band, variable, series)
     except OSError as error:
         raise ValueError(f"{path.name}: {error.strerror or error}") from None
 
 
 @lru_cache(maxsize=2)
-def _read(path: Path, changed: int, size: int, band: int, variable: str) -> Pixels:
+def _read(path: Path, changed: int, size: int, band: int, variable: str, series: bool) -> Pixels:
     """Pixels of a file; changed, size : of the file, which differ for an edited file"""
     with open(path, "rb") as file:
         head = file.read(4)
     if head[:3] == b"CDF" or head == b"\x89HDF":
-        result = read_netcdf(path, variable, head[:3] == b"CDF")
+        result = read_netcdf(path, variable, head[:3] == b"CDF", series)
     elif head[:2] in (b"II", b"MM"):
         result = read_geotiff(path, band)
     else:
@@ -191,8 +196,11 @@ class NetcdfVariable(NamedTuple):
     read: Callable[[], np.ndarray]
 
 
-def read_netcdf(path: Path, name: str, classic: bool) -> Pixels:
-    """Pixels of a variable over x and y; classic : True for NetCDF-3, which needs no extra package"""
+def read_netcdf(path: Path, name: str, classic: bool, series: bool) -> Pixels:
+    """Pixels of a variable over x and y, or over time too for a `series`.
+
+    classic : True for NetCDF-3, which needs no extra package
+    """
     try:
         if classic:
             from scipy.io import netcdf_file
@@ -201,14 +209,14 @@ def read_netcdf(path: Path, name: str, classic: bool) -> Pixels:
                 known = {key: NetcdfVariable(item.dimensions, item.shape, _texts(item._attributes),
                                        lambda item=item: np.ma.filled(np.ma.asarray(item[:], float), np.nan))
                          for key, item in file.variables.items()}  # fmt: skip
-                return _pixels_of(path.name, known, name)
+                return _pixels_of(path.name, known, name, series)
         import_library("h5netcdf", f"{path.name} is a NetCDF-4 file, and NetCDF-4")
         xarray = import_library("xarray", f"{path.name} is a NetCDF-4 file, and NetCDF-4")
         with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
             known = {str(key): NetcdfVariable(item.dims, item.shape, dict(item.attrs),
                                         lambda item=item: np.asarray(item.values, float))
                      for key, item in file.variables.items()}  # fmt: skip
-            return _pixels_of(path.name, known, name)
+            return _pixels_of(path.name, known, name, series)
     except (OSError, TypeError, KeyError, IndexError) as error:
         raise ValueError(f"{path.name} cannot be read as NetCDF: {error}") from None
 
@@ -218,8 +226,11 @@ def _texts(attributes: dict[str, Any]) -> dict[str, Any]:
     return {key: item.decode(errors="replace") if isinstance(item, bytes) else item for key, item in attributes.items()}
 
 
-def _pixels_of(file: str, known: dict[str, NetcdfVariable], name: str) -> Pixels:
-    """Pixels of the variable `name` of a NetCDF file, "" for the only one; known : its variables by name"""
+def _pixels_of(file: str, known: dict[str, NetcdfVariable], name: str, series: bool) -> Pixels:
+    """Pixels of the variable `name` of a NetCDF file, "" for the only one; known : its variables by name
+
+    series : True if the variable may have several frames
+    """
     planes = [key for key, item in known.items() if len(item.dimensions) > 1]
     if name not in known and (name or len(planes) != 1):
         text = f"has no variable {show(name)}{did_you_mean(name, planes)}" if name else f"has {len(planes)} variables"
@@ -231,17 +242,41 @@ def _pixels_of(file: str, known: dict[str, NetcdfVariable], name: str) -> Pixels
         raise ValueError(f"{file} has no georeference: no variables {across} and {along} with coordinates; {REFERENCE}")
     check_count(file, *item.shape[-2:])
     (x, dx), (y, dy) = (_even(file, key, known[key]) for key in (along, across))
-    if np.prod(item.shape[:-2]) != 1:
-        raise ValueError(f"{file}: {name or planes[0]} has {np.prod(item.shape[:-2]):.0f} planes; expected one")
-    values = item.read().reshape(item.shape[-2:])
-    values = (values.T if turned else values)[:: -1 if dy < 0.0 else 1, :: -1 if dx < 0.0 else 1].copy()
+    (*outer, _, _), times = item.shape, None
+    if np.prod(outer) != 1 and not (series and len(outer) == 1 and outer[0]):
+        raise ValueError(f"{file}: {name or planes[0]} has {np.prod(outer):.0f} planes; expected one")
+    if np.prod(outer) != 1:
+        times = _frame_times(file, item.dimensions[0], known)
+    values = item.read().reshape((*outer, *item.shape[-2:])[-3 if times is not None else -2 :])
+    values = values.swapaxes(-1, -2) if turned else values
+    values = values[..., :: -1 if dy < 0.0 else 1, :: -1 if dx < 0.0 else 1].copy()
     holder = known.get(str(item.attributes.get("grid_mapping", "")))
     text = "" if holder is None else str(holder.attributes.get("crs_wkt") or holder.attributes.get("spatial_ref", ""))
     try:
         crs = epsg_code(text)
     except ValueError as error:
         raise ValueError(f"{file} {error}") from None
-    return Pixels(values, x, y, abs(dx), abs(dy), str(item.attributes.get("units", "")), crs)
+    return Pixels(values, x, y, abs(dx), abs(dy), str(item.attributes.get("units", "")), crs, times)
+
+
+def _frame_times(file: str, name: str, known: dict[str, NetcdfVariable]) -> np.ndarray:
+    """Times of frames since the start of the run [s]: as stated "since start", otherwise since the first frame.
+
+    name : of the dimension of time; known : variables of the NetCDF file
+    """
+    if name not in known:
+        raise ValueError(f"{file} has no variable {name}; expected the times of its frames, in seconds since start")
+    unit = str(known[name].attributes.get("units", ""))
+    if (match := SINCE.fullmatch(unit)) is None:
+        text = f'{file}: {name} has the unit {show(unit)}; expected for example "seconds since start"'
+        raise ValueError(f'{text} or "minutes since 2026-01-01"')
+    times = known[name].read()
+    try:
+        check_increasing(times, times.tolist(), "times")
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from None
+    first = 0.0 if match[2].strip().lower() == "start" else times[0]
+    return units.find({"s": "s", "m": "min", "h": "h", "d": "d"}[match[1][0].lower()], "time").si(times - first)
 
 
 def _even(file: str, name: str, item: NetcdfVariable) -> tuple[float, float]:

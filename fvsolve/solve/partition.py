@@ -131,8 +131,9 @@ class Partition:
 
 
 def quantities(model: Model, b: int) -> int:
-    """Number of states in each cell of basin number b, transported scalars included."""
-    return len(model.basins[b].quantities) + len(model.basins[b].scalars)
+    """Number of states in each cell of basin number b, with transported scalars and the height that infiltrated."""
+    basin = model.basins[b]
+    return len(basin.quantities) + len(basin.scalars) + (basin.soil is not None)
 
 
 def row_size(model: Model, b: int) -> int:
@@ -203,7 +204,7 @@ def make_partition(model: Model, count: int) -> Partition:
     return Partition(model, count, basins, np.arange(count + 1) * rows[:, None] // count)
 
 
-READ_ALL_CELLS = ("volume", "wet_area")  # quantities of whole basins
+READ_ALL_CELLS = ("volume", "wet_area", "infiltration", "infiltrated")  # quantities of whole basins
 EXPLICIT_ONLY = "only explicit methods can be distributed over threads"
 
 

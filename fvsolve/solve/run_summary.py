@@ -328,6 +328,10 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     """
     kinds = model.tables.nodes["kind"]
     initial, change = model.contents(y)
+    sources = ((basin, name) for basin in model.basins for name in basin.source_names)
+    for k, (basin, name) in enumerate(sources, len(model.node_names)):
+        if name == "infiltration":  # from its heights, whose sum needs no exchange between threads at every stage
+            ledger[1, k] = -basin.mass_in_soil(y)
     passes = {int(row["node"]) for row in model.tables.patches if row["open"]}
     # nodes with `made_up` and `spilled`
     own = [kind in (rec.TANK, rec.PATCH) and i not in passes for i, kind in enumerate(kinds)]

@@ -87,10 +87,12 @@ def attempt(handle, run, t, h, now, new):
 @njit
 def any_nonzero(values):
     """True if a value is not zero."""
-    for value in values:
-        if value != 0.0:
-            return True
-    return False
+    if values.size > 0 and values[0] != 0.0:
+        return True
+    count = 0
+    for i in range(values.size):  # without an early end, so that it is vectorised
+        count += values[i] != 0.0
+    return count > 0
 
 
 @njit

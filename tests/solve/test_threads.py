@@ -118,6 +118,9 @@ def told(case, threads: int, state=None):
 
 
 AMBIENT = 101325.0
+RAIN = {"rain": {"time": ["0 s", "0.1 s", "0.3 s"], "value": ["0 mm/h", "9 m/h", "1 m/h"]}}
+HORTON = {"model": "horton", "initial": "(6 + x)/3600", "final": "1 m/h", "decay": "5 1/s"}
+GREEN_AMPT = {"model": "green-ampt", "conductivity": "1 m/h", "suction": "9 cm", "deficit": 0.4}
 SCENES = {
     "upwind, euler": water(scheme="upwind", method="euler"),
     "muscl, ssp-rk2": water(),
@@ -140,6 +143,9 @@ SCENES = {
     "a dye in water": dyed(),
     "a dye in water that spreads, upwind": dyed("upwind", diffusivity=1e-3),
     "greatest values": with_maxima(water(), "pool"),
+    "rain and Horton": water(basin=RAIN | {"infiltration": HORTON}),
+    "rain and Green-Ampt, rk4": water(basin=RAIN | {"infiltration": GREEN_AMPT}, method="rk4"),
+    "a mesh, rain and Green-Ampt": water(basin=MESH | RAIN | {"infiltration": GREEN_AMPT}),
     "a dye": carried(),
     "a dye that spreads, upwind": carried("upwind", 1e-3),
     "a mesh": with_maxima(water(basin=MESH), "pool"),
@@ -164,7 +170,7 @@ def test_any_number_of_threads_gives_the_bits_of_one(name):
 
 FORMED = ("muscl, ssp-rk2", "muscl, a limiter of its own, rk4", "upwind5, ssp-rk3", "a tolerance",
           "a tolerance, first same as last", "a liquid", "a liquid between walls", "a liquid, upwind5", "a dye",
-          "walls all around")  # fmt: skip
+          "walls all around", "rain and Horton", "rain and Green-Ampt, rk4")  # fmt: skip
 
 
 @pytest.mark.in_turn

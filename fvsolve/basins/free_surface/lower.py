@@ -11,7 +11,14 @@ from fvsolve.assembly.lowering import Restriction
 from fvsolve.assembly.state_names import Numbered
 from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
-from fvsolve.basins.free_surface import law_patch_face, patch_closures, surface_grid, surface_maxima, surface_mesh
+from fvsolve.basins.free_surface import (
+    law_patch_face,
+    patch_closures,
+    surface_grid,
+    surface_maxima,
+    surface_mesh,
+    water_sources,
+)
 from fvsolve.basins.free_surface.bed_friction import add_friction
 from fvsolve.basins.free_surface.lower_error_checks import error_notices, error_watches
 from fvsolve.basins.free_surface.lower_marks import Marks, chain_texts, lower_marks, marks_of
@@ -23,7 +30,9 @@ from fvsolve.case.basins import patch_names
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import RhsTerms
+from fvsolve.parts.field_series import SpatialSeries
 from fvsolve.parts.formula import SpatialField, means, samples
+from fvsolve.parts.schedule import Schedule
 
 FILLING_DEPTH = 0.1  # depth of water that flows into dry cells, for the first step [m]
 PACKAGE = __package__
@@ -42,7 +51,6 @@ DRIVEN_TERMS = RhsTerms(
 )
 DEPTH_SCALE = 0.1  # [m] of depth
 HEIGHT_SCALE = 1e-3  # [m] of rain and infiltrated water
-SOILS = {"constant": rec.CONSTANT_RATE, "horton": rec.HORTON, "green-ampt": rec.GREEN_AMPT}
 ROUNDING = 1e-12  # depth over levels and beds below which there is no water
 TINY = 1e-300
 CLOSURES = {  # key of a driven patch, or word of its key `boundary` -> code
@@ -51,6 +59,22 @@ CLOSURES = {  # key of a driven patch, or word of its key `boundary` -> code
 }  # fmt: skip
 COURANT_FACTOR = 2.0  # Courant numbers of water refer to half cells, so that no depth falls below zero at 1,
 SHORE_COURANT_FACTOR = 6.0  # and to sixths of cells under fifth order with a shore
+
+
+def soil_numbers(model: str, fields: list[np.ndarray]) -> tuple[int, np.ndarray]:
+    """(code of a soil, its numbers : float64[rows, cells]) as `water_sources.limit_infiltration` reads them.
+
+    fields : values of the keys of its model in cells. The numbers of a uniform soil are those of CHUNK cells.
+    """
+    if all(np.ptp(values) == 0.0 for values in fields):
+        fields = [np.full(water_sources.CHUNK, values[0]) for values in fields]
+    if model == "constant":
+        return rec.CONSTANT_RATE, np.array(fields)
+    if model == "green-ampt":
+        conductivity, suction, deficit = fields
+        return rec.GREEN_AMPT, np.array([conductivity, conductivity * suction * deficit])
+    initial, final, decay = fields
+    return rec.HORTON if np.ptp(decay) == 0.0 else rec.HORTON_FIELDS, np.array([final, initial - final, decay])
 
 
 def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
@@ -157,16 +181,29 @@ class FreeSurfaceRows(RowsWithFriction):
         return self.part.infiltration
 
     def lower_sources(self, draft, row) -> None:
-        row["present_rain"], row["source"] = draft.to_work(1), draft.sources
-        if self.rains:
-            row["rain"] = draft.schedules.add(self.part.rain)
-            row["rained"] = draft.states(Numbered(f"{self.name}.rained", 1), HEIGHT_SCALE)
-        if self.soil is not None:
-            row["soil"] = SOILS[self.soil.model]
-            row["soil_numbers"] = draft.to_plane(np.array([self.formula(shape) for shape in self.soil.numbers]))
+        row["present"], row["source"] = draft.to_work(water_sources.PRESENT_NUMBERS), draft.sources
+        if self.soil is not None:  # right after the states of cells
+            row["soil"], numbers = soil_numbers(self.soil.model, [self.formula(shape) for shape in self.soil.shapes])
+            row["soil_numbers"], row["soil_row"] = draft.to_plane(numbers), numbers.shape[1]
             row["soil_work"] = draft.to_work(self.n)
             row["infiltrated"] = draft.states(Numbered(f"{self.name}.infiltrated", self.n), HEIGHT_SCALE)
+        rain = self.part.rain
+        if self.rains:
+            if isinstance(rain, SpatialSeries):
+                frames, times = rain.over(self.mesh), rain.times + self.case.numerics.start
+                row["frames"], row["frame_rates"] = len(frames), draft.to_plane(frames)
+                kind = "linear" if len(frames) > 1 else "constant"
+                row["frame_position"] = draft.schedules.add(Schedule(kind, times, np.arange(len(frames))))
+                breaks = draft.schedules.breaks
+                breaks |= {t: breaks.get(t, False) for t in times.tolist()}  # slopes in cells change at all frames
+                rain = Schedule(kind, times, frames @ self.mesh.area / self.mesh.area.sum())
+            row["rain"] = draft.schedules.add(rain)
+            row["rained"] = draft.states(Numbered(f"{self.name}.rained", 1), HEIGHT_SCALE)
         draft.sources += len(self.source_names)
+
+    def mass_in_soil(self, y: np.ndarray) -> float:
+        at = int(self.row["infiltrated"])
+        return float(self.mass_per_depth() @ y[at : at + self.n])
 
     def lower_patch(self, draft, patch: str, row) -> None:
         super().lower_patch(draft, patch, row)

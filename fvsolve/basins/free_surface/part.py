@@ -6,9 +6,10 @@ import numpy as np
 
 from fvsolve.errors import listing
 from fvsolve.parts.basin import MANNING_RANGE, VELOCITY_FIELDS, Physics, PointList, VelocityStart
+from fvsolve.parts.field_series import ScheduledField, SpatialSeries
 from fvsolve.parts.formula import NumberOrField, SpatialField, SpatialFieldKey, samples
 from fvsolve.parts.nodes_and_links import TwoPort
-from fvsolve.parts.schedule import Schedule, Scheduled
+from fvsolve.parts.schedule import Schedule
 from fvsolve.parts.table_model import NamedTables, Nested, Table
 from fvsolve.parts.value import (
     SHAPE,
@@ -79,9 +80,9 @@ class Infiltration(Table):
         return SOIL_KEYS[self.model]
 
     @property
-    def numbers(self) -> list[SpatialField | None]:
-        """Fields of its three numbers, None for those that its model does not have."""
-        return [*(getattr(self, key) for key in self.fields), None, None][:3]
+    def shapes(self) -> list[SpatialField]:
+        """Fields of the numbers of its model."""
+        return [getattr(self, key) for key in self.fields]
 
 
 class FaceWall(Table):
@@ -171,9 +172,9 @@ class FreeSurface(Physics, name="free-surface"):
     ] = None  # fmt: skip
 
     rain: Annotated[
-        Schedule | None,
-        Scheduled(
-            "rainfall", nonnegative, "rate of rain on the whole basin [m/s]; default: none",
+        Schedule | SpatialSeries | None,
+        ScheduledField(
+            "rainfall", nonnegative, "rate of rain on the basin [m/s]; default: none",
             UsualRange(1e-9, 500 / 3.6e6, "drizzle to cloudburst"), needs_unit=True,
         ),
     ] = None  # fmt: skip
@@ -189,10 +190,12 @@ class FreeSurface(Physics, name="free-surface"):
         yield from super().formulas(basin, mesh)
         for key in basin.infiltration.fields if basin.infiltration is not None else ():
             yield ("infiltration", key), getattr(basin.infiltration, key), None
+        if isinstance(basin.rain, SpatialSeries):
+            yield ("rain",), basin.rain.least, None
 
     @classmethod
     def value_faults(cls, basin, place, shape, mesh):
-        if place[0] not in ("infiltration", "manning") or shape is None:
+        if place[0] not in ("infiltration", "manning", "rain") or shape is None:
             return
         values, greatest = samples(shape, mesh), 1.0 if place[-1] == "deficit" else np.inf
         if not (values.min() >= 0.0 and values.max() <= greatest):

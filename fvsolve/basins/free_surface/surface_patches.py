@@ -17,7 +17,7 @@ from fvsolve.basins.free_surface.patch_closures import (
     read_faces_around,
 )
 from fvsolve.basins.free_surface.surface_rows import THIN
-from fvsolve.basins.free_surface.water_sources import infiltrate, rain_rate, sum_of_products
+from fvsolve.basins.free_surface.water_sources import infiltration, rain_rate, sum_of_products
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import CELL_FIELD, GN, INTERIOR, LINKED, NO_SOIL, PATCH, RATE
 from fvsolve.kernels.restrictions import head_drop
@@ -247,7 +247,7 @@ def total_of_basin(tables, basin, quantity, t, y):
         return y[basin["rained"]] * basin["total_area"] if basin["rain"] >= 0 else 0.0
     total, n, soaks = 0.0, basin["n"], basin["soil"] != NO_SOIL
     if quantity == INFILTRATION:
-        return infiltrate(tables, basin, t, y, tables.work[basin["soil_work"] :][:n]) if soaks else 0.0
+        return infiltration(tables, basin, t, y) if soaks else 0.0
     if quantity == INFILTRATED:
         area, first = tables.plane[basin["area"] : basin["area"] + n], basin["infiltrated"]
         return sum_of_products(y[first : first + n], area) if soaks else 0.0

@@ -11,7 +11,7 @@ from fvsolve.basins.free_surface.bed_friction import add_capped_friction, add_fr
 from fvsolve.basins.free_surface.marked_faces import marked_faces, no_marks
 from fvsolve.basins.free_surface.patch_closures import driven_faces
 from fvsolve.basins.free_surface.surface_rows import GHOSTS, MAX_COLUMNS
-from fvsolve.basins.free_surface.water_sources import DRAIN_TIME, add_infiltration, add_rain, begin_rain
+from fvsolve.basins.free_surface.water_sources import DRAIN_TIME, add_sources, begin_sources, has_sources
 from fvsolve.basins.moving_meshes import mesh_motion
 from fvsolve.basins.moving_walls import grid_motion
 from fvsolve.jit import njit, specialise
@@ -52,7 +52,7 @@ def flows_of(values, first, n, a, z):
 def add_bed_friction(tables, b, a, z, y, rates, out):
     """Add bed friction to the rates of cells `a` to `z` - 1 of basin b; capped friction also limits the time step.
 
-    rates : rates of the three states of all cells of the basin, three arrays
+    rates : rates of the three states of all cells of the basin, and of infiltrated heights, four arrays
     """
     basin = tables.basins[b]
     n, o, seen = basin["n"], basin["y"], deviations_of(basin, tables.seen, y)
@@ -86,11 +86,18 @@ def damp_stages(h, y, rates, quick, handle):
             )  # fmt: skip
 
 
+@njit(forceinline=True)
+def quantities_of(basin):
+    """Number of states of a cell: three, and the infiltrated height of a soil, which follows them."""
+    return 3 + (basin["soil"] != NO_SOIL)
+
+
 @njit
 def finish_block(tables, b, row, block_stop, first, last, y, rates, out):
-    """Add bed friction to the rates of a block: columns `first` to `last` - 1 of rows `row` to `block_stop` - 1.
+    """Add bed friction, rain and infiltration to the rates of a block, and finish the sums of stages there.
 
-    Then form the state at the end of the step in these cells, or check that it is finite, as `tables.sums` requests.
+    It is columns `first` to `last` - 1 of rows `row` to `block_stop` - 1. The sums are the state at the end of the step
+    in these cells, or check that it is finite, as `tables.sums` requests.
     b : number of the basin; rates : as for `add_bed_friction`
     """
     basin, sums, nx = tables.basins[b], tables.sums, tables.basins[b]["nx"]
@@ -99,12 +106,12 @@ def finish_block(tables, b, row, block_stop, first, last, y, rates, out):
             add_bed_friction(tables, b, nx * row, nx * block_stop, y, rates, out)
         for j in range(row, block_stop if last - first < nx else row):
             add_bed_friction(tables, b, nx * j + first, nx * j + last, y, rates, out)
-    if basin["rain"] >= 0:
+    if has_sources(basin):
         if first == 0 and last == nx:
-            add_rain(tables, basin, rates[0][nx * row : nx * block_stop])
+            add_sources(tables, b, nx * row, nx * block_stop, y, rates)
         for j in range(row, block_stop if last - first < nx else row):
-            add_rain(tables, basin, rates[0][nx * j + first : nx * j + last])
-    for q in range(3):
+            add_sources(tables, b, nx * j + first, nx * j + last, y, rates)
+    for q in range(quantities_of(basin)):
         at = basin["y"] + q * basin["n"]
         if sums[sums_of.MODE] == sums_of.CHECK:
             sums_of.check_rows(sums, y, at, nx, row, block_stop, first, last)
@@ -129,7 +136,7 @@ def by_blocks(tables, b, grid, states, flows, work, y, rates, out, faces):
         for row in range(begin, stop, rows):
             block_stop = min(row + rows, stop)
             ahead = min(block_stop + surface_grid.REACH, stop)
-            for q in range(3 if sums[sums_of.MODE] != sums_of.CHECK else 0):
+            for q in range(quantities_of(basin) if sums[sums_of.MODE] != sums_of.CHECK else 0):
                 sums_of.form_rows(sums, False, basin["y"] + q * n, nx, formed_ahead, ahead, left, right)
             formed_ahead = ahead
             fresh = row == begin
@@ -155,9 +162,14 @@ def grid_of(tables, basin, marks):
 
 @njit(forceinline=True)
 def rates_of(tables, basin, dydt):
-    """Arrays for the rates of the three states of a basin: in `dydt` or, if that is empty, in `tables.work`."""
+    """Arrays for the rates of the three states of a basin: in `dydt` or, if that is empty, in `tables.work`.
+
+    The fourth array is for the rates of infiltrated heights in `dydt`; it is empty without a soil.
+    """
     n, (to, first) = basin["n"], (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["boundary_rates"])
-    return to[first : first + n], to[first + n : first + 2 * n], to[first + 2 * n : first + 3 * n]
+    soaks = n if basin["soil"] != NO_SOIL and dydt.size > 0 else 0
+    taken = to[first + 3 * n : first + 3 * n + soaks]
+    return to[first : first + n], to[first + n : first + 2 * n], to[first + 2 * n : first + 3 * n], taken
 
 
 @njit
@@ -183,18 +195,12 @@ def grid_rates(tables, b, y, rates, out, moves, faces, marks):
     rate = surface_grid.grid_rates(grid, begin, stop, states, flows, scratch, rates, moves, faces)
     if f >= 0:
         through_faces(begin, stop, grid.kx, grid.ky, flow_x, flow_y)
-    if basin["friction"] != NO_DRAG:
-        a, z = band_cells(tables, b)
-        add_bed_friction(tables, b, a, z, y, rates, out)
-    add_rain_to_band(tables, b, rates)
-    return rate
-
-
-@njit
-def add_rain_to_band(tables, b, rates):
-    """Add the rate of rain to the rates of depth of the cells of basin b that this thread computes."""
     a, z = band_cells(tables, b)
-    add_rain(tables, tables.basins[b], rates[0][a:z])
+    if basin["friction"] != NO_DRAG:
+        add_bed_friction(tables, b, a, z, y, rates, out)
+    if has_sources(basin):
+        add_sources(tables, b, a, z, y, rates)
+    return rate
 
 
 @njit
@@ -215,10 +221,11 @@ def mesh_rates(tables, b, y, rates, out, moves, faces, marks):
     passing, scratch = work[max(through, 0) :][: basin["outer_given"] if through >= 0 else 0], work[basin["work"] :]
     band, reflect = band_cells(tables, b), grid.reflect
     rate = water_mesh_rates(water, floats, integers, reflect, states, flow, passing, scratch, rates, band, moves, None)
+    a, z = band
     if basin["friction"] != NO_DRAG:
-        a, z = band
         add_bed_friction(tables, b, a, z, y, rates, out)
-    add_rain_to_band(tables, b, rates)
+    if has_sources(basin):
+        add_sources(tables, b, a, z, y, rates)
     return rate
 
 
@@ -250,7 +257,7 @@ def _rates(t, y, dydt, out, handle):
             continue
         if (basin["driven"] >= 0) != DRIVEN or (basin["marked"] >= 0) != MARKED:
             continue
-        begin_rain(tables, basin, t, dydt, out)
+        begin_sources(tables, basin, t, dydt, out)
         if MOVING or needs_rates(basin, dydt):
             rate = CELLS(
                 tables, b, y, rates_of(tables, basin, dydt), out, MOTION(tables, basin), FACES(tables, basin),
@@ -258,7 +265,6 @@ def _rates(t, y, dydt, out, handle):
             )  # fmt: skip
             put_open_flows(tables, b, tables.settings[0]["rho"], out)
             if basin["soil"] != NO_SOIL:  # steps keep all depths above 0
-                add_infiltration(tables, basin, t, y, dydt, out)
                 rate += 1.0 / (basin["unsplit"] * DRAIN_TIME)
             out[RATE] = max(out[RATE], basin["unsplit"] * rate)
 
