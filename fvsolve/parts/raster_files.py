@@ -20,6 +20,9 @@ SMALL = 0.01  # [m] or degrees: pixels of rasters in degrees are smaller
 HEAD = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "dx", "dy", "nodata_value")
 EVEN = 1e-4  # of the spacing: greatest distance of a coordinate from an even grid
 AUTHORITY = re.compile(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d+)"?\]')  # in the text of a CRS; the last is its own
+IN_DEGREES = {
+    f"EPSG:{n}" for n in (4171, 4258, 4267, 4269, 4283, 4326, 4490, 4674, 4979, 7844)
+}  # usual ones, by number
 REFERENCE = "expected a raster with coordinates in metres, for example written by GDAL or QGIS"
 
 
@@ -107,7 +110,7 @@ def check_count(name: str, nx: float, ny: float) -> None:
 
 def epsg_code(text: str) -> str:
     """Code such as "EPSG:32633" of the text of a CRS (WKT or code), "" if none. Raises ValueError for degrees."""
-    if text.lstrip().startswith(("GEOGCS", "GEOGCRS")):
+    if text.lstrip().startswith(("GEOGCS", "GEOGCRS")) or text in IN_DEGREES:
         raise ValueError(f"is in degrees; {REFERENCE}")
     if text.startswith("EPSG:"):
         return text
