@@ -94,10 +94,12 @@ def _port_faults(
 def _island_faults(groups: list[list[str]], nodes: dict[str, Any], places: dict[str, Any], held: set[str]) -> Faults:
     """Faults of several islands (groups of connected names), and of islands in which nothing fixes the pressure.
 
+    Islands with a basin may be separate: a reach has its own boundaries.
     places : names that links can join -> domain; held : places at which a link fixes the pressure
     """
     groups = [island for island in groups if not is_apart({places[name] for name in island})]
-    if len(groups) > 1:
+    in_basins = {place for name, node in nodes.items() for place in own_places(name, node) or ()}
+    if len(groups) > 1 and sum(in_basins.isdisjoint(island) for island in groups) > 1:
         sizes = " | ".join(listing(island, 6) for island in groups)
         text = f"disconnected network of {len(groups)} parts: {sizes}"
         yield ("links",), f"{text}; join these parts, or write a case for each part"

@@ -18,6 +18,7 @@ from fvsolve.parts.csv_rows import copy_name, find_file
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey, uniform
 from fvsolve.parts.kinds import Kinds
 from fvsolve.parts.nodes_and_links import Node, PlaceOnBody
+from fvsolve.parts.raster_files import IN_DEGREES
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table_model import NamedTables, Nested, Table
 from fvsolve.parts.value import (
@@ -281,6 +282,8 @@ class ReferenceSystem(Text):
     def read(self, given: Any, setting: ReadContext) -> str:
         if re.fullmatch(r"EPSG:\d+", text := super().read(given, setting)) is None:
             raise ValueError(f'{show(given)} is not a coordinate reference system; expected for example "EPSG:32633"')
+        if text in IN_DEGREES:
+            raise ValueError(f'{show(given)} is in degrees; expected a system in metres, for example "EPSG:32633"')
         return text
 
 

@@ -22,6 +22,9 @@ HEAD = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "c
 EVEN = 1e-4  # of the spacing: greatest distance of a coordinate from an even grid
 SINCE = re.compile(r"\s*(s|min|h|d|sec|hr|second|minute|hour|day)s?\s+since\s+(\S.*)", re.IGNORECASE)  # after CF
 AUTHORITY = re.compile(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d+)"?\]')  # in the text of a CRS; the last is its own
+IN_DEGREES = {
+    f"EPSG:{n}" for n in (4171, 4258, 4267, 4269, 4283, 4326, 4490, 4674, 4979, 7844)
+}  # usual ones, by number
 REFERENCE = "expected a raster with coordinates in metres, for example written by GDAL or QGIS"
 
 
@@ -112,7 +115,7 @@ def check_count(name: str, nx: float, ny: float) -> None:
 
 def epsg_code(text: str) -> str:
     """Code such as "EPSG:32633" of the text of a CRS (WKT or code), "" if none. Raises ValueError for degrees."""
-    if text.lstrip().startswith(("GEOGCS", "GEOGCRS")):
+    if text.lstrip().startswith(("GEOGCS", "GEOGCRS")) or text in IN_DEGREES:
         raise ValueError(f"is in degrees; {REFERENCE}")
     if text.startswith("EPSG:"):
         return text

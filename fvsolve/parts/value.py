@@ -410,4 +410,4 @@ def check_increasing(values: Any, given: Any, noun: str = "values") -> None:
     for before, after, text_before, text_after in zip(values, values[1:], given, given[1:], strict=False):
         if not after > before:
             wrong = f"{show(text_after)} comes after {show(text_before)}"
-            raise ValueError(f"{noun} out of order: {wrong}; expected rising {noun}")
+            raise ValueError(f"{noun} out of order: {wrong}; expected rising {noun.split(': ')[-1]}")

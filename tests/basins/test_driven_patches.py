@@ -425,3 +425,19 @@ def test_a_file_of_a_stage_states_its_unit(tmp_path):
     stage = {"file": str(tmp_path / "tide.csv"), "unit": "cm"}
     case = fvsolve.load(reach({"up": {"side": "west", "stage": stage}}))
     assert case.nodes["reach"].patches["up"].stage.value.tolist() == [1.0, 1.2]
+
+
+def test_a_rating_may_begin_where_the_bed_meets_the_outline():
+    """The mean bed of the last cell, 2.5 mm, lies above the outline, where the rating begins."""
+    rating = {"level": [0, 1, 2], "flow": [0, 12, 40]}
+    keys = {"level": 0.0, "bed": "0.001*x", "size": (500.0, 2.0), "numerics": {"scheme": "muscl"}, "end": 20.0}
+    result = fvsolve.run(reach({"up": {"side": "west", "rating": rating}}, rain=1e-4, probes=["reach.up.flow"], **keys))
+    assert result.ok and result["reach.up.flow"][-1] < 0.0
+
+
+def test_two_reaches_without_a_link_between_them_are_one_case():
+    data = reach({"up": {"side": "west", "discharge": 1.0}}, end=2.0, cells=(20, 2), probes=["reach.volume"])
+    alone = fvsolve.run(fvsolve.load(data))
+    data["nodes"]["other"] = data["nodes"]["reach"] | {"patches": {"sea": {"side": "west", "stage": 0.9 * DEEP}}}
+    both = fvsolve.run(fvsolve.load(data))
+    assert both.ok and both["reach.volume"] == approx(alone["reach.volume"], rel=1e-12)

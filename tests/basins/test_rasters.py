@@ -225,6 +225,7 @@ def test_faults_of_rasters_name_place_and_remedy(tmp_path):
         "has the CRS EPSG:32633, and the basin EPSG:25832": pond(
             {"raster": str(netcdf(tmp_path / "utm.nc", values))}, crs="EPSG:25832"),
         '"UTM 33" is not a coordinate reference system': pond(0.0, crs="UTM 33"),
+        '"EPSG:4326" is in degrees': pond(0.0, crs="EPSG:4326"),
         "cell is missing": pond({"raster": str(path)}, **none, mesh={"raster": str(path)}),
         "measures 10 m by 6 m; expected smaller cells": pond(0.0, **none, mesh={"raster": str(path), "cell": 20.0}),
         "file and raster are given": pond(0.0, **none, mesh={"raster": str(path), "file": "a.msh"}),

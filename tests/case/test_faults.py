@@ -425,7 +425,7 @@ BAD = {
     ),
     "schedule file, out of order": (
         opening('{ file = "back.csv" }'),
-        "back.csv: times out of order: 0.0 comes after 1.0",
+        "back.csv: times out of order: 0.0 comes after 1.0; expected rising times",
     ),
     "schedule file, out of range": (opening('{ file = "wide.csv" }'), "opening.file: 2.0 is out of range"),
     "schedule file, not text": (opening('{ file = "noise.csv" }'), "noise.csv is not UTF-8 or UTF-16 text"),

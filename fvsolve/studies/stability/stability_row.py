@@ -146,11 +146,11 @@ def field_of_values(e: np.ndarray) -> np.ndarray:
     """
     from scipy.linalg import eigh
 
-    n = e.shape[0]
     points = []
     for angle in np.linspace(0.0, np.pi, TANGENTS):
         rotated = np.exp(-1j * angle) * e
-        x = eigh(0.5 * (rotated + rotated.conj().T), subset_by_index=[n - 1, n - 1], check_finite=False)[1][:, 0]
+        hermitian = 0.5 * (rotated + rotated.conj().T)  # LAPACK's search for one value can lose a multiple eigenvalue
+        x = eigh(hermitian, check_finite=False, driver="evd")[1][:, -1]
         points.append(np.vdot(x, e @ x))
     upper = np.array(points)
     corners = np.concatenate([upper, upper[::-1].conj()])
