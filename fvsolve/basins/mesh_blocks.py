@@ -9,7 +9,7 @@ reflect : float64[b]  reflection coefficients of boundary faces, 1 for walls; em
 flow : float64[f]  flows through faces, left to right, or empty; through : float64[b]  inward flows through the
 boundary, or empty; n cells, f faces, b boundary faces
 cells, sides : values of cells and at their sides from inside, in the ring of `cell_sides`, a row for each field;
-`cells` also has a row of wave speeds. Under UPWIND both are the same array
+`cells` also has a row of wave speeds, and one of the bed for water. Under UPWIND both are the same array
 shown : values beyond boundary sides, from which gradients in cells are computed, b for each of EQUATION.SHOWN fields
 first, last : first boundary side of a block or side, and first one after it
 w : scratch of a block, rows of BLOCK; the first rows are the values beyond a side
@@ -68,7 +68,7 @@ def open_mesh(floats, integers):
 
 def work_size(equation, integers):
     """Length of the work array of the rates on a mesh. equation : module EQUATION; integers : mesh, see `cell_sides`"""
-    cells = (5 * equation.FIELDS + 1) * integers[4] * BLOCK
+    cells = (4 * equation.FIELDS + equation.ROWS_OF_CELLS) * integers[4] * BLOCK
     return cells + equation.SHOWN * integers[3] + equation.ROWS * BLOCK
 
 
@@ -107,7 +107,8 @@ def mesh_rates(fluid, floats, integers, reflect, states, flow, through, work, ra
     band : first of these cells, at the start of a block, and one beyond the last, at the end of a block
     """
     mesh, fields, near = open_mesh(floats, integers), EQUATION.FIELDS, integers[4] * BLOCK
-    cells, rest = work[: (fields + 1) * near].reshape((fields + 1, near)), work[(fields + 1) * near :]
+    count = EQUATION.ROWS_OF_CELLS
+    cells, rest = work[: count * near].reshape((count, near)), work[count * near :]
     sides, rest = rest[: 4 * fields * near].reshape((fields, 4 * near)), rest[4 * fields * near :]
     shown, w = rest[: EQUATION.SHOWN * mesh.edges.size], rest[EQUATION.SHOWN * mesh.edges.size :]
     begin, stop, first_order, most = band[0] // BLOCK, blocks_of(band[1]), fluid.scheme == UPWIND, 0.0

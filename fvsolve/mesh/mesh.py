@@ -76,6 +76,15 @@ class Mesh:
         first, last = np.searchsorted(-self.right, [k + 1, k + 2])  # -right of inner faces is 0 or less, in any order
         return slice(int(first), int(last))
 
+    def faces_beside(self, name: str) -> np.ndarray:
+        """Numbers in a patch of the faces before and after each of its faces, or of itself at ends : int64[2, count]."""
+        starts, stops = self.ends[self.patch(name)].T
+        numbers, at_start, at_stop = np.arange(starts.size), np.argsort(starts), np.argsort(stops)
+        before = at_stop[np.searchsorted(stops[at_stop], starts).clip(max=starts.size - 1)]
+        after = at_start[np.searchsorted(starts[at_start], stops).clip(max=starts.size - 1)]
+        ends = (stops[before] == starts, before), (starts[after] == stops, after)
+        return np.array([np.where(joined, other, numbers) for joined, other in ends])
+
     def faces(self, name: str) -> "PatchFaces":
         """Faces of a patch: on the boundary, or around an interior patch."""
         if name not in self.interior:

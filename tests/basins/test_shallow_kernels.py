@@ -155,9 +155,11 @@ def test_flows_through_faces_are_what_depth_changes_by_and_none_pass_a_wall(sche
     assert found == approx(out[0], abs=1e-13 * abs(out[0]).max())
 
 
-@pytest.mark.parametrize(("scheme", "courant"), [("upwind", 0.5), ("muscl", 0.5), ("upwind5", 0.16), ("weno5", 0.16)])
-def test_no_depth_falls_below_zero_over_a_random_bed(scheme, courant):
-    rng = np.random.default_rng(2)
+@pytest.mark.parametrize(("scheme", "courant"), [("upwind", 0.5), ("muscl", 0.45), ("upwind5", 0.16), ("weno5", 0.16)])
+@pytest.mark.parametrize("seed", range(1, 5))
+def test_no_depth_falls_below_zero_over_a_random_bed(scheme, courant, seed):
+    """With `muscl` and the limit itself, 0.5, a quarter of all random fields reach -5e-6 m: bounds mix two cells."""
+    rng = np.random.default_rng(seed)
     for limiter in range(MONOTONIZED_CENTRAL + 1):
         water = Water(even(24, 2.0), even(20, 2.0), rng.random((20, 24)), level=0.3, scheme=scheme, limiter=limiter)
         h = np.where(rng.random((20, 24)) < 0.5, 0.0, rng.random((20, 24)) ** 3)

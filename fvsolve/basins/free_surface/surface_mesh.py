@@ -3,7 +3,7 @@
 The scheme is the same as on a grid (`surface_grid`), but with least-squares gradients and a common limiter for all
 sides of a cell. Pressures at sides are relative to the pressure in the cell, and the force of the bed to the surface
 of the cell. So every term is zero where the surface is level: a lake at rest stays at rest, with dry islands too.
-Cells have depth, surface, both velocities and wave speed.
+Cells have depth, surface, both velocities, wave speed and bed; depths at sides are limited surface minus limited bed.
 """
 
 from math import sqrt
@@ -21,7 +21,7 @@ from fvsolve.basins.mesh_blocks import own_sides
 from fvsolve.jit import inline, njit
 
 DEPTH, SURFACE = 0, 1  # rows of plan: depth of the profile, its surface above the level
-FIELDS, SHOWN = 4, 2  # see `mesh_blocks`
+FIELDS, ROWS_OF_CELLS, SHOWN = 4, 6, 2  # see `mesh_blocks`
 
 # Rows of BLOCK in the scratch of a block: values beyond, rates, sums for the step, flow through the side.
 _E, _U, _V, _C, _RH, _RX, _RY, _FAST, _OUTFLOW, MASS = (k * BLOCK for k in range(1, 11))
@@ -62,6 +62,8 @@ def put_cells(water, mesh, j, states, cells, phi):
     a, z, o, (dh, qx, qy), plan = j * BLOCK, min((j + 1) * BLOCK, mesh.n), (j % mesh.ring) * BLOCK, states, water.plan
     h, e, u, v, c = cells[0, o:], cells[1, o:], cells[2, o:], cells[3, o:], cells[4, o:]
     put_primitives(water.g, plan[DEPTH, a:z], plan[SURFACE, a:z], dh[a:z], qx[a:z], qy[a:z], h, e, u, v, c)
+    for i in range(z - a):
+        cells[5, o + i] = plan[SURFACE, a + i] - plan[DEPTH, a + i]
 
 
 @njit
@@ -89,9 +91,10 @@ def put_sides(water, mesh, j, first, last, reflect, cells, sides, shown, w, move
         shown[q], shown[b + q] = mirrored_velocity(mesh, q, reflect, cells[2, i], cells[3, i], moves)
     o, shore, su, sv = (j % mesh.ring) * BLOCK, w[_SHORE:], shown[first:], shown[b + first :]
     h, e, c = cells[0], cells[1], cells[4, o:]
-    limited_sides(j, floats, integers, h, wide_by, h[o:], su, edges[:0], w, sides[0])  # limits: zero to twice the depth
     put_shores(h[o:], shore)
+    limited_sides(j, floats, integers, cells[5], wide_by, shore, su, edges[:0], w, sides[0])
     limited_sides(j, floats, integers, e, wide_by, shore, su, edges[:0], w, sides[1])
+    put_depths(mesh.slots, h[o:], sides[0, 4 * o :], sides[1, 4 * o :])
     # Velocities differ by no more than the wave speed: next to a thin fast cell, a linear field would reverse the flow.
     limited_sides(j, floats, integers, cells[2], wide_by, c, su, edges, w, sides[2])
     limited_sides(j, floats, integers, cells[3], wide_by, c, sv, edges, w, sides[3])
@@ -254,6 +257,15 @@ def close_marked(g, marks, row, centre, inside, geo, w):
             w[MASS + i] = mass
         if marks.number[m] >= 0:
             marks.flows[k] = w[MASS + i]
+
+
+@njit
+def put_depths(slots, h, depth, surface):
+    """Replace the bed at the sides of a block by the depth there: from zero to twice the depth h of the cell."""
+    for k in range(slots):
+        d, e = depth[k * BLOCK :], surface[k * BLOCK :]
+        for i in range(BLOCK):
+            d[i] = min(max(e[i] - d[i], 0.0), 2.0 * h[i])
 
 
 @njit

@@ -6,8 +6,8 @@ five quantities at the faces before and after a cell, and depth times the rise o
 There are fluxes of depth, of normal momentum minus the pressure on the side before and on the side after, and of
 tangential momentum.
 
-In fifth order, where the water is deep enough, depth h, surface e and unit flows are reconstructed from cell means;
-velocities are unit flows over depth. The integral of h de/dx over a cell is exact for cubics: that of the parabolas
+In fifth order, where the water is deep enough, bed, surface e and unit flows are reconstructed from cell means; the
+depth h is surface minus bed, and velocities are unit flows over depth. The integral of h de/dx over a cell is exact for cubics: that of the parabolas
 through both face values and the mean, plus the products of third differences with second differences.
 """
 
@@ -15,7 +15,7 @@ from math import sqrt
 
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import UPWIND, WENO5
-from fvsolve.kernels.reconstruction import by_limiter, half_slopes, value_weno5
+from fvsolve.kernels.reconstruction import by_limiter, half_slopes, slope, value_weno5
 
 THIN = 1e-6  # depth below which velocities fade to zero [m]
 TINY = 1e-300
@@ -167,10 +167,18 @@ def put_side(i, hl, el, ul, vl, hr, er, ur, vr, push, sides):
 
 @inline
 def put_sloped(limiter, n, before, here, after, sides):
-    """Write the values at both faces of n cells with slopes by a limiter function; arguments as for `put_limited`."""
+    """Write the values at both faces of n cells with slopes by a limiter function; arguments as for `put_limited`.
+
+    The slope of the depth is that of the surface minus that of the bed, up to a change by h / 16 to a side. From h / 8
+    on it is that of the depths; in between it is interpolated.
+    """
     for i in range(n):
         h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
-        a, b = half_slopes(limiter, h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e)
+        below, above, low, high = h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e
+        bed, b = half_slopes(limiter, low - below, high - above, low, high)
+        own = 0.5 * slope(limiter, below, above)
+        share = min(max(2.0 - 16.0 * abs(b - bed) / (h + TINY), 0.0), 1.0)
+        a = own + share * (b - bed - own)
         c, d = half_slopes(
             limiter, u - before[i + EAST], after[i + EAST] - u, v - before[i + NORTH], after[i + NORTH] - v
         )
@@ -228,6 +236,19 @@ def put_fifth(scheme, p, q, r, s, t, deep, low, high):
 
 
 @njit
+def put_depths(scheme, p, q, r, s, t, deep, low, high):
+    """Write the depth at both faces where `deep` is 1: surface minus fifth-order bed; arguments as for `put_push`."""
+    for i in range(deep.size):
+        j = i + SURFACE
+        a, b, c, d, e = p[j] - p[i], q[j] - q[i], r[j] - r[i], s[j] - s[i], t[j] - t[i]
+        if scheme == WENO5:
+            x, y = value_weno5(e, d, c, b, a, SMALL), value_weno5(a, b, c, d, e, SMALL)
+        else:
+            x, y = value_upwind5(e, d, c, b, a), value_upwind5(a, b, c, d, e)
+        low[i], high[i] = (low[j] - x if deep[i] > 0.0 else low[i]), (high[j] - y if deep[i] > 0.0 else high[i])
+
+
+@njit
 def put_velocities(g, deep, side):
     """Convert unit flows at faces to velocities where `deep` is 1, and write wave speeds at all faces, in place.
 
@@ -267,10 +288,9 @@ def put_smooth(g, scheme, p, q, r, s, t, sides, deep):
     """
     low, high = sides, sides[HIGH:]
     put_smooth_flags(p, q, r, s, t, deep)
-    for f in range(4):
-        at = f * STRIDE
-        o = at if at < EAST else at - EAST + FLOW_EAST
+    for at, o in ((SURFACE, SURFACE), (EAST, FLOW_EAST), (NORTH, FLOW_NORTH)):
         put_fifth(scheme, p[o:], q[o:], r[o:], s[o:], t[o:], deep, low[at:], high[at:])
+    put_depths(scheme, p, q, r, s, t, deep, low, high)
     put_push(p, q, r, s, t, low, high, deep, sides[PUSH : PUSH + deep.size])
     put_velocities(g, deep, low)
     put_velocities(g, deep, high)

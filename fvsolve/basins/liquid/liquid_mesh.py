@@ -14,7 +14,7 @@ from fvsolve.basins.liquid.riemann_invariants import invariant, invariant_at_pot
 from fvsolve.basins.mesh_blocks import own_sides
 from fvsolve.jit import inline, njit
 
-FIELDS, SHOWN = 3, 3  # see `mesh_blocks`
+FIELDS, ROWS_OF_CELLS, SHOWN = 3, 4, 3  # see `mesh_blocks`
 # Rows of BLOCK in the scratch of a block: values beyond, rates, sum for the step, flow through the side.
 _U, _V, _RR, _RX, _RY, _FAST, _C, TOP, _FREE, MASS = (k * BLOCK for k in range(1, 11))
 _NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
