@@ -382,7 +382,9 @@ def places(
         kind, place = place_kind(basin, patch), f"{name}.{patch}"
         keys = {"position": None, "basin": name, "patch": patch, **rest}
         if place in with_faces and not basin.added:
-            inflow = {"flow": basin.patches[patch].discharge} if is_source(basin.patches.get(patch)) else {}
+            stated, inflow = basin.patches.get(patch), {}
+            if is_source(stated):
+                inflow = {"flow": stated.discharge, "scalars": stated.scalars}
             result[place] = PatchJunction.model_construct(**keys, **inflow)
             place = f"{place}.inside"
         result[place] = kind.model_construct(**keys)

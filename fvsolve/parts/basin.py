@@ -72,7 +72,7 @@ class Rating(Table):
 
 
 CLOSURES = ("stage", "discharge", "rating", "normal_slope")  # keys that close a driven patch
-INTERIOR_KEYS = ("at", "area", "polygon", "discharge")  # keys of interior patches
+INTERIOR_KEYS = ("at", "area", "polygon", "discharge", "scalars")  # keys of interior patches
 
 
 class PointList(Value):

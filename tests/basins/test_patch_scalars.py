@@ -34,7 +34,9 @@ def on_mesh(basin: dict, folder) -> dict:
         points, cells = triangles(tuple(basin["size"]), 0.5)
         cells, groups = cells.tolist(), {"rim": boundary(cells)}
     write(folder / "t.msh", points, cells, groups)
-    kept = {key: value for key, value in basin.items() if key not in ("size", "cells", *(["patches"] if patches else []))}
+    kept = {
+        key: value for key, value in basin.items() if key not in ("size", "cells", *(["patches"] if patches else []))
+    }
     return kept | {"mesh": {"file": str(folder / "t.msh")}}
 
 
@@ -197,6 +199,21 @@ def test_a_pond_fills_a_shaft_with_its_dye_and_gets_it_back(place, method):
     entered = 2.0 * (4.0 - back["shaft.level"][-1]) * 1000.0
     assert back["gate.flow"].max() < 0.0 and back["shaft.dye"] == approx(0.0, abs=1e-12)
     assert back.ledger["dye"]["final"] == approx(back.ledger["dye"]["initial"], rel=1e-12) and entered > 100.0
+
+
+@pytest.mark.parametrize("method", ["ssp-rk3", "radau-iia-5", "rodas-5p"])
+def test_a_spring_brings_its_dye(method):
+    """The amount that enters is flow times value times time; what a sink draws has the value of the pond."""
+    own = {"rtol": 1e-7, "courant": None} if method != "ssp-rk3" else {}
+    amounts = []
+    for flow in (0.02, -0.02):
+        spring = {**PLACES["interior"], "discharge": flow, "scalars": {"dye": 0.8}}
+        case = pond(spring, bed="0", start=0.1, numerics={"scheme": "upwind", "method": method, **own})
+        case["links"], case["nodes"], case["output"]["probes"] = {}, {"pond": case["nodes"]["pond"]}, ["pond.hole.dye"]
+        ledger = fvsolve.run(case).ledger["dye"]
+        assert abs(ledger["relative"]) < 1e-12 and list(ledger["by_node"]) == ["pond.hole"]
+        amounts.append(ledger["by_node"]["pond.hole"])
+    assert amounts == approx([0.02 * 12.0 * 0.8 * 1000.0, -0.02 * 12.0 * 0.1 * 1000.0], rel=1e-10)
 
 
 def test_street_manhole_shaft_and_sewer_keep_their_dye():

@@ -200,8 +200,8 @@ class FreeSurfaceRows(RowsWithFriction):
         """Report an interior patch without faces: a fault if it has a discharge, a notice if no link joins it."""
         place, joined = f"nodes.{self.name}.patches.{patch}", self.places_of_links
         if self.part.patches[patch].discharge is not None:
-            text = "needs the faces around the patch, which it does not have in cases with scalars, or where a rigid "
-            draft.fault(f"{place}.discharge", f"{text}column or a delay line joins it; leave this key out")
+            text = "needs the faces around the patch, which it does not have where a rigid column or a delay line "
+            draft.fault(f"{place}.discharge", f"{text}joins it; leave this key out")
         elif f"{self.name}.{patch}" not in joined:
             text = f"basin {self.name}: no link joins the interior patch {patch}, so no water flows through it"
             draft.warnings.append(Notice("patch", place, text, None))
