@@ -115,7 +115,7 @@ def pond(place, scheme="muscl", dye=SALT, start=0.5, bed=ROUGH, numerics=None, *
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
 @pytest.mark.parametrize("place", PLACES)
 def test_a_tide_keeps_amount_and_bounds_of_a_dye_and_uniform_values(place, scheme, path, tmp_path):
-    """Over a dry bed within bounds; over a wet one uniform values too, as values fade in films of less than a micron."""
+    """Bounds over a dry bed; uniform values over a wet one, because values fade in films of less than a micron."""
     for dye, bed in ((SALT, ROUGH), (0.5, "0.02*x + 0.02*sin(3*x)*cos(2*y)")):
         case = pond(PLACES[place], scheme, dye, 0.5, bed)
         if path == "triangles":

@@ -68,8 +68,8 @@ def run_in_two_parts(
 ):
     """Run a case with an interruption and a resumption into `run`, and without into `whole`, where nothing is drawn.
 
-    after : time of the interruption [s]; between : function of the folder `run`, called before the resumption; ok : False for a case
-    whose results have marks
+    after : time of the interruption [s]; between : function of the folder `run`, called before the resumption
+    ok : False for a case whose results have marks
     """
     times = []
 

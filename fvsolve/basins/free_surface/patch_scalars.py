@@ -94,9 +94,9 @@ def add_through_faces(tables, patch, basin, q, y, rate, out):
     """Add the flows of scalar q through the faces of a patch to the rates of its amounts per area."""
     valve, layout, at = tables.valves[patch["valve"]], tables.layout[0], patch["normals"] + 2 * patch["faces"]
     total, amount = leaving(tables, patch, basin, q, y)
-    brought = max(out[layout["valve"] + patch["valve"]], 0.0) / tables.settings[0]["rho"]
-    amount += brought * out[layout["value"] + q * tables.nodes.size + valve["from_node"]]
-    total += brought
+    entering = max(out[layout["valve"] + patch["valve"]], 0.0) / tables.settings[0]["rho"]
+    amount += entering * out[layout["value"] + q * tables.nodes.size + valve["from_node"]]
+    total += entering
     for m in range(patch["faces"]):
         flow, value = outflow_of_face(tables, patch, basin, q, y, m)
         if flow != 0.0:
