@@ -45,7 +45,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/studies": (14877, 51),
     "fvsolve/validation": (1463, 11),
     "tests/attitude": (447, 2),
-    "tests/basins": (9335, 31),
+    "tests/basins": (9341, 31),
     "tests/case": (4527, 16),
     "tests/cli": (1130, 8),
     "tests/draw": (217, 2),
