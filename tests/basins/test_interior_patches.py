@@ -244,9 +244,3 @@ def test_outflow_of_an_interior_patch_is_at_most_critical(fall):
 def test_an_interior_patch_without_a_link_gives_a_notice():
     model = model_of(pond(None, probes=["pond.volume"]))
     assert any("no link joins the interior patch hole" in notice.text for notice in model.warnings)
-
-
-def test_a_spring_that_a_rigid_column_joins_is_refused():
-    column = {"type": "rigid-column", "from": "pond.hole", "to": "shaft", "length": 5.0, "diameter": 0.3}
-    with pytest.raises(CaseError, match="needs the faces around the patch"):
-        model_of(pond(column, hole={**HOLE, "discharge": 0.1}, probes=["pond.volume"]))

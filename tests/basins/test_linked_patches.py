@@ -69,6 +69,32 @@ def test_a_sudden_level_drives_the_flow_of_a_simple_wave(head, area, method):
     assert found["gate.flow"][-1] == approx(flow, rel=1e-3) and found["reach.end.level"][-1] == approx(level, rel=1e-3)
 
 
+PIPED = {"from": "lake", "to": "reach.end", "length": 20.0, "diameter": 1.0}  # between the lake and the channel
+
+
+def test_a_delay_line_and_a_pipe_of_cells_bring_the_same_flow():
+    flows = []
+    for own in ({"pipe_model": "delay-line"}, {"cells": 100}):
+        case = channel({"time": [0.0, 4.0], "value": [2.0, 2.3]}, numerics={"courant": 0.9})
+        case["links"]["gate"] = {"type": "pipe", **PIPED, "wave_speed": 400.0, "friction": {"model": "none"}, **own}
+        case["output"]["probes"] = ["gate.flow@1"]
+        found = fvsolve.run(case)
+        assert found.ok and abs(found.ledger["mass"]["relative"]) < 1e-12
+        flows.append(found["gate.flow@1"])
+    assert flows[0] == approx(flows[1], abs=2e-3 * flows[1].max())
+
+
+@pytest.mark.parametrize("method", ["ssp-rk2", "rodas-5p"])
+def test_a_delay_line_that_falls_deep_draws_the_critical_outflow(method):
+    case = channel(-10.0, end=4.0, numerics={"method": method, **METHODS[method]})
+    line = {"type": "pipe", "wave_speed": 400.0, "pipe_model": "delay-line", "minor_loss": 0.5}
+    case["links"]["gate"] = {**line, **PIPED, "diameter": 2.0, "friction": {"model": "none"}}
+    case["output"]["probes"] = ["reach.end.flow"]
+    found = fvsolve.run(case)
+    assert found["reach.end.flow"][-1] == approx(-WIDE * 8.0 / 27.0 * math.sqrt(G) * DEEP**1.5, rel=3e-4)
+    assert found.ledger["mass"]["made_up"] == 0.0 and abs(found.ledger["mass"]["relative"]) < 1e-12
+
+
 def test_a_wide_orifice_over_a_deep_fall_passes_the_critical_outflow():
     found = fvsolve.run(channel(-5.0, 40.0, end=2.0))
     assert found["gate.flow"][-1] == approx(-WIDE * 8.0 / 27.0 * math.sqrt(G) * DEEP**1.5, rel=3e-4)
