@@ -10,11 +10,18 @@ from math import cos, pi
 from fvsolve.basins import advection, fifth_order
 from fvsolve.basins.advection import THIN, AdvectionGrid, GridFlows
 from fvsolve.basins.advection_faces import MeshFlows, advection_rates
-from fvsolve.basins.boundary_cells import flow_weight, has_given_flows, patch_inflow, stencil_cells, weighted_volume
+from fvsolve.basins.boundary_cells import (
+    depth_at_patch,
+    flow_weight,
+    has_given_flows,
+    patch_inflow,
+    stencil_cells,
+    weighted_volume,
+)
 from fvsolve.basins.cell_sides import deviations_of
 from fvsolve.jit import njit
 from fvsolve.kernels import stage_sums
-from fvsolve.kernels.dtypes import CELL_SCALAR, GIVEN_FLOW, MUSCL, RATE, UPWIND
+from fvsolve.kernels.dtypes import CELL_SCALAR, GIVEN_FLOW, INTERIOR, MUSCL, NO_CLOSURE, RATE, UPWIND
 from fvsolve.kernels.scalar_transport import change_rate, record_loss
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
@@ -49,7 +56,10 @@ def patch_values(t, y, dydt, out, handle):
             for m in range(patch["count"]):
                 i = tables.integers[patch["first"] + m]
                 part = tables.plane[basin["area"] + i]
-                part *= max(flow_weight(tables.plane, basin, True, i, seen), DRY_WEIGHT) if deep else 1.0
+                if deep and patch["closure"] == INTERIOR:
+                    part *= max(depth_at_patch(tables.plane, basin, i, seen), DRY_WEIGHT)
+                elif deep:
+                    part *= max(flow_weight(tables.plane, basin, True, i, seen), DRY_WEIGHT)
                 total, amount = total + part, amount + part * cell_value(tables, basin, q, seen, i)
             out[value + q * nodes + patch["node"]] = amount / total
 
@@ -308,8 +318,9 @@ def add_sources(t, y, dydt, out, handle):
             if tables.scalars[q]["decay"] > 0.0:
                 add_decay(tables, basin, q, per, seen[at : at + basin["n"]], rate, out)
             for p in range(0 if has_given_flows(basin) else tables.patches.size):
-                if tables.patches[p]["basin"] == b and tables.patches[p]["open"] == 0:
-                    add_link_inflow(tables, tables.patches[p], basin, q, seen, rate, out)
+                patch = tables.patches[p]
+                if patch["basin"] == b and patch["open"] == 0 and patch["closure"] == NO_CLOSURE:
+                    add_link_inflow(tables, patch, basin, q, seen, rate, out)
 
 
 @njit

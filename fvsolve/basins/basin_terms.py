@@ -36,6 +36,11 @@ FIFTH = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: add_fifth_order_o
 DIFFUSION = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: diffuse_on_grids")
 MESHES = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: advect_on_meshes")
 SOURCES = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: add_sources")
+PATCH_FACES = RhsTerms(  # of links at patches of water
+    package="fvsolve.basins.free_surface",
+    outlet_values="patch_scalars: values_at_faces",
+    scalar_rates="patch_scalars: add_face_flows",
+)
 REACTIONS = RhsTerms(
     package=PACKAGE,
     prepare="basin_reactions: limit_rates_in_basins",
@@ -43,7 +48,7 @@ REACTIONS = RhsTerms(
     observe="basin_reactions: observe_reactions_in_basins",
 )
 # in the order in which they run within a phase
-SCALAR_TERMS = (PATCH_VALUES, MIXED, GRIDS, FIFTH, DIFFUSION, MESHES, SOURCES, REACTIONS)
+SCALAR_TERMS = (PATCH_VALUES, MIXED, GRIDS, FIFTH, DIFFUSION, MESHES, SOURCES, PATCH_FACES, REACTIONS)
 
 
 def terms_of_basins(basins: list, valves: bool) -> tuple[RhsTerms, ...]:
@@ -70,6 +75,8 @@ def scalar_terms(basin) -> Iterator[RhsTerms]:
         yield REACTIONS
     if not basin.given:
         yield MIXED
+    if any(place.startswith(f"{basin.name}.") for place in basin.case.patches_with_faces):
+        yield PATCH_FACES
     if not basin.is_grid:
         yield MESHES
         return

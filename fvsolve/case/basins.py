@@ -349,18 +349,15 @@ def may_have_faces(basin: Basin) -> bool:
     return basin.physics_type.has_closures and basin.on is None and not moving_walls(basin)
 
 
-def patches_with_faces(nodes: dict[str, Any], links: dict[str, Any], lines: str, meshes: dict) -> frozenset[str]:
+def patches_with_faces(nodes: dict[str, Any], links: dict[str, Any], meshes: dict) -> frozenset[str]:
     """Full names of the patches through whose faces the flow of their links passes; cells take it at other patches.
 
-    These are patches of fixed basins that may have closures, unless a delay line or a rigid column joins them.
-    lines : model of pipes that state none
+    These are patches of fixed basins that may have closures, unless a rigid column joins them: a level that a column
+    draws far below the bed, because its flow is above critical, would stop it within a step.
     """
     joined, others = set(), set()
     for link in links.values():
-        is_other = link.kind == "rigid-column" or (
-            link.kind == "pipe" and (link.pipe_model or lines) != "finite-volume"
-        )
-        (others if is_other else joined).update(link.ports.values())
+        (others if link.kind == "rigid-column" else joined).update(link.ports.values())
     fixed = [name for name in meshes if may_have_faces(nodes[name])]
     names = {f"{name}.{patch}" for name in fixed for patch in patch_names(meshes[name])}
     given = {f"{name}.{patch}" for name in fixed for patch, keys in nodes[name].patches.items() if is_source(keys)}
@@ -393,7 +390,9 @@ def places(
         kind, place = place_kind(basin, patch), f"{name}.{patch}"
         keys = {"position": None, "basin": name, "patch": patch, **rest}
         if place in with_faces and not basin.added:
-            inflow = {"flow": basin.patches[patch].discharge} if is_source(basin.patches.get(patch)) else {}
+            stated, inflow = basin.patches.get(patch), {}
+            if is_source(stated):
+                inflow = {"flow": stated.discharge, "scalars": stated.scalars}
             result[place] = PatchJunction.model_construct(**keys, **inflow)
             place = f"{place}.inside"
         result[place] = kind.model_construct(**keys)

@@ -203,9 +203,9 @@ class Case(Displayable):
     @cached_property
     def patches_with_faces(self) -> frozenset[str]:
         """Patches through whose faces the flow of their links passes, see `basins.patches_with_faces`."""
-        if not self.meshes or self.scalars:
+        if not self.meshes:
             return frozenset()
-        return basins.patches_with_faces(self.nodes, self.links, self.numerics.pipe_model, self.meshes)
+        return basins.patches_with_faces(self.nodes, self.links, self.meshes)
 
     @cached_property
     def unread_blocks(self) -> set[str]:

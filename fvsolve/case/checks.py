@@ -236,7 +236,7 @@ def scalar_faults(
                     place = (group, name, "patches", patch, "scalars", scalar)
                     if scalar not in scalars:
                         yield place, _unknown_scalar(scalar, scalars)
-                    elif part.physics_type.joined and not patch_options.passes:
+                    elif part.physics_type.joined and not (patch_options.passes or basins.is_source(patch_options)):
                         text = "is not valid here, because the joined links give the value. Remove this key, or set "
                         yield place, text + 'boundary = "open"'
             if scalars and part.no_scalars:

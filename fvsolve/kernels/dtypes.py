@@ -61,6 +61,7 @@ SETTINGS = record(
     gravity=f8,
     datum=f8,  # elevation of zero height in energy studies [m]
     vapor=f8,  # vapour pressure [Pa]
+    unmarked=f8,  # pressure below which a node stands for a flow that a patch does not have [Pa]
     rate=f8,  # greatest constant wave rate, speed / dx [1/s]
     stop_below=i8,  # 1: a pressure below vapour pressure ends the run
     law=i8,

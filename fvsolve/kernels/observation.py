@@ -182,6 +182,7 @@ def record_nodes(t, y, out, handle, values):
     tables = open_tables(handle)
     pipes, nodes, extremes = tables.pipes, tables.nodes, tables.extremes
     marks, layout, vapor = tables.marks, tables.layout[0], tables.settings[0]["vapor"]
+    lowest = tables.settings[0]["unmarked"]
     for k in range(values.size):
         update_extremes(extremes, k, t, values[k])
         mark = tables.probes[k]["mark"]
@@ -189,7 +190,7 @@ def record_nodes(t, y, out, handle, values):
             marks[mark] = t
     for i in range(nodes.size):
         at = pipes.size + i
-        if nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:
+        if lowest < nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:
             marks[at] = t
         if nodes[i]["kind"] == rec.TANK and abs(out[layout["supply"] + i]) > SUPPLY_ROUNDING * mass_per_metre(nodes[i]):
             at += nodes.size if out[layout["supply"] + i] > 0.0 else 2 * nodes.size

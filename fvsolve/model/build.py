@@ -12,6 +12,7 @@ from fvsolve.assembly.lowering import lower_devices, lowering_of
 from fvsolve.assembly.model_draft import ModelDraft
 from fvsolve.assembly.pipe_terms import MAX_TERMS, add_terms, limit_creep_step
 from fvsolve.assembly.scheme_codes import limiter_notices, scheme_settings
+from fvsolve.basins.free_surface.patch_closures import DEEPEST
 from fvsolve.basins.lower import basin_start, lower_basins
 from fvsolve.case import load, locate_faults
 from fvsolve.case.case import Case
@@ -371,7 +372,9 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     s["start"], s["late_blocks"] = case.numerics.start, bool(draft.control_table["late"].any())
     s["late_sensors"] = has_late_sensors(draft)
     s["ambient"], s["gravity"] = case.ambient_pressure, case.gravity
-    s["vapor"] = case.law.cavity_pressure
+    s["vapor"], s["unmarked"] = case.law.cavity_pressure, -np.inf
+    if case.patches_with_faces:
+        s["unmarked"] = s["vapor"] - 0.5 * DEEPEST * case.properties.density * case.gravity
     s["stop_below"] = case.numerics.below_vapor == "stop"
     case.law.lower(draft.fluid, s, draft.floats)
     s["tolerance"] = case.numerics.rtol or 0.0

@@ -588,7 +588,8 @@ class ScalarCouplings:
     def own(self, i: int) -> list:
         """States that set the scalar's value at node i, a storing node or a patch of a basin; else an empty list."""
         if i in self.of.patches:
-            return [self.behind(i), self.of.behind(i, 1)]
+            faces = self.of.patches[i]["closure"] in pattern.THROUGH_FACES  # outflow has the weights of flows
+            return [self.behind(i), *(self.through[i] if faces else [self.of.behind(i, 1)])]
         return [self.places[i], self.of.own(i)] if self.stores[i] else []
 
     def behind(self, i: int) -> np.ndarray:

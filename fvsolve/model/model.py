@@ -203,6 +203,12 @@ class Model(Displayable):
         return [f"{basin.name}.{name}" for basin in self.basins for name in basin.source_names]
 
     @property
+    def ledger_names(self) -> list[str]:
+        """Names of nodes in the ledger; the cells at a patch have the name of the patch."""
+        kinds = zip(self.node_names, self.tables.nodes["kind"], strict=True)
+        return [name.removesuffix(".inside") if kind == rec.PATCH else name for name, kind in kinds]
+
+    @property
     def ledgers(self) -> int:
         """Number of rows of the ledger: supply of nodes; inflow of scalars, decay, heat, reactions; rain and soil."""
         return int(self.layout["net"] - self.layout["supply"])

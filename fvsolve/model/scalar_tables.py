@@ -248,7 +248,9 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
         initial, final = total_amount(model, q, model.start), total_amount(model, q, y)
         formed = formed_amount(model, q, ledger)
         remainder = final - initial - (float(np.sum(flows)) - decayed + heated + formed)
-        net = zip(model.node_names, flows.sum(axis=0), strict=True)
+        by_place: dict[str, np.ndarray] = {}
+        for place, flow in zip(model.ledger_names, flows.T, strict=True):
+            by_place[place] = by_place.get(place, 0.0) + flow
         turnover = float(np.sum(np.abs(flows))) + abs(decayed) + abs(heated) + abs(formed)
         turnover = max(abs(initial), abs(final), turnover)
         in_wall = {key: wall_amount(model, q, state) for key, state in (("initial", model.start), ("final", y))}
@@ -258,9 +260,9 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
             "outflow": float(0.0 - flows[1].sum()), "decayed": decayed,
             **({"fluid": in_fluid, "wall": in_wall} if wall_masses(model.tables, row).any() else {}),
             **({"reacted": formed} if name in reacting(model.case) else {}),
-            "by_node": {node: float(x) for node, x in net if x != 0.0},
-            "nodes": {node: {"inflow": float(x), "outflow": float(0.0 - y)}
-                      for node, x, y in zip(model.node_names, *flows, strict=True) if x != 0.0 or y != 0.0},
+            "by_node": {place: float(flow.sum()) for place, flow in by_place.items() if flow.sum() != 0.0},
+            "nodes": {place: {"inflow": float(x), "outflow": float(0.0 - y)}
+                      for place, (x, y) in by_place.items() if x != 0.0 or y != 0.0},
             **({"heated": float(heated), "heat": heat} if row["specific_heat"] > 0.0 else {}),
             "remainder": remainder, "relative": abs(remainder) / turnover if turnover > 0.0 else 0.0,
         }  # fmt: skip

@@ -73,7 +73,7 @@ class Rating(Table):
 
 
 CLOSURES = ("stage", "discharge", "rating", "normal_slope")  # keys that close a driven patch
-INTERIOR_KEYS = ("at", "area", "polygon", "discharge")  # keys of interior patches
+INTERIOR_KEYS = ("at", "area", "polygon", "discharge", "scalars")  # keys of interior patches
 
 
 class PointList(Value):
@@ -609,9 +609,9 @@ class PatchRows(Lowering, kind="patch"):
             row["kind"] = rec.PATCH_FROUDE
             row["index"] = k = draft.patch_table["node"].tolist().index(draft.node_index[name])
             if draft.patch_table["closure"][k] in (rec.NO_CLOSURE, rec.INTERIOR):
-                reason = "a delay line or rigid column joins it, or no part at all"
+                reason = "a rigid column joins it, or no part at all"
                 reason = reason if draft.patch_table["closure"][k] == rec.NO_CLOSURE else "it lies inside the basin"
-                expected = "a patch of the boundary with a closure, a pipe of finite volumes or a restriction"
+                expected = "a patch of the boundary with a closure or another link"
                 draft.fault("output.probes", f"{name} has no Froude number: {reason}; expected {expected}")
         elif probe.quantity != "flow":
             super().probe(draft, name, probe, row)

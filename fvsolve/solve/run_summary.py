@@ -336,10 +336,11 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     # nodes with `made_up` and `spilled`
     own = [kind in (rec.TANK, rec.PATCH) and i not in passes for i, kind in enumerate(kinds)]
     words = [("made_up", "spilled") if in_cells else ("inflow", "outflow") for in_cells in own]
-    names, words = [*model.node_names, *model.sources], words + [("inflow", "outflow")] * len(model.sources)
-    rows = zip(names, words, ledger[0], ledger[1], strict=True)
-    nodes = {name: {inflow_word: float(x), outflow_word: float(0.0 - y)}
-             for name, (inflow_word, outflow_word), x, y in rows if x != 0.0 or y != 0.0}  # fmt: skip
+    names, words = [*model.ledger_names, *model.sources], words + [("inflow", "outflow")] * len(model.sources)
+    nodes: dict[str, dict[str, float]] = {}
+    for name, (inflow_word, outflow_word), x, y in zip(names, words, ledger[0], ledger[1], strict=True):
+        if x != 0.0 or y != 0.0:
+            nodes.setdefault(name, {}).update({inflow_word: float(x), outflow_word: float(0.0 - y)})
     total = {word: sum(row.get(word, 0.0) for row in nodes.values()) for pair in set(words) for word in pair}
     remainder = change - float(np.sum(ledger))
     terms = {word: total.get(word, 0.0) for word in ("inflow", "outflow", "spilled", "made_up")}

@@ -540,13 +540,13 @@ def test_a_fault_in_a_basin_comes_once(changes, said, tmp_path):
 def test_check_names_the_valve_that_sets_the_step():
     """Between equal levels the slope of the flow through a large valve limits the step, where the cells take its flow.
 
-    They do in a basin with scalars. Where the flow passes through faces, their waves bound the slope.
+    They do in a basin with a moving wall. Where the flow passes through faces, their waves bound the slope.
     """
     nodes = {"pool": pool(), "pond": {"type": "tank", "area": 2.0, "level": 2.0}}
     case = scene(nodes, {"sluice": valve("pool.outlet", "pond", 0.5)}, 1.0, PLANE, [], 0.1)
     checks = model_of(case).checks
     assert checks["step_set_by"] == "one of pond, pool"
-    case["scalars"] = {"dye": {}}
+    case["nodes"]["pool"]["patches"] = {**case["nodes"]["pool"]["patches"], "paddle": {"side": "west", "travel": 0.0}}
     checks = model_of(case).checks
     assert checks["step_set_by"].startswith("links.sluice: ") and checks["step"] < 1e-4
     case["links"]["sluice"]["area"] = 1e-5

@@ -244,13 +244,3 @@ def test_outflow_of_an_interior_patch_is_at_most_critical(fall):
 def test_an_interior_patch_without_a_link_gives_a_notice():
     model = model_of(pond(None, probes=["pond.volume"]))
     assert any("no link joins the interior patch hole" in notice.text for notice in model.warnings)
-
-
-def test_with_scalars_links_see_the_cells_of_an_interior_patch_and_a_discharge_is_refused():
-    dye = {"scalars": {"dye": {"initial": 1.0}}}
-    found = fvsolve.run(pond(numerics={"scheme": "upwind"}) | dye)
-    plain = fvsolve.run(pond(numerics={"scheme": "upwind"}))
-    assert found["shaft.level"][-1] == approx(plain["shaft.level"][-1], rel=1e-2)
-    assert all(abs(found.ledger[name]["relative"]) < 1e-12 for name in ("mass", "dye"))
-    with pytest.raises(CaseError, match="needs the faces around the patch"):
-        model_of(pond(None, hole={**HOLE, "discharge": 0.1}, probes=["pond.volume"]) | dye)

@@ -213,7 +213,9 @@ class FreeSurfaceRows(RowsWithFriction):
         has_faces, is_interior = f"{self.name}.{patch}" in self.case.patches_with_faces, patch in self.mesh.interior
         if is_interior and not has_faces:
             row["faces"] = 0  # links see its cells only
-            self.check_interior_patch(draft, patch)
+            if f"{self.name}.{patch}" not in self.places_of_links:
+                text = f"basin {self.name}: no link joins the interior patch {patch}, so no water flows through it"
+                draft.warnings.append(Notice("patch", f"nodes.{self.name}.patches.{patch}", text, None))
         if patch not in self.driven and not has_faces:
             return
         behind = np.array(draft.integers[row["ring"] + row["faces"] :][: row["faces"]])
@@ -236,16 +238,6 @@ class FreeSurfaceRows(RowsWithFriction):
             row["points"] = len(stated.rating.level)
         if stated.normal_slope is not None:
             row["conveyance"] = draft.to_plane(math.sqrt(stated.normal_slope) / self.roughness[behind])
-
-    def check_interior_patch(self, draft, patch: str) -> None:
-        """Report an interior patch without faces: a fault if it has a discharge, a notice if no link joins it."""
-        place, joined = f"nodes.{self.name}.patches.{patch}", self.places_of_links
-        if self.part.patches[patch].discharge is not None:
-            text = "needs the faces around the patch, which it does not have in cases with scalars, or where a rigid "
-            draft.fault(f"{place}.discharge", f"{text}column or a delay line joins it; leave this key out")
-        elif f"{self.name}.{patch}" not in joined:
-            text = f"basin {self.name}: no link joins the interior patch {patch}, so no water flows through it"
-            draft.warnings.append(Notice("patch", place, text, None))
 
     @property
     def places_of_links(self) -> set[str]:
