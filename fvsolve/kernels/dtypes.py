@@ -645,7 +645,7 @@ PATCHES = record(
     # interior patch, its own cells at the faces around it.
     second=i8,
     # Offset in `integers` of the faces before and after each face along a driven patch of a mesh; -1 if not needed.
-    beside=i8,
+    neighbours=i8,
     closure=i8,  # NO_CLOSURE, or the closure of a driven patch
     drive=i8,  # schedule of its stage or discharge
     depth=i8,  # schedule of the depth of supercritical inflow; -1 for none

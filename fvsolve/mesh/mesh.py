@@ -76,8 +76,8 @@ class Mesh:
         first, last = np.searchsorted(-self.right, [k + 1, k + 2])  # -right of inner faces is 0 or less, in any order
         return slice(int(first), int(last))
 
-    def faces_beside(self, name: str) -> np.ndarray:
-        """Numbers in a patch of the faces before and after each of its faces, or of itself at ends : int64[2, count]."""
+    def neighbouring_faces(self, name: str) -> np.ndarray:
+        """Numbers in a patch of the faces before and after each of its faces, its own at ends : int64[2, count]."""
         starts, stops = self.ends[self.patch(name)].T
         numbers, at_start, at_stop = np.arange(starts.size), np.argsort(starts), np.argsort(stops)
         before = at_stop[np.searchsorted(stops[at_stop], starts).clip(max=starts.size - 1)]

@@ -102,7 +102,7 @@ class Couplings:
                 cells = pattern.cells_read(pattern.neighbours(basin), self.integers[behind : behind + row["faces"]])
                 yield pairs_of(unique_states(self.size + i), pattern.cell_states(basin, cells))
             joint = rec.DISCHARGE, rec.RATING, *pattern.THROUGH_FACES  # one level for all faces
-            if row["closure"] in joint or (row["closure"] == rec.STAGE and row["beside"] >= 0):
+            if row["closure"] in joint or (row["closure"] == rec.STAGE and row["neighbours"] >= 0):
                 read = unique_states(
                     self.behind(i), pattern.cell_states(basin, pattern.cells_at_faces(self.integers, row))
                 )

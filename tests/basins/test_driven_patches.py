@@ -223,7 +223,8 @@ def short_channel(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 LOWER = float(short_channel(np.array([150.0]))[0][0])
-SHORT_ENDS = {"stage": {"stage": LOWER}, "rating": {"rating": {"level": [LOWER - 0.4, LOWER + 0.4], "flow": [0.0, 8.0]}},
+SHORT_ENDS = {"stage": {"stage": LOWER},
+              "rating": {"rating": {"level": [LOWER - 0.4, LOWER + 0.4], "flow": [0.0, 8.0]}},
               "normal_slope": {"normal_slope": 4.0 * ROUGHNESS**2 / LOWER ** (10.0 / 3.0)}}  # fmt: skip
 
 
@@ -276,7 +277,7 @@ def uniform_flow(unit: float, size, cells, end: float, numerics=None, upper=None
 @pytest.mark.parametrize("scheme", ["muscl", "weno5"])
 @pytest.mark.parametrize("froude", [0.9, 1.12, 1.4])
 def test_fast_flow_on_a_slope_has_no_standing_noise(froude, scheme):
-    """Waves leave. A bed that is the difference of two limited fields, surface and depth, keeps noise of one per cent."""
+    """A bed that is the difference of two limited fields, surface and depth, would keep noise of one per cent."""
     unit = froude * math.sqrt(G * 0.8**3)
     numerics = {"scheme": scheme, "method": "ssp-rk3" if scheme == "weno5" else "ssp-rk2"}
     model, state = ended(uniform_flow(unit, (75.0, 2.0), (200, 1), 150.0, numerics, start="1e-3*sin(0.04*x*x)"))
@@ -304,7 +305,7 @@ def test_inflow_through_sides_of_triangles_stays_even(unit, upper, tmp_path):
 def test_neighbours_of_faces_of_a_patch_do_not_depend_on_the_order_in_the_file(tmp_path):
     case = on_mesh(uniform_flow(1.0, (4.0, 3.0), (10, 1), 1.0), (4.0, 3.0), 0.5, ["west", "east"], tmp_path)
     mesh = model_of(case).basins[0].mesh
-    before, after = mesh.faces_beside("west")
+    before, after = mesh.neighbouring_faces("west")
     y = mesh.middle[mesh.patch("west"), 1]
     order = np.argsort(-y)  # the west side runs down, anticlockwise around the basin
     assert np.array_equal(after[order], [*order[1:], order[-1]]) and np.array_equal(

@@ -208,7 +208,7 @@ class FreeSurfaceRows(RowsWithFriction):
     def lower_patch(self, draft, patch: str, row) -> None:
         super().lower_patch(draft, patch, row)
         cells = draft.integers[row["first"] : row["first"] + row["count"]]
-        row["rest"], row["depth"], row["beside"] = self.part.level, -1, -1
+        row["rest"], row["depth"], row["neighbours"] = self.part.level, -1, -1
         row["lowest"] = max(float(self.bed[cells].min()) - self.part.level, 0.0)
         has_faces, is_interior = f"{self.name}.{patch}" in self.case.patches_with_faces, patch in self.mesh.interior
         if is_interior and not has_faces:
@@ -222,8 +222,8 @@ class FreeSurfaceRows(RowsWithFriction):
         row["second"], row["inside"] = len(draft.integers), draft.to_work(5 * int(row["faces"]))
         draft.integers += (self.mesh.faces(patch).inside if is_interior else self.second_cells(patch, behind)).tolist()
         if not (self.is_grid or is_interior):
-            row["beside"] = len(draft.integers)
-            draft.integers += self.mesh.faces_beside(patch).ravel().tolist()
+            row["neighbours"] = len(draft.integers)
+            draft.integers += self.mesh.neighbouring_faces(patch).ravel().tolist()
         if has_faces:
             row["closure"] = rec.INTERIOR if is_interior else rec.LINKED
             row["valve"] = draft.valve_names.index(f"{self.name}.{patch}.face")

@@ -270,7 +270,7 @@ def read_faces(tables, patch, y):
                 e[m] += 0.5 * (e[m] - surface)
                 u[m] += 0.5 * (u[m] - inward)
         lengths[m] = plane[at + 2 * count + m] * plane[basin["area"] + k]
-    if patch["beside"] >= 0:
+    if patch["neighbours"] >= 0:
         smooth_inflow(tables, patch, h, u)
     return h, e, u, lengths
 
@@ -282,13 +282,13 @@ def smooth_inflow(tables, patch, h, u):
     Inflow would otherwise have the velocity of the cell behind its face, whatever that is: on triangles, differences
     from face to face then grow. Velocities of uniform flow are proportional to h^(2/3), and stay as they are.
     """
-    n, beside = h.size, tables.integers[patch["beside"] :]
+    n, neighbours = h.size, tables.integers[patch["neighbours"] :]
     ratio = tables.work[patch["inside"] + 4 * n : patch["inside"] + 5 * n]
     for m in range(n):
         ratio[m] = u[m] / h[m] ** (2.0 / 3.0) if h[m] > THIN else 0.0
     for m in range(n):
         if u[m] > 0.0 and h[m] > THIN:
-            u[m] = h[m] ** (2.0 / 3.0) * (0.5 * ratio[m] + 0.25 * (ratio[beside[m]] + ratio[beside[n + m]]))
+            u[m] = h[m] ** (2.0 / 3.0) * (0.5 * ratio[m] + 0.25 * (ratio[neighbours[m]] + ratio[neighbours[n + m]]))
 
 
 @njit

@@ -1,12 +1,13 @@
 """Shallow water on a grid of rectangles: rates of depth and flow.
 
-h_t + (q_x)_x + (q_y)_y = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed). Surface e, bed and velocities
-are reconstructed, and the depth is h = e - bed, because a bed that is the difference of two limited fields would change
-with the flow: fast flow would never settle. Where h varies by more than an eighth within a cell, h is reconstructed
-instead of the bed. Both sides of a face use the higher bed (hydrostatic reconstruction, Audusse et al. 2004). The pressure of a cell on its faces and the force of its bed are combined in g h (rise of e). So a lake at rest stays at
-rest to the bit, with dry islands too. The flux is the HLLC flux (Harten, Lax and van Leer, with contact wave, Toro
-2001): tangential momentum is carried with the mass. The bounds of wave speeds are those of the cells on either side,
-which bound limited values too.
+h_t + (q_x)_x + (q_y)_y = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed). Surface e, bed and velocities are
+reconstructed, and the depth is h = e - bed: a bed that is the difference of two limited fields would change with the
+flow, and fast flow would never settle. Where h varies by more than an eighth from the middle of a cell to its side, h
+is reconstructed instead of the bed. Both sides of a face use the higher bed (hydrostatic reconstruction, Audusse et al.
+2004). The pressure of a cell on its faces and the force of its bed are combined in g h (rise of e). So a lake at rest
+stays at rest to the bit, with dry islands too. The flux is the HLLC flux (Harten, Lax and van Leer, with contact wave,
+Toro 2001): tangential momentum is carried with the mass. The bounds of wave speeds are those of the cells on either
+side, which bound limited values too.
 
 Fifth order (`LINEAR`, `WENO5`) reconstructs unit flows instead of velocities where the shallowest of five cells has
 half the depth of the deepest, and uses limited values elsewhere. It has that order along one direction on uniform

@@ -7,8 +7,9 @@ There are fluxes of depth, of normal momentum minus the pressure on the side bef
 tangential momentum.
 
 In fifth order, where the water is deep enough, bed, surface e and unit flows are reconstructed from cell means; the
-depth h is surface minus bed, and velocities are unit flows over depth. The integral of h de/dx over a cell is exact for cubics: that of the parabolas
-through both face values and the mean, plus the products of third differences with second differences.
+depth h is surface minus bed, and velocities are unit flows over depth. The integral of h de/dx over a cell is exact for
+cubics: that of the parabolas through both face values and the mean, plus the products of third differences with second
+differences.
 """
 
 from math import sqrt
