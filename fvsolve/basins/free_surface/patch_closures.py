@@ -18,7 +18,7 @@ import numpy as np
 
 from fvsolve.basins.basin_patches import physics_code
 from fvsolve.basins.cell_sides import deviations_of
-from fvsolve.basins.free_surface.surface_rows import THIN
+from fvsolve.basins.free_surface.surface_rows import THIN, TINY
 from fvsolve.jit import njit
 from fvsolve.kernels.cube_root import cube_root_reciprocal
 from fvsolve.kernels.dtypes import (
@@ -277,18 +277,20 @@ def read_faces(tables, patch, y):
 
 @njit
 def smooth_inflow(tables, patch, h, u):
-    """Replace velocities u into the basin, over depth h^(2/3), by means over three faces along the patch.
+    """Replace velocities u into the basin by means, weighted by depth h, over three faces along the patch.
 
     Inflow would otherwise have the velocity of the cell behind its face, whatever that is: on triangles, differences
-    from face to face then grow. Velocities of uniform flow are proportional to h^(2/3), and stay as they are.
+    from face to face then grow.
     """
     n, neighbours = h.size, tables.integers[patch["neighbours"] :]
-    ratio = tables.work[patch["inside"] + 4 * n : patch["inside"] + 5 * n]
+    as_read = tables.work[patch["inside"] + 4 * n : patch["inside"] + 5 * n]
     for m in range(n):
-        ratio[m] = u[m] / h[m] ** (2.0 / 3.0) if h[m] > THIN else 0.0
+        as_read[m] = u[m]
     for m in range(n):
-        if u[m] > 0.0 and h[m] > THIN:
-            u[m] = h[m] ** (2.0 / 3.0) * (0.5 * ratio[m] + 0.25 * (ratio[neighbours[m]] + ratio[neighbours[n + m]]))
+        if u[m] > 0.0:
+            a, b = neighbours[m], neighbours[n + m]
+            flow = 2.0 * h[m] * u[m] + (h[a] * as_read[a] + h[b] * as_read[b])
+            u[m] = flow / (2.0 * h[m] + (h[a] + h[b]) + TINY)
 
 
 @njit
