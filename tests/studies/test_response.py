@@ -105,6 +105,10 @@ def test_friction_moves_a_line_off_the_boundary():
 def test_ports_that_are_none_and_cases_that_are_too_large_are_refused():
     with pytest.raises(FvsolveError, match='no port named "gat"; did you mean "gate"'):
         response_of_line("upwind", "gat")
+    pool = {"type": "basin", "size": [10.0, 1.0], "cells": [5, 1], "level": 1.0, "elevation": 0.0}
+    pool |= {"patches": {"up": {"side": "west", "discharge": 0.0}}}
+    with pytest.raises(FvsolveError, match=r"pool\.up joins no link.*linearise"):
+        response(scene({"pool": pool}, {}, 1.0, {"scheme": "upwind", "method": "rk4"}), "pool.up")
     with pytest.raises(FvsolveError, match="900 states.*fewer"):
         response_of_line("upwind", cells=450)
     with pytest.raises(FvsolveError, match="limited"):

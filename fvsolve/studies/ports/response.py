@@ -404,6 +404,10 @@ def response(
     if port not in case.places:
         hint = did_you_mean(port, case.places) or f". Ports are {listing(case.places)}"
         raise FvsolveError(f'no port named "{port}"{hint}')
+    basin = port.partition(".")[0]
+    if basin != port and getattr(case.nodes.get(basin), "kind", "") == "basin" and not port_flows(case, port):
+        raise FvsolveError(f"{port} joins no link, so nothing can flow into it there. Expected a patch with a link; "
+                           "the inputs and outputs of a driven patch are given by: fvsolve linearise")  # fmt: skip
     system, flows = _linear_system(case, port, at, before, scheme)
     a, b, c, d = system
     model = flows.at.model
