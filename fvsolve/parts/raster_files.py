@@ -94,10 +94,14 @@ def _read(path: Path, changed: int, size: int, band: int, variable: str, series:
     with open(path, "rb") as file:
         head = file.read(4)
     if head[:3] == b"CDF" or head == b"\x89HDF":
+        check_unused(path, "band", band != 1, "a GeoTIFF")
         result = read_netcdf(path, variable, head[:3] == b"CDF", series)
     elif head[:2] in (b"II", b"MM"):
+        check_unused(path, "variable", variable != "", "a NetCDF file")
         result = read_geotiff(path, band)
     else:
+        check_unused(path, "variable", variable != "", "a NetCDF file")
+        check_unused(path, "band", band != 1, "a GeoTIFF")
         result = read_ascii_grid(path)
     result.values[~np.isfinite(result.values)] = np.nan
     if np.isnan(result.values).all():
@@ -160,6 +164,12 @@ def read_ascii_grid(path: Path) -> Pixels:
     except ValueError as error:
         raise ValueError(f"{path.name} {error}") from None
     return Pixels(values.reshape(ny, nx)[::-1].copy(), x, y, dx, dy, crs=crs)
+
+
+def check_unused(path: Path, key: str, given: bool, owner: str) -> None:
+    """Raise ValueError if a key is given that files of this format do not have; owner : the format that has it"""
+    if given:
+        raise ValueError(f"{path.name} has no {key}, which only {owner} has; remove it")
 
 
 def read_geotiff(path: Path, band: int) -> Pixels:

@@ -264,6 +264,12 @@ def test_faults_of_geotiffs(tmp_path):
         assert text in str(refused(pond({"raster": str(path)})))
 
 
+@pytest.mark.parametrize(("key", "value"), [("variable", "z"), ("band", 2)])
+def test_keys_of_another_format_are_refused(key, value, tmp_path):
+    path = ascii_grid(tmp_path / "dem.asc", heights())
+    assert f"has no {key}, which only a" in str(refused(pond({"raster": str(path), key: value})))
+
+
 def test_a_missing_extra_is_named_with_its_command(tmp_path, monkeypatch):
     (tmp_path / "dem.tif").write_bytes(b"II*\0")
     (tmp_path / "dem.nc").write_bytes(b"\x89HDF")
