@@ -136,7 +136,7 @@ def pool(physics: str, links: bool, law: str = "linear", **numerics) -> dict:
     if links:
         nodes |= {"a": reservoir(2e5), "b": reservoir(1e5)}
         joined = {"hole": valve("a", "b", 0.01)}
-        if physics != "transport":
+        if physics == "liquid":  # faces of water that a link joins have rates of their own, also while it is shut
             joined |= {"shut": valve("pool.gate", "a", 0.01, opening=0.0)}
     case = scene(nodes, joined, 1e-3, numerics, fluid={**WATER, "law": law})
     return case if physics == "liquid" else case | {"scalars": {"dye": {}}}
