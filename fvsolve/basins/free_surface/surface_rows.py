@@ -177,9 +177,9 @@ def put_sloped(limiter, n, before, here, after, sides):
         h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
         below, above, low, high = h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e
         bed, b = half_slopes(limiter, low - below, high - above, low, high)
-        own = 0.5 * slope(limiter, below, above)
-        share = min(max(2.0 - 16.0 * abs(b - bed) / (h + TINY), 0.0), 1.0)
-        a = own + share * (b - bed - own)
+        own, change = 0.5 * slope(limiter, below, above), b - bed
+        most = max(0.5 * h - 4.0 * abs(change), 0.0)
+        a = own + min(max(change - own, -most), most)
         c, d = half_slopes(
             limiter, u - before[i + EAST], after[i + EAST] - u, v - before[i + NORTH], after[i + NORTH] - v
         )
