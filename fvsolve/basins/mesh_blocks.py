@@ -107,8 +107,8 @@ def mesh_rates(fluid, floats, integers, reflect, states, flow, through, work, ra
     band : first of these cells, at the start of a block, and one beyond the last, at the end of a block
     """
     mesh, fields, near = open_mesh(floats, integers), EQUATION.FIELDS, integers[4] * BLOCK
-    count = EQUATION.ROWS_OF_CELLS
-    cells, rest = work[: count * near].reshape((count, near)), work[count * near :]
+    rows = EQUATION.ROWS_OF_CELLS
+    cells, rest = work[: rows * near].reshape((rows, near)), work[rows * near :]
     sides, rest = rest[: 4 * fields * near].reshape((fields, 4 * near)), rest[4 * fields * near :]
     shown, w = rest[: EQUATION.SHOWN * mesh.edges.size], rest[EQUATION.SHOWN * mesh.edges.size :]
     begin, stop, first_order, most = band[0] // BLOCK, blocks_of(band[1]), fluid.scheme == UPWIND, 0.0

@@ -170,8 +170,8 @@ def put_side(i, hl, el, ul, vl, hr, er, ur, vr, push, sides):
 def put_sloped(limiter, n, before, here, after, sides):
     """Write the values at both faces of n cells with slopes by a limiter function; arguments as for `put_limited`.
 
-    The slope of the depth is that of the surface minus that of the bed, up to a change by h / 16 to a side. From h / 8
-    on it is that of the depths; in between it is interpolated.
+    The change of the depth to a side is that of the surface minus that of the bed, up to h / 16; from h / 8 on it is
+    that of the limited depths, and in between it lies between both.
     """
     for i in range(n):
         h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
