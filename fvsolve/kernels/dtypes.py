@@ -453,7 +453,6 @@ CLUSTER_RECORD = record(
     inverse=i8,
     order=i8,  # offset in `integers` of an order of elimination that keeps its matrix sparse; -1: none
     senses=i8,  # 1 if a device senses pressures for one of its valves
-    bracketed=i8,  # 1 for a single node whose pressure is bracketed, as at the ends of conduits
 )
 
 LAYOUT = record(

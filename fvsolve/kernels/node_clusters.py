@@ -25,7 +25,7 @@ wide : True while valves that a pressure lifts are held wide open, see `restrict
 space : work arrays of `node_work`
 """
 
-from math import inf, sqrt
+from math import sqrt
 
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels.dtypes import NO_SOLUTION, NOT_CONVERGED, STATUS, WHERE
@@ -43,6 +43,7 @@ from fvsolve.kernels.table_handle import open_tables
 BAR = 1e5
 ROUNDING = 1e-15  # relative rounding of pressures; of a flow, relative to the flow at 1 Pa
 NEARLY_CONVERGED = 1e-9  # relative change of Newton below which it may be rounding
+FIRST_RISE = 1e4  # greatest change of a pressure in the first limited step of Newton [Pa]
 FAILED_CHANGE = 1e-5  # relative change of flow above which Newton has failed; smaller changes may be rounding
 # Errors of valve flows against their laws up to this fraction of the node's imbalance cannot reverse a Newton step.
 FLOW_ERROR = 0.01
@@ -283,6 +284,15 @@ def largest_magnitude(a):
 
 
 @njit
+def scale_step(share, a, right):
+    """Multiply a Newton step by `share`; a, right : as for `limit_step`"""
+    for r in range(right.size):
+        right[r] *= share
+    for e in range(a.size):
+        a[e] *= share
+
+
+@njit
 def limit_step(most, a, right):
     """Scale a Newton step so that no pressure rises by more than `most` [Pa].
 
@@ -293,10 +303,7 @@ def limit_step(most, a, right):
     for r in range(right.size):
         greatest = max(greatest, right[r])
     if greatest > most:
-        for r in range(right.size):
-            right[r] *= most / greatest
-        for e in range(a.size):
-            a[e] *= most / greatest
+        scale_step(most / greatest, a, right)
 
 
 @njit
@@ -347,9 +354,10 @@ def close_unstable(cluster, tables, g, m):
     return closed
 
 
-def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, work):
+def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, most, work):
     """Make a Newton step for the pressures and valve flows of a cluster.
 
+    most : greatest change of a pressure [Pa], 0 for no limit
     Returns the greatest relative change, and True if the step points to the root. This is so if the errors of valve
     flows against their laws are below the fraction FLOW_ERROR of the imbalance of the nodes: then the second-order
     error of Newton cannot reverse this imbalance. Under the density law `linear` the second result has no meaning.
@@ -377,6 +385,9 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, work):
         for e in range(k):
             flow_error += a[e] * a[e] / max(abs(m[e] + a[e]), 1e-300)
         limit_step(tables.settings[0]["beta"], a, right)
+    greatest = largest_magnitude(right)
+    if most > 0.0 and greatest > most:
+        scale_step(most / greatest, a, right)
     return apply_step(cluster, tables, out, m, a, s, lift, right), flow_error <= FLOW_ERROR * imbalance
 
 
@@ -567,7 +578,7 @@ def step_clusters(sweep, out, tables, space):
         if done[k] == 0.0:
             last_change[k] = change[k]
             step, near = newton_step_barotropic(
-                cluster, tables, out, g[b:j], m[b:j], c[a:i], connected[a:i], slope, wide[k] == 1.0, rest
+                cluster, tables, out, g[b:j], m[b:j], c[a:i], connected[a:i], slope, wide[k] == 1.0, 0.0, rest
             )
             change[k] = max(0.0, step)  # 0 for NaN: the iteration ends, the rates show the fault
             sure[k] = 1.0 if near else 0.0
@@ -632,24 +643,21 @@ def write_clusters(out, tables, space):
 
 
 @njit
-def keep_in_bracket(cluster, tables, out, m, work, low, high):
-    """Bracket (low, high) [Pa] of the pressure of a cluster of a single node after a step, which it bisects if needed.
+def put_law_flows(cluster, tables, out, g, m, c, connected, slope, wide, work):
+    """Set the flows m of valves to those of their laws at the present pressures; arguments as for `newton_step`."""
+    assemble_linear(cluster, tables, out, g, m, c, connected, slope, wide, work, False)
+    a = step_arrays(c.size, g.size, work)[2]
+    for e in range(m.size):
+        m[e] += a[e]
 
-    m : flows of valves; work : work array of the step; low, high : bracket before the step
-    The inflow falls with the pressure, so the root is in the direction of the step. An empty bracket begins anew.
-    """
-    at, k = tables.layout[0]["pressure"] + tables.integers[cluster["first_node"]], m.size
-    _, right, _, slopes, _ = step_arrays(1, k, work)
-    end, step = out[at], right[0]
-    low, high = (end - step, high) if step > 0.0 else (low, end - step)
-    if not high > low:
-        return -inf, inf
-    if high - low < inf and not low < end < high:
-        out[at] = 0.5 * (low + high)
-        for e in range(k):
-            valve = tables.valves[tables.integers[cluster["first_valve"] + e]]
-            m[e] += (slopes[e] if inner_row(tables.nodes, valve["from_node"]) == 0 else -slopes[e]) * (out[at] - end)
-    return low, high
+
+@njit
+def greatest_step(n, k, work):
+    """Step of the pressure that changes most [Pa]; arguments as for `step_arrays`."""
+    right, greatest = step_arrays(n, k, work)[1], 0.0
+    for r in range(n):
+        greatest = right[r] if abs(right[r]) > abs(greatest) else greatest
+    return greatest
 
 
 @njit
@@ -666,16 +674,22 @@ def solve_cluster(out, tables, index):
     undisturbed = total_inflows(cluster, tables, out, c) and unchanged
     find_connected(cluster, tables, g, connected)
     zero_isolated(cluster, tables, g, m, connected)
-    change, wide, low, high = 1e300, True, -inf, inf
-    for _ in range(MAX_SWEEPS):
+    change, wide, most, last = 1e300, True, 0.0, 0.0
+    for sweep in range(2 * MAX_SWEEPS):
         if undisturbed:
             change = 0.0
             break
-        last_change = change
-        slope = c  # not used under this law
-        change = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, rest)[0]
-        if cluster["bracketed"] == 1 and change > NEARLY_CONVERGED:
-            low, high = keep_in_bracket(cluster, tables, out, m, rest, low, high)
+        slope, last_change = c, change  # `slope` is not used under this law
+        if sweep == MAX_SWEEPS:  # steps may have alternated, or led far away
+            prepare_cluster(cluster, tables, out, g, m)
+            zero_isolated(cluster, tables, g, m, connected)
+            change, wide, most = 1e300, True, FIRST_RISE
+        if most > 0.0:
+            put_law_flows(cluster, tables, out, g, m, c, connected, slope, wide, rest)
+        change = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, most, rest)[0]
+        if most > 0.0:
+            greatest = greatest_step(n, k, rest)
+            most, last = most * (0.5 if greatest * last < 0.0 else 1.5), greatest
         if has_converged(change, last_change):
             if not (wide and has_backflow(cluster, tables, m)):
                 break

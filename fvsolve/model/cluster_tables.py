@@ -137,8 +137,7 @@ def add_cluster(draft, members, ks, own) -> tuple[int, ...]:
         draft.integers += elimination_order(draft, members, ks, own)
     devices = draft.valve_table["device"][ks]
     senses = (draft.device_table["node"][devices[devices >= 0]] >= 0).any() if ks else False
-    bracketed = n == 1 and any(draft.case.conduits[draft.valve_names[k]].kind == "conduit-end" for k in ks)
-    return at, n, at + n, len(ks), at + n + len(ks), len(own), inverse, order, int(senses), int(bracketed)
+    return at, n, at + n, len(ks), at + n + len(ks), len(own), inverse, order, int(senses)
 
 
 def elimination_order(draft, members, ks, own) -> list[int]:

@@ -341,3 +341,54 @@ def test_a_basin_drained_by_a_demand_runs_dry_at_its_patch():
     mark, ledger = found.marks[-1], found.ledger["mass"]
     assert found.reason == "finished" and abs(ledger["relative"]) < 1e-12
     assert mark.volume == approx(ASKED * 40.0 - (ledger["initial"] - ledger["final"]) / ledger["initial"] * 240.0)
+
+
+BELOW_GROUND = {
+    "weir": {"crest": 1.7, "width": 2.0}, "manhole": {"crest": 1.7, "area": 0.3, "perimeter": 2.0},
+    "sluice-gate": {"sill": 1.2, "width": 2.0, "opening": 0.4}, "orifice": {"area": 0.2},
+    "culvert": {"diameter": 0.6, "length": 10.0, "inverts": [1.4, 1.3], "manning": 0.013, "inlet":
+                "circular-concrete-square-edge", "entrance_loss": 0.5},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("numerics", [{}, {"method": "tr-bdf2", "rtol": 1e-6, "courant": None},
+                                      {"method": "auto", "courant": None}], ids=["explicit", "implicit", "auto"])  # fmt: skip
+@pytest.mark.parametrize("name", BELOW_GROUND)
+def test_a_film_falls_freely_into_whatever_lies_below_it(name, numerics):
+    """Rain on a slope of 0.1 : links that could pass more draw the critical outflow of a free overfall."""
+
+    def slope(**patch) -> dict:
+        return {"type": "basin", "size": [24.0, 10.0], "cells": [24, 10], "elevation": 2.0, "level": 0.0, "bed": "0.1*x",
+                "start": {"level": 0.0}, "manning": 0.02, "rain": "100 mm/h", "patches": {"low": {"side": "south", **patch}}}  # fmt: skip
+
+    given = {key: value for key, value in (NUMERICS | numerics).items() if value is not None}
+    link = {"type": name, "from": "slope.low", "to": "lake", **BELOW_GROUND[name]}
+    probes = ["slope.volume", "slope.low.flow"]
+    nodes = {"slope": slope(), "lake": lake(-1.0)}
+    linked = fvsolve.run(scene(nodes, {"link": link}, 10.0, given, probes, 1.0))
+    free = fvsolve.run(scene({"slope": slope(boundary="critical")}, {}, 10.0, given, probes, 1.0))
+    assert linked.ok and linked.ledger["mass"]["relative"] < 1e-12
+    assert free["slope.low.flow"][-1] < -5e-5
+    for probe in probes:
+        assert linked[probe] == approx(free[probe], rel=1e-9 if "courant" in given else 1e-3, abs=1e-15)
+
+
+@pytest.mark.parametrize("method", ["ssp-rk2", "ssp-rk3", "euler"])
+def test_a_pump_whose_sump_is_dry_waits(method):
+    """The level of the dry patch falls until the pump gives its shut-off head; then a hydrograph fills the sump."""
+    sump = {"type": "basin", "size": [24.0, 10.0], "cells": [24, 10], "elevation": 0.0, "level": 0.0, "bed": "0.1*x",
+            "start": {"level": -0.01}, "patches": {"intake": {"side": "west", "span": ["4 m", "6 m"]},
+            "inflow": {"side": "north", "discharge": {"time": [0.0, 5.0, 6.0], "value": [0.0, 0.0, 1.0]}}}}  # fmt: skip
+    pond = {"type": "basin", "size": [24.0, 10.0], "cells": [24, 10], "elevation": 2.0, "level": 0.0, "bed": -1.0,
+            "patches": {"in": {"at": [14.5, 3.2], "area": "0.5 m2"}, "out": {"side": "south", "boundary": "critical"}}}  # fmt: skip
+    pump = {"type": "pump", "from": "sump.intake", "to": "pond.in", "curve": {"flow": [0, 0.2, 0.4], "head": [6, 4, 1]}}
+    drain = {"type": "orifice", "from": "pond.in", "to": "lake", "area": 0.1}
+    probes = ["pump.flow", "sump.volume", "sump.intake.level"]
+    given = NUMERICS | {"method": method, "scheme": "upwind"}
+    run = fvsolve.run(scene({"sump": sump, "pond": pond, "lake": lake(0.0)}, {"pump": pump, "drain": drain}, 20.0, given,
+                            probes, 1.0))  # fmt: skip
+    assert run.reason == "finished" and run.ledger["mass"]["relative"] < 1e-12
+    assert run["pump.flow"][:6] == approx(np.zeros(6), abs=1e-12)
+    assert run["pump.flow"][-1] > 0.01
+    moved = run.ledger["mass"]["nodes"]["sump.inflow"]["inflow"] / run.summary["fluid"]["density"]
+    assert run["sump.volume"][-1] - run["sump.volume"][0] < moved

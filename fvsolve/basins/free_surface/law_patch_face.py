@@ -9,6 +9,7 @@ from fvsolve.jit import njit
 
 LEAST_SLOPE = 1e-12  # least derivative of the flow by the level [m2/s]; critical outflow does not depend on the level
 SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
+DRY_DEPTH = 1e-3  # [m]
 DRY_SPEED = 0.1  # derivative at dry faces over their length: speed of waves in a millimetre of water [m/s]
 
 
@@ -25,7 +26,8 @@ def level_step(g, faces, z, target):
     """(change of the flow from `target` [m3/s], its derivative by the level [m2/s]) in Newton's step from the level z.
 
     At or below critical outflow the flow has no derivative by the level. If the target is greater, the step is that
-    from the level at which it passes. A smaller target has the level of `DEEPEST`.
+    from the level at which it passes, or, below dry faces, that of the chord to this level: with any slope of its own
+    a patch that stays dry would keep Newton's method from its root. A smaller target has the level of `DEEPEST`.
     g : gravity; faces : as for `patch_flow`
     """
     q, change = patch_flow(g, z, faces)
@@ -34,14 +36,15 @@ def level_step(g, faces, z, target):
     long = 0.0
     for m in range(faces[3].size):
         long += faces[3][m]
-    if q == 0.0 and target >= 0.0:
-        return q - target, DRY_SPEED * long
+    if q == 0.0 and target == 0.0:
+        return 0.0, DRY_SPEED * long if lowest_bed(faces) - z < DRY_DEPTH else LEAST_SLOPE
     if not target > q + SAME_FLOW * abs(q):
         deeper = z - (lowest_bed(faces) - DEEPEST)
         return (q + DRY_SPEED * long * deeper - target, DRY_SPEED * long) if deeper < 0.0 else (q - target, LEAST_SLOPE)
     level = solve_level(g, faces, target, 0.0, faces[0][:0], faces[0][:0])
-    change = max(patch_flow(g, level, faces)[1], LEAST_SLOPE)
-    return change * (z - level), change
+    change = patch_flow(g, level, faces)[1] if q != 0.0 else target / max(level - z, DRY_DEPTH)
+    change = max(change, LEAST_SLOPE)
+    return change * (z - level) if q != 0.0 else q - target, change
 
 
 @njit
