@@ -292,7 +292,7 @@ class RunLoop:
         """Return to the state before the last step, unless the ledgers include that step already; it is valid then."""
         if self.progress["has_last_step"] == 1 and self.state["unbooked"] > 0.0:
             self.before  # noqa: B018  (copies that state from the other threads or ranks)
-            self.state["t"] -= self.state["last"]
+            self.state["t"] = self.progress["t_old"]
             self.state["unbooked"] = 0.0
             self.progress["now"], self.progress["old"] = self.progress["old"], self.progress["now"]
             self.progress["has_last_step"] = 0
