@@ -82,8 +82,8 @@ def test_a_structure_narrower_than_a_cell_has_a_notice(width, narrow):
 def test_a_structure_wider_than_its_patch_has_a_notice(kind, width, wide):
     keys = {"weir": {"crest": 0.4}, "sluice-gate": {"sill": 0.0, "opening": 0.1}}[kind]
     link = {"type": kind, "from": "pond", "to": "pool.up", "width": width, **keys}
-    found = notices(nodes={"pond": lake(0.3, elevation=-1.0)}, links={"x": link}, patches=inflow())
-    assert [text for text in found if text.startswith("x is wider than pool.up, 4 m: ")] == found
+    found = notices(nodes={"pond": lake(0.3, elevation=-1.0)}, links={"x": link}, patches=inflow(span=[1.0, 3.0]))
+    assert [text for text in found if text.startswith("x is wider than the side of pool.up, 4 m: ")] == found
     assert bool(found) is wide
 
 

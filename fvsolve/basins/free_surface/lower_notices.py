@@ -85,19 +85,21 @@ def subcritical_inflow(basin, name: str, patch) -> Iterator[Notice]:
 
 
 def structures_of_unusual_width(basin, name: str) -> Iterator[Notice]:
-    """Notices of structures at a patch that are narrower than its cells, or wider than the patch."""
+    """Notices of structures at a patch that are narrower than its cells, or wider than the patch and its side."""
     place, sides = f"{basin.name}.{name}", basin.mesh.length[basin.mesh.faces(name).index]
+    side, size = basin.part.patches[name].side if name in basin.part.patches else None, basin.part.size
+    whole = max(float(sides.sum()), size[side in ("west", "east")] if side and size else 0.0)
     widths = {
         link: (getattr(part, "width", None) or getattr(part, "diameter", None)) * getattr(part, "barrels", 1)
         for link, part in basin.case.links.items()
         if isinstance(part, HydraulicStructure) and place in part.ports.values() and hasattr(part, "width")
     }
     narrow = [link for link, width in widths.items() if width < sides.min() * (1.0 - 1e-9)]
-    wide = [link for link, width in widths.items() if width > sides.sum() * (1.0 + 1e-9)]
+    wide = [link for link, width in widths.items() if width > whole * (1.0 + 1e-9)]
     for links, word, size, text in (
         (narrow, "narrower than the cells at", sides.min(),
          "the flow spreads over the cells; use smaller cells where velocities beside it matter"),
-        (wide, "wider than", sides.sum(),
+        (wide, "wider than the side of" if side else "wider than", whole,
          "no more than critical flow through the patch passes; give the width that is in the basin"),
     ):  # fmt: skip
         if links:
