@@ -141,7 +141,8 @@ class Patch(Table):
         None
     )
     depth: Annotated[Schedule | None, Scheduled(
-        "length", nonnegative, "depth of a supercritical inflow by `discharge` [m]; at most critical flow if left out",
+        "length", nonnegative, "depth of a supercritical inflow by `discharge` [m]; at most critical flow if left out, and "
+        "while a schedule is 0",
     )] = None  # fmt: skip
     rating: Annotated[
         Rating | None, Nested(Rating, "flow out of the basin by the level at the patch, linear between points")
@@ -169,6 +170,8 @@ class Patch(Table):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
         faults = super().key_faults(given)
+        if len({"side", "at", "polygon"} & given.keys()) > 1:  # a fault already, by which other keys are right or not
+            return faults
         if ("at" in given) != ("area" in given):
             present, missing = ("at", "area") if "at" in given else ("area", "at")
             faults.append(((), f"{missing} is missing, which an interior patch with `{present}` needs"))
