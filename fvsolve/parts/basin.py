@@ -141,8 +141,8 @@ class Patch(Table):
         None
     )
     depth: Annotated[Schedule | None, Scheduled(
-        "length", nonnegative, "depth of a supercritical inflow by `discharge` [m]; at most critical flow if left out, and "
-        "while a schedule is 0",
+        "length", nonnegative, "depth of a supercritical inflow by `discharge` [m]; at most critical flow if left out, "
+        "and while a schedule is 0",
     )] = None  # fmt: skip
     rating: Annotated[
         Rating | None, Nested(Rating, "flow out of the basin by the level at the patch, linear between points")
