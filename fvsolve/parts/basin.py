@@ -18,7 +18,7 @@ from fvsolve.parts.csv_rows import copy_name, find_file
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey, uniform
 from fvsolve.parts.kinds import Kinds
 from fvsolve.parts.nodes_and_links import Node, PlaceOnBody
-from fvsolve.parts.raster_files import IN_DEGREES
+from fvsolve.parts.raster_files import is_in_degrees
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table_model import NamedTables, Nested, Table
 from fvsolve.parts.value import (
@@ -285,7 +285,7 @@ class ReferenceSystem(Text):
     def read(self, given: Any, setting: ReadContext) -> str:
         if re.fullmatch(r"EPSG:\d+", text := super().read(given, setting)) is None:
             raise ValueError(f'{show(given)} is not a coordinate reference system; expected for example "EPSG:32633"')
-        if text in IN_DEGREES:
+        if is_in_degrees(text):
             raise ValueError(f'{show(given)} is in degrees; expected a system in metres, for example "EPSG:32633"')
         return text
 
