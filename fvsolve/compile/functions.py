@@ -80,8 +80,8 @@ def specialise(template: FunctionType, name: str, **constants: Any) -> Callable:
     numba stores code by template and name, so that the second copy would run the code of the first.
     """
     module = sys._getframe(1).f_globals["__name__"]
-    made = template.__code__.co_filename, template.__code__.co_firstlineno, name
-    first = COPIES.setdefault(made, module)
+    key = template.__code__.co_filename, template.__code__.co_firstlineno, name
+    first = COPIES.setdefault(key, module)
     if first != module:
         raise ValueError(
             f'{module}: {first} has a copy of {template.__name__} with the name "{name}"; give another name'
