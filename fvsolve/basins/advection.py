@@ -7,10 +7,10 @@ The rate of a cell by advection is kx ky times the sum of F (q - c) over its fac
 face, minus c times the divergence of F. So the rate of a uniform c is minus c times the divergence, to the last bit.
 The slope of an upwind cell uses the differences across the face and across the opposite face of that cell.
 
-The Courant number is the step times the rate of `grid_fastest`. In flows without divergence, Euler steps keep every
-value within the range of its neighbours up to these Courant numbers: upwind 1; muscl 1/2, next to an inlet 1/3; muscl
-with minmod 2/3, next to an inlet 1/2. Up to 1/2, weno5 keeps all values between `least` and `most`; upwind5 has no
-bounds (`fifth_order`). SSP methods keep these bounds up to their SSP coefficient times these numbers.
+The Courant number is the step times the greatest rate of `put_row_rates`. In flows without divergence, Euler steps keep
+every value within the range of its neighbours up to these Courant numbers: upwind 1; muscl 1/2, next to an inlet 1/3;
+muscl with minmod 2/3, next to an inlet 1/2. Up to 1/2, weno5 keeps all values between `least` and `most`; upwind5 has
+no bounds (`fifth_order`). SSP methods keep these bounds up to their SSP coefficient times these numbers.
 
 Arguments of all functions
     scheme, limiter : MUSCL with the limiter, else UPWIND; nx, ny : numbers of columns and rows
@@ -73,27 +73,18 @@ def stencil_values(grid, s, depth, c):
     put_values(s[a:z], depth[a:z], c[a:z])
 
 
-@njit
-def grid_fastest(grid, flows, depth, work):
-    """Greatest rate |u| kx + |v| ky over the cells of a grid [1/s]; work : float64[nx].
+@inline
+def put_row_rates(factor, kx, ky, flows, depth, rates):
+    """Write the rates |u| kx + |v| ky of the cells of a row of a grid [1/s].
 
     u, v : velocities along x and y [m/s], each from the greater flow through two opposite faces of the cell
+    kx, ky : 1 / widths of the cells, 1 / height of the row [1/m]
+    flows : through the western, eastern, southern and northern faces
     """
-    nx, kx, ky, flow_x, flow_y = grid.nx, grid.kx, grid.ky, flows.x, flows.y
-    top = work[:nx]
-    for i in range(nx):
-        top[i] = 0.0
-    for j in range(grid.ny):
-        fw, fe = flow_x[j * (nx + 1) :], flow_x[j * (nx + 1) + 1 :]
-        fs, fn, h = flow_y[j * nx :], flow_y[(j + 1) * nx :], depth[j * nx :]
-        for i in range(nx):
-            rate = kx[i] * ky[j] * (max(abs(fw[i]), abs(fe[i])) + max(abs(fs[i]), abs(fn[i])))
-            rate = rate / max(h[i], THIN) if depth.size > 0 else rate
-            top[i] = rate if rate > top[i] else top[i]
-    most = 0.0
-    for i in range(nx):
-        most = max(most, top[i])
-    return most
+    fw, fe, fs, fn = flows
+    for i in range(rates.size):
+        rate = kx[i] * ky * (max(abs(fw[i]), abs(fe[i])) + max(abs(fs[i]), abs(fn[i])))
+        rates[i] = abs(factor) * rate / max(depth[i], THIN)
 
 
 def second_order_work(nx, ny):

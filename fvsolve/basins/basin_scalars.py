@@ -241,8 +241,6 @@ def add_fifth_order_on_grids(t, y, dydt, out, handle):
             continue
         grid, depth, work = grid_arrays(tables, b)
         seen, n, fastest = deviations_of(basin, tables.seen, y), basin["n"], basin["fastest"]
-        if depth.size > 0:
-            fastest = advection.grid_fastest(grid, grid_flows(t, tables, basin, 0), depth, work)
         for q in range(tables.scalars.size):
             flows = grid_flows(t, tables, basin, q)
             at, bounds = basin["carried"] + q * n, (tables.scalars[q]["least"], tables.scalars[q]["greatest"])

@@ -13,7 +13,7 @@ Arguments as in `advection`; c : values of cells; scheme : LINEAR (upwind5) or W
 weno5 keeps, infinite for none; ax, ay : excesses, ordered as the flows along x and y.
 """
 
-from fvsolve.basins.advection import put_values
+from fvsolve.basins.advection import put_row_rates, put_values
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import WENO5
 
@@ -35,7 +35,7 @@ def add_fifth_order(scheme, grid, flows, depth, bounds, fastest, s, work, rate):
     """Add the rates by upwind5 or weno5, minus the rates by upwind, to `rate`, which contains the rates by upwind.
 
     Fluxes of weno5 are limited so that an Euler step of Courant number WENO_COURANT keeps the bounds.
-    fastest : result of `grid_fastest` for the flows [1/s]; work : float64[fifth_order_work(nx, ny)]
+    fastest : greatest rate of flow through a cell [1/s], for depth 1; work : float64[fifth_order_work(nx, ny)]
     """
     nx, ny, factor = grid.nx, grid.ny, flows.factor
     c, rest, mx, my = s, work[nx * ny :], (nx + 1) * ny, nx * (ny + 1)
@@ -44,9 +44,8 @@ def add_fifth_order(scheme, grid, flows, depth, bounds, fastest, s, work, rate):
         c = work[: nx * ny]
     ax, ay, rest = rest[:mx], rest[mx : mx + my], rest[mx + my :]
     grid_excesses(scheme, grid, flows, c, rest, ax, ay)
-    pace = abs(factor) * fastest
-    if scheme == WENO5 and pace > 0.0 and (bounds[0] > -INFINITE or bounds[1] < INFINITE):
-        limit_excesses(grid, flows, depth, bounds, WENO_COURANT / pace, s, rate, ax, ay, rest)
+    if scheme == WENO5 and (bounds[0] > -INFINITE or bounds[1] < INFINITE):
+        limit_excesses(grid, flows, depth, bounds, abs(factor) * fastest, s, rate, ax, ay, rest)
     add_excesses(grid, factor, ax, ay, rate)
 
 
@@ -265,14 +264,16 @@ def sum_of_positive(a, b, c, d):
 
 
 @inline
-def row_fractions(step, factor, kx, ky, flows, excesses, depth, bounds, s, rate, up, down):
+def row_fractions(paces, factor, kx, ky, flows, excesses, depth, bounds, s, rate, up, down):
     """Write the fractions of excess inflow (`up`) and outflow (`down`) with which each cell of a row keeps the bounds.
 
-    Fractions are at most 1. kx, ky : 1 / widths of the cells, 1 / height of the row [1/m]; step : Euler step [s]
+    Fractions are at most 1. kx, ky : 1 / widths of the cells, 1 / height of the row [1/m]
+    paces : rates of flow through the cells [1/s]; a cell keeps the bounds in an Euler step of WENO_COURANT / rate
     flows, excesses : through the western, eastern, southern and northern faces
     """
     (fw, fe, fs, fn), (aw, ae, south, north), (least, most) = flows, excesses, bounds
     for i in range(s.size):
+        step = WENO_COURANT / (paces[i] + SMALL)
         scale = step * (factor * (kx[i] * ky))
         then = s[i] + step * rate[i]
         deep = (depth[i] if depth.size > 0 else 1.0) - scale * ((fe[i] - fw[i]) + (fn[i] - fs[i]))
@@ -295,27 +296,33 @@ def limit_faces(factor, up, down, up_then, down_then, excess):
 
 def limit_excesses_work(nx, ny):
     """Length of the work array of `limit_excesses`."""
-    return 2 * (nx + 2) * (ny + 2)
+    return 2 * (nx + 2) * (ny + 2) + nx
 
 
 @njit
-def limit_excesses(grid, flows, depth, bounds, step, s, rate, ax, ay, work):
-    """Limit the excesses so that the values of a scalar after an Euler step [s] are within their bounds.
+def limit_excesses(grid, flows, depth, bounds, fastest, s, rate, ax, ay, work):
+    """Limit the excesses so that the values of a scalar after an Euler step are within their bounds.
 
-    After the step, s + step times the corrected rates lies between least and most times the depth.
+    After the step, s + step times the corrected rates lies between least and most times the depth. The step has the
+    Courant number WENO_COURANT for the greatest rate `fastest` [1/s] of a given flow. With depths it has this number in
+    each cell, where it is no shorter than in the fastest cell, so that no rate depends on states far away.
     rate : float64[n]  rates by upwind; work : float64[limit_excesses_work(nx, ny)]
     """
     nx, ny, kx, ky, factor, flow_x, flow_y = grid.nx, grid.ny, grid.kx, grid.ky, flows.factor, flows.x, flows.y
     wide = nx + 2
-    up, down = work[: wide * (ny + 2)], work[wide * (ny + 2) : 2 * wide * (ny + 2)]
-    for i in range(up.size):
+    up, down, paces = work[: wide * (ny + 2)], work[wide * (ny + 2) :], work[2 * wide * (ny + 2) :][:nx]
+    for i in range(wide * (ny + 2)):
         up[i], down[i] = 1.0, 1.0  # beyond the boundary this remains
+    for i in range(nx):
+        paces[i] = fastest
     for j in range(ny):
         a, z, w, to = j * nx, (j + 1) * nx, j * (nx + 1), (j + 1) * wide + 1
         around = flow_x[w:], flow_x[w + 1 :], flow_y[a:], flow_y[z:]
         beyond = ax[w:], ax[w + 1 :], ay[a:], ay[z:]
+        if depth.size > 0:
+            put_row_rates(factor, kx, ky[j], around, depth[a:], paces)
         row_fractions(
-            step, factor, kx, ky[j], around, beyond, depth[a:], bounds, s[a:z], rate[a:], up[to:], down[to:]
+            paces, factor, kx, ky[j], around, beyond, depth[a:], bounds, s[a:z], rate[a:], up[to:], down[to:]
         )  # fmt: skip
     for j in range(ny):
         at = (j + 1) * wide

@@ -37,9 +37,12 @@ def scalar_neighbours(basin) -> csr_array:
     """Cells on which the rate of the amount in each cell depends : bool[n, n].
 
     On grids, schemes of fifth order also read cells beside the faces of a cell, up to four columns and four rows away.
-    The flux correction of weno5 reads further cells.
+    The flux correction of weno5 reads further cells. On other meshes, diffusion reads the gradients of both cells at a
+    face.
     """
-    near = neighbours(basin)
+    near, scalars = neighbours(basin), basin.case.scalars
+    if not basin.is_grid and basin.reach == 1 and any(scalars[name].diffusivity > 0.0 for name in basin.scalars):
+        near = near @ near
     if basin.is_grid and basin.row["scheme"] in (rec.LINEAR, rec.WENO5):
         near = near @ near if basin.row["scheme"] == rec.WENO5 else near
         box = eye_array(basin.n, dtype=bool)

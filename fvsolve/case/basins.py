@@ -32,6 +32,8 @@ def closure_faults(basin: Any, options: Any) -> Faults:
     """Faults (key path within the patch, message) of the closure of a driven patch; options : keys of the patch."""
     if options.depth is not None and options.discharge is None:
         yield ("depth",), "is the depth of an inflow by `discharge`; give `discharge` too, or leave this key out"
+    elif options.depth is not None and options.depth.kind != "control" and not options.depth.value.max() > 0.0:
+        yield ("depth",), "is never above 0; expected the depth of a supercritical inflow, or no key for critical flow"
     if options.closure is None:
         return
     below = "boundary" if options.closure == options.boundary else options.closure

@@ -66,6 +66,9 @@ def inline(function: Callable) -> Callable:
     return njit(function, forceinline=True)
 
 
+COPIES: dict[tuple[str, int, str], str] = {}  # (file, line of a template, name of a copy) -> module of the copy
+
+
 def specialise(template: FunctionType, name: str, **constants: Any) -> Callable:
     """Compile a copy of a plain function in which global names have other values, such as functions, codes or None.
 
@@ -73,7 +76,18 @@ def specialise(template: FunctionType, name: str, **constants: Any) -> Callable:
     this call. Numba caches such copies, which it does not do for closures.
     name : name of the result; the module must assign the result to it, because code is stored and pickled under it
     constants : values of global names of the template, and `__name__=__name__` in another module than the template's
+    Raises ValueError if another module compiles the same template under this name, or if that `__name__` is missing:
+    numba stores code by template and name, so that the second copy would run the code of the first.
     """
+    module = sys._getframe(1).f_globals["__name__"]
+    key = template.__code__.co_filename, template.__code__.co_firstlineno, name
+    first = COPIES.setdefault(key, module)
+    if first != module:
+        raise ValueError(
+            f'{module}: {first} has a copy of {template.__name__} with the name "{name}"; give another name'
+        )
+    if constants.get("__name__", template.__module__) != module:
+        raise ValueError(f"{module}: the copy {name} of {template.__name__} needs __name__=__name__")
     function = FunctionType(template.__code__, template.__globals__ | constants, name, template.__defaults__)
     function.__qualname__, function.__doc__ = name, template.__doc__  # its module is the constant `__name__`
     return njit(function)

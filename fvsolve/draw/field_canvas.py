@@ -68,6 +68,7 @@ class FieldCanvas:
         self.plotter.clear_actors()
         for file in files:
             self._add(read_frame(file, self.scene))
+        self._walls()
         self.image.set_data(self.plotter.screenshot(transparent_background=True, return_img=True))
         rise = self.aspect.rise / self.scene.height_ratio
         notes = [] if abs(rise - 1.0) < 1e-9 else [f"heights drawn {rise:.3g} times"]
@@ -194,6 +195,17 @@ class FieldCanvas:
             self.plotter.add_mesh(surface, color=WATER, smooth_shading=True)
         return None
 
+    def _walls(self) -> None:
+        """Draw the walls of basins as lines along their crests."""
+        import pyvista
+
+        for wall in self.scene.walls:
+            shape = pyvista.line_segments_from_points(self.scene.shown(wall) * (1.0, 1.0, self.aspect.rise))
+            for colour, width in (("white", 6), (style.INK, 2)):
+                # the water beside the wall would hide parts of the lines, and the white line the other
+                shape.points[:] += WALL_OFFSET * shape.length * self.aspect.back
+                self.plotter.add_mesh(shape.copy(), color=colour, line_width=width, lighting=False)
+
     def _coloured(self, shape: Any, plane: bool) -> None:
         """Draw a shape in the colours of the field; plane : True for a surface, which then also has contour lines."""
         (low, high), field, count = self.limits, self.scene.quantity.name, self.scene.contours
@@ -212,6 +224,7 @@ class FieldCanvas:
 
 
 TUBE_RADIUS = 0.008  # radius of a pipe as a fraction of the diagonal of the scene
+WALL_OFFSET = 0.01  # distance of the lines of walls towards the observer, over the extent of the wall
 WET_DEPTH = 1e-4  # least depth of water that is drawn [m]
 WALL_SLOPE = 1.0  # least slope of the bed that counts as a wall
 BUILDING_INSET = 1e-3  # relative reduction of a building, so that its walls do not coincide with those of the water

@@ -68,6 +68,7 @@ class DrawnScene:
     bodies: list[str] = field(default_factory=list)  # names of bodies by index
     parts: list[DrawnPart] = field(default_factory=list)
     anchors: dict[str, tuple[float, float, float]] = field(default_factory=dict)  # positions of linked patches [m]
+    walls: list[np.ndarray] = field(default_factory=list)  # faces of walls at their crests: float64[n, 2, 3] [m]
     plan: str = "given"
     contours: int = 0
     over_run: bool = False

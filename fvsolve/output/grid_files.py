@@ -15,6 +15,11 @@ from fvsolve.units import DIMENSIONS
 GRID_FILES = "grids/*.*"
 SOURCE = FILE_ATTRIBUTE.pattern.replace("file", "Source")
 NEAR = 1e-12  # of the size of a cell squared: twice the area by which a point may lie outside
+MERCATOR = {  # parameter of Transverse_Mercator in the text of a CRS -> its name in CF-1.8
+    "latitude_of_origin": "latitude_of_projection_origin", "central_meridian": "longitude_of_central_meridian",
+    "scale_factor": "scale_factor_at_central_meridian", "false_easting": "false_easting",
+    "false_northing": "false_northing",
+}  # fmt: skip
 BLOCK = 4096  # cells at once: limits the memory of pairs of cells and pixels
 
 
@@ -103,7 +108,9 @@ class PixelGrid:
                 item.units, item.standard_name, item.axis = unit, word, axis[0].upper()
                 item[:] = at
             if self.basin.part.crs:
-                file.createVariable("crs", "i", ()).spatial_ref = self.basin.part.crs
+                item = file.createVariable("crs", "i", ())
+                for key, value in grid_mapping(self.basin.part.crs).items():
+                    setattr(item, key, value if isinstance(value, (str, bytes)) else np.float64(value))
             for key in self.spec.fields:
                 item = file.createVariable(key, "d", ("time", "y", "x"))
                 item.units, item._FillValue = self.unit(key).replace("-", "1"), np.nan
@@ -112,6 +119,27 @@ class PixelGrid:
             for k, frame in enumerate(frames):
                 for key in self.spec.fields:
                     file.variables[key][k] = self.values(frame[key])
+
+
+def grid_mapping(crs: str) -> dict[str, Any]:
+    """Attributes of the variable of a grid mapping (CF-1.8) for a CRS such as "EPSG:32633".
+
+    GDAL reads the CRS from its text (WKT), which is written if rasterio is installed and knows the code.
+    """
+    import re
+
+    try:
+        rasterio = import_library("rasterio", "the text of a CRS")
+        text = rasterio.crs.CRS.from_user_input(crs).to_wkt()
+    except ValueError:  # a CRSError is one too
+        return {"epsg_code": crs, "spatial_ref": crs}
+    result = {"epsg_code": crs, "spatial_ref": text.encode(), "crs_wkt": text.encode()}
+    if 'PROJECTION["Transverse_Mercator"]' in text:
+        result["grid_mapping_name"] = "transverse_mercator"
+        result |= {to: float(re.search(rf'PARAMETER\["{key}",([^]]+)\]', text)[1]) for key, to in MERCATOR.items()}
+        axis, flattening = re.search(r'SPHEROID\["[^"]*",([^,]+),([^],]+)', text).groups()
+        result |= {"semi_major_axis": float(axis), "inverse_flattening": float(flattening)}
+    return result
 
 
 def frame_field(path: Path, key: str) -> np.ndarray:

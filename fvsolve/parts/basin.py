@@ -18,7 +18,7 @@ from fvsolve.parts.csv_rows import copy_name, find_file
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey, uniform
 from fvsolve.parts.kinds import Kinds
 from fvsolve.parts.nodes_and_links import Node, PlaceOnBody
-from fvsolve.parts.raster_files import IN_DEGREES
+from fvsolve.parts.raster_files import is_in_degrees
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table_model import NamedTables, Nested, Table
 from fvsolve.parts.value import (
@@ -141,7 +141,8 @@ class Patch(Table):
         None
     )
     depth: Annotated[Schedule | None, Scheduled(
-        "length", nonnegative, "depth of a supercritical inflow by `discharge` [m]; at most critical flow if left out",
+        "length", nonnegative, "depth of a supercritical inflow by `discharge` [m]; at most critical flow if left out, "
+        "and while a schedule is 0",
     )] = None  # fmt: skip
     rating: Annotated[
         Rating | None, Nested(Rating, "flow out of the basin by the level at the patch, linear between points")
@@ -169,6 +170,8 @@ class Patch(Table):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
         faults = super().key_faults(given)
+        if len({"side", "at", "polygon"} & given.keys()) > 1:  # a fault already, by which other keys are right or not
+            return faults
         if ("at" in given) != ("area" in given):
             present, missing = ("at", "area") if "at" in given else ("area", "at")
             faults.append(((), f"{missing} is missing, which an interior patch with `{present}` needs"))
@@ -282,7 +285,7 @@ class ReferenceSystem(Text):
     def read(self, given: Any, setting: ReadContext) -> str:
         if re.fullmatch(r"EPSG:\d+", text := super().read(given, setting)) is None:
             raise ValueError(f'{show(given)} is not a coordinate reference system; expected for example "EPSG:32633"')
-        if text in IN_DEGREES:
+        if is_in_degrees(text):
             raise ValueError(f'{show(given)} is in degrees; expected a system in metres, for example "EPSG:32633"')
         return text
 

@@ -22,9 +22,18 @@ HEAD = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "c
 EVEN = 1e-4  # of the spacing: greatest distance of a coordinate from an even grid
 SINCE = re.compile(r"\s*(s|min|h|d|sec|hr|second|minute|hour|day)s?\s+since\s+(\S.*)", re.IGNORECASE)  # after CF
 AUTHORITY = re.compile(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d+)"?\]')  # in the text of a CRS; the last is its own
-IN_DEGREES = {
-    f"EPSG:{n}" for n in (4171, 4258, 4267, 4269, 4283, 4326, 4490, 4674, 4979, 7844)
-}  # usual ones, by number
+# Numbers of EPSG up to 9140 for systems in degrees, in ranges without projected and vertical systems (EPSG 12; the
+# ranges include geocentric systems and numbers without a system).
+NUMBERS_IN_DEGREES = """
+    3819-3824 3888-3889 3906 4001-4025 4027-4036 4040-4047 4052-4055 4074-4081 4120-4216 4218-4388 4463-4466 4469-4470
+    4472 4475-4483 4490 4555-4558 4600-4646 4657-4765 4801-4811 4813-4821 4823-4824 4883-5013 5132 5228-5233 5245-5246
+    5251-5252 5263-5264 5323-5324 5340-5342 5353-5354 5359-5360 5364-5365 5370-5381 5392-5393 5451 5464 5467 5488-5489
+    5498-5500 5524-5527 5545-5546 5560-5561 5592-5593 5628 5681 5830 5885-5886 5942 6134-6135 6144 6207 6310-6311
+    6318-6325 6349 6364-6365 6649 6667-6668 6696-6700 6705-6706 6782-6783 6881-6883 6892 6894 6917 6979-6983 6986-6990
+    7034-7042 7072-7073 7084-7088 7133-7139 7372-7373 7400 7404 7406 7409-7410 7414 7423 7657-7686 7797-7798 7816
+    7843-7844 7880-7881 7885-7886 7900-7931 8042-8043 8085-8086 8231-8255 8349-8351 8360 8399-8431 8449 8542-8545
+    8684-8685 8694-8699 8817-8818 8860 8888 8899-8902 8906-8907 8916-8949 8972-9019 9053-9075 9139-9140
+"""
 REFERENCE = "expected a raster with coordinates in metres, for example written by GDAL or QGIS"
 
 
@@ -117,9 +126,17 @@ def check_count(name: str, nx: float, ny: float) -> None:
         raise ValueError(f"{text}; expected larger cells, or a part of it")
 
 
+def is_in_degrees(crs: str) -> bool:
+    """True for a code such as "EPSG:4326" of a system in degrees, by `NUMBERS_IN_DEGREES`."""
+    if not crs.startswith("EPSG:"):
+        return False
+    ranges = ([int(end) for end in item.split("-")] for item in NUMBERS_IN_DEGREES.split())
+    return any(ends[0] <= int(crs.removeprefix("EPSG:")) <= ends[-1] for ends in ranges)
+
+
 def epsg_code(text: str) -> str:
     """Code such as "EPSG:32633" of the text of a CRS (WKT or code), "" if none. Raises ValueError for degrees."""
-    if text.lstrip().startswith(("GEOGCS", "GEOGCRS")) or text in IN_DEGREES:
+    if text.lstrip().startswith(("GEOGCS", "GEOGCRS")) or is_in_degrees(text):
         raise ValueError(f"is in degrees; {REFERENCE}")
     if text.startswith("EPSG:"):
         return text

@@ -51,6 +51,7 @@ def scene_of(case, title: str, field: str, frames: list[tuple[float, list[Path]]
     if not bodies:
         plan = network_layout.plan_positions(case, lengths) if pipes or not frames else _about_basins(case)
         scene.parts, scene.anchors = parts_of(case, plan), _anchors(case, plan)
+        scene.walls = _walls(case, plan)
     return scene
 
 
@@ -133,6 +134,17 @@ def _anchors(case, plan: dict[str, np.ndarray]) -> dict[str, tuple[float, float,
             middle = plan[name] + mesh.middle[mesh.faces(patch).index].mean(axis=0)
             anchors[f"{name}.{patch}"] = (*map(float, middle), case.elevations.get(f"{name}.{patch}", 0.0))
     return anchors
+
+
+def _walls(case, plan: dict[str, np.ndarray]) -> list[np.ndarray]:
+    """Faces of each wall of the basins in the drawing, at the height of its crest : float64[faces, 2, 3] [m]."""
+    found = []
+    for name, mesh in case.meshes.items():
+        for wall in (getattr(case.nodes[name], "walls", None) or {}).values():
+            ends = plan[name] + mesh.points[mesh.ends[wall.chain(mesh).faces]]
+            height = np.full((*ends.shape[:2], 1), wall.crest + (case.nodes[name].elevation or 0.0))
+            found.append(np.concatenate([ends, height], axis=2))
+    return found
 
 
 def _about_basins(case) -> dict[str, np.ndarray]:

@@ -54,6 +54,10 @@ STATUS_FAILURES = {  # status of the right-hand side -> text
     "`required_pressure`, so that it falls with the pressure; a pump would lose its suction there: trip it earlier",
     rec.NO_WEIGHT: "the water in {name} has no weight left at {when}; reduce the downward acceleration of its body",
 }
+CONDUITS_EXHAUSTED = (
+    "the demand of {demand} at {name} cannot be met at {when}: at most {available} leave the conduits there (critical "
+    "outflow); draw less, or replace the node by a tank"
+)
 
 
 class RunLoop:
@@ -292,7 +296,7 @@ class RunLoop:
         """Return to the state before the last step, unless the ledgers include that step already; it is valid then."""
         if self.progress["has_last_step"] == 1 and self.state["unbooked"] > 0.0:
             self.before  # noqa: B018  (copies that state from the other threads or ranks)
-            self.state["t"] -= self.state["last"]
+            self.state["t"] = self.progress["t_old"]
             self.state["unbooked"] = 0.0
             self.progress["now"], self.progress["old"] = self.progress["old"], self.progress["now"]
             self.progress["has_last_step"] = 0
@@ -321,6 +325,8 @@ class RunLoop:
             if status == rec.NOT_CONVERGED and (cavity := self.cavity_of_cluster(index)) >= 0:
                 index, status = cavity, rec.NO_LIQUID
             text = STATUS_FAILURES.get(status, "Newton did not converge{place} at {when}; try a smaller step")
+            if status == rec.NOT_CONVERGED and (values := self.demand_above_outflow(index)):
+                text, names = CONDUITS_EXHAUSTED, names | values
             if status == rec.NO_WEIGHT:
                 bodies = [*(basin.name for basin in model.basins), *model.node_names]
                 names["name"] = bodies[index].removesuffix(".inside")
@@ -334,6 +340,31 @@ class RunLoop:
         if block := self.block_without_output():
             return f"the output of {block} is not a finite number at {names['when']}; check its formula and its inputs"
         return text.format(**names)
+
+    def demand_above_outflow(self, index: int) -> dict[str, str]:
+        """Names and values of a node that draws more than the critical outflow of the conduits there; empty for others.
+
+        index : number of a node in its cluster, which is solved at once
+        """
+        model, tables, found = self.model, self.model.tables, {}
+        links = (tables.valves, tables.pipes, tables.columns)
+        for cluster in tables.clusters:
+            nodes = tables.integers[cluster["first_node"] : cluster["first_node"] + cluster["nodes"]]
+            for i in nodes[self.out[model.layout["supply"] + nodes] < 0.0] if index in nodes else ():
+                ends = [p for p in tables.patches if p["valve"] >= 0 and tables.valves["from_node"][p["valve"]] == i]
+                ends = [(model.basins[p["basin"]], p) for p in ends]
+                joined = sum(np.count_nonzero(t[end] == i) for t in links for end in ("from_node", "to_node"))
+                if joined != len(ends) or not all(hasattr(basin, "greatest_outflow") for basin, _ in ends):
+                    continue
+                available = sum(basin.greatest_outflow(p, self.run_data.written.work) for basin, p in ends)
+                demand = -self.out[model.layout["supply"] + i] / model.case.properties.density
+                if demand > available:
+                    found = {"name": model.node_names[i]}
+                    found |= {
+                        "demand": model.case.amount(demand, "flow"),
+                        "available": model.case.amount(available, "flow"),
+                    }
+        return found
 
     def cavity_of_cluster(self, index: int) -> int:
         """Number of a junction with a cavity in the cluster of node `index`, which is solved at once; -1 for none."""

@@ -41,10 +41,11 @@ CONTROL = _record(
 # state; number of rows; 1 if the rhs switches at the end of the last step. Kept from a step to the next within a call:
 # 1 if the last stage is the first stage of the next step; 1 if `g_new` belongs to the end of the last step; 1 if
 # compensated sums have changed the new state; 1 if the next step is not solved in sweeps; status of the first stage of
-# the last step whose rates are not valid, 0 if all are, and the place of this fault; end of the step [s].
+# the last step whose rates are not valid, 0 if all are, and the place of this fault; end of the step, start of the last
+# accepted step [s].
 PROGRESS = _record(
     "phase has_last_step now old rows switch_pending reuse event_known changed no_sweeps stage_status stage_where",
-    "t_new",
+    "t_new t_old",
 )
 # 1 with a Jacobian; step at which it was computed; number of earlier steps known (2: or more); step of the present
 # stages; shift of the last factors (0: none; negative: a resumed run has to factor again); greatest ratio of successive

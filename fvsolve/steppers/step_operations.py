@@ -138,20 +138,21 @@ def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, start_slope,
 
 
 @njit
-def all_finite(handle, r, y, checked):
+def all_finite(handle, r, y, checked, bad=0):
     """True if the states y of all bands are finite and below 1e100.
 
     A band is a part of the states, which one thread or process steps. A single partial sum means a single band.
     handle, r : handle of the model, open handle of the run
     checked : True if the rhs has already counted the invalid values of the stages that it formed
+    bad : number of faults found before in this band
     """
-    bad, stage_sums, row_blocks = 0, r.structure, r.row_blocks
+    stage_sums, row_blocks = r.structure, r.row_blocks
     if checked:
-        bad, first = stage_sums[BAD], HEAD + stage_sums[BASINS]
+        bad, first = bad + stage_sums[BAD], HEAD + stage_sums[BASINS]
         for m in range(stage_sums[OTHERS]):
             bad += count_not_finite(stage_sums[first + 2 * m], stage_sums[first + 2 * m + 1], y)
     elif r.sums.size == 1:
-        bad = count_not_finite(0, y.size, y)
+        bad += count_not_finite(0, y.size, y)
     else:
         for m in range(row_blocks.shape[0]):
             bad += count_not_finite(row_blocks[m, BEGIN], row_blocks[m, STOP], y)

@@ -142,8 +142,8 @@ def run_steps(handle, run):
     for _ in range(1 << 62):
         if progress["phase"] == rec.FRESH and switches_at_start(handle, r):
             return rec.SWITCHED
-        if progress["phase"] == rec.FRESH:
-            evaluate_state(handle, r)
+        if progress["phase"] == rec.FRESH and not evaluate_state(handle, r):
+            continue
         status = check_state(r) if progress["phase"] <= rec.EMIT else rec.DONE
         if status == rec.DONE and progress["phase"] == rec.EMIT:
             status = finish_last_step(handle, r)
@@ -183,7 +183,10 @@ def switches_at_start(handle, r):
 
 @inline
 def evaluate_state(handle, r):
-    """Compute the rates k[0] and the results `out` of the present state, record it and check that it is finite."""
+    """Compute the rates k[0] and the results `out` of the present state, record it and check that it is finite.
+
+    Returns False if the last step is rejected because of these rates, see `reject_end`.
+    """
     progress, t, k, out, structure = r.progress[0], r.state[0]["t"], r.k, r.out, r.structure
     y, row_blocks, last_stage = r.y[progress["now"]], r.row_blocks, k[k.shape[0] - 1]
     checked = r.control[0]["kind"] == rec.EXPLICIT and structure.size > 0 and progress["reuse"] == 0
@@ -197,6 +200,8 @@ def evaluate_state(handle, r):
         evaluate(handle, r, t, y, k[0])
         if checked:
             structure[MODE] = OFF
+        if reject_end(handle, r):
+            return False
     progress["reuse"], progress["phase"] = 0, rec.EMIT
     run_handle.call_observer(r.calls[run_handle.RECORDER], t, y, out, handle, r.values)
     if out[rec.STATUS] == rec.CORRECTED:
@@ -204,6 +209,29 @@ def evaluate_state(handle, r):
         run_handle.call_observer(r.calls[run_handle.RECORDER], t, y, out, handle, r.values)
     if not all_finite(handle, r, y, checked):
         out[rec.STATUS] = rec.NOT_FINITE
+    return True
+
+
+@inline
+def reject_end(handle, r):
+    """Reject the last step if the rates at its end are not valid, and a shorter one is possible (error control).
+
+    Returns True if the state at the start of that step is the present state again. The rates are not recorded.
+    """
+    state, progress, control, out = r.state[0], r.progress[0], r.control[0], r.out
+    if control["mode"] != rec.TOLERANCE or progress["has_last_step"] == 0 or not state["unbooked"] > 0.0:
+        return False
+    h = state["last"] * step_control.reduced(control, nan)
+    faults = 0 if out[rec.STATUS] == 0.0 and isfinite(out[rec.RATE]) else 1
+    if too_short(control, state, h) or all_finite(handle, r, r.k[0], False, faults):
+        return False
+    state["t"], state["step"], state["unbooked"] = progress["t_old"], h, 0.0
+    state["steps"] -= 1.0
+    state["rejections"] += 1.0
+    progress["now"], progress["old"] = progress["old"], progress["now"]
+    progress["has_last_step"], progress["switch_pending"] = 0, 0
+    discard_stages(r)
+    return True
 
 
 @inline
@@ -453,7 +481,7 @@ def accept(handle, r, h, last, due):
     is_part = state["split_remainder"] > h
     state["split_remainder"] = state["split_remainder"] - h if is_part else 0.0
     state["n_mark"] += 0.0 if is_part else 1.0
-    state["last"] = progress["t_new"] - state["t"]
+    state["last"], progress["t_old"] = progress["t_new"] - state["t"], state["t"]
     state["t"] = progress["t_new"]
     state["steps"] += 1.0
     control["budget"] -= 1.0

@@ -467,6 +467,8 @@ def test_any_number_of_threads_gives_the_bits_of_one(threads):
 
 
 FAULTS = {
+    "expected the depth of a supercritical inflow, or no key": {"discharge": 1.0, "depth": 0.0},
+    "depth: is never above 0": {"discharge": 1.0, "depth": {"time": [0.0, 1.0], "value": [0.0, 0.0]}},
     "stage and discharge are given": {"stage": 1.0, "discharge": 1.0},
     "boundary and stage are given": {"stage": 1.0, "boundary": "open"},
     "give `discharge` too": {"stage": 1.0, "depth": 1.0},
@@ -511,3 +513,8 @@ def test_two_reaches_without_a_link_between_them_are_one_case():
     data["nodes"]["other"] = data["nodes"]["reach"] | {"patches": {"sea": {"side": "west", "stage": 0.9 * DEEP}}}
     both = fvsolve.run(fvsolve.load(data))
     assert both.ok and both["reach.volume"] == approx(alone["reach.volume"], rel=1e-12)
+
+
+def test_a_schedule_of_depths_may_begin_at_zero():
+    depth = {"time": [0.0, 1.0], "value": [0.0, 0.3]}
+    fvsolve.load(reach({"up": {"side": "west", "discharge": 1.0, "depth": depth}}))

@@ -206,6 +206,8 @@ FAULTS = {
     "in a hole": (HOLE, {"holes": [[4, 5, 5, 6]]}, "lies outside the mesh or in a hole"),
     "without area": ({"at": [4.5, 5.5]}, {}, "area is missing"),
     "with a side": ({**HOLE, "side": "west"}, {}, "keep one"),
+    "without area, with a side": ({"at": [4.5, 5.5], "side": "west", "stage": "1 m"}, {}, "keep one"),
+    "two shapes": ({"at": [4.5, 5.5], "polygon": [[1, 1], [2, 2], [1, 2]]}, {}, "keep one"),
     "with a closure": ({**HOLE, "stage": "1 m"}, {}, "this is an interior patch; leave this key out"),
     "two corners": ({"polygon": [[1, 1], [2, 2]]}, {}, "list of 3 or more points"),
     "the whole basin": ({"at": [5.0, 5.0], "area": 200.0}, {}, "contains all cells"),
@@ -218,7 +220,7 @@ def test_a_faulty_interior_patch_is_named(name):
     hole, basin, text = FAULTS[name]
     with pytest.raises(CaseError, match=text) as error:
         fvsolve.load(pond(hole=hole, **basin))
-    assert "patches" in str(error.value)
+    assert "patches" in str(error.value) and "1 fault" in str(error.value)
 
 
 @pytest.mark.parametrize("fall", [False, True], ids=["demand", "deep fall"])

@@ -12,6 +12,7 @@ from reference.scenes import scene
 from scipy.io import netcdf_file
 
 import fvsolve
+from fvsolve.parts.raster_files import is_in_degrees
 
 EAST, NORTH = 412000.0, 5650000.0
 UTM = 32633
@@ -277,3 +278,27 @@ def test_a_missing_extra_is_named_with_its_command(tmp_path, monkeypatch):
         monkeypatch.setitem(sys.modules, name, None)
     for name in ("tif", "nc"):
         assert 'pip install "fvsolve[gis]"' in str(refused(pond({"raster": str(tmp_path / f"dem.{name}")})))
+
+
+def test_no_projected_crs_counts_as_degrees_and_every_geographic_one_does():
+    """All codes that PROJ of rasterio knows: up to 9140 by its own list, and every projected one beyond."""
+    rasterio = pytest.importorskip("rasterio")
+    counts = {"degrees": 0, "metres": 0}
+    for code in range(2000, 33000):
+        try:
+            with rasterio.Env():  # its log in place of lines on the terminal
+                known = rasterio.crs.CRS.from_epsg(code)
+        except ValueError:
+            continue
+        if known.is_projected:
+            counts["metres"] += 1
+            assert not is_in_degrees(f"EPSG:{code}")
+        elif known.is_geographic and code <= 9140:
+            counts["degrees"] += 1
+            assert is_in_degrees(f"EPSG:{code}")
+    assert counts["degrees"] > 700 and counts["metres"] > 5000
+
+
+@pytest.mark.parametrize("code", [4230, 4289, 4617, 4937, 6668, 9057])
+def test_a_crs_in_degrees_is_refused(code):
+    assert f'"EPSG:{code}" is in degrees' in str(refused(pond(0.0, crs=f"EPSG:{code}")))

@@ -36,6 +36,16 @@ def test_rain_is_printed_in_millimetres_an_hour():
     assert "508 mm/h is outside" in text
 
 
+@pytest.mark.parametrize("rain", ["1.5e-4*x/10", "2e-4*(y > 3) + 1e-5"])
+def test_a_formula_of_intense_rain_has_a_notice(rain):
+    """Greatest rates: the cells at x = 19.5 m and at y = 3.5 m. A formula of time is compared as a schedule is."""
+    (text,) = notices(rain=rain)
+    assert text == f"nodes.pool.rain: {1053 if 'x' in rain else 756} mm/h is above 500 mm/h, drizzle to cloudburst"
+    assert notices(rain=rain.replace("e-4", "e-5")) == []
+    (text,) = notices(rain="1.5e-4*sin(3.14159*t)**2 + 1e-6")
+    assert "is outside 0.0036 to 500 mm/h" in text
+
+
 @pytest.mark.parametrize("bed, steep", [("0.11*x", True), ("0.09*x", False), ("0.11*y", True)])
 def test_rain_on_steep_beds_has_a_notice(bed, steep):
     found = notices(rain="20 mm/h", bed=bed, level=2.5)
@@ -65,6 +75,23 @@ def test_a_structure_narrower_than_a_cell_has_a_notice(width, narrow):
     found = notices(nodes={"pond": lake(0.3, elevation=-1.0)}, links={"spill": weir}, patches=inflow())
     assert [text for text in found if text.startswith("spill is narrower than the cells at pool.up, 1 m")] == found
     assert bool(found) is narrow
+
+
+@pytest.mark.parametrize("width, wide", [(4.1, True), (4.0, False)])
+@pytest.mark.parametrize("kind", ["weir", "sluice-gate"])
+def test_a_structure_wider_than_its_patch_has_a_notice(kind, width, wide):
+    keys = {"weir": {"crest": 0.4}, "sluice-gate": {"sill": 0.0, "opening": 0.1}}[kind]
+    link = {"type": kind, "from": "pond", "to": "pool.up", "width": width, **keys}
+    found = notices(nodes={"pond": lake(0.3, elevation=-1.0)}, links={"x": link}, patches=inflow(span=[1.0, 3.0]))
+    assert [text for text in found if text.startswith("x is wider than the side of pool.up, 4 m: ")] == found
+    assert bool(found) is wide
+
+
+@pytest.mark.parametrize("opening, far", [(0.4, False), (2.0, True), ({"time": [0, 1], "value": [0.4, 9]}, False)])
+def test_a_gate_far_above_the_water_at_the_start_has_a_notice(opening, far):
+    gate = {"type": "sluice-gate", "from": "pool.up", "to": "pond", "width": 4.0, "sill": 0.0, "opening": opening}
+    found = notices(nodes={"pond": lake(0.3, elevation=-1.0)}, links={"x": gate}, patches=inflow())
+    assert ["x: the opening of 2 m above the sill is above the water there" in text for text in found] == far * [True]
 
 
 def test_check_does_not_list_the_cells_behind_a_linked_patch():

@@ -162,3 +162,18 @@ def test_what_is_cut_out_of_a_basin_and_what_rises_from_its_bed_are_houses(bowl)
     mesh.points = at
     rises = field_canvas.raised_cells(mesh)
     assert inside[rises].sum() >= 16 and rises.sum() <= 40
+
+
+def test_walls_of_a_basin_are_lines_at_their_crests_on_the_faces():
+    """Faces nearest to x = 2.4 m, and a wall of two points along y = 1 m, shifted with their basin."""
+    walls = {
+        "levee": {"line": [[2.4, 0.0], [2.4, 3.0]], "crest": 0.7},
+        "kerb": {"line": [[0, 1], [4, 1]], "crest": 0.2},
+    }
+    pool = {"type": "basin", "size": [4.0, 3.0], "cells": [4, 3], "level": 0.5, "elevation": 2.0,
+            "position": [10.0, 20.0], "walls": walls}  # fmt: skip
+    case = fvsolve.load(scene({"pool": pool}, {}, 1.0, {"courant": 0.9}, ["pool.volume"]))
+    levee, kerb = scene_of(case, "", "depth", [(0.0, [])], 0).walls
+    found = sorted(tuple(sorted(map(tuple, face))) for face in levee.round(9).tolist())
+    assert found == [((12.0, 20.0 + k, 2.7), (12.0, 21.0 + k, 2.7)) for k in range(3)]
+    assert kerb.shape == (4, 2, 3) and np.ptp(kerb[..., 0]) == 4.0 and (kerb[..., 1:] == (21.0, 2.2)).all()

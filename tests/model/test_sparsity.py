@@ -5,6 +5,7 @@ import functools
 import numpy as np
 import pytest
 from reference import folders
+from reference.meshes import triangles, write
 from reference.scenes import NO_FRICTION, SHARP, chamber, junction, lake, pipe, scene, tank, valve
 from scipy.sparse import csc_array
 
@@ -97,6 +98,24 @@ def test_scalars_that_decay_spread_and_pass_the_boundary_keep_to_their_pattern(p
     model = fvsolve.build(fvsolve.load(given))
     y = model.start + model.scale * np.random.default_rng(0).normal(scale=0.05, size=model.y_size)
     assert stray(model, 0.2, y) < 1e-7 and stray(model, 0.2, model.start) < 1e-7
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("mesh", ["grid", "holes", "triangles"])
+def test_a_lone_basin_keeps_to_its_pattern_with_scalars_and_without(tmp_path, mesh, scheme):
+    shape = {"size": [9.0, 6.0], "cells": [18, 12]}
+    if mesh == "holes":
+        shape["holes"] = [[3.0, 2.0, 4.5, 4.0]]
+    if mesh == "triangles":
+        write(tmp_path / "m.vtk", *triangles((9.0, 6.0), 1.0))
+        shape = {"mesh": {"file": str(tmp_path / "m.vtk")}}
+    pool = {"type": "basin", "level": 1.0, "bed": "0.2*sin(x)*cos(y)", "manning": 0.03} | shape
+    for scalars in ({}, {"dye": {"diffusivity": 1e-3}, "heat": {}}):
+        numerics = {"scheme": scheme, "method": "implicit-euler", "step": 0.1}
+        made = scene({"pool": pool}, {}, 1.0, numerics) | ({"scalars": scalars} if scalars else {})
+        model, rng = fvsolve.build(fvsolve.load(made)), np.random.default_rng(0)
+        for size in (0.02, 0.2):
+            assert stray(model, 0.2, model.start + model.scale * rng.normal(scale=size, size=model.y_size)) < 1e-7
 
 
 def test_a_pipe_couples_no_more_than_its_scheme_reads():

@@ -51,6 +51,39 @@ def test_a_netcdf_grid_of_the_cells_is_the_field(tmp_path):
     assert frame.field_data["origin"].tolist() == [EAST, NORTH] and frame.field_data["epsg"].tolist() == [32633]
 
 
+KEYS = ("latitude_of_projection_origin", "longitude_of_central_meridian", "scale_factor_at_central_meridian",
+        "false_easting", "false_northing", "semi_major_axis", "inverse_flattening")  # fmt: skip
+MERCATOR = {  # UTM on WGS 84; the National Grid of the Ordnance Survey on the ellipsoid of Airy
+    "EPSG:32633": dict(zip(KEYS, (0.0, 15.0, 0.9996, 5e5, 0.0, 6378137.0, 298.257223563), strict=True)),
+    "EPSG:27700": dict(zip(KEYS, (49.0, -2.0, 0.9996012717, 4e5, -1e5, 6377563.396, 299.3249646), strict=True)),
+}
+
+
+@pytest.mark.parametrize("crs", ["EPSG:32633", "EPSG:27700", "EPSG:3035", "EPSG:2154", "EPSG:31370"])
+def test_gdal_reads_the_crs_of_a_netcdf_grid(tmp_path, crs):
+    """Rasterio opens the file through GDAL, as QGIS does; numbers of the mapping as published."""
+    rasterio = pytest.importorskip("rasterio")
+    fvsolve.run(dam({"flood": grid()}, crs=crs), out=tmp_path)
+    path = tmp_path / "grids/flood.nc"
+    with rasterio.open(f"netcdf:{path}:max_depth") as file:
+        assert file.crs == rasterio.crs.CRS.from_user_input(crs) and file.crs.is_projected
+        assert file.transform.c == EAST and file.transform.f == NORTH + 8.0
+    assert read_pixels(path, variable="max_depth", series=True).crs == crs
+    with netcdf_file(path, mmap=False) as file:
+        stated = file.variables["crs"]._attributes
+        assert stated["epsg_code"] == crs.encode() and ("grid_mapping_name" in stated) == (crs in MERCATOR)
+    for key, value in MERCATOR.get(crs, {}).items():
+        assert float(stated[key]) == approx(value, rel=1e-9)
+
+
+def test_without_rasterio_a_netcdf_grid_has_the_code_of_its_crs(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rasterio", None)
+    fvsolve.run(dam({"flood": grid()}), out=tmp_path)
+    with netcdf_file(tmp_path / "grids/flood.nc", mmap=False) as file:
+        assert file.variables["crs"].epsg_code == file.variables["crs"].spatial_ref == UTM.encode()
+    assert read_pixels(tmp_path / "grids/flood.nc", variable="max_depth", series=True).crs == UTM
+
+
 def test_a_geotiff_of_half_cells_is_read_back_as_the_field(tmp_path):
     rasterio = pytest.importorskip("rasterio")
     result = fvsolve.run(dam({"flood": grid(format="geotiff", cell="50 cm", fields=[*FIELDS, "depth"])}), out=tmp_path)

@@ -10,6 +10,8 @@ from reference import conduits as exact_section
 from reference.basins import assert_equal_files, run_in_two_parts
 from reference.conduits import DamBreak, backwater, bore, uniform_depth
 from reference.scenes import WATER
+from scipy.integrate import quad
+from scipy.optimize import brentq
 
 import fvsolve
 from fvsolve.kernels.dtypes import OK, STATUS
@@ -258,6 +260,31 @@ def test_it_drains_over_a_free_overfall():
     run = fvsolve.run(case)
     assert 0.0 <= run["s.depth@0.1"][-1] < 0.01 and run["s.flow@1"].min() >= 0.0
     assert run.ledger["mass"]["relative"] < 1e-12 and run.ledger["mass"]["outflow"] > 3.5e3
+
+
+@pytest.mark.parametrize("method", ["ssp-rk2", "tr-bdf2", "rodas-4"])
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_demand_above_critical_outflow_is_named_with_what_is_available(method, turned):
+    """Half full at rest: critical outflow has phi(h) + c(h) = phi(D / 2), phi by quadrature of sqrt(g T / A)."""
+    d, g = 0.4, 9.80665
+    wave = lambda h: np.sqrt(g * exact_section.width(h, d) / exact_section.area(h, d))  # noqa: E731
+    celerity = lambda h: g / wave(h)  # noqa: E731
+    depth = brentq(lambda h: quad(wave, h, d / 2)[0] - celerity(h), 1e-3, d / 2)
+    outflow = exact_section.area(depth, d) * celerity(depth)
+    ends = {"from": "j", "to": "a"} if turned else {"from": "a", "to": "j"}
+    link = {
+        "type": "conduit",
+        **ends,
+        "length": 50.0,
+        "diameter": d,
+        "manning": 0.0,
+        "inverts": [1.0, 1.0],
+        "cells": 20,
+    }
+    nodes = {"a": {"type": "reservoir", "head": 1.2}, "j": {"type": "junction", "demand": "300 l/s"}}
+    result = fvsolve.run(sewer(nodes, {"p": link}, ["p.flow"], 5.0, initial="rest", method=method))
+    assert not result.ok and "the demand of 0.3 m3/s at j cannot be met at t = 0 s" in result.reason
+    assert f"at most {outflow:.4g} m3/s leave the conduits there" in result.reason
 
 
 def test_drawn_the_other_way_it_is_the_same():

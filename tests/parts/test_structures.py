@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fvsolve
+from fvsolve.case.case_notices import range_notices
 from fvsolve.parts.culvert import law as culvert_law
 from fvsolve.parts.culvert.lower import culvert_numbers
 from fvsolve.parts.culvert.part import Culvert, inlets
@@ -351,6 +352,31 @@ def test_a_structure_that_water_never_reaches_gives_one_notice(link):
         return [notice.text for notice in model.warnings if "never reach" in notice.text]
 
     assert len(notices(-0.1)) == 1 and notices(3.0) == []
+
+
+@pytest.mark.parametrize(
+    "opening, above", [(1.9, False), (2.1, True), ({"time": [0.0, 1.0], "value": [2.1, 1.9]}, False)]
+)
+def test_a_gate_that_no_head_of_its_reservoirs_reaches_gives_one_notice(opening, above):
+    nodes = {"a": lake({"time": [0.0, 1.0], "value": [1.0, 2.0]}), "b": lake(0.5)}
+    gate = {**SLUICE, **ENDS, "sill": 0.0, "opening": opening}
+    texts = [n.text for n in fvsolve.build(fvsolve.load(scene(nodes, {"x": gate}, 1.0, METHODS[0]))).warnings]
+    assert ["above the water there, 2 m deep at most" in text for text in texts] == above * [True]
+
+
+@pytest.mark.parametrize("size, of_others", [
+    ({"diameter": 1.0}, ["box-headwall-chamfered", "rectangular-tapered-throat"]),
+    ({"width": 1.0, "height": 1.0}, ["circular-concrete-square-edge", "circular-tapered-throat-smooth"]),
+])  # fmt: skip
+def test_an_inlet_of_another_shape_gives_a_notice(size, of_others):
+    """HDS-5 has ellipses and arches too; docs/structures.md gives them as a circle or a box."""
+    under = {key: value for key, value in UNDER.items() if key != "diameter"} | size | ENDS
+    for inlet in inlets():
+        case = scene({"a": lake(2.0), "b": lake(1.0)}, {"x": under | {"inlet": inlet}}, 1.0, METHODS[0])
+        found = [notice.text for notice in range_notices(fvsolve.load(case)) if "inlet" in notice.text]
+        other = inlet.startswith("circular" if "width" in size else ("box", "rectangular"))
+        assert len(found) == other and (not other or f'"{inlet}" has formulas for' in found[0])
+        assert other or inlet not in of_others
 
 
 def fault(**keys) -> str:

@@ -128,6 +128,19 @@ def test_without_the_store_all_code_comes_from_numba(package):
     assert python(package, PROBE) == ["12.0", "True", "0"] and python(package, PROBE) == ["12.0", "False", "False"]
 
 
+@pytest.mark.parametrize("copy, told", [
+    ('"sum_of_squares", POWER=cube, __name__=__name__', 'powers has a copy of _sums with the name "sum_of_squares"'),
+    ('"sum_of_more", POWER=cube', "the copy sum_of_more of _sums needs __name__=__name__"),
+])  # fmt: skip
+def test_a_template_is_compiled_once_under_a_name(package, copy, told):
+    """The copy of the second module ran the code of the first, loaded from the cache."""
+    (package / "kernels" / "powers.py").write_text(POWERS)
+    line = "from fvsolve.jit import specialise\nfrom fvsolve.kernels.powers import _sums, cube\n"
+    (package / "steppers" / "more.py").write_text(f"{line}other = specialise(_sums, {copy})\n")
+    code = "try:\n    import fvsolve.steppers.more\nexcept ValueError as fault:\n    print(fault)"
+    assert f"fvsolve.steppers.more: {told}" in " ".join(python(package, code)).replace("fvsolve.kernels.", "")
+
+
 def test_a_run_without_the_store_has_the_same_results():
     """Events, probes and error control of a whole run, to the bit."""
     code = """

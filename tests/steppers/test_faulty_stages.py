@@ -74,3 +74,36 @@ def test_given_steps_end_at_a_faulty_stage_as_at_a_faulty_state(method):
 
 def test_a_method_whose_stages_miss_the_fault_does_not_stop():
     assert fvsolve.run(pulse("ssp-rk2")).ok
+
+
+def gap(t, y, dydt, out, handle):
+    """y0' = -y0, without valid rates at y0 = y1 within 1e-9: with a status, or not a number where y2 is 1."""
+    bad = abs(y[0] - y[1]) < 1e-9
+    out[0], out[1], out[2], out[3] = 0.0, FAULT if bad and y[2] == 0.0 else 0.0, PLACE, 0.0
+    dydt[0], dydt[1], dydt[2] = np.nan if bad and y[2] > 0.0 else -y[0], 0.0, 0.0
+
+
+@pytest.fixture(scope="module")
+def functions_with_gap(functions):
+    return *functions[:-1], ode._compile(numba.njit(gap), RHS) if ode.COMPILING else gap
+
+
+@pytest.mark.parametrize("silent", [False, True], ids=["status", "nan"])
+@pytest.mark.parametrize("name", EXPLICIT + IMPLICIT)
+def test_error_control_rejects_a_step_whose_end_has_no_valid_rates(name, silent, functions_with_gap):
+    """The gap is at the end of the first step; the stages of Rosenbrock methods are not there."""
+
+    def run(at: float, budget: float):
+        stepper = Integrator(method_named(name), 3, 0, lambda: ode._full(3), np.ones(3))
+        stepper.y[0], stepper.state["step"] = (1.0, at, float(silent)), 0.1
+        stepper.times, stepper.rows = np.empty(0), np.zeros((1, 4))
+        stepper.set_control(mode=rec.TOLERANCE, size=1e-3, step_max=1e300, stop_at=1e300, budget=budget, end=1.0)
+        code = stepper.call(*functions_with_gap, np.array([0]), ode.WHERE, stepper.no_floats)
+        return code, stepper.y[stepper.progress[0]["now"], 0], stepper
+
+    _, end_of_first, stepper = run(100.0, 1.0)
+    assert stepper.counts()["steps"] == 1
+    code, end, stepper = run(end_of_first, 1e300)
+    assert code == rec.DONE and stepper.state[0]["t"] == 1.0
+    assert end == pytest.approx(exp(-1.0), abs=1e-2)
+    assert stepper.counts()["rejections"] + stepper.counts()["newton_failures"] > 0

@@ -17,6 +17,7 @@ from fvsolve.basins.lower_friction import RowsWithFriction, cap_checks, run_chec
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import RhsTerms
+from fvsolve.parts.conduit.law import end_flow
 from fvsolve.parts.conduit.law_section import area_of, celerity, depth_of, section_at_depth, section_of
 
 PACKAGE = __package__
@@ -114,6 +115,11 @@ class ConduitWaterRows(RowsWithFriction):
             depth = np.maximum(low + (high - low) * (np.arange(self.n) + 0.5) / self.n - self.bed, 0.0)
         change = np.zeros(self.n) if np.array_equal(depth, self.depth) else self.areas(depth) - self.area
         return np.array([change, np.where(self.area + change > 0.0, flow, 0.0)])
+
+    def greatest_outflow(self, patch, work: np.ndarray) -> float:
+        """Critical outflow of an end [m3/s]; patch : its row of the table; work : work array with the state inside."""
+        h, e, u = work[patch["inside"] : patch["inside"] + 3]
+        return -end_flow(self.section, e - h, h, e, u)[0]
 
     def start_flow(self, patch: str) -> float:
         """Flow into the end `patch` at the start [m3/s]."""

@@ -4,11 +4,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fvsolve.basins.free_surface.part import RAIN
 from fvsolve.errors import Notice, listing
 from fvsolve.parts.basin import MANNING_RANGE
+from fvsolve.parts.field_series import SpatialSeries
 from fvsolve.parts.formula import SpatialField
 from fvsolve.parts.weir.part import HydraulicStructure
 
+MM_PER_H = 3.6e6  # mm/h in 1 m/s
 STEEP = 0.1  # slope above which rain runs off otherwise than shallow-water theory assumes
 TIMES = 1001  # times at which a scheduled inflow is compared with critical flow, beside its own
 
@@ -28,11 +31,25 @@ def unusual_values(basin) -> Iterator[Notice]:
         text = f"{basin.name}: rain falls on a bed with slopes up to {slope:.3g}, between adjacent cells"
         text += f"; shallow-water theory, with vertical depths, is for slopes below {STEEP:g}"
         yield Notice("slope", place, text, "bed", slope, STEEP)
+    if basin.rains:
+        yield from intense_formula(basin)
     for name, patch in basin.part.patches.items():
         if patch.depth is not None and "control" not in (patch.depth.kind, patch.discharge.kind):
             yield from subcritical_inflow(basin, name, patch)
     for name in basin.linked:
-        yield from narrow_structures(basin, name)
+        yield from structures_of_unusual_width(basin, name)
+
+
+def intense_formula(basin) -> Iterator[Notice]:
+    """Notice of a formula of place for rain, with a rate in a cell above that of cloudbursts.
+
+    Other rates are compared when the case is read.
+    """
+    place, rain = f"nodes.{basin.name}", basin.part.rain
+    most = float(rain.over(basin.mesh).max()) if isinstance(rain, SpatialSeries) and rain.value == 0.0 else 0.0
+    if most > RAIN.greatest:
+        text = f"{place}.rain: {most * MM_PER_H:.4g} mm/h is above {RAIN.greatest * MM_PER_H:g} mm/h, {RAIN.source}"
+        yield Notice("range", place, text, "rain", most, RAIN.greatest)
 
 
 def steepest(basin) -> float:
@@ -67,20 +84,29 @@ def subcritical_inflow(basin, name: str, patch) -> Iterator[Notice]:
         yield Notice("range", f"nodes.{basin.name}", text, f"patches.{name}.depth", float(number[k]), 1.0)
 
 
-def narrow_structures(basin, name: str) -> Iterator[Notice]:
-    """Notice of structures at a patch that are narrower than its cells, over which their flow spreads."""
-    place, side, narrow = f"{basin.name}.{name}", float(basin.mesh.length[basin.mesh.faces(name).index].min()), []
-    for link, part in basin.case.links.items():
-        if isinstance(part, HydraulicStructure) and place in part.ports.values():
-            width = getattr(part, "width", None) or getattr(part, "diameter", None) or np.inf
-            if width * getattr(part, "barrels", 1) < side * (1.0 - 1e-9):
-                narrow.append(link)
-    if narrow:
-        verb, size = "is" if len(narrow) == 1 else "are", basin.case.amount(side, "length")
-        text = f"{listing(narrow)} {verb} narrower than the cells at {place}, {size}: the flow spreads over the cells; "
-        yield Notice(
-            "cells", f"links.{narrow[0]}", text + "use smaller cells where velocities beside it matter", "width"
-        )
+def structures_of_unusual_width(basin, name: str) -> Iterator[Notice]:
+    """Notices of structures at a patch that are narrower than its cells, or wider than the patch and its side."""
+    place, sides = f"{basin.name}.{name}", basin.mesh.length[basin.mesh.faces(name).index]
+    side, size = basin.part.patches[name].side if name in basin.part.patches else None, basin.part.size
+    whole = max(float(sides.sum()), size[side in ("west", "east")] if side and size else 0.0)
+    widths = {
+        link: (getattr(part, "width", None) or getattr(part, "diameter", None)) * getattr(part, "barrels", 1)
+        for link, part in basin.case.links.items()
+        if isinstance(part, HydraulicStructure) and place in part.ports.values() and hasattr(part, "width")
+    }
+    narrow = [link for link, width in widths.items() if width < sides.min() * (1.0 - 1e-9)]
+    wide = [link for link, width in widths.items() if width > whole * (1.0 + 1e-9)]
+    for links, word, size, text in (
+        (narrow, "narrower than the cells at", sides.min(),
+         "the flow spreads over the cells; use smaller cells where velocities beside it matter"),
+        (wide, "wider than the side of" if side else "wider than", whole,
+         "no more than critical flow through the patch passes; give the width that is in the basin"),
+    ):  # fmt: skip
+        if links:
+            verb, size = "is" if len(links) == 1 else "are", basin.case.amount(float(size), "length")
+            yield Notice(
+                "cells", f"links.{links[0]}", f"{listing(links)} {verb} {word} {place}, {size}: {text}", "width"
+            )
 
 
 class InflowWatch:

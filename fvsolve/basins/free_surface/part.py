@@ -26,6 +26,8 @@ from fvsolve.parts.value import (
 from fvsolve.parts.weir.part import COEFFICIENTS, WEIR_COEFFICIENTS
 from fvsolve.units import show
 
+RAIN = UsualRange(1e-9, 500 / 3.6e6, "drizzle to cloudburst")
+
 
 class SurfaceStart(VelocityStart):
     """Keys of the table `start` of water that is not at rest at the start."""
@@ -175,7 +177,7 @@ class FreeSurface(Physics, name="free-surface"):
         Schedule | SpatialSeries | None,
         ScheduledField(
             "rainfall", nonnegative, "rate of rain on the basin [m/s]; default: none",
-            UsualRange(1e-9, 500 / 3.6e6, "drizzle to cloudburst"), needs_unit=True,
+            RAIN, needs_unit=True,
         ),
     ] = None  # fmt: skip
     infiltration: Annotated[

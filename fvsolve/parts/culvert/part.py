@@ -24,6 +24,7 @@ SIZES = UsualRange(0.1, 15.0, "drains of fields to bridges over streams")
 LENGTHS = UsualRange(0.5, 1000.0, "drives of farms to embankments")
 LOSSES = UsualRange(0.05, 3.0, "rounded inlets to grids")
 ROUGHNESSES = UsualRange(0.008, 0.06, "smooth plastic to large corrugations")
+CIRCLES, BOXES = ("circular-",), ("box-", "rectangular-")  # begins of the names of inlets of these shapes
 INVERT_DROP = 0.5  # slope above which the formulas of inlets no longer hold
 
 
@@ -112,6 +113,12 @@ class Culvert(HydraulicStructure, kind="culvert"):
         if abs(self.inverts[0] - self.inverts[1]) >= INVERT_DROP * self.length:
             text = f"fall by {abs(self.inverts[0] - self.inverts[1]):g} m over a length of {self.length:g} m"
             yield ("inverts",), f"{text}; expected a slope below {INVERT_DROP:g}, for which the formulas of inlets hold"
+
+    def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
+        shape, others = ("circular barrels", BOXES) if self.width is None else ("boxes", CIRCLES)
+        if self.inlet.startswith(others):
+            text = f'"{self.inlet}" has formulas for {"boxes" if others is BOXES else "circular barrels"}'
+            yield ("inlet",), 0.0, 0.0, f"{text}, but the culvert has {shape}; give an inlet of this shape"
 
     @property
     def losses(self) -> float:
