@@ -17,6 +17,7 @@ from fvsolve.basins.lower_friction import RowsWithFriction, cap_checks, run_chec
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import RhsTerms
+from fvsolve.parts.conduit.law import INSIDE
 from fvsolve.parts.conduit.law_section import area_of, celerity, depth_of, section_at_depth, section_of
 
 PACKAGE = __package__
@@ -73,7 +74,8 @@ class ConduitWaterRows(RowsWithFriction):
     def lower(self, draft, row) -> None:
         surface = np.maximum(self.bed - self.part.level, 0.0)
         row["plan"] = draft.to_plane(np.array([self.area, self.depth, surface]))
-        row["table"], row["work"] = draft.to_plane(np.array(self.section)), draft.to_work(conduit_rates.WORK)
+        row["table"] = draft.to_plane(np.array(self.section))
+        row["work"] = draft.to_work(conduit_rates.WORK + 2 * self.n)
         row["rest"] = self.case.properties.density * self.case.gravity * self.part.level
         row["friction"] = rec.MANNING if self.conduit.manning > 0.0 else rec.NO_DRAG
         row["roughness"] = draft.to_plane(np.array([self.conduit.manning]))
@@ -85,7 +87,7 @@ class ConduitWaterRows(RowsWithFriction):
         level = self.part.level
         row["closure"], row["valve"] = rec.LINKED, draft.valve_names.index(f"{self.name}.{patch}.face")
         row["rest"], row["lowest"] = self.conduit.inverts[i] - level, max(self.bed[i] - level, 0.0)
-        row["depth"], row["inside"], row["second"] = -1, draft.to_work(3), len(draft.integers)
+        row["depth"], row["inside"], row["second"] = -1, draft.to_work(INSIDE), len(draft.integers)
         inner = min(1, self.n - 1) if patch == "from" else max(self.n - 2, 0)
         draft.integers.append(inner)
 
