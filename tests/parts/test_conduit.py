@@ -172,6 +172,72 @@ def test_a_run_starts_in_gradually_varied_flow(name, turned):
         assert depths[:, 0] == approx(exact if turned else exact[::-1], abs=1e-5)
 
 
+def chain(cells: int, up: dict, down: dict, turned: bool, branches: tuple = ()) -> dict:
+    """Case of three conduits with a slope of 0.001 between two nodes; branches : nodes at the end of further ones."""
+    ends = {"a": up, "b": down} | {f"n{i}": node for i, node in enumerate(branches)}
+    nodes = {name: {"elevation": 0.0, **node} for name, node in ends.items()}
+    nodes |= {name: {"type": "junction", "elevation": 0.0} for name in "mk"}
+    keys = {"length": 40.0, "cells": cells}
+    links = {f"s{i}": pipe(*"amkb"[i : i + 2], inverts=[0.12 - 0.04 * i, 0.08 - 0.04 * i], **keys) for i in range(3)}
+    for i in range(len(branches)):
+        links[f"r{i}"] = pipe("m", f"n{i}", inverts=[0.08, 0.1], **keys)
+    if turned:
+        links["s1"] |= {"from": "k", "to": "m", "inverts": [0.04, 0.08]}
+    probes = [f"{name}.depth@{x}" for name in links for x in (0.1, 0.5, 0.9)] + [f"{name}.flow@0.5" for name in links]
+    return sewer(nodes, links, probes, 100.0)
+
+
+LAKE = {"type": "reservoir", "head": 0.4}
+CHAINS = {  # nodes at both ends, nodes of branches, flows of the three conduits if they follow from the inflows
+    "mild": ({"type": "inflow", "flow": 0.05}, LAKE, (), [0.05, 0.05, 0.05]),
+    "full": ({"type": "inflow", "flow": 0.3}, {**LAKE, "head": 1.5}, (), [0.3, 0.3, 0.3]),
+    "between reservoirs": ({"type": "reservoir", "head": 0.5}, LAKE, (), None),
+    "full, back": ({"type": "reservoir", "head": 1.0}, {**LAKE, "head": 2.0}, (), None),
+    "two inflows": ({"type": "inflow", "flow": 0.05}, LAKE, ({"type": "inflow", "flow": 0.03},), [0.05, 0.08, 0.08]),
+    "a demand": ({"type": "reservoir", "head": 1.5}, {"type": "inflow", "flow": -0.04}, (
+        {"type": "junction", "demand": 0.02}, {"type": "junction"}), [0.06, 0.04, 0.04]),
+    "inflow between reservoirs": ({"type": "reservoir", "head": 0.5}, LAKE, ({"type": "inflow", "flow": 0.03},), None),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("name", CHAINS)
+def test_a_chain_starts_in_steady_flow(name, turned):
+    """Depths and flows stay to the error of the scheme, at order 1.8 above rounding; flows are sums of inflows."""
+    up, down, branches, flows = CHAINS[name]
+    changes = []
+    for cells in (10, 20):
+        run = fvsolve.run(chain(cells, up, down, turned, branches))
+        changes.append(max(np.ptp(run[probe.text]) for probe in run.case.probes))
+        start = np.array([run[f"s{i}.flow@0.5"][0] for i in range(3)]) * ([1.0, -1.0, 1.0] if turned else 1.0)
+        assert start == approx(flows or start[:1] + [0.0, *2 * [sum(n.get("flow", 0.0) for n in branches)]], rel=1e-9)
+    assert changes[0] < 1e-4 and (changes[1] < 1e-7 or np.log2(changes[0] / changes[1]) > 1.8)
+
+
+@pytest.mark.parametrize("numerics", METHODS, ids=lambda keys: keys["method"])
+def test_a_chain_starts_in_one_backwater(numerics):
+    """Depths of all three conduits are those of gradually varied flow in one pipe, for each method."""
+    up, down, branches, _ = CHAINS["mild"]
+    case = chain(20, up, down, False, branches)
+    case["numerics"] |= {"end": 20.0, **numerics}
+    run = fvsolve.run(case)
+    x = np.array([40.0 * i + 40.0 * at for i in range(3) for at in (0.1, 0.5, 0.9)])
+    exact = backwater(0.05, 0.013, 0.001, 0.5, 0.4, 120.0 - x[::-1])[::-1]
+    found = np.array([run[f"s{i}.depth@{at}"] for i in range(3) for at in (0.1, 0.5, 0.9)])
+    assert found[:, 0] == approx(exact, abs=1e-5) and found[:, -1] == approx(exact, abs=1e-5)
+
+
+def test_water_in_a_dead_end_of_a_chain_is_level():
+    """A conduit without flow that rises above the head of its junction has a level surface and a dry end."""
+    up, down, _, _ = CHAINS["mild"]
+    case = chain(40, up, down, False, ({"type": "junction"},))
+    case["links"]["r0"] |= {"inverts": [0.08, 0.6]}
+    run = fvsolve.run(case)
+    depths = [probe.text for probe in run.case.probes if "depth" in probe.text]
+    assert max(np.ptp(run[text]) for text in depths) < 1e-3
+    assert run["r0.depth@0.9"].max() == 0.0 and run["r0.depth@0.1"][0] > 0.2
+
+
 def dam_break_error(cells: int, right: float) -> float:
     """Mean error of the depth after a dam break over the difference of depths, 1 m wide pipe."""
     exact, time = DamBreak(0.7, right, 1.0), 2.0

@@ -11,7 +11,8 @@ from fvsolve.basins.basin_terms import SHORTAGES
 from fvsolve.basins.conduit import conduit_rates
 from fvsolve.basins.conduit.conduit_cells import drag_per_flow, fastest, velocity_factor
 from fvsolve.basins.conduit.conduit_rates import OF_AREA, OF_DEPTH, OF_FLOW
-from fvsolve.basins.conduit.steady_profile import put_profile, steady_flow
+from fvsolve.basins.conduit.lower_chain import steady_chain
+from fvsolve.basins.conduit.steady_profile import put_profile
 from fvsolve.basins.free_surface.lower import COURANT_FACTOR
 from fvsolve.basins.lower_friction import RowsWithFriction, cap_checks, run_checks, start_notices
 from fvsolve.errors import Notice
@@ -100,8 +101,8 @@ class ConduitWaterRows(RowsWithFriction):
 
         Otherwise it is the level of the water at the other end, at most the invert.
         """
-        ends = list(zip(self.part.heads, self.conduit.inverts, strict=True))
-        reached = [None if head is None or head < bed else head for head, bed in ends]
+        ends = list(zip(self.steady[1], self.conduit.inverts, strict=True))
+        reached = [None if head is None or head <= bed else head for head, bed in ends]
         return [
             head if head is not None else bed if other is None else min(other, bed)
             for head, other, (_, bed) in zip(reached, reached[::-1], ends, strict=True)
@@ -123,25 +124,26 @@ class ConduitWaterRows(RowsWithFriction):
         return float(flows[0] if patch == "from" else -flows[-1])
 
     @cached_property
-    def steady_start(self) -> tuple[np.ndarray | None, float]:
-        """(depths of gradually varied flow in cells [m], None without flow; flow [m3/s]) at the start.
+    def steady(self) -> tuple[float | None, list[float | None]]:
+        """(steady flow at the start [m3/s], heads of both nodes then [m]); None if not known."""
+        conduit, flows, heads = self.conduit, {}, {}
+        if self.case.numerics.initial != "rest" and conduit.initial_depth is None:
+            flows, heads = steady_chain(self.part.chain, self.case.gravity)
+        flow = conduit.initial_flow if conduit.initial_flow is not None else flows.get(self.name)
+        places = zip(conduit.ports.values(), self.part.heads, strict=True)
+        return flow, [heads.get(place, head) for place, head in places]
 
-        The flow is `initial_flow`, else that of an inflow, else the steady flow between heads that both nodes state.
-        """
-        conduit, flow = self.conduit, self.conduit.initial_flow
-        starts = self.case.numerics.initial != "rest" and conduit.initial_depth is None
-        heads = [-math.inf if head is None else head for head in self.part.heads]
-        if flow is None and starts:
-            flow = self.part.inflow
-        seeks = flow is None and starts and self.part.stated and heads[0] != heads[1]
-        turn = -1 if (heads[0] < heads[1] if seeks else (flow or 0.0) < 0.0) else 1
-        (upper, lower), (begin, end) = heads[::turn], conduit.inverts[::turn]
-        depths, sizes = np.zeros(self.n + 2), (conduit.manning, begin - end, conduit.length)
-        if seeks and upper > begin:
-            flow = turn * steady_flow(self.section, *sizes, upper - begin, max(lower - end, 0.0), depths)
+    @cached_property
+    def steady_start(self) -> tuple[np.ndarray | None, float]:
+        """(depths of gradually varied flow in cells [m], None without flow; flow [m3/s]) at the start."""
+        conduit, (flow, heads) = self.conduit, self.steady
         if not flow:
             return None, 0.0
-        put_profile(self.section, abs(flow), *sizes, max(lower - end, 0.0), depths)
+        turn = -1 if flow < 0.0 else 1
+        (begin, end), lower = conduit.inverts[::turn], heads[::turn][1]
+        depth = max(-math.inf if lower is None else lower - end, 0.0)
+        depths = np.zeros(self.n + 2)
+        put_profile(self.section, abs(flow), conduit.manning, begin - end, conduit.length, depth, depths)
         return depths[1:-1][::turn].copy(), flow
 
     def depths(self, y: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Gradually varied flow in a conduit, for the water at the start, and the steady flow between given heads.
+"""Gradually varied flow in a conduit, for the water at the start.
 
 The energy E = h + Q^2 / (2 g A^2) changes by the slope of the invert minus that of friction, from step to step by the
 trapezoidal rule. Subcritical depths follow from the depth at the lower end, at least the critical depth, and
@@ -77,18 +77,3 @@ def put_profile(section, flow, n, fall, length, end, depths):
         if flow * flow / area + section.g * thrust > flow * flow / wet + section.g * force:
             depths[i] = h
     return upper
-
-
-@njit
-def steady_flow(section, n, fall, length, begin, end, depths):
-    """Steady flow [m3/s] with the depths `begin` and `end` that the nodes give; at most critical at the upper end."""
-    low, high = 0.0, critical_flow(section, begin)
-    if put_profile(section, high, n, fall, length, end, depths) <= begin:
-        return high
-    for _ in range(HALVINGS):
-        flow = 0.5 * (low + high)
-        if put_profile(section, flow, n, fall, length, end, depths) < begin:
-            low = flow
-        else:
-            high = flow
-    return low

@@ -50,6 +50,9 @@ class ConduitEndRows(Restriction, kind="conduit-end"):
         section = section_of(draft.case.gravity, conduit.diameter, conduit.celerity(draft.case.gravity))
         return [*section, float(patches.index(draft.case.places[link.to]))]
 
+    def follow(self, start, k: int) -> None:
+        """Leave the drop as it is: it is the height of the node over the water, and critical outflow has many drops."""
+
     def stepper(self, start, k: int, g: float, density_ratio: float):
         """Function as in `Restriction.stepper`, for water at rest."""
         link = start.case.conduits[start.draft.valve_names[k]]

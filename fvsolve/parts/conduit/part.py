@@ -1,6 +1,7 @@
 """Conduits: partly full and filling pipes such as sewers, and the basin of cells that represents their water."""
 
 import math
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -124,19 +125,31 @@ class ConduitFlow(Physics, name=""):
         return {"elevation": bed, "depth": max(basin.level - bed, 0.0), "pressure": None}
 
 
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Conduits that junctions and inflows join, with what keys of their nodes give at the start.
+
+    links : conduits; heads : of nodes of other kinds at its ends, -inf if unknown [m]
+    inflows : of junctions and inflows [m3/s]
+    """
+
+    links: dict[str, Conduit]
+    heads: dict[str, float]
+    inflows: dict[str, float]
+
+
 class ConduitWater(Basin):
     """Basin of a row of cells that represents the water of a conduit.
 
     level : level of the water at rest above datum [m]; heads : of both nodes at the start, None if unknown [m]
-    stated : True if keys of both nodes give these heads; inflow : flow at the start of an inflow [m3/s], or None
+    chain : that of the conduit
     """
 
     added: ClassVar[bool] = True
     level: float
     conduit: Conduit
     heads: tuple[float | None, float | None]
-    stated: bool
-    inflow: float | None
+    chain: Chain
 
     @property
     def physics_type(self) -> type[Physics]:
