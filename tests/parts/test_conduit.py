@@ -119,6 +119,30 @@ def test_uniform_flow_has_the_depth_of_manning():
     assert run["s.depth@0.5"][-1] == approx(depth, rel=2e-3) and run["s.depth@0.2"][-1] == approx(depth, rel=2e-3)
 
 
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("numerics", [METHODS[0], *METHODS[2:]], ids=lambda keys: keys["method"])  # without a cap
+def test_minor_losses_are_those_of_the_energy_balance(turned, numerics):
+    """K v^2 / 2g over the length: of the full pipe with and without Manning's friction, and in a free backwater."""
+    ends, inverts = (("b", "a"), [0.0, 0.1]) if turned else (("a", "b"), [0.1, 0.0])
+    keys = {"inverts": inverts, "length": 100.0, "minor_loss": 5.0}
+    nodes = {"a": {"type": "inflow", "flow": 0.3}, "b": {"type": "reservoir", "head": 1.5}}
+    for n in (0.0, 0.013):
+        link = pipe(*ends, **{**keys, "inverts": [0.0, 0.0]}, manning=n)
+        run = fvsolve.run(sewer(nodes, {"s": link}, ["s.head@0.25", "s.head@0.75"], 20.0, **numerics))
+        area = pi * 0.5**2 / 4.0
+        exact = 2.5 * (0.3 / area) ** 2 / (2.0 * 9.80665) + n**2 * (0.3 / area) ** 2 * 50.0 / 0.125 ** (4.0 / 3.0)
+        fall = (run["s.head@0.25"] - run["s.head@0.75"]) * (-1.0 if turned else 1.0)
+        share = 1.0 - 0.01 * (0.3 / area) ** 2 / (0.25 * pi * 9.80665 * 0.5)  # of the slot, as above
+        assert fall * share == approx(exact, rel=1e-3)
+    nodes = {"a": {"type": "inflow", "flow": 0.05}, "b": {"type": "reservoir", "head": 0.4}}
+    x = [0.1, 0.5, 0.9]
+    case = sewer(nodes, {"s": pipe(*ends, **keys, cells=50)}, [f"s.depth@{at}" for at in x], 50.0, **numerics)
+    run = fvsolve.run(case)
+    exact = backwater(0.05, 0.013, 0.001, 0.5, 0.4, 100.0 * np.array(x), loss=0.05)
+    found = np.array([run[f"s.depth@{at}"] for at in (x if turned else x[::-1])])
+    assert found == approx(np.broadcast_to(exact[:, None], found.shape), abs=2e-5)
+
+
 def backwater_error(cells: int, **numerics) -> float:
     """Greatest error of the depth over the depth at the end, M1 backwater in a mild sewer."""
     flow, slope, length, d = 0.05, 0.001, 200.0, 0.5

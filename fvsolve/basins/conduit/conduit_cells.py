@@ -45,14 +45,15 @@ def velocity_factor(section, area):
 
 
 @njit(forceinline=True)
-def drag_per_flow(section, n, h, area):
-    """Decay rate of the flow by friction over the flow |Q| [1/m3]; n : Manning's number.
+def drag_per_flow(section, rough, h, area):
+    """Decay rate of the flow by friction over the flow |Q| [1/m3].
 
     The slot has weight, but no velocity: in the full section the slope of friction is that at the velocity Q / A_f.
+    rough : (g n^2 with Manning's number n [m^(1/3)], minor loss coefficient over twice the length [1/m])
     """
     full = 0.25 * pi * section.diameter * section.diameter
     share = velocity_factor(section, area) if area < full else area / (full * full)
-    return section.g * n * n * share * hydraulic_radius_power(section, h, min(area, full))
+    return share * (rough[0] * hydraulic_radius_power(section, h, min(area, full)) + rough[1])
 
 
 @njit(forceinline=True)

@@ -1,7 +1,8 @@
 """Rates of the cells of conduits: area A and flow Q of a circular section that is partly full or full.
 
-A_t + Q_x = 0, Q_t + (Q^2 / A + g I)_x = -g A z_x - g n^2 |Q| Q / (A R^(4/3)), with the invert z, the integral I of the
-area over the depth and the hydraulic radius R. Cells are computed in blocks, see `conduit_cells`.
+A_t + Q_x = 0, Q_t + (Q^2 / A + g I)_x = -g A z_x - g n^2 |Q| Q / (A R^(4/3)) - K |Q| Q / (2 L A), with the invert
+z, the coefficient K of minor losses over the length L, the integral I of the area over the depth and the hydraulic
+radius R. Cells are computed in blocks, see `conduit_cells`.
 """
 
 from math import inf
@@ -125,6 +126,12 @@ def drag_rows(tables, basin, first, last):
 
 
 @njit
+def rough_wall(tables, basin):
+    """Argument `rough` of `conduit_cells.drag_per_flow`."""
+    return tables.plane[basin["roughness"]], tables.plane[basin["roughness"] + 1]
+
+
+@njit
 def block_rates(tables, b, section, y, dydt, first, last, ends):
     """Write the rates of cells first to last - 1; return (greatest (|u| + c) / dx, greatest decay rate) there [1/s].
 
@@ -149,7 +156,7 @@ def block_rates(tables, b, section, y, dydt, first, last, ends):
     cells.put_rates(st["gravity"], k, own, dydt[o + first : o + last], flow_rates)
     if basin["friction"] == NO_DRAG:
         return most, 0.0
-    rough, flows = tables.plane[basin["roughness"]], y[o + n + first : o + n + last]
+    rough, flows = rough_wall(tables, basin), y[o + n + first : o + n + last]
     seen, drag = drag_rows(tables, basin, first, last)
     cells.put_drag(section, rough, y[o + first : o + last], own, seen, drag)
     cells.add_friction(basin["held"], flows, drag, own, flow_rates)
@@ -184,14 +191,14 @@ def damp_conduits(h, y, rates, quick, handle):
         basin = tables.basins[b]
         if basin["kind"] != OWN_CODE or basin["damped"] == 0:
             continue
-        n, o, section, rough = basin["n"], basin["y"], section_at(tables.plane, basin["table"]), basin["roughness"]
+        n, o, section = basin["n"], basin["y"], section_at(tables.plane, basin["table"])
         for first in range(0, n, cells.MOST_CELLS):
             last = min(first + cells.MOST_CELLS, n)
             seen, drag = drag_rows(tables, basin, first, last)
             if drag[0] == 0.0 or not cells.are_equal(seen, y[o + first : o + last]):  # not the state of the last rates
                 block = tables.work[basin["work"] : basin["work"] + WORK]
                 read_block(tables, basin, section, y, first, last, block)
-                cells.put_drag(section, tables.plane[rough], y[o + first : o + last], block, seen, drag)
+                cells.put_drag(section, rough_wall(tables, basin), y[o + first : o + last], block, seen, drag)
             low, high = o + n + first, o + n + last
             cells.damp_row(h, y[low:high], drag, rates[low:high], quick[low:high])
 

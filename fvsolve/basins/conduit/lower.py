@@ -38,6 +38,7 @@ class ConduitWaterRows(RowsWithFriction):
         super().__init__(case, name)
         self.conduit, self.bed = self.part.conduit, self.part.bed_at_centres()
         self.section = section_of(case.gravity, self.conduit.diameter, self.conduit.celerity(case.gravity))
+        self.rough = self.conduit.rough(case.gravity)
         self.depth = np.maximum(self.part.level - self.bed, 0.0)
         self.area = self.areas(self.depth)
         self.full_rate = COURANT_FACTOR * self.conduit.celerity(case.gravity) * self.n / self.conduit.length
@@ -78,8 +79,8 @@ class ConduitWaterRows(RowsWithFriction):
         row["table"] = draft.to_plane(np.array(self.section))
         row["work"] = draft.to_work(conduit_rates.WORK + 2 * self.n)
         row["rest"] = self.case.properties.density * self.case.gravity * self.part.level
-        row["friction"] = rec.MANNING if self.conduit.manning > 0.0 else rec.NO_DRAG
-        row["roughness"] = draft.to_plane(np.array([self.conduit.manning]))
+        row["friction"] = rec.MANNING if any(self.rough) else rec.NO_DRAG
+        row["roughness"] = draft.to_plane(np.array(self.rough))
         row["held"], row["damped"], row["unsplit"] = self.rate_cap, self.damped, COURANT_FACTOR
 
     def lower_patch(self, draft, patch: str, row) -> None:
@@ -143,7 +144,7 @@ class ConduitWaterRows(RowsWithFriction):
         (begin, end), lower = conduit.inverts[::turn], heads[::turn][1]
         depth = max(-math.inf if lower is None else lower - end, 0.0)
         depths = np.zeros(self.n + 2)
-        put_profile(self.section, abs(flow), conduit.manning, begin - end, conduit.length, depth, depths)
+        put_profile(self.section, abs(flow), self.rough, begin - end, conduit.length, depth, depths)
         return depths[1:-1][::turn].copy(), flow
 
     def depths(self, y: np.ndarray) -> np.ndarray:
@@ -165,7 +166,7 @@ class ConduitWaterRows(RowsWithFriction):
 
     def friction_in_cells(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         pairs = zip(self.depths(y).tolist(), (self.area + y[0]).tolist(), strict=True)
-        per = [drag_per_flow(self.section, self.conduit.manning, h, max(area, 0.0)) for h, area in pairs]
+        per = [drag_per_flow(self.section, self.rough, h, max(area, 0.0)) for h, area in pairs]
         return self.depths(y), np.abs(y[1]), np.array(per) * np.abs(y[1])
 
     def notices(self, y: np.ndarray) -> list[Notice]:

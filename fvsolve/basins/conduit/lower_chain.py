@@ -25,7 +25,7 @@ def upper_head(link: Conduit, gravity: float, flow: float, head: float) -> float
     if flow == 0.0:
         return head if head > max(link.inverts) else min(head, *link.inverts)
     depths, flow = np.zeros(link.cells + 2), abs(flow)
-    depth = put_profile(section, flow, link.manning, begin - end, link.length, max(head - end, 0.0), depths)
+    depth = put_profile(section, flow, link.rough(gravity), begin - end, link.length, max(head - end, 0.0), depths)
     low, high = depth, depth
     while critical_flow(section, high) < flow:  # inflow is at most critical, and at most that of Torricelli
         low, high = high, high + section.diameter

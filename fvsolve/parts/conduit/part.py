@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from fvsolve.parts.basin import MANNING_RANGE, Basin, Physics
+from fvsolve.parts.full_pipe import LOSS
 from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.value import (
@@ -48,6 +49,7 @@ class Conduit(TwoPort, kind="conduit"):
         Rows("length", length=2, about="height of the invert above datum at `from` and at `to` [m]", changes=PROFILE),
     ]
     manning: Annotated[float, Number(nonnegative, "Manning's n of the wall [s/m^(1/3)]", MANNING_RANGE, PROFILE)]
+    minor_loss: Annotated[float, LOSS] = 0.0
     cells: Annotated[int, Whole(between(1, 10**6), "number of cells", SHAPE)] = DEFAULT_CELLS
     surcharge_celerity: Annotated[float | None, Quantity(
         "velocity", positive, "speed of waves in the full conduit [m/s]; 28 sqrt(diameter), by a slot of 1 % of it "
@@ -65,6 +67,10 @@ class Conduit(TwoPort, kind="conduit"):
     def celerity(self, gravity: float) -> float:
         """Speed of waves in the full conduit [m/s]."""
         return self.surcharge_celerity or math.sqrt(0.25 * math.pi * gravity * self.diameter / SLOT)
+
+    def rough(self, gravity: float) -> tuple[float, float]:
+        """(g n^2 with Manning's number n [m^(1/3)], minor loss coefficient over twice the length [1/m])."""
+        return gravity * self.manning**2, self.minor_loss / (2.0 * self.length)
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if name in around.nodes:
@@ -117,7 +123,7 @@ class ConduitFlow(Physics, name=""):
 
     @classmethod
     def has_friction(cls, basin: Basin) -> bool:
-        return bool(basin.conduit.manning)
+        return any(basin.conduit.rough(1.0))
 
     @classmethod
     def rest(cls, basin: Basin, mean: Any, cells: np.ndarray, area: np.ndarray) -> dict[str, Any]:
