@@ -501,11 +501,106 @@ def test_the_cap_of_friction_gives_a_notice():
     assert notice.value == approx((1.0 + decay / 20.0) ** 0.5 - 1.0, rel=0.03)
 
 
-def test_scalars_are_refused_by_name():
-    case = two_tanks(0.3)
+def with_dye(case: dict, **start) -> dict:
+    """The case with the scalar `dye` in all tanks and conduits; start : values by name of the part, else 0."""
+    for group in ("nodes", "links"):
+        for name, part in case[group].items():
+            if part["type"] in ("tank", "conduit", "inflow", "reservoir"):
+                part["scalars"] = {"dye": start.get(name, 0.0)}
     case["scalars"] = {"dye": {}}
-    with pytest.raises(fvsolve.CaseError, match="its cells carry no scalars yet"):
-        fvsolve.load(case)
+    return case
+
+
+def pulse_error(cells: int) -> float:
+    """Mean error of a pulse of dye in uniform flow after 50 s, over its height."""
+    depth, times = uniform_depth(0.1, 0.013, 0.005, 0.5), np.linspace(0.0, 30.0, 301)
+    speed = 0.1 / exact_section.area(depth, 0.5)
+    height = np.exp(-(((times - 15.0) / 4.0) ** 2))
+    inflow = {"type": "inflow", "flow": 0.1}
+    nodes = {"a": inflow, "b": {"type": "reservoir", "head": depth}}
+    link = pipe(length=100.0, inverts=[0.5, 0.0], cells=cells, initial_depth=depth, initial_flow=0.1)
+    x = (np.arange(cells) + 0.5) / cells
+    case = with_dye(sewer(nodes, {"s": link}, [f"s.dye@{at:.12g}" for at in x], 50.0))
+    inflow["scalars"] = {"dye": {"time": times.tolist(), "value": height.tolist()}}
+    run = fvsolve.run(case)
+    found = np.array([run[probe.text][-1] for probe in run.case.probes])
+    assert run.ledger["dye"]["relative"] < 1e-12 and found.min() > -1e-14
+    return float(abs(found - np.interp(50.0 - 100.0 * x / speed, times, height)).mean())
+
+
+def test_a_pulse_of_dye_moves_with_the_water():
+    errors = [pulse_error(cells) for cells in (100, 200)]
+    assert errors[1] < 5e-3 and np.log2(errors[0] / errors[1]) > 1.7
+
+
+@pytest.mark.parametrize("numerics", [{"method": "ssp-rk3"}, *METHODS[2:]], ids=lambda keys: keys["method"])
+@pytest.mark.parametrize("scheme", ["upwind", "muscl"])
+def test_dye_stays_between_its_bounds_while_conduits_fill_and_drain(scheme, numerics):
+    """Through a manhole, a junction and a dry conduit: ledger to 1e-12, each method."""
+    nodes = {"a": {**TANK, "area": 2.0, "level": 1.2}, "h": {**TANK, "area": 0.5, "level": 0.1},
+             "m": {"type": "junction"}, "b": {**TANK, "area": 1.0, "level": 0.0}}  # fmt: skip
+    links = {
+        "p": pipe("a", "h", inverts=[0.2, 0.1]),
+        "q": pipe("m", "h", inverts=[0.05, 0.1]),
+        "r": pipe("m", "b", inverts=[0.05, 0.0]),
+    }
+    for link in links.values():
+        link |= {"length": 10.0, "cells": 10}
+    probes = [f"{name}.dye@{at}" for name in "pqr" for at in (0.05, 0.5, 0.95)] + ["h.dye", "b.dye", "b.level"]
+    case = with_dye(sewer(nodes, links, probes, 30.0, scheme=scheme, **numerics), a=1.0)
+    for node in nodes.values():
+        node.setdefault("elevation", 0.0)
+    run = fvsolve.run(case)
+    values = np.array([run[probe.text] for probe in run.case.probes[:-1]])
+    assert run.ledger["dye"]["relative"] < 1e-12 and run.ledger["mass"]["relative"] < 1e-12
+    assert values.min() > -1e-13 and values.max() < 1.0 + 1e-13
+    assert run["p.dye@0.95"][-1] > 0.9 and run["b.level"][-1] > 0.3
+
+
+def test_uniform_dye_remains_uniform():
+    """In waves, free and full, to rounding; at rest no amount moves by one bit."""
+    case = with_dye(two_tanks(0.3, 1.0), a=0.7, b=0.7, s=0.7)
+    case["output"]["probes"] = ["a.dye", "b.dye", *(f"s.dye@{at}" for at in (0.0, 0.3, 0.7, 1.0))]
+    case["numerics"]["method"] = "ssp-rk3"
+    run = fvsolve.run(case)
+    assert all(run[probe.text] == approx(0.7, rel=1e-13) for probe in run.case.probes)
+    case = with_dye(two_tanks(0.6, 0.6), a=0.7, b=0.2, s=0.4)
+    case["output"]["probes"] = ["a.dye", "b.dye", "s.dye@0.3", "s.flow"]
+    rest = fvsolve.run(case)
+    assert all(np.ptp(rest[probe.text]) == 0.0 for probe in rest.case.probes)
+
+
+def test_dye_in_a_conduit_drawn_the_other_way_and_resumed_is_the_same(tmp_path):
+    cases = [with_dye(two_tanks(0.3), a=1.0, b=0.0, s=0.25), with_dye(two_tanks(0.3), a=1.0, b=0.0, s=0.25)]
+    cases[1]["links"]["s"] |= {"from": "b", "to": "a", "inverts": [0.1, 0.2]}
+    for case, at in zip(cases, (0.25, 0.75), strict=True):
+        case["output"]["probes"] = ["a.dye", "b.dye", f"s.dye@{at}"]
+    one, other = (fvsolve.run(case) for case in cases)
+    for mine, its in zip(one.case.probes, other.case.probes, strict=True):
+        assert other[its.text] == approx(one[mine.text], abs=1e-10)
+    cases[0]["links"]["s"]["cells"], cases[0]["output"]["every"] = 200, 0.05
+    run_in_two_parts(cases[0], tmp_path, 8.0)
+    assert_equal_files(tmp_path, ["history.csv"])
+
+
+def test_dye_runs_from_a_basin_through_a_conduit_into_a_tank():
+    case = pond(0.3)
+    case["nodes"]["pool"]["scalars"] = {"dye": 1.0}
+    case["nodes"]["b"]["scalars"] = case["links"]["s"]["scalars"] = {"dye": 0.0}
+    case["scalars"], case["output"]["probes"] = {"dye": {}}, ["b.dye", "s.dye@0.1"]
+    run = fvsolve.run(case)
+    assert run.ledger["dye"]["relative"] < 1e-12
+    assert run["s.dye@0.1"][-1] == approx(1.0, abs=1e-3) and run["b.dye"].max() < 0.2  # 2.4 of 3.9 m3 in the conduit
+
+
+def test_rates_of_dye_depend_on_the_states_of_the_pattern_only():
+    case = with_dye(two_tanks(0.3), a=1.0, s=0.5)
+    case["nodes"]["m"] = {"type": "junction", "elevation": 0.0}
+    ends = {"s": ("a", "m", [0.2, 0.0]), "r": ("m", "b", [0.0, 0.0])}
+    case["links"] = {name: pipe(*pair, inverts=z, cells=6, scalars={"dye": 0.5}) for name, (*pair, z) in ends.items()}
+    case["output"]["probes"] = ["a.level"]
+    model = fvsolve.build(fvsolve.load(case))
+    assert stray(model, 0.0, model.start) < 1e-9
 
 
 def test_an_unusual_manning_gives_a_notice():

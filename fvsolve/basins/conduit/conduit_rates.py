@@ -152,6 +152,8 @@ def block_rates(tables, b, section, y, dydt, first, last, ends):
         block[cells.FLOW], block[cells.AFTER] = ends[0]
     if last == n:
         block[count + cells.FLOW], block[count + cells.BEFORE] = ends[1]
+    for i in range(max(first, 1), last if basin["flows"] >= 0 else 0):  # for scalars: times the width; walls at ends
+        tables.work[basin["flows"] + i] = section.diameter * block[i - low + cells.FLOW]
     own, flow_rates = block[at:], dydt[o + n + first : o + n + last]
     cells.put_rates(st["gravity"], k, own, dydt[o + first : o + last], flow_rates)
     if basin["friction"] == NO_DRAG:
@@ -181,6 +183,23 @@ def conduit_rates(t, y, dydt, out, handle):
             if basin["held"] < inf:
                 out[RATE] = max(out[RATE], 2.0 * decay)
         out[RATE] = max(out[RATE], basin["unsplit"] * rate)
+
+
+@njit
+def add_end_scalars(t, y, dydt, out, handle):
+    """Add the scalars in the flows through the ends of conduits to the rates of the amounts in the cells there."""
+    tables = open_tables(handle)
+    layout, nodes = tables.layout[0], tables.nodes.size
+    for k in range(tables.patches.size if dydt.size > 0 else 0):
+        patch = tables.patches[k]
+        basin = tables.basins[patch["basin"]]
+        if basin["kind"] != OWN_CODE:
+            continue
+        flow, at = out[layout["valve"] + patch["valve"]], basin["carried"] + tables.integers[patch["first"]]
+        node = tables.valves[patch["valve"]]["from_node"] if flow > 0.0 else patch["node"]
+        per = tables.plane[basin["spacing"]] * flow / tables.settings[0]["rho"]
+        for q in range(tables.scalars.size):
+            dydt[at + q * basin["n"]] += per * out[layout["value"] + q * nodes + node]
 
 
 @njit

@@ -65,6 +65,19 @@ class ConduitWaterRows(RowsWithFriction):
     def undivided_reason(self) -> str:
         return "it is a conduit"
 
+    @property
+    def deep(self) -> bool:
+        return bool(self.scalars)  # the area takes the place of the depth
+
+    def given_value(self, name: str) -> float | None:
+        return self.conduit.scalars.get(name)
+
+    def depth_of(self, y: np.ndarray) -> np.ndarray:
+        return np.maximum(self.area + y[0], 0.0)
+
+    def mass_per_depth(self) -> np.ndarray:
+        return self.mass()[1]
+
     def end_at_rest(self, patch: str) -> tuple[float, float]:
         """(depth, surface above the level at rest) inside an end of the water at rest."""
         i, inner = (0, 1) if patch == "from" else (-1, -2)
@@ -76,6 +89,7 @@ class ConduitWaterRows(RowsWithFriction):
     def lower(self, draft, row) -> None:
         surface = np.maximum(self.bed - self.part.level, 0.0)
         row["plan"] = draft.to_plane(np.array([self.area, self.depth, surface]))
+        row["area"] = draft.to_plane(np.full(self.n, self.conduit.length / self.n))  # of cells of unit width
         row["table"] = draft.to_plane(np.array(self.section))
         row["work"] = draft.to_work(conduit_rates.WORK + 2 * self.n)
         row["rest"] = self.case.properties.density * self.case.gravity * self.part.level

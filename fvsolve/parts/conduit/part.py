@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from fvsolve.parts.basin import MANNING_RANGE, Basin, Physics
+from fvsolve.parts.carried_scalar import ScalarValues
 from fvsolve.parts.full_pipe import LOSS
 from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.table_model import CaseContext, Faults
@@ -40,7 +41,7 @@ class Conduit(TwoPort, kind="conduit"):
     quantities: ClassVar[dict[str, str]] = {"flow": "flow"}
     along: ClassVar[dict[str, str]] = {"depth": "level", "filling": "number", "flow": "flow", "head": "head"}
     fixes_pressure: ClassVar[bool] = True
-    no_scalars: ClassVar[str] = "its cells carry no scalars yet; leave out this part, or `[scalars]`"
+    own_scalars: ClassVar[str] = "along"
 
     diameter: Annotated[float, Quantity("length", positive, "inner diameter [m]", DIAMETERS, PROFILE)]
     length: Annotated[float, Quantity("length", positive, "length along its axis [m]", changes=PROFILE)]
@@ -63,6 +64,8 @@ class Conduit(TwoPort, kind="conduit"):
         "flow", about="flow at the start [m3/s]; that of an inflow at an end, or the steady flow between the heads "
         "of both nodes, 0 where these are not known, if left out", changes=PROFILE,
     )] = None  # fmt: skip
+
+    scalars: Annotated[dict[str, Any], ScalarValues("scalar values in the conduit at the start", Number())] = {}
 
     def celerity(self, gravity: float) -> float:
         """Speed of waves in the full conduit [m/s]."""
@@ -117,7 +120,7 @@ class ConduitFlow(Physics, name=""):
     states: ClassVar[dict[str, str]] = {"area": "m2", "flow": "m3/s"}
     fields: ClassVar[dict[str, str]] = {"depth": "level", "surface": "level", "bed": "level"}
     laws: ClassVar[tuple[str, ...]] = ("linear",)
-    carries: ClassVar[bool] = False
+    carries: ClassVar[bool] = True
     has_shocks: ClassVar[bool] = True
     has_closures: ClassVar[bool] = True
 
