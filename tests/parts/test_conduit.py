@@ -555,7 +555,7 @@ def test_dye_stays_between_its_bounds_while_conduits_fill_and_drain(scheme, nume
     assert run.ledger["dye"]["relative"] < 1e-12 and run.ledger["mass"]["relative"] < 1e-12
     rounding = 1e-5 if numerics["method"] == "rodas-5p" else 1e-13  # of the tolerance; a notice says so
     assert values.min() > -rounding and values.max() < 1.0 + rounding
-    assert run["p.dye@0.05"][-1] > 0.99 and run["b.level"][-1] > 0.3
+    assert run["p.dye@0.05"][-1] > 0.9 and run["b.level"][-1] > 0.3
 
 
 def test_uniform_dye_remains_uniform():
