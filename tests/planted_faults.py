@@ -140,7 +140,7 @@ FAULTS = [
         "gain = richest.seconds / cheapest.seconds",
         "gain = cheapest.seconds / richest.seconds",
     ),
-    Fault("basins/conduit/conduit_cells.py", "section.g * n * n * share", "section.g * n * share"),
+    Fault("basins/conduit/conduit_cells.py", "rough[0] * hydraulic_radius_power", "2.0 * hydraulic_radius_power"),
     Fault("basins/frame_forces.py", "spin + f1 - p1 * z", "spin + f1 + p1 * z"),
     Fault(
         "basins/liquid/liquid_mesh.py",

@@ -41,6 +41,7 @@ PATCH_FACES = RhsTerms(  # of links at patches of water
     outlet_values="patch_scalars: values_at_faces",
     scalar_rates="patch_scalars: add_face_flows",
 )
+CONDUIT_ENDS = RhsTerms(package="fvsolve.basins.conduit", scalar_rates="conduit_rates: add_end_scalars")
 REACTIONS = RhsTerms(
     package=PACKAGE,
     prepare="basin_reactions: limit_rates_in_basins",
@@ -48,7 +49,7 @@ REACTIONS = RhsTerms(
     observe="basin_reactions: observe_reactions_in_basins",
 )
 # in the order in which they run within a phase
-SCALAR_TERMS = (PATCH_VALUES, MIXED, GRIDS, FIFTH, DIFFUSION, MESHES, SOURCES, PATCH_FACES, REACTIONS)
+SCALAR_TERMS = (PATCH_VALUES, MIXED, GRIDS, FIFTH, DIFFUSION, MESHES, SOURCES, PATCH_FACES, CONDUIT_ENDS, REACTIONS)
 
 
 def terms_of_basins(basins: list, valves: bool) -> tuple[RhsTerms, ...]:
@@ -76,7 +77,7 @@ def scalar_terms(basin) -> Iterator[RhsTerms]:
     if not basin.given:
         yield MIXED
     if any(place.startswith(f"{basin.name}.") for place in basin.case.patches_with_faces):
-        yield PATCH_FACES
+        yield CONDUIT_ENDS if basin.part.added else PATCH_FACES
     if not basin.is_grid:
         yield MESHES
         return

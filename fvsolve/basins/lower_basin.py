@@ -527,9 +527,14 @@ class BasinRows:
 
         For a scalar without a formula for this basin the ambient value counts too. The scale is 1 if all are 0.
         """
-        given, scalar = self.part.scalars.get(name), self.case.scalars[name]
-        values = np.abs([scalar.initial, scalar.ambient]) if given is None else np.abs(self.formula(given))
+        given, scalar = self.given_value(name), self.case.scalars[name]
+        values = np.abs([scalar.initial, scalar.ambient]) if given is None else np.abs(given)
         return float(values.max()) or 1.0
+
+    def given_value(self, name: str) -> Any:
+        """Value of a scalar at the start that the part states, in all cells or each : float64[n]; None without it."""
+        given = self.part.scalars.get(name)
+        return None if given is None else self.formula(given)
 
     def depth_of(self, y: np.ndarray) -> np.ndarray:
         """Depth of each cell over which amounts of scalars are distributed, at deviations y : float64[n]."""
@@ -538,8 +543,8 @@ class BasinRows:
     def start_scalars(self, y: np.ndarray) -> None:
         """Write the amounts of scalars at the start to the states y of the model, for the depths of cells in y."""
         for name, amounts in zip(self.scalars, self.amounts(y), strict=True):
-            given = self.part.scalars.get(name)
-            value = self.case.scalars[name].initial if given is None else self.formula(given)
+            given = self.given_value(name)
+            value = self.case.scalars[name].initial if given is None else given
             amounts[:] = value * self.depth_of(self.deviations(y))
 
     def amounts(self, y: np.ndarray) -> np.ndarray:

@@ -315,9 +315,8 @@ def _scalar_value_fault(scalar: str, value: Any, part: Any, scalars: dict[str, A
     if part.own_scalars == "start" and not value.constant:
         return "is the value at the start; expected a number, not a schedule"
     if not part.own_scalars:
-        return (
-            f"{article(part.kind)} has no scalar values; expected an inflow, a reservoir, a tank, a chamber or a pipe"
-        )
+        expected = "expected an inflow, a reservoir, a tank, a chamber, a pipe or a conduit"
+        return f"{article(part.kind)} has no scalar values; {expected}"
     return None
 
 

@@ -48,13 +48,35 @@ def heads_at_start(conduits: dict[str, Any], stated: dict[str, float | None]) ->
     return heads
 
 
-def inflow_at_start(nodes: dict[str, Any], links: dict[str, Any], conduit: Any) -> float | None:
-    """Flow of a conduit at the start [m3/s] by a node of type `inflow` that no other link joins; None without it."""
-    for place, way in zip(conduit.ports.values(), (1.0, -1.0), strict=True):
-        node, joined = nodes.get(place), sum(place in link.ports.values() for link in links.values())
-        if is_kind(node, "inflow") and joined == 1:
-            return way * float(node.flow.value[0])
-    return None
+def chains_of(
+    conduits: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], stated: dict[str, float | None]
+) -> dict[str, Any]:
+    """Chain of each conduit: all conduits that junctions and inflows join, at which there are no other links.
+
+    stated : head of each node, None if it is not known [m]
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    from fvsolve.parts.conduit.part import Chain
+
+    others = {place for name, link in links.items() if name not in conduits for place in link.ports.values()}
+    inflows = {}
+    for place in stated:
+        node = nodes.get(place)
+        if place not in others and is_kind(node, "inflow"):
+            inflows[place] = float(node.flow.value[0])
+        if place not in others and is_kind(node, "junction"):
+            inflows[place] = -float(node.demand.value[0])
+    ends = {name: (link.from_, link.to) for name, link in conduits.items()}
+    joined = np.array([[place in both for place in inflows] for both in ends.values()], dtype=float)
+    _, group = connected_components(joined @ joined.T)
+    found = {}
+    for k in range(max(group) + 1):
+        own = {name: conduits[name] for name, mine in zip(conduits, group, strict=True) if mine == k}
+        places = list(dict.fromkeys(place for name in own for place in ends[name]))
+        heads = {place: -np.inf if stated[place] is None else stated[place] for place in places if place not in inflows}
+        found |= dict.fromkeys(own, Chain(own, heads, {place: inflows[place] for place in places if place in inflows}))
+    return found
 
 
 def water_of_conduits(
@@ -73,21 +95,14 @@ def water_of_conduits(
 
     places = {place for link in conduits.values() for place in link.ports.values()}
     ends = {place: stated_head(nodes, place, ambient, weight) for place in sorted(places)}
-    known = heads_at_start(conduits, ends)
+    known, chains = heads_at_start(conduits, ends), chains_of(conduits, nodes, links, ends)
     waters, meshes = {}, {}
     for name, link in conduits.items():
         heads = known[link.from_], known[link.to]
         rests = heads[0] is not None and heads[0] == heads[1] and link.initial_depth is None
         level = heads[0] if rests else min(link.inverts)
-        stated = None not in (ends[link.from_], ends[link.to])
-        waters[name] = ConduitWater.model_construct(
-            physics="conduit",
-            level=level,
-            conduit=link,
-            heads=heads,
-            stated=stated,
-            inflow=inflow_at_start(nodes, links, link),
-        )
+        keys = {"level": level, "conduit": link, "heads": heads, "chain": chains[name]}
+        waters[name] = ConduitWater.model_construct(physics="conduit", **keys)
         sides = {"from": "west", "to": "east"}
         meshes[name] = rectangle((link.length, link.diameter), (link.cells, 1), patches=sides)
     return waters, meshes

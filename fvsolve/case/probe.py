@@ -173,11 +173,12 @@ def default_probes(kinds: Kinds) -> list[Probe]:
 
 
 def _scalars_of(kind: type[Node] | type[Link], kinds: Kinds, where: str) -> dict[str, str]:
-    """Scalars (name -> "number") that a class of part has: all scalars of the case if it has a pressure, else none.
+    """Scalars (name -> "number") of a class of part: all of the case if it has a pressure or states them; else none.
 
     where : attribute of the class that lists its quantities, "along" for those along a pipe, or "quantities"
     """
-    return dict.fromkeys(kinds["scalars"] if "pressure" in getattr(kind, where, {}) else (), "number")
+    has = "pressure" in getattr(kind, where, {}) or getattr(kind, "own_scalars", "") == where
+    return dict.fromkeys(kinds["scalars"] if has else (), "number")
 
 
 def _probe(text: str, part: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe:

@@ -61,6 +61,8 @@ def scalar_probe(draft, row, probe) -> None:
     row["scalar"] = list(draft.case.scalars).index(probe.quantity)
     if probe.part == "nodes":
         row["kind"], row["index"] = rec.NODE_SCALAR, draft.node_index[draft.inside(probe.name)]
+    elif probe.name in draft.case.meshes:
+        lowering_of(type(draft.case.links[probe.name])).probe(draft, probe.name, probe, row)
     else:
         row["kind"], row["index"] = rec.PIPE_SCALAR, draft.pipe_names.index(probe.name)
         lower_position(draft, row, probe.fraction, 1)

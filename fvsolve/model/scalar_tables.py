@@ -344,7 +344,7 @@ def depths(model):
     for basin in model.basins:
         if basin.deep:
             states = int(basin.row["y"]) + np.arange(basin.n)
-            yield bound_rows(states, NO_STATE, NO_STATE, basin.depth, 0.0, -1.0, np.inf)
+            yield bound_rows(states, NO_STATE, NO_STATE, basin.at_rest(), 0.0, -1.0, np.inf)
 
 
 def scalar_bounds(model, q: int):
@@ -369,5 +369,5 @@ def scalar_bounds(model, q: int):
         if basin.row["carried"] < 0:
             continue
         states = int(basin.row["carried"]) + q * basin.n + np.arange(basin.n)
-        depth = (int(basin.row["y"]) + np.arange(basin.n), basin.depth) if basin.deep else (NO_STATE, 1.0)
+        depth = (int(basin.row["y"]) + np.arange(basin.n), basin.at_rest()) if basin.deep else (NO_STATE, 1.0)
         yield bound_rows(states, depth[0], NO_STATE, depth[1], 1.0, *limits)

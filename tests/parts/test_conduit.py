@@ -121,6 +121,30 @@ def test_uniform_flow_has_the_depth_of_manning():
     assert run["s.depth@0.5"][-1] == approx(depth, rel=2e-3) and run["s.depth@0.2"][-1] == approx(depth, rel=2e-3)
 
 
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("numerics", [METHODS[0], *METHODS[2:]], ids=lambda keys: keys["method"])  # without a cap
+def test_minor_losses_are_those_of_the_energy_balance(turned, numerics):
+    """K v^2 / 2g over the length: of the full pipe with and without Manning's friction, and in a free backwater."""
+    ends, inverts = (("b", "a"), [0.0, 0.1]) if turned else (("a", "b"), [0.1, 0.0])
+    keys = {"inverts": inverts, "length": 100.0, "minor_loss": 5.0}
+    nodes = {"a": {"type": "inflow", "flow": 0.3}, "b": {"type": "reservoir", "head": 1.5}}
+    for n in (0.0, 0.013):
+        link = pipe(*ends, **{**keys, "inverts": [0.0, 0.0]}, manning=n)
+        run = fvsolve.run(sewer(nodes, {"s": link}, ["s.head@0.25", "s.head@0.75"], 20.0, **numerics))
+        area = pi * 0.5**2 / 4.0
+        exact = 2.5 * (0.3 / area) ** 2 / (2.0 * 9.80665) + n**2 * (0.3 / area) ** 2 * 50.0 / 0.125 ** (4.0 / 3.0)
+        fall = (run["s.head@0.25"] - run["s.head@0.75"]) * (-1.0 if turned else 1.0)
+        share = 1.0 - 0.01 * (0.3 / area) ** 2 / (0.25 * pi * 9.80665 * 0.5)  # of the slot, as above
+        assert fall * share == approx(exact, rel=1e-3)
+    nodes = {"a": {"type": "inflow", "flow": 0.05}, "b": {"type": "reservoir", "head": 0.4}}
+    x = [0.1, 0.5, 0.9]
+    case = sewer(nodes, {"s": pipe(*ends, **keys, cells=50)}, [f"s.depth@{at}" for at in x], 50.0, **numerics)
+    run = fvsolve.run(case)
+    exact = backwater(0.05, 0.013, 0.001, 0.5, 0.4, 100.0 * np.array(x), loss=0.05)
+    found = np.array([run[f"s.depth@{at}"] for at in (x if turned else x[::-1])])
+    assert found == approx(np.broadcast_to(exact[:, None], found.shape), abs=2e-5)
+
+
 def backwater_error(cells: int, **numerics) -> float:
     """Greatest error of the depth over the depth at the end, M1 backwater in a mild sewer."""
     flow, slope, length, d = 0.05, 0.001, 200.0, 0.5
@@ -172,6 +196,72 @@ def test_a_run_starts_in_gradually_varied_flow(name, turned):
     if name == "mild":
         exact = backwater(0.05, 0.013, 0.001, 0.5, 0.3, 100.0 * np.array(x))
         assert depths[:, 0] == approx(exact if turned else exact[::-1], abs=1e-5)
+
+
+def chain(cells: int, up: dict, down: dict, turned: bool, branches: tuple = ()) -> dict:
+    """Case of three conduits with a slope of 0.001 between two nodes; branches : nodes at the end of further ones."""
+    ends = {"a": up, "b": down} | {f"n{i}": node for i, node in enumerate(branches)}
+    nodes = {name: {"elevation": 0.0, **node} for name, node in ends.items()}
+    nodes |= {name: {"type": "junction", "elevation": 0.0} for name in "mk"}
+    keys = {"length": 40.0, "cells": cells}
+    links = {f"s{i}": pipe(*"amkb"[i : i + 2], inverts=[0.12 - 0.04 * i, 0.08 - 0.04 * i], **keys) for i in range(3)}
+    for i in range(len(branches)):
+        links[f"r{i}"] = pipe("m", f"n{i}", inverts=[0.08, 0.1], **keys)
+    if turned:
+        links["s1"] |= {"from": "k", "to": "m", "inverts": [0.04, 0.08]}
+    probes = [f"{name}.depth@{x}" for name in links for x in (0.1, 0.5, 0.9)] + [f"{name}.flow@0.5" for name in links]
+    return sewer(nodes, links, probes, 100.0)
+
+
+LAKE = {"type": "reservoir", "head": 0.4}
+CHAINS = {  # nodes at both ends, nodes of branches, flows of the three conduits if they follow from the inflows
+    "mild": ({"type": "inflow", "flow": 0.05}, LAKE, (), [0.05, 0.05, 0.05]),
+    "full": ({"type": "inflow", "flow": 0.3}, {**LAKE, "head": 1.5}, (), [0.3, 0.3, 0.3]),
+    "between reservoirs": ({"type": "reservoir", "head": 0.5}, LAKE, (), None),
+    "full, back": ({"type": "reservoir", "head": 1.0}, {**LAKE, "head": 2.0}, (), None),
+    "two inflows": ({"type": "inflow", "flow": 0.05}, LAKE, ({"type": "inflow", "flow": 0.03},), [0.05, 0.08, 0.08]),
+    "a demand": ({"type": "reservoir", "head": 1.5}, {"type": "inflow", "flow": -0.04}, (
+        {"type": "junction", "demand": 0.02}, {"type": "junction"}), [0.06, 0.04, 0.04]),
+    "inflow between reservoirs": ({"type": "reservoir", "head": 0.5}, LAKE, ({"type": "inflow", "flow": 0.03},), None),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("name", CHAINS)
+def test_a_chain_starts_in_steady_flow(name, turned):
+    """Depths and flows stay to the error of the scheme, at order 1.8 above rounding; flows are sums of inflows."""
+    up, down, branches, flows = CHAINS[name]
+    changes = []
+    for cells in (10, 20):
+        run = fvsolve.run(chain(cells, up, down, turned, branches))
+        changes.append(max(np.ptp(run[probe.text]) for probe in run.case.probes))
+        start = np.array([run[f"s{i}.flow@0.5"][0] for i in range(3)]) * ([1.0, -1.0, 1.0] if turned else 1.0)
+        assert start == approx(flows or start[:1] + [0.0, *2 * [sum(n.get("flow", 0.0) for n in branches)]], rel=1e-9)
+    assert changes[0] < 1e-4 and (changes[1] < 1e-7 or np.log2(changes[0] / changes[1]) > 1.8)
+
+
+@pytest.mark.parametrize("numerics", METHODS, ids=lambda keys: keys["method"])
+def test_a_chain_starts_in_one_backwater(numerics):
+    """Depths of all three conduits are those of gradually varied flow in one pipe, for each method."""
+    up, down, branches, _ = CHAINS["mild"]
+    case = chain(20, up, down, False, branches)
+    case["numerics"] |= {"end": 20.0, **numerics}
+    run = fvsolve.run(case)
+    x = np.array([40.0 * i + 40.0 * at for i in range(3) for at in (0.1, 0.5, 0.9)])
+    exact = backwater(0.05, 0.013, 0.001, 0.5, 0.4, 120.0 - x[::-1])[::-1]
+    found = np.array([run[f"s{i}.depth@{at}"] for i in range(3) for at in (0.1, 0.5, 0.9)])
+    assert found[:, 0] == approx(exact, abs=1e-5) and found[:, -1] == approx(exact, abs=1e-5)
+
+
+def test_water_in_a_dead_end_of_a_chain_is_level():
+    """A conduit without flow that rises above the head of its junction has a level surface and a dry end."""
+    up, down, _, _ = CHAINS["mild"]
+    case = chain(40, up, down, False, ({"type": "junction"},))
+    case["links"]["r0"] |= {"inverts": [0.08, 0.6]}
+    run = fvsolve.run(case)
+    depths = [probe.text for probe in run.case.probes if "depth" in probe.text]
+    assert max(np.ptp(run[text]) for text in depths) < 1e-3
+    assert run["r0.depth@0.9"].max() == 0.0 and run["r0.depth@0.1"][0] > 0.2
 
 
 def dam_break_error(cells: int, right: float) -> float:
@@ -438,11 +528,107 @@ def test_the_cap_of_friction_gives_a_notice():
     assert notice.value == approx((1.0 + decay / 20.0) ** 0.5 - 1.0, rel=0.03)
 
 
-def test_scalars_are_refused_by_name():
-    case = two_tanks(0.3)
+def with_dye(case: dict, **start) -> dict:
+    """The case with the scalar `dye` in all tanks and conduits; start : values by name of the part, else 0."""
+    for group in ("nodes", "links"):
+        for name, part in case[group].items():
+            if part["type"] in ("tank", "conduit", "inflow", "reservoir"):
+                part["scalars"] = {"dye": start.get(name, 0.0)}
     case["scalars"] = {"dye": {}}
-    with pytest.raises(fvsolve.CaseError, match="its cells carry no scalars yet"):
-        fvsolve.load(case)
+    return case
+
+
+def pulse_error(cells: int) -> float:
+    """Mean error of a pulse of dye in uniform flow after 50 s, over its height."""
+    depth, times = uniform_depth(0.1, 0.013, 0.005, 0.5), np.linspace(0.0, 30.0, 301)
+    speed = 0.1 / exact_section.area(depth, 0.5)
+    height = np.exp(-(((times - 15.0) / 4.0) ** 2))
+    inflow = {"type": "inflow", "flow": 0.1}
+    nodes = {"a": inflow, "b": {"type": "reservoir", "head": depth}}
+    link = pipe(length=100.0, inverts=[0.5, 0.0], cells=cells, initial_depth=depth, initial_flow=0.1)
+    x = (np.arange(cells) + 0.5) / cells
+    case = with_dye(sewer(nodes, {"s": link}, [f"s.dye@{at:.12g}" for at in x], 50.0))
+    inflow["scalars"] = {"dye": {"time": times.tolist(), "value": height.tolist()}}
+    run = fvsolve.run(case)
+    found = np.array([run[probe.text][-1] for probe in run.case.probes])
+    assert run.ledger["dye"]["relative"] < 1e-12 and found.min() > -1e-14
+    return float(abs(found - np.interp(50.0 - 100.0 * x / speed, times, height)).mean())
+
+
+def test_a_pulse_of_dye_moves_with_the_water():
+    errors = [pulse_error(cells) for cells in (100, 200)]
+    assert errors[1] < 5e-3 and np.log2(errors[0] / errors[1]) > 1.7
+
+
+@pytest.mark.parametrize("numerics", [{"method": "ssp-rk3"}, *METHODS[2:]], ids=lambda keys: keys["method"])
+@pytest.mark.parametrize("scheme", ["upwind", "muscl"])
+def test_dye_stays_between_its_bounds_while_conduits_fill_and_drain(scheme, numerics):
+    """Through a manhole, a junction and a dry conduit: ledger to 1e-12, each method."""
+    nodes = {"a": {**TANK, "area": 2.0, "level": 1.2}, "h": {**TANK, "area": 0.5, "level": 0.1},
+             "m": {"type": "junction"}, "b": {**TANK, "area": 1.0, "level": 0.0}}  # fmt: skip
+    links = {
+        "p": pipe("a", "h", inverts=[0.2, 0.1]),
+        "q": pipe("m", "h", inverts=[0.05, 0.1]),
+        "r": pipe("m", "b", inverts=[0.05, 0.0]),
+    }
+    for link in links.values():
+        link |= {"length": 10.0, "cells": 10}
+    probes = [f"{name}.dye@{at}" for name in "pqr" for at in (0.05, 0.5, 0.95)] + ["h.dye", "b.dye", "b.level"]
+    case = with_dye(sewer(nodes, links, probes, 30.0, scheme=scheme, **numerics), a=1.0)
+    for node in nodes.values():
+        node.setdefault("elevation", 0.0)
+    run = fvsolve.run(case)
+    values = np.array([run[probe.text] for probe in run.case.probes[:-1]])
+    assert run.ledger["dye"]["relative"] < 1e-12 and run.ledger["mass"]["relative"] < 1e-12
+    rounding = 1e-5 if numerics["method"] == "rodas-5p" else 1e-13  # of the tolerance; a notice says so
+    assert values.min() > -rounding and values.max() < 1.0 + rounding
+    assert run["p.dye@0.05"][-1] > 0.9 and run["b.level"][-1] > 0.3
+
+
+def test_uniform_dye_remains_uniform():
+    """In waves, free and full, to rounding; at rest no amount moves by one bit."""
+    case = with_dye(two_tanks(0.3, 1.0), a=0.7, b=0.7, s=0.7)
+    case["output"]["probes"] = ["a.dye", "b.dye", *(f"s.dye@{at}" for at in (0.0, 0.3, 0.7, 1.0))]
+    case["numerics"]["method"] = "ssp-rk3"
+    run = fvsolve.run(case)
+    assert all(run[probe.text] == approx(0.7, rel=1e-13) for probe in run.case.probes)
+    case = with_dye(two_tanks(0.6, 0.6), a=0.7, b=0.2, s=0.4)
+    case["output"]["probes"] = ["a.dye", "b.dye", "s.dye@0.3", "s.flow"]
+    rest = fvsolve.run(case)
+    assert all(np.ptp(rest[probe.text]) == 0.0 for probe in rest.case.probes)
+
+
+def test_dye_in_a_conduit_drawn_the_other_way_and_resumed_is_the_same(tmp_path):
+    cases = [with_dye(two_tanks(0.3), a=1.0, b=0.0, s=0.25), with_dye(two_tanks(0.3), a=1.0, b=0.0, s=0.25)]
+    cases[1]["links"]["s"] |= {"from": "b", "to": "a", "inverts": [0.1, 0.2]}
+    for case, at in zip(cases, (0.25, 0.75), strict=True):
+        case["output"]["probes"] = ["a.dye", "b.dye", f"s.dye@{at}"]
+    one, other = (fvsolve.run(case) for case in cases)
+    for mine, its in zip(one.case.probes, other.case.probes, strict=True):
+        assert other[its.text] == approx(one[mine.text], abs=1e-10)
+    cases[0]["links"]["s"]["cells"], cases[0]["output"]["every"] = 200, 0.05
+    run_in_two_parts(cases[0], tmp_path, 8.0)
+    assert_equal_files(tmp_path, ["history.csv"])
+
+
+def test_dye_runs_from_a_basin_through_a_conduit_into_a_tank():
+    case = pond(0.3)
+    case["nodes"]["pool"]["scalars"] = {"dye": 1.0}
+    case["nodes"]["b"]["scalars"] = case["links"]["s"]["scalars"] = {"dye": 0.0}
+    case["scalars"], case["output"]["probes"] = {"dye": {}}, ["b.dye", "s.dye@0.1"]
+    run = fvsolve.run(case)
+    assert run.ledger["dye"]["relative"] < 1e-12
+    assert run["s.dye@0.1"].max() == approx(1.0, abs=1e-3) and run["b.dye"].max() < 0.2  # then the flow turns
+
+
+def test_rates_of_dye_depend_on_the_states_of_the_pattern_only():
+    case = with_dye(two_tanks(0.3), a=1.0, s=0.5)
+    case["nodes"]["m"] = {"type": "junction", "elevation": 0.0}
+    ends = {"s": ("a", "m", [0.2, 0.0]), "r": ("m", "b", [0.0, 0.0])}
+    case["links"] = {name: pipe(*pair, inverts=z, cells=6, scalars={"dye": 0.5}) for name, (*pair, z) in ends.items()}
+    case["output"]["probes"] = ["a.level"]
+    model = fvsolve.build(fvsolve.load(case))
+    assert stray(model, 0.0, model.start) < 1e-9
 
 
 def test_an_unusual_manning_gives_a_notice():

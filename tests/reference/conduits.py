@@ -44,12 +44,16 @@ def uniform_depth(q: float, n: float, slope: float, d: float) -> float:
     return brentq(lambda h: slope_of_friction(q, n, h, d) - slope, 1e-6 * d, 0.9 * d, xtol=1e-14)
 
 
-def backwater(q: float, n: float, slope: float, d: float, end: float, x: np.ndarray) -> np.ndarray:
-    """Depths at distances x upstream of a place with the depth `end`, by gradually varied flow."""
+def backwater(q: float, n: float, slope: float, d: float, end: float, x: np.ndarray, loss: float = 0.0) -> np.ndarray:
+    """Depths at distances x upstream of a place with the depth `end`, by gradually varied flow.
+
+    loss : coefficient of minor losses over the length [1/m], of q^2 / (2 g A^2)
+    """
 
     def rise(_, h):
         froude = q * q * width(h[0], d) / (G * area(h[0], d) ** 3)
-        return [-(slope - slope_of_friction(q, n, h[0], d)) / (1.0 - froude)]
+        friction = slope_of_friction(q, n, h[0], d) + loss * q * q / (2.0 * G * area(h[0], d) ** 2)
+        return [-(slope - friction) / (1.0 - froude)]
 
     found = solve_ivp(rise, (0.0, x.max()), [end], rtol=1e-11, atol=1e-13, dense_output=True)
     return found.sol(x)[0]

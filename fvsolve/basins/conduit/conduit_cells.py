@@ -45,14 +45,15 @@ def velocity_factor(section, area):
 
 
 @njit(forceinline=True)
-def drag_per_flow(section, n, h, area):
-    """Decay rate of the flow by friction over the flow |Q| [1/m3]; n : Manning's number.
+def drag_per_flow(section, rough, h, area):
+    """Decay rate of the flow by friction over the flow |Q| [1/m3].
 
     The slot has weight, but no velocity: in the full section the slope of friction is that at the velocity Q / A_f.
+    rough : (g n^2 with Manning's number n [m^(1/3)], minor loss coefficient over twice the length [1/m])
     """
     full = 0.25 * pi * section.diameter * section.diameter
     share = velocity_factor(section, area) if area < full else area / (full * full)
-    return section.g * n * n * share * hydraulic_radius_power(section, h, min(area, full))
+    return share * (rough[0] * hydraulic_radius_power(section, h, min(area, full)) + rough[1])
 
 
 @njit(forceinline=True)
@@ -199,21 +200,44 @@ def put_rates(g, k, b, area_rates, flow_rates):
 
 
 @inline
-def add_friction(section, rough, cap, flows, b, flow_rates):
-    """Add friction -r Q to the rates of flows Q, with r / (1 + r / cap) for r, and write r to the row WAVE of b."""
+def put_drag(section, rough, changes, b, seen, drag):
+    """Write the decay rate of the flow over |Q| of a row of cells of the block b to `drag`, and the states to `seen`.
+
+    changes : states of the area, on which alone it depends
+    """
+    for i in range(changes.size):
+        drag[i] = drag_per_flow(section, rough, b[i + DEPTH], b[i + AREA]) + TINY  # above 0: written
+    for i in range(changes.size):
+        seen[i] = changes[i]
+
+
+@njit
+def are_equal(a, b):
+    """True if the numbers of two rows are equal."""
+    count = 0
+    for i in range(a.size):  # without an early end, so that it is vectorised
+        count += a[i] != b[i]
+    return count == 0
+
+
+@inline
+def add_friction(cap, flows, drag, b, flow_rates):
+    """Add friction -r Q to the rates of flows Q, with r / (1 + r / cap) for r, and write r to the row WAVE of b.
+
+    drag : decay rate over |Q|, see `put_drag`
+    """
     for i in range(flows.size):
-        rate = drag_per_flow(section, rough, b[i + DEPTH], b[i + AREA]) * abs(flows[i])
+        rate = drag[i] * abs(flows[i])
         rate *= 1.0 / (1.0 + rate / cap)
         b[i + WAVE] = rate
         flow_rates[i] -= rate * flows[i]
 
 
 @inline
-def damp_row(section, rough, h, flows, b, rates, quick):
+def damp_row(h, flows, drag, rates, quick):
     """Divide the rates of flows Q by 1 + h R for friction, and write h R to `quick`; see `bed_friction.damp_flows`."""
     for i in range(flows.size):
-        flow = flows[i]
-        per = drag_per_flow(section, rough, b[i + DEPTH], b[i + AREA])
+        flow, per = flows[i], drag[i]
         rate = per * abs(flow)
         free = h * per * abs(flow + h * (rates[i] + rate * flow))
         damping = h * rate + 2.0 * free / (1.0 + sqrt(1.0 + 4.0 * free))

@@ -1,7 +1,8 @@
 """Rates of the cells of conduits: area A and flow Q of a circular section that is partly full or full.
 
-A_t + Q_x = 0, Q_t + (Q^2 / A + g I)_x = -g A z_x - g n^2 |Q| Q / (A R^(4/3)), with the invert z, the integral I of the
-area over the depth and the hydraulic radius R. Cells are computed in blocks, see `conduit_cells`.
+A_t + Q_x = 0, Q_t + (Q^2 / A + g I)_x = -g A z_x - g n^2 |Q| Q / (A R^(4/3)) - K |Q| Q / (2 L A), with the invert
+z, the coefficient K of minor losses over the length L, the integral I of the area over the depth and the hydraulic
+radius R. Cells are computed in blocks, see `conduit_cells`.
 """
 
 from math import inf
@@ -12,12 +13,12 @@ from fvsolve.basins.conduit.conduit_cells import cell_state, fastest
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import CELL_FIELD, NO_DRAG, RATE, UPWIND
 from fvsolve.kernels.table_handle import open_tables
-from fvsolve.parts.conduit.law import end_flow, section_at
+from fvsolve.parts.conduit.law import INSIDE, end_flow, end_state, read_state, section_at
 from fvsolve.parts.conduit.law_section import celerity, section_at_depth
 
 OWN_CODE = physics_code(__package__)
 AREA, DEPTH, SURFACE, PLANS = range(4)  # constant data of cells at rest, the surface above the level at rest
-WORK = cells.ROWS * cells.STRIDE  # size of the work array of a conduit
+WORK = cells.ROWS * cells.STRIDE  # size of the block in the work array of a conduit; two rows of its cells follow
 OF_DEPTH, OF_AREA, OF_FLOW = range(3)  # quantities of probes
 
 
@@ -67,7 +68,9 @@ def read_ends(t, y, dydt, out, handle):
         at, turn, node = patch["inside"], patch_turn(tables, patch), patch["node"]
         section = section_at(tables.plane, basin["table"])
         h, e, u = state_inside(tables, basin, section, y, turn)
-        tables.work[at], tables.work[at + 1], tables.work[at + 2] = h, e if h > 0.0 else patch["rest"], turn * u
+        inside = end_state(section, h, e if h > 0.0 else patch["rest"], turn * u)
+        for i in range(INSIDE):
+            tables.work[at + i] = inside[i]
         cell = read_cell(tables, basin, section, y, tables.integers[patch["first"]])
         out[layout["pressure"] + node] = st["rho"] * st["gravity"] * (cell[2] - patch["lowest"])
         out[layout["supply"] + node] = 0.0
@@ -78,14 +81,15 @@ def read_ends(t, y, dydt, out, handle):
 @njit
 def flux_at_end(tables, patch, section, out):
     """(inflow [m3/s], momentum flux minus the thrust inside [m4/s2], wave speed [m/s]) at an end of a conduit."""
-    st, layout, valve, at = tables.settings[0], tables.layout[0], tables.valves[patch["valve"]], patch["inside"]
+    st, layout, valve = tables.settings[0], tables.layout[0], tables.valves[patch["valve"]]
     q = out[layout["valve"] + patch["valve"]] / st["rho"]
     drop = valve["drop"] + out[layout["pressure"] + valve["from_node"]]
     z = patch["lowest"] + drop / (st["rho"] * st["gravity"])
-    depth = end_flow(section, z, tables.work[at], tables.work[at + 1], tables.work[at + 2])[2]
+    inside = read_state(tables.work, patch["inside"])
+    depth = end_flow(section, z, inside)[2]
     area, width, thrust = section_at_depth(section, depth)
     u = q / area if area > 0.0 else 0.0
-    momentum = q * u + section.g * (thrust - section_at_depth(section, tables.work[at])[2])
+    momentum = q * u + section.g * (thrust - inside[4])
     return q, momentum, abs(u) + fastest(section, area, celerity(section, width, area))
 
 
@@ -115,6 +119,19 @@ def read_block(tables, basin, section, y, low, high, block):
 
 
 @njit
+def drag_rows(tables, basin, first, last):
+    """Rows `seen` and `drag` of the cells first to last - 1 for `conduit_cells.put_drag`."""
+    at = basin["work"] + WORK
+    return tables.work[at + first : at + last], tables.work[at + basin["n"] + first : at + basin["n"] + last]
+
+
+@njit
+def rough_wall(tables, basin):
+    """Argument `rough` of `conduit_cells.drag_per_flow`."""
+    return tables.plane[basin["roughness"]], tables.plane[basin["roughness"] + 1]
+
+
+@njit
 def block_rates(tables, b, section, y, dydt, first, last, ends):
     """Write the rates of cells first to last - 1; return (greatest (|u| + c) / dx, greatest decay rate) there [1/s].
 
@@ -135,12 +152,16 @@ def block_rates(tables, b, section, y, dydt, first, last, ends):
         block[cells.FLOW], block[cells.AFTER] = ends[0]
     if last == n:
         block[count + cells.FLOW], block[count + cells.BEFORE] = ends[1]
+    for i in range(max(first, 1), last if basin["flows"] >= 0 else 0):  # for scalars: times the width; walls at ends
+        tables.work[basin["flows"] + i] = section.diameter * block[i - low + cells.FLOW]
     own, flow_rates = block[at:], dydt[o + n + first : o + n + last]
     cells.put_rates(st["gravity"], k, own, dydt[o + first : o + last], flow_rates)
     if basin["friction"] == NO_DRAG:
         return most, 0.0
-    rough, flows = tables.plane[basin["roughness"]], y[o + n + first : o + n + last]
-    cells.add_friction(section, rough, basin["held"], flows, own, flow_rates)
+    rough, flows = rough_wall(tables, basin), y[o + n + first : o + n + last]
+    seen, drag = drag_rows(tables, basin, first, last)
+    cells.put_drag(section, rough, y[o + first : o + last], own, seen, drag)
+    cells.add_friction(basin["held"], flows, drag, own, flow_rates)
     return most, cells.greatest(last - first, own[cells.WAVE :])
 
 
@@ -165,6 +186,23 @@ def conduit_rates(t, y, dydt, out, handle):
 
 
 @njit
+def add_end_scalars(t, y, dydt, out, handle):
+    """Add the scalars in the flows through the ends of conduits to the rates of the amounts in the cells there."""
+    tables = open_tables(handle)
+    layout, nodes = tables.layout[0], tables.nodes.size
+    for k in range(tables.patches.size if dydt.size > 0 else 0):
+        patch = tables.patches[k]
+        basin = tables.basins[patch["basin"]]
+        if basin["kind"] != OWN_CODE:
+            continue
+        flow, at = out[layout["valve"] + patch["valve"]], basin["carried"] + tables.integers[patch["first"]]
+        node = tables.valves[patch["valve"]]["from_node"] if flow > 0.0 else patch["node"]
+        per = tables.plane[basin["spacing"]] * flow / tables.settings[0]["rho"]
+        for q in range(tables.scalars.size):
+            dydt[at + q * basin["n"]] += per * out[layout["value"] + q * nodes + node]
+
+
+@njit
 def damp_conduits(h, y, rates, quick, handle):
     """Divide the rates of flows by 1 + h R for friction, and write h R to `quick`; see `bed_friction.damp_flows`."""
     tables = open_tables(handle)
@@ -172,13 +210,16 @@ def damp_conduits(h, y, rates, quick, handle):
         basin = tables.basins[b]
         if basin["kind"] != OWN_CODE or basin["damped"] == 0:
             continue
-        n, section, rough = basin["n"], section_at(tables.plane, basin["table"]), tables.plane[basin["roughness"]]
+        n, o, section = basin["n"], basin["y"], section_at(tables.plane, basin["table"])
         for first in range(0, n, cells.MOST_CELLS):
             last = min(first + cells.MOST_CELLS, n)
-            block = tables.work[basin["work"] : basin["work"] + WORK]
-            read_block(tables, basin, section, y, first, last, block)
-            low, high = basin["y"] + n + first, basin["y"] + n + last
-            cells.damp_row(section, rough, h, y[low:high], block, rates[low:high], quick[low:high])
+            seen, drag = drag_rows(tables, basin, first, last)
+            if drag[0] == 0.0 or not cells.are_equal(seen, y[o + first : o + last]):  # not the state of the last rates
+                block = tables.work[basin["work"] : basin["work"] + WORK]
+                read_block(tables, basin, section, y, first, last, block)
+                cells.put_drag(section, rough_wall(tables, basin), y[o + first : o + last], block, seen, drag)
+            low, high = o + n + first, o + n + last
+            cells.damp_row(h, y[low:high], drag, rates[low:high], quick[low:high])
 
 
 @njit

@@ -11,13 +11,14 @@ from fvsolve.basins.basin_terms import SHORTAGES
 from fvsolve.basins.conduit import conduit_rates
 from fvsolve.basins.conduit.conduit_cells import drag_per_flow, fastest, velocity_factor
 from fvsolve.basins.conduit.conduit_rates import OF_AREA, OF_DEPTH, OF_FLOW
-from fvsolve.basins.conduit.steady_profile import put_profile, steady_flow
+from fvsolve.basins.conduit.lower_chain import steady_chain
+from fvsolve.basins.conduit.steady_profile import put_profile
 from fvsolve.basins.free_surface.lower import COURANT_FACTOR
 from fvsolve.basins.lower_friction import RowsWithFriction, cap_checks, run_checks, start_notices
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import RhsTerms
-from fvsolve.parts.conduit.law import end_flow
+from fvsolve.parts.conduit.law import INSIDE, end_flow
 from fvsolve.parts.conduit.law_section import area_of, celerity, depth_of, section_at_depth, section_of
 
 PACKAGE = __package__
@@ -37,6 +38,7 @@ class ConduitWaterRows(RowsWithFriction):
         super().__init__(case, name)
         self.conduit, self.bed = self.part.conduit, self.part.bed_at_centres()
         self.section = section_of(case.gravity, self.conduit.diameter, self.conduit.celerity(case.gravity))
+        self.rough = self.conduit.rough(case.gravity)
         self.depth = np.maximum(self.part.level - self.bed, 0.0)
         self.area = self.areas(self.depth)
         self.full_rate = COURANT_FACTOR * self.conduit.celerity(case.gravity) * self.n / self.conduit.length
@@ -63,6 +65,19 @@ class ConduitWaterRows(RowsWithFriction):
     def undivided_reason(self) -> str:
         return "it is a conduit"
 
+    @property
+    def deep(self) -> bool:
+        return bool(self.scalars)  # the area takes the place of the depth
+
+    def given_value(self, name: str) -> float | None:
+        return self.conduit.scalars.get(name)
+
+    def depth_of(self, y: np.ndarray) -> np.ndarray:
+        return np.maximum(self.area + y[0], 0.0)
+
+    def mass_per_depth(self) -> np.ndarray:
+        return self.mass()[1]
+
     def end_at_rest(self, patch: str) -> tuple[float, float]:
         """(depth, surface above the level at rest) inside an end of the water at rest."""
         i, inner = (0, 1) if patch == "from" else (-1, -2)
@@ -74,10 +89,12 @@ class ConduitWaterRows(RowsWithFriction):
     def lower(self, draft, row) -> None:
         surface = np.maximum(self.bed - self.part.level, 0.0)
         row["plan"] = draft.to_plane(np.array([self.area, self.depth, surface]))
-        row["table"], row["work"] = draft.to_plane(np.array(self.section)), draft.to_work(conduit_rates.WORK)
+        row["area"] = draft.to_plane(np.full(self.n, self.conduit.length / self.n))  # of cells of unit width
+        row["table"] = draft.to_plane(np.array(self.section))
+        row["work"] = draft.to_work(conduit_rates.WORK + 2 * self.n)
         row["rest"] = self.case.properties.density * self.case.gravity * self.part.level
-        row["friction"] = rec.MANNING if self.conduit.manning > 0.0 else rec.NO_DRAG
-        row["roughness"] = draft.to_plane(np.array([self.conduit.manning]))
+        row["friction"] = rec.MANNING if any(self.rough) else rec.NO_DRAG
+        row["roughness"] = draft.to_plane(np.array(self.rough))
         row["held"], row["damped"], row["unsplit"] = self.rate_cap, self.damped, COURANT_FACTOR
 
     def lower_patch(self, draft, patch: str, row) -> None:
@@ -86,7 +103,7 @@ class ConduitWaterRows(RowsWithFriction):
         level = self.part.level
         row["closure"], row["valve"] = rec.LINKED, draft.valve_names.index(f"{self.name}.{patch}.face")
         row["rest"], row["lowest"] = self.conduit.inverts[i] - level, max(self.bed[i] - level, 0.0)
-        row["depth"], row["inside"], row["second"] = -1, draft.to_work(3), len(draft.integers)
+        row["depth"], row["inside"], row["second"] = -1, draft.to_work(INSIDE), len(draft.integers)
         inner = min(1, self.n - 1) if patch == "from" else max(self.n - 2, 0)
         draft.integers.append(inner)
 
@@ -99,8 +116,8 @@ class ConduitWaterRows(RowsWithFriction):
 
         Otherwise it is the level of the water at the other end, at most the invert.
         """
-        ends = list(zip(self.part.heads, self.conduit.inverts, strict=True))
-        reached = [None if head is None or head < bed else head for head, bed in ends]
+        ends = list(zip(self.steady[1], self.conduit.inverts, strict=True))
+        reached = [None if head is None or head <= bed else head for head, bed in ends]
         return [
             head if head is not None else bed if other is None else min(other, bed)
             for head, other, (_, bed) in zip(reached, reached[::-1], ends, strict=True)
@@ -118,8 +135,8 @@ class ConduitWaterRows(RowsWithFriction):
 
     def greatest_outflow(self, patch, work: np.ndarray) -> float:
         """Critical outflow of an end [m3/s]; patch : its row of the table; work : work array with the state inside."""
-        h, e, u = work[patch["inside"] : patch["inside"] + 3]
-        return -end_flow(self.section, e - h, h, e, u)[0]
+        inside = work[patch["inside"] : patch["inside"] + INSIDE]
+        return -end_flow(self.section, inside[1] - inside[0], inside)[0]
 
     def start_flow(self, patch: str) -> float:
         """Flow into the end `patch` at the start [m3/s]."""
@@ -127,25 +144,26 @@ class ConduitWaterRows(RowsWithFriction):
         return float(flows[0] if patch == "from" else -flows[-1])
 
     @cached_property
-    def steady_start(self) -> tuple[np.ndarray | None, float]:
-        """(depths of gradually varied flow in cells [m], None without flow; flow [m3/s]) at the start.
+    def steady(self) -> tuple[float | None, list[float | None]]:
+        """(steady flow at the start [m3/s], heads of both nodes then [m]); None if not known."""
+        conduit, flows, heads = self.conduit, {}, {}
+        if self.case.numerics.initial != "rest" and conduit.initial_depth is None:
+            flows, heads = steady_chain(self.part.chain, self.case.gravity)
+        flow = conduit.initial_flow if conduit.initial_flow is not None else flows.get(self.name)
+        places = zip(conduit.ports.values(), self.part.heads, strict=True)
+        return flow, [heads.get(place, head) for place, head in places]
 
-        The flow is `initial_flow`, else that of an inflow, else the steady flow between heads that both nodes state.
-        """
-        conduit, flow = self.conduit, self.conduit.initial_flow
-        starts = self.case.numerics.initial != "rest" and conduit.initial_depth is None
-        heads = [-math.inf if head is None else head for head in self.part.heads]
-        if flow is None and starts:
-            flow = self.part.inflow
-        seeks = flow is None and starts and self.part.stated and heads[0] != heads[1]
-        turn = -1 if (heads[0] < heads[1] if seeks else (flow or 0.0) < 0.0) else 1
-        (upper, lower), (begin, end) = heads[::turn], conduit.inverts[::turn]
-        depths, sizes = np.zeros(self.n + 2), (conduit.manning, begin - end, conduit.length)
-        if seeks and upper > begin:
-            flow = turn * steady_flow(self.section, *sizes, upper - begin, max(lower - end, 0.0), depths)
+    @cached_property
+    def steady_start(self) -> tuple[np.ndarray | None, float]:
+        """(depths of gradually varied flow in cells [m], None without flow; flow [m3/s]) at the start."""
+        conduit, (flow, heads) = self.conduit, self.steady
         if not flow:
             return None, 0.0
-        put_profile(self.section, abs(flow), *sizes, max(lower - end, 0.0), depths)
+        turn = -1 if flow < 0.0 else 1
+        (begin, end), lower = conduit.inverts[::turn], heads[::turn][1]
+        depth = max(-math.inf if lower is None else lower - end, 0.0)
+        depths = np.zeros(self.n + 2)
+        put_profile(self.section, abs(flow), self.rough, begin - end, conduit.length, depth, depths)
         return depths[1:-1][::turn].copy(), flow
 
     def depths(self, y: np.ndarray) -> np.ndarray:
@@ -167,7 +185,7 @@ class ConduitWaterRows(RowsWithFriction):
 
     def friction_in_cells(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         pairs = zip(self.depths(y).tolist(), (self.area + y[0]).tolist(), strict=True)
-        per = [drag_per_flow(self.section, self.conduit.manning, h, max(area, 0.0)) for h, area in pairs]
+        per = [drag_per_flow(self.section, self.rough, h, max(area, 0.0)) for h, area in pairs]
         return self.depths(y), np.abs(y[1]), np.array(per) * np.abs(y[1])
 
     def notices(self, y: np.ndarray) -> list[Notice]:

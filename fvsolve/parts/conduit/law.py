@@ -12,10 +12,11 @@ and the row of its patch.
 from math import sqrt
 
 from fvsolve.jit import njit
+from fvsolve.kernels.isolated_nodes import inner_row
 from fvsolve.parts.conduit.law_section import SlottedSection, celerity, riemann_function, section_at_depth
 
 NUMBERS = len(SlottedSection._fields)  # of a section
-INSIDE = 3  # numbers of the state inside an end: depth [m], surface above the level at rest [m], inward velocity [m/s]
+INSIDE = 7  # numbers of the state inside an end, see `end_state`
 LEAST_SLOPE = 1e-12  # least derivative of the flow by the head [m2/s]; critical outflow does not depend on the head
 SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
 DRY_CELERITY = 1e-4  # celerity at a dry end for its least derivative [m/s]; far below that of films of water
@@ -63,13 +64,28 @@ def critical_depth(section, target, high):
 
 
 @njit
-def end_flow(section, z, h, e, u):
-    """(inflow q [m3/s], dq/dz [m2/s], depth [m]) of an end with the head z of its node.
+def end_state(section, h, e, u):
+    """State inside an end: (h, e, u, area [m2], thrust integral [m3], celerity [m/s], phi [m/s]).
 
-    h, e, u : state inside; z and e count from the level at rest
+    h, e, u : depth [m], surface above the level at rest [m], inward velocity [m/s]
     """
-    area, width, _ = section_at_depth(section, h)
-    phi, c = riemann_function(section, h), celerity(section, width, area)
+    area, width, thrust = section_at_depth(section, h)
+    return h, e, u, area, thrust, celerity(section, width, area), riemann_function(section, h)
+
+
+@njit
+def read_state(work, at):
+    """Result of `end_state` whose numbers are work[at:]."""
+    return work[at], work[at + 1], work[at + 2], work[at + 3], work[at + 4], work[at + 5], work[at + 6]
+
+
+@njit
+def end_flow(section, z, inside):
+    """(inflow q [m3/s], dq/dz [m2/s], depth [m]) of an end with the head z of its node, from the level at rest [m].
+
+    inside : result of `end_state`
+    """
+    h, e, u, area, _, c, phi = inside
     depth = max(h + (z - e), 0.0)
     area_b, width_b, _ = section_at_depth(section, depth)
     speed, own = celerity(section, width_b, area_b), u
@@ -93,14 +109,15 @@ def end_flow(section, z, h, e, u):
 
 
 @njit
-def passing_head(section, target, h, e, u):
+def passing_head(section, target, inside):
     """Head of the node at which an end passes the inflow `target` [m3/s]; that of a dry end for lower flows."""
+    h, e = inside[:2]
     low, rise = e - h, 1e-3 * section.diameter
     z, high = e, e + rise
-    while end_flow(section, high, h, e, u)[0] < target and rise < 1e9:
+    while end_flow(section, high, inside)[0] < target and rise < 1e9:
         low, high, rise = high, high + rise, 4.0 * rise
     for _ in range(SWEEPS):
-        q, slope, _ = end_flow(section, z, h, e, u)
+        q, slope, _ = end_flow(section, z, inside)
         if q < target:
             low = max(low, z)
         else:
@@ -115,49 +132,52 @@ def passing_head(section, target, h, e, u):
 
 
 @njit
-def level_step(section, z, target, h, e, u):
+def level_step(section, z, target, inside):
     """(change of the flow from `target` [m3/s], slope over the head [m2/s]) in Newton's step from the head z.
 
     Far from the target the slope is at least that of the chord to the head at which the target passes: the slope
     changes by the factor T_s / D at the crown and vanishes at critical outflow, where tangents would alternate.
-    h, e, u : state inside
+    inside : result of `end_state`
     """
-    q, slope, _ = end_flow(section, z, h, e, u)
+    q, slope, _ = end_flow(section, z, inside)
     if slope > 0.0 and abs(q - target) <= CHORD * section.area * sqrt(section.g * section.diameter):
         return q - target, slope
-    least = end_flow(section, e - h, h, e, u)[0]
+    least = end_flow(section, inside[1] - inside[0], inside)[0]
     if not target > least + SAME_FLOW * abs(least):
         if slope > 0.0:
             return q - target, slope
         return q - target, DRY_CELERITY * section.diameter if q == 0.0 else LEAST_SLOPE
-    reach = z - passing_head(section, target, h, e, u)
+    reach = z - passing_head(section, target, inside)
     return q - target, max(slope, (q - target) / reach if reach != 0.0 else 0.0, LEAST_SLOPE)
 
 
 @njit
-def head_at_end(out, tables, k, drop):
-    """(offset of the section in `floats`, offset of the state inside in `work`, head above the level at rest [m]).
+def end_of(out, tables, k, drop):
+    """(section, head above the level at rest [m], state inside) of an end.
 
     k : restriction of the end; drop : of the pressure, to the cell [Pa]
     """
     at, st = tables.valves[k]["data"], tables.settings[0]
     patch = tables.patches[int(tables.floats[at + NUMBERS])]
     pressure = out[tables.layout[0]["pressure"] + patch["node"]] + drop
-    return at, patch["inside"], pressure / (st["rho"] * st["gravity"]) + patch["lowest"]
+    z = pressure / (st["rho"] * st["gravity"]) + patch["lowest"]
+    return section_at(tables.floats, at), z, read_state(tables.work, patch["inside"])
 
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
-    """(a, s) of `restrictions.restriction_step`: Newton's step."""
-    at, inside, z = head_at_end(out, tables, k, drop)
-    rho, h, e, u = tables.settings[0]["rho"], tables.work[inside], tables.work[inside + 1], tables.work[inside + 2]
-    a, s = level_step(section_at(tables.floats, at), z, m / rho, h, e, u)
+    """(a, s) of `restrictions.restriction_step`: Newton's step; at a node with a known head the tangent is enough."""
+    section, z, inside = end_of(out, tables, k, drop)
+    rho = tables.settings[0]["rho"]
+    if inner_row(tables.nodes, tables.valves[k]["from_node"]) < 0:
+        q, s, _ = end_flow(section, z, inside)
+        return rho * q - m, s / tables.settings[0]["gravity"]
+    a, s = level_step(section, z, m / rho, inside)
     return rho * a, s / tables.settings[0]["gravity"]
 
 
 @njit
 def slope(out, tables, k, g, drop):
     """Derivative of the mass flow by the drop [kg/s/Pa]."""
-    at, inside, z = head_at_end(out, tables, k, drop)
-    h, e, u = tables.work[inside], tables.work[inside + 1], tables.work[inside + 2]
-    return end_flow(section_at(tables.floats, at), z, h, e, u)[1] / tables.settings[0]["gravity"]
+    section, z, inside = end_of(out, tables, k, drop)
+    return end_flow(section, z, inside)[1] / tables.settings[0]["gravity"]

@@ -16,20 +16,22 @@ class ConduitRows(Lowering, kind="conduit"):
 
     def probe(self, draft, name, probe, row) -> None:
         """Fill the row of a probe: the flow at an end, or values between the centres of cells, beside them constant."""
+        carries = probe.quantity in draft.case.scalars
         if probe.quantity == "flow" and probe.fraction in (0.0, 1.0, None):
             end = "to" if probe.fraction == 1.0 else "from"
             row["kind"], row["index"] = rec.VALVE_FLOW, draft.valve_names.index(f"{name}.{end}.face")
             row["side"] = -1 if end == "to" else 0
             return
         ((k, basin),) = ((k, basin) for k, basin in enumerate(draft.basins) if basin.name == name)
-        at = min(max(probe.fraction * basin.n - 0.5, 0.0), basin.n - 1.0)
+        at = min(max((probe.fraction or 0.0) * basin.n - 0.5, 0.0), basin.n - 1.0)
         first = min(int(at), max(basin.n - 2, 0))
         cells, weights = [first, min(first + 1, basin.n - 1)], [1.0 - (at - first), at - first]
-        row["kind"], row["index"], row["count"] = rec.CELL_FIELD, k, 2
+        row["kind"], row["index"], row["count"] = rec.CELL_SCALAR if carries else rec.CELL_FIELD, k, 2
         row["cell"], row["weights"] = len(draft.integers), len(draft.floats)
         draft.integers += cells
         draft.floats += weights
-        basin.lower_probe(row, probe.quantity, np.array(cells), np.array(weights))
+        if not carries:
+            basin.lower_probe(row, probe.quantity, np.array(cells), np.array(weights))
 
 
 class ConduitEndRows(Restriction, kind="conduit-end"):
@@ -50,6 +52,9 @@ class ConduitEndRows(Restriction, kind="conduit-end"):
         section = section_of(draft.case.gravity, conduit.diameter, conduit.celerity(draft.case.gravity))
         return [*section, float(patches.index(draft.case.places[link.to]))]
 
+    def follow(self, start, k: int) -> None:
+        """Leave the drop as it is: it is the height of the node over the water, and critical outflow has many drops."""
+
     def stepper(self, start, k: int, g: float, density_ratio: float):
         """Function as in `Restriction.stepper`, for water at rest."""
         link = start.case.conduits[start.draft.valve_names[k]]
@@ -59,7 +64,7 @@ class ConduitEndRows(Restriction, kind="conduit-end"):
 
         def step(flow, drop):
             z = lowest + float(drop) / (rho * start.case.gravity)
-            a, s = law.level_step(basin.section, z, float(flow) / rho, h, e, 0.0)
+            a, s = law.level_step(basin.section, z, float(flow) / rho, law.end_state(basin.section, h, e, 0.0))
             return rho * a, s / start.case.gravity
 
         return step

@@ -1,11 +1,14 @@
 """Conduits: partly full and filling pipes such as sewers, and the basin of cells that represents their water."""
 
 import math
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from fvsolve.parts.basin import MANNING_RANGE, Basin, Physics
+from fvsolve.parts.carried_scalar import ScalarValues
+from fvsolve.parts.full_pipe import LOSS
 from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.value import (
@@ -38,7 +41,7 @@ class Conduit(TwoPort, kind="conduit"):
     quantities: ClassVar[dict[str, str]] = {"flow": "flow"}
     along: ClassVar[dict[str, str]] = {"depth": "level", "filling": "number", "flow": "flow", "head": "head"}
     fixes_pressure: ClassVar[bool] = True
-    no_scalars: ClassVar[str] = "its cells carry no scalars yet; leave out this part, or `[scalars]`"
+    own_scalars: ClassVar[str] = "along"
 
     diameter: Annotated[float, Quantity("length", positive, "inner diameter [m]", DIAMETERS, PROFILE)]
     length: Annotated[float, Quantity("length", positive, "length along its axis [m]", changes=PROFILE)]
@@ -47,6 +50,7 @@ class Conduit(TwoPort, kind="conduit"):
         Rows("length", length=2, about="height of the invert above datum at `from` and at `to` [m]", changes=PROFILE),
     ]
     manning: Annotated[float, Number(nonnegative, "Manning's n of the wall [s/m^(1/3)]", MANNING_RANGE, PROFILE)]
+    minor_loss: Annotated[float, LOSS] = 0.0
     cells: Annotated[int, Whole(between(1, 10**6), "number of cells", SHAPE)] = DEFAULT_CELLS
     surcharge_celerity: Annotated[float | None, Quantity(
         "velocity", positive, "speed of waves in the full conduit [m/s]; 28 sqrt(diameter), by a slot of 1 % of it "
@@ -61,9 +65,15 @@ class Conduit(TwoPort, kind="conduit"):
         "of both nodes, 0 where these are not known, if left out", changes=PROFILE,
     )] = None  # fmt: skip
 
+    scalars: Annotated[dict[str, Any], ScalarValues("scalar values in the conduit at the start", Number())] = {}
+
     def celerity(self, gravity: float) -> float:
         """Speed of waves in the full conduit [m/s]."""
         return self.surcharge_celerity or math.sqrt(0.25 * math.pi * gravity * self.diameter / SLOT)
+
+    def rough(self, gravity: float) -> tuple[float, float]:
+        """(g n^2 with Manning's number n [m^(1/3)], minor loss coefficient over twice the length [1/m])."""
+        return gravity * self.manning**2, self.minor_loss / (2.0 * self.length)
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if name in around.nodes:
@@ -110,13 +120,13 @@ class ConduitFlow(Physics, name=""):
     states: ClassVar[dict[str, str]] = {"area": "m2", "flow": "m3/s"}
     fields: ClassVar[dict[str, str]] = {"depth": "level", "surface": "level", "bed": "level"}
     laws: ClassVar[tuple[str, ...]] = ("linear",)
-    carries: ClassVar[bool] = False
+    carries: ClassVar[bool] = True
     has_shocks: ClassVar[bool] = True
     has_closures: ClassVar[bool] = True
 
     @classmethod
     def has_friction(cls, basin: Basin) -> bool:
-        return bool(basin.conduit.manning)
+        return any(basin.conduit.rough(1.0))
 
     @classmethod
     def rest(cls, basin: Basin, mean: Any, cells: np.ndarray, area: np.ndarray) -> dict[str, Any]:
@@ -124,19 +134,31 @@ class ConduitFlow(Physics, name=""):
         return {"elevation": bed, "depth": max(basin.level - bed, 0.0), "pressure": None}
 
 
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Conduits that junctions and inflows join, with what keys of their nodes give at the start.
+
+    links : conduits; heads : of nodes of other kinds at its ends, -inf if unknown [m]
+    inflows : of junctions and inflows [m3/s]
+    """
+
+    links: dict[str, Conduit]
+    heads: dict[str, float]
+    inflows: dict[str, float]
+
+
 class ConduitWater(Basin):
     """Basin of a row of cells that represents the water of a conduit.
 
     level : level of the water at rest above datum [m]; heads : of both nodes at the start, None if unknown [m]
-    stated : True if keys of both nodes give these heads; inflow : flow at the start of an inflow [m3/s], or None
+    chain : that of the conduit
     """
 
     added: ClassVar[bool] = True
     level: float
     conduit: Conduit
     heads: tuple[float | None, float | None]
-    stated: bool
-    inflow: float | None
+    chain: Chain
 
     @property
     def physics_type(self) -> type[Physics]:
