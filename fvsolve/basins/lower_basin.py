@@ -50,6 +50,7 @@ class BasinRows:
     deep: ClassVar[bool] = False  # True if its first quantity is a depth (minus that in `plan`) that contains scalars
     given: ClassVar[bool] = False  # True if flows through its faces are those of a given velocity
     has_wide_closure: ClassVar[bool] = True  # True if outgoing waves are extrapolated by a polynomial of five cells
+    extrapolates: bool = False  # True if sides of cells at driven faces of a mesh depend on the cells around them
     no_fifth_order: ClassVar[str] = "does not support walls on faces"  # reason on a grid
     banded: ClassVar[bool] = False  # True if threads can step bands of rows of a grid
     banded_mesh: ClassVar[bool] = False  # True if threads can step bands of blocks of cells of another mesh

@@ -78,7 +78,8 @@ def all_states(basin) -> np.ndarray:
 def cells_at_faces(integers: np.ndarray, patch) -> np.ndarray:
     """Cells whose states the flow through the faces of a patch reads, besides its own; patch : its row of the table"""
     behind, second, count = int(patch["ring"] + patch["faces"]), int(patch["second"]), int(patch["faces"])
-    return np.unique([*integers[behind : behind + count], *integers[second : second + count]]).astype(np.int64)
+    around = integers[second : second + int(patch["stencil"]) * count]
+    return np.unique([*integers[behind : behind + count], *around]).astype(np.int64)
 
 
 def source_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
@@ -96,13 +97,18 @@ def neighbours(basin) -> csr_array:
     edge = np.unique(basin.mesh.left[basin.mesh.inner :])
     if reach < STENCIL_RADIUS or not basin.has_wide_closure or not basin.row["outer_given"]:
         edge = edge[:0]
-    at_edge = csr_array(coo_array((np.ones(edge.size, dtype=bool), (edge, edge)), shape=pattern.shape))
+    driven = np.unique(basin.mesh.left[basin.mesh.inner :] if basin.extrapolates else edge[:0])
+    at_edge, at_driven = (
+        csr_array(coo_array((np.ones(cells.size, dtype=bool), (cells, cells)), shape=pattern.shape))
+        for cells in (edge, driven)
+    )
     for ring in neighbour_rings(basin):
         reached = ring
         for _ in range(reach - 1):
             reached = reached @ ring
-        # outgoing waves of a liquid are extrapolated by a polynomial of five cells
-        pattern = pattern + reached + at_edge @ reached @ ring
+        # outgoing waves of a liquid are extrapolated by a polynomial of five cells, water at driven faces of a mesh by
+        # neighbours of neighbours, on which sides of the cells behind depend
+        pattern = pattern + reached + at_edge @ reached @ ring + ring @ at_driven @ ring @ ring
     return csr_array(pattern, dtype=bool)
 
 

@@ -641,8 +641,10 @@ PATCHES = record(
     moves=i8,  # 1 if it is a moving wall
     values=i8,  # offset in `integers` of schedules of inflow values, for each scalar; -1: its initial value
     # Offset in `integers` of the cells next inside those behind its faces, a cell itself if there is none; of an
-    # interior patch, its own cells at the faces around it.
+    # interior patch, its own cells at the faces around it. On a mesh the nearest cells around each cell behind.
     second=i8,
+    stencil=i8,  # number of cells of `second` for each face
+    weights=i8,  # on a mesh: offset in `plane` of their weights, see `free_surface.patch_closures.read_around`
     # Offset in `integers` of the faces before and after each face along a driven patch of a mesh; -1 if not needed.
     neighbours=i8,
     closure=i8,  # NO_CLOSURE, or the closure of a driven patch

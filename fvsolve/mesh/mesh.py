@@ -85,6 +85,36 @@ class Mesh:
         ends = (stops[before] == starts, before), (starts[after] == stops, after)
         return np.array([np.where(joined, other, numbers) for joined, other in ends])
 
+    def extrapolation(self, name: str, size: int, walls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Nearest cells around the cell behind each face of a boundary patch, and their weights in extrapolation.
+
+        They are neighbours and neighbours of these, `size` at most: with the nearest three, noise on triangles grows.
+        Cells beyond the faces `walls` are left out.
+        A field that is linear by least squares is, at the middle of the face and at the mirror image of the centre of
+        the cell, its value in the cell plus the sum of weights times differences from this cell.
+        Returns (int64[count, size], float64[count, size, 2]).
+        """
+        faces = np.arange(self.left.size)[self.patch(name)]
+        left, right = (np.delete(side[: self.inner], walls) for side in (self.left, self.right))
+        own, beyond = np.concatenate([left, right]), np.concatenate([right, left])
+        order = np.argsort(own, kind="stable")
+        starts = np.searchsorted(own[order], np.arange(self.area.size + 1))
+
+        def next_to(cell: int) -> np.ndarray:
+            return beyond[order[starts[cell] : starts[cell + 1]]]
+
+        cells, weights = np.repeat(self.left[faces, None], size, axis=1), np.zeros((faces.size, size, 2))
+        for m, (face, cell) in enumerate(zip(faces, self.left[faces], strict=True)):
+            near = np.unique(np.concatenate([next_to(k) for k in (cell, *next_to(cell))]))
+            near = near[near != cell]
+            near = near[np.argsort(np.hypot(*(self.centre[near] - self.centre[cell]).T), kind="stable")][:size]
+            offsets = self.centre[near] - self.centre[cell]
+            middle = self.middle[face] - self.centre[cell]
+            mirrored = 2.0 * (middle @ self.normal[face]) * self.normal[face]
+            gradient = np.linalg.pinv(offsets, rcond=0.05)
+            cells[m, : near.size], weights[m, : near.size] = near, (np.array([middle, mirrored]) @ gradient).T
+        return cells, weights
+
     def faces(self, name: str) -> "PatchFaces":
         """Faces of a patch: on the boundary, or around an interior patch."""
         if name not in self.interior:

@@ -11,6 +11,7 @@ import numpy as np
 
 from fvsolve.basins.boundary_cells import BAND_MARGIN
 from fvsolve.basins.cell_sides import BLOCK
+from fvsolve.basins.lower_pattern import cells_at_faces
 from fvsolve.errors import FvsolveError, Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import stage_sums
@@ -167,8 +168,7 @@ def common_cells(model: Model, b: int):
     for patch in model.tables.patches[model.tables.patches["basin"] == b]:
         yield integers[patch["first"] : patch["first"] + patch["count"]]
         if patch["closure"] != rec.NO_CLOSURE:
-            for first in (patch["ring"] + patch["faces"], patch["second"]):  # behind its faces, and next to these
-                yield integers[first : first + patch["faces"]]
+            yield cells_at_faces(integers, patch)
     probes = model.tables.probes
     for probe in probes[np.isin(probes["kind"], (rec.CELL_FIELD, rec.CELL_SCALAR)) & (probes["index"] == b)]:
         yield integers[probe["cell"] : probe["cell"] + probe["count"]]

@@ -284,6 +284,20 @@ def test_fast_flow_on_a_slope_has_no_standing_noise(froude, scheme):
     assert depths(model, state) == approx(0.8, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    "numerics", [{}, {"method": "rodas-5p", "rtol": 1e-6, "courant": None}], ids=["explicit", "rodas"]
+)
+def test_films_pass_the_ends_of_triangles_evenly(numerics, tmp_path):
+    """Level beds in the cells at the ends would dam up a film that is thinner than the fall of the bed in a cell."""
+    depth, slope, n, size = 0.005, 0.05, 0.1, (40.0, 8.0)
+    speed = depth ** (2.0 / 3.0) * math.sqrt(slope) / n
+    patches = {"west": {"side": "west", "discharge": speed * depth * size[1]}}
+    patches["east"] = {"side": "east", "normal_slope": slope}
+    start = {"level": f"{depth} - {slope}*x", "u": speed}
+    case = reach(patches, size, (10, 1), 60.0, numerics, level=-5.0, bed=f"-{slope}*x", manning=n, start=start)
+    assert depths(*ended(on_mesh(case, size, 2.0, ["west", "east"], tmp_path))) == approx(depth, rel=1e-6)
+
+
 @pytest.mark.parametrize("unit", [1.0, 2.0])
 @pytest.mark.parametrize("upper", [None, "stage"], ids=["discharge", "stage"])
 def test_inflow_through_sides_of_triangles_stays_even(unit, upper, tmp_path):
@@ -299,7 +313,7 @@ def test_inflow_through_sides_of_triangles_stays_even(unit, upper, tmp_path):
         )
         model, state = ended(case)
         errors.append(np.abs(model.basins[0].deviations(state.y)[1] / unit - 1.0).max())
-    assert errors[0] < 0.03 and errors[1] < 0.8 * errors[0]
+    assert max(errors) < 1e-9
 
 
 def test_neighbours_of_faces_of_a_patch_do_not_depend_on_the_order_in_the_file(tmp_path):

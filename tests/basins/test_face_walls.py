@@ -96,6 +96,19 @@ def test_water_at_rest_beside_a_wall_does_not_move(beyond, triangular, scheme, n
     assert np.ptp(depth(model, state)) > 0.1
 
 
+@pytest.mark.parametrize("triangular", [False, True], ids=["grid", "triangles"])
+def test_water_between_a_wall_and_a_patch_with_a_link_does_not_move(triangular, tmp_path):
+    """The level at the patch is extrapolated from two cells, but not across the wall."""
+    case = pool(
+        [[23.0, -1.0], [23.0, 7.0]], {"down": {}}, level=1.2, start={"level": "where(x < 23, 0.7, 1.2)"}, end=3.0
+    )
+    case = on_triangles(case, tmp_path) if triangular else case
+    case["nodes"]["tank"] = {"type": "tank", "area": 5.0, "elevation": 0.0, "level": 1.2}
+    case["links"] = {"o": {"type": "orifice", "from": "reach.down", "to": "tank", "diameter": 0.3}}
+    model, state = ended(case)
+    assert np.array_equal(state.y, fvsolve.initial_state(model).y)
+
+
 def test_a_wall_that_ends_in_the_basin_lets_water_around(tmp_path):
     case = pool([[12.0, 0.0], [12.0, 4.0]], start={"level": "where(x < 12, 1.4, 1)"}, end=200.0, manning=0.05)
     model, state = ended(case)

@@ -103,7 +103,8 @@ class ConduitWaterRows(RowsWithFriction):
         level = self.part.level
         row["closure"], row["valve"] = rec.LINKED, draft.valve_names.index(f"{self.name}.{patch}.face")
         row["rest"], row["lowest"] = self.conduit.inverts[i] - level, max(self.bed[i] - level, 0.0)
-        row["depth"], row["inside"], row["second"] = -1, draft.to_work(INSIDE), len(draft.integers)
+        row["depth"], row["inside"], row["stencil"] = -1, draft.to_work(INSIDE), 1
+        row["second"] = len(draft.integers)
         inner = min(1, self.n - 1) if patch == "from" else max(self.n - 2, 0)
         draft.integers.append(inner)
 

@@ -220,7 +220,13 @@ class FreeSurfaceRows(RowsWithFriction):
             return
         behind = np.array(draft.integers[row["ring"] + row["faces"] :][: row["faces"]])
         row["second"], row["inside"] = len(draft.integers), draft.to_work(5 * int(row["faces"]))
-        draft.integers += (self.mesh.faces(patch).inside if is_interior else self.second_cells(patch, behind)).tolist()
+        row["stencil"] = patch_closures.STENCIL if self.extrapolates and not is_interior else 1
+        if row["stencil"] > 1:
+            cells, weights = self.mesh.extrapolation(patch, patch_closures.STENCIL, self.marks.walls)
+            row["weights"] = draft.to_plane(weights)
+        else:
+            cells = self.mesh.faces(patch).inside if is_interior else self.second_cells(patch, behind)
+        draft.integers += cells.ravel().tolist()
         if not (self.is_grid or is_interior):
             row["neighbours"] = len(draft.integers)
             draft.integers += self.mesh.neighbouring_faces(patch).ravel().tolist()
@@ -250,13 +256,20 @@ class FreeSurfaceRows(RowsWithFriction):
         bed = np.maximum(self.bed[cells], self.bed[inside]) - self.part.level
         return np.maximum(-bed, 0.0), np.maximum(bed, 0.0), np.zeros(cells.size), self.mesh.length[faces]
 
+    @property
+    def extrapolates(self) -> bool:
+        """True if states at driven faces follow from cells around the cells behind them."""
+        return bool(self.driven) and not (self.is_grid or self.moves or self.scheme == "upwind")
+
     def second_cells(self, patch: str, behind: np.ndarray) -> np.ndarray:
-        """Cells next inside the cells `behind` the faces of a patch; the same cells on a mesh, and with upwind."""
+        """Cells next inside the cells `behind` the faces of a patch; the same cells at a wall, and with upwind."""
         if not self.is_grid or self.scheme == "upwind":
             return behind
         grid, (x, y) = self.mesh.grid, -np.round(self.mesh.normal[self.mesh.patch(patch)].T).astype(int)
-        step = x * (grid.nx > 1) + y * grid.nx * (grid.ny > 1)
-        return behind + step
+        second = behind + x * (grid.nx > 1) + y * grid.nx * (grid.ny > 1)
+        low, high = (self.mesh.left[self.marks.walls], self.mesh.right[self.marks.walls])
+        apart = np.isin(behind * self.n + second, np.concatenate([low * self.n + high, high * self.n + low]))
+        return np.where(apart, behind, second)
 
     def scales(self) -> list[float]:
         flow = DEPTH_SCALE * np.sqrt(self.case.gravity * DEPTH_SCALE)

@@ -29,6 +29,11 @@ class Marks(NamedTuple):
     cosine: np.ndarray
     sine: np.ndarray
 
+    @property
+    def walls(self) -> np.ndarray:
+        """Faces with a wall : int64[:]."""
+        return self.faces[self.height > 0.0]
+
 
 def marks_of(basin) -> Marks:
     """Marked faces of a basin: those of its sections, and those of walls above both beds; the highest wall counts."""
@@ -52,7 +57,7 @@ def lower_marks(draft, basin, row) -> None:
     """Fill the columns of the row of a basin for marked faces; add notices for walls below the bed."""
     for name, wall in (basin.part.walls or {}).items():
         faces = wall.chain(basin.mesh).faces
-        if not np.isin(faces, basin.marks.faces[basin.marks.height > 0.0]).any():
+        if not np.isin(faces, basin.marks.walls).any():
             text = f"basin {basin.name}: wall {name} has no effect, its crest is nowhere above the bed or another wall"
             draft.warnings.append(Notice("range", f"nodes.{basin.name}", text, "walls", wall.crest))
     marks = basin.marks

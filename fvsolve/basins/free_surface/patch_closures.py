@@ -37,9 +37,10 @@ from fvsolve.kernels.table_handle import open_tables
 
 OWN_CODE = physics_code(__package__)
 # Rows of the work array of driven faces: inflow per width, its momentum q^2 / h_b, surface above the level at rest,
-# greatest wave speed |u_b| + c_b (0 at faces that are not driven, DRY_FACE at dry faces), all in the order of boundary
-# faces.
-FLOW, MOMENTUM, SURFACE, SPEED, ROWS = range(5)
+# greatest wave speed |u_b| + c_b (0 at faces that are not driven, DRY_FACE at dry faces); on meshes bed, surface and
+# both velocities at the mirror image of the centre of the cell behind. All in the order of boundary faces.
+FLOW, MOMENTUM, SURFACE, SPEED, BEYOND, ROWS = 0, 1, 2, 3, 4, 8
+STENCIL = 9  # cells around a cell of a mesh, from which states at its driven face are extrapolated
 ITERATIONS = 100
 ROUNDING = 1e-15  # relative error of a flow at which a level is accepted
 HELD = 1e-9  # relative difference of a discharge from its schedule above which it counts as held
@@ -263,7 +264,9 @@ def read_faces(tables, patch, y):
         k, inner = integers[patch["ring"] + count + m], integers[patch["second"] + m]
         nx, ny = plane[at + m], plane[at + count + m]
         h[m], e[m], u[m] = read_cell(plane, basin, k, nx, ny, y)
-        if inner != k and h[m] > 0.0:
+        if patch["stencil"] == STENCIL:
+            h[m], e[m], u[m] = read_around(tables, patch, m, y)
+        elif inner != k and h[m] > 0.0:
             depth, surface, inward = read_cell(plane, basin, inner, nx, ny, y)
             if depth > 0.0:  # linear extrapolation from two cells, as in the ghost cells of the rates
                 h[m] = 0.5 * (h[m] + max(2.0 * h[m] - depth, 0.0))
@@ -273,6 +276,40 @@ def read_faces(tables, patch, y):
     if patch["neighbours"] >= 0:
         smooth_inflow(tables, patch, h, u)
     return h, e, u, lengths
+
+
+@njit
+def read_around(tables, patch, m, y):
+    """(depth, surface, inward velocity) at the middle of face m of a patch of a mesh, by linear extrapolation.
+
+    The state at the mirror image of the centre is written to the rows from BEYOND on. Both are the values of the cell
+    behind plus the sum of weights times differences of the STENCIL cells around it from this cell, if all are wet.
+    """
+    basin, plane, integers = tables.basins[patch["basin"]], tables.plane, tables.integers
+    count, (first, outer) = patch["faces"], driven_range(basin)
+    nx, ny = plane[patch["normals"] + m], plane[patch["normals"] + count + m]
+    k, second = integers[patch["ring"] + count + m], integers[patch["second"] + STENCIL * m :]
+    weights = plane[patch["weights"] + 2 * STENCIL * m :]
+    h, e, u = read_cell(plane, basin, k, nx, ny, y)
+    v = read_cell(plane, basin, k, -ny, nx, y)[2]  # along the face: not extrapolated, or its differences would grow
+    deeper, higher, faster, wet = 0.0, 0.0, 0.0, h > 0.0
+    bed, surface, across = e - h, e, u
+    for j in range(STENCIL):
+        depth, level, inward = read_cell(plane, basin, second[j], nx, ny, y)
+        near, far, wet = weights[2 * j], weights[2 * j + 1], wet and depth > 0.0
+        deeper += near * (depth - h)
+        higher += near * (level - e)
+        faster += near * (inward - u)
+        bed += far * ((level - depth) - (e - h))
+        surface += far * (level - e)
+        across += far * (inward - u)
+    if not wet:
+        deeper, higher, faster, bed, surface, across = 0.0, 0.0, 0.0, e - h, e, u
+    at = first + BEYOND * outer + integers[patch["ring"] + m]
+    tables.work[at], tables.work[at + outer] = bed, surface
+    tables.work[at + 2 * outer], tables.work[at + 3 * outer] = v * ny - across * nx, -across * ny - v * nx
+    c = sqrt(tables.settings[0]["gravity"] * h)  # differences of the velocity are bounded as at other sides of the cell
+    return min(max(h + deeper, 0.5 * h), 2.0 * h), e + higher, u + min(max(faster, -c), c)
 
 
 @njit

@@ -14,7 +14,7 @@ import numpy as np
 from fvsolve.basins import cell_sides as side
 from fvsolve.basins.cell_sides import BLOCK, HUGE, INDICES, MEASURES, TINY, gather, limited_sides, ring_place
 from fvsolve.basins.free_surface.marked_faces import MarkedFaces, flatten_cells, flux_over_wall, save_sums
-from fvsolve.basins.free_surface.patch_closures import FLOW, MOMENTUM, SPEED, DrivenFaces
+from fvsolve.basins.free_surface.patch_closures import BEYOND, FLOW, MOMENTUM, SPEED, DrivenFaces
 from fvsolve.basins.free_surface.patch_closures import SURFACE as DRIVEN_SURFACE
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.mesh_blocks import own_sides
@@ -86,19 +86,36 @@ def put_sides(water, mesh, j, first, last, reflect, cells, sides, shown, w, move
     """Write the limited values at the sides of the cells of block j."""
     floats, integers, wide_by = mesh.floats, mesh.integers, water.wide_by
     edges, b = mesh.edges[first:last], mesh.edges.size
+    o, shore, su, sv = (j % mesh.ring) * BLOCK, w[_SHORE:], shown[first:], shown[b + first :]
+    h, e, c = cells[0], cells[1], cells[4, o:]
+    for q in range(first, last):
+        i = ring_place(mesh.edges[q], mesh.ring)
+        shown[q], shown[b + q] = cells[5, i], e[i]
+    put_beyond(water.faces, moves, mesh, first, last, BEYOND, shown)
+    put_shores(h[o:], shore)
+    limited_sides(j, floats, integers, cells[5], wide_by, shore, su, edges, w, sides[0])
+    limited_sides(j, floats, integers, e, wide_by, shore, sv, edges, w, sides[1])
     for q in range(first, last):
         i = ring_place(mesh.edges[q], mesh.ring)
         shown[q], shown[b + q] = mirrored_velocity(mesh, q, reflect, cells[2, i], cells[3, i], moves)
-    o, shore, su, sv = (j % mesh.ring) * BLOCK, w[_SHORE:], shown[first:], shown[b + first :]
-    h, e, c = cells[0], cells[1], cells[4, o:]
-    put_shores(h[o:], shore)
-    limited_sides(j, floats, integers, cells[5], wide_by, shore, su, edges[:0], w, sides[0])
-    limited_sides(j, floats, integers, e, wide_by, shore, su, edges[:0], w, sides[1])
+    put_beyond(water.faces, moves, mesh, first, last, BEYOND + 2, shown)
     put_depths(mesh.slots, h[o:], sides[0, 4 * o :], sides[1, 4 * o :])
     # Velocities differ by no more than the wave speed: next to a thin fast cell, a linear field would reverse the flow.
     limited_sides(j, floats, integers, cells[2], wide_by, c, su, edges, w, sides[2])
     limited_sides(j, floats, integers, cells[3], wide_by, c, sv, edges, w, sides[3])
     flatten_cells(water.marks, mesh, j, cells, sides)
+
+
+@njit
+def put_beyond(faces, moves, mesh, first, last, row, shown):
+    """Write the rows `row` and `row` + 1 of driven faces to `shown`, for boundary sides `first` to `last` - 1."""
+    if faces is not None:
+        if moves is None:
+            driven = faces.values
+            for q in range(first, last):
+                k = mesh.number[q]
+                if driven[SPEED, k] != 0.0:
+                    shown[q], shown[mesh.edges.size + q] = driven[row, k], driven[row + 1, k]
 
 
 @njit(forceinline=True)
