@@ -689,7 +689,7 @@ def solve_cluster(out, tables, index):
         change = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, most, rest)[0]
         if most > 0.0:
             greatest = greatest_step(n, k, rest)
-            most, last = most * (0.5 if greatest * last < 0.0 else 1.5), greatest
+            most, last = abs(greatest) * (0.5 if greatest * last < 0.0 else 2.0), greatest
         if has_converged(change, last_change):
             if not (wide and has_backflow(cluster, tables, m)):
                 break

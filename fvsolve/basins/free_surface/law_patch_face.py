@@ -9,7 +9,8 @@ from fvsolve.jit import njit
 
 LEAST_SLOPE = 1e-12  # least derivative of the flow by the level [m2/s]; critical outflow does not depend on the level
 SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
-DRY_DEPTH = 1e-3  # [m]
+DRY_DEPTH = 1e-3  # depth of the level below dry faces from which they have no derivative [m]
+NEAR = 1e-12  # least length of a chord [m]
 DRY_SPEED = 0.1  # derivative at dry faces over their length: speed of waves in a millimetre of water [m/s]
 
 
@@ -25,9 +26,9 @@ def junction_level(out, tables, patch, drop):
 def level_step(g, faces, z, target):
     """(change of the flow from `target` [m3/s], its derivative by the level [m2/s]) in Newton's step from the level z.
 
-    At or below critical outflow the flow has no derivative by the level. If the target is greater, the step is that
-    from the level at which it passes, or, below dry faces, that of the chord to this level: with any slope of its own
-    a patch that stays dry would keep Newton's method from its root. A smaller target has the level of `DEEPEST`.
+    At or below critical outflow, and below dry faces, the flow has no derivative by the level. If the target is
+    greater, it is that of the chord to the level at which the target passes: with any slope of its own a patch that
+    stays dry would keep Newton's method from its root. A smaller target has the level of `DEEPEST`.
     g : gravity; faces : as for `patch_flow`
     """
     q, change = patch_flow(g, z, faces)
@@ -42,9 +43,7 @@ def level_step(g, faces, z, target):
         deeper = z - (lowest_bed(faces) - DEEPEST)
         return (q + DRY_SPEED * long * deeper - target, DRY_SPEED * long) if deeper < 0.0 else (q - target, LEAST_SLOPE)
     level = solve_level(g, faces, target, 0.0, faces[0][:0], faces[0][:0])
-    change = patch_flow(g, level, faces)[1] if q != 0.0 else target / max(level - z, DRY_DEPTH)
-    change = max(change, LEAST_SLOPE)
-    return change * (z - level) if q != 0.0 else q - target, change
+    return q - target, max((target - q) / max(level - z, NEAR), LEAST_SLOPE)
 
 
 @njit
