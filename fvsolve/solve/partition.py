@@ -11,7 +11,6 @@ import numpy as np
 
 from fvsolve.basins.boundary_cells import BAND_MARGIN
 from fvsolve.basins.cell_sides import BLOCK
-from fvsolve.basins.lower_pattern import cells_at_faces
 from fvsolve.errors import FvsolveError, Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import stage_sums
@@ -164,6 +163,8 @@ def rows_read(model: Model, b: int, first: int, stop: int) -> tuple[int, int]:
 
 def common_cells(model: Model, b: int):
     """Yield the numbers of the cells of basin b that all bands read: an array for each patch and probe in cells."""
+    from fvsolve.basins.lower_pattern import cells_at_faces  # loads scipy
+
     integers = model.tables.integers
     for patch in model.tables.patches[model.tables.patches["basin"] == b]:
         yield integers[patch["first"] : patch["first"] + patch["count"]]

@@ -9,7 +9,6 @@ from fvsolve.jit import njit
 
 LEAST_SLOPE = 1e-12  # least derivative of the flow by the level [m2/s]; critical outflow does not depend on the level
 SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
-DRY_DEPTH = 1e-3  # depth of the level below dry faces from which they have no derivative [m]
 NEAR = 1e-12  # least length of a chord [m]
 DRY_SPEED = 0.1  # derivative at dry faces over their length: speed of waves in a millimetre of water [m/s]
 
@@ -38,7 +37,7 @@ def level_step(g, faces, z, target):
     for m in range(faces[3].size):
         long += faces[3][m]
     if q == 0.0 and target == 0.0:
-        return 0.0, DRY_SPEED * long if lowest_bed(faces) - z < DRY_DEPTH else LEAST_SLOPE
+        return 0.0, DRY_SPEED * long
     if not target > q + SAME_FLOW * abs(q):
         deeper = z - (lowest_bed(faces) - DEEPEST)
         return (q + DRY_SPEED * long * deeper - target, DRY_SPEED * long) if deeper < 0.0 else (q - target, LEAST_SLOPE)
