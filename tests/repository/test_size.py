@@ -22,7 +22,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests": (967, 7),
     "benchmarks": (6726, 51),
     "fvsolve/assembly": (1969, 10),
-    "fvsolve/basins": (12550, 61),
+    "fvsolve/basins": (12552, 61),
     "fvsolve/case": (8126, 30),
     "fvsolve/cli": (3525, 17),
     "fvsolve/compile": (1357, 7),

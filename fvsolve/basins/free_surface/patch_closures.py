@@ -309,8 +309,10 @@ def read_around(tables, patch, m, y):
     tables.work[at], tables.work[at + outer] = bed, surface
     tables.work[at + 2 * outer], tables.work[at + 3 * outer] = v * ny - across * nx, -across * ny - v * nx
     c = sqrt(tables.settings[0]["gravity"] * h)  # differences of the velocity are bounded as at other sides of the cell
-    depth = min(max(h + deeper, 0.5 * h), 2.0 * h)
-    return depth, e + (higher - deeper) + (depth - h), u + min(max(faster, -c), c)
+    depth, level = min(max(h + deeper, 0.5 * h), 2.0 * h), e + higher
+    if depth != h + deeper:  # the bed is no lower than that of the cell and the extrapolated one
+        level = max(level, (e - h) + min(higher - deeper, 0.0) + depth)
+    return depth, level, u + min(max(faster, -c), c)
 
 
 @njit
