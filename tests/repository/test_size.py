@@ -32,7 +32,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/exact": (1462, 7),
     "fvsolve/fluid": (1091, 4),
     "fvsolve/fmi": (439, 5),
-    "fvsolve/kernels": (16736, 70),
+    "fvsolve/kernels": (16737, 70),
     "fvsolve/mesh": (1238, 5),
     "fvsolve/model": (9308, 27),
     "fvsolve/output": (1901, 11),
