@@ -10,7 +10,7 @@ of its pipes. p' is the pressure change since the initial steady state. Both are
 Todini and Pilati 1988). The unknown flows are total flows, not changes: where a valve is nearly closed, a change would
 lose all but its rounding. A cluster in which nothing has changed is not solved. Each cluster stops by its own change,
 so its result does not depend on other clusters. Under `linear`, where MAX_SWEEPS steps do not converge, Newton starts
-again from the flows of the laws, with a limit of its steps: half the last step if the direction has changed, else twice.
+again from the flows of the laws, with limited steps: half the last step if the direction has changed, else twice.
 
 A law gives the inflow of a node except through valves with its fall per pressure (`linear_balance`,
 `barotropic_balance`), and the driving pressure of a valve.
