@@ -45,7 +45,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/studies": (14882, 51),
     "fvsolve/validation": (1463, 11),
     "tests/attitude": (447, 2),
-    "tests/basins": (9904, 32),
+    "tests/basins": (9939, 32),
     "tests/case": (4528, 16),
     "tests/cli": (1130, 8),
     "tests/draw": (232, 2),
