@@ -298,6 +298,20 @@ def test_films_pass_the_ends_of_triangles_evenly(numerics, tmp_path):
     assert depths(*ended(on_mesh(case, size, 2.0, ["west", "east"], tmp_path))) == approx(depth, rel=1e-6)
 
 
+@pytest.mark.parametrize("closure", [{"boundary": "critical"}, {"normal_slope": 0.01}])
+def test_the_level_of_faces_of_their_own_is_continuous_where_they_fall_dry(closure):
+    """A film of 1e-9 m on the higher of two faces; without water at both the level is that of the lower bed."""
+
+    def level(lower, upper):
+        more = {"start": {"level": f"({lower})*(y < 1) + ({upper})*(y > 1)"}, "bed": "1 + (y > 1)", "manning": 0.03}
+        patches, probes = {"end": {"side": "east", **closure}}, ["reach.end.level"]
+        case = reach(patches, (20.0, 2.0), (10, 2), 1e-6, probes=probes, level=5.0, **more)
+        return fvsolve.run(case).si("reach.end.level")[0]
+
+    assert level("1.5", "2 + 1e-9") == approx(level("1.5", "2"), abs=1e-8)
+    assert 1.0 < level("1.5", "2") < 1.5 and level("1", "2") == 1.0
+
+
 TURNED_ENDS = {
     "stage": {"stage": 0.0},
     "rating": {"rating": {"level": [-0.55, 0.0, 1.0], "flow": [0.0, 6.0, 30.0]}},

@@ -355,7 +355,10 @@ def read_faces_around(tables, patch, y):
 
 @njit
 def level_of_patch(tables, patch, g, faces, t, out):
-    """(level of a patch above the level at rest [m], given inflow [m3/s]); 0 for closures of single faces."""
+    """(level of a patch above the level at rest [m], given inflow [m3/s]).
+
+    The level is the lowest bed for closures of single faces. The inflow is 0 where none is given.
+    """
     empty = tables.plane[:0]
     if patch["closure"] == LINKED or patch["closure"] == INTERIOR:
         st, layout, valve = tables.settings[0], tables.layout[0], tables.valves[patch["valve"]]
@@ -370,7 +373,7 @@ def level_of_patch(tables, patch, g, faces, t, out):
         at, count = patch["numbers"], patch["points"]
         levels, flows = tables.plane[at : at + count], tables.plane[at + count : at + 2 * count]
         return solve_level(g, faces, 0.0, patch["rest"], levels, flows), 0.0
-    return 0.0, 0.0
+    return lowest_bed(faces), 0.0
 
 
 @njit
@@ -412,9 +415,8 @@ def close_patch(tables, patch, t, y, out):
         total += lengths[m] * q
         wide += lengths[m]
         low = min(low, e[m] - h[m])
-        if depth > 0.0:
-            wet += lengths[m]
-            surface += lengths[m] * rows[SURFACE, k]
+        wet += lengths[m] * depth
+        surface += lengths[m] * depth * rows[SURFACE, k]
     if patch["closure"] == DISCHARGE or patch["closure"] == LINKED:
         may_hold = z < lowest_bed(faces) - DEEPEST if patch["closure"] == LINKED else given == 0.0
         held = put_discharge(tables, patch, rows, total, target, wide, given, may_hold)
