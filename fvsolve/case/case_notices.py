@@ -37,7 +37,7 @@ TOP = {  # keys outside tables
 
 def range_notices(case: Any) -> list[Notice]:
     """Notices of values outside the usual range of their key, and of keys that contradict each other."""
-    parts = {("fluid",): case.fluid}
+    parts = {("fluid",): case.fluid, ("numerics",): case.numerics}
     parts |= {
         (group, name): part for group in ("nodes", "links", "scalars") for name, part in getattr(case, group).items()
     }
@@ -130,7 +130,8 @@ def _beyond(declared: Any, value: Any, given: Any) -> tuple[float, float, str] |
         shown = SHOWN.get(declared.dimension, DIMENSIONS[declared.dimension].si)
         unit = "" if declared.dimension == "number" else f" {shown}"
         per = units.convert(1.0, declared.dimension, shown) if declared.dimension in SHOWN else 1.0
-        given = f"{per * x:g}{unit}" if not isinstance(given, str) else given
+        if not isinstance(given, str) or getattr(value, "kind", "") == "formula":
+            given = f"{per * x:g}{unit}"
         span = f"{per * usual.least:g} to {per * usual.greatest:g}{unit}, {usual.source}"
         hint = units.likely(given, declared.dimension, usual.least, usual.greatest)
         return x, usual.least if x < usual.least else usual.greatest, f"{given} is outside {span}{hint}"

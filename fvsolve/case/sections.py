@@ -228,7 +228,7 @@ class Numerics(Table):
     rtol: Annotated[float | None, Number(
         val.between(0, 1, open=True),
         f"relative tolerance of the error per step; {DEFAULT_RTOL:g} (without cells, with auto, or with adaptive "
-        "implicit methods) if left out",
+        "implicit methods) if left out", usual=val.UsualRange(0.0, 1e-2, "for errors of a few percent at most"),
     )] = None  # fmt: skip
     linear_algebra: Annotated[str | None, Choice(
         "linear algebra", KINDS, "linear solver of implicit steps; chosen by the structure of the case if left out",

@@ -164,7 +164,7 @@ class Patch(Table):
         dict[str, Any], ScalarValues("scalar values of the inflow, for a given velocity or an open boundary")
     ] = {}
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
-        ("boundary", "impedance", *CLOSURES), ("body", "travel"), ("side", "at", "polygon"),
+        ("boundary", "impedance", *CLOSURES), ("body", "travel"), ("side", "at", "polygon"), ("area", "polygon"),
     )  # fmt: skip
 
     @classmethod
@@ -172,7 +172,7 @@ class Patch(Table):
         faults = super().key_faults(given)
         if len({"side", "at", "polygon"} & given.keys()) > 1:  # a fault already, by which other keys are right or not
             return faults
-        if ("at" in given) != ("area" in given):
+        if "polygon" not in given and ("at" in given) != ("area" in given):
             present, missing = ("at", "area") if "at" in given else ("area", "at")
             faults.append(((), f"{missing} is missing, which an interior patch with `{present}` needs"))
         if "at" in given or "polygon" in given:

@@ -207,6 +207,7 @@ FAULTS = {
     "without area": ({"at": [4.5, 5.5]}, {}, "area is missing"),
     "with a side": ({**HOLE, "side": "west"}, {}, "keep one"),
     "without area, with a side": ({"at": [4.5, 5.5], "side": "west", "stage": "1 m"}, {}, "keep one"),
+    "an area of a polygon": ({"polygon": [[1, 1], [3, 1], [3, 3]], "area": 2.0}, {}, "area and polygon are given"),
     "two shapes": ({"at": [4.5, 5.5], "polygon": [[1, 1], [2, 2], [1, 2]]}, {}, "keep one"),
     "with a closure": ({**HOLE, "stage": "1 m"}, {}, "this is an interior patch; leave this key out"),
     "two corners": ({"polygon": [[1, 1], [2, 2]]}, {}, "list of 3 or more points"),

@@ -65,6 +65,7 @@ SLIPS = {  # settings -> (place, key, value, limit, part of the text)
         "links.main", "wave_speed", 1200.0, (998.0 * (1 / 2.2e9 + 9 / 1.3e9)) ** -0.5,
         "the wall of PE100 SDR11 DN300",
     ),
+    "loose tolerance": ({"numerics.rtol": 0.1}, "numerics", "rtol", 0.1, 0.01, "errors of a few percent"),
     "smooth through two": (
         {"links.valve.opening": {"time": [1, 2], "value": [1, 0], "kind": "smooth"}},
         "links.valve", "opening", 2.0, 3.0, "a straight line",
