@@ -280,6 +280,11 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
     return unit
 
 
+def is_unit(spelling: str) -> bool:
+    """True for the spelling of a unit in `UNITS`."""
+    return _canonical(spelling) in UNITS
+
+
 def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0, ambient: float = 101325.0) -> str:
     """Text of a message about a given pressure that is too low for a liquid; pressure : its value in Pa, absolute
 

@@ -149,7 +149,11 @@ class BasinFields:
             raise ValueError(f"{x:g}, {y:g} is not a point")
         if self.points.cell(x, y) < 0:
             near = ",".join(f"{value:.6g}" for value in self.points.nearest(x, y))
-            raise ValueError(f"{x:g},{y:g} m lies outside the mesh or in a hole; the nearest point inside is {near}")
+            east, north = getattr(self.basin, "origin", None) or (0.0, 0.0)
+            if (east or north) and self.points.cell(x - east, y - north) >= 0:
+                near += f"; for easting and northing subtract `origin`: {x - east:.6g},{y - north:.6g}"
+            text = f"{x:.9g},{y:.9g} m lies outside the mesh or in a hole"
+            raise ValueError(f"{text}; the nearest point inside is {near}")
         return x, y
 
     @cached_property

@@ -42,19 +42,21 @@ def rectangle(
     solid = np.ones((cells[1], cells[0]), bool)
     for k, hole in enumerate(holes):
         faults += _cut(solid, lines, f"holes[{k}]", hole)
+    gaps, place = ("cells without data", "") if lacks else ("the holes", "holes")
     for empty in lacks:
         solid &= ~empty(*lines)
     if faults or not solid.any():
-        raise MeshError(faults or [Fault("holes", "the holes leave no cell; expected smaller holes")], "rectangle")
+        text = f"{gaps} leave no cell; expected {'smaller cells' if lacks else 'smaller holes'}"
+        raise MeshError(faults or [Fault(place, text)], "rectangle")
     index = np.where(solid, np.cumsum(solid).reshape(solid.shape) - 1, -1)
     points, corners = _corners(lines, solid)
     edges = edges_of(corners, len(points))
     piece = edges.pieces(len(corners))
     pieces = np.bincount(piece)
     if pieces.size > 1:
-        text = f"the holes leave {pieces.size} pieces that share no face, {pieces.max()} of {pieces.sum()} cells in the"
+        text = f"{gaps} leave {pieces.size} pieces that share no face, {pieces.max()} of {pieces.sum()} cells in the"
         x, y = points[corners[np.argmax(piece != np.argmax(pieces)), 0]]
-        faults.append(Fault("holes", f"{text} largest, another piece at {x:.6g},{y:.6g} m; expected one piece"))
+        faults.append(Fault(place, f"{text} largest, another piece at {x:.6g},{y:.6g} m; expected one piece"))
     names, patch = _patches(patches or {}, lines, solid, points, edges, faults)
     if faults:
         raise MeshError(faults, "rectangle")

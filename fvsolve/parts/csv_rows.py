@@ -120,9 +120,14 @@ class CsvRows:
 
 
 def split_header(header: str) -> tuple[str, str]:
-    """(name, unit) of a header such as "t [s]"; the unit is empty if the header has none."""
-    match = re.fullmatch(r"(.*?)\s*\[(.*)\]", header)
-    return (match[1], match[2]) if match else (header, "")
+    """(name, unit) of a header such as "t [s]" or "t (s)"; the unit is empty if the header has none.
+
+    Text in round brackets that is not a unit belongs to the name.
+    """
+    match = re.fullmatch(r"(.*?)\s*(?:\[(.*)\]|\((.*)\))", header)
+    if match is None or not (match[3] is None or units.is_unit(match[3])):
+        return header, ""
+    return match[1], match[2] if match[3] is None else match[3]
 
 
 def number(text: str) -> float | None:
@@ -191,7 +196,7 @@ def read_text(path: Path) -> str:
     except UnicodeDecodeError:
         text = "\0"
     if "\0" in text:
-        raise ValueError(f"{path.name} is not UTF-8 or UTF-16 text")
+        raise ValueError(f"{path.name} is not UTF-8 or UTF-16 text; expected a file saved as UTF-8")
     return text
 
 

@@ -21,6 +21,7 @@ SMALL = 0.01  # [m] or degrees: pixels of rasters in degrees are smaller
 HEAD = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "dx", "dy", "nodata_value")
 EVEN = 1e-4  # of the spacing: greatest distance of a coordinate from an even grid
 SINCE = re.compile(r"\s*(s|min|h|d|sec|hr|second|minute|hour|day)s?\s+since\s+(\S.*)", re.IGNORECASE)  # after CF
+NORTH = re.compile("y|northing|lat(itude)?|projection_y_coordinate", re.IGNORECASE)  # along y, after CF
 AUTHORITY = re.compile(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d+)"?\]')  # in the text of a CRS; the last is its own
 # Numbers of EPSG up to 9140 for systems in degrees, in ranges without projected and vertical systems (EPSG 12; the
 # ranges include geocentric systems and numbers without a system).
@@ -235,7 +236,11 @@ def read_netcdf(path: Path, name: str, classic: bool, series: bool) -> Pixels:
         if classic:
             from scipy.io import netcdf_file
 
-            with netcdf_file(path, "r", mmap=False, maskandscale=True) as file:
+            try:
+                opened = netcdf_file(path, "r", mmap=False, maskandscale=True)
+            except ValueError as error:  # a file that was cut off
+                raise OSError(error) from None
+            with opened as file:
                 known = {key: NetcdfVariable(item.dimensions, item.shape, _texts(item._attributes),
                                        lambda item=item: np.ma.filled(np.ma.asarray(item[:], float), np.nan))
                          for key, item in file.variables.items()}  # fmt: skip
@@ -266,7 +271,7 @@ def _pixels_of(file: str, known: dict[str, NetcdfVariable], name: str, series: b
         text = f"has no variable {show(name)}{did_you_mean(name, planes)}" if name else f"has {len(planes)} variables"
         raise ValueError(f"{file} {text}; expected `variable`, of {listing(planes) or 'a file with a plane of values'}")
     item = known[name or planes[0]]
-    turned = len(item.dimensions) > 1 and item.dimensions[-1] == "y"
+    turned = len(item.dimensions) > 1 and _is_northward(item.dimensions[-1], known)
     across, along = item.dimensions[-2:] if not turned else item.dimensions[:-3:-1]
     if not {across, along} <= known.keys():
         raise ValueError(f"{file} has no georeference: no variables {across} and {along} with coordinates; {REFERENCE}")
@@ -274,7 +279,7 @@ def _pixels_of(file: str, known: dict[str, NetcdfVariable], name: str, series: b
     (x, dx), (y, dy) = (_even(file, key, known[key]) for key in (along, across))
     (*outer, _, _), times = item.shape, None
     if np.prod(outer) != 1 and not (series and len(outer) == 1 and outer[0]):
-        raise ValueError(f"{file}: {name or planes[0]} has {np.prod(outer):.0f} planes; expected one")
+        raise ValueError(f"{file}: {name or planes[0]} has {np.prod(outer):.0f} planes; expected one at a single time")
     if np.prod(outer) != 1:
         times = _frame_times(file, item.dimensions[0], known)
     values = item.read().reshape((*outer, *item.shape[-2:])[-3 if times is not None else -2 :])
@@ -287,6 +292,13 @@ def _pixels_of(file: str, known: dict[str, NetcdfVariable], name: str, series: b
     except ValueError as error:
         raise ValueError(f"{file} {error}") from None
     return Pixels(values, x, y, abs(dx), abs(dy), str(item.attributes.get("units", "")), crs, times)
+
+
+def _is_northward(dimension: str, known: dict[str, NetcdfVariable]) -> bool:
+    """True for a dimension along y, by its name or the attributes of CF of its coordinates."""
+    attributes = known[dimension].attributes if dimension in known else {}
+    texts = dimension, attributes.get("axis"), attributes.get("standard_name")
+    return any(NORTH.fullmatch(str(text)) for text in texts)
 
 
 def _frame_times(file: str, name: str, known: dict[str, NetcdfVariable]) -> np.ndarray:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.studies.outcome import Outcome
+from fvsolve.studies.outcome import NO_FIELDS, Outcome
 from fvsolve.studies.resolution import basin_fields, pipes, variable_name
 
 END = {"nodes": "nodes at the end: ", "links": "links at the end: "}  # prefixes of quantities
@@ -65,7 +65,7 @@ class Distance:
 def recording_keys(case, keys: Mapping | None = None) -> dict:
     """Overrides `keys`, with two more: a run also records the probes of `end_probes`, and writes no values of cells."""
     own = [probe.text for probe in case.probes]
-    return {**(keys or {}), "output.probes": list(dict.fromkeys([*own, *end_probes(case)])), "output.fields": 0}
+    return {**(keys or {}), "output.probes": list(dict.fromkeys([*own, *end_probes(case)])), **NO_FIELDS}
 
 
 def end_probes(case) -> list[str]:

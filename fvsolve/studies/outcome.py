@@ -11,7 +11,8 @@ from fvsolve.errors import CaseError, FvsolveError, collect_faults, listing
 from fvsolve.run import model_of
 from fvsolve.solve.solve import Run
 
-NO_FIELDS = {"output.fields": 0, "output.lines": {}}  # overrides: no output of cell values, which no study needs
+# Overrides: no output of cell values, which no study needs.
+NO_FIELDS: dict = {"output.fields": 0, "output.lines": {}, "output.grids": {}}
 POINTS = 5  # points of a cell of a line at which waves are evaluated
 WEIGHTS = np.array([275.0, 100.0, 402.0, 100.0, 275.0]) / 1152.0  # at the middles of fifths; exact to degree 5
 

@@ -25,6 +25,7 @@ from fvsolve.studies.linearise import linearise
 from fvsolve.studies.peak_error import description
 from fvsolve.studies.resolution import cell_counts, cell_keys_of, project_to, scaled
 from fvsolve.studies.stability.stability import stability
+from fvsolve.studies.sweep import sweep
 
 SLOSH = "1 + 0.05*cos(0.3141592653589793*x) + 0.03*cos(0.6283185307179586*y)"  # in 10 m by 5 m
 
@@ -418,6 +419,17 @@ def test_a_chart_of_a_slosh_lays_error_against_cost():
         assert errors[0][0] > errors[1][0] > errors[2][0] and errors[0][1] > errors[1][1] > errors[2][1]
     assert curves["muscl ssp-rk2"][2].end < 0.3 * curves["upwind ssp-rk2"][2].end
     assert [point.setting.keys["nodes.pool.cells"] for point in curves["muscl ssp-rk2"]] == [[8, 4], [16, 8], [32, 16]]
+
+
+def test_studies_run_cases_with_lines_and_grids_of_frames():
+    case = alone(pool((16, 8), SLOSH), 1.0)
+    grid = {"basin": "pool", "fields": ["depth", "max_depth"], "format": "netcdf", "cell": 1.0}
+    case["output"] |= {"fields": 2, "probes": ["pool.depth@0.3,0.3"], "grids": {"water": grid},
+                       "lines": {"axis": {"basin": "pool", "from": [1, 2], "to": [9, 2]}}}  # fmt: skip
+    rows = sweep(case, {"numerics.courant": [0.5, 0.9]}).rows
+    assert [row["reason"] for row in rows] == ["finished"] * 2
+    assert len(order(case, levels=2).rows) == 2
+    assert all(point.ok for point in chart(case, schemes=["muscl"], methods=["ssp-rk2"], cells=[8, 16]).points)
 
 
 def test_a_chart_says_that_cells_of_a_file_are_not_refined():

@@ -62,12 +62,19 @@ def geotiff(path, values, size=0.5, corner=(0.0, 0.0), crs=f"EPSG:{UTM}", **chan
     return path
 
 
-def netcdf_4(path, values, size=0.5, corner=(0.0, 0.0)):
+def netcdf_4(path, values, size=0.5, corner=(0.0, 0.0), names=("y", "x"), **axis):
     pytest.importorskip("h5netcdf")
     xarray = pytest.importorskip("xarray")
     axes = {key: low + size * (np.arange(count) + 0.5)
-            for key, low, count in (("y", corner[1], values.shape[0]), ("x", corner[0], values.shape[1]))}  # fmt: skip
-    xarray.Dataset({"height": (("y", "x"), values)}, axes).to_netcdf(path, engine="h5netcdf")
+            for key, low, count in zip(names, corner[::-1], values.shape, strict=True)}  # fmt: skip
+    data = xarray.Dataset({"height": (names, values)}, axes)
+    data[names[0]].attrs.update(axis)
+    data.transpose(*(names[::-1] if names != ("y", "x") else names)).to_netcdf(path, engine="h5netcdf")
+    return path
+
+
+def cut_off(path):
+    path.write_bytes(path.read_bytes()[:300])
     return path
 
 
@@ -129,6 +136,15 @@ def test_all_formats_of_a_raster_give_the_same_bits(tmp_path, kind, cells):
     other = FORMATS[kind](tmp_path / f"dem.{kind}", values, corner=corner)
     (one, _), (two, _) = (bed_of(pond({"raster": str(path)}, **frame)) for path in (first, other))
     assert (one == two).all()
+
+
+@pytest.mark.parametrize("names, axis", [(("Y", "X"), {}), (("northing", "easting"), {}), (("lat", "lon"), {}),
+                                         (("b", "a"), {"axis": "Y"})])  # fmt: skip
+def test_a_netcdf_file_may_have_x_before_y(tmp_path, names, axis):
+    values = heights()
+    expected, _ = bed_of(pond({"raster": str(ascii_grid(tmp_path / "dem.asc", values))}))
+    turned = netcdf_4(tmp_path / "dem.nc", values, names=names, **axis)
+    assert (bed_of(pond({"raster": str(turned)}))[0] == expected).all()
 
 
 def test_rows_from_north_bands_and_units_of_files(tmp_path):
@@ -201,8 +217,15 @@ def test_a_basin_over_a_raster_has_holes_where_it_lacks_data(tmp_path):
 def test_cells_smaller_than_pixels_are_noticed(tmp_path):
     bed = {"raster": str(ascii_grid(tmp_path / "dem.asc", heights()))}
     texts = [str(fvsolve.run(pond(bed, cells=cells)).warnings) for cells in ([20, 12], [40, 24])]
-    assert "terraces" not in texts[0]
+    assert "terraces" not in texts[0] and "missing data" not in texts[0]
     assert "cells of 0.25 m are smaller than the pixels of dem.asc, so the bed has terraces" in texts[1]
+
+
+def test_a_bed_with_undeclared_missing_data_is_noticed(tmp_path):
+    values = heights()
+    values[4, 4] = -32768.0
+    (notice,) = fvsolve.run(pond({"raster": str(ascii_grid(tmp_path / "dem.asc", values))})).warnings
+    assert "from -81" in str(notice) and "does dem.asc state its value of missing data?" in str(notice)
 
 
 def test_faults_of_rasters_name_place_and_remedy(tmp_path):
@@ -231,6 +254,10 @@ def test_faults_of_rasters_name_place_and_remedy(tmp_path):
         "measures 10 m by 6 m; expected smaller cells": pond(0.0, **none, mesh={"raster": str(path), "cell": 20.0}),
         "file and raster are given": pond(0.0, **none, mesh={"raster": str(path), "file": "a.msh"}),
         "are its coordinates in degrees?": pond(grid("deg.asc", cellsize=0.0008)),
+        "bad.nc cannot be read as NetCDF": pond({"raster": str(cut_off(netcdf(tmp_path / "bad.nc", values)))}),
+        "nodes.pond: cells without data leave 2 pieces": pond(
+            grid("two.asc", np.where(np.arange(20) == 8, np.nan, values)), **none,
+            mesh={"raster": str(tmp_path / "two.asc"), "cell": 0.5, "outside": "hole"}),
         "gives only the outline": pond(None, **none, mesh={"raster": str(path), "cell": 1.0}),
         "is not the number of a class": pond(0.0, manning={"raster": str(path), "table": {"a": 1}}),
     }  # fmt: skip

@@ -45,6 +45,13 @@ def test_faults_of_a_file_of_gauges_name_the_line(text, fault, tmp_path):
     assert fault in str(raised.value)
 
 
+def test_a_gauge_by_easting_and_northing_is_refused_with_its_place_in_the_basin(tmp_path):
+    made = case({"kerb": {"basin": "pool", "at": [412003.0, 5650002.5]}, "ford": {"basin": "pool", "at": [3, 2]}})
+    made["nodes"]["pool"] = POOL | {"origin": [412000.0, 5650000.0]}
+    with pytest.raises(CaseError, match="412003,5650002.5 m lies .* for easting and northing subtract `origin`: 3,2.5"):
+        fvsolve.load(made)
+
+
 def test_a_file_of_gauges_excludes_others_and_must_exist():
     both = {"file": "a.csv", "kerb": {"basin": "pool", "at": [3, 2]}}
     for gauges, fault in [({"file": "none.csv"}, "there is no such file"), (both, "file and kerb are given")]:

@@ -42,6 +42,12 @@ def test_a_comma_in_a_header_parts_no_columns(header, tmp_path):
     assert t.tolist() == [0.0, 1.0] and head.tolist() == [45.7, 46.1]
 
 
+@pytest.mark.parametrize("header, scale", [("t (min),H (cm)", 0.01), ("t [min],H (measured)", 1.0)])
+def test_round_brackets_may_contain_the_unit(header, scale, tmp_path):
+    t, head = columns(tmp_path / "rig.csv", f"{header}\n0,45.7\n1,46\n")
+    assert t.tolist() == [0.0, 60.0] and head == approx([45.7 * scale, 46.0 * scale], rel=1e-15)
+
+
 def test_numbers_in_quotes_may_have_commas(tmp_path):
     t, head = columns(tmp_path / "rig.csv", 't [s],H [m]\n"0,0","45,7"\n"0,5","46,1"\n')
     assert t.tolist() == [0.0, 0.5] and head.tolist() == [45.7, 46.1]

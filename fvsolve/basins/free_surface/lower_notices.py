@@ -9,9 +9,11 @@ from fvsolve.errors import Notice, listing
 from fvsolve.parts.basin import MANNING_RANGE
 from fvsolve.parts.field_series import SpatialSeries
 from fvsolve.parts.formula import SpatialField
+from fvsolve.parts.raster import Raster
 from fvsolve.parts.weir.part import HydraulicStructure
 
 MM_PER_H = 3.6e6  # mm/h in 1 m/s
+CLIFF = 50.0  # slope above which a pixel of a bed is rather a value that stands for missing data, such as -9999 m
 STEEP = 0.1  # slope above which rain runs off otherwise than shallow-water theory assumes
 TIMES = 1001  # times at which a scheduled inflow is compared with critical flow, beside its own
 
@@ -26,8 +28,15 @@ def unusual_values(basin) -> Iterator[Notice]:
         if 0.0 < odd < least or odd > greatest:
             text = f"{place}.manning: {odd:.3g} s/m^(1/3) in a cell is outside {least} to {greatest}, {meaning}"
             yield Notice("range", place, text, "manning", odd, least if odd < least else greatest)
-    slope = steepest(basin) if basin.rains else 0.0
-    if slope > STEEP:
+    bed = basin.part.bed
+    is_raster = isinstance(bed, SpatialField) and isinstance(bed.rule, Raster)
+    slope = steepest(basin) if basin.rains or is_raster else 0.0
+    if is_raster and slope > CLIFF:
+        text = f"{place}.bed: slopes up to {slope:.3g} between adjacent cells, for heights in the basin from "
+        text += f"{basin.bed.min():.6g} to {basin.bed.max():.6g} m; "
+        text += f"does {bed.rule.name} state its value of missing data?"
+        yield Notice("range", place, text, "bed", slope, CLIFF)
+    elif basin.rains and slope > STEEP:
         text = f"{basin.name}: rain falls on a bed with slopes up to {slope:.3g}, between adjacent cells"
         text += f"; shallow-water theory, with vertical depths, is for slopes below {STEEP:g}"
         yield Notice("slope", place, text, "bed", slope, STEEP)
