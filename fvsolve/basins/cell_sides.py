@@ -248,21 +248,34 @@ def limit_four_sides(p, wide, cap, beyond, geo, out):
 
 
 @njit
-def limited_sides(j, floats, integers, values, wide, cap, shown, edges, scratch, sides):
+def gather_beyond(j, integers, values, beyond):
+    """Write the values of the neighbours of all cells of block j to `beyond`; arguments as for `limited_sides`."""
+    slots, places = integers[0], integers[HEAD:].view(np.int32)
+    for k in range(slots):
+        gather(values, places[((j * slots + k) * INDICES + CELL) * BLOCK :], beyond[k * BLOCK :])
+
+
+@njit
+def limited_sides(j, floats, integers, values, wide, cap, shown, edges, beyond, sides):
     """Write the limited values at the sides of all cells of block j to `sides`.
 
     values, sides : float64[ring BLOCK], float64[4 ring BLOCK]  values of cells and at sides, in the ring
     wide, cap : see `limit_three_sides`
-    edges : int64[:]  boundary sides of the block; shown : float64[:]  values beyond them; scratch : float64[4 BLOCK]
+    edges : int64[:]  boundary sides of the block; shown : float64[:]  values beyond them
+    beyond : float64[4 BLOCK]  scratch
     """
-    slots, ring, places = integers[0], integers[4], integers[HEAD:].view(np.int32)
-    for k in range(slots):
-        gather(values, places[((j * slots + k) * INDICES + CELL) * BLOCK :], scratch[k * BLOCK :])
+    gather_beyond(j, integers, values, beyond)
+    limit_gathered(j, floats, integers, values, wide, cap, shown, edges, beyond, sides)
+
+
+@njit
+def limit_gathered(j, floats, integers, values, wide, cap, shown, edges, beyond, sides):
+    """Write the limited values as `limited_sides`, from the values of neighbours in `beyond`."""
     for q in range(edges.size):
-        scratch[edges[q] % (4 * BLOCK)] = shown[q]
-    at = (j % ring) * BLOCK
+        beyond[edges[q] % (4 * BLOCK)] = shown[q]
+    at, slots = (j % integers[4]) * BLOCK, integers[0]
     p, geo, out = values[at:], floats[j * slots * MEASURES * BLOCK :], sides[4 * at :]
     if slots == 3:
-        limit_three_sides(p, wide, cap, scratch, geo, out)
+        limit_three_sides(p, wide, cap, beyond, geo, out)
     else:
-        limit_four_sides(p, wide, cap, scratch, geo, out)
+        limit_four_sides(p, wide, cap, beyond, geo, out)

@@ -93,8 +93,10 @@ def put_sides(water, mesh, j, first, last, reflect, cells, sides, shown, w, move
         shown[q], shown[b + q] = cells[5, i], e[i]
     put_beyond(water.faces, moves, mesh, first, last, BEYOND, shown)
     put_shores(h[o:], shore)
-    limited_sides(j, floats, integers, cells[5], wide_by, shore, su, edges, w, sides[0])
-    limited_sides(j, floats, integers, e, wide_by, shore, sv, edges, w, sides[1])
+    limited_sides(j, floats, integers, cells[5], wide_by, shore, su, edges, w[_C:], sides[0])
+    side.gather_beyond(j, integers, e, w)
+    lower_shores(mesh.slots, h[o:], e[o:], w)
+    side.limit_gathered(j, floats, integers, e, wide_by, shore, sv, edges, w, sides[1])
     for q in range(first, last):
         i = ring_place(mesh.edges[q], mesh.ring)
         shown[q], shown[b + q] = mirrored_velocity(mesh, q, reflect, cells[2, i], cells[3, i], moves)
@@ -104,6 +106,27 @@ def put_sides(water, mesh, j, first, last, reflect, cells, sides, shown, w, move
     limited_sides(j, floats, integers, cells[2], wide_by, c, su, edges, w, sides[2])
     limited_sides(j, floats, integers, cells[3], wide_by, c, sv, edges, w, sides[3])
     flatten_cells(water.marks, mesh, j, cells, sides)
+
+
+@njit
+def lower_shores(slots, h, e, w):
+    """Reduce the rise of the surface to neighbours with less than half the depth of a cell, by their depth.
+
+    The rise stays at least as great as the greatest fall to another neighbour. Otherwise the surface at the other sides
+    follows dry banks, and water beside them never comes to rest.
+    h, e : depths and surfaces of a block; w : surfaces of its neighbours, and from _C on their beds
+    """
+    for i in range(BLOCK):
+        w[_FAST + i], w[_OUTFLOW + i] = 2.0 / (h[i] + TINY), 0.0
+    for k in range(slots):
+        for i in range(BLOCK):
+            w[_OUTFLOW + i] = max(w[_OUTFLOW + i], e[i] - w[k * BLOCK + i])
+    for k in range(slots):
+        surface, bed = w[k * BLOCK :], w[_C + k * BLOCK :]
+        for i in range(BLOCK):
+            rise, share = surface[i] - e[i], max((surface[i] - bed[i]) * w[_FAST + i], 0.0)
+            most = max(share * rise, w[_OUTFLOW + i])
+            surface[i] = e[i] + most if rise > most else surface[i]
 
 
 @njit
