@@ -309,7 +309,7 @@ def limit_step(most, a, right):
 
 @njit
 def apply_step(cluster, tables, out, m, a, s, lift, right):
-    """Apply a Newton step to pressures and valve flows; return the greatest relative change of both.
+    """Apply a Newton step to pressures and valve flows; return the greatest relative change of each.
 
     m : flows of valves [kg/s], updated; right : pressure steps of nodes [Pa]
     a, s, lift : terms of the changes of flow, see `add_valve`
@@ -337,7 +337,7 @@ def apply_step(cluster, tables, out, m, a, s, lift, right):
     relative = change / scale
     if relative > FAILED_CHANGE and change <= rounded:  # perhaps rounding: no failure, but iterate further
         relative = FAILED_CHANGE
-    return max(relative, most)
+    return most, relative
 
 
 @njit
@@ -359,9 +359,10 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, most, wo
     """Make a Newton step for the pressures and valve flows of a cluster.
 
     most : greatest change of a pressure [Pa], 0 for no limit
-    Returns the greatest relative change, and True if the step points to the root. This is so if the errors of valve
-    flows against their laws are below the fraction FLOW_ERROR of the imbalance of the nodes: then the second-order
-    error of Newton cannot reverse this imbalance. Under the density law `linear` the second result has no meaning.
+    Returns the greatest relative change, and under the density law `linear` that of flows alone, if the step was not
+    limited: then the nodes balance. Under other laws the second result is 1 if the step points to the root, else 0. It
+    does if the errors of valve flows against their laws are below the fraction FLOW_ERROR of the imbalance of the
+    nodes: then the second-order error of Newton cannot reverse this imbalance.
     """
     n, k = c.size, g.size
     matrix, right, a, s, lift = step_arrays(n, k, work)
@@ -380,16 +381,22 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, most, wo
         sign = solve_dense(matrix, right, n)
     if sign == 0.0:
         out[STATUS], out[WHERE] = NO_SOLUTION, tables.integers[cluster["first_node"]]
-        return 0.0, True
+        return 0.0, 1.0 if BAROTROPIC else 0.0
     flow_error = 0.0
     if BAROTROPIC:
         for e in range(k):
             flow_error += a[e] * a[e] / max(abs(m[e] + a[e]), 1e-300)
         limit_step(tables.settings[0]["beta"], a, right)
     greatest = largest_magnitude(right)
-    if most > 0.0 and greatest > most:
+    limited = most > 0.0 and greatest > most
+    if limited:
         scale_step(most / greatest, a, right)
-    return apply_step(cluster, tables, out, m, a, s, lift, right), flow_error <= FLOW_ERROR * imbalance
+    pressures, flows = apply_step(cluster, tables, out, m, a, s, lift, right)
+    near = 1.0 if flow_error <= FLOW_ERROR * imbalance else 0.0
+    change = max(flows, pressures)
+    if not BAROTROPIC:
+        near = change if limited else flows
+    return change, near
 
 
 newton_step_linear = specialise(_newton_step, "newton_step_linear", ASSEMBLE=assemble_linear, BAROTROPIC=False)
@@ -582,7 +589,7 @@ def step_clusters(sweep, out, tables, space):
                 cluster, tables, out, g[b:j], m[b:j], c[a:i], connected[a:i], slope, wide[k] == 1.0, 0.0, rest
             )
             change[k] = max(0.0, step)  # 0 for NaN: the iteration ends, the rates show the fault
-            sure[k] = 1.0 if near else 0.0
+            sure[k] = near
         a, b = i, j
 
 
@@ -613,7 +620,8 @@ def write_cluster(cluster, tables, out, g, m, c, connected, group, change):
 
     g, m : conductances and flows [kg/s] of valves; c : inflow of nodes except through valves, less the demand [kg/s]
     connected, group : 0 for isolated nodes; work array for their groups
-    change : last relative change of Newton
+    change : last relative change of Newton; under the law `linear` that of flows, because a level on which no flow
+    depends may still change
     Flows that are rounding (dead ends) become zero: their sign does not depend on the pressures.
     """
     scale = 1e-300
@@ -675,7 +683,7 @@ def solve_cluster(out, tables, index):
     undisturbed = total_inflows(cluster, tables, out, c) and unchanged
     find_connected(cluster, tables, g, connected)
     zero_isolated(cluster, tables, g, m, connected)
-    change, wide, most, last = 1e300, True, 0.0, 0.0
+    change, flows, wide, most, last = 1e300, 0.0, True, 0.0, 0.0
     for sweep in range(2 * MAX_SWEEPS):
         if undisturbed:
             change = 0.0
@@ -687,7 +695,7 @@ def solve_cluster(out, tables, index):
             change, wide, most = 1e300, True, FIRST_RISE
         if most > 0.0:
             put_law_flows(cluster, tables, out, g, m, c, connected, slope, wide, rest)
-        change = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, most, rest)[0]
+        change, flows = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, most, rest)
         if most > 0.0:
             greatest = greatest_step(n, k, rest)
             most, last = abs(greatest) * (0.5 if greatest * last < 0.0 else 2.0), greatest
@@ -695,7 +703,7 @@ def solve_cluster(out, tables, index):
             if not (wide and has_backflow(cluster, tables, m)):
                 break
             change, wide = 1e300, False
-    write_cluster(cluster, tables, out, g, m, c, connected, group, change)
+    write_cluster(cluster, tables, out, g, m, c, connected, group, flows)
 
 
 @njit
