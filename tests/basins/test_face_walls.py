@@ -192,15 +192,15 @@ def test_a_group_of_a_mesh_file_is_the_wall_on_its_lines(tmp_path):
 @pytest.mark.parametrize("numerics", METHODS.values(), ids=METHODS)
 @pytest.mark.parametrize("triangular", [False, True], ids=["grid", "triangles"])
 def test_all_methods_spill_the_same_volume(triangular, numerics, tmp_path):
-    case = pool(start={"level": "where(x < 12.05, 1.52, 0)"}, end=60.0, numerics=numerics, probes=["reach.volume"])
-    result = fvsolve.run(on_triangles(case, tmp_path) if triangular else case)
-    assert abs(result.ledger["mass"]["relative"]) < 1e-12
+    end = 60.0 if not triangular or numerics.get("method") != "radau-iia-5" else 25.0  # there it takes a second a second
+    case = pool(start={"level": "where(x < 12.05, 1.52, 0)"}, end=end, numerics=numerics)
     model, state = ended(on_triangles(case, tmp_path) if triangular else case)
+    found, start = depth(model, state), depth(model, fvsolve.initial_state(model))
     behind, cells = model.basins[0].x > 12.05, model.basins[0].mesh.area
-    spilled, area = float(depth(model, state)[behind] @ cells[behind]), cells[~behind].sum()
+    spilled, area = float(found[behind] @ cells[behind]), cells[~behind].sum()
     rate = villemonte(CREST + 1.0, 0.0) * SIZE[1] / area  # of a pool with one level: dh/dt = -rate h^1.5
-    assert spilled == approx(area * (0.02 - (0.02**-0.5 + 0.5 * rate * 60.0) ** -2), rel=0.03)
-    assert depth(model, state).min() >= 0.0
+    assert spilled == approx(area * (0.02 - (0.02**-0.5 + 0.5 * rate * end) ** -2), rel=0.03)
+    assert found.min() >= 0.0 and found @ cells == approx(start @ cells, rel=1e-12)
 
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl"])
