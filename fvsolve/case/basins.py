@@ -88,14 +88,42 @@ def rating_faults(basin: Any, mesh: Any, patch: str) -> Faults:
     rating = basin.patches[patch].rating
     if rating is None or rating.fault or not basin.physics_type.has_closures:
         return
-    cells, bed = boundary_cells(mesh, patch), means(samples(basin.bed, mesh))
+    lowest, doubt = bed_at(basin, mesh, patch)
+    if rating.lowest < lowest - doubt:
+        text = f"passes water from the level {rating.lowest:g} m on, below the bed, {lowest:g} m at its lowest"
+        yield ("rating", "level"), f"{text}; expected 0 flow up to the bed"
+
+
+def bed_at(basin: Any, mesh: Any, patch: str) -> tuple[float, float]:
+    """(lowest bed in the cells at a patch above the elevation, greatest step to an adjacent cell) [m].
+
+    From the centres on, the bed may fall by this step to the outline. A faulty bed counts as -inf.
+    """
+    try:
+        cells, bed = boundary_cells(mesh, patch), means(samples(basin.bed, mesh))
+    except ValueError:
+        return -math.inf, 0.0
     left, right = mesh.left[: mesh.inner], mesh.right[: mesh.inner]
     at = np.isin(left, cells) | np.isin(right, cells)
-    step = np.abs(bed[left] - bed[right])[at].max(initial=0.0)  # from centres on, the bed may fall to the outline
-    bed = bed[cells]
-    if rating.lowest < bed.min() - step:
-        text = f"passes water from the level {rating.lowest:g} m on, below the bed, {bed.min():g} m at its lowest"
-        yield ("rating", "level"), f"{text}; expected 0 flow up to the bed"
+    return float(bed[cells].min()), float(np.abs(bed[left] - bed[right])[at].max(initial=0.0))
+
+
+def crest_faults(links: dict[str, Any], pools: dict[str, Any], meshes: dict) -> Faults:
+    """Faults (key path, message) of weirs between two basins with a crest that is always below the beds of both."""
+    for name, weir in links.items():
+        if not is_kind(weir, "weir") or weir.crest.kind == "control":
+            continue
+        ends, levels, doubts = [*weir.ports.values()], [], []
+        for pool, _, patch in (end.partition(".") for end in ends):
+            if pool in meshes and patch in patch_names(meshes[pool]) and getattr(pools[pool], "bed", None) is not None:
+                lowest, doubt = bed_at(pools[pool], meshes[pool], patch)
+                levels.append((pools[pool].elevation or 0.0) + lowest)
+                doubts.append(doubt)
+        top = float(weir.crest.value.max())
+        if len(levels) == 2 and all(top < level - doubt for level, doubt in zip(levels, doubts, strict=True)):
+            at = " and ".join(f"{level:g} m at {end}" for level, end in zip(levels, ends, strict=True))
+            text = f"{top:g} m above datum is below the bed on both sides, {at}"
+            yield ("links", name, "crest"), f"{text}; expected a crest above the lower bed, in heights above datum"
 
 
 if TYPE_CHECKING:
@@ -450,6 +478,7 @@ def find_faults(
     """
     pools = {name: node for name, node in nodes.items() if is_kind(node, "basin")}
     joined = {place for link in links.values() for place in link.ports.values()}
+    yield from crest_faults(links, pools, meshes)
     for name, basin in pools.items():
         key = ("nodes", name)
         own = basin.physics_type

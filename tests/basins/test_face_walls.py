@@ -192,7 +192,9 @@ def test_a_group_of_a_mesh_file_is_the_wall_on_its_lines(tmp_path):
 @pytest.mark.parametrize("numerics", METHODS.values(), ids=METHODS)
 @pytest.mark.parametrize("triangular", [False, True], ids=["grid", "triangles"])
 def test_all_methods_spill_the_same_volume(triangular, numerics, tmp_path):
-    end = 60.0 if not triangular or numerics.get("method") != "radau-iia-5" else 25.0  # there it takes a second a second
+    end = (
+        60.0 if not triangular or numerics.get("method") != "radau-iia-5" else 25.0
+    )  # there it takes a second a second
     case = pool(start={"level": "where(x < 12.05, 1.52, 0)"}, end=end, numerics=numerics)
     model, state = ended(on_triangles(case, tmp_path) if triangular else case)
     found, start = depth(model, state), depth(model, fvsolve.initial_state(model))

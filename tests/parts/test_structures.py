@@ -396,3 +396,28 @@ def test_faults_of_keys():
     assert "no kind of crest" in fault(**SPILL, kind="round") and "of at least 0" in fault(
         **{**SLUICE, "opening": -0.1}
     )
+
+
+@pytest.mark.parametrize(("crest", "fault"), [(0.9, True), ([0.2, 0.8], True), ([0.2, 1.2], False), (1.1, False)])
+def test_a_crest_below_the_beds_of_both_basins_is_refused(crest, fault):
+    """Beds 1 m above the elevation of 0 m, and 2 m above that of -0.5 m."""
+    pool = {"type": "basin", "size": [20.0, 4.0], "cells": [20, 4], "level": 2.5, "patches": {"e": {"side": "east"}}}
+    nodes = {"a": pool | {"elevation": 0.0, "bed": "1 + 0*x"}, "b": pool | {"elevation": -0.5, "bed": "2 + 0*x"}}
+    crest = {"time": [0.0, 1.0], "value": crest} if isinstance(crest, list) else crest
+    weir = {"type": "weir", "width": 2.0, "crest": crest, "from": "a.e", "to": "b.e"}
+    case = scene(nodes, {"spill": weir}, 1.0, {"courant": 0.9})
+    if fault:
+        refused(
+            case, "links.spill.crest: 0.[89] m above datum is below the bed on both sides, 1 m at a.e and 1.5 m at b.e"
+        )
+    else:
+        fvsolve.load(case)
+
+
+def test_a_rating_at_a_faulty_bed_is_a_fault_of_the_bed():
+    patches = {"e": {"side": "east", "rating": {"level": [0, 1], "flow": [0, 2]}}}
+    pool = {"type": "basin", "elevation": 0.0, "size": [20.0, 4.0], "cells": [20, 4], "level": 2.0, "patches": patches}
+    refused(
+        scene({"a": pool | {"bed": "sqrt(x-5)"}}, {}, 1.0, {"courant": 0.9}),
+        r"nodes.a.bed: .sqrt\(x-5\). is not a number",
+    )
