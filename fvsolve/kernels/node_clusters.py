@@ -359,10 +359,10 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, most, wo
     """Make a Newton step for the pressures and valve flows of a cluster.
 
     most : greatest change of a pressure [Pa], 0 for no limit
-    Returns the greatest relative change, and under the density law `linear` that of flows alone, if the step was not
-    limited: then the nodes balance. Under other laws the second result is 1 if the step points to the root, else 0. It
-    does if the errors of valve flows against their laws are below the fraction FLOW_ERROR of the imbalance of the
-    nodes: then the second-order error of Newton cannot reverse this imbalance.
+    Returns (greatest relative change, that of flows alone if the step was not limited, True if the step points to the
+    root). Nodes balance only after a step that was not limited. A step points to the root if the errors of valve flows
+    against their laws are below the fraction FLOW_ERROR of the imbalance of the nodes: then the second-order error of
+    Newton cannot reverse this imbalance. Under the density law `linear` the third result has no meaning.
     """
     n, k = c.size, g.size
     matrix, right, a, s, lift = step_arrays(n, k, work)
@@ -381,7 +381,7 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, most, wo
         sign = solve_dense(matrix, right, n)
     if sign == 0.0:
         out[STATUS], out[WHERE] = NO_SOLUTION, tables.integers[cluster["first_node"]]
-        return 0.0, 1.0 if BAROTROPIC else 0.0
+        return 0.0, 0.0, True
     flow_error = 0.0
     if BAROTROPIC:
         for e in range(k):
@@ -392,11 +392,8 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, most, wo
     if limited:
         scale_step(most / greatest, a, right)
     pressures, flows = apply_step(cluster, tables, out, m, a, s, lift, right)
-    near = 1.0 if flow_error <= FLOW_ERROR * imbalance else 0.0
     change = max(flows, pressures)
-    if not BAROTROPIC:
-        near = change if limited else flows
-    return change, near
+    return change, change if limited else flows, flow_error <= FLOW_ERROR * imbalance
 
 
 newton_step_linear = specialise(_newton_step, "newton_step_linear", ASSEMBLE=assemble_linear, BAROTROPIC=False)
@@ -585,11 +582,11 @@ def step_clusters(sweep, out, tables, space):
                 done[k] = 0.0
         if done[k] == 0.0:
             last_change[k] = change[k]
-            step, near = newton_step_barotropic(
+            step, _, near = newton_step_barotropic(
                 cluster, tables, out, g[b:j], m[b:j], c[a:i], connected[a:i], slope, wide[k] == 1.0, 0.0, rest
             )
             change[k] = max(0.0, step)  # 0 for NaN: the iteration ends, the rates show the fault
-            sure[k] = near
+            sure[k] = 1.0 if near else 0.0
         a, b = i, j
 
 
@@ -695,14 +692,14 @@ def solve_cluster(out, tables, index):
             change, wide, most = 1e300, True, FIRST_RISE
         if most > 0.0:
             put_law_flows(cluster, tables, out, g, m, c, connected, slope, wide, rest)
-        change, flows = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, most, rest)
+        change, flows, _ = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, most, rest)
         if most > 0.0:
             greatest = greatest_step(n, k, rest)
             most, last = abs(greatest) * (0.5 if greatest * last < 0.0 else 2.0), greatest
         if has_converged(change, last_change):
             if not (wide and has_backflow(cluster, tables, m)):
                 break
-            change, wide = 1e300, False
+            change, flows, wide = 1e300, 1e300, False
     write_cluster(cluster, tables, out, g, m, c, connected, group, flows)
 
 
