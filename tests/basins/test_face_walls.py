@@ -195,8 +195,10 @@ def test_all_methods_spill_the_same_volume(triangular, numerics, tmp_path):
     end = (
         60.0 if not triangular or numerics.get("method") != "radau-iia-5" else 25.0
     )  # there it takes a second a second
-    case = pool(start={"level": "where(x < 12.05, 1.52, 0)"}, end=end, numerics=numerics)
-    model, state = ended(on_triangles(case, tmp_path) if triangular else case)
+    case = pool(start={"level": "where(x < 12.05, 1.52, 0)"}, end=end, numerics=numerics, probes=["reach.volume"])
+    case = on_triangles(case, tmp_path) if triangular else case
+    assert abs(fvsolve.run(case, {"numerics.end": 5.0}).ledger["mass"]["relative"]) < 1e-12
+    model, state = ended(case)
     found, start = depth(model, state), depth(model, fvsolve.initial_state(model))
     behind, cells = model.basins[0].x > 12.05, model.basins[0].mesh.area
     spilled, area = float(found[behind] @ cells[behind]), cells[~behind].sum()

@@ -419,10 +419,10 @@ def joined_patches(rng) -> dict:
     return scene(nodes, links, 1.0, NUMERICS, [], 1.0)
 
 
-@pytest.mark.parametrize("thinnest", [-13.0, -7.0])
+@pytest.mark.parametrize(("thinnest", "most"), [(-13.0, 2), (-7.0, 1)])
 @pytest.mark.parametrize("seed", range(4))
-def test_flows_balance_between_dry_thin_and_deep_water(seed, thinnest):
-    """Depths of 0, and of 10^thinnest to 2 m, at Froude numbers up to 3: Newton converges in 99 of 100 states."""
+def test_flows_balance_between_dry_thin_and_deep_water(seed, thinnest, most):
+    """Depths of 0, and of 10^thinnest to 2 m, at Froude numbers up to 3: Newton fails in `most` of 500 states."""
     rng, failures = np.random.default_rng(seed), 0
     for _ in range(10):
         model = fvsolve.build(fvsolve.load(joined_patches(rng)))
@@ -441,4 +441,4 @@ def test_flows_balance_between_dry_thin_and_deep_water(seed, thinnest):
             if out[STATUS] == OK:
                 assert abs(sums[joints]).max() <= 1e-9 * max(abs(flows).max(), 1.0)
             failures += int(out[STATUS] != OK)
-    assert failures <= 5
+    assert failures <= most
