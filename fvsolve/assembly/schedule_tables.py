@@ -107,6 +107,8 @@ class Schedules:
         self.records.append((first, -1))
         for time, jump in schedule.program.breaks():
             self.breaks[time] = self.breaks.get(time, False) or jump
+        for time in schedule.program.pulses(*self.span):
+            self.breaks.setdefault(time, False)
         self.spacing = min(self.spacing, period_of(schedule.program, *self.span) / STEPS_PER_PERIOD)
         return len(self.records) - 1
 

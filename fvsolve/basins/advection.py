@@ -28,7 +28,8 @@ from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import MUSCL, UPWIND
 from fvsolve.kernels.reconstruction import by_limiter, minmod, slope
 
-THIN = 1e-6  # depth below which values fade to zero [m]
+THIN = 1e-6  # least depth in rates, which limit the step: flows through thinner films are far below those of waves [m]
+DRY = 1e-14  # depth below which values fade to zero [m]: there the rounding of amounts and depths decides them
 
 
 class AdvectionGrid(NamedTuple):
@@ -61,9 +62,9 @@ class GridFlows(NamedTuple):
 
 @njit
 def put_values(s, depth, c):
-    """Write the values c = s / depth of cells, with a depth of at least THIN."""
+    """Write the values c = s / depth of cells, with a depth of at least DRY."""
     for i in range(c.size):
-        c[i] = s[i] / max(depth[i], THIN)
+        c[i] = s[i] / max(depth[i], DRY)
 
 
 @njit

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fvsolve.basins import cell_sides as side
-from fvsolve.basins.advection import THIN
+from fvsolve.basins.advection import DRY, THIN
 from fvsolve.basins.cell_sides import BLOCK, HEAD, INDICES, MEASURES, TINY, edges_before, gather, side_numbers
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import UPWIND
@@ -70,7 +70,7 @@ class MeshValues(NamedTuple):
 
 @njit
 def put_values(s, depth, c, d):
-    """Write the values c = s / depth of a block of cells, with a depth of at least THIN, and their depths d.
+    """Write the values c = s / depth of a block of cells, with a depth of at least DRY, and their depths d.
 
     s : amounts of a scalar per area; if `depth` is empty, c = s and d = 1
     """
@@ -79,7 +79,7 @@ def put_values(s, depth, c, d):
             c[i], d[i] = s[i], 1.0
     else:
         for i in range(s.size):
-            c[i], d[i] = s[i] / max(depth[i], THIN), depth[i]
+            c[i], d[i] = s[i] / max(depth[i], DRY), depth[i]
 
 
 @njit

@@ -11,6 +11,8 @@ from fvsolve.kernels import band_exchange
 from fvsolve.kernels.dtypes import DISCHARGE, GN
 from fvsolve.kernels.table_handle import open_tables
 
+LEAST_SUPPLY = 1e-7  # mass flow from outside up to which a patch is not short of water [kg/s]: rounding
+
 
 def physics_code(package: str) -> int:
     """Code of the type of basin in a package; its compiled files contain `OWN_CODE = physics_code(__package__)`."""
@@ -70,7 +72,7 @@ def record_patches(t, y, out, handle, values):
     for k in range(patches.size):
         i = patches[k]["node"]
         at = tables.pipes.size + nodes.size + i
-        is_short = patches[k]["open"] == 0 and out[layout["supply"] + i] > 0.0
+        is_short = patches[k]["open"] == 0 and out[layout["supply"] + i] > LEAST_SUPPLY
         if patches[k]["closure"] == DISCHARGE:
             is_short = out[layout["outflow_fraction"] + nodes[i]["row"]] < 1.0
         if is_short and marks[at] != marks[at]:

@@ -8,7 +8,7 @@ amounts per area.
 from math import cos, pi
 
 from fvsolve.basins import advection, fifth_order
-from fvsolve.basins.advection import THIN, AdvectionGrid, GridFlows
+from fvsolve.basins.advection import DRY, AdvectionGrid, GridFlows
 from fvsolve.basins.advection_faces import MeshFlows, advection_rates
 from fvsolve.basins.boundary_cells import (
     depth_at_patch,
@@ -31,11 +31,11 @@ DRY_WEIGHT = 1e-12  # weight of a dry cell in the value at a patch [m]
 
 @njit
 def cell_value(tables, basin, q, y, i):
-    """Value of scalar q in cell i of a basin, towards 0 below the depth THIN."""
+    """Value of scalar q in cell i of a basin, towards 0 below the depth DRY."""
     depth = 1.0
     if basin["deep"] == 1:
         depth = max(tables.plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
-    return y[basin["carried"] + q * basin["n"] + i] / max(depth, THIN)
+    return y[basin["carried"] + q * basin["n"] + i] / max(depth, DRY)
 
 
 @njit

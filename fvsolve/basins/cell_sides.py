@@ -31,6 +31,8 @@ a grid stretch alike, or all rows.
 wide : A / A0; narrow : A0 / A
 """
 
+from math import sqrt
+
 import numpy as np
 
 from fvsolve.jit import njit
@@ -129,11 +131,37 @@ CELL, SIDE, INDICES = 0, 1, 2
 NX, NY, REACH, DX, DY, WX, WY, MEASURES = range(8)
 PER_AREA, PER_DISTANCE, OBLIQUE_X, OBLIQUE_Y, DISTANCES = range(5)
 HEAD = 5
+STEEPEST = 0.75  # in liquids, bound of the norm of the map from differences to neighbours to those at sides
 BLOCK = 256  # cells whose geometry and neighbours stay in the nearest cache
 TINY = 1e-300
 HUGE = 1e300
 
 _WX, _WY, _DX, _DY, _SIDE = WX * BLOCK, WY * BLOCK, DX * BLOCK, DY * BLOCK, MEASURES * BLOCK
+
+
+@njit(forceinline=True)
+def gradient_share(sides, squares, weighted, steepest):
+    """Factor on the gradient of a cell, at most 1, with which the norm of extrapolation to its sides is `steepest`.
+
+    The differences at the sides are a linear map of the differences to the neighbours. In cells with sharp or very
+    blunt corners its norm is large, and waves grow there: with 0.75 (equilateral triangles) no mode grows on random
+    Delaunay triangles. With a bound, linear fields are not exact; so water, which flows evenly down a plane, has none.
+    The other arguments are symmetric matrices (xx, xy, yy), sums over the sides of the cell: vectors from the centre to
+    the middles of sides, d d^T; vectors to the next centres, a a^T / |a|^2, and a a^T / |a|^4.
+    The square of the norm is the greatest eigenvalue of sides S^-1 weighted S^-1, where S is `squares`.
+    """
+    sxx, sxy, syy = squares
+    wxx, wxy, wyy = weighted
+    dxx, dxy, dyy = sides
+    per = 1.0 / (sxx * syy - sxy * sxy)
+    ixx, ixy, iyy = per * syy, -per * sxy, per * sxx
+    # A = S^-1 weighted, K = A S^-1
+    axx, axy, ayx, ayy = ixx * wxx + ixy * wxy, ixx * wxy + ixy * wyy, ixy * wxx + iyy * wxy, ixy * wxy + iyy * wyy
+    kxx, kxy, kyy = axx * ixx + axy * ixy, axx * ixy + axy * iyy, ayx * ixy + ayy * iyy
+    trace = dxx * kxx + 2.0 * dxy * kxy + dyy * kyy
+    product = (dxx * dyy - dxy * dxy) * (kxx * kyy - kxy * kxy)
+    largest = 0.5 * trace + sqrt(max(0.25 * trace * trace - product, 0.0))
+    return min(1.0, steepest / sqrt(largest))
 
 
 @njit

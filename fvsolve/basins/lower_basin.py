@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -11,7 +12,7 @@ import numpy as np
 from fvsolve.assembly.scheme_codes import code_of_limiter, family
 from fvsolve.assembly.state_names import Numbered
 from fvsolve.basins import advection_faces
-from fvsolve.basins.advection import THIN, advection_work, diffusion_work
+from fvsolve.basins.advection import DRY, advection_work, diffusion_work
 from fvsolve.basins.basin_output import SPEED, U, V
 from fvsolve.basins.basin_patches import physics_code
 from fvsolve.basins.cell_sides import BLOCK, HEAD, INDICES
@@ -48,12 +49,14 @@ class BasinRows:
     physics: ClassVar[dict[str, type[BasinRows]]] = {}  # by the package that declares it
     units: ClassVar[dict[str, str]] = {}  # of fields
     deep: ClassVar[bool] = False  # True if its first quantity is a depth (minus that in `plan`) that contains scalars
+    steepest: ClassVar[float] = math.inf  # on meshes, bound of gradients in cells, see `cell_sides.gradient_share`
     given: ClassVar[bool] = False  # True if flows through its faces are those of a given velocity
     has_wide_closure: ClassVar[bool] = True  # True if outgoing waves are extrapolated by a polynomial of five cells
     extrapolates: bool = False  # True if sides of cells at driven faces of a mesh depend on the cells around them
     no_fifth_order: ClassVar[str] = "does not support walls on faces"  # reason on a grid
     banded: ClassVar[bool] = False  # True if threads can step bands of rows of a grid
     banded_mesh: ClassVar[bool] = False  # True if threads can step bands of blocks of cells of another mesh
+    fades: float = 0.0  # stored quantity below which velocities, the other quantities over it, fade to zero; 0 for none
     full_rate: float = 0.0  # rate of the waves of a full conduit, which limits steps as `out[RATE]` does [1/s]
     max_divergence: float = 0.0  # greatest divergence of a given velocity [1/s]
 
@@ -169,6 +172,10 @@ class BasinRows:
         """Weights w, for which a small deviation d from y stores the energy w d^2 [J] : float64[quantities, n]."""
         return np.tile(0.5 * self.mesh.area, (len(self.quantities), 1))
 
+    def energy_of_waves(self, y: np.ndarray) -> float:
+        """Energy at deviations y [J], relative to the same amount of fluid at rest and level: scale of its waves."""
+        return 0.0
+
     def above(self, y: np.ndarray, datum: float) -> float:
         """Energy at deviations y [J], relative to water at rest with its surface at the elevation `datum`.
 
@@ -182,6 +189,7 @@ class BasinRows:
         return np.inf
 
     soil: Any = None  # keys of the soil into which water infiltrates; None without infiltration
+    soil_states: int = 0  # states of each cell that belong to the soil: infiltrated height, condensed time
     rains: bool = False  # True if rain falls on the basin
 
     @property
@@ -191,9 +199,9 @@ class BasinRows:
 
     @property
     def source_states(self) -> np.ndarray:
-        """Indices in y of the heights of rain and of infiltrated water."""
+        """Indices in y of the heights of rain, and of the states of the soil."""
         rained = [int(self.row["rained"])] if self.rains else []
-        return np.append(rained, int(self.row["infiltrated"]) + np.arange(self.n if self.soil else 0)).astype(int)
+        return np.append(rained, int(self.row["infiltrated"]) + np.arange(self.n * self.soil_states)).astype(int)
 
     def lower_sources(self, draft, row) -> None:
         """Fill the columns of rain and infiltration, and add their states."""
@@ -428,6 +436,7 @@ class BasinRows:
         row["deep"], row["given"] = self.deep, self.given
         row["scheme"] = family(self.scheme)
         row["limiter"] = code_of_limiter(numerics.limiter, basins=self.is_grid)
+        row["steepest"] = self.steepest
         row["wide"] = LIMITERS[numerics.limiter].overshoot
         row["area"] = row["drawn"] = draft.to_plane(mesh.area)
         if self.is_grid:
@@ -435,7 +444,7 @@ class BasinRows:
             row["nx"], row["ny"] = grid.nx, grid.ny
             row["spacing"] = draft.to_plane(np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)]))
         else:
-            floats, self.integers = lower_mesh(mesh)
+            floats, self.integers = lower_mesh(mesh, self.steepest)
             row["mesh"], row["faces"] = draft.to_plane(floats), mesh.left.size
             row["links"] = len(draft.integers)
             draft.integers += self.integers.tolist()
@@ -556,9 +565,9 @@ class BasinRows:
     def values(self, y: np.ndarray) -> dict[str, np.ndarray]:
         """Values of scalars in cells at the states y of the model : name -> float64[n].
 
-        Below the depth THIN they tend to 0.
+        Below the depth DRY they tend to 0.
         """
-        depth = np.maximum(self.depth_of(self.deviations(y)), THIN) * (self.area_ratios(y) if self.moves else 1.0)
+        depth = np.maximum(self.depth_of(self.deviations(y)), DRY) * (self.area_ratios(y) if self.moves else 1.0)
         return {name: amounts / depth for name, amounts in zip(self.scalars, self.amounts(y), strict=True)}
 
     def mass_per_depth(self) -> np.ndarray:

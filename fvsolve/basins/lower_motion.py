@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,10 +19,10 @@ if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
 
 
-def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+def lower_mesh(mesh: Mesh, steepest: float = math.inf) -> tuple[np.ndarray, np.ndarray]:
     """(float64[:] floats, int64[:] integers) with geometry and neighbours of the cells of a mesh, see `cell_sides`.
 
-    Cells and faces keep their numbers.
+    Cells and faces keep their numbers. steepest : see `cell_sides.gradient_share`
     """
     n, f, inner = len(mesh.area), len(mesh.left), mesh.inner
     slots, face, own, side = sides_of_cells(mesh)
@@ -42,7 +43,7 @@ def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     face_of[at] = face
     measures = np.zeros((cell_sides.MEASURES + cell_sides.DISTANCES, indices.shape[1]))
     measures[cell_sides.NX] = 1.0
-    measures[:, at] = _measures(mesh, face, own, n)
+    measures[:, at] = _measures(mesh, face, own, n, steepest)
     rank = np.argsort(slot[inner:f])
     measures, distances = np.split(measures, [cell_sides.MEASURES])
     floats = [_by_block(measures), mesh.normal[inner + rank].T.ravel(), mesh.length, _by_block(distances)]
@@ -104,10 +105,10 @@ def _by_block(table: np.ndarray) -> np.ndarray:
     return table.reshape(len(table), -1, BLOCK).swapaxes(0, 1).ravel()
 
 
-def _measures(mesh: Mesh, face: np.ndarray, own: np.ndarray, n: int) -> np.ndarray:
+def _measures(mesh: Mesh, face: np.ndarray, own: np.ndarray, n: int, steepest: float) -> np.ndarray:
     """Measures of every side : float64[MEASURES + DISTANCES, sides], see `cell_sides`.
 
-    face, own : face (~f if the cell is to its right) and cell of each side; n : number of cells
+    face, own : face (~f if the cell is to its right) and cell of each side; n : number of cells; steepest : see above
     """
     number = np.where(face >= 0, face, ~face)
     normal = np.where(face[:, None] >= 0, 1.0, -1.0) * mesh.normal[number]
@@ -116,14 +117,30 @@ def _measures(mesh: Mesh, face: np.ndarray, own: np.ndarray, n: int) -> np.ndarr
     across = 2.0 * np.sum(to_side * normal, axis=1, keepdims=True) * normal  # to the mirror image
     across = np.where(beyond[:, None] >= 0, mesh.centre[beyond] - mesh.centre[own], across)
     weight = 1.0 / np.sum(across**2, axis=1)
-    square = [np.bincount(own, weight * across[:, a] * across[:, b], n) for a, b in ((0, 0), (0, 1), (1, 1))]
-    xx, xy, yy = (s[own] for s in square)
-    scale = weight / (xx * yy - xy * xy)
+
+    def sums(factors: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+        terms = factors[:, None, None] * vectors[:, :, None] * vectors[:, None, :]
+        return np.array([[np.bincount(own, terms[:, a, b], n) for a in (0, 1)] for b in (0, 1)])
+
+    square = sums(weight, across)
+    share_of = np.ones(n)
+    if steepest < math.inf:
+        around, weighted = sums(np.ones(own.size), to_side), sums(weight**2, across)
+        share_of = _gradient_shares(around.T, square.T, weighted.T, steepest)
+    (xx, xy), (_, yy) = square[:, :, own]
+    scale = share_of[own] * weight / (xx * yy - xy * xy)
     slope = scale * (yy * across[:, 0] - xy * across[:, 1]), scale * (xx * across[:, 1] - xy * across[:, 0])
     gap = 1.0 / np.sum(across * normal, axis=1)
     offset = normal - across * gap[:, None]
     share = 1.0 / mesh.area[own]
     return np.stack([*normal.T, mesh.length[number] * share, *to_side.T, *slope, share, gap, *offset.T])
+
+
+def _gradient_shares(sides: np.ndarray, squares: np.ndarray, weighted: np.ndarray, steepest: float) -> np.ndarray:
+    """Factors on the gradients of cells, see `cell_sides.gradient_share` : float64[n]. Matrices : float64[n, 2, 2]"""
+    inverse = np.linalg.inv(squares)
+    largest = np.linalg.eigvals(sides @ inverse @ weighted @ inverse).real.max(axis=1)
+    return np.minimum(1.0, steepest / np.sqrt(largest))
 
 
 TRAVEL_SCALE = 1e-2  # a small travel [m]

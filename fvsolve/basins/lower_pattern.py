@@ -83,9 +83,11 @@ def cells_at_faces(integers: np.ndarray, patch) -> np.ndarray:
 
 
 def source_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
-    """(rates, states) as indices in y: rates of depth and infiltrated height, and heights on which they depend."""
-    depth, height = int(basin.row["y"]) + np.arange(basin.n), int(basin.row["infiltrated"]) + np.arange(basin.n)
-    return np.concatenate([depth, height, height]), np.concatenate([height, depth, height])
+    """(rates, states) as indices in y: rates of depth and of the soil, and states of both on which they depend."""
+    firsts = [int(basin.row["y"]), *(int(basin.row["infiltrated"]) + k * basin.n for k in range(basin.soil_states))]
+    states = np.array(firsts)[:, None] + np.arange(basin.n)
+    pairs = [(states[i], states[j]) for i in range(len(states)) for j in range(len(states)) if i + j > 0]
+    return np.concatenate([i for i, _ in pairs]), np.concatenate([j for _, j in pairs])
 
 
 def neighbours(basin) -> csr_array:

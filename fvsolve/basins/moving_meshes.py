@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fvsolve.basins import cell_sides as side
-from fvsolve.basins.cell_sides import BLOCK, DISTANCES, MEASURES, TINY, blocks, side_numbers
+from fvsolve.basins.cell_sides import BLOCK, DISTANCES, MEASURES, TINY, blocks, gradient_share, side_numbers
 from fvsolve.basins.moving_walls import size_patch
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import RATE
@@ -28,9 +28,10 @@ from fvsolve.kernels.table_handle import open_tables
 
 START, STOP, BEYOND, ENDS = range(4)
 # Rows of BLOCK in the scratch of a block: sums over sides, 1 / area, centre; of the current side its ends, the centre
-# beyond, 1 where there is a cell, length.
+# beyond, 1 where there is a cell, length; then the other sums of `cell_sides.gradient_share`.
 _XX, _XY, _YY, _SHARE, _CX, _CY, _XA, _YA, _XB, _YB, _OX, _OY, _INSIDE, _LENGTH = (k * BLOCK for k in range(14))
-SCRATCH = 14 * BLOCK
+_SIDES_XX, _SIDES_XY, _SIDES_YY, _WEIGHTED_XX, _WEIGHTED_XY, _WEIGHTED_YY = (k * BLOCK for k in range(14, 20))
+SCRATCH = 20 * BLOCK
 _NX, _NY, _REACH, _DX, _DY, _WX, _WY = (k * BLOCK for k in range(7))  # groups of `cell_sides`, in its order
 
 
@@ -108,6 +109,8 @@ def gather_cells(area, cx, cy, scratch):
     """Write 1 / areas and centres of a block of cells to `scratch`, and set the sums over their sides there to zero."""
     for i in range(BLOCK):
         scratch[i], scratch[_XY + i], scratch[_YY + i], scratch[_SHARE + i] = 0.0, 0.0, 0.0, 0.0
+        scratch[_SIDES_XX + i], scratch[_SIDES_XY + i], scratch[_SIDES_YY + i] = 0.0, 0.0, 0.0
+        scratch[_WEIGHTED_XX + i], scratch[_WEIGHTED_XY + i], scratch[_WEIGHTED_YY + i] = 0.0, 0.0, 0.0
     for i in range(area.size):
         scratch[_SHARE + i], scratch[_CX + i], scratch[_CY + i] = 1.0 / area[i], cx[i], cy[i]
 
@@ -152,6 +155,12 @@ def put_side(scratch, geo):
         scratch[i] += weight * ax * ax
         scratch[_XY + i] += weight * ax * ay
         scratch[_YY + i] += weight * ay * ay
+        scratch[_SIDES_XX + i] += to_x * to_x
+        scratch[_SIDES_XY + i] += to_x * to_y
+        scratch[_SIDES_YY + i] += to_y * to_y
+        scratch[_WEIGHTED_XX + i] += weight * weight * ax * ax
+        scratch[_WEIGHTED_XY + i] += weight * weight * ax * ay
+        scratch[_WEIGHTED_YY + i] += weight * weight * ay * ay
 
 
 @njit
@@ -173,14 +182,18 @@ def put_distance(scratch, geo, far):
 
 
 @njit
-def invert(scratch):
+def invert(scratch, steepest):
     """Invert the least-squares matrix of each cell of a block in `scratch`, in place.
 
-    The inverse times sums over the sides gives the gradient.
+    The inverse times sums over the sides gives the gradient. It is multiplied by `cell_sides.gradient_share`, see there
+    for `steepest`.
     """
     for i in range(BLOCK):
         xx, xy, yy = scratch[i], scratch[_XY + i], scratch[_YY + i]
-        scale = 1.0 / max(xx * yy - xy * xy, TINY)
+        sides = scratch[_SIDES_XX + i], scratch[_SIDES_XY + i], scratch[_SIDES_YY + i]
+        weighted = scratch[_WEIGHTED_XX + i], scratch[_WEIGHTED_XY + i], scratch[_WEIGHTED_YY + i]
+        share = gradient_share(sides, (xx, xy, yy), weighted, steepest) if xx > 0.0 else 1.0  # 1 in padding
+        scale = share / max(xx * yy - xy * xy, TINY)
         scratch[i], scratch[_XY + i], scratch[_YY + i] = scale * yy, scale * xy, scale * xx
 
 
@@ -222,7 +235,7 @@ def update_sides(tables, basin):
                 put_distance(scratch, geo, distances[slot * DISTANCES * BLOCK :])
             if basin["flows"] >= 0:
                 put_lengths(face[slot * BLOCK :], scratch[_LENGTH:], lengths)
-        invert(scratch)
+        invert(scratch, basin["steepest"])
         for slot in range(j * slots, (j + 1) * slots):
             put_weights(scratch, floats[slot * MEASURES * BLOCK :])
     for q in range(b):

@@ -171,7 +171,7 @@ def place_kinds(network: chainage.CutTable, parts: Parts, scalars: dict[str, Any
     nodes |= dict.fromkeys(bare)  # faulty
     for name in (*parts.meshes, *parts.lumped):
         nodes |= basins.probe_kinds(name, parts.nodes[name], parts.meshes.get(name), parts.lumped.get(name), scalars)
-    pipes = {name: link for name, link in parts.links.items() if isinstance(link, Pipe)}
+    pipes = {name: link for name, link in parts.links.items() if getattr(link, "along", None)}
     uncut = dict.fromkeys(_uncounted(table) if faulty else ())
     return {"nodes": nodes, "links": links, "scalars": scalars, "uncut": uncut, "pipes": pipes}
 

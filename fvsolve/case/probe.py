@@ -58,7 +58,7 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     """Probe from its text, such as "gate.pressure"; None if the part is faulty. Raises ValueError.
 
     kinds : "nodes" and "links" -> class of each part by name (None if faulty, `BasinFields` for a basin);
-    "sections" -> `SectionKind` of each section; "scalars" -> scalars; "pipes" -> pipes
+    "sections" -> `SectionKind` of each section; "scalars" -> scalars; "pipes" -> pipes and conduits
     "routes" -> (legs, links) of each route; "uncut" -> faulty parts with unknown points, patches or pieces
     """
     match = _PROBE.fullmatch(given.strip()) if isinstance(given, str) else None
@@ -193,7 +193,8 @@ def _probe(text: str, part: str, name: str, quantity: str, place: str | None, ki
     along = getattr(kind, "along", {}) | _scalars_of(kind, kinds, "along")
     quantities = kind.quantities | _scalars_of(kind, kinds, "quantities")
     pipe = kinds.get("pipes", {}).get(name) if part == "links" else None
-    begin = 0.0 if pipe is None or pipe.profile is None else float(pipe.profile.chainage[0])
+    profile = getattr(pipe, "profile", None)
+    begin = 0.0 if profile is None else float(profile.chainage[0])
     fraction, dimension = _quantity(kind, along, quantities, name, quantity, place, pipe and pipe.length, begin)
     return Probe(text, part, name, quantity, fraction, dimension, unit=unit)
 

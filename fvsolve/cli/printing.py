@@ -51,11 +51,14 @@ REASONS_SHOWN = 10  # summary.json has all
 
 
 def cost_estimate(model) -> str:
-    """Text on the expected duration and file sizes of a run; "" if both are small."""
-    seconds, bytes_ = model.checks["expected_seconds"] or 0.0, disk_size(model.case)
+    """Text on the expected duration and file sizes of a run, and on steps that are too short; "" if all are small."""
+    facts, bytes_ = model.checks, disk_size(model.case)
+    seconds = facts["expected_seconds"] or 0.0
     parts = [duration(seconds)] if seconds > LONG_RUN else []
     parts += [f"{byte_text(bytes_)} on disk"] if bytes_ > LARGE_FILES else []
-    return f"{model.case.name} will take about {' and '.join(parts)}" if parts else ""
+    lines = [f"{model.case.name} will take about {' and '.join(parts)}"] if parts else []
+    lines += [f"note: {notice['text']}" for notice in facts["warnings"] if notice["kind"] == "cost"]
+    return "\n".join(lines)
 
 
 def duration(seconds: float) -> str:
@@ -301,6 +304,8 @@ def difference_text(results: dict, summary: dict) -> Iterator:
         time = None if probe["t_greatest"] is None else clock.from_si(probe["t_greatest"])
         rows.append([name, span(probe["unit"]), *map(_number, (probe["greatest"], time, probe["rms"]))])
     yield TextTable(["probe", "unit", "greatest difference", f"at [{clock.unit}]", "rms"], rows)
+    if results["note"]:
+        yield results["note"]
     for key in ("only_a", "only_b"):
         if results[key]:
             yield f"only in {results[key[-1]]}: {', '.join(results[key])}"

@@ -28,7 +28,7 @@ def fused_cells(h, k, flow, half, base, r, l, r_new, l_new, least, greatest):
     """
     here, beyond, low, high = r[1:], l[1:], 0, 0
     for i in range(r_new.size):
-        m = flow + (here[i] - l[i])
+        m = flow + (r[i] - beyond[i])
         s = half * (abs(m) * m) - base
         a = here[i] + h * (-k * (here[i] - r[i]) - s)
         b = l[i] + h * (k * (beyond[i] - l[i]) + s)
@@ -45,7 +45,7 @@ def fused_cell(t, h, terms, index, at, i, outer_waves, r, l, r_new, l_new, table
     outer_waves : forward wave before the cell, and backward wave behind it [kg/s]; other arguments: `fused_block`
     """
     (k, flow, half, base), (before, behind), e = terms, outer_waves, tables.envelope
-    m = flow + (r[i] - l[i])
+    m = flow + (before - behind)
     s = half * (abs(m) * m) - base
     a, b = r[i] + h * (-k * (r[i] - before) - s), l[i] + h * (k * (behind - l[i]) + s)
     r_new[i], l_new[i] = a, b

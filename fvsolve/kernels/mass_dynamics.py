@@ -18,6 +18,10 @@ from fvsolve.kernels.density import density, log_density, pressure_of_log
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
 
+CONTACT_STEPS = (
+    0.6  # times the rate of a contact: `step_control.closing_step` then takes a quarter of a radian in a step
+)
+
 
 @njit(forceinline=True)
 def motion(mass, y):
@@ -263,9 +267,40 @@ def mechanical_rate(out, tables):
 
 
 @njit
+def contact_rate(out, tables):
+    """Greatest rate [1/s] of the closed contacts of stops that will open again, in units of out[CLOSING].
+
+    A contact with stiffness k and damping c per mass has the rate c / 2 + sqrt(c^2 / 4 + k). Its depth x swings about
+    that at rest, x_0 = x + (x'' + c x') / k, with an amplitude (x - x_0)^2 + x'^2 / k; it opens again if the amplitude
+    exceeds x_0. A load at rest on a stop does not limit the step.
+    """
+    masses, stops, armed = tables.masses, tables.stops, tables.armed
+    net, first, greatest = tables.layout[0]["net_force"], armed.size - 2 * stops.size, 0.0
+    for k in range(stops.size):
+        stop = stops[k]
+        i, j = stop["from_mass"], stop["to_mass"]
+        lightness = masses[i]["lightness"] + masses[j]["lightness"]
+        stiffness, brake = lightness * stop["stiffness"], lightness * stop["damping"]
+        if not stiffness > 0.0 or stop["line"] >= 0:
+            continue
+        travel, speed = stop_travel(out, tables, k)
+        change = out[net + j] * masses[j]["lightness"] - out[net + i] * masses[i]["lightness"]
+        for side in range(2):
+            if armed[first + 2 * k + side] > 0.0:
+                sign = 2.0 * side - 1.0
+                depth = travel - stop["above"] if side == 1 else -(stop["below"] + travel)
+                resting = depth + sign * (change + brake * speed) / stiffness
+                swing = (depth - resting) * (depth - resting) + speed * speed / stiffness
+                if resting <= 0.0 or swing > resting * resting:
+                    greatest = max(greatest, 0.5 * brake + sqrt(0.25 * brake * brake + stiffness))
+    return CONTACT_STEPS * greatest
+
+
+@njit
 def mass_rates(t, y, dydt, out, handle):
     """Write net forces to `out`, d/dt of positions and velocities to `dydt`; raise out[RATE] to `mechanical_rate`.
 
+    A given step is divided while a contact lasts, by out[CLOSING].
     STATUS is NO_VOLUME if a piston has used up its chamber.
     """
     tables = open_tables(handle)
@@ -273,6 +308,9 @@ def mass_rates(t, y, dydt, out, handle):
     forces(t, y, out, tables)
     if out[rec.RATE] != rec.RATE_UNWANTED:
         out[rec.RATE] = max(out[rec.RATE], mechanical_rate(out, tables))
+        if tables.stops.size > 0:
+            closing = out[rec.CLOSING] if tables.columns.size > 0 else 0.0  # columns have cleared it in this call
+            out[rec.CLOSING] = max(closing, contact_rate(out, tables))
     for k in range(tables.pistons.size):
         for i in (tables.pistons[k]["a"], tables.pistons[k]["b"]):
             if not out[layout["stiffness"] + nodes[i]["row"]] > 0.0:

@@ -10,7 +10,8 @@ of its pipes. p' is the pressure change since the initial steady state. Both are
 Todini and Pilati 1988). The unknown flows are total flows, not changes: where a valve is nearly closed, a change would
 lose all but its rounding. A cluster in which nothing has changed is not solved. Each cluster stops by its own change,
 so its result does not depend on other clusters. Under `linear`, where MAX_SWEEPS steps do not converge, Newton starts
-again from the flows of the laws, with limited steps: half the last step if the direction has changed, else twice.
+again from the flows of the laws, with a limited step of each node: half its last step if the direction has changed,
+else twice (`limit_each_step`).
 
 A law gives the inflow of a node except through valves with its fall per pressure (`linear_balance`,
 `barotropic_balance`), and the driving pressure of a valve.
@@ -26,7 +27,7 @@ wide : True while valves that a pressure lifts are held wide open, see `restrict
 space : work arrays of `node_work`
 """
 
-from math import sqrt
+from math import copysign, sqrt
 
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels.dtypes import NO_SOLUTION, NOT_CONVERGED, STATUS, WHERE
@@ -45,6 +46,8 @@ BAR = 1e5
 ROUNDING = 1e-15  # relative rounding of pressures; of a flow, relative to the flow at 1 Pa
 NEARLY_CONVERGED = 1e-9  # relative change of Newton below which it may be rounding
 FIRST_RISE = 1e4  # greatest change of a pressure in the first limited step of Newton [Pa]
+NOT_BALANCED = 1e300  # in place of a change of Newton: the step was limited
+LEAST_RISE = 1e-9  # least limit of such a step [Pa]
 FAILED_CHANGE = 1e-5  # relative change of flow above which Newton has failed; smaller changes may be rounding
 # Errors of valve flows against their laws up to this fraction of the node's imbalance cannot reverse a Newton step.
 FLOW_ERROR = 0.01
@@ -285,15 +288,6 @@ def largest_magnitude(a):
 
 
 @njit
-def scale_step(share, a, right):
-    """Multiply a Newton step by `share`; a, right : as for `limit_step`"""
-    for r in range(right.size):
-        right[r] *= share
-    for e in range(a.size):
-        a[e] *= share
-
-
-@njit
 def limit_step(most, a, right):
     """Scale a Newton step so that no pressure rises by more than `most` [Pa].
 
@@ -304,7 +298,30 @@ def limit_step(most, a, right):
     for r in range(right.size):
         greatest = max(greatest, right[r])
     if greatest > most:
-        scale_step(most / greatest, a, right)
+        for r in range(right.size):
+            right[r] *= most / greatest
+        for e in range(a.size):
+            a[e] *= most / greatest
+
+
+@njit
+def limit_each_step(limits, right):
+    """Limit the step of each pressure, and renew its limit; return True if a step was longer than its limit.
+
+    limits : greatest step of each node, with the sign of its last step [Pa]: half of this step if the direction has
+    changed, so that a root between two constant flows is bracketed, else twice, and at least LEAST_RISE. A common limit
+    would stop all nodes where the flow of one hardly depends on pressure.
+    right : changes of node pressures [Pa], limited
+    """
+    limited = False
+    for i in range(right.size):
+        limit = abs(limits[i])
+        if abs(right[i]) > limit:
+            right[i] = copysign(limit, right[i])
+            limited = True
+        limit = (0.5 if right[i] * limits[i] < 0.0 else 2.0) * abs(right[i])
+        limits[i] = copysign(max(limit, LEAST_RISE), right[i])
+    return limited
 
 
 @njit
@@ -355,14 +372,14 @@ def close_unstable(cluster, tables, g, m):
     return closed
 
 
-def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, most, work):
+def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, limits, work):
     """Make a Newton step for the pressures and valve flows of a cluster.
 
-    most : greatest change of a pressure [Pa], 0 for no limit
-    Returns (greatest relative change, that of flows alone if the step was not limited, True if the step points to the
-    root). Nodes balance only after a step that was not limited. A step points to the root if the errors of valve flows
-    against their laws are below the fraction FLOW_ERROR of the imbalance of the nodes: then the second-order error of
-    Newton cannot reverse this imbalance. Under the density law `linear` the third result has no meaning.
+    limits : greatest step of each node, see `limit_each_step`; empty for no limit
+    Returns (greatest relative change, that of flows alone, True if the step points to the root). Both changes are
+    NOT_BALANCED after a step that was limited: nodes balance only after one that was not. A step points to the root if
+    the errors of valve flows against their laws are below the fraction FLOW_ERROR of the imbalance of the nodes: then
+    the second-order error of Newton cannot reverse this imbalance. Under `linear` the third result has no meaning.
     """
     n, k = c.size, g.size
     matrix, right, a, s, lift = step_arrays(n, k, work)
@@ -387,13 +404,11 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, most, wo
         for e in range(k):
             flow_error += a[e] * a[e] / max(abs(m[e] + a[e]), 1e-300)
         limit_step(tables.settings[0]["beta"], a, right)
-    greatest = largest_magnitude(right)
-    limited = most > 0.0 and greatest > most
-    if limited:
-        scale_step(most / greatest, a, right)
+    limited = limit_each_step(limits, right) if limits.size > 0 else False
     pressures, flows = apply_step(cluster, tables, out, m, a, s, lift, right)
-    change = max(flows, pressures)
-    return change, change if limited else flows, flow_error <= FLOW_ERROR * imbalance
+    if limited:
+        return NOT_BALANCED, NOT_BALANCED, False
+    return max(flows, pressures), flows, flow_error <= FLOW_ERROR * imbalance
 
 
 newton_step_linear = specialise(_newton_step, "newton_step_linear", ASSEMBLE=assemble_linear, BAROTROPIC=False)
@@ -403,6 +418,7 @@ newton_step_barotropic = specialise(
 
 
 MAX_SWEEPS = 100
+LIMITED_SWEEPS = 400  # a step of 2e7 Pa is halved to 1e-6 Pa in 45 of them, one node after the other
 
 
 @njit
@@ -504,6 +520,21 @@ def prepare_cluster(cluster, tables, out, g, m):
 
 
 @njit
+def begin_level(cluster, tables, out):
+    """Set nodes behind valves with a level start to the potential at the known end of the valve.
+
+    The flow of such a valve has a bound on the side of low potentials, where its slope is zero: from there Newton would
+    approach its root by the slopes of other valves alone.
+    """
+    pressure = tables.layout[0]["pressure"]
+    for e in range(cluster["valves"]):
+        valve = tables.valves[tables.integers[cluster["first_valve"] + e]]
+        i, j = valve["from_node"], valve["to_node"]
+        if valve["level_start"] == 1 and inner_row(tables.nodes, i) >= 0:
+            out[pressure + i] = out[pressure + j] - valve["drop"]
+
+
+@njit
 def has_backflow(cluster, tables, m):
     """True if a lifted valve of a cluster, opened by its upstream pressure, has a negative flow."""
     for e in range(m.size):
@@ -547,6 +578,8 @@ def begin_clusters(out, tables, space):
         unchanged = prepare_cluster(cluster, tables, out, g[b:j], m[b:j])
         done[k] = 1.0 if total_inflows(cluster, tables, out, c[a:i]) and unchanged else 0.0
         change[k], wide[k] = 1e300, 1.0
+        if done[k] == 0.0:
+            begin_level(cluster, tables, out)
         find_connected(cluster, tables, g[b:j], connected[a:i])
         zero_isolated(cluster, tables, g[b:j], m[b:j], connected[a:i])
         a, b = i, j
@@ -583,7 +616,7 @@ def step_clusters(sweep, out, tables, space):
         if done[k] == 0.0:
             last_change[k] = change[k]
             step, _, near = newton_step_barotropic(
-                cluster, tables, out, g[b:j], m[b:j], c[a:i], connected[a:i], slope, wide[k] == 1.0, 0.0, rest
+                cluster, tables, out, g[b:j], m[b:j], c[a:i], connected[a:i], slope, wide[k] == 1.0, rest[:0], rest
             )
             change[k] = max(0.0, step)  # 0 for NaN: the iteration ends, the rates show the fault
             sure[k] = 1.0 if near else 0.0
@@ -650,20 +683,15 @@ def write_clusters(out, tables, space):
 
 @njit
 def put_law_flows(cluster, tables, out, g, m, c, connected, slope, wide, work):
-    """Set the flows m of valves to those of their laws at the present pressures; arguments as for `newton_step`."""
+    """Set the flows m of valves to those of their laws at the present pressures; arguments as for `newton_step`.
+
+    A valve with a level start keeps the flow that its node needs: its law takes a chord to it where it has no slope.
+    """
     assemble_linear(cluster, tables, out, g, m, c, connected, slope, wide, work, False)
     a = step_arrays(c.size, g.size, work)[2]
     for e in range(m.size):
-        m[e] += a[e]
-
-
-@njit
-def greatest_step(n, k, work):
-    """Step of the pressure that changes most [Pa]; arguments as for `step_arrays`."""
-    right, greatest = step_arrays(n, k, work)[1], 0.0
-    for r in range(n):
-        greatest = right[r] if abs(right[r]) > abs(greatest) else greatest
-    return greatest
+        if tables.valves[tables.integers[cluster["first_valve"] + e]]["level_start"] == 0:
+            m[e] += a[e]
 
 
 @njit
@@ -680,8 +708,8 @@ def solve_cluster(out, tables, index):
     undisturbed = total_inflows(cluster, tables, out, c) and unchanged
     find_connected(cluster, tables, g, connected)
     zero_isolated(cluster, tables, g, m, connected)
-    change, flows, wide, most, last = 1e300, 0.0, True, 0.0, 0.0
-    for sweep in range(2 * MAX_SWEEPS):
+    change, flows, wide, limits = 1e300, 0.0, True, group[:0]
+    for sweep in range(MAX_SWEEPS + LIMITED_SWEEPS):
         if undisturbed:
             change = 0.0
             break
@@ -689,13 +717,12 @@ def solve_cluster(out, tables, index):
         if sweep == MAX_SWEEPS:  # steps may have alternated, or led far away
             prepare_cluster(cluster, tables, out, g, m)
             zero_isolated(cluster, tables, g, m, connected)
-            change, wide, most = 1e300, True, FIRST_RISE
-        if most > 0.0:
+            change, wide, limits = 1e300, True, group
+            for i in range(n):
+                limits[i] = FIRST_RISE
+        if limits.size > 0:
             put_law_flows(cluster, tables, out, g, m, c, connected, slope, wide, rest)
-        change, flows, _ = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, most, rest)
-        if most > 0.0:
-            greatest = greatest_step(n, k, rest)
-            most, last = abs(greatest) * (0.5 if greatest * last < 0.0 else 2.0), greatest
+        change, flows, _ = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, limits, rest)
         if has_converged(change, last_change):
             if not (wide and has_backflow(cluster, tables, m)):
                 break

@@ -207,11 +207,60 @@ def rates_upwind(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
 
 
 @njit(forceinline=True)
+def arriving_cell(k, flow, loss, base, before, behind, r, l):
+    """Rates of both waves in a cell, as in `rates_arriving`; before, behind : waves that enter it [kg/s]."""
+    m = flow + (before - behind)
+    s = 0.5 * loss * (abs(m) * m) - base
+    return -k * (r - before) - s, k * (behind - l) + s
+
+
+@njit
+def rates_arriving(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
+    """Write d/dt of both waves by the upwind scheme, with the friction of the waves that enter a cell.
+
+    A step of the length 1 / k by the Euler method is then that of the method of characteristics: waves move by a cell,
+    and friction acts at their new place. With the friction of the old waves of a cell, the first cell behind a front
+    would have none.
+    """
+    n = r.size
+    half = 0.5 * loss
+    dr[0], dl[0] = arriving_cell(k, flow, loss, base, r_in, l[1] if n > 1 else l_in, r[0], l[0])
+    if n > 1:
+        dr[n - 1], dl[n - 1] = arriving_cell(k, flow, loss, base, r[n - 2], l_in, r[n - 1], l[n - 1])
+    before, behind, here, own = r[: n - 1], l[2:], r[1:], l[1:]
+    forward, backward = dr[1:], dl[1:]
+    for i in range(n - 2):
+        m = flow + (before[i] - behind[i])
+        s = half * (abs(m) * m) - base
+        forward[i] = -k * (here[i] - before[i]) - s
+        backward[i] = k * (behind[i] - own[i]) + s
+
+
+@njit
+def subtract_friction_arriving(pipe, base, r, l, r_in, l_in, dr, dl):
+    """Subtract friction as `subtract_friction` does, that of the waves that enter a cell, see `rates_arriving`."""
+    kind, loss, rough, n = pipe["friction"], pipe["loss"], pipe["rough"], r.size
+    e, reynolds, flow = pipe["roughness"], pipe["reynolds"], pipe["flow"]
+    for i in range(n):
+        before, behind = r[i - 1] if i > 0 else r_in, l[i + 1] if i < n - 1 else l_in
+        s = 0.5 * drag(kind, loss, rough, e, reynolds, flow + (before - behind)) - base
+        dr[i] -= s
+        dl[i] += s
+
+
+@njit(forceinline=True)
 def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
     """Write d/dt of forward and backward wave of a pipe to dr and dl, from its cells and four waves at its ends."""
     n = r.size
     k = pipe["speed"] / pipe["dx"]
     base = 0.5 * pipe["drag"]
+    if settings["from_arriving"] == 1:
+        if pipe["friction"] != FRICTION_ROUGH and pipe["friction"] != FRICTION_HAZEN:
+            rates_arriving(k, pipe["flow"], pipe["loss"], base, r, l, r_in, l_in, dr, dl)
+        else:
+            rates_arriving(k, 0.0, 0.0, 0.0, r, l, r_in, l_in, dr, dl)
+            subtract_friction_arriving(pipe, base, r, l, r_in, l_in, dr, dl)
+        return
     if settings["scheme"] == UPWIND and pipe["friction"] != FRICTION_ROUGH:
         if pipe["friction"] != FRICTION_HAZEN:
             rates_upwind(k, pipe["flow"], pipe["loss"], base, r, l, r_in, l_in, dr, dl)

@@ -187,6 +187,10 @@ COMPONENTS = {
         record="mass_dynamics: record_masses",
         events="mass_dynamics: mass_events",
     ),
+    "energy of masses": RhsTerms(power="mass_energy: add_power_linear", stored="mass_energy: add_stored_linear"),
+    "energy of masses, barotropic": RhsTerms(
+        power="mass_energy: add_power_barotropic", stored="mass_energy: add_stored_barotropic"
+    ),
     "devices": RhsTerms(
         prepare="devices: set_devices",
         move="devices: device_rates",
@@ -308,6 +312,8 @@ class ModelFeatures(NamedTuple):
         lumped = linear and not self.pipes and not self.delays
         yield from (ALONE,) if self.alone else (LUMPED,) if lumped else (NETWORK, NODES[family])
         yield READ["linear" if linear else "barotropic"]
+        if self.masses:
+            yield COMPONENTS["energy of masses" if linear else "energy of masses, barotropic"]
         if self.pipes:
             yield PIPES[family]
         if self.delays:

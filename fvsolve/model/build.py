@@ -341,10 +341,11 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     # location of the first cavity, greatest cavity volume, and its time.
     marks = pipes * (4 if draft.case.law.cavitates else 1) + 3 * nodes + len(draft.column_table)
     marks += 2 * len(draft.device_table) + len(draft.piston_table)
-    # `spare` has a copy of `out`; with delay lines two copies, three values for each probe and node, and arrival times
+    # `spare` has a copy of `out`; with delay lines two copies, three values for each probe and node, arrival times of
+    # jumps and the changes that they cause
     spare = out
     if lines := len(draft.delay_table):
-        spare = 2 * out + 3 * (len(draft.probe_table) + nodes) + 2 * (1 << (4 * lines - 1).bit_length())
+        spare = 2 * out + 3 * (len(draft.probe_table) + nodes) + 2 * (1 << (4 * lines - 1).bit_length()) + 8 * lines + 1
     draft.shapes = rec.RunArrays(
         clock=1, work=draft.work_size, marks=marks,
         armed=tanks.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),
@@ -365,6 +366,7 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     case, pipes, table = draft.case, draft.pipe_table, np.zeros(1, rec.SETTINGS)
     s = table[0]
     scheme_settings(s, case.numerics.scheme, case.numerics.limiter)
+    s["from_arriving"] = case.numerics.scheme == "upwind" and case.numerics.method == "euler"
     s["viscosity"] = draft.fluid.viscosity or 0.0
     if draft.fluid.walther is not None and (draft.scalar_table["specific_heat"] > 0.0).any():
         s["walther_a"], s["walther_b"] = draft.fluid.walther
@@ -383,7 +385,10 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
         method = method_named(automatic.first_method(case.numerics.method))
         s["weights"], s["stages"] = len(draft.floats), method.stages
         draft.floats += [*map(float, method.b), *method.times]
-    rates = [*(pipes["speed"] / pipes["dx"] * pipes["rate_factor"]), *column_rates(draft)]
+    waves = pipes["speed"] / pipes["dx"] * pipes["rate_factor"]
+    if case.numerics.step is not None:  # delay lines do not limit a given step
+        waves = waves[pipes["delay"] < 0]
+    rates = [*waves, *column_rates(draft)]
     s["rate"] = max([0.0, *rates, control_rate(draft), network_rate(draft)])
     return table
 

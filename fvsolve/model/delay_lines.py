@@ -21,6 +21,7 @@ from fvsolve.kernels.delay_lines.line_rates import drag_and_slope
 from fvsolve.kernels.schedule_pieces import POWER, WAVE
 from fvsolve.model.cluster_tables import classify_nodes
 from fvsolve.steppers import automatic
+from fvsolve.steppers.step_control import DIVIDED_FRACTION
 from fvsolve.steppers.tableau import AUTO, method_named
 
 # stored jumps: in all lines together, least and most of each wave
@@ -83,6 +84,7 @@ def begin_history(past: np.ndarray, delays: np.ndarray) -> None:
     wider = 1 if past.size == history_size(delays) else ring_factor(past, delays)
     past[sizes] = wider * int(delays["ring_size"].max()), jump_capacity(count), count, wider, math.nan, -math.inf
     past[at.NEXT_ARRIVAL], past[at.RING_ENTRIES] = at.INFINITE, ring_entries(delays)
+    past[at.SEGMENT_END], past[at.REFLECTION_RATE] = at.INFINITE, 1.0 / float(delays["tau"].min())
 
 
 def ring_factor(past: np.ndarray, delays: np.ndarray) -> int:
@@ -420,6 +422,27 @@ def time_scales(draft) -> tuple[float, float]:
                 if row[1] == POWER or not any(row[5:7]):
                     ramp = min(ramp, rows[k + 1][0] - row[0])
     return tuple(duration if math.isfinite(duration) else 0.0 for duration in (shortest, ramp))
+
+
+def dividing_rate(model, step: float) -> float:
+    """Rate above which explicit steps of given length are divided [1/s]; 0 for steps that are never divided.
+
+    Steps are divided beside delay lines, whose own waves do not limit a step: without cells, the parts at the ends of
+    lines are all that a given step can be too long for. The rate is that of the step, and at least that of waves in the
+    cells of other pipes. step : given step [s]
+    """
+    if model.basins or not (model.tables.pipes["delay"] >= 0).any():
+        return 0.0
+    return max(1.0 / step, float(model.tables.settings["rate"][0]) * (1.0 + 1e-9))
+
+
+def step_at_start(model) -> float:
+    """Given step of a run, or the part of it into which an explicit method divides it at the start [s]."""
+    numerics, step = model.case.numerics, model.case.numerics.step
+    explicit = method_named(automatic.first_method(numerics.method)).explicit
+    least = dividing_rate(model, step) if explicit else 0.0
+    rate = float(model.evaluate(numerics.start, model.start, numerics.start)[1][rec.RATE]) if least > 0.0 else 0.0
+    return DIVIDED_FRACTION / rate if rate > least > 0.0 else step
 
 
 def longest_step(draft) -> float:

@@ -10,8 +10,10 @@ from fvsolve.assembly.pipe_terms import elements, memory_shares
 from fvsolve.case.bodies import missing_reactions
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.model import Model
+from fvsolve.model.model import Model, once_per_model
 from fvsolve.model.run_data import RunData
+
+LEAST_GAS = 1.0  # least gas pressure of a mixture at rest [Pa]
 
 
 def datum_of(model: Model, port: str | None = None) -> float:
@@ -25,6 +27,7 @@ def datum_of(model: Model, port: str | None = None) -> float:
     return float(min(placed, default=0.0))
 
 
+@once_per_model
 def available_energy(model: Model) -> dict[str, float]:
     """Energy of every part at the start [J], above its energy at rest and at P = 0 : name -> energy.
 
@@ -71,13 +74,18 @@ def vessel_energy_function(model: Model):
 
     def energy(row) -> float:
         ambient, height = float(st["ambient"]), float(row["elevation"] - st["datum"])
-        rest = pressure_of_enthalpy(st, floats, enthalpy(st, floats, ambient) - float(st["gravity"]) * height)
+        rest = reachable(st, pressure_of_enthalpy(st, floats, enthalpy(st, floats, ambient) - st["gravity"] * height))
         volume = float(row["volume"])
         parts = [vessel_energy(st, floats, row, density(st, floats, float(p)) * volume, volume, float(p))
                  for p in (row["pressure"], rest)]  # fmt: skip
         return parts[0] - parts[1]
 
     return energy
+
+
+def reachable(st, pressure: float) -> float:
+    """Pressure at which P = 0 [Pa]; where gas in the fluid would have to expand without bound, that of LEAST_GAS."""
+    return float(pressure) if np.isfinite(pressure) else float(st["floor"]) + LEAST_GAS
 
 
 def potential(model: Model, row) -> float:
@@ -101,7 +109,7 @@ def pipe_energy(model: Model, k: int) -> float:
     base, total = enthalpy(st, floats, float(st["ambient"])), 0.0
     for i, z in enumerate(pipe.elevation):
         height, m = float(st["gravity"] * (z - st["datum"])), float(profile[row["center"] + i])
-        rest = pressure_of_enthalpy(st, floats, base - height)
+        rest = reachable(st, pressure_of_enthalpy(st, floats, base - height))
         low = mass_of_pressure(st, floats, row, rest)[0]
         p = pressure_of_mass(st, floats, row, m)
         head, least = enthalpy(st, floats, p) - base + height, enthalpy(st, floats, rest) - base + height
@@ -188,8 +196,7 @@ class Accounts:
         model, case = run_data.model, run_data.model.case
         if faults := [f"{'.'.join(place)}: {text}" for place, text in missing_reactions(case.nodes, case.links)]:
             raise FvsolveError(f"the energy of this network on a body is not supported; {'; '.join(faults)}")
-        if len(model.tables.moving_segments):
-            run_data.tables.moving_segments["loads_body"] = rec.JOINT_LOAD_READ
+        compute_all_loads(run_data)
         if any(basin.part.on is not None and basin.opening for basin in model.basins):
             raise FvsolveError("the energy of a basin on a body with an open side is not supported; expected closed "
                                "sides, or a basin that no body carries")  # fmt: skip
@@ -204,8 +211,6 @@ class Accounts:
         if model.basins and not case.law.linear:
             raise FvsolveError('the energy of basins is computed for law = "linear" only; expected this density law')
         self.power, self.stored = model.functions.energies
-        if model.basins and len(model.tables.bodies):  # include loads of the fluid in basins on bodies, for its work
-            run_data.tables.basins["loads_body"] = 1
         self.accounts: list[Account] = []
         self.stored_accounts: list[Account] = []  # accounts of stored energy, by rows of `stored`
         self.stops: list[tuple[int, int]] = []  # lines of the rate and of the loss of every stop
@@ -228,14 +233,15 @@ class Accounts:
             self.add("dissipated", name, "friction", at + 1)
             self.hold(name, "rigid column", at + 2)
             self.accounts.append(Account("law", name, "rigid column", (at, at + 1, at + 2), (1, -1, -1)))
+        self.network_rows = self.power_count  # rows of power that `kernels.network_energy` fills
         self.mechanics()
         self.networks()
         self.bodies()
         self.devices()
         self.walls()
         self.basins()
-        self.matrix = matrix_of(self.accounts, self.power_count)
-        self.holding = matrix_of(self.stored_accounts, self.stores)
+        self.power_terms = terms_of(self.accounts)
+        self.stored_terms = terms_of(self.stored_accounts)
 
     def take(self, count: int) -> int:
         """Reserve `count` new rows of power; return the index of the first."""
@@ -364,19 +370,33 @@ class Accounts:
         """Power of every account [W] : float64[accounts], at a state with given `dydt` and `out`."""
         rows = np.zeros(self.power_count)
         self.power(t, y, dydt, out, self.run_data.handle, rows)
-        return self.matrix @ rows
+        return sums_of(self.power_terms, rows, len(self.accounts))
 
     def stored_at(self, t: float, y: np.ndarray) -> np.ndarray:
         """Stored energy of each storing part, relative to the initial steady state [J] : float64[stored accounts]."""
         rows, out = np.zeros(self.stores), self.model.new_out()
         self.model.functions.rhs(t, y, np.zeros(0), out, self.run_data.handle)
         self.stored(t, y, np.zeros(0), out, self.run_data.handle, rows)
-        return self.holding @ rows
+        return sums_of(self.stored_terms, rows, len(self.stored_accounts))
 
 
-def matrix_of(accounts: list[Account], rows: int) -> np.ndarray:
-    """Matrix that sums the rows of each account with their signs : float64[accounts, rows]."""
-    matrix = np.zeros((len(accounts), rows))
-    for k, account in enumerate(accounts):
-        matrix[k, list(account.rows)] += account.signs
-    return matrix
+def compute_all_loads(run_data: RunData) -> None:
+    """Let the right-hand side compute all loads of fluid on bodies, for their work; changes tables of `run_data`."""
+    if len(run_data.model.tables.moving_segments):
+        run_data.tables.moving_segments["loads_body"] = rec.JOINT_LOAD_READ
+    if (run_data.model.tables.basins["frame"] >= 0).any():
+        run_data.tables.basins["loads_body"] = 1
+
+
+def terms_of(accounts: list[Account]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Terms of the sums of accounts: number of the account, row, and sign of each term."""
+    terms = [(k, row, sign) for k, account in enumerate(accounts)
+             for row, sign in zip(account.rows, account.signs, strict=True)]  # fmt: skip
+    numbers, rows, signs = zip(*terms, strict=True) if terms else ((), (), ())
+    return np.array(numbers, dtype=np.int64), np.array(rows, dtype=np.int64), np.array(signs, dtype=np.float64)
+
+
+def sums_of(terms: tuple[np.ndarray, np.ndarray, np.ndarray], rows: np.ndarray, count: int) -> np.ndarray:
+    """Sum of the rows of each account with their signs : float64[count]; terms : result of `terms_of`."""
+    numbers, at, signs = terms
+    return np.bincount(numbers, signs * rows[at], count)

@@ -48,7 +48,7 @@ class Couplings:
         self.short = self.pipes[tables.delays["pipe"][tables.delays["now"] > 0.0]]
         settings = tables.settings[0]
         self.linear = model.case.law.linear
-        self.upwind = settings["scheme"] == rec.UPWIND
+        self.own_friction = settings["scheme"] == rec.UPWIND and not settings["from_arriving"]
         self.reach = reach_of(model.case.numerics.scheme, settings)
         self.inner = self.nodes["kind"] == rec.JUNCTION
         self.masses, self.pistons = tables.masses["y"], tables.pistons
@@ -429,7 +429,7 @@ class Couplings:
     def coupled(self, pipe) -> bool:
         """True if the rate of each wave depends on all states that the rate of either wave reads."""
         rough = pipe["friction"] in (rec.FRICTION_ROUGH, rec.FRICTION_HAZEN)
-        return bool(not self.linear or rough or (pipe["loss"] != 0.0 and not self.upwind))
+        return bool(not self.linear or rough or (pipe["loss"] != 0.0 and not self.own_friction))
 
     def inside(self, pipe) -> Iterator[Pairs]:
         """Yield couplings of the waves in cells of a pipe with the waves in neighbouring cells."""

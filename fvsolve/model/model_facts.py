@@ -12,6 +12,7 @@ from fvsolve.case.basins import boundary_cells, patch_names
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.steady_friction import drag
+from fvsolve.model.delay_lines import step_at_start
 from fvsolve.model.reaction_tables import reaction_facts
 from fvsolve.parts.pipe.pipe_wall import HEAT_KEYS, Wall, materials, restraint_factor
 from fvsolve.steppers.automatic import first_method
@@ -111,21 +112,24 @@ def pose_facts(pose) -> dict[str, float]:
 def cost_notices(model, steps: int | None, set_by: str) -> list[Notice]:
     """List with a notice if an explicit method needs very many steps because a part is much faster than waves.
 
-    It is empty otherwise, and for given steps (`numerics.step`). steps, set_by : number of steps and reason as in
-    `checks`
+    It is empty otherwise, and for given steps (`numerics.step`) that are not divided.
+    steps, set_by : number of steps and reason as in `checks`
     """
     numerics, start = model.case.numerics, model.case.numerics.start
     explicit = numerics.method != AUTO and method_named(numerics.method).explicit
     waves = max([*model.wave_rates, *(basin.max_rate(model.start)[0] for basin in model.basins)], default=0.0)
-    if not explicit or numerics.step is not None or not waves > 0.0:
+    if numerics.step is not None:
+        waves = 1.0 / numerics.step
+    if not explicit or not waves > 0.0 or (numerics.step is not None and step_at_start(model) == numerics.step):
         return []
     rate = float(model.evaluate(start, model.start, start)[1][rec.RATE])
     ratio, count = rate / waves, steps or math.ceil((numerics.end - start) * rate / STABILITY_LIMIT)
     if ratio <= COSTLY_RATIO or count <= COSTLY_STEPS:
         return []
     reason = set_by if numerics.rtol is None else "a part that is faster than waves"
+    need = "waves need" if numerics.step is None else "numerics.step would need alone"
     text = (
-        f"{numerics.method}: about {count} steps, {ratio:.3g} times as many as waves need ({reason}); "
+        f"{numerics.method}: about {count} steps, {ratio:.3g} times as many as {need} ({reason}); "
         'method = "auto" or "rodas-5p" with rtol = 1e-6 needs fewer steps'
     )
     return [Notice("cost", "numerics", text, "method", float(count), float(count / ratio))]
@@ -178,7 +182,9 @@ def step_and_reason(model) -> tuple[float | None, str]:
     """
     numerics = model.case.numerics
     if numerics.step is not None:
-        return numerics.step, "numerics.step"
+        part = step_at_start(model)
+        divided = f"numerics.step, {model.case.step_amount(numerics.step)}, divided for {fastest_parts(model)}"
+        return part, "numerics.step" if part == numerics.step else divided
     if numerics.rtol is not None:
         return None, f"error control, rtol = {numerics.rtol:g}"
     if method_named(numerics.method).explicit:

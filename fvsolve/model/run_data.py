@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.assembly.model_draft import aligned_zeros
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.delay_lines.wave_history import COUNT
+from fvsolve.kernels.delay_lines.wave_history import COUNT, INFINITE, NEXT_ARRIVAL, SEGMENT_END, time_tolerance
 from fvsolve.model import input_histories
 from fvsolve.model.delay_lines import (
     LEAST_STEPS,
@@ -192,6 +192,20 @@ class RunData:
                 waves[int(row["pipe"])] = r, l = np.zeros(n), np.zeros(n)  # noqa: E741
                 waves_along_line(t, out, self.handle, index, r, l)
         return waves
+
+    def begin_segment(self, t: float, y: np.ndarray, end: float) -> None:
+        """Let the jumps of waves arrive that arrive at the time t [s] of state y, together with jumps of schedules.
+
+        A segment of the run begins at t. end : its end, where schedules may jump again; infinity for the last one [s]
+        """
+        past = self.past
+        if not past.size:
+            return
+        past[SEGMENT_END] = min(end, INFINITE)
+        if past[COUNT] > 0.0 and past[NEXT_ARRIVAL] <= t + time_tolerance(past):
+            out, values = self.model.new_out(), np.zeros(len(self.model.tables.probes))
+            out[rec.STATUS] = rec.ARRIVED
+            self.model.functions.record(t, y, out, self.handle, values)
 
     def evaluate(self, t: float, y: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:
         """Right-hand side and `out`, as `Model.evaluate`, with event flags set to the conditions at (t, y).

@@ -340,11 +340,17 @@ def bound_rows(states, first, second, base, gain, least, most) -> tuple[np.ndarr
 
 
 def depths(model):
-    """Yield `bound_rows` that keep depths of water in basin cells at 0 or above."""
+    """Yield `bound_rows` that keep depths of water in basin cells at 0 or above, and limit velocities between steps.
+
+    With bed friction, a velocity between two steps lies between those of the steps.
+    """
     for basin in model.basins:
+        states = int(basin.row["y"]) + np.arange(basin.n)
         if basin.deep:
-            states = int(basin.row["y"]) + np.arange(basin.n)
             yield bound_rows(states, NO_STATE, NO_STATE, basin.at_rest(), 0.0, -1.0, np.inf)
+        if basin.fades > 0.0 and basin.row["friction"] != rec.NO_DRAG:
+            for k in range(1, len(basin.quantities)):
+                yield bound_rows(states + k * basin.n, states, NO_STATE, basin.at_rest(), 1.0, basin.fades, -1.0)
 
 
 def scalar_bounds(model, q: int):

@@ -15,6 +15,7 @@ from fvsolve.report import import_library
 from fvsolve.units import span
 
 PRESSURE_QUANTITIES = ("pressure", "gauge_pressure", "head")
+COARSE = 0.98  # range of the rows, relative to that of all steps, below which rows are too coarse to be counted
 SMALLEST_RANGE = 1e-3  # smallest range that is counted, as a fraction of the greatest range
 
 
@@ -51,6 +52,21 @@ def count_cycles(values: np.ndarray, bins: int = 10) -> list[tuple[float, float]
     return [((k + 1) * width, float(sums[k])) for k in reversed(range(bins)) if sums[k] > 0.0]
 
 
+def check_rows(result, name: str) -> None:
+    """Raise FvsolveError if the rows of a probe miss a part of its range over all steps: cycles would be too small."""
+    extreme = result.extremes.get(name)
+    if extreme is None or extreme.maximum is None or extreme.minimum is None:
+        return
+    whole, rows = extreme.maximum - extreme.minimum, float(np.ptp(result[name]))
+    size = max(abs(extreme.maximum), abs(extreme.minimum))
+    if rows < COARSE * whole and whole > 1e-9 * size:
+        unit = span(result.units[name])
+        raise FvsolveError(
+            f"{name}: the rows have a range of {rows:.4g} {unit}, all steps one of {whole:.4g} {unit}, so cycles are "
+            "not counted. Repeat the run with a shorter output.every, a tenth of the shortest period"
+        )
+
+
 def cycles(result, probes: list[str] | None = None, strength: FatigueStrength | None = None) -> list[dict[str, Any]]:
     """Cycles of pressure or head at the probes `probes` (None for all of these quantities) : a dict for each probe.
 
@@ -58,7 +74,7 @@ def cycles(result, probes: list[str] | None = None, strength: FatigueStrength | 
     probe : name of the probe; unit : unit of the ranges; cycles : as from `count_cycles`
     share : fraction of the fatigue life that a run uses, if `strength` is given
     Ranges are upper ends of bins, so that the share is on the safe side. Raises FvsolveError for probes of other
-    quantities and for values that are not finite.
+    quantities, for values that are not finite, and for rows that are too coarse for the waves.
     """
     known = [name for name in result.probes if result.column(name).dimension in PRESSURE_QUANTITIES]
     unknown = [name for name in probes or () if name not in known]
@@ -69,6 +85,7 @@ def cycles(result, probes: list[str] | None = None, strength: FatigueStrength | 
     for name in probes or known:
         if not np.isfinite(result[name]).all():
             raise FvsolveError(f"{name} has values that are not finite, so its cycles cannot be counted")
+        check_rows(result, name)
         counts = count_cycles(np.asarray(result[name]))
         row: dict[str, Any] = {"probe": name, "unit": span(result.units[name]), "cycles": counts}
         if strength is not None:

@@ -16,6 +16,7 @@ ENVELOPE_KEYS = ("distance", "elevation", "min_pressure", "t_min", "max_pressure
 ROUNDING = 1e-9  # relative to a limit and the typical size of its quantity; a smaller excess is within the limit
 SIZES = {"pressure": 1e5, "gauge_pressure": 1e5, "head": 10.0, "pressure_head": 10.0}
 MAGNITUDES = ("velocity", "force")  # quantities of which a limit bounds the magnitude
+FEWEST_COMMON, COMMON = 3, 0.1  # least number of common times of two compared runs, and share in the shorter run
 NEAR = 1e-3  # relative to a vapour pressure, within which a limit counts as equal to it: a cavity keeps about that much
 WORST = 10  # places that a limit lists
 STATES = (FAILS, OPEN, HOLDS)  # worst first
@@ -355,18 +356,50 @@ def interpolated(t: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.nda
 def differences(a, b) -> dict:
     """Greatest and rms difference `b` - `a` of two results, for each probe that both have.
 
-    The differences are in the units of `a`, at those times of `a` that are within both runs; if the times of `b`
-    differ, its values are interpolated. The greatest is that of the greatest magnitude, with its sign. Without common
-    times they are None. "only_a" and "only_b" list probes of one run only.
+    The differences are in the units of `a`, at the times that both runs have. The greatest is that of the greatest
+    magnitude, with its sign. With few common times (`FEWEST_COMMON`, `COMMON`), they are at those times of `a` that are
+    within both runs, and values of `b` are interpolated; without such times they are None. "note" states which times
+    are compared, "" for equal times. "only_a" and "only_b" list probes of one run only.
     """
     shared = [probe for probe in a.probes if probe in b.units]
     return {
         "a": str(a.directory),
         "b": str(b.directory),
+        "note": _note(a.seconds, b.seconds),
         "probes": {probe: _difference(a, b, probe) for probe in shared},
         "only_a": [probe for probe in a.probes if probe not in b.units],
         "only_b": [probe for probe in b.probes if probe not in a.units],
     }
+
+
+def _note(t: np.ndarray, theirs: np.ndarray) -> str:
+    """Text that states which times of two runs are compared; "" for equal times."""
+    if np.array_equal(t, theirs):
+        return ""
+    count = len(common_rows(t, theirs)[0])
+    if count >= max(FEWEST_COMMON, COMMON * min(len(t), len(theirs))):
+        return f"the rows of both runs differ: compared at their {count} common times of {len(t)} and {len(theirs)}"
+    widest = float(np.diff(theirs).max(initial=0.0))
+    return (f"the runs have {count} common times: values of the second run are interpolated between rows up to "
+            f"{widest:.3g} s apart, so differences include those of this interpolation")  # fmt: skip
+
+
+def common_rows(t: np.ndarray, theirs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of the rows of two runs at common times : int64[k], int64[k].
+
+    At a jump (two rows at one time) both rows of one run belong to those of the other, or the later ones do.
+    """
+    near = 1e-9 * max(np.abs(t).max(initial=0.0), np.abs(theirs).max(initial=0.0))
+    rows: list[tuple[int, int]] = []
+    later = [np.append(np.diff(x) > near, True) for x in (t, theirs)]
+    for sides in (later, [~side for side in later]):  # all times; then the earlier rows of jumps
+        ours, others = map(np.flatnonzero, sides)
+        if others.size:
+            at = np.minimum(np.searchsorted(theirs[others], t[ours] - near), others.size - 1)
+            same = np.abs(theirs[others][at] - t[ours]) <= near
+            rows += list(zip(ours[same].tolist(), others[at[same]].tolist(), strict=True))
+    found = np.array(sorted(rows), dtype=np.int64).reshape(-1, 2)
+    return found[:, 0], found[:, 1]
 
 
 def _difference(a, b, probe: str) -> dict:
@@ -374,9 +407,13 @@ def _difference(a, b, probe: str) -> dict:
     other = b[probe] if a.units[probe] == b.units[probe] else column.from_si(b.si(probe))
     t, ours, theirs = a.seconds, a[probe], b.seconds
     if not np.array_equal(t, theirs):
-        within = (t >= theirs[0]) & (t <= theirs[-1])
-        t, ours = t[within], ours[within]
-        other = interpolated(theirs, other, t)
+        mine, same = common_rows(t, theirs)
+        if len(mine) >= max(FEWEST_COMMON, COMMON * min(len(t), len(theirs))):
+            t, ours, other = t[mine], ours[mine], other[same]
+        else:
+            within = (t >= theirs[0]) & (t <= theirs[-1])
+            t, ours = t[within], ours[within]
+            other = interpolated(theirs, other, t)
     difference = other - ours
     worst = int(np.argmax(np.abs(difference))) if len(t) else 0
     return {"unit": column.unit, "rows": len(t), "greatest": float(difference[worst]) if len(t) else None,

@@ -33,7 +33,8 @@ from fvsolve.steppers import loop_records
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.run_handle import JOIN
 
-COPIED = ("state", "control", "progress", "ledger", "carry", "g", "g_new", "out", "out_row", "values", "ledger_rates")
+COPIED = ("state", "control", "progress", "ledger", "carry", "g", "g_new", "pace", "out", "out_row", "values",
+          "ledger_rates")  # fmt: skip
 WRITTEN = ("clock", "armed", "marks", "scratch", "spare", "envelope", "extremes", "past")
 ABORT_DELAY = 0.5  # seconds between a message and the end of all ranks: `mpiexec` loses what it has not yet forwarded
 
@@ -132,7 +133,7 @@ def copy_integrator(stepper: Integrator) -> Integrator:
     copy = Integrator(stepper.method, stepper.scale.size, stepper.ledger_rates.shape[1], stepper.jacobian_structure,
                       stepper.scale, stepper.damped)  # fmt: skip
     copy.stored, copy.carry = stepper.stored, stepper.carry.copy()
-    for name in ("out", "out_row", "values", "g", "g_new", "rows"):
+    for name in ("out", "out_row", "values", "g", "g_new", "pace", "inner", "rows"):
         setattr(copy, name, getattr(stepper, name).copy())
     return copy
 

@@ -131,9 +131,9 @@ class Partition:
 
 
 def quantities(model: Model, b: int) -> int:
-    """Number of states in each cell of basin number b, with transported scalars and the height that infiltrated."""
+    """Number of states in each cell of basin number b, with transported scalars and the states of the soil."""
     basin = model.basins[b]
-    return len(basin.quantities) + len(basin.scalars) + (basin.soil is not None)
+    return len(basin.quantities) + len(basin.scalars) + basin.soil_states
 
 
 def row_size(model: Model, b: int) -> int:

@@ -16,9 +16,17 @@ from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.delay_lines.wave_history import CORRECTED_TIME
 from fvsolve.model.delay_lines import jump_overflow_notices
+from fvsolve.solve.energy_watch import EnergyWatch
 from fvsolve.solve.run_loop import STATUS_FAILURES
 from fvsolve.step_limits.growing_modes import forcing_sizes, state_ranges, states_outside_cells
-from fvsolve.step_limits.step_notices import DOUBTFUL, WRONG, initial_step_limits, step_limits
+from fvsolve.step_limits.step_notices import (
+    DOUBTFUL,
+    WRONG,
+    exceeds_limit_of_cells,
+    first_step,
+    initial_step_limits,
+    step_limits,
+)
 from fvsolve.steppers import automatic
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.tableau import method_named
@@ -36,9 +44,10 @@ class RunChecks:
     sound : time of the last checked state without growth [s]
     """
 
-    def __init__(self, run_data) -> None:
+    def __init__(self, run_data, has_ranks: bool = False) -> None:
         self.run_data, self.model = run_data, run_data.model
         model = self.model
+        self.energy = EnergyWatch(run_data, has_ranks)
         self.moving = model.basins if model.case.numerics.step is not None else []
         self.rates: dict[str, float] = {}
         self.predicted = initial_step_limits(model, run_data)
@@ -82,10 +91,14 @@ class RunChecks:
         """Notices of all checks at the end of a run; ledgers : balances of mass and scalars by name."""
         notices = list(self.predicted)
         # repeat the prediction with the wave rates and step errors of the run
-        if self.model.case.numerics.step is not None and (notices or self.moving):
-            notices = step_limits(self.model, self.rates, np.inf if self.grown else self.step_doubling.worst()[1])
+        doubling = self.step_doubling
+        if doubling.over_limit or (self.model.case.numerics.step is not None and (notices or self.moving)):
+            error = np.inf if self.grown else doubling.worst()[1]
+            notices = step_limits(self.model, self.rates, error, cell_error=doubling.worst_in_cells())
         step_error = self.step_doubling.notice()
         notices += [] if step_error is None else [step_error]
+        energy = self.energy.notice()
+        notices += [] if energy is None else [energy]
         notices += jump_overflow_notices(self.run_data.past)
         notices += self.sloshing.notices()
         notices += [] if self.grown is None else [self.grown]
@@ -100,9 +113,10 @@ def split_step_notices(numerics, counts: dict[str, int]) -> list[Notice]:
     if not counts.get("parted"):
         return []
     key = "step" if numerics.step is not None else "courant"
-    text = (f"{counts['parted']} of {counts['steps']} steps were too long for Newton's method, or for a disc that "
-            "shuts on a rigid column, and were taken in parts that end where the full step would have ended; give a "
-            f"smaller numerics.{key}, or rtol instead")  # fmt: skip
+    text = (f"{counts['parted']} of {counts['steps']} steps were too long for Newton's method, for a disc that shuts "
+            "on a rigid column, for a contact with an end-stop, or for a part with storage beside delay lines, and "
+            "were taken in parts that end where the full step would have ended; give a smaller "
+            f"numerics.{key}, or rtol instead")  # fmt: skip
     return [Notice("step-limit", "numerics", text, key, float(counts["parted"]), 0.0, True)]
 
 
@@ -234,6 +248,7 @@ EXPLICIT_CHECKS, IMPLICIT_CHECKS = 32, 16  # number of checks in a run of explic
 STEPS_BETWEEN_CHECKS, FEWEST_CHECKS = 50.0, 8
 LEAST_RANGE = 0.1  # least range of a state, in units of its small deviation
 FULL_STEP = 0.99  # fraction of a full step: steps that an event or a kink has shortened are not checked
+PEAK_SHARE = 0.1  # weight of the greatest error in cells beside the mean error
 STEP_ROUNDING = 1e-10  # relative to ranges: a smaller error is too small to measure r
 
 
@@ -241,12 +256,13 @@ class StepDoubling:
     """Estimate of the error of a run with steps of given length.
 
     It checks states outside cells under an explicit method, where the Courant limit bounds the errors of cells, and all
-    states under an implicit method; states of delay lines are left out. Without such states or without a given step
-    there is no check.
+    states under an implicit method, or if the steps exceed a limit of cells (`over_limit`); states of delay lines are
+    left out. Without such states, or without a given step within the limits of cells, there is no check.
 
-    restart_data : float64[4 + 5 k]  number of checks, step count of the next check, step count of the last check,
-    fraction r of an error that a step leaves; then five arrays over the k checked states: error of the last checked
-    step, accumulated error, sum of the accumulated errors over the checks, least value, greatest value
+    restart_data : float64[4 + 6 k]  number of checks, step count of the next check, step count of the last check,
+    fraction r of an error that a step leaves; then six arrays over the k checked states: error of the last checked
+    step, accumulated error, sum of the accumulated errors over the checks, least value, greatest value, greatest
+    accumulated error
     """
 
     def __init__(self, run_data) -> None:
@@ -254,26 +270,32 @@ class StepDoubling:
         numerics = model.case.numerics
         method = method_named(automatic.first_method(numerics.method))
         lines = model.tables.pipes["y"][model.tables.pipes["delay"] >= 0]  # their states do not affect other states
-        states = states_outside_cells(model) if method.explicit else np.setdiff1d(np.arange(model.y_size), lines)
-        self.model, self.states = model, states[: None if self.step > 0.0 else 0]
-        self.restart_data = np.zeros(4 + 5 * self.states.size)
-        self.error, self.accumulated_error, self.sums, self.least, self.greatest = self.restart_data[4:].reshape(5, -1)
+        self.over_limit = exceeds_limit_of_cells(model)
+        outside = states_outside_cells(model)
+        all_states = self.over_limit or not method.explicit
+        states = np.setdiff1d(np.arange(model.y_size), lines) if all_states else outside
+        self.model, self.states = model, states[: None if self.step > 0.0 or self.over_limit else 0]
+        self.in_cells = ~np.isin(self.states, outside) & self.over_limit
+        self.restart_data = np.zeros(4 + 6 * self.states.size)
+        rows = self.restart_data[4:].reshape(6, -1)
+        self.error, self.accumulated_error, self.sums, self.least, self.greatest, self.peaks = rows
         self.least[:] = self.greatest[:] = model.start[self.states]
         self.restart_data[3], self.stepper, self.implicit = 1.0, None, not method.explicit
         if self.states.size:
-            steps = (numerics.end - numerics.start) / self.step
+            steps = (numerics.end - numerics.start) / (self.step or first_step(model))
             self.interval = max(1.0, steps // IMPLICIT_CHECKS)
             if method.explicit:
                 self.interval = max(1.0, steps // EXPLICIT_CHECKS, min(STEPS_BETWEEN_CHECKS, steps // FEWEST_CHECKS))
             self.restart_data[1], self.small = self.interval, state_ranges(model, LEAST_RANGE)[self.states]
 
     def begin(self, steps: float) -> None:
-        """Order a check of the first step of a segment if the method is implicit.
+        """Order a check of the first step of a segment if the method is implicit, or the steps exceed a limit of cells.
 
-        An implicit method stays stable there, however great the change at the start of the segment.
+        An implicit method stays stable there, however great the change at the start of the segment. A segment of a run
+        beyond the limit may have a single step.
         steps : number of steps at the start of the segment
         """
-        if self.states.size and self.implicit:
+        if self.states.size and (self.implicit or self.over_limit):
             self.restart_data[1] = steps + 1.0
 
     def steps_left(self, steps: float) -> float:
@@ -286,9 +308,11 @@ class StepDoubling:
         steps, h = memory["steps"], memory["last"]
         if not self.states.size or steps < self.restart_data[1]:
             return
-        self.restart_data[1] = steps + 1.0  # check the next step if this step cannot be checked
+        # check the next step if this step cannot be checked, unless most steps are divided
+        divided = 0.0 < loop.control["dividing_rate"] < loop.out[rec.RATE]
+        self.restart_data[1] = steps + (self.interval if divided else 1.0)
         end = loop.control["end"]
-        full_step = self.step if loop.t < end else min(self.step, end - memory["t_mark"])
+        full_step = self.step if loop.t < end else min(self.step, end - memory["t_mark"])  # 0: any step is checked
         # A step in which a jump in a delay line corrected masses of storing nodes or flows of columns is not checked,
         # because half steps have no such correction. The mark is removed when the corrected state is recorded again.
         # Neither is a step that ends at an event, because half steps would follow the equations after it.
@@ -301,6 +325,8 @@ class StepDoubling:
         middle = self.single_step(loop, t, loop.before, 0.5 * h, first=True)
         half_steps = self.single_step(loop, t + 0.5 * h, middle, 0.5 * h)
         if not np.all(np.isfinite(half_steps)):  # the half steps cannot be computed
+            if self.over_limit:
+                self.peaks[self.in_cells] = np.inf
             return
         for state in (before, now):
             np.fmin(self.least, state, out=self.least)
@@ -330,6 +356,7 @@ class StepDoubling:
         )
         self.error[:] = own
         self.sums += self.accumulated_error
+        np.fmax(self.peaks, self.accumulated_error, out=self.peaks)
 
     def single_step(self, loop, t: float, y: np.ndarray, h: float, first=False) -> np.ndarray:
         """State after one step of length h [s] from state y at time t [s], with the method of the run.
@@ -359,13 +386,26 @@ class StepDoubling:
             return "", 0.0
         share = self.sums / self.restart_data[0] / self.widths()
         share[np.isnan(share)] = np.inf
+        share[self.in_cells] = 0.0
         at = int(np.argmax(share))
         return self.model.state_names[self.states[at]].partition("[")[0], float(share[at])
+
+    def worst_in_cells(self) -> float | None:
+        """Mean error of a state in cells over its range, if the steps exceed a limit of cells; otherwise None.
+
+        A tenth of the greatest error counts where it is more than the mean: an event may be near the end of the run. A
+        front that passes a cell gives a greatest error of 5 % and a small mean.
+        """
+        if not self.in_cells.any():
+            return None
+        mean = self.sums / max(1.0, self.restart_data[0])
+        share = (np.fmax(mean, PEAK_SHARE * self.peaks) / self.widths())[self.in_cells]
+        return float(np.nan_to_num(share, nan=np.inf).max())
 
     def notice(self) -> Notice | None:
         """Notice at the end of a run if the mean error is 0.5 % or more of the range of a state, otherwise None."""
         place, share = self.worst()
-        if not DOUBTFUL <= share < np.inf:  # a state that is not finite has stopped the run
+        if not DOUBTFUL <= share < np.inf or not self.step:  # a state that is not finite has stopped the run
             return None
         ok = share < WRONG
         verdict = "the results may be wrong" if ok else "the numbers are not to be trusted"

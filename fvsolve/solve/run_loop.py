@@ -14,6 +14,7 @@ from fvsolve.kernels.compiled_functions import fused_step_function
 from fvsolve.kernels.input_histories import BEGINS, MOST_POINTS
 from fvsolve.kernels.scalar_transport import GREATEST_RISE
 from fvsolve.model import Model, RunData
+from fvsolve.model.delay_lines import dividing_rate
 from fvsolve.model.input_histories import delays_of
 from fvsolve.model.scalar_tables import amount_indices, state_bounds
 from fvsolve.parts.schedule import BLOCK_PREFIX
@@ -95,16 +96,14 @@ class RunLoop:
         self.changed_at_events = [(device, row) for (_, _, device), row in
                                   zip(model.devices, model.tables.devices, strict=True)
                                   if type(device).apply_event is not Device.apply_event]  # fmt: skip
-        events = self.armed.size
-        stepper.g, stepper.g_new = np.zeros(events), np.zeros(events)
+        stepper.prepare_events(self.armed.size)
         stepper.rows = np.zeros((ROW_CAPACITY, 1 + len(model.tables.probes)))
         self.state, self.control, self.progress = stepper.state[0], stepper.control[0], stepper.progress[0]
         self.out, control = stepper.out, self.control
         control["step_max"] = longest_step(model)
         control["stop_at"], control["allow_fused"] = NO_LIMIT, fused_allowed
-        for mode, key in enumerate(("courant", "step", "rtol")):  # COURANT, FIXED_STEP, TOLERANCE of `loop_records`
-            if getattr(numerics, key) is not None:
-                control["mode"], control["size"] = mode, getattr(numerics, key)
+        control["has_jumps"] = model.tables.delays.size > 0
+        set_step_mode(control, numerics)
         if numerics.method == automatic.AUTO:
             automatic.watch(stepper, structure())
         # of waves only: implicit steps are stable for the rest
@@ -114,6 +113,8 @@ class RunLoop:
         control["step_max"] = min(control["step_max"], longest / (STEPS_IN_DELAY if numerics.rtol is not None else 1))
         if control["mode"] == loop_records.FIXED_STEP:
             control["size"] = min(control["size"], longest)
+        if control["mode"] == loop_records.FIXED_STEP and method.explicit:
+            control["dividing_rate"] = dividing_rate(model, self.given_step)
         self.run_data.clock["step"] = self.given_step
         self.team, single_band = None, make_partition(model, 1)
         if method.explicit and numerics.method != automatic.AUTO:
@@ -407,6 +408,13 @@ class RunLoop:
         return f"{parts_text} {verbs} without end at {when}; {remedy}"
 
 
+def set_step_mode(control, numerics) -> None:
+    """Set the mode of the steps and its number: Courant number, given step [s] or tolerance."""
+    for mode, key in enumerate(("courant", "step", "rtol")):  # COURANT, FIXED_STEP, TOLERANCE of `loop_records`
+        if getattr(numerics, key) is not None:
+            control["mode"], control["size"] = mode, getattr(numerics, key)
+
+
 def step_of_waves(model: Model) -> float:
     """Given step of an implicit method with a Courant number [s]: that of the fastest wave at the start."""
     rate = model.wave_rate
@@ -446,7 +454,7 @@ def fused_step_allowed(model: Model, method: Method) -> bool:
     settings, numerics = model.tables.settings[0], model.case.numerics
     laws = model.tables.pipes["friction"]
     return bool(
-        model.case.law.linear and settings["scheme"] == rec.UPWIND
+        model.case.law.linear and settings["scheme"] == rec.UPWIND and settings["from_arriving"]
         and method.explicit and method.stages == 1 and numerics.rtol is None
         and model.y_size == 2 * model.cells and model.shapes.armed == 0 and not len(model.tables.moving_segments)
         and not len(model.tables.controls)

@@ -23,6 +23,8 @@ CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
 FIRST_CHUNK = 1000.0  # steps before the first pause
 # steps between two checks by `RunChecks.check` where it is needed often
+# A run under error control ends if this count of attempted steps advances by less than this fraction of the run.
+STALLED_ATTEMPTS, STALLED_ADVANCE = 2000, 1e-10
 FREQUENT_CHECK_STEPS = loop_records.GROWTH_CHECK_STEPS
 PERSISTENT = ("extremes", "envelope", "maxima", "marks", "armed", "discrete")
 HISTORIES = ("past", "histories")  # arrays that may grow during a run
@@ -107,7 +109,7 @@ class Run:
         self.loop.now[:] = state.y
         self.loop.state["t"] = state.t
         self.budget, self.seconds, self.saved = FIRST_CHUNK, 0.0, time.perf_counter()
-        self.checks = RunChecks(self.run_data)
+        self.checks = RunChecks(self.run_data, comm is not None)
         self.loop.stepper.largest = self.checks.largest_if_needed
         if self.checks.needs_frequent_checks:
             self.budget = FREQUENT_CHECK_STEPS
@@ -115,6 +117,7 @@ class Run:
         self.invalid_from = np.inf  # time from which results are invalid, because states have grown [s]
         # steps left in a chunk, time of the last pause: rows, frames and new segments do not end a chunk
         self.left, self.paused = self.budget, self.saved
+        self.last_stall_check: np.ndarray | None = None  # time, attempted steps
         if not self.fresh:
             try:
                 self.restore(state.memory)
@@ -136,7 +139,8 @@ class Run:
         views = {name: getattr(self.run_data, name) for name in PERSISTENT} | self.loop.stepper.restart_arrays()
         views |= {f"watch {k}": watch.greatest for k, watch in enumerate(self.watches)}
         return views | {
-            "sloshing": self.checks.sloshing.restart_data, "step doubling": self.checks.step_doubling.restart_data
+            "sloshing": self.checks.sloshing.restart_data, "step doubling": self.checks.step_doubling.restart_data,
+            "energy": self.checks.energy.restart_data,
         }  # fmt: skip
 
     def memory(self) -> dict[str, np.ndarray]:
@@ -279,11 +283,15 @@ class Run:
 
     def begin_segment(self, jumped: bool) -> None:
         end, jump = self.bounds[self.segment]
+        last = self.segment == len(self.bounds) - 1 and not self.ends_with_jump
+        self.run_data.begin_segment(self.loop.t, self.loop.now, np.inf if last else end)
         self.stop_columns()
         self.checks.step_doubling.begin(self.loop.state["steps"])
         if jumped:
             self.row(self.loop.t, end)
         self.loop.begin(end, end if jump else NO_LIMIT)
+        if jumped or self.loop.t == self.start:
+            self.checks.energy.begin(self.loop)
 
     def segments(self) -> str:
         """Step through the remaining segments; returns the reason for the end of the run."""
@@ -300,6 +308,7 @@ class Run:
                 self.pass_outputs(end, out)
             if self.segment == len(self.bounds) - 1:
                 if self.ends_with_jump:
+                    self.run_data.begin_segment(self.loop.t, self.loop.now, np.inf)
                     self.row(end, np.inf)
                 return "finished"
             self.segment += 1
@@ -309,12 +318,14 @@ class Run:
         """Step to the end of the segment; returns "", or the reason why the run cannot continue."""
         while True:
             before, steps, busy = time.perf_counter(), self.loop.state["steps"], self.busy
-            code = self.loop.run(min(self.left, self.checks.step_doubling.steps_left(steps)))
+            due = min(self.checks.step_doubling.steps_left(steps), self.checks.energy.prepare(self.loop))
+            code = self.loop.run(min(self.left, due))
             self.processor += self.busy - busy
             self.left = max(0.0, self.left - (self.loop.state["steps"] - steps))
             self.seconds += time.perf_counter() - before
             self.flush()
             self.checks.step_doubling.check(self.loop)
+            self.checks.energy.check(self.loop)
             grown = self.checks.check(self.loop.t, self.loop.now)
             if grown and code != loop_records.CHATTERING:  # the message about chattering names the parts
                 self.invalid_from = self.checks.sound
@@ -328,6 +339,8 @@ class Run:
             elif code == loop_records.BUDGET_SPENT and self.left <= 0.0:
                 self.pause()
                 self.left, self.paused = self.budget, time.perf_counter()
+                if stalled := self.stalled():
+                    return self.failure(stalled)
             elif code == loop_records.DONE:
                 lost = self.model.y_size == 0 and self.loop.block_without_output()  # no rate can tell
                 return self.failure(code) if lost else ""
@@ -349,6 +362,23 @@ class Run:
             self.progress(self.loop.t, time.perf_counter() - self.began, int(self.loop.state["steps"]))
         if time.perf_counter() - self.saved > CHECKPOINT_SECONDS:
             self.save()
+
+    def stalled(self) -> int:
+        """Code of the failure of a run under error control whose steps no longer advance, otherwise 0.
+
+        Rates with noise let Newton fail, or errors stay, at any step above the rounding of time: such a run has no end.
+        """
+        state, control = self.loop.state, self.loop.control
+        now = np.array([self.loop.t, state["steps"] + state["rejections"] + state["newton_failures"]])
+        if self.last_stall_check is None:
+            self.last_stall_check = now
+        advance, attempts = now - self.last_stall_check
+        if attempts < STALLED_ATTEMPTS:
+            return 0
+        self.last_stall_check = now
+        if control["mode"] != loop_records.TOLERANCE or advance >= STALLED_ADVANCE * (self.end - self.start):
+            return 0
+        return loop_records.NEWTON_STUCK if state["newton_failures"] > 0.0 else loop_records.TINY_STEP
 
     def save(self) -> None:
         self.sink.checkpoint(self.state(), {})

@@ -34,7 +34,7 @@ GROWTH = 1e-9  # |R| - 1 above which a wave counts as growing
 LOWEST, HIGHEST, HALVINGS = 1.0 / 64.0, 64.0, 40  # range of trial Courant numbers, number of bisections
 FINE = 1001  # phases along a line
 MARGIN = 1.01  # margin of the Courant number: a step stable with it needs no further check
-LONG = 40  # number of cells from which the ends of a pipe do not reduce the limit
+LONG = 40  # number of cells from which the ends of a pipe reduce the limit by less than 8 %
 WORST = (0.0, 1.0, -1.0)  # products of reflection factors of both ends that reduce the limit most
 RISE = 1.02  # ratio of trial Courant numbers for a pipe of few cells
 

@@ -140,9 +140,10 @@ class Mode(NamedTuple):
     frequency: float
 
 
-def lumped_modes(model, method: str, step: float) -> list[Mode]:
+def lumped_modes(model, method: str, step: float, count: float | None = None) -> list[Mode]:
     """Fastest growing mode of the states outside cells, and that of the cells, with steps of `step` [s], as a list.
 
+    count : number of steps of the run; default: the duration of the run over the step
     Modes that grow less than 10 times in the run are left out. Under a given Courant number only modes of waves with
     friction are computed. Raises FvsolveError for a method without a stability function.
     """
@@ -153,6 +154,7 @@ def lumped_modes(model, method: str, step: float) -> list[Mode]:
     if fixed:  # a Courant number limits the other modes
         cells += memory_modes(model) + pipe_scalar_modes(model) + basin_scalar_modes(model)
         cells += reaction_modes(model)
+    span = max(span, step * (count or 0.0))  # breaks of schedules shorten steps, but each still is a step
     candidates = [fastest_growing(r, modes, step, span, modes is own) for modes in (own, cells)]
     return [mode for mode in candidates if mode is not None]
 
@@ -234,10 +236,15 @@ def friction_modes(model) -> Modes:
     """Modes of waves in pipes with friction, at the initial flow: pairs of pipe name and eigenvalues [1/s]."""
     scheme, modes = model.case.numerics.scheme, []
     weights = SCHEMES[scheme].smooth.weights
+    from_arriving = model.tables.settings[0]["from_arriving"] and model.case.law.linear
     symbols = {n: pipe_symbol(tuple(weights), n) for n in {mesh.cells for mesh in model.pipes}}
     for mesh, row, q in zip(model.pipes, model.tables.pipes, model.wave_rates, strict=True):
         g = friction_slope(row)
-        if g > 0.0 and row["delay"] < 0:
+        if g > 0.0 and row["delay"] < 0 and from_arriving:
+            # Friction of the waves that enter a cell follows their transport, which amplifies nothing up to its own
+            # limit; it multiplies the flow by 1 - h g.
+            modes.append((mesh.name, np.array([-g + 0j])))
+        elif g > 0.0 and row["delay"] < 0:
             z = symbols[mesh.cells]  # waves between two ends are longer than two cells
             root = np.sqrt(0.25 * g * g - (q * z.imag) ** 2 + 0j)
             modes.append((mesh.name, np.concatenate([q * z.real - 0.5 * g + root, q * z.real - 0.5 * g - root])))

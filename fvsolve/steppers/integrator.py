@@ -10,8 +10,18 @@ from fvsolve.jit import compile_in_parallel, compile_once
 from fvsolve.kernels.calls import compile_as
 from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers.coefficients import coefficients, start_slope_correction
+from fvsolve.steppers.event_search import INNER_ROWS
 from fvsolve.steppers.ledger import LEDGER_ROWS
-from fvsolve.steppers.run_handle import ATTEMPT, RunArrays, addresses, boxed_run, handle_of_run, no_algebra, no_exchange
+from fvsolve.steppers.run_handle import (
+    ATTEMPT,
+    RunArrays,
+    addresses,
+    boxed_run,
+    handle_of_run,
+    no_algebra,
+    no_exchange,
+    no_watch,
+)
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import Method
 from fvsolve.steppers.time_loop import compiled
@@ -48,9 +58,11 @@ class Integrator:
         self.largest = self.no_floats  # largest allowed states, where growth is checked
         self.out, self.out_row, self.values = np.zeros(6), np.zeros(6), np.zeros(0)
         self.out[rec.JUMP_TIME] = rec.NO_JUMP
-        self.g = self.g_new = self.armed = self.no_floats
+        self.armed = self.no_floats
+        self.prepare_events(0)
         self.y_out, self.rows = np.zeros(n), np.zeros((1, 1))
         self.bounded_states, self.bounds = self.no_integers, np.zeros((0, 4))
+        self.watcher, self.watch = no_watch(), self.no_integers
         self.join, self.row_blocks, self.sums = no_exchange(), np.array([[0, n, 0, 1, n]]), np.zeros(1)
         self.use(method)
 
@@ -72,13 +84,18 @@ class Integrator:
             self.attempt = attempt_of(method.kind, structure.kind)
             self.prepare_newton(structure)
         control["order"] = method.control_order
-        control["end_at_rows"] = self.dense_order + 1 < method.order  # else rows are as accurate as ends of steps
         control["separate_rows"] = self.separate_rows
+        control["end_at_rows"] = self.end_at_rows
         control["fsal"] = method.explicit and method.first_same_as_last
         control["kind"] = KINDS[method.kind][1]
         ends_at_stage = np.array_equal(self.coefficients[s * (s - 1) : s * s], self.coefficients[s * s : s * s + s])
         control["stage_slope"] = control["kind"] == rec.NEWTON_SOLVED and not self.dense.size and ends_at_stage
         self.restart_segment()
+
+    def prepare_events(self, count: int) -> None:
+        """Allocate the arrays of `count` event functions."""
+        self.g, self.g_new, self.inner = np.zeros(count), np.zeros(count), np.zeros((INNER_ROWS, count))
+        self.pace = np.full(count, rec.UNKNOWN_PACE)
 
     def restart_segment(self) -> None:
         """Begin the next call at the present state, without a step before it."""
@@ -143,6 +160,22 @@ class Integrator:
         solved = method.kind == "linear" or method.stiffly_accurate and not (self.dense.size and method.c[0] == 0.0)
         return rec.SEPARATE_AT_START if solved else rec.ALWAYS_SEPARATE
 
+    @property
+    def end_at_rows(self) -> bool:
+        """True if steps under error control end at the times of rows: the dense output cannot be used within them.
+
+        Its order is too low, or it contains the rate f(t, y) of a stiff problem, or no real factor of Newton iterations
+        exists, with which `row_substeps.defect` estimates its error.
+        """
+        method, implicit = self.method, not self.method.explicit
+        if self.dense_order + 1 < method.order or implicit and self.separate_rows == rec.ALWAYS_SEPARATE:
+            return True
+        if method.kind != "full":
+            return False
+        from fvsolve.steppers.irk import pairs_of
+
+        return len(self.k) - 1 == 2 * pairs_of(method)
+
     def discard_history(self) -> None:
         """Discard the step size, the last error, the stiffness count and the Jacobian, for a start after a kink."""
         for name in ("step", "error_old", "switch_count", "split_remainder"):
@@ -154,7 +187,7 @@ class Integrator:
 
     def restart_arrays(self) -> dict[str, np.ndarray]:
         """All arrays of this object on which the next step depends, by name, except the states y."""
-        names = ["state", "ledger", "carry"]
+        names = ["state", "ledger", "carry", "pace"]
         if self.control["kind"] != rec.EXPLICIT:  # f at the start of the last step, and its stages
             names += ["newton", "jacobian", "first", "k"]
         return {name: getattr(self, name) for name in names}
@@ -184,15 +217,20 @@ class Integrator:
         return self.run
 
     def prepare_spare(self) -> None:
-        """Make the handle `spare`, with other arrays of a step, if separate steps are needed for output rows."""
+        """Make the handle `spare`, with other arrays of a step, if rows may need separate steps or substeps."""
         control = self.control[0]
-        if control["separate_rows"] == rec.NEVER_SEPARATE or control["mode"] == rec.TOLERANCE:
+        adaptive = control["mode"] == rec.TOLERANCE
+        if control["separate_rows"] == rec.NEVER_SEPARATE and (control["kind"] == rec.EXPLICIT or not adaptive):
             return
         own = ("newton", "k", "ledger_rates", "jacobian", "product", "buffer", "ledger_slopes", "factors")
         own += ("complex_factors", "last_stages", "transformed", *IMPLICIT_VECTORS)
-        self.spare_arrays = RunArrays(*all_arrays(self))._replace(
-            **{name: np.zeros_like(getattr(self, name)) for name in own}, out=self.out_row
-        )
+        if adaptive:
+            if control["end_at_rows"] and not control["dense_steps"]:
+                return
+            own += () if control["end_at_rows"] else ("state", "progress", "y", "f_old")
+        arrays = {name: getattr(self, name) for name in own}
+        empty = {name: np.zeros(array.shape, array.dtype) for name, array in arrays.items()}  # no memory before use
+        self.spare_arrays = RunArrays(*all_arrays(self))._replace(**empty, out=self.out_row)
         self.spare = boxed_run(self.spare_arrays)
 
     def single_step(self, rhs, handle, ledger_offset: int, t: float, h: float, y: np.ndarray) -> np.ndarray:
@@ -206,7 +244,7 @@ class Integrator:
         self.state["steps"] += 1.0
         self.control["ledger_offset"] = ledger_offset
         if not self.calls.size:  # a single step calls no observers
-            self.calls = addresses((self.attempt, rhs, rhs, rhs, rhs, rhs, *self.algebra, self.join))
+            self.calls = addresses((self.attempt, rhs, rhs, rhs, rhs, rhs, *self.algebra, self.join, self.watcher))
         rhs(t, self.y[0], self.k[0], self.out, handle)
         self.ledger_rates[0] = self.out[ledger_offset : ledger_offset + self.ledger_rates.shape[1]]
         error = self.attempt(handle, self.handle(False), t, h, 0, 1)
@@ -223,7 +261,9 @@ class Integrator:
         handle : their argument, the handle of the model; armed : flags of the events
         ledger_offset : index of the first ledger rate in `out`
         """
-        calls = addresses((self.attempt, fused_step, observe, record, events, rhs, *self.algebra, self.join))
+        calls = addresses(
+            (self.attempt, fused_step, observe, record, events, rhs, *self.algebra, self.join, self.watcher)
+        )
         self.calls = self.calls if self.calls.size else calls
         self.calls[:] = calls
         self.control["ledger_offset"], self.armed = ledger_offset, armed

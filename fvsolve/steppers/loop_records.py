@@ -32,10 +32,14 @@ COUNTS = {
 # stage_slope : 1 where the slope of the last stage is used as that of the end, because a new evaluation of f
 # would amplify the Newton residual
 # end_at_rows, separate_rows : source of rows with and without error control; ledger_offset : first ledger rate in `out`
+# dense_steps : 1 where states within every step are needed, not only those of rows
+# dividing_rate : rate above which a given step is divided into parts of its time constant [1/s]; 0 for none
+# watch_at : count of steps at which the next state is watched, see `run_handle.WATCH`; 0 for none
+# has_jumps : 1 where waves of delay lines arrive, so that event functions may jump
 # price : cost of an implicit step in explicit steps; order : power of h of the error estimate; budget : steps left
 CONTROL = _record(
-    "mode kind allow_fused fsal stage_slope watch end_at_rows separate_rows ledger_offset",
-    "start end every field_every size step_max budget field_count stop_at order price",
+    "mode kind allow_fused fsal stage_slope watch end_at_rows separate_rows ledger_offset dense_steps has_jumps",
+    "start end every field_every size step_max budget field_count stop_at order price dividing_rate watch_at",
 )
 # Kept between calls while rows remain to be written: phase; 1 after a step; rows of y with the present and the last
 # state; number of rows; 1 if the rhs switches at the end of the last step. Kept from a step to the next within a call:
@@ -71,6 +75,7 @@ REPEAT = -1  # in place of a reason: compute the rates of the present state agai
 FRESH, FUSED, EMIT, READY = range(4)  # values of `phase`
 
 LEAST_TOLERANCE = 1e-13  # least relative tolerance: below it rounding errors dominate
+UNKNOWN_PACE = 1e100  # in the array `pace`: no step with this event function has been taken
 LEAST_STEP = 4e-16  # least step, relative to the time
 
 # Entries of `out` that the loop reads; LONGEST_STEP limits the next step under error control [s], 0 for no limit.
@@ -79,4 +84,5 @@ NO_JUMP = -1e300  # in JUMP_TIME: no jump will arrive
 CORRECTED, ARRIVED = 7, 8  # in STATUS: the record has corrected the accepted state; the record lets a jump arrive now
 NOT_FINITE = 3  # a value of out[STATUS]
 STOP_HERE = -2.0  # in out[PLACE]: the record requests the end of the run
+UNKNOWN_DEFECT = 1e300  # in place of a defect: the rates on the dense output are not valid
 NEWTON_FAILED = -1.0  # in place of an error: the stages could not be solved with this step

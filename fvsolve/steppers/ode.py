@@ -4,10 +4,10 @@ import functools
 import inspect
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from numbers import Real
 from types import CodeType, FunctionType
-from typing import Any
+from typing import Any, overload
 
 import numba
 import numpy as np
@@ -20,18 +20,38 @@ from fvsolve.kernels.calls import argument_types
 from fvsolve.steppers import automatic, loop_records
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.loop_records import LEAST_STEP, LEAST_TOLERANCE
+from fvsolve.steppers.ode_events import EventSearch, EventSolution, read_events
 from fvsolve.steppers.run_handle import EVENTS, FUSED_STEP, OBSERVE, RHS
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import AUTO, METHODS, Method, method_named
 
 NO_LIMIT = 1e308
+AFTER_STEP = loop_records.DONE, loop_records.BUDGET_SPENT  # codes after a step whose end is valid
+
+
+@overload
+def integrate(
+    f: Callable[..., Any], y0: ArrayLike, t: ArrayLike, method: str | Method = ..., rtol: float | None = ...,
+    step: float | None = ..., atol: ArrayLike | None = ..., counts: dict[str, int] | None = ..., *,
+    max_step: float | None = ..., first_step: float | None = ..., tcrit: ArrayLike = ..., events: None = ...,
+) -> np.ndarray: ...  # fmt: skip
+
+
+@overload
+def integrate(
+    f: Callable[..., Any], y0: ArrayLike, t: ArrayLike, method: str | Method = ..., rtol: float | None = ...,
+    step: float | None = ..., atol: ArrayLike | None = ..., counts: dict[str, int] | None = ..., *,
+    max_step: float | None = ..., first_step: float | None = ..., tcrit: ArrayLike = ...,
+    events: Callable[..., Any] | Sequence[Callable[..., Any]],
+) -> EventSolution: ...  # fmt: skip
 
 
 def integrate(
     f: Callable[..., Any], y0: ArrayLike, t: ArrayLike, method: str | Method = "dormand-prince",
     rtol: float | None = None, step: float | None = None, atol: ArrayLike | None = None,
-    counts: dict[str, int] | None = None,
-) -> np.ndarray:  # fmt: skip
+    counts: dict[str, int] | None = None, *, max_step: float | None = None, first_step: float | None = None,
+    tcrit: ArrayLike = (), events: Any = None,
+) -> np.ndarray | EventSolution:  # fmt: skip
     """Integrate y' = f(t, y), y(t[0]) = y0; returns y at the times t : float64[len(t), n].
 
     f : f(t, y) -> float64[n], or f(t, y, dydt), which fills its last argument; compiled if numba can compile it
@@ -40,6 +60,11 @@ def integrate(
     atol : absolute tolerance, a number or float64[n]; default: equal to rtol; not used under `step`
     step : fixed step [s], possible with every method except "auto"
     counts : dict that receives the numbers of steps, rejections, rhs calls, Jacobians, factorisations and so on
+    max_step, first_step : greatest and first step under error control [s]; default: not limited, from the rates
+    tcrit : times at which f jumps or has a kink, at which steps end; f is read before and after each of them
+    events : function g(t, y) whose zeros are located, or a list of functions, with the attributes `terminal` (False, or
+    the number of zeros that ends the integration) and `direction` (0, or the sign of the slope of g at zeros that
+    count). Then the result is an `EventSolution` with t, y, t_events, y_events, status. A zero at t[0] is no event.
     Values at the times t come from dense output if it is accurate enough. Otherwise steps end there under `rtol`, and
     separate steps lead there under `step`.
     Raises FvsolveError for invalid arguments, two step settings, a method without an error estimate and without a step,
@@ -59,46 +84,99 @@ def integrate(
     if y0.ndim != 1:
         raise FvsolveError(f"y0 has shape {y0.shape}. Expected a single row of numbers")
     _check(method, t, rtol, step)
+    _check_steps(t, step, max_step, first_step)
+    found = read_events(events) if events is not None else []
     size = step if step is not None else (1e-6 if rtol is None else rtol)
     scale = np.ones(y0.size) if atol is None or step is not None else _scale(atol, size, y0.size)
     stepper = Integrator(method, y0.size, 0, lambda: _full(y0.size), scale)
     stepper.y[0], stepper.state["t"] = y0, t[0]
     mode = loop_records.FIXED_STEP if step is not None else loop_records.TOLERANCE
-    stepper.set_control(mode=mode, size=size, step_max=NO_LIMIT, stop_at=NO_LIMIT)
+    stepper.set_control(mode=mode, size=size, step_max=max_step or NO_LIMIT, stop_at=NO_LIMIT)
+    stepper.state["step"] = first_step or 0.0
     if automatic_choice:
         automatic.watch(stepper, _full(y0.size))
     key = next(_KEYS)
     functions, _PYTHON[key] = _prepare(f, t[0], y0)
+    search = EventSearch(found, stepper, np.array([key]))
     try:
-        states = _solve_steps(stepper, functions, key, t, y0)
+        states = _solve_steps(stepper, functions, key, t, y0, _critical_times(tcrit, t), search)
     finally:
         _PYTHON.pop(key), _EXCEPTIONS.pop(key, None)
     if counts is not None:
         counts |= stepper.counts()
-    return states
+    return states if events is None else search.solution(t, states)
 
 
-def _solve_steps(stepper: Integrator, functions: tuple, key: int, t, y0) -> np.ndarray:
-    """Take all steps, and return the states at the times t : float64[len(t), n].
+def _solve_steps(stepper: Integrator, functions: tuple, key: int, t, y0, critical, search) -> np.ndarray:
+    """Take all steps, and return the states at the times t : float64[len(t), n], or up to a terminal event.
 
     stepper : `Integrator` of the call; y0 : state at t[0]; functions : result of `_functions`
     key : number of the call, with which compiled code finds the Python function
+    critical : result of `_critical_times`; search : `EventSearch` of the call
     """
     stepper.times, stepper.rows = np.ascontiguousarray(t[1:]), np.zeros((t.size, y0.size + 1))
     states = np.empty((t.size, y0.size))
     states[0] = y0
-    stepper.set_control(end=t[-1])
-    stepper.restart_segment()
-    code = loop_records.BUDGET_SPENT
+    for end, start in (*critical, (t[-1], t[-1])):
+        stepper.set_control(end=end)
+        stepper.restart_segment()
+        code = _solve_segment(stepper, functions, key, search)
+        if code == loop_records.STOPPED:
+            states[1:] = stepper.rows[: t.size - 1, 1:]
+            return states
+        if code != loop_records.DONE:
+            raise FvsolveError(_failure(stepper.method, code, stepper.state[0])) from _EXCEPTIONS.get(key)
+        if end < t[-1]:
+            stepper.discard_history()
+            stepper.state["t"] = start
+    states[1:-1], states[-1] = stepper.rows[: t.size - 2, 1:], stepper.y[stepper.progress[0]["now"]]
+    return states
+
+
+def _solve_segment(stepper: Integrator, functions: tuple, key: int, search) -> int:
+    """Take all steps of a segment; returns a code of `loop_records`, STOPPED for a terminal event.
+
+    Arguments as for `_solve_steps`
+    """
+    code, handle, steps = loop_records.BUDGET_SPENT, np.array([key]), stepper.state[0]["steps"]
     while code == loop_records.BUDGET_SPENT:
         if automatic.is_change_due(stepper):
             automatic.change(stepper)
-        stepper.set_control(budget=NO_LIMIT)
-        code = stepper.call(*functions, np.array([key]), WHERE, stepper.no_floats)
-    if code != loop_records.DONE:
-        raise FvsolveError(_failure(stepper.method, code, stepper.state[0])) from _EXCEPTIONS.get(key)
-    states[1:-1], states[-1] = stepper.rows[: t.size - 2, 1:], stepper.y[stepper.progress[0]["now"]]
-    return states
+        stepper.set_control(budget=1.0 if search.events else NO_LIMIT)
+        code = stepper.call(*functions, handle, WHERE, stepper.no_floats)
+        if search.events and stepper.state[0]["steps"] > steps and code in AFTER_STEP:
+            steps = stepper.state[0]["steps"]
+            if search.search_step():
+                return loop_records.STOPPED
+    return code
+
+
+def _critical_times(tcrit, t) -> list[tuple[float, float]]:
+    """(end of steps just before, start just after) each critical time within the times t, increasing [s].
+
+    The distance is a few units of rounding, so that f is evaluated on the right side of a jump of either convention.
+    Raises FvsolveError for values that are not finite numbers.
+    """
+    times = np.unique(_numbers("tcrit", tcrit))
+    if not np.isfinite(times).all():
+        raise FvsolveError(f"tcrit = {tcrit!r} is not valid. Expected finite times")
+    gap = 4.0 * np.finfo(float).eps * np.abs(t).max()
+    return [(time - gap, time + gap) for time in times.tolist() if t[0] + 4.0 * gap < time < t[-1] - 4.0 * gap]
+
+
+def _check_steps(t, step, max_step, first_step) -> None:
+    """Raise FvsolveError for invalid limits of steps."""
+    for name, value in (("max_step", max_step), ("first_step", first_step)):
+        if value is None:
+            continue
+        if step is not None:
+            raise FvsolveError(f"step and {name} both set the step; give only one of them")
+        if not isinstance(value, Real) or not value > 0:
+            raise FvsolveError(f"{name} = {value!r} is not a positive number")
+        if value <= LEAST_STEP * np.abs(t).max():
+            raise FvsolveError(f"{name} = {value:g} is too small to change the time")
+    if first_step is not None and first_step > t[-1] - t[0]:
+        raise FvsolveError(f"first_step = {first_step:g} is longer than the integration, {t[-1] - t[0]:g}")
 
 
 def _prepare(f, t0, y0) -> tuple:

@@ -5,6 +5,7 @@ from fvsolve.kernels.stage_sums import HUGE
 from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers import run_handle
 from fvsolve.steppers.coefficients import start_slope_of
+from fvsolve.steppers.row_substeps import needs_defect, substep_row
 from fvsolve.steppers.run_handle import evaluate, open_run, store_ledger_rates
 from fvsolve.steppers.step_control import NEVER
 from fvsolve.steppers.step_operations import BEGIN, STOP, copy, interpolate
@@ -63,18 +64,48 @@ def reference_amount(states, bounds, y):
     return amount
 
 
+@njit(forceinline=True)
+def per_amount(value, total, thin):
+    """Ratio of a state to its reference amount, which fades to zero below the amount `thin`."""
+    wide = max(total, thin)
+    return value * (2.0 * total / (total * total + wide * wide))
+
+
 @njit
-def limit_to_bounds(states, bounds, y_old, y, out):
+def limit_ratio(states, row, y_old, y, out):
+    """Limit the ratio of an interpolated state to its reference amount to the range of both ends of the step.
+
+    Strong damping within a step makes rates at its ends useless for interpolation: between slow states the polynomial
+    has fast ones, without bound. states, row : as for `limit_to_bounds`, of one state; other arguments as there
+    """
+    first = per_amount(y_old[states[0]], max(reference_amount(states, row, y_old), 0.0), row[LEAST])
+    last = per_amount(y[states[0]], max(reference_amount(states, row, y), 0.0), row[LEAST])
+    total = max(reference_amount(states, row, out), 0.0)
+    found = per_amount(out[states[0]], total, row[LEAST])
+    limited = min(max(found, min(first, last)), max(first, last))
+    if limited != found:
+        wide = max(total, row[LEAST])
+        out[states[0]] = limited * (total * total + wide * wide) / (2.0 * total) if total > 0.0 else 0.0
+
+
+@njit
+def limit_to_bounds(states, bounds, y_old, y, out, checked):
     """Limit interpolated states to their bounds, because a polynomial between two valid states may leave them.
 
     states : int64[3 q]  for each bounded state its number and the numbers of up to two states for its reference amount,
     -1 for none, see `reference_amount`
     bounds : float64[q, 4]  base and gain of the reference amount, least and greatest ratio of the state to this amount;
-    ratios outside this range at the start or end of the step widen it
+    ratios outside this range at the start or end of the step widen it. A row with a greatest ratio below the least is
+    a flow, for which the least is an amount, below which the ratio fades to zero, see `limit_ratio`
     y_old, y : states at the start and the end of the step; out : interpolated state, which is changed
+    checked : True if the error of the interpolation is within the tolerance of the steps: flows are not limited then
     """
     for r in range(bounds.shape[0]):
         row_states, low, high = states[3 * r : 3 * r + 3], bounds[r, LEAST], bounds[r, MOST]
+        if high < low:
+            if not checked:
+                limit_ratio(row_states, bounds[r], y_old, y, out)
+            continue
         for y_end in (y_old, y):
             total = reference_amount(row_states, bounds[r], y_end)
             if total > NEGLIGIBLE:
@@ -142,13 +173,15 @@ def compute_row(handle, r, t_old, due, now, old):
     t, new, y_out, row_blocks = r.state[0]["t"], 3 - now - old, r.y_out, r.row_blocks
     separate = needs_separate_step(r)
     within = due < t - AT_END * (t - t_old)
-    if separate and within and separate_step(handle, r, t_old, due - t_old, old, new):
+    if within and needs_defect(r) and substep_row(handle, r, t_old, due, now, old):
+        pass
+    elif separate and within and separate_step(handle, r, t_old, due - t_old, old, new):
         for m in range(row_blocks.shape[0]):
             begin, end = row_blocks[m, BEGIN], row_blocks[m, STOP]
             copy(r.y[new, begin:end], y_out[begin:end])
     else:
         interpolate_row(r, t_old, due, separate, now, old)
-    limit_to_bounds(r.bounded_states, r.bounds, r.y[old], r.y[now], y_out)
+    limit_to_bounds(r.bounded_states, r.bounds, r.y[old], r.y[now], y_out, needs_defect(r))
     run_handle.call_rhs(r.calls[run_handle.RHS_CALL], due, y_out, y_out[:0], r.out_row, handle)
 
 

@@ -20,6 +20,9 @@ from fvsolve.steppers import loop_records as rec
 FACTOR, SOLVE, FACTOR_COMPLEX, SOLVE_COMPLEX = "hvtv", "hvv", "hvcz", "hzz"
 ATTEMPT = "hhttii"  # step of a method: handle of the model, handle of the run, t, h, row of y at the start, at the end
 FUSED_STEP, OBSERVE, EVENTS, RHS, JOIN = "ttVVVHV", READS, "tVHV", RATES, "vsh"
+WATCH = (
+    "ttVVHHb"  # arguments of the function that watches some accepted states: see `kernels.energy_supply.watch_state`
+)
 
 # Arrays of a run, for n states, s stages and m ledger rates : record, or letter of the type.
 ARRAY_KINDS = {
@@ -38,11 +41,13 @@ ARRAY_KINDS = {
     "out": "v", "out_row": "v",  # results of rhs besides the rates, at the present state and at an output row
     "values": "v",  # probe values of the present state
     "g": "v", "g_new": "v", "armed": "v",  # event functions at the start and the end of a step, and event flags
+    "pace": "v", "inner": "w",  # data of the search for events within a step, see `event_search`: [events], [6, events]
     "stored": "h", "carry": "v",  # states with compensated sums, and the rounding errors of these sums
     "times": "v",  # times of the output rows if given as a list
     "y_out": "v", "rows": "w",  # state of an output row; rows [capacity, 1 + probes]
     "bounded_states": "h", "bounds": "w",  # limits of interpolated rows, see `output_rows.limit_to_bounds`
     "largest": "v",  # [n]  largest allowed states, checked every 16 steps, or empty
+    "watch": "h",  # handle of the arrays of the function that watches some accepted states, or empty
     # data of implicit steps: entries of the Jacobian; its product with a vector; array [q q] for q implicit stages;
     # slopes in time of the ledger rates; factors of shift I - J for real and complex shifts. Semi-implicit steps
     # store damping factors in `factors`.
@@ -60,7 +65,7 @@ EXPECTED = [
 ]
 # Indices into `calls`.
 STEP, FUSED_CALL, OBSERVER, RECORDER, EVENT_FUNCTIONS, RHS_CALL = range(6)
-REAL_FACTOR, REAL_SOLVE, PAIR_FACTOR, PAIR_SOLVE, BANDS = range(6, 11)
+REAL_FACTOR, REAL_SOLVE, PAIR_FACTOR, PAIR_SOLVE, BANDS, WATCHER = range(6, 12)
 
 
 @functools.cache
@@ -121,6 +126,7 @@ call_factor = call_at_address("call_factor", FACTOR, "i", __name__)
 call_solve = call_at_address("call_solve", SOLVE, "", __name__)
 call_factor_complex = call_at_address("call_factor_complex", FACTOR_COMPLEX, "i", __name__)
 call_solve_complex = call_at_address("call_solve_complex", SOLVE_COMPLEX, "", __name__)
+call_watch = call_at_address("call_watch", WATCH, "t", __name__)  # returns the count of steps of its next state
 call_join = call_at_address("call_join", JOIN, "", __name__)  # exchange of partial sums between bands
 
 
@@ -190,3 +196,14 @@ def single_band(sums, row_blocks, handle):
 def no_exchange():
     """Compiled function that exchanges no data, for a model that is not divided into bands."""
     return compile_as(njit(single_band), JOIN)
+
+
+def unwatched(t, steps, y, ledger, handle, watch, begins):
+    """Do nothing, in place of a function that watches some accepted states."""
+    return 0.0
+
+
+@functools.cache
+def no_watch():
+    """Compiled function that watches no state."""
+    return compile_as(njit(unwatched), WATCH)

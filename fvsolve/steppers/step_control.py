@@ -16,6 +16,7 @@ LIMITED_BY_STABILITY = 2.5
 COUNT_DECREASE = 0.4  # decrease of the count by a step that stability does not limit
 # Fraction of an opening that may close in one given step; for x ~ (time left)^(1/3) this is half of the time left.
 CLOSING_FRACTION = 0.15
+DIVIDED_FRACTION = 0.5  # longest part of a divided step, as fraction of the time constant of the fastest mode
 LIMITED = 0.8  # fraction of a limit of the step, so that the limit does not act at every step
 APPROACH = 0.95  # fraction of the rest of a segment that the second-last step takes
 EARLY = 1e-12  # least time relative to the end, to which the least step is relative
@@ -134,6 +135,22 @@ def closing_step(state, closing, h, least):
         state["split_remainder"] = h
         state["split_steps"] += 1.0
     return max(least, min(0.5 * h, CLOSING_FRACTION / closing))
+
+
+@njit(forceinline=True)
+def divided_step(control, state, rate, h, least):
+    """Length of the next step [s]: the given step h, or a part of it where an explicit method would amplify a mode.
+
+    A step longer than the time constant of the fastest mode is divided into parts of at most half of it, so no explicit
+    method amplifies the mode. The parts end together where the given step would have ended, see `closing_step`.
+    rate : greatest rate at the start of the step [1/s]; least : least length of a part [s]
+    """
+    if not 0.0 < control["dividing_rate"] < rate or h * rate <= 1.0 or h <= 2.0 * least:
+        return h
+    if state["split_remainder"] == 0.0:
+        state["split_remainder"] = h
+        state["split_steps"] += 1.0
+    return max(least, min(0.5 * h, DIVIDED_FRACTION / rate))
 
 
 @njit(forceinline=True)

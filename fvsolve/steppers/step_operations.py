@@ -138,6 +138,32 @@ def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, start_slope,
 
 
 @njit
+def interpolate_slope(theta, h, y, f, y_new, f_new, k, dense, start_slope, out):
+    """Write the derivative of the dense output at t + theta h to `out` : float64[n]; arguments as for `interpolate`."""
+    if dense.shape[0] == 0:
+        r = 1.0 - theta
+        per, h10, h11 = 6.0 * theta * r / h, r * (1.0 - 3.0 * theta), theta * (3.0 * theta - 2.0)
+        for i in range(out.size):
+            out[i] = per * (y_new[i] - y[i]) + h10 * f[i] + h11 * f_new[i]
+        return
+    for i in range(out.size):
+        out[i] = 0.0
+    for j in range(dense.shape[0]):
+        w = 0.0
+        for m in range(dense.shape[1] - 1, -1, -1):
+            w = w * theta + (m + 1) * dense[j, m]
+        slope = f if j == 0 else k[j]
+        for i in range(out.size):
+            out[i] += w * slope[i]
+    if start_slope.size > 0:
+        w, terms = 0.0, dense.shape[1] + 1
+        for m in range(terms):
+            w = w * theta + (terms - m) * start_slope[start_slope.size - 1 - m]
+        for i in range(out.size):
+            out[i] += w * f[i]
+
+
+@njit
 def all_finite(handle, r, y, checked, bad=0):
     """True if the states y of all bands are finite and below 1e100.
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -190,7 +190,7 @@ def tableau(
     digits : significant digits of the entries, by default the greatest number in any decimal; up to six digits all
     entries count as exact, above as rounded in the last digit
     Raises FvsolveError for an empty or built-in name, and with all faults of the array: rows of wrong length, rows that
-    do not add up to c, invalid entries.
+    do not add up to c, invalid entries, an embedded solution equal to the new state.
     """
     if name in BUILT_IN or name == "auto" or not name.strip() or name != name.strip():
         raise FvsolveError(f'method name "{name}" is not free: it is empty, has blanks at an end or names a built-in '
@@ -385,7 +385,20 @@ def _faults(head: list, weights: list, rounding: Fraction) -> list[str]:
         for row in weights:
             if differs(row, 1):
                 faults.append(f"weights add up to {_show(sum(row, Fraction(0)))}; expected 1")
+        if len(weights) == 2 and not faults and not _estimates(head, weights, rounding):
+            faults.append("both rows of weights give the same solution, so the error estimate is zero. Expected an "
+                          "embedded solution of another order, or a single row of weights")  # fmt: skip
     return faults
+
+
+def _estimates(head: list, weights: list, rounding: Fraction) -> bool:
+    """True if the embedded solution differs from the new state: stages with equal rows count as a single stage."""
+    totals: dict[tuple, Any] = {}
+    for row, x, y in zip(head, *weights, strict=True):
+        stage = tuple(row[1:] + [Fraction(0)] * (len(head) - len(row) + 1))
+        totals[stage] = totals.get(stage, Fraction(0)) + x - y
+    size = max(abs(x) for row in weights for x in row)
+    return any(abs(total) > 2 * rounding * size for total in totals.values())
 
 
 def _show(value) -> str:

@@ -15,9 +15,11 @@ from fvsolve.kernels.calls import compile_as
 from fvsolve.kernels.stage_sums import BAD, CHECK, MODE, OFF
 from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers import run_handle, step_control
-from fvsolve.steppers.coefficients import error_of, start_slope_of, weights_of
+from fvsolve.steppers.coefficients import error_of, weights_of
+from fvsolve.steppers.event_search import NOWHERE, forget_pace, is_near, update_pace, zero_within
 from fvsolve.steppers.ledger import book, book_error
 from fvsolve.steppers.output_rows import emit, next_due, row_due
+from fvsolve.steppers.row_substeps import store_start_slopes
 from fvsolve.steppers.run_handle import (
     EVENT_FUNCTIONS,
     STEP,
@@ -35,14 +37,16 @@ from fvsolve.steppers.step_operations import (
     all_finite,
     copy,
     exceeded,
-    start_slope_defect,
     update_carry,
 )
 
 EVENT_TOLERANCE = 1e-13
+MOST_SEARCHES = 8  # for events before an event within the same step
 SECANT_TURNS = 40  # turns of the Illinois rule, which is slow where an event function is nearly zero at the start
 # attempts of an implicit step by Newton alone at tolerances above LOOSE: shorter steps cost less than sweeps
 UNSWEPT, LOOSE = 5, 3e-6
+# time for which a step goes on after an event function has jumped, as fraction of the step and of the time
+SAME_TIMES, SAME_ROUNDING = 1e-8, 1e-14
 JUMP = 1e-6  # fraction of an event function, and of a given step; smaller changes do not count as a jump
 
 
@@ -113,6 +117,7 @@ def locate(handle, run, r, h, now, new, e):
         e = call_attempt(r.calls[STEP], handle, run, t, guess, now, new)
         if e == rec.NEWTON_FAILED:
             break
+        add_stored(r, guess, now, new)  # `accept` does it too: rounding must not move the state back before the event
         call_events(r.calls[EVENT_FUNCTIONS], t + guess, r.y[new], handle, g_new)
         if done:
             break
@@ -127,7 +132,30 @@ def locate(handle, run, r, h, now, new, e):
     fixed = control["kind"] == rec.NEWTON_SOLVED and control["mode"] != rec.TOLERANCE
     if fixed and past < -JUMP and high > JUMP * r.state[0]["step"]:
         e = rec.NEWTON_FAILED
+    if e != rec.NEWTON_FAILED and past < -JUMP and control["has_jumps"]:
+        return after_jump(handle, run, r, h, high, now, new)
     return high, e
+
+
+@njit
+def after_jump(handle, run, r, h, length, now, new):
+    """Extend a step that ends where an event function jumps over zero; returns its length and error.
+
+    Waves that arrive together make it jump at times that differ by rounding, within which the step has ended. Which of
+    them have arrived must not depend on rounding, so it ends after all of them.
+    h : length of the full step; length : of the step up to the event
+    """
+    t, later = r.state[0]["t"], 0.0
+    for extension in (SAME_TIMES * h + SAME_ROUNDING * abs(r.state[0]["t"]), 0.0):
+        later = min(h, length + extension)
+        r.progress[0]["stage_status"] = 0
+        e = call_attempt(r.calls[STEP], handle, run, t, later, now, new)
+        if e != rec.NEWTON_FAILED:
+            add_stored(r, later, now, new)
+            call_events(r.calls[EVENT_FUNCTIONS], t + later, r.y[new], handle, r.g_new)
+            if event_ratio(r.g, r.g_new) <= 0.0:
+                break
+    return later, e
 
 
 @njit
@@ -151,6 +179,8 @@ def run_steps(handle, run):
             continue
         if status == rec.DONE and has_ended(r):
             return rec.DONE
+        if status == rec.DONE and 0.0 < r.control[0]["watch_at"] <= r.state[0]["steps"]:
+            watch_present_state(handle, r)
         if status == rec.DONE:
             status = reason_to_stop(r)
         if status == rec.DONE:
@@ -168,6 +198,7 @@ def switches_at_start(handle, r):
     """
     progress, g = r.progress[0], r.g
     if progress["event_known"] == 1:
+        update_pace(r)
         copy(r.g_new, g)
     elif g.size > 0:
         run_handle.call_events(r.calls[run_handle.EVENT_FUNCTIONS], r.state[0]["t"], r.y[progress["now"]], handle, g)
@@ -178,6 +209,7 @@ def switches_at_start(handle, r):
     if progress["has_last_step"] == 1:
         return False
     set_flags(g, r.armed)
+    forget_pace(r)
     return True
 
 
@@ -271,6 +303,7 @@ def finish_last_step(handle, r):
             return status
     if progress["switch_pending"] == 1:  # the rhs has switched: discard the step size and the Jacobian
         set_flags(r.g, r.armed)
+        forget_pace(r)
         progress["switch_pending"], progress["phase"] = 0, rec.FRESH
         if control["mode"] == rec.TOLERANCE:
             state["step"] = 0.0
@@ -305,6 +338,15 @@ def has_ended(r):
     return True
 
 
+@njit
+def watch_present_state(handle, r):
+    """Pass the present state to the function that watches some states."""
+    state, y = r.state[0], r.y[r.progress[0]["now"]]
+    r.control[0]["watch_at"] = run_handle.call_watch(
+        r.calls[run_handle.WATCHER], state["t"], state["steps"], y, r.ledger, handle, r.watch, False
+    )
+
+
 @inline
 def reason_to_stop(r):
     """Reason to return before the next step: STOPPED or BUDGET_SPENT; DONE without a reason."""
@@ -321,7 +363,9 @@ def take_step(handle, run, r):
     if not full > 0.0:
         full = step_control.next_step(control, state, r.out[rec.RATE], r.out[rec.LONGEST_STEP], r.k, r.scale)
     if control["mode"] != rec.TOLERANCE:
-        full = step_control.closing_step(state, r.out[rec.CLOSING_RATE], full, step_control.shortest(control, state))
+        least = step_control.shortest(control, state)
+        full = step_control.closing_step(state, r.out[rec.CLOSING_RATE], full, least)
+        full = step_control.divided_step(control, state, r.out[rec.RATE], full, least)
     h = step_control.arriving_step(control, state, r.out[rec.JUMP_TIME], full)
     if can_use_fused_step(r, h):
         take_fused_steps(handle, r, h)
@@ -356,7 +400,7 @@ def take_fused_steps(handle, r, h):
         if not same or due_soon or h >= (control["end"] - t_new) * full or check_state(r) != rec.DONE:
             return
         store_ledger_rates(r, 0)
-        if reason_to_stop(r) != rec.DONE:
+        if reason_to_stop(r) != rec.DONE or 0.0 < control["watch_at"] <= state["steps"]:
             return
 
 
@@ -425,15 +469,53 @@ def try_step(handle, run, r, h, last, due, now, new, near_kink):
     end_step(r, h, last, due, now, new)
     if g.size > 0:
         run_handle.call_events(r.calls[run_handle.EVENT_FUNCTIONS], progress["t_new"], r.y[new], handle, r.g_new)
-    if not crossed(g, r.g_new):
-        return nan if has_faulty_stage(r) else e, h, last
-    progress["event_known"] = 0
-    length, e = locate(handle, run, r, h, now, new, e)
+    found, length = crossed(g, r.g_new), h
+    if found:
+        length, e = locate(handle, run, r, h, now, new, e)
+    if e != rec.NEWTON_FAILED and (found or is_near(r, h)):
+        length, e, found = shorten_to_first(handle, run, r, length, e, found, now, new)
     if e == rec.NEWTON_FAILED:
+        progress["event_known"] = 0
         return e, h, last
-    state["step"], state["split_remainder"] = 0.0, 0.0
-    last = last and state["t"] + length >= r.control[0]["end"]
-    return nan if has_faulty_stage(r) else error_with_ledger(r, length, e), length, last
+    if found:
+        progress["event_known"] = 0
+        state["step"], state["split_remainder"] = 0.0, 0.0
+        last = last and state["t"] + length >= r.control[0]["end"]
+        e = error_with_ledger(r, length, e)
+    return nan if has_faulty_stage(r) else e, length, last
+
+
+@njit
+def shorten_to_first(handle, run, r, h, e, found, now, new):
+    """Shorten a step to an event within it that its end does not show; returns its length, its error and `found`.
+
+    h : length of the step, which ends just past an event if `found` is True
+    """
+    progress, t = r.progress[0], r.state[0]["t"]
+    no_sweeps = progress["no_sweeps"]
+    for _ in range(MOST_SEARCHES):
+        t_end = t + h if found else progress["t_new"]
+        store_start_slopes(r)
+        theta, stepped = zero_within(handle, run, r, h, t_end, now, new)
+        if theta < NOWHERE:
+            progress["stage_status"] = 0
+            shorter = call_attempt(r.calls[STEP], handle, run, t, theta * h, now, new)
+            call_events(r.calls[EVENT_FUNCTIONS], t + theta * h, r.y[new], handle, r.g_new)
+            if shorter != rec.NEWTON_FAILED and crossed(r.g, r.g_new):
+                h, e = locate(handle, run, r, theta * h, now, new, shorter)
+                found = True
+                if e == rec.NEWTON_FAILED:
+                    return h, e, found
+                continue
+        if theta < NOWHERE or stepped:  # no event, or only in the dense output: repeat the step as it was
+            progress["no_sweeps"], progress["stage_status"] = no_sweeps, 0
+            if call_attempt(r.calls[STEP], handle, run, t, h, now, new) == rec.NEWTON_FAILED:
+                return h, rec.NEWTON_FAILED, found
+            if not found:
+                progress["changed"] = 1 if add_stored(r, h, now, new) else 0
+        call_events(r.calls[EVENT_FUNCTIONS], t_end, r.y[new], handle, r.g_new)
+        break
+    return h, e, found
 
 
 @inline
@@ -487,28 +569,11 @@ def accept(handle, r, h, last, due):
     control["budget"] -= 1.0
     if r.largest.size > 0 and state["steps"] % rec.GROWTH_CHECK_STEPS == 0.0 and exceeded(handle, r, r.y[new]):
         control["budget"] = rec.GROWTH_FOUND
-    if next_due(r) <= state["t"]:
+    if next_due(r) <= state["t"] or control["dense_steps"] == 1:
         store_start_slopes(r)
     reuses = control["fsal"] == 1 and control["mode"] == rec.TOLERANCE and not last and progress["changed"] == 0
     progress["reuse"] = 1 if reuses else 0
     progress["old"], progress["now"], progress["has_last_step"] = now, new, 1
-
-
-@inline
-def store_start_slopes(r):
-    """Store the slopes at the start of the accepted step for output rows within it."""
-    control, row_blocks, k, f_old, s = r.control[0], r.row_blocks, r.k, r.f_old, r.k.shape[0]
-    known = control["kind"] == rec.NEWTON_SOLVED and r.newton[0]["known_steps"] > 0.0
-    start_slope, use_slope = start_slope_of(r.coefficients, s), control["stage_slope"] == 1 and known
-    slope = r.last_stages[s - 1] if known else k[0]
-    for m in range(row_blocks.shape[0]):
-        begin, end = row_blocks[m, BEGIN], row_blocks[m, STOP]
-        if start_slope.size > 0:
-            start_slope_defect(begin, end, start_slope, k, slope, known, f_old)
-        elif use_slope:
-            copy(slope[begin:end], f_old[begin:end])
-        else:
-            copy(k[0, begin:end], f_old[begin:end])
 
 
 def compiled():

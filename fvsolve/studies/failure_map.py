@@ -12,6 +12,8 @@ import numpy as np
 from fvsolve.argument_checks import NAMES, NUMBER, NUMBERS, ROW, TEXT, Kind, is_row, validated
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError, did_you_mean
+from fvsolve.model.build import build
+from fvsolve.model.delay_lines import dividing_rate
 from fvsolve.schemes import LIMITED
 from fvsolve.steppers.tableau import METHODS as KNOWN_METHODS
 from fvsolve.studies.distance import Deviation, column_ranges, time_weights
@@ -393,8 +395,13 @@ class MapRuns:
         return self._references[at]
 
     def limit(self, scheme: str, method: str, k: int) -> float | None:
-        """Greatest stable step [s] in column k, by eigenvalues and by waves in delay lines; None if one is unknown."""
+        """Greatest stable step [s] in column k, by eigenvalues and by waves in delay lines; None if one is unknown.
+
+        It is inf for steps that the run itself divides where they are too long.
+        """
         at = scheme, k if self.columns.keys(k) else 0
+        if self.is_divided(method, scheme, k):
+            return math.inf
         if at not in self._spectra:
             keys = {**self.base, **self.columns.keys(k), "numerics.scheme": scheme}
             self._spectra[at] = eigenvalues_of(self.case, keys)
@@ -404,6 +411,17 @@ class MapRuns:
             both = of_modes, self.lines_limit(method, *at)
             self._limits[method, *at] = None if None in both else min(both)
         return self._limits[method, *at]
+
+    def is_divided(self, method: str, scheme: str, k: int) -> bool:
+        """True if a run with this method divides all steps that are too long: explicit given steps of delay lines."""
+        step = self.columns.sets[k].get("numerics.step")
+        if step is None or not (method not in KNOWN_METHODS or KNOWN_METHODS[method].explicit):
+            return False
+        case = load(self.case, {**self.base, **self.columns.keys(k), "numerics.scheme": scheme})
+        if not delay_lines(case):
+            return False
+        model = build(case)
+        return dividing_rate(model, step) > 0.0 and not model.tables.settings["rate"][0] > 0.0
 
     def lines_limit(self, method: str, scheme: str, k: int) -> float | None:
         """Predicted greatest step [s] in column k at which waves between storing nodes and delay lines hardly grow.

@@ -194,7 +194,7 @@ def with_weights(at: OperatingPoint, weights: tuple[float, ...], degree: int) ->
     """
     tables = at.model.tables._replace(settings=at.model.tables.settings.copy())
     settings = tables.settings[0]
-    settings["scheme"], settings["degree"] = rec.LINEAR, degree
+    settings["scheme"], settings["degree"], settings["from_arriving"] = rec.LINEAR, degree, 0
     for k, weight in enumerate(weights):
         settings[f"w{k}"] = weight
     settings["inside"], settings["enter"], settings["leave"] = difference_rows(weights, degree)

@@ -27,28 +27,35 @@ and twice the resolution
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from fvsolve.case import load
+from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.errors import CaseError, listing
 from fvsolve.model.start_notices import LEAST_CELLS, answering_parts
+from fvsolve.output.unit_columns import probe_columns
 from fvsolve.parts.schedule import Schedule
 from fvsolve.run import Result, run
-from fvsolve.run.result import HOLDS, OPEN
-from fvsolve.run.verdicts import MAGNITUDES, PLACES_KEY, PlaceMargins, verdict
-from fvsolve.studies.outcome import NO_FIELDS
+from fvsolve.run.result import OPEN
+from fvsolve.run.verdicts import MAGNITUDES, PLACES_KEY, PlaceMargins, in_quantity, verdict
+from fvsolve.studies.line_reference import line_references
+from fvsolve.studies.outcome import NO_FIELDS, study_model
 from fvsolve.studies.resolution import (
     basins_from_files,
     cell_counts,
     delay_lines,
+    fixed_choices,
     pipes_with_cells,
     refined_keys,
     scaled,
 )
+from fvsolve.studies.separated_peaks import first_peak, separate_maxima, separated_error
 
 LEVELS = (0.5, 1.0, 2.0)
+FINEST = 4.0  # greatest resolution, with column separation
 RELATIVE_FLOOR = 5e-6  # least relative error, from iterations, interpolated rows and nearly decayed oscillations
 ROUNDING = 1e-12  # rounding error relative to the greatest value in that unit (for angles at least 1 rad)
 SIGNS = {"minimum": -1.0, "maximum": 1.0}
@@ -56,10 +63,17 @@ SIDES = tuple(SIGNS)
 MIN_ROWS, MAX_ROWS = 500, 4000  # limits of the number of rows of signals, at the resolution of the run itself
 PLACES_PER_PART = 12  # greatest number of places of a part with signals, under a bound
 MAX_PLACES = 400  # greatest number of places with signals, of all limits
+Signal = tuple[np.ndarray, np.ndarray]  # times and values
 Part = tuple[str, str]  # group and name
 MANY_STEPS = 20.0  # accumulated error of steps between jumps of delay lines, in tolerances of a step
 SMOOTHED = 0.05  # effect of jumps below a quarter of numerics.delay_tolerance, smoothed over a step, over that key
 MIN_CELLS = 4  # cells recommended for a pipe, and for the travel time of a short pipe in its neighbour
+REFERENCE_ROWS = 4.0  # rows of references for each row of the run
+REFERENCE_SAFETY = 1.0  # factor on the difference of both references
+DIFFERENCE_SAFETY = 1.2  # factor on the difference to the second reference
+SPREAD_SHARE = 0.5  # fraction of the greatest relative difference of both references that counts for every peak
+MOST_SPREAD = 0.02  # limit of this difference: a single chaotic signal does not widen all bands
+LINES_TEXT, FINEST_TEXT = "delay lines with short steps", f"{FINEST:g} times the resolution"
 MAX_NAMES = 3  # greatest number of names in a text
 WIDE_ERROR = 0.05  # error relative to the span of a signal above which a reason is given
 SMALL_DIFFERENCE = 0.1  # differences below this fraction of an error are not its cause
@@ -108,33 +122,121 @@ class Unresolved:
 
     unknown : (group, name) of a part -> reason for which the errors of its peaks are unknown
     shared : reasons of wide errors that concern all peaks
-    tolerance : accumulated error of the steps of delay lines under error control, relative to the range of a signal
+    tolerance : accumulated error of the steps of delay lines under error control, or error of the references, relative
+    to the range of a signal
     """
 
-    def __init__(self, case: Any, runs: dict[float, Any]) -> None:
+    def __init__(self, case: Any, runs: dict[float, Any], references: dict[int, Any]) -> None:
         self.case, self.runs = case, runs
         self.unknown = unknown_parts(case)
         self.tolerance = 0.0
-        if case.numerics.rtol is not None and delay_lines(case):
+        self.vapor = VaporValues(case) if has_separation(runs) and case.law.cavitates else None
+        if is_pair(references):
+            self.tolerance = SPREAD_SHARE * greatest_spread(references)
+        elif case.numerics.rtol is not None and delay_lines(case):
             self.tolerance = max(MANY_STEPS * case.numerics.rtol, SMOOTHED * case.numerics.delay_tolerance)
         liquid = ["column separation, so no order is assumed; use more cells"] if has_separation(runs) else []
         self.shared = [*liquid, *differing_events(runs), *coarse_pipes_at_devices(case)]
 
+    def ceiling(self, probe: str) -> float:
+        """Negative of the least possible value of a probe, in its unit; inf unless vapour bounds it."""
+        return math.inf if self.vapor is None else self.vapor.ceiling(probe)
+
     def reason(self, part: tuple[str, str], triple: Sequence[float | None], error: float | None, span: float,
-               unit: str) -> str | None:  # fmt: skip
+               unit: str, difference: float | None) -> str | None:  # fmt: skip
         """Reason why the error of a peak is unknown, or wide (above `WIDE_ERROR` times `span`); otherwise None.
 
         part : (group, name) of the part; triple : peak at half, one and twice the resolution; span : range of the
-        signal; unit : unit of all values
+        signal; unit : unit of all values; difference : difference to a reference, or None
         """
         if error is None:
             return self.unknown.get(part) or stopped_runs_text(self.case, self.runs)
         if error <= WIDE_ERROR * span:
             return None
+        causes = "; ".join(self.shared)
+        if not causes:
+            causes = difference_text(triple, error, unit, self.case)
+            if difference is not None and difference > 0.5 * error:
+                causes += "; " + reference_text(
+                    self.case, self.runs[1.0], difference, error / (WIDE_ERROR * span), unit
+                )
         if error > span:
-            causes = "; ".join(self.shared) or difference_text(triple, error, unit, self.case)
             return f"this estimate exceeds the range of the signal, so the peak is not known; {causes}"
-        return "; ".join(self.shared) or difference_text(triple, error, unit, self.case)
+        return causes
+
+
+class VaporValues:
+    """Values of pressures and heads at the vapour pressure, below which `cavitation` allows none."""
+
+    def __init__(self, case: Any) -> None:
+        self.case, self.model = case, study_model(case)
+        self.columns = {column.name: column for column in probe_columns(self.model)}
+        self.probes = {probe.text: probe for probe in case.probes}
+
+    def value(self, text: str) -> float:
+        """Value of a probe at the vapour pressure, in its unit; -inf if it is no pressure or head."""
+        if text not in self.probes:  # at places of limits
+            other = VaporValues(load(self.case, {"output.probes": [text]}))
+            return other.value(text) if text in other.probes else -math.inf
+        probe, model = self.probes[text], self.model
+        if probe.quantity not in OF_PRESSURE:
+            return -math.inf
+        if probe.part == "nodes":
+            elevation = model.elevation.get(probe.name, 0.0)
+        else:
+            pipe = next((pipe for pipe in model.pipes if pipe.name == probe.name), None)
+            if pipe is None:
+                return -math.inf
+            elevation = float(pipe.height(probe.fraction * self.case.links[probe.name].length))
+        pressure = (1.0 + 1e-9) * self.case.properties.vapor_pressure  # at it a head is not finite
+        return float(self.columns[text].from_si(in_quantity(model, probe.quantity, pressure, elevation)))
+
+    def ceiling(self, text: str) -> float:
+        """Negative of `value`."""
+        return -self.value(text)
+
+    def greatest_excess(self, neighbours: PlaceMargins) -> float:
+        """Greatest possible excess below a limit at any place of a part, in the unit of the limit."""
+        if "flow" in neighbours.probes[0] or "velocity" in neighbours.probes[0]:
+            return math.inf
+        text = neighbours.probes[0]
+        first = self.value(text)
+        if not math.isfinite(first) or text.rpartition(".")[2].startswith("head"):
+            return math.inf
+        return float(np.max(neighbours.limits)) - first
+
+
+def first_of(signals: Sequence[Signal], sign: float, ceiling: float) -> dict[str, float] | None:
+    """First peak of a probe with column separation : {value, time [s], error}; signals : with maxima in place of peaks.
+
+    None if the signals are not usable or have no peak.
+    """
+    found = first_peak(signals, troughs, ceiling) if usable(signals) else None
+    if found is None:
+        return None
+    least = RELATIVE_FLOOR * abs(found["value"]) if found["error"] > 0.0 else 0.0
+    return {"value": sign * found["value"], "time": found["time"], "error": found["error"] + least}
+
+
+def is_pair(references: dict) -> bool:
+    """True for two references with delay lines; False without references, and for runs with column separation."""
+    return len(references) == 2
+
+
+def reference_text(case: Any, own: Any, difference: float, times: float, unit: str) -> str:
+    """Reason of an error that references show: its size, and the cells or the step that would resolve the peak.
+
+    own : result of the case; times : factor of the resolution, if the error is of first order; unit : of the difference
+    """
+    factor = 2 ** math.ceil(math.log2(min(max(times, 2.0), 1e6)))
+    counts = cell_counts(case)
+    if counts:
+        key = max(counts, key=lambda key: counts[key][0])
+        remedy = f"use {factor} times the cells, {key} = {factor * counts[key][0]}"
+    else:
+        step = own.summary["t"] / max(own.summary["steps"], 1) / factor
+        remedy = f"use steps of at most {case.step_amount(step, 2)}"
+    return f"delay lines with short steps differ by {difference:.2g} {unit}; {remedy}"
 
 
 def unknown_parts(case: Any) -> dict[Part, str]:
@@ -230,14 +332,18 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
     progress : called with a text before each run
     """
     own = result if result.places is not None else run(case, set=NO_FIELDS, pictures=False)
-    runs = refined_runs(own, case, progress)
-    summary, unresolved = result.summary, Unresolved(case, runs)
-    summary["peaks"] = peak_rows(result, runs, unresolved)
-    summary["verdicts"] = [verdict([limit_row(runs, k, j, row, unresolved) for j, row in enumerate(rows)])
+    case = load(case, fixed_choices(case))
+    runs, references = refined_runs(own, case, progress)
+    summary, unresolved = result.summary, Unresolved(case, runs, references)
+    summary["peaks"] = peak_rows(result, runs, references, unresolved)
+    summary["verdicts"] = [verdict([limit_row(runs, references, k, j, row, unresolved) for j, row in enumerate(rows)])
                         for k, rows in enumerate(own.places)]  # fmt: skip
     for k, claim in enumerate(summary["expectations"]):
-        claim["error"] = expectation_error(runs, case.expect[claim["text"]], k, summary["peaks"])
-    summary["resolution"] = {"levels": sorted(runs), "kept": basins_from_files(case), "words": description(runs, case),
+        claim["error"] = expectation_error(runs, references, case.expect[claim["text"]], k, summary["peaks"])
+    words = description(runs, case)
+    if references:
+        words += "; errors from " + (LINES_TEXT if is_pair(references) else FINEST_TEXT)
+    summary["resolution"] = {"levels": sorted(runs), "kept": basins_from_files(case), "words": words,
                           "reasons": reason_texts(summary)}  # fmt: skip
     return summary
 
@@ -254,11 +360,12 @@ def reason_texts(summary: dict[str, Any]) -> list[str]:
     return [f"{listing(list(names), MAX_NAMES)}: {text}" for text, names in names_by_reason.items() if text is not None]
 
 
-def refined_runs(own: Result, case: Any, progress: Callable[[str], None] | None) -> dict[float, Result]:
-    """Run a case at half, one and twice the resolution, with about as many rows of output as steps.
+def refined_runs(own: Result, case: Any, progress: Callable[[str], None] | None) -> tuple[dict, dict]:
+    """Run a case at half, one and twice the resolution, with about as many rows of output as steps, and references.
 
     At resolution 1 the number of rows is that of the steps, limited to `MIN_ROWS` to `MAX_ROWS`, or that of the case if
-    it is larger. Returns {0.5 | 1.0 | 2.0: result}, without resolutions that the case cannot have.
+    it is larger. Returns ({0.5 | 1.0 | 2.0: result}, without resolutions that the case cannot have; references as from
+    `line_references`).
     own : result of the case itself; progress : called with a text before each run
     """
     named = [probe.text for probe in case.output.probes]
@@ -271,7 +378,24 @@ def refined_runs(own: Result, case: Any, progress: Callable[[str], None] | None)
             if progress is not None:
                 progress(f"{times:g} times the resolution")
             runs[times] = run(case, set=keys | settings | {"output.every": every / times}, pictures=False)
-    return runs
+    if has_separation(runs):
+        return runs, separated_runs(runs, case, settings | {"output.every": every / FINEST}, progress)
+    return runs, line_references(own, case, settings | {"output.every": every / REFERENCE_ROWS}, progress)
+
+
+def separated_runs(
+    runs: dict[float, Result], case: Any, settings: dict[str, Any], progress: Callable[[str], None] | None
+) -> dict[float, Result]:
+    """Results at one, two and four times the resolution of a case of pipes with column separation, or {}.
+
+    runs : results at lower resolutions; settings : changed keys of the run at four times the resolution
+    """
+    if case.meshes or any(times not in runs or runs[times].reason != "finished" for times in LEVELS[1:]):
+        return {}
+    if progress is not None:
+        progress(f"{FINEST:g} times the resolution")
+    finest = run(case, set=refined_keys(case, FINEST) | settings, pictures=False)
+    return {times: runs[times] for times in LEVELS[1:]} | {FINEST: finest} if finest.reason == "finished" else {}
 
 
 def limit_probes(own: Result, case: Any, named: list[str]) -> list[str]:
@@ -312,7 +436,9 @@ def accepts_probes(case: Any, texts: list[str]) -> bool:
     return True
 
 
-def peak_rows(result: Result, runs: dict[float, Result], unresolved: Unresolved) -> dict[str, Any]:
+def peak_rows(
+    result: Result, runs: dict[float, Result], references: dict[int, Result], unresolved: Unresolved
+) -> dict[str, Any]:
     """Entry `peaks` of the summary of `result`, as in `peak_errors`: unit, extremes of each probe, and their errors."""
     summary, largest, rows = result.summary, {"rad": 1.0}, {}
     parts = {probe.text: (probe.part, probe.name) for probe in unresolved.case.probes}
@@ -323,9 +449,13 @@ def peak_rows(result: Result, runs: dict[float, Result], unresolved: Unresolved)
         rows[name] = {"unit": extreme["unit"]}
         for side, sign in SIGNS.items():
             missed = 0.0 if summary["cells"] else between_rows(result, name, side)
-            triple = values_of_runs(runs, lambda run, n=name, s=side: run.summary["extremes"][n][s], sign)
+            value_of = partial(extreme_of, name=name, side=side)
+            triple = values_of_runs(runs, value_of, sign)
             unknown = parts[name] in unresolved.unknown
-            error = None if unknown else error_bound(runs, triple, [signals(runs, name, lambda v, sign=sign: sign * v)])
+            places = [partial(signals, probe=name, rising=partial(np.multiply, sign))]
+            ceiling = unresolved.ceiling(name) if side == "minimum" else math.inf
+            error = None if unknown else error_estimate(runs, references, value_of, sign, places, ceiling)
+            difference = reference_difference(references, value_of, extreme[side])
             span = (extreme["maximum"] or 0.0) - (extreme["minimum"] or 0.0)
             if error is not None:
                 least = 2.0 * (missed + ROUNDING * largest[extreme["unit"]]) + RELATIVE_FLOOR * abs(extreme[side])
@@ -335,9 +465,57 @@ def peak_rows(result: Result, runs: dict[float, Result], unresolved: Unresolved)
                 "value": extreme[side],
                 "error": error,
                 "order": None if unknown else observed_order(triple, has_separation(runs)),
-                "reason": unresolved.reason(parts[name], triple, error, span, extreme["unit"]),
+                "reason": unresolved.reason(parts[name], triple, error, span, extreme["unit"], difference),
             }
+            if references and not is_pair(references):
+                rows[name][side]["first"] = first_of(places[0](references), sign, ceiling)
     return rows
+
+
+def extreme_of(run: Result, name: str, side: str) -> float | None:
+    """Extreme of a probe in a run; side : "minimum" or "maximum"."""
+    return run.summary["extremes"][name][side]
+
+
+def error_estimate(
+    runs: dict[float, Result], references: dict, value_of: Callable, sign: float, places: Sequence,
+    ceiling: float = math.inf,
+) -> float | None:  # fmt: skip
+    """Error bound of the value of a run, from references if there are any, else from further resolutions.
+
+    value_of(run) : value, which times `sign` is a maximum; places : for each place, a function that gives the signals
+    of several runs, as from `signals`, with maxima in place of peaks; ceiling : least upper bound of these maxima
+    """
+    triple = values_of_runs(runs, value_of, sign)
+    if references and None not in triple[1:]:
+        values = [value_of(references[times]) for times in sorted(references)]
+        if all(value is not None and math.isfinite(value) for value in values):
+            values, found = [sign * value for value in values], [place(references) for place in places]
+            if is_pair(references):
+                return reference_error(triple[1], values, found)
+            maxima = [separate_maxima(signals, troughs)[0] for signals in found if usable(signals)]
+            return separated_error(values, np.vstack([np.empty((0, 3)), *maxima]), ceiling)
+    return error_bound(runs, triple, [place(runs) for place in places])
+
+
+def reference_difference(references: dict[int, Result], value_of: Callable, value: float | None) -> float | None:
+    """Difference between a value and that of the finer reference; None without references or values."""
+    finer = value_of(references[max(references)]) if references else None
+    return None if finer is None or value is None else abs(finer - value)
+
+
+def greatest_spread(references: dict[int, Result]) -> float:
+    """Greatest difference of a peak between both references, relative to the range of its signal."""
+    first, second = (references[times].summary["extremes"] for times in sorted(references))
+    spread = 0.0
+    for name, extreme in second.items():
+        values = [entry[side] for entry in (extreme, first[name]) for side in SIDES]
+        if None in values or not values[1] > values[0]:
+            continue
+        low, high, other_low, other_high = values
+        if high - low > RELATIVE_FLOOR * max(abs(low), abs(high)):
+            spread = max(spread, abs(low - other_low) / (high - low), abs(high - other_high) / (high - low))
+    return min(spread, MOST_SPREAD)
 
 
 def error_bound(runs: dict[float, Result], triple: Sequence[float | None], places: Sequence = ()) -> float | None:
@@ -364,8 +542,11 @@ def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray]
     return [(run.seconds, rising(run[probe])) for run in finished if probe in run.units]
 
 
-def limit_row(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], unresolved: Unresolved) -> dict:
-    """Row of a limit with its error. A limit that holds becomes open if the error is unknown or above the margin.
+def limit_row(
+    runs: dict[float, Result], references: dict[int, Result], limit: int, k: int, row: dict[str, Any],
+    unresolved: Unresolved,
+) -> dict:  # fmt: skip
+    """Row of a limit with its error. The state becomes open if the error is unknown or above the margin.
 
     limit, k : indices of the limit and of the row in these results; row : row of `run.verdicts.places`
     """
@@ -374,20 +555,41 @@ def limit_row(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any]
     places = []
     for position, probe in enumerate(row[PLACES_KEY].probes):
         allowed = float(row[PLACES_KEY].limits[position])
-        places.append(signals(runs, probe, lambda v, a=allowed: sign * ((np.abs(v) if magnitude else v) - a)))
-    part = (row[PLACES_KEY].probes[0].split(".")[0], row["place"])
-    error = None if part in unresolved.unknown else error_bound(runs, triple, places)
-    span = max((float(np.ptp(run[-2][1])) for run in places if usable(run)), default=math.inf)
+        rising = partial(exceedance, sign=sign, allowed=allowed, magnitude=magnitude)
+        places.append(partial(signals, probe=probe, rising=rising))
+    part, error = (row[PLACES_KEY].probes[0].split(".")[0], row["place"]), None
+    margin_of = partial(margin_in, limit=limit, k=k)
+    if part not in unresolved.unknown:
+        ceiling = math.inf
+        if row["bound"] == "minimum" and unresolved.vapor is not None:
+            ceiling = unresolved.vapor.greatest_excess(row[PLACES_KEY])
+        error = error_estimate(runs, references, margin_of, -1.0, places, ceiling)
+    found = [place(runs) for place in places]
+    span = max((float(np.ptp(run[-2][1])) for run in found if usable(run)), default=math.inf)
     size = abs(row["value"] or 0.0)
     if error is not None:
-        error += RELATIVE_FLOOR * size + unresolved.tolerance * (span if math.isfinite(span) else 0.0)
-    doubtful = row["state"] == HOLDS and (error is None or not row["margin"] >= error)
+        spread = span if math.isfinite(span) else 0.0
+        error += RELATIVE_FLOOR * (size + spread) + unresolved.tolerance * spread  # gauge values have another zero
+    doubtful = error is None or not abs(row["margin"] or 0.0) >= error
     span_and_floor = span + 2.0 * RELATIVE_FLOOR / WIDE_ERROR * size
-    reason = unresolved.reason(part, triple, error, span_and_floor, row["unit"])
+    difference = reference_difference(references, margin_of, row["margin"])
+    reason = unresolved.reason(part, triple, error, span_and_floor, row["unit"], difference)
     return row | {"error": error, "reason": reason, "state": OPEN if doubtful else row["state"]}
 
 
-def expectation_error(runs: dict[float, Result], expect: Any, k: int, peak_rows: dict[str, Any]) -> float | None:
+def margin_in(run: Result, limit: int, k: int) -> float | None:
+    """Margin of a row of a limit in a run; limit, k : indices of the limit and of the row."""
+    return run.places[limit][k]["margin"]
+
+
+def exceedance(values: np.ndarray, sign: float, allowed: float, magnitude: bool) -> np.ndarray:
+    """Values above an allowed maximum (sign 1), or below a minimum (sign -1); magnitude : True for their magnitudes."""
+    return sign * ((np.abs(values) if magnitude else values) - allowed)
+
+
+def expectation_error(
+    runs: dict[float, Result], references: dict[int, Result], expect: Any, k: int, peak_rows: dict[str, Any]
+) -> float | None:
     """Error of the value in an expectation: the error of the peak if it is a peak, else from the values of all runs.
 
     expect : expectation of the case; k : its index in the summaries; peak_rows : entry `peaks` of the summary
@@ -395,9 +597,9 @@ def expectation_error(runs: dict[float, Result], expect: Any, k: int, peak_rows:
     side = {"min": "minimum", "max": "maximum"}.get(expect.function)
     if side is not None and expect.probe is not None and expect.probe.text in peak_rows:
         return peak_rows[expect.probe.text][side]["error"]
-    triple = values_of_runs(runs, lambda run: run.summary["expectations"][k]["found"])
-    error = error_bound(runs, triple)
-    return None if error is None else error + RELATIVE_FLOOR * abs(triple[1])
+    error = error_estimate(runs, references, lambda run: run.summary["expectations"][k]["found"], 1.0, [])
+    own = runs[1.0].summary["expectations"][k]["found"]
+    return None if error is None else error + RELATIVE_FLOOR * abs(own)
 
 
 def values_of_runs(runs: dict[float, Result], of: Callable, sign: float = 1.0) -> tuple[float | None, ...]:
@@ -454,6 +656,23 @@ def description(runs: dict[float, Result], case: Any) -> str:
     return text
 
 
+def reference_error(value: float, pair: Sequence[float], places: Sequence[Sequence[Signal]]) -> float:
+    """Error bound of a value from two references: its difference to the second, plus the error of the second itself.
+
+    pair : values of both references; places : for each place, the signals of both references
+    """
+    first, second = pair
+    own = REFERENCE_SAFETY * abs(second - first)
+    for signals in places:
+        if not usable(signals):
+            continue
+        _, maxima = local_maxima(signals)
+        maxima = maxima[np.isfinite(maxima).all(axis=1)]
+        changes = np.abs(maxima[:, 2] - maxima[:, 1])
+        own = max(own, float(np.max(maxima[:, 2] + REFERENCE_SAFETY * changes, initial=second)) - second)
+    return DIFFERENCE_SAFETY * abs(value - second) + own
+
+
 # error bounds from local maxima --------------------------------------------------------------------------------------
 
 SAFETY = 2.15  # factor on remainders
@@ -465,8 +684,6 @@ MAX_MOVED = 16.0  # limit of the two further terms, in differences of the greate
 CONVERGED, TRUSTED = (0.35, 0.75), (0.5, 1.0)  # ratios of mean differences of signals -> factor on the bound
 MINIMUM_SAFETY = 1.6  # factor on the remainder by that ratio
 RISE = 0.002  # drop between two separate maxima, as a fraction of the range of a signal
-
-Signal = tuple[np.ndarray, np.ndarray]  # times and values
 
 
 def greatest_error(places: Sequence[Sequence[Signal]], triple: Sequence[float], believed: bool = True) -> float:

@@ -238,6 +238,11 @@ def refined_keys(case, times: float) -> dict[str, Any]:
     lines, see `refined_step_keys`. The result is empty if nothing can be refined, or if the coarser case is invalid,
     for example because a patch of a basin would begin within a cell.
     """
+    fixed = fixed_choices(case)
+    if fixed:  # cells of pipes with "auto" count as cells only after this choice
+        from fvsolve.case import load
+
+        case = load(case, fixed)
     keys = cell_keys_of(scaled(cell_counts(case), times))
     if times < 1.0 and not is_valid(case, scaled(cell_counts(case), times)):
         return {}
@@ -249,7 +254,7 @@ def refined_keys(case, times: float) -> dict[str, Any]:
     if delay_lines(case):
         keys["numerics.delay_tolerance"] = min(numerics.delay_tolerance / times, 0.5)
         keys |= refined_step_keys(case, times)
-    return keys | fixed_choices(case)
+    return keys | fixed
 
 
 def refined_step_keys(case, times: float) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from fvsolve.units import UNITS, show
 
 GOALS = ("minimum", "maximum")
 INTERIOR_TRIALS = 8  # greatest number of trials between two ends if limits fail at both
+MOST_TRIALS = 30  # the same where the margins nearby allow a value with which all limits hold
 MAX_RUNS = 60
 GUESS_MARGIN = 0.1  # least distance of the next value from the ends of the bracket, as a fraction of its width
 _VALUE = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
@@ -177,17 +178,23 @@ class SizeSearch:
         return good, (bad, good)
 
     def find_interior(self) -> float | None:
-        """Search for a value at which all limits hold, in the middle of intervals between earlier runs.
+        """Search for a value at which all limits hold, beside the run with the greatest margin so far.
 
-        Each interval is the larger one beside the run with the greatest margin so far. Returns None after
-        `INTERIOR_TRIALS` runs without such a value.
+        Each trial is the highest peak of the margin by `peak_between`, or the middle of the wider interval where a
+        margin is not known. Returns None after `INTERIOR_TRIALS` runs without such a value, or `MOST_TRIALS` as long as
+        a peak above zero is possible.
         """
-        for _ in range(INTERIOR_TRIALS):
+        for trial in range(MOST_TRIALS):
             runs = sorted(self.runs, key=lambda run: run.value)
             position = max(range(len(runs)), key=lambda k: -math.inf if runs[k].margin is None else runs[k].margin)
-            gaps = [(runs[k + 1].value - runs[k].value, k) for k in (position - 1, position) if 0 <= k < len(runs) - 1]
-            k = max(gaps)[1]
-            x = 0.5 * (runs[k].value + runs[k + 1].value)
+            adjacent = [k for k in (position - 1, position) if 0 <= k < len(runs) - 1]
+            peaks = [peak for k in adjacent if (peak := peak_between(runs, k)) is not None]
+            x, height = max(peaks, key=lambda peak: peak[1], default=(math.nan, -math.inf))
+            if trial >= INTERIOR_TRIALS and not height > 0.0:
+                return None
+            if trial % 2 == 0 or not height > 0.0:  # peaks of a margin that is not concave may mislead
+                k = max((runs[k + 1].value - runs[k].value, k) for k in adjacent)[1]
+                x = 0.5 * (runs[k].value + runs[k + 1].value)
             if self(x).ok:
                 return x
         return None
@@ -203,6 +210,22 @@ class SizeSearch:
         if None not in margins and margins[1] > margins[0] and len(self.runs) % 2:
             share = min(max(-margins[0] / (margins[1] - margins[0]), GUESS_MARGIN), 1.0 - GUESS_MARGIN)
         return bad + share * (good - bad)
+
+
+def peak_between(runs: list[SizeRun], k: int) -> tuple[float, float] | None:
+    """(value, margin) of the peak between runs k and k + 1: where the lines through the runs on either side meet.
+
+    runs : sorted by value. No concave margin is greater. None without two runs with known margins on each side, and for
+    lines that do not meet between the runs.
+    """
+    if k < 1 or k + 2 >= len(runs) or any(run.margin is None for run in runs[k - 1 : k + 3]):
+        return None
+    (a, b, c, d), (p, q, r, s) = zip(*((run.value, run.margin or 0.0) for run in runs[k - 1 : k + 3]), strict=True)
+    rise, fall = (q - p) / (b - a), (s - r) / (d - c)
+    if not rise > fall:
+        return None
+    x = (r - q + rise * b - fall * c) / (rise - fall)
+    return (x, q + rise * (x - b)) if b < x < c else None
 
 
 def size_run(value: float, result: Any) -> SizeRun:

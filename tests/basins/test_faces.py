@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from scipy.special import erfc
 
 from fvsolve.basins import advection_faces
+from fvsolve.basins.cell_sides import STEEPEST
 from fvsolve.basins.free_surface import surface_mesh
 from fvsolve.basins.free_surface.surface_rates import water_mesh_rates
 from fvsolve.basins.liquid import liquid_mesh
@@ -35,6 +36,7 @@ class Field:
 
     def __post_init__(self):
         self.floats, self.integers = lower_mesh(self.mesh)
+        self.bounded, _ = lower_mesh(self.mesh, STEEPEST)  # of liquids
         self.centre, self.area = self.mesh.centre, self.mesh.area
         self.edge = self.mesh.middle[self.mesh.inner :]
         self.band = 0, len(self.area)
@@ -57,7 +59,7 @@ class Field:
         fluid = LiquidScheme(C, RHO, table, table is not None or law == LAW_LOG, scheme, 0, 0.0, wide)
         states = tuple(np.ascontiguousarray(y))
         return found, mesh_rates(
-            fluid, self.floats, self.integers, reflect, states, NONE, NONE, work, tuple(found), self.band, None, None
+            fluid, self.bounded, self.integers, reflect, states, NONE, NONE, work, tuple(found), self.band, None, None
         )
 
     def advection(self, scheme, flow, s, outside=None, depth=NONE, diffusivity=0.0, wide=2.0, bounds=FREE):

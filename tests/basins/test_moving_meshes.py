@@ -68,7 +68,7 @@ def test_what_is_known_of_sides_is_that_of_the_mesh_with_corners_where_they_are(
         model.functions.rhs(0.0, y, np.zeros(y.size), model.new_out(), slate.handle)
     now = as_it_is(basin.mesh, basin.mesh.points + sum(y[at] * goes for at, _, goes in basin.stretches))
     assert now.area / basin.mesh.area == pytest.approx(basin.area_ratios(y), rel=1e-13)
-    floats, integers = lower_mesh(now)
+    floats, integers = lower_mesh(now, basin.steepest)
     assert (integers == basin.integers).all()
     at = int(basin.row["mesh"])
     assert slate.tables.plane[at : at + floats.size] == pytest.approx(floats, rel=1e-10, abs=1e-11)

@@ -76,6 +76,26 @@ def test_a_uniform_scalar_stays_uniform_in_sloshing_water(scheme, path, tmp_path
     assert np.abs(model.basins[0].deviations(state.y)).max() > 0.05
 
 
+@pytest.mark.parametrize("end", [2.0, 12.0])
+def test_a_uniform_scalar_stays_uniform_beside_films_that_a_pipe_fills(end):
+    """Films had up to 1.011 and deep water 0.9988 to 1.0021 of a tracer that all sources have as 1."""
+    film = {
+        "type": "basin", "elevation": 0.0, "size": [20.0, 12.0], "cells": [8, 8], "level": -50.0,
+        "bed": "0.01*(20-x)+0.22*sin(0.93*x)*cos(0.892*y)+0.053*abs(y-6)", "start": {"level": 0.19843786090757914},
+        "scalars": {"dye": 1.0}, "patches": {"west": {"side": "west", "span": [0.0, 4.5]}},
+    }  # fmt: skip
+    feed = pipe("lake", "film.west", 20.0, 0.4, 50.0, 6, minor_loss=1.5) | {"scalars": {"dye": 1.0}}
+    nodes = {"film": film, "lake": lake(0.55, elevation=0.0) | {"scalars": {"dye": 1.0}}}
+    numerics = {"end": end, "scheme": "muscl", "method": "ssp-rk3", "courant": 0.9}
+    dyed = {"fluid": {"name": "Water", "law": "linear"}, "scalars": {"dye": {"initial": 1.0}}, "nodes": nodes}
+    model, state = ended(dyed | {"links": {"feed": feed}, "numerics": numerics, "output": {"every": end}})
+    pool = model.basins[0]
+    dye, depth = pool.values(state.y)["dye"], pool.depth + pool.deviations(state.y)[0]
+    wet, deep = depth > 1e-9, depth > 1e-3
+    assert 0 < np.count_nonzero(~wet) and np.count_nonzero(deep) > 10
+    assert np.abs(dye[wet] - 1.0).max() < 1e-9 and np.abs(dye[deep] - 1.0).max() < 1e-12
+
+
 @pytest.mark.parametrize("law", ["linear", "log", "table"])
 def test_first_order_on_a_rectangle_is_the_same_by_both_paths(law, tmp_path):
     """Loops over faces give the rates of loops over rows, for the same cells from a file."""

@@ -372,3 +372,64 @@ def test_a_gauge_names_a_point():
 def test_a_gauge_that_cannot_be_is_named(text, gauges):
     with pytest.raises(fvsolve.FvsolveError, match=text):
         fvsolve.load(gauged(gauges, ["field.depth@kirb"]))
+
+
+def soil_by_scipy(capacity, first: float, rain, end: float) -> float:
+    """Height infiltrated into a soil whose capacity is a function of it, with water that stands : SciPy's LSODA.
+
+    capacity : function of the infiltrated height; first : depth at the start [m]; rain : function of time
+    """
+
+    def rates(t, states):
+        depth, height = states
+        taken = min(capacity(max(height, 1e-12)), rain(t) + max(depth, 0.0) / 10.0)
+        return [rain(t) - taken, taken]
+
+    return solve_ivp(rates, (0.0, end), [first, 1e-9], "LSODA", rtol=1e-8, atol=1e-12, max_step=20.0).y[1, -1]
+
+
+DRY_WET_DRY = {"time": [0.0, 600.0, 601.0, 1500.0, 1501.0, 2700.0, 2701.0, 3600.0],
+               "value": [f"{rate} mm/h" for rate in (4, 4, 90, 90, 0, 0, 60, 60)]}  # fmt: skip
+
+
+def horton_capacity(height: float) -> float:
+    """Capacity of HORTON at an infiltrated height: that at the time in which this height infiltrates at capacity."""
+    k, first, last = 2.0 / 3600.0, 60 * MM_PER_HOUR, 10 * MM_PER_HOUR
+    time = brentq(lambda t: last * t - (first - last) / k * math.expm1(-k * t) - height, 0.0, 1e6)
+    return last + (first - last) * math.exp(-k * time)
+
+
+@pytest.mark.in_turn
+@pytest.mark.parametrize("method", BY_METHOD)
+@pytest.mark.parametrize("soil", [HORTON, GREEN_AMPT], ids=["horton", "green-ampt"])
+def test_capacities_fall_with_the_infiltrated_height_through_dry_and_wet_times(soil, method):
+    capacity = horton_capacity if soil is HORTON else lambda height: CONDUCTIVITY * (1 + SUCTION * DEFICIT / height)
+    times, values = DRY_WET_DRY["time"], [float(text.split()[0]) * MM_PER_HOUR for text in DRY_WET_DRY["value"]]
+    exact = soil_by_scipy(capacity, 0.0, lambda t: np.interp(t, times, values), 3600.0)
+    numerics = {"courant": None, "method": method} | BY_METHOD[method]
+    found = fvsolve.run(field(3600.0, numerics, rain=DRY_WET_DRY, infiltration=soil))
+    assert found["field.infiltrated"][-1] / 100.0 == approx(exact, rel=2e-4)
+
+
+STANDING = {
+    "ssp-rk2": {"courant": 0.9}, "ssp-rk3": {"courant": 0.9}, "rk4": {"courant": 0.9},
+    "bogacki-shampine": {"step": 2.5}, "dormand-prince": {"rtol": 1e-4}, "tr-bdf2": {"step": 10.0},
+    "radau-iia-5": {"rtol": 1e-4}, "rodas-4": {"rtol": 1e-4}, "auto": {},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("method", STANDING)
+def test_green_ampt_under_standing_water_is_its_closed_form(method):
+    """The capacity is infinite at the start: F - S ln(1 + F / S) = K t; 22.9 and 84 mm were found in place of 6.19."""
+    exact = {t: brentq(lambda F, t=t: F - 0.0297 * math.log1p(F / 0.0297) - 3.4 * MM_PER_HOUR * t, 1e-9, 1.0)
+             for t in (120.0, 600.0)}  # fmt: skip
+    soil = {"model": "green-ampt", "conductivity": "3.4 mm/h", "suction": "110 mm", "deficit": 0.27}
+    for size, level in (([100.0, 40.0], 1.0), ([500.0, 200.0], 2.0)):
+        case = field(600.0, {"courant": None, "method": method} | STANDING[method], every=120.0, level=level,
+                     infiltration=soil)  # fmt: skip
+        case["nodes"]["field"] |= {"size": size}
+        found = fvsolve.run(case)
+        heights = found["field.infiltrated"] / (size[0] * size[1])
+        assert heights[-1] == approx(exact[600.0], rel=2e-4)
+        assert heights[1] == approx(exact[120.0], rel=2e-3)
+        assert found.ok and found.summary["ledgers"]["mass"]["relative"] < 1e-12

@@ -87,11 +87,7 @@ def said(value: Any, key: str) -> Any:
 
 
 def swapped(case: dict) -> dict:
-    """Case with exchanged ends of links between points.
-
-    The damping of a bushing acts in the axes of the `from` body, so bushings of the tests have no translational
-    damping.
-    """
+    """Case with exchanged ends of links between points."""
     other = copy.deepcopy(case)
     for link in other["links"].values():
         if link["type"] in ("spring", "damper", "end-stop", "pin", "bushing", "force") and "from" in link:

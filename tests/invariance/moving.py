@@ -65,7 +65,7 @@ def machine(method: str = "rk4", law: str = "linear", **more) -> dict:
         "push": {"type": "force", "from": "arm.eye", "to": "wrist.grip", "force": 4.0},
         "motor": {"type": "torque", "from": "arm", "to": "wrist", "torque": 0.3, "axis": [0, 0.6, 0.8]},
         "rubber": {"type": "bushing", "from": "slider.tip", "to": "plate.edge", "stiffness": 25.0,
-                   "rotational_stiffness": 1.5, "rotational_damping": 0.05},
+                   "damping": 0.8, "rotational_stiffness": 1.5, "rotational_damping": 0.05},
     }  # fmt: skip
     probes = seen("arm.eye", "slider.tip", "wrist.grip", "plate.edge", "kite.nose", "kite")
     probes += [f"{one}.{what}{axis}" for one in ("arm", "kite", "wrist") for what in ("w", "angular_momentum_")

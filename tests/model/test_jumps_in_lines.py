@@ -166,6 +166,47 @@ def test_a_pulse_shorter_than_a_step_is_seen_wherever_it_passes(method):
     ) == pytest.approx(envelope, rel=1e-6)  # the pulse overlaps its reflection at the dead end
 
 
+@pytest.mark.parametrize("turn", [False, True])
+def test_small_jumps_that_arrive_together_count_by_their_sum(turn):
+    """Four pulses of 3 ms meet at a junction; their sum enters the main, though each part is below the least jump.
+
+    The pressure at the junction is 2 sum(Y p) / sum(Y), with the admittances Y of the pipes.
+    """
+    flow, many, bore = 1e-5, 4, 0.03
+    nodes = {"lake": lake(50.0), "j": junction()}
+    links = {"main": line("lake", "j", 1000.0)}
+    for k in range(many):
+        demand = {"time": [0.0, 0.5, 0.503], "value": [0.0, flow, 0.0], "kind": "step"}
+        nodes[f"d{k}"], links[f"p{k}"] = junction(demand), line("j", f"d{k}", 100.0, bore)
+    numerics = {"pipe_model": "delay-line", "method": "rk4", "step": 0.0137, "delay_tolerance": 0.16}
+    probe = "main.head@0.1" if turn else "main.head@0.9"  # 100 m from the junction
+    case = scene(nodes, links, 0.78, numerics, [probe], 0.05)
+    found = fvsolve.run(turned(case) if turn else case)
+    ratio = (bore / 0.3) ** 2  # of the admittances
+    fall = SPEED * flow / area(bore) / GRAVITY * 2.0 * many * ratio / (many * ratio + 1.0)
+    assert found.extremes[probe].minimum == pytest.approx(50.0 - fall, abs=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.25, 0.3])
+def test_a_probe_reads_the_same_from_both_ends_of_a_line(share):
+    """At joints of stretches and between them, rows, extremes and envelopes are those of the line turned round."""
+    nodes = {"lake": lake(50.0), "gate": junction({"start": 0.013, "duration": 0.21, "value": [0.05, 0.0]})}
+    friction = {"model": "steady", "factor": 0.2}
+    found = []
+    for ends, at in ((("lake", "gate"), share), (("gate", "lake"), 1.0 - share)):
+        links = {"main": line(*ends, 1000.0, friction=friction)}
+        numerics = {"pipe_model": "delay-line", "method": "euler", "step": 0.0137, "delay_tolerance": 0.004}
+        found.append(fvsolve.run(scene(nodes, links, 3.0, numerics, [f"main.head@{at}"], 0.01)))
+    one, other = found
+    name, turned_name = f"main.head@{share}", f"main.head@{1.0 - share}"
+    assert one[name] == pytest.approx(other[turned_name], abs=1e-9)
+    same = one.extremes[name], other.extremes[turned_name]
+    for key in ("minimum", "maximum", "t_min", "t_max"):
+        assert getattr(same[0], key) == pytest.approx(getattr(same[1], key), abs=1e-9)
+    for key in ("min_pressure", "max_pressure"):
+        assert one.envelope["main"][key] == pytest.approx(other.envelope["main"][key][::-1], abs=1e-4)
+
+
 def test_pulses_that_meet_between_two_places_of_a_line():
     """The envelope contains the sum of two pulses that cross inside a line with two stored places."""
 

@@ -119,7 +119,10 @@ def test_a_lone_basin_keeps_to_its_pattern_with_scalars_and_without(tmp_path, me
 
 
 def test_a_pipe_couples_no_more_than_its_scheme_reads():
-    """With `upwind` a cell depends on itself, its upstream cell and, with friction or at ends, on its opposite wave."""
+    """With `upwind` a cell depends on itself, its upstream cell and, with friction or at ends, on its opposite wave.
+
+    With `euler` friction depends on the waves that enter a cell: also on the upstream cell of the opposite wave.
+    """
     counts = []
     for friction in (NO_FRICTION, {"model": "steady", "factor": 0.02}):
         links = {"p": pipe("a", "b", 90.0, 0.2, 1000.0, 9, friction=friction)}
@@ -128,7 +131,8 @@ def test_a_pipe_couples_no_more_than_its_scheme_reads():
         )
         counts.append(found[:18].nnz)
         assert found[18:].toarray().sum() == 2  # supply of each lake: its edge cell
-    assert counts == [18 + 16 + 2, 18 + 16 + 18]  # cell and upstream cell; opposite wave at ends, or everywhere
+    # cell and upstream cell; opposite wave at ends, or everywhere with its upstream cell
+    assert counts == [18 + 16 + 2, 18 + 16 + 18 + 16]
 
 
 # differences ----------------------------------------------------------------------------------------------------

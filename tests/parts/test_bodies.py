@@ -514,19 +514,53 @@ def test_what_drives_a_joint_may_not_jump_nor_its_rate(driven):
 
 
 def test_a_body_on_a_bushing_swings_by_its_stiffnesses_and_fades_by_its_damping():
-    """m x'' = -k x - d x' along x, and J q'' = -K sin q - D q' about z."""
+    """m r'' = F = -k r - d (r' - q'/2 x r), and J q'' = -K sin q - D q' - (r/2 x F) about z, r = (x, y)."""
     m, k, d, j, turn_k, turn_d = 2.0, 300.0, 1.5, 0.4, 50.0, 0.2
     block = body(m, [j, j, j], {"kind": "free", "velocity": [0.5, 0, 0], "rate": [0, 0, 12.0]})
     links = {"rubber": {"type": "bushing", "from": "ground.top", "to": "block", "stiffness": k, "damping": d,
                         "rotational_stiffness": turn_k, "rotational_damping": turn_d}}  # fmt: skip
     nodes = {"block": block, "ground": {"type": "frame", "points": {"top": [0, 0, 0]}}}
-    case = {**bodies(nodes, 2.0, ["block.x", "block.yaw", "rubber.gap", "rubber.torque"], links), **WEIGHTLESS}
+    probes = ["block.x", "block.y", "block.yaw", "rubber.gap", "rubber.torque"]
+    result = run({**bodies(nodes, 2.0, probes, links), **WEIGHTLESS})
+
+    def rates(t, state):
+        (x, y), (u, v), q, w = state[:2], state[2:4], state[4], state[5]
+        fx, fy = -k * x - d * (u + 0.5 * w * y), -k * y - d * (v - 0.5 * w * x)
+        torque = -turn_k * math.sin(q) - turn_d * w - 0.5 * (x * fy - y * fx)
+        return [u, v, fx / m, fy / m, w, torque / j]
+
+    x, y, _, _, q, w = solve_ivp(rates, (0.0, 2.0), [0.0, 0.0, 0.5, 0.0, 0.0, 12.0], rtol=1e-12, atol=1e-13).y[:, -1]
+    assert result["block.x"][-1] == approx(x, abs=1e-8) and result["block.y"][-1] == approx(y, abs=1e-8)
+    assert abs(y) > 1e-4 and result["rubber.gap"][-1] == approx(math.hypot(x, y), abs=1e-8)
+    assert result["block.yaw"][-1] == approx(q, abs=1e-7)
+    assert result["rubber.torque"][-1] == approx(abs(turn_k * math.sin(q) + turn_d * w), abs=1e-5)
+
+
+@pytest.mark.parametrize("ends", [("wheel.e", "post.j"), ("post.j", "wheel.e")])
+def test_a_bushing_with_a_gap_has_no_direction(ends):
+    """A damper of 20 N s/m between the centre and a point 0.7 m out of a wheel slows it by 20 (0.7 / 2)^2 w.
+
+    The middle of the gap moves by 0.35 w in axes that turn by w / 2. With the rate in axes of `from` it did not act.
+    """
+    post = {**body(10.0, [2, 3, 4], {"kind": "fixed"}), "points": {"j": [0.3, 0, 0]}}
+    joint = {"kind": "revolute", "on": "post.j", "axis": [0, 0, 1], "rate": 2.0}
+    wheel = {**body(5.0, [1, 1, 1], joint), "centre_of_mass": [0.2, 0, 0], "points": {"e": [0.7, 0, 0]}}
+    links = {"l": {"type": "bushing", "from": ends[0], "to": ends[1], "damping": 20.0}}
+    case = {**bodies({"post": post, "wheel": wheel}, 0.5, ["wheel.rate", "l.force", "l.gap"], links), **WEIGHTLESS}
     result = run(case)
-    y = solve_ivp(lambda t, y: [y[1], -(k * y[0] + d * y[1]) / m, y[3], -(turn_k * math.sin(y[2]) + turn_d * y[3]) / j],
-                  (0.0, 2.0), [0.0, 0.5, 0.0, 12.0], rtol=1e-12, atol=1e-13).y[:, -1]  # fmt: skip
-    assert result["block.x"][-1] == approx(y[0], abs=1e-8) and result["rubber.gap"][-1] == approx(abs(y[0]), abs=1e-8)
-    assert result["block.yaw"][-1] == approx(y[2], abs=1e-7)
-    assert result["rubber.torque"][-1] == approx(abs(turn_k * math.sin(y[2]) + turn_d * y[3]), abs=1e-5)
+    rate = 2.0 * math.exp(-20.0 * 0.35**2 * 0.5 / (1.0 + 5.0 * 0.2**2))
+    assert result["wheel.rate"][-1] == approx(rate, rel=1e-7)
+    assert result["l.force"][-1] == approx(20.0 * 0.35 * rate, rel=1e-7) and result["l.gap"] == approx(0.7, abs=1e-12)
+
+
+def test_a_bushing_does_not_damp_a_common_rotation():
+    """Two bodies on one plate's rotation: a free body, joined by a bushing with a gap to a body that turns with it."""
+    turn = {"kind": "revolute", "axis": [0, 0, 1], "rate": 3.0}
+    disc = {**body(2.0, [1, 1, 1], turn), "points": {"p": [0.5, 0, 0]}}
+    fixed = {**body(1.0, [1, 1, 1], {"kind": "fixed", "on": "disc.p"}), "points": {"q": [0.2, 0.3, 0]}}
+    links = {"l": {"type": "bushing", "from": "disc.p", "to": "rider.q", "damping": 20.0, "rotational_damping": 5.0}}
+    result = run({**bodies({"disc": disc, "rider": fixed}, 1.0, ["disc.rate", "l.force"], links), **WEIGHTLESS})
+    assert result["disc.rate"] == approx(3.0, abs=1e-12) and result["l.force"] == approx(0.0, abs=1e-12)
 
 
 def test_a_bushing_between_two_free_bodies_keeps_their_momenta():

@@ -634,3 +634,21 @@ def test_rates_of_dye_depend_on_the_states_of_the_pattern_only():
 def test_an_unusual_manning_gives_a_notice():
     case = fvsolve.load(two_tanks(0.3, manning=0.5))
     assert any("manning" in str(notice.text) or notice.key == "manning" for notice in case.notices)
+
+
+def test_probes_of_a_conduit_by_distance_are_those_by_its_fraction_of_the_length():
+    """They read the first cell, and any distance was accepted."""
+    from fvsolve.case import load
+    from fvsolve.errors import FvsolveError
+
+    def case(*probes):
+        tanks = {"a": {"type": "tank", "area": 1.0, "level": 0.2}, "b": {"type": "tank", "area": 1.0, "level": 0.1}}
+        own = {"type": "conduit", "from": "a", "to": "b", "diameter": 0.3, "length": 20.0, "inverts": [0.0, 0.0],
+               "manning": 0.012}  # fmt: skip
+        fluid = {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 1e-3}
+        return {"fluid": fluid, "nodes": tanks, "links": {"c": own}, "numerics": {"end": 1.0},
+                "output": {"every": 1.0, "probes": list(probes)}}  # fmt: skip
+
+    assert [probe.fraction for probe in load(case("c.head@5 m", "c.flow@0.02 km")).output.probes] == [0.25, 1.0]
+    with pytest.raises(FvsolveError, match="is outside 0 m to 20 m"):
+        load(case("c.head@99 km"))

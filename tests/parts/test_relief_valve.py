@@ -207,6 +207,47 @@ def test_open_at_the_start_it_says_so_and_nothing_moves(disc):
     assert np.ptp(held["end.pressure"]) == 0.0 and held.summary["events"] == []
 
 
+def pocket(back, law="linear", **disc):
+    """Return a case of a chamber at 5 MPa behind a valve with set pressure 4.8 MPa, and a reservoir at `back`."""
+    fluid = {"name": "user", "density": 900.0, "bulk_modulus": 1.5e9, "viscosity": 0.03, "law": law}
+    nodes = {"c": chamber(1e-3, 5e6), "r": reservoir(back)}
+    links = {"v": relief("c", "r", 1e-5, 4.8e6, 4e5, **disc)}
+    return scene(nodes, links, 2e-3, {"method": "dormand-prince", "rtol": 1e-9},
+                 ["c.pressure", "v.opening", "v.flow"], 1e-4, fluid=fluid)  # fmt: skip
+
+
+@pytest.mark.parametrize("back", [8e6, 5.05e6, 5e6, 1e6])
+@pytest.mark.parametrize("disc", [{}, *DISCS.values()], ids=["none", *DISCS])
+def test_lifted_at_the_start_it_has_its_lift_whatever_the_pressure_behind_it(disc, back):
+    """At the start the lift is (p - set) / span = 0.5 for a reversed flow too, and without flow; then against SciPy."""
+    from scipy.integrate import solve_ivp
+
+    def rates(t, y):
+        lift = (y[0] - 4.8e6) / 4e5
+        x = y[1] if disc else lift  # without disc dynamics the pressure is the only state
+        q = 1e-5 * min(max(x, 0.0), 1.0) * math.copysign(math.sqrt(2.0 * abs(y[0] - back) / 900.0), y[0] - back)
+        if not disc:
+            return [-1.5e12 * q]
+        if "time_constant" in disc:
+            return [-1.5e12 * q, (lift - y[1]) / disc["time_constant"]]
+        w = 2.0 * math.pi * disc["natural_frequency"]
+        return [-1.5e12 * q, y[2], w * w * (lift - y[1]) - 2.0 * disc["damping_ratio"] * w * y[2]]
+
+    result = fvsolve.run(pocket(back, **disc))
+    start = [5e6, 0.5, 0.0][: 1 + len(disc)]
+    exact = solve_ivp(rates, (0.0, 2e-3), start, t_eval=result.t, rtol=1e-9, atol=1e-9, max_step=1e-5)
+    assert result.ok and result["v.opening"][0] == pytest.approx(0.5, abs=1e-12)
+    assert result["c.pressure"] == pytest.approx(exact.y[0], abs=1e-6 * 5e6)
+    lift = exact.y[1] if disc else (exact.y[0] - 4.8e6) / 4e5
+    assert result["v.opening"] == pytest.approx(np.clip(lift, 0.0, 1.0), abs=1e-5)
+
+
+def test_a_reversed_flow_through_a_lifted_valve_is_the_same_under_other_laws():
+    peaks = [fvsolve.run(pocket(8e6, law, discharge_coefficient=0.61))["c.pressure"][-1] for law in ("linear", "log")]
+    assert peaks[0] == pytest.approx(6249029.0, rel=3e-6)  # closed form by separation of variables
+    assert peaks[1] == pytest.approx(peaks[0], rel=3e-3)
+
+
 def test_it_dissipates_and_the_ledger_closes():
     found = energy(filled(**DISCS["lag"]))
     assert found.relative < 1e-9

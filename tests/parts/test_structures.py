@@ -55,7 +55,8 @@ def culvert_of(**keys):
 
 WEIR = of(weir_law, [2.0 / 3.0 * 0.62 * math.sqrt(2.0 * G) * 5.0], 1.0)
 GATE = of(gate_law, [1.0, 0.0, 0.61, BROAD, G], 0.4)
-MANHOLE = of(manhole_law, [0.2, 2.0 / 3.0 * 0.54 * math.sqrt(2.0 * G) * 1.9, 0.167 * 0.28 * math.sqrt(2.0 * G)])
+LID = [0.2, 2.0 / 3.0 * 0.54 * math.sqrt(2.0 * G) * 1.9, 0.167 * 0.28 * math.sqrt(2.0 * G)]
+MANHOLE, TURNED_MANHOLE = of(manhole_law, [*LID, 1.0]), of(manhole_law, [*LID, 0.0])
 LAWS = {  # law, level of its crest, a full flow [m3/s]
     "weir": (WEIR, 1.0, 10.0),
     "gate": (GATE, 0.0, 1.5),
@@ -128,6 +129,7 @@ def test_manholes_fall_as_weirs_and_orifices_and_rise_as_orifices():
     law = reference.manhole(0.2, 0.28, 1.9)
     for levels in ((0.25, -1.0), (0.6, -1.0), (0.6, 0.5), (0.25, 0.24), (0.2, 0.7), (0.3, 0.7), (0.1, 0.19)):
         assert MANHOLE(*levels) == approx(law(*levels), rel=1e-12, abs=1e-15), levels
+        assert TURNED_MANHOLE(*levels[::-1]) == -MANHOLE(*levels), levels
 
 
 def test_all_inlets_of_hds_5_rise_with_the_headwater():

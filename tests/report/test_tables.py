@@ -47,6 +47,16 @@ def test_a_swing_uses_its_share() -> None:
     assert found["still.pressure"] == {"probe": "still.pressure", "unit": "Pa", "cycles": [], "share": 0.0}
 
 
+def test_rows_too_coarse_for_the_waves_are_refused() -> None:
+    """Rows every 0.5 s of a wave of 0.5 s are all alike: no cycle would be counted, and the life would be unlimited."""
+    case = swung() | {"output": {"every": 0.5, "fields": 0, "probes": ["swung.pressure", "still.pressure"]}}
+    result = fvsolve.run(case)
+    with pytest.raises(FvsolveError) as caught:
+        cycles(result, None, FatigueStrength(4e5, 1e6, 3.0))
+    assert "swung.pressure: the rows have a range of" in str(caught.value) and "output.every" in str(caught.value)
+    assert cycles(result, ["still.pressure"])[0]["cycles"] == []
+
+
 def test_the_command_says_how_long_it_lasts(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "swung.toml").write_text(write(swung()))

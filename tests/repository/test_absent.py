@@ -163,4 +163,5 @@ def test_the_rates_are_called_no_more_often_than_the_steps_ask_for():
     loop = RunLoop(fvsolve.build(fvsolve.load(tanks(method="rk4", step=0.1))))
     loop.begin(10.0, 1e308)
     loop.run(1e308)
-    assert loop.state["steps"] == 100 and loop.state["calls"] <= 4 * 100 + 1
+    # the end of the last step; that of the first step, in which events are searched: their pace is not known yet
+    assert loop.state["steps"] == 100 and loop.state["calls"] <= 4 * 100 + 2

@@ -113,3 +113,53 @@ def test_landing_leaves_given_steps_where_they_end():
     cut = ode.integrate(circle, [1.0, 0.0, 0.5], t, "verner-7", step=0.1)
     assert whole == pytest.approx(exact(np.ones(1))[0], abs=1e-10)
     assert cut == pytest.approx(exact(t), abs=1e-10)
+
+
+STIFF_METHODS = [name for name in IMPLICIT if METHODS[name].adaptive] + ["auto"]
+
+
+def forced(rate, t):
+    """Exact solution of y' = -rate (y - cos t), y(0) = 2 (Prothero and Robinson 1974)."""
+    a, b = rate**2 / (rate**2 + 1), rate / (rate**2 + 1)
+    return a * np.cos(t) + b * np.sin(t) + (2 - a) * np.exp(-rate * t)
+
+
+@pytest.mark.parametrize("method", STIFF_METHODS)
+@pytest.mark.parametrize("rate", [1e4, 1e6, 1e9])
+def test_rows_of_a_stiff_problem_have_the_accuracy_of_its_steps(method, rate):
+    """Many and few rows between long steps are right to a few tolerances, and do not change the steps.
+
+    Without control of the interpolant the errors were up to 1.7 for a tolerance of 1e-6, with steps right to 1e-9.
+    """
+    rtol = 1e-6 if method != "tr-bdf2" else 1e-4  # of order 2: few steps
+    whole, counts = {}, {}
+
+    def rates(t, y):
+        return -rate * (y - np.cos(t))
+
+    ode.integrate(rates, [2.0], [0.0, 10.0], method, rtol=rtol, counts=whole)
+    for number in (8, 400):
+        t = np.linspace(0.0, 10.0, number)
+        y = ode.integrate(rates, [2.0], t, method, rtol=rtol, counts=counts)[:, 0]
+        assert np.abs(y - forced(rate, t)).max() <= 6 * rtol
+        if method not in ("esdirk-5", "radau-iia-9"):  # their steps end at rows
+            assert counts["steps"] == whole["steps"] and counts["rhs"] <= 7 * whole["rhs"]
+
+
+@pytest.mark.parametrize("method", ["rodas-4", "rodas-5p", "radau-iia-5", "esdirk-4", "auto"])
+def test_rows_of_a_stiff_circuit_have_the_accuracy_of_its_steps(method):
+    """Rows of the voltage of a small capacitor behind a resistor: RC = 1 us under a source of 0.2 Hz.
+
+    With rodas-4 they differed by 6.5e-3 for a tolerance of 1e-6.
+    """
+    source = {"mean": 0.0, "amplitude": 1.0, "period": 5.0}
+    nodes = {"plus": {"type": "terminal"}, "c": {"type": "terminal"}, "earth": {"type": "ground"}}
+    links = {
+        "source": {"type": "voltage-source", "from": "earth", "to": "plus", "voltage": source},
+        "r": {"type": "resistor", "from": "plus", "to": "c", "resistance": 1.0},
+        "store": {"type": "capacitor", "from": "c", "to": "earth", "capacitance": 1e-6, "initial_voltage": 0.0},
+    }
+    run = fvsolve.run(scene(nodes, links, 10.0, {"method": method, "rtol": 1e-6}, ["c.voltage"], every=0.013))
+    omega, t = 2 * np.pi / 5.0, run.seconds
+    lag = omega * 1e-6  # of the slow solution; the transient has the size of the lag
+    assert run.si("c.voltage") == pytest.approx(np.sin(omega * t) - lag * np.cos(omega * t), abs=6e-6)

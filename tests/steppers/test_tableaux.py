@@ -159,6 +159,13 @@ def test_every_decimal_of_a_published_array_counts():
             "0.123456789 | 0.1234567\n--+--\n | 1",
             "row 1 adds up to 1234567/10000000; expected c = 123456789/1000000000",
         ),
+        ("0 |\n1 | 1\n--+----\n | 1/2 1/2\n | 1/2 1/2", "the error estimate is zero"),
+        ("0 |\n1 | 1\n1 | 1\n--+----\n | 1/2 1/2 0\n | 1/2 1/4 1/4", "the error estimate is zero"),
+        ("1/2 | 1/2\n1/2 | 1/2\n--+----\n | 1/2 1/2\n | 1 0", "the error estimate is zero"),
+        (
+            "0 |\n0.3333333333333333 | 0.3333333333333333\n--+--\n | 0.25 0.75\n | 0.2500000000000001 0.75",
+            "the error estimate is zero",
+        ),
     ],
 )
 def test_a_wrong_array_is_refused_with_its_fault(text, wanted):

@@ -16,7 +16,7 @@ from fvsolve.case.text import write
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.run.result import HOLDS, OPEN, LimitVerdict
 from fvsolve.studies import optimise, scenarios
-from fvsolve.studies.sizing import parse_range, parse_ties, size, size_run
+from fvsolve.studies.sizing import SizeRun, SizeSearch, parse_range, parse_ties, size, size_run
 
 
 def throttled() -> dict:
@@ -216,6 +216,41 @@ def test_ends_that_hold_or_fail_are_said() -> None:
     assert lost.value is None and lost.nearest.value == 80.0
     island = size(still(minimum=3e5, maximum=4.5e5), "nodes.lake.head", 20.0, 100.0, rtol=1e-3)
     assert island.value == pytest.approx(10.0 + 3e5 / (RHO * GRAVITY), rel=2e-3)
+
+
+def margins(rule):
+    """`SizeSearch` whose margin is a function of the value, without runs."""
+
+    class Trials(SizeSearch):
+        def __init__(self):
+            self.runs = []
+
+        def __call__(self, value):
+            known = next((one for one in self.runs if one.value == value), None)
+            if known is None:
+                known = SizeRun(value, rule(value) >= 0.0, rule(value), "", "")
+                self.runs.append(known)
+            return known
+
+    return Trials()
+
+
+@pytest.mark.parametrize("goal", ["minimum", "maximum"])
+@pytest.mark.parametrize(
+    "low, high",
+    [(3.8, 4.2), (3.99, 4.01), (11.7, 11.71), (17.0, 17.05), (0.6, 0.62), (19.3, 19.31), (5.0, 5.001)],
+)
+def test_a_narrow_window_with_known_margins_is_found(goal, low, high) -> None:
+    """Windows of 0.005 % to 2 % of the range 0 to 20, with margins relative to the limits as those of a tank."""
+    found = margins(lambda x: min((x - low) / low, (high - x) / high)).search(0.0, 20.0, goal, 1e-3)[0]
+    assert found is not None and low <= found <= high
+    bent = margins(lambda x: 1e-4 - abs(x - 0.5 * (low + high)) ** 1.5 / 20.0).search(0.0, 20.0, goal, 1e-3)[0]
+    assert bent is not None and abs(bent - 0.5 * (low + high)) ** 1.5 <= 2e-3
+
+
+def test_a_margin_that_fails_everywhere_ends_the_search() -> None:
+    search = margins(lambda x: -0.1 - abs(x - 3.0))
+    assert search.search(0.0, 20.0, "minimum", 0.01) == (None, None) and len(search.runs) <= 10
 
 
 def test_ties_follow_in_si() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.basins.basin_terms import SHORTAGES
 from fvsolve.basins.conduit import conduit_rates
-from fvsolve.basins.conduit.conduit_cells import drag_per_flow, fastest, velocity_factor
+from fvsolve.basins.conduit.conduit_cells import THIN, drag_per_flow, fastest, velocity_factor
 from fvsolve.basins.conduit.conduit_rates import OF_AREA, OF_DEPTH, OF_FLOW
 from fvsolve.basins.conduit.lower_chain import steady_chain
 from fvsolve.basins.conduit.steady_profile import put_profile
@@ -41,6 +41,7 @@ class ConduitWaterRows(RowsWithFriction):
         self.rough = self.conduit.rough(case.gravity)
         self.depth = np.maximum(self.part.level - self.bed, 0.0)
         self.area = self.areas(self.depth)
+        self.fades = THIN * self.section.area
         self.full_rate = COURANT_FACTOR * self.conduit.celerity(case.gravity) * self.n / self.conduit.length
 
     def areas(self, depth: np.ndarray) -> np.ndarray:

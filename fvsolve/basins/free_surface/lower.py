@@ -51,6 +51,7 @@ DRIVEN_TERMS = RhsTerms(
 )
 DEPTH_SCALE = 0.1  # [m] of depth
 HEIGHT_SCALE = 1e-3  # [m] of rain and infiltrated water
+TIME_SCALE = 10.0  # [s] of condensed times of soils
 ROUNDING = 1e-12  # depth over levels and beds below which there is no water
 TINY = 1e-300
 CLOSURES = {  # key of a driven patch, or word of its key `boundary` -> code
@@ -72,9 +73,10 @@ def soil_numbers(model: str, fields: list[np.ndarray]) -> tuple[int, np.ndarray]
         return rec.CONSTANT_RATE, np.array(fields)
     if model == "green-ampt":
         conductivity, suction, deficit = fields
-        return rec.GREEN_AMPT, np.array([conductivity, conductivity * suction * deficit])
+        store, ponded = suction * deficit, conductivity * water_sources.EARLY
+        return rec.GREEN_AMPT, np.array([conductivity, store, np.sqrt(2.0 * store * ponded) + ponded])
     initial, final, decay = fields
-    return rec.HORTON if np.ptp(decay) == 0.0 else rec.HORTON_FIELDS, np.array([final, initial - final, decay])
+    return rec.HORTON, np.array([final, initial - final, decay])
 
 
 def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
@@ -105,6 +107,7 @@ class PatchFaceRows(Restriction, kind="patch-face"):
     def restriction(self, draft, name, link, row) -> None:
         row["conductance"] = draft.fluid.density * link.length**2 * DEPTH_SCALE**2
         row["chained"] = 1  # the links at the junction limit its rate
+        row["level_start"] = 1
         row["drive"] = 1.0  # unlike that of valves without a shaft: the velocity in the cells may change alone
 
     def numbers(self, draft, name, link) -> list[float]:
@@ -131,6 +134,7 @@ class FreeSurfaceRows(RowsWithFriction):
 
     units = {"depth": "m", "surface": "m", "bed": "m", "velocity": "m/s"}
     deep, has_wide_closure, banded, banded_mesh = True, False, True, True
+    fades = THIN
 
     def __init__(self, case, name: str) -> None:
         super().__init__(case, name)
@@ -180,13 +184,19 @@ class FreeSurfaceRows(RowsWithFriction):
     def soil(self):
         return self.part.infiltration
 
+    @property
+    def soil_states(self) -> int:
+        return 0 if self.soil is None else 1 if self.soil.model == "constant" else 2
+
     def lower_sources(self, draft, row) -> None:
         row["present"], row["source"] = draft.to_work(water_sources.PRESENT_NUMBERS), draft.sources
         if self.soil is not None:  # right after the states of cells
             row["soil"], numbers = soil_numbers(self.soil.model, [self.formula(shape) for shape in self.soil.shapes])
             row["soil_numbers"], row["soil_row"] = draft.to_plane(numbers), numbers.shape[1]
-            row["soil_work"] = draft.to_work(self.n)
+            row["soil_work"] = draft.to_work(2 * self.n + water_sources.CHUNK)
             row["infiltrated"] = draft.states(Numbered(f"{self.name}.infiltrated", self.n), HEIGHT_SCALE)
+            if self.soil_states > 1:
+                draft.states(Numbered(f"{self.name}.condensed_time", self.n), TIME_SCALE)
         rain = self.part.rain
         if self.rains:
             if isinstance(rain, SpatialSeries):
@@ -227,9 +237,11 @@ class FreeSurfaceRows(RowsWithFriction):
         else:
             cells = self.mesh.faces(patch).inside if is_interior else self.second_cells(patch, behind)
         draft.integers += cells.ravel().tolist()
-        if not (self.is_grid or is_interior):
+        of_triangles = self.mesh.cells[behind, 3] < 0
+        if of_triangles.any() and not is_interior:  # quadrilaterals, as cells of grids, have inflow of their own
             row["neighbours"] = len(draft.integers)
-            draft.integers += self.mesh.neighbouring_faces(patch).ravel().tolist()
+            faces = np.where(of_triangles, self.mesh.neighbouring_faces(patch), np.arange(behind.size))
+            draft.integers += faces.ravel().tolist()
         if has_faces:
             row["closure"] = rec.INTERIOR if is_interior else rec.LINKED
             row["valve"] = draft.valve_names.index(f"{self.name}.{patch}.face")
@@ -388,6 +400,16 @@ class FreeSurfaceRows(RowsWithFriction):
     def weights(self, y: np.ndarray) -> np.ndarray:
         per, depth = self.case.properties.density * self.mesh.area, np.maximum(self.depth + y[0], THIN)
         return np.array([0.5 * self.case.gravity * per, 0.5 * per / depth, 0.5 * per / depth])
+
+    def energy_of_waves(self, y: np.ndarray) -> float:
+        depth = np.maximum(self.depth + y[0], 0.0)
+        wet = depth > THIN
+        if not wet.any():
+            return 0.0
+        area, surface, depth = self.mesh.area[wet], (self.bed + depth)[wet], depth[wet]
+        square = (y[1][wet] ** 2 + y[2][wet] ** 2) / depth
+        height = self.case.gravity * (surface - np.average(surface, weights=area)) ** 2
+        return float(0.5 * self.case.properties.density * np.sum(area * (height + square)))
 
     def above(self, y: np.ndarray, datum: float) -> float:
         depth, bed = np.maximum(self.depth + y[0], 0.0), self.bed + (self.part.elevation or 0.0) - datum

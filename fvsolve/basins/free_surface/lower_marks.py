@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fvsolve.assembly.lowering import lowering_of
 from fvsolve.basins.cell_sides import BLOCK
 from fvsolve.basins.free_surface.marked_faces import SUM_COUNT
 from fvsolve.basins.lower_motion import sides_of_cells
@@ -103,3 +104,23 @@ def chain_texts(basin) -> Iterator[str]:
         yield f"wall {name}: {faces.size} faces, {length} long, crest {low} to {high} above the bed"
     for name, chain in basin.sections.items():
         yield f"section {name}: {chain.faces.size} faces"
+    yield from crest_texts(basin)
+
+
+def crest_texts(basin) -> Iterator[str]:
+    """Yield a text on each structure at a patch: its crest above datum, the bed there, and the surface around it."""
+    amount, datum = basin.case.amount, basin.part.elevation or 0.0
+    surface = basin.bed + np.maximum(basin.depth + basin.start()[0], 0.0)
+    for name, link in basin.case.links.items():
+        rows = lowering_of(type(link))
+        for end, place in enumerate(link.ports.values() if hasattr(rows, "bottoms") else ()):
+            of, _, patch = place.partition(".")
+            if of != basin.name:
+                continue
+            _, around, own, _ = basin.mesh.faces(patch)
+            crest, bed = rows.bottoms(link)[end], datum + float(basin.bed[own].min())
+            low, high = (amount(datum + float(value), "length", 6)
+                         for value in (surface[around].min(), surface[around].max()))  # fmt: skip
+            text = f"{name}: {rows.bottom_key} {amount(crest, 'length', 6)}, {amount(abs(crest - bed), 'length', 3)} "
+            text += f"{'above' if crest > bed else 'below'} the lowest bed of {place}" if crest != bed else ""
+            yield f"{text}; surface around it at the start {low} to {high}"

@@ -43,6 +43,8 @@ FLOW, MOMENTUM, SURFACE, SPEED, BEYOND, ROWS = 0, 1, 2, 3, 4, 8
 STENCIL = 9  # cells around a cell of a mesh, from which states at its driven face are extrapolated
 ITERATIONS = 100
 ROUNDING = 1e-15  # relative error of a flow at which a level is accepted
+# Depth of critical flow below which an outflow counts as rounding: of a schedule that passes zero, or of its end [m].
+FILM = 1e-7
 HELD = 1e-9  # relative difference of a discharge from its schedule above which it counts as held
 # Level of the links of a patch below its bed [m], farther than any network falls, from which on they may draw more than
 # critical outflow (`law_patch_face`); the rest is supplied from outside.
@@ -320,7 +322,9 @@ def smooth_inflow(tables, patch, h, u):
     """Replace velocities u into the basin by means, weighted by depth h, over three faces along the patch.
 
     Inflow would otherwise have the velocity of the cell behind its face, whatever that is: on triangles, differences
-    from face to face then grow.
+    from face to face then grow. A mean lies between 0 and twice the velocity of its face, so that it is continuous
+    where this velocity passes zero: a jump of the rates there has no solution for implicit stages. The neighbours of a
+    face with a quadrilateral behind it are the face itself.
     """
     n, neighbours = h.size, tables.integers[patch["neighbours"] :]
     as_read = tables.work[patch["inside"] + 4 * n : patch["inside"] + 5 * n]
@@ -330,7 +334,7 @@ def smooth_inflow(tables, patch, h, u):
         if u[m] > 0.0:
             a, b = neighbours[m], neighbours[n + m]
             flow = 2.0 * h[m] * u[m] + (h[a] * as_read[a] + h[b] * as_read[b])
-            u[m] = flow / (2.0 * h[m] + (h[a] + h[b]) + TINY)
+            u[m] = min(max(flow / (2.0 * h[m] + (h[a] + h[b]) + TINY), 0.0), 2.0 * u[m])
 
 
 @njit
@@ -350,6 +354,8 @@ def read_faces_around(tables, patch, y):
         above = depth - max(step, 0.0)  # of the surface over the bed of the face
         within = max(plane[beds + own] + y[basin["y"] + own], 0.0)
         h[m], e[m] = min(max(above, 0.0), 2.0 * within), surface + max(-above, 0.0)
+        if h[m] == 0.0:
+            u[m] = 0.0  # no outflow through a dry face, however fast the water is beyond the kerb
         lengths[m] = plane[at + 2 * count + m] * plane[basin["area"] + k]
 
 
@@ -419,7 +425,8 @@ def close_patch(tables, patch, t, y, out):
         surface += lengths[m] * depth * rows[SURFACE, k]
     if patch["closure"] == DISCHARGE or patch["closure"] == LINKED:
         may_hold = z < lowest_bed(faces) - DEEPEST if patch["closure"] == LINKED else given == 0.0
-        held = put_discharge(tables, patch, rows, total, target, wide, given, may_hold)
+        least = wide * sqrt(g * FILM) * FILM
+        held = put_discharge(tables, patch, rows, total, target, wide, given, may_hold, least)
     for m in range(h.size):
         k = tables.integers[patch["ring"] + m]
         q, depth = rows[FLOW, k], h[m] + (rows[SURFACE, k] - e[m])
@@ -437,14 +444,15 @@ def close_patch(tables, patch, t, y, out):
 
 
 @njit
-def put_discharge(tables, patch, rows, total, target, wide, given, may_hold):
+def put_discharge(tables, patch, rows, total, target, wide, given, may_hold, least):
     """Correct the flows of faces so that their sum is the discharge; return the fraction that leaves, else 1.
 
     total : sum of the flows [m3/s]; target : discharge [m3/s]; wide : length of all faces [m]; given : depth of a
     supercritical inflow [m], or 0; may_hold : True if an outflow above critical is possible
+    least : outflow up to which none is held [m3/s]
     """
     if may_hold and target < 0.0 and total - target > -HELD * target:
-        return total / target
+        return total / target if -target > least else 1.0
     for m in range(patch["faces"] if total != target or given > 0.0 else 0):
         k = tables.integers[patch["ring"] + m]
         if given > 0.0:

@@ -3,6 +3,8 @@
 The scheme is the same as on a grid (`surface_grid`), but with least-squares gradients and a common limiter for all
 sides of a cell. Pressures at sides are relative to the pressure in the cell, and the force of the bed to the surface
 of the cell. So every term is zero where the surface is level: a lake at rest stays at rest, with dry islands too.
+With `muscl` the flux of tangential momentum over an uneven bed has a term for its jump: without it, vortices of the
+size of cells, which HLLC does not damp in water at rest, are coupled with waves by the differences of depth, and grow.
 Cells have depth, surface, both velocities, wave speed and bed; depths at sides are limited surface minus limited bed.
 """
 
@@ -19,6 +21,7 @@ from fvsolve.basins.free_surface.patch_closures import SURFACE as DRIVEN_SURFACE
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.mesh_blocks import own_sides
 from fvsolve.jit import inline, njit
+from fvsolve.kernels.dtypes import UPWIND
 
 DEPTH, SURFACE = 0, 1  # rows of plan: depth of the profile, its surface above the level
 FIELDS, ROWS_OF_CELLS, SHOWN = 4, 6, 2  # see `mesh_blocks`
@@ -175,10 +178,11 @@ def add_side(water, mesh, j, k, first, last, reflect, cells, sides, w, moves, ph
     centre = cells[0, o:], cells[1, o:], cells[4, o:]
     edges, number = mesh.edges[first:last], mesh.number[first:last]
     save_sums(water.marks, 4 * j + k, w, SUMS)
+    damping = 0.0 if water.scheme == UPWIND else 0.5  # with upwind no vortex grows
     if moves is None:
-        add_side_fluxes(water.g, centre, inside, geo, w, None)
+        add_side_fluxes(water.g, damping, centre, inside, geo, w, None)
     else:
-        add_side_fluxes(water.g, centre, inside, geo, w, moves.speeds[(4 * j + k) * BLOCK :])
+        add_side_fluxes(water.g, damping, centre, inside, geo, w, moves.speeds[(4 * j + k) * BLOCK :])
         rest = water.plan[DEPTH, j * BLOCK :]
         close_walls(water.g, edges, number, reflect, rest, cells[0, o:], geo, w, moves.thrust)
     close_driven(water.g, water.faces, edges, number, inside, cells[4, o:], geo, w)
@@ -186,11 +190,13 @@ def add_side(water, mesh, j, k, first, last, reflect, cells, sides, w, moves, ph
 
 
 @njit
-def add_side_fluxes(g, cells, inside, geo, w, speeds):
+def add_side_fluxes(g, damping, cells, inside, geo, w, speeds):
     """Subtract the outflow through one side of each cell of a block (HLLC flux) from the rates in `w`.
 
+    Tangential momentum is carried with the mass, and a jump of the tangential velocity is damped: `damping` times
+    |difference of wave speeds of the cells| times depth at the face times the jump is subtracted from its flux.
     The flow through the side and the sums for the limit of the time step are written to `w` too.
-    g : gravity [m/s2]; cells : depth, surface and wave speed of the cells
+    g : gravity [m/s2]; damping : see above [-]; cells : depth, surface and wave speed of the cells
     inside : depth, surface and velocities at the side from inside; `w` contains the values from beyond
     geo : measures of the side, see `cell_sides`
     speeds : None, or speeds of moving sides along their outward normals [m/s]; the flux is then relative to the side
@@ -214,6 +220,7 @@ def add_side_fluxes(g, cells, inside, geo, w, speeds):
             flow += speeds[i] * mass
             w[_PUSH + i] = flow
         along = mass * (ta if mass > 0.0 else tb)
+        along -= damping * abs(c0[i] - w[_C + i]) * min(a, b) * (tb - ta)  # damps vortices of the size of cells
         w[_RH + i] -= reach * mass
         w[_RX + i] -= reach * (flow * nx - along * ny)
         w[_RY + i] -= reach * (flow * ny + along * nx)

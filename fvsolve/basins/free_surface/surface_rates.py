@@ -11,7 +11,13 @@ from fvsolve.basins.free_surface.bed_friction import add_capped_friction, add_fr
 from fvsolve.basins.free_surface.marked_faces import marked_faces, no_marks
 from fvsolve.basins.free_surface.patch_closures import driven_faces
 from fvsolve.basins.free_surface.surface_rows import GHOSTS, MAX_COLUMNS
-from fvsolve.basins.free_surface.water_sources import DRAIN_TIME, add_sources, begin_sources, has_sources
+from fvsolve.basins.free_surface.water_sources import (
+    DRAIN_TIME,
+    add_sources,
+    begin_sources,
+    has_condensed_times,
+    has_sources,
+)
 from fvsolve.basins.moving_meshes import mesh_motion
 from fvsolve.basins.moving_walls import grid_motion
 from fvsolve.jit import njit, specialise
@@ -52,7 +58,7 @@ def flows_of(values, first, n, a, z):
 def add_bed_friction(tables, b, a, z, y, rates, out):
     """Add bed friction to the rates of cells `a` to `z` - 1 of basin b; capped friction also limits the time step.
 
-    rates : rates of the three states of all cells of the basin, and of infiltrated heights, four arrays
+    rates : rates of the three states of all cells of the basin, and of its soil, see `rates_of`
     """
     basin = tables.basins[b]
     n, o, seen = basin["n"], basin["y"], deviations_of(basin, tables.seen, y)
@@ -88,8 +94,8 @@ def damp_stages(h, y, rates, quick, handle):
 
 @njit(forceinline=True)
 def quantities_of(basin):
-    """Number of states of a cell: three, and the infiltrated height of a soil, which follows them."""
-    return 3 + (basin["soil"] != NO_SOIL)
+    """Number of states of a cell: three, and those of a soil, which follow them."""
+    return 3 + (basin["soil"] != NO_SOIL) + has_condensed_times(basin)
 
 
 @njit
@@ -164,12 +170,14 @@ def grid_of(tables, basin, marks):
 def rates_of(tables, basin, dydt):
     """Arrays for the rates of the three states of a basin: in `dydt` or, if that is empty, in `tables.work`.
 
-    The fourth array is for the rates of infiltrated heights in `dydt`; it is empty without a soil.
+    The fourth array is for the rates of infiltrated heights in `dydt`, the fifth for those of condensed times; they are
+    empty without a soil that has them.
     """
     n, (to, first) = basin["n"], (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["boundary_rates"])
     soaks = n if basin["soil"] != NO_SOIL and dydt.size > 0 else 0
     taken = to[first + 3 * n : first + 3 * n + soaks]
-    return to[first : first + n], to[first + n : first + 2 * n], to[first + 2 * n : first + 3 * n], taken
+    aging = to[first + 4 * n : first + 4 * n + (soaks if has_condensed_times(basin) else 0)]
+    return to[first : first + n], to[first + n : first + 2 * n], to[first + 2 * n : first + 3 * n], taken, aging
 
 
 @njit

@@ -16,10 +16,10 @@ from math import sqrt
 
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import UPWIND, WENO5
-from fvsolve.kernels.reconstruction import by_limiter, half_slopes, slope, value_weno5
+from fvsolve.kernels.reconstruction import by_limiter, half_slopes, minmod, slope, value_weno5
 
 THIN = 1e-6  # depth below which velocities fade to zero [m]
-TINY = 1e-300
+TINY, HUGE = 1e-300, 1e300
 MAX_COLUMNS = 1024  # greatest number of cells of a row in one pass
 GHOSTS = 8  # three are needed; with eight the cells of a row begin at a cache line
 STRIDE = 1048  # an odd number of cache lines, so that rows do not evict each other from the cache
@@ -172,14 +172,24 @@ def put_sloped(limiter, n, before, here, after, sides):
 
     The change of the depth to a side is that of the surface minus that of the bed, up to h / 16; from h / 8 on it is
     that of the limited depths, and in between it lies between both.
+    At a kerb, where the second difference of the bed exceeds h / 4 and no cell is dry, the slope of the bed differs
+    from that by minmod by no more than the film allows. That of minmod never raises the side of a cell above the next
+    side uphill, where a film would have to pond. For the same reason the change of the surface lies between zero and
+    that of bed and depth there: beside a pond it would tilt the bed of a film, and beside a film on a bank a pond.
     """
     for i in range(n):
         h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
         below, above, low, high = h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e
+        least, bend = min(h, min(before[i], after[i])), abs((high - above) - (low - below))
+        allowed = 0.25 * h if least > THIN else HUGE
+        thin, safe = least if bend > allowed else h, 0.5 * slope(minmod, low - below, high - above)
         bed, b = half_slopes(limiter, low - below, high - above, low, high)
+        lip = 0.125 * thin if bend > allowed else HUGE
+        bed = min(max(bed, safe - lip), safe + lip)
         own, change = 0.5 * slope(limiter, below, above), b - bed
-        most = max(0.5 * h - 4.0 * abs(change), 0.0)
+        most = max(min(0.5 * h, 4.0 * thin - 0.5 * h) - 4.0 * abs(change), 0.0)
         a = own + min(max(change - own, -most), most)
+        b = min(max(bed + a if bend > allowed else b, min(b, 0.0)), max(b, 0.0))
         c, d = half_slopes(
             limiter, u - before[i + EAST], after[i + EAST] - u, v - before[i + NORTH], after[i + NORTH] - v
         )
@@ -208,14 +218,19 @@ def value_upwind5(a, b, c, d, e):
 
 @njit
 def put_smooth_flags(p, q, r, s, t, deep):
-    """Set `deep` to 1 where the least of five depths exceeds LEAST_DEPTH_RATIO times the greatest, else to 0.
+    """Set `deep` to 1 where fifth-order values are used, else to 0.
 
-    p, q, r, s, t : depths in five consecutive cells
+    The least of five depths must exceed LEAST_DEPTH_RATIO times the greatest, and the second differences of the bed,
+    to both neighbours and to the cells beyond them, half of that depth together.
+    p, q, r, s, t : depths in five consecutive cells, their surfaces SURFACE later
     """
     for i in range(deep.size):
+        j = i + SURFACE
         least = min(min(min(p[i], q[i]), min(s[i], t[i])), r[i])
         most = max(max(max(p[i], q[i]), max(s[i], t[i])), r[i])
-        deep[i] = 1.0 if least > LEAST_DEPTH_RATIO * most else 0.0
+        a, b, c, d, e = p[j] - p[i], q[j] - q[i], r[j] - r[i], s[j] - s[i], t[j] - t[i]
+        bend = 2.0 * (abs((b - c) + (d - c)) + abs((a - c) + (e - c)))
+        deep[i] = 1.0 if least > max(LEAST_DEPTH_RATIO * most, bend) else 0.0
 
 
 @njit

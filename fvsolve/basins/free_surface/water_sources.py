@@ -2,23 +2,32 @@
 
 The depth h grows at R - f, with the rate of rain R and the infiltration f = min(f_p, R + h / DRAIN_TIME), so that no
 depth falls below zero in steps up to DRAIN_TIME. R is uniform, or linear in time between frames of rates in cells. The
-infiltration capacity f_p [m/s] of a soil is a constant, Horton's (1933) f_1 + (f_0 - f_1) exp(-k t) with the time t
-since the start of the run, or Green and Ampt's (1911) K (1 + psi d / F) with conductivity K, suction psi, moisture
-deficit d and infiltrated height F.
+infiltration capacity f_p [m/s] of a soil is a constant, Horton's (1933) f_1 + (f_0 - f_1) exp(-k T), or Green and
+Ampt's (1911) K (1 + S / F) with conductivity K, S the product of suction and moisture deficit, and the infiltrated
+height F.
+
+T is the condensed time of a cell: in this time the height F would infiltrate at capacity (Reeves and Miller 1975). It
+is a state with the rate f / f_p, so that the capacity falls with the infiltrated height; under light rain it falls
+little. Green and Ampt's F(T) is the root of q(F) = F - S ln(1 + F / S) = K T. Its slope is infinite at T = 0, where no
+step could follow f_p(F). While T is below EARLY, the rate is therefore multiplied by 1 + (T - q(F) / K) g, with g from
+1 / s at first to 1 / DRAIN_TIME: F returns to F(T) from any error of the first steps. This rate is at most twice what
+the next DRAIN_TIME needs, by the bound F(T) <= sqrt(2 S K T) + K T. A supply s, above this bound, limits the
+infiltration in the first instant only, until F = K S / s: time then lags by K S / (2 s^2).
 """
 
-from math import exp
+from math import exp, log1p, sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import CONSTANT_RATE, GREEN_AMPT, HORTON, HORTON_FIELDS, NO_SOIL
+from fvsolve.kernels.dtypes import CONSTANT_RATE, GREEN_AMPT, HORTON, NO_SOIL
 from fvsolve.kernels.schedule_pieces import schedule_value
 
 DRAIN_TIME = 10.0  # [s]
+EARLY = 20.0 * DRAIN_TIME  # condensed time in which errors of the first steps vanish [s]
+FIRST = 2.0  # condensed time in which a lag of the first instant is spread [s]
 TINY = 1e-300
-# Numbers in `work`: mean rate of rain [m/s]; position among the frames of rain; factor exp(-k t) of Horton, or the time
-# since the start of the run [s]
-RATE_OF_RAIN, POSITION, FACTOR = range(3)
-PRESENT_NUMBERS = 3
+# Numbers in `work`: mean rate of rain [m/s]; position among the frames of rain
+RATE_OF_RAIN, POSITION = range(2)
+PRESENT_NUMBERS = 2
 CHUNK = 512  # cells for which all loops run in turn, so that their arrays stay in the first-level cache
 
 
@@ -37,14 +46,10 @@ def rain_rate(tables, basin, t):
 @njit
 def write_present_sources(tables, basin, t):
     """Write the numbers of rain and soil at time t to `work`."""
-    present, numbers, time = tables.work[basin["present"] :], basin["soil_numbers"], t - tables.settings[0]["start"]
+    present = tables.work[basin["present"] :]
     present[RATE_OF_RAIN] = rain_rate(tables, basin, t)
     if basin["frames"] > 0:
         present[POSITION] = schedule_value(tables, basin["frame_position"], t)
-    if basin["soil"] == HORTON:
-        present[FACTOR] = exp(-tables.plane[numbers + 2 * basin["soil_row"]] * time)
-    elif basin["soil"] == HORTON_FIELDS:
-        present[FACTOR] = time
 
 
 @njit
@@ -78,56 +83,104 @@ def add_frames(tables, basin, first, rates):
         rates[i] += rest * before[i] + share * after[i]
 
 
-@njit
-def limit_infiltration(kind, soil, factor, depth0, dh, heights, rates):
-    """Replace rates of rain in cells by rates of infiltration [m/s].
+@njit(forceinline=True)
+def has_condensed_times(basin):
+    """True if cells of a basin have condensed times, which follow their infiltrated heights."""
+    return basin["soil"] == HORTON or basin["soil"] == GREEN_AMPT
 
-    kind : CONSTANT_RATE, HORTON, HORTON_FIELDS or GREEN_AMPT; factor : exp(-k t), for HORTON_FIELDS the time [s]
-    soil : three arrays: the rate; final rate, its difference from the first, and decay; or K and K psi d
-    depth0, dh, heights : depth at rest, deviation from it, and infiltrated heights [m]
+
+@njit
+def limit_by_horton(soil, supply, times, rates, aging):
+    """Write rates of infiltration [m/s] and of condensed times by Horton's law; arguments as for `limit_infiltration`.
+
+    soil : final rate f_1, its difference from the first f_0 - f_1, decay k
     """
-    a, b, c = soil
-    n = rates.size
-    if kind == GREEN_AMPT:
-        for i in range(n):
-            capacity = a[i] + b[i] / max(heights[i], TINY)
-            rates[i] = min(capacity, rates[i] + max(depth0[i] + dh[i], 0.0) * (1.0 / DRAIN_TIME))
-    elif kind == HORTON:
-        for i in range(n):
-            capacity = a[i] + b[i] * factor
-            rates[i] = min(capacity, rates[i] + max(depth0[i] + dh[i], 0.0) * (1.0 / DRAIN_TIME))
-    elif kind == HORTON_FIELDS:
-        for i in range(n):
-            capacity = a[i] + b[i] * exp(-c[i] * factor)
-            rates[i] = min(capacity, rates[i] + max(depth0[i] + dh[i], 0.0) * (1.0 / DRAIN_TIME))
-    elif kind == CONSTANT_RATE:
-        for i in range(n):
-            rates[i] = min(a[i], rates[i] + max(depth0[i] + dh[i], 0.0) * (1.0 / DRAIN_TIME))
+    final, more, decay = soil
+    for i in range(rates.size):
+        capacity = final[i] + more[i] * exp(-decay[i] * times[i])
+        rates[i] = min(capacity, supply[i])
+        aging[i] = rates[i] / max(capacity, TINY)
 
 
 @njit
-def put_infiltration(tables, basin, first, y, rates):
-    """Write the rates of infiltration in at most CHUNK cells from number `first` on [m/s].
+def limit_by_green_ampt(soil, supply, heights, times, rates, aging):
+    """Write rates of infiltration [m/s] and of condensed times by Green and Ampt's law.
+
+    soil : K, S, and the height that infiltrates in EARLY; other arguments as for `limit_infiltration`
+    """
+    k, s, early = soil
+    least = 1e300
+    for i in range(rates.size):
+        capacity = k[i] + k[i] * s[i] / max(heights[i], TINY)
+        rates[i] = min(capacity, supply[i])
+        aging[i] = rates[i] / max(capacity, TINY)
+        least = min(least, heights[i] - early[i])
+    for i in range(rates.size if least < 0.0 else 0):
+        if heights[i] < early[i]:
+            height = max(heights[i], TINY)
+            store = max(s[i], TINY)
+            steeper = 1.0 + s[i] / height
+            # by the lag of the height behind its condensed time
+            lag = k[i] * times[i] - (height - store * log1p(height / store))
+            gain = max(1.0 / DRAIN_TIME, 3.0 / (3.0 + max(times[i], 0.0)))  # [1/s]
+            ahead = k[i] * (max(times[i], 0.0) + DRAIN_TIME)
+            capacity = min(
+                steeper * (k[i] + lag * gain),
+                (sqrt(2.0 * store * ahead) + ahead - height) * (2.0 / DRAIN_TIME),
+            )
+            rates[i] = min(max(capacity, 0.0), supply[i])
+            if capacity <= supply[i]:  # at capacity time passes, less the lag of the first instant
+                lost = min(0.5 * k[i] * store / max(supply[i] * supply[i], TINY), FIRST)
+                aging[i] = 1.0 - lost * (1.0 / FIRST) * exp(-times[i] * (1.0 / FIRST))
+            else:
+                aging[i] = min(supply[i] / max(steeper * k[i], TINY), 1.0)
+
+
+@njit
+def limit_infiltration(kind, soil, states, supply, rates, aging):
+    """Write rates of infiltration [m/s] in cells, and the rates of their condensed times.
+
+    kind : CONSTANT_RATE, HORTON or GREEN_AMPT; soil : three arrays, the constant rate in the first
+    states : infiltrated heights [m], condensed times [s]; supply : rain plus the water that can drain [m/s]
+    """
+    heights, times = states
+    if kind == GREEN_AMPT:
+        limit_by_green_ampt(soil, supply, heights, times, rates, aging)
+    elif kind == HORTON:
+        limit_by_horton(soil, supply, times, rates, aging)
+    elif kind == CONSTANT_RATE:
+        for i in range(rates.size):
+            rates[i] = min(soil[0][i], supply[i])
+
+
+@njit
+def put_infiltration(tables, basin, first, y, rates, aging):
+    """Write rates in at most CHUNK cells from number `first` on: of infiltration [m/s], of condensed times.
 
     `write_present_sources` must run before. Numbers of a uniform soil are those of CHUNK cells.
     """
-    plane, row, count, present = tables.plane, basin["soil_row"], rates.size, tables.work[basin["present"] :]
-    at = basin["soil_numbers"] + (first if row == basin["n"] else 0)
+    plane, row, count, n = tables.plane, basin["soil_row"], rates.size, basin["n"]
+    at = basin["soil_numbers"] + (first if row == n else 0)
     soil = plane[at : at + count], plane[at + row : at + row + count], plane[at + 2 * row : at + 2 * row + count]
     depth0, dh = plane[basin["plan"] + first :][:count], y[basin["y"] + first :][:count]
     rate, heights = uniform_rate(tables, basin), y[basin["infiltrated"] + first :][:count]
+    times = y[basin["infiltrated"] + n + first :][: count if has_condensed_times(basin) else 0]
+    supply = tables.work[basin["soil_work"] + 2 * n :][:count]
     for i in range(count):
-        rates[i] = rate
+        supply[i] = rate
     if basin["frames"] > 0:
-        add_frames(tables, basin, first, rates)
-    limit_infiltration(basin["soil"], soil, present[FACTOR], depth0, dh, heights, rates)
+        add_frames(tables, basin, first, supply)
+    for i in range(count):
+        supply[i] += max(depth0[i] + dh[i], 0.0) * (1.0 / DRAIN_TIME)
+    limit_infiltration(basin["soil"], soil, (heights, times), supply, rates, aging)
 
 
 @njit
 def add_sources(tables, b, a, z, y, rates):
     """Add rain to the rates of depth of cells `a` to `z` - 1 of basin b, subtract infiltration, and write its rates.
 
-    rates : of depth, of both unit flows, and of infiltrated heights (empty without a soil) in all cells, four arrays
+    rates : of depth, of both unit flows, of infiltrated heights (empty without a soil), and of condensed times (empty
+    if the soil has none) in all cells, five arrays
     """
     basin = tables.basins[b]
     rate = uniform_rate(tables, basin)
@@ -137,7 +190,7 @@ def add_sources(tables, b, a, z, y, rates):
         if basin["frames"] > 0:
             add_frames(tables, basin, first, to_depth)
         if taken.size > 0:
-            put_infiltration(tables, basin, first, y, taken)
+            put_infiltration(tables, basin, first, y, taken, rates[4][first:last])
             for i in range(taken.size):
                 to_depth[i] += rate - taken[i]
         else:
@@ -149,10 +202,11 @@ def add_sources(tables, b, a, z, y, rates):
 def infiltration(tables, basin, t, y):
     """Flow into the soil of a basin at time t [m3/s]."""
     n = basin["n"]
-    rates = tables.work[basin["soil_work"] :][:n]
+    rates, aging = tables.work[basin["soil_work"] :][:n], tables.work[basin["soil_work"] + n :][:n]
     write_present_sources(tables, basin, t)
     for first in range(0, n, CHUNK):
-        put_infiltration(tables, basin, first, y, rates[first : min(first + CHUNK, n)])
+        last = min(first + CHUNK, n)
+        put_infiltration(tables, basin, first, y, rates[first:last], aging[first:last])
     return sum_of_products(rates, tables.plane[basin["area"] : basin["area"] + n])
 
 

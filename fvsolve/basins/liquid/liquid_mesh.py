@@ -21,6 +21,7 @@ _NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
 _PUSH, _LOSS = 11 * BLOCK, 12 * BLOCK  # of moving sides: pressure at the side, term of the power lost there
 _PER, _BULK, _PHI = (k * BLOCK for k in range(13, 16))  # with a potential: see `grid_nonlinear.stiffness`
 ROWS = 16
+LINKED = 2.0  # reflection coefficient that marks the faces of a patch with links: a wall, through which links pass flow
 
 
 @inline
@@ -80,12 +81,15 @@ def put_sides(liquid, mesh, j, first, last, reflect, cells, sides, shown, w, mov
 def put_ghosts(liquid, mesh, first, last, reflect, cells, shown, moves):
     """Write the values beyond boundary sides, from which gradients in cells are computed.
 
-    At the reflection coefficients 1 and -1 they are mirror images; at 0 (open) they are the values of the cell.
+    At the reflection coefficients 1 and -1 they are mirror images; at 0 (open) they are the values of the cell, and at
+    patches with links too. A mirror image of the flow there would give a gradient to uniform flow, and the pressure on
+    the face would do work on it.
     """
     w, u, v, b = cells[0], cells[1], cells[2], mesh.edges.size
     for q in range(first, last):
         i, nx, ny = ring_place(mesh.edges[q], mesh.ring), mesh.nx[q], mesh.ny[q]
         r = reflect[mesh.number[q]] if reflect.size > 0 else 1.0
+        r = 0.0 if r == LINKED else r
         out = u[i] * nx + v[i] * ny
         if moves is not None:
             out -= wall_flow(liquid.full, liquid.c, liquid.rho, moves.speeds[mesh.edges[q]], w[i] + out)
@@ -137,7 +141,7 @@ def put_reflections(liquid, mesh, first, last, reflect, wl, ul, vl, w, moves):
     """
     for q in range(first, last):
         i, nx, ny = mesh.edges[q] % BLOCK, mesh.nx[q], mesh.ny[q]
-        r = reflect[mesh.number[q]] if reflect.size > 0 else 1.0
+        r = min(reflect[mesh.number[q]], 1.0) if reflect.size > 0 else 1.0
         out = ul[i] * nx + vl[i] * ny
         if moves is not None:
             out -= wall_flow(liquid.full, liquid.c, liquid.rho, moves.speeds[mesh.edges[q]], wl[i] + out)
@@ -265,7 +269,7 @@ def close_walls(edges, number, reflect, geo, w, thrust):
     for q in range(edges.size):
         i = edges[q] % BLOCK
         thrust[number[q]], thrust[count + number[q]] = w[_PUSH + i], w[_LOSS + i]
-        if reflect.size == 0 or reflect[number[q]] == 1.0:
+        if reflect.size == 0 or reflect[number[q]] >= 1.0:
             w[_RR + i] += geo[_REACH + i] * w[MASS + i]
             w[MASS + i] = 0.0
 

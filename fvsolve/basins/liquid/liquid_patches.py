@@ -15,14 +15,52 @@ OWN_CODE = physics_code(__package__)
 PRESSURE = FIRST_OWN
 
 
+@njit(forceinline=True)
+def count_shares(tables, patch):
+    """Number of the shares of a patch: a face each, or a cell each in an interior patch."""
+    return patch["count"] if is_interior(tables, patch) else patch["faces"]
+
+
+@njit(forceinline=True)
+def is_interior(tables, patch):
+    """True for an interior patch, whose faces are not on the boundary."""
+    return patch["faces"] > 0 and tables.integers[patch["ring"]] < 0
+
+
+@njit
+def share_of(tables, patch, m):
+    """(cell, share of the flow of links that enters it) of share m of a patch, see `count_shares`.
+
+    Each face passes the flow at one velocity, so that uniform flow has no loss: its share is its length over that of
+    the patch, whatever the sizes of the cells behind. In an interior patch it is the area of the cell over that of the
+    patch.
+    """
+    if is_interior(tables, patch):
+        i = tables.integers[patch["first"] + m]
+        return i, tables.plane[tables.basins[patch["basin"]]["area"] + i] / patch_area(tables, patch)
+    i = tables.integers[patch["ring"] + patch["faces"] + m]
+    per_area = tables.plane[patch["normals"] + 2 * patch["faces"] + m]
+    return i, per_area * tables.plane[tables.basins[patch["basin"]]["area"] + i] / patch_length(tables, patch)
+
+
 @njit
 def mean_deviation(tables, patch, y):
-    """Mean of the deviation of density in the cells next to a patch, weighted by area [kg/m3]."""
+    """Mean of the deviation of density in the cells next to a patch, weighted by their shares of its flow [kg/m3]."""
     basin, total = tables.basins[patch["basin"]], 0.0
-    for m in range(patch["count"]):
-        i = tables.integers[patch["first"] + m]
-        total += tables.plane[basin["area"] + i] * y[basin["y"] + i]
-    return total / patch_area(tables, patch)
+    for m in range(count_shares(tables, patch)):
+        i, share = share_of(tables, patch, m)
+        total += share * y[basin["y"] + i]
+    return total
+
+
+@njit
+def area_of_flow(tables, patch):
+    """Area over which the flow through a patch spreads at once [m2]: 1 / sum of share^2 / area of the cells."""
+    basin, total = tables.basins[patch["basin"]], 0.0
+    for m in range(count_shares(tables, patch)):
+        i, share = share_of(tables, patch, m)
+        total += share * share / tables.plane[basin["area"] + i]
+    return 1.0 / total
 
 
 TABLED = False  # of the templates: True under the density law `table`
@@ -52,7 +90,7 @@ def _patch_pressures(t, y, dydt, out, handle):
         out[layout["pressure"] + patch["node"]] = deviation
         out[layout["supply"] + patch["node"]] = 0.0
         out[layout["outflow_fraction"] + node["row"]] = 1.0
-        out[layout["stiffness"] + node["row"]] = slope / (basin["thickness"] * patch_area(tables, patch))
+        out[layout["stiffness"] + node["row"]] = slope / (basin["thickness"] * area_of_flow(tables, patch))
 
 
 patch_pressures = specialise(_patch_pressures, "patch_pressures")
@@ -69,10 +107,11 @@ def patch_flows(t, y, dydt, out, handle):
         if basin["kind"] != OWN_CODE:
             continue
         inflow = out[tables.layout[0]["net"] + patch["node"]]
-        n, flow = basin["n"], inflow / (basin["thickness"] * patch_area(tables, patch))
-        for m in range(patch["count"]):
-            i = tables.integers[patch["first"] + m]
-            dydt[basin["y"] + i] += flow * stretch_of_cell(tables.plane, basin, i)
+        n, flow = basin["n"], inflow / basin["thickness"]
+        for m in range(count_shares(tables, patch)):
+            i, share = share_of(tables, patch, m)
+            per_area = share / tables.plane[basin["area"] + i]
+            dydt[basin["y"] + i] += flow * per_area * stretch_of_cell(tables.plane, basin, i)
         for m in range(patch["faces"]):
             i = basin["y"] + tables.integers[patch["ring"] + patch["faces"] + m]
             push = -basin["speed"] * inflow / (basin["thickness"] * patch_length(tables, patch))

@@ -13,6 +13,7 @@ import numpy as np
 
 from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
+from fvsolve.basins.cell_sides import STEEPEST
 from fvsolve.basins.liquid import liquid_mesh, liquid_sides
 from fvsolve.basins.liquid.liquid_patches import PRESSURE
 from fvsolve.basins.liquid.riemann_invariants import HEAD
@@ -158,6 +159,7 @@ class LiquidRows(BasinRows):
 
     units = {"pressure": "Pa", "velocity": "m/s"}
     banded = banded_mesh = True
+    steepest = STEEPEST
 
     def __init__(self, case, name: str) -> None:
         super().__init__(case, name)
@@ -213,6 +215,19 @@ class LiquidRows(BasinRows):
             return super().reflection(patch)
         own = self.density * self.speed
         return (patch.impedance - own) / (patch.impedance + own)
+
+    def reflections(self) -> np.ndarray:
+        coefficients, mesh = super().reflections(), self.mesh
+        if self.is_grid:
+            return coefficients
+        ends = {place for link in self.case.links.values() for place in link.ports.values()}
+        linked = [name for name in mesh.patches if f"{self.name}.{name}" in ends]
+        if linked and coefficients.size == 0:
+            coefficients = np.ones(mesh.left.size - mesh.inner)
+        for name in linked:
+            own = coefficients[mesh.patch(name).start - mesh.inner : mesh.patch(name).stop - mesh.inner]
+            own[own == 1.0] = liquid_mesh.LINKED
+        return coefficients
 
     def lower(self, draft, row) -> None:
         row["thickness"], row["speed"], row["density"] = self.part.thickness, self.speed, self.density
@@ -316,6 +331,10 @@ class LiquidRows(BasinRows):
     def weights(self, y: np.ndarray) -> np.ndarray:
         per = 0.5 * self.part.thickness * self.mesh.area / self.density
         return np.array([self.speed**2 * per, per, per])
+
+    def energy_of_waves(self, y: np.ndarray) -> float:
+        square = (self.speed * y[0]) ** 2 + y[1] ** 2 + y[2] ** 2
+        return float(0.5 * self.part.thickness / self.case.properties.density * np.sum(self.mesh.area * square))
 
     def above(self, y: np.ndarray, datum: float) -> float:
         rho, height = self.case.properties.density, (self.part.elevation or 0.0) - datum

@@ -22,7 +22,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.calls import CLOSE, observe_in_turn, run_job
 from fvsolve.kernels.delay_lines import jumps
 from fvsolve.kernels.delay_lines import wave_history as history
-from fvsolve.kernels.delay_lines.jumps import first_waiting_jump, least_jump, store_jump, store_large_jump
+from fvsolve.kernels.delay_lines.jumps import add_change, clear_changes, first_waiting_jump, least_jump, send_changes
 from fvsolve.kernels.delay_lines.line_envelopes import update_line_envelopes
 from fvsolve.kernels.delay_lines.line_rates import has_friction
 from fvsolve.kernels.dtypes import ALONE, AMENDED, ARRIVES, JUNCTION, NEVER, PIPE_FLOW, PIPE_PRESSURE, STATUS
@@ -40,7 +40,7 @@ def spare_offsets(tables):
     - probe values at the end of the step, without the jumps that arrive in the step
     - node pressures at the end of the step, without these jumps
     - work array
-    - arrival times of jumps, see `write_arrival`
+    - arrival times of jumps and changes that they cause, see `arrival_arrays`
     """
     at, probes, nodes = 2 * tables.layout[0]["size"], tables.probes.size, tables.nodes.size
     both = probes + nodes
@@ -143,9 +143,11 @@ def record_lines(t, y, out, handle, values):
     store_values(tables, out, values)
     if past[history.NEXT_ARRIVAL] > t + history.time_tolerance(past):
         past[history.NEXT_ARRIVAL] = next_arrival(past, places, tables, t)
-        out[ARRIVES] = past[history.NEXT_ARRIVAL] if past[history.NEXT_ARRIVAL] < history.INFINITE else NEVER
-    else:
-        out[ARRIVES] = t
+    arrival = past[history.NEXT_ARRIVAL]
+    out[ARRIVES] = NEVER
+    # at the end of a segment the caller lets jumps arrive, with those of schedules
+    if arrival < past[history.SEGMENT_END]:
+        out[ARRIVES] = t if arrival <= t + history.time_tolerance(past) else arrival
 
 
 @njit
@@ -263,8 +265,13 @@ def ends_step(past, tables, line, pipe, q, wave, size):
 
 @njit
 def next_arrival(past, places, tables, t):
-    """Arrival time of the next jump after t that ends a step (`ends_step`) [s]; INFINITE for none."""
-    first_time, queue, after = history.INFINITE, int(past[history.JUMP_CAPACITY]), t + history.time_tolerance(past)
+    """Arrival time of the next jump that ends a step (`ends_step`) [s]; INFINITE for none.
+
+    At most the end of the segment after t: schedules may jump there, and the state between such a jump and one that
+    arrives at the same time never occurs. It may lie before t: a jump may cross a line shorter than a step within that
+    step.
+    """
+    first_time, queue = history.INFINITE, int(past[history.JUMP_CAPACITY])
     for number in range(tables.delays.size):
         line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
         if line["acts"] == 0:
@@ -275,24 +282,25 @@ def next_arrival(past, places, tables, t):
                 for i in range(int(past[at + history.ARRIVED_COUNT]), int(past[at + history.JUMP_COUNT])):
                     place = history.jump_place(past, places, at, i)
                     arrival, size = past[place] + line["tau"], past[place + queue]
-                    if arrival > after and ends_step(past, tables, line, pipe, q, wave, size):
+                    if ends_step(past, tables, line, pipe, q, wave, size):
                         first_time = min(first_time, arrival)
                         break
-    return first_time
+    end, tolerance = past[history.SEGMENT_END], history.time_tolerance(past)
+    return end if end > t + tolerance and first_time >= end - tolerance else first_time
 
 
 @njit
 def admit_jumps(past, places, tables, t):
-    """Let the jumps that end a step at t arrive; `detect_jumps` then computes the changes at nodes.
+    """Let the jumps that end a step at t arrive, and all jumps that arrive with them, in any line.
 
-    Their parts that stay in the line, transmitted or reflected, enter the neighbouring stretches. past[NEXT_ARRIVAL]
-    receives the time of the following such jump.
+    `detect_jumps` then computes the changes at nodes. The parts of the jumps that stay in a line, transmitted or
+    reflected, enter the neighbouring stretches. past[NEXT_ARRIVAL] receives the time of the following such jump.
     """
+    latest = t + history.time_tolerance(past)
     for number in range(tables.delays.size):
         line = tables.delays[number]
-        for q in range(0, line["stretches"] if line["acts"] != 0 else 0, max(1, line["stretches"] - 1)):
-            for wave in range(2):
-                jumps.pass_waiting_jumps(past, places, tables, line, q, wave, t, t)
+        for q in range(line["stretches"]):
+            jumps.pass_waiting_jumps(past, places, tables, line, q, t, latest, t)
     past[history.NEXT_ARRIVAL], past[history.ARRIVALS_TIME] = next_arrival(past, places, tables, t), history.NAN
 
 
@@ -308,12 +316,22 @@ def arrival_of(past, places, tables, number, slot, latest):
         return history.INFINITE
     q, wave = line["stretches"] - 1 if slot > 1 else 0, slot % 2
     place = first_waiting_jump(past, places, line["stretch"] + q, wave)
-    if place < 0 or past[place] + line["tau"] > latest:
+    if place < 0:
         return history.INFINITE
-    size = past[place + int(past[history.JUMP_CAPACITY])]
-    if ends_step(past, tables, line, tables.pipes[line["pipe"]], q, wave, size):
+    size, time = past[place + int(past[history.JUMP_CAPACITY])], history.arrival_until(past[place], line["tau"], latest)
+    if time <= latest and ends_step(past, tables, line, tables.pipes[line["pipe"]], q, wave, size):
         return history.INFINITE
-    return past[place] + line["tau"]
+    return time
+
+
+@njit(forceinline=True)
+def arrival_arrays(tables):
+    """Tree of arrival times of jumps (`write_arrival`), and changes that they cause (`clear_changes`), in `spare`."""
+    slots, first, n = 4 * tables.delays.size, spare_offsets(tables)[5], 1
+    while n < slots:
+        n *= 2
+    middle = first + 2 * n
+    return tables.spare[first:middle], tables.spare[middle : middle + 2 * slots + 1]
 
 
 @njit(forceinline=True)
@@ -367,17 +385,17 @@ def times_may_change(past, tables, t):
 def pass_jumps_at_ends(past, places, own, t, y, out, handle):
     """Pass on the jumps that leave first and last stretches of delay lines up to t, in order; return True if any do.
 
-    Extremes are updated by the values beside each jump. Masses of storing nodes and lines and flows of columns in y are
-    corrected (`jumps`). Jumps that end a step are left out.
+    Jumps that arrive together pass as one: the states between them never occur, and the result does not depend on the
+    order of the lines. Extremes are updated by the values on both sides. Masses of storing nodes and lines and flows of
+    columns in y are corrected (`jumps`). Jumps that end a step are left out.
     own : tables of the run, in which short lines couple their ends at once
     """
-    latest, tree = t + history.time_tolerance(past), own.spare[spare_offsets(own)[5] :]
+    latest, (tree, changes) = history.latest_arrival(past, t), arrival_arrays(own)
     write_all_times(past, places, own, tree, latest)
     if tree[1] > latest:
         return False
     sharp, changing = own.sharp, times_may_change(past, own, t)
-    tables, size = open_tables(sharp), own.layout[0]["size"]
-    state, queue = own.spare[:size], int(past[history.JUMP_CAPACITY])
+    tables, state = open_tables(sharp), own.spare[: own.layout[0]["size"]]
     past[history.ONLY_PASSED_JUMPS], past[history.ARRIVALS_TIME] = 1.0, history.NAN
     run_job(CLOSE, t, y, y[:0], state, handle)
     past[history.ONLY_PASSED_JUMPS] = 0.0
@@ -387,37 +405,52 @@ def pass_jumps_at_ends(past, places, own, t, y, out, handle):
         past[places[0] + history.ARRIVALS_SIZE * end_stretch(line, 0)] = state[at + 1]
         past[places[0] + history.ARRIVALS_SIZE * end_stretch(line, 1) + 1] = state[at + 2]
     store_smooth_values(t, y, state, handle)
-    together = False  # True if a jump arrives with the jump before: the state between both never occurs
+    clear_changes(changes)
     while tree[1] <= latest:
-        next_jump = earliest_arrival(tree)
-        number, wave = next_jump // 4, next_jump % 2
-        line = tables.delays[number]
-        q = line["stretches"] - 1 if next_jump % 4 > 1 else 0
-        place = first_waiting_jump(past, places, line["stretch"] + q, wave)
-        sent, jump = past[place], past[place + queue]
-        time = min(sent + line["tau"], t)
-        share = jumps.reflected_part(past, places, line, tables.pipes[line["pipe"]], q, wave, jump, t)
-        past[history.jump_head(places, line["stretch"] + q, wave) + history.ARRIVED_COUNT] += 1.0
-        times = jumps.change_times(past, tables, t, time, sent)
-        if not together:
-            extremes_at_jump(t, time, y, state, handle)
-        closed = leave_stretch(past, places, tables, y, state, number, q, wave, time, jump - share, times)
-        closed = leave_stretch(past, places, tables, y, state, number, q, 1 - wave, time, share, times) and closed
-        if not closed:
-            solve_nodes_again(past, places, tables, t, y, state, sharp, time, times)
+        time = min(tree[1], t)
+        extremes_at_jump(t, time, y, state, handle)
+        alone, times = pass_next_jumps(past, places, own, tables, tree, changes, t, y, state, latest)
+        if not alone:
+            solve_nodes_again(past, places, tables, t, y, state, changes, sharp, times)
+        send_changes(past, places, tables, changes, time)
         if changing:
             write_all_times(past, places, own, tree, latest)
-        else:
-            write_arrival(tree, next_jump, arrival_of(past, places, own, number, next_jump % 4, latest))
-        together = tree[1] <= min(latest, time + history.time_tolerance(past))
-        if not together:
-            extremes_at_jump(t, time, y, state, handle)
+        extremes_at_jump(t, time, y, state, handle)
     past[history.ARRIVALS_TIME] = history.NAN
     return True
 
 
 @njit
-def leave_stretch(past, places, tables, y, state, number, q, wave, time, size, times):
+def pass_next_jumps(past, places, own, tables, tree, changes, t, y, state, latest):
+    """Let the next jumps that arrive together leave their stretches; what they send goes to the changes.
+
+    Returns (True if no nodes must be solved for them, result of `change_times` for those where nodes must be solved).
+    Jumps that were sent within the step have other times than older ones; their mean is weighted by size.
+    own, tables : tables of the run, and those with lines shorter than a step as longer lines
+    """
+    until, queue = min(latest, tree[1] + history.time_tolerance(past)), int(past[history.JUMP_CAPACITY])
+    alone, total, since, booked = True, 0.0, 0.0, 0.0
+    while tree[1] <= until:
+        slot = earliest_arrival(tree)
+        number, wave = slot // 4, slot % 2
+        line = tables.delays[number]
+        pipe, q = tables.pipes[line["pipe"]], line["stretches"] - 1 if slot % 4 > 1 else 0
+        place = first_waiting_jump(past, places, line["stretch"] + q, wave)
+        sent, jump = past[place], past[place + queue]
+        share = jumps.reflected_part(past, places, line, pipe, q, wave, jump, t)
+        past[history.jump_head(places, line["stretch"] + q, wave) + history.ARRIVED_COUNT] += 1.0
+        times = jumps.change_times(past, tables, t, min(sent + line["tau"], t), sent)
+        closed = leave_stretch(past, places, tables, y, state, changes, number, q, wave, jump - share, times)
+        closed = leave_stretch(past, places, tables, y, state, changes, number, q, 1 - wave, share, times) and closed
+        if not closed:
+            alone, weight = False, abs(jump) / pipe["admittance"]
+            total, since, booked = total + weight, since + weight * times[0], booked + weight * times[1]
+        write_arrival(tree, slot, arrival_of(past, places, own, number, slot % 4, latest))
+    return alone, (since / total, booked / total) if total > 0.0 else (0.0, 0.0)
+
+
+@njit
+def leave_stretch(past, places, tables, y, state, changes, number, q, wave, size, times):
     """Pass a jump on from stretch q of a delay line, in the direction of a wave; False if nodes must be solved for it.
 
     At an end of the line it is added to the arriving wave in `past`; a node that is solved alone then responds, see
@@ -428,21 +461,21 @@ def leave_stretch(past, places, tables, y, state, number, q, wave, time, size, t
     if size == 0.0:
         return True
     if 0 <= onward < line["stretches"]:
-        store_large_jump(past, places, tables, line["stretch"] + onward, wave, time, size, pipe)
+        add_change(changes, 4 * number + 2 + wave, size)
         return True
     past[places[0] + history.ARRIVALS_SIZE * end_stretch(line, side) + side] += size
     if not solved_alone(tables, pipe["to_node"] if side == 1 else pipe["from_node"]):
         return False
-    enter_plain_node(past, places, tables, y, state, number, side, time, size, times)
+    enter_plain_node(past, tables, y, state, changes, number, side, size, times)
     return True
 
 
 @njit
-def enter_plain_node(past, places, tables, y, state, number, side, time, size, times):
+def enter_plain_node(past, tables, y, state, changes, number, side, size, times):
     """Let a jump arrive at an end of a delay line, at a node that is solved alone: the node sends jumps at once.
 
     y : states, corrected; state : values of the right-hand side at the end of the step, updated
-    number : number of the line; size : change of the wave [kg/s]; time : arrival time [s]
+    changes : see `clear_changes`; number : number of the line; size : change of the wave [kg/s]
     times : result of `change_times`
     """
     line, pipe, layout = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]], tables.layout[0]
@@ -451,7 +484,7 @@ def enter_plain_node(past, places, tables, y, state, number, side, time, size, t
     state[at + 1 + side] += size
     if node["kind"] != JUNCTION:
         state[at + 3 * side] -= size
-        store_large_jump(past, places, tables, end_stretch(line, side), side, time, -size, pipe)
+        add_change(changes, 4 * number + side, -size)
         jumps.correct_store(past, tables, y, state, pipe, i, 2.0 * size, times)
         return
     change = 2.0 * size / node["admittance"]
@@ -463,29 +496,27 @@ def enter_plain_node(past, places, tables, y, state, number, side, time, size, t
         pipe = tables.pipes[other["pipe"]]
         part = pipe["admittance"] * change - (size if end == 2 * number + side else 0.0)
         state[layout["ends"] + 4 * other["pipe"] + 3 * right] += part
-        store_large_jump(past, places, tables, end_stretch(other, right), right, time, part, pipe)
+        add_change(changes, 4 * (end // 2) + right, part)
 
 
 @njit
-def solve_nodes_again(past, places, tables, t, y, state, sharp, time, times):
-    """Solve the nodes with the waves that arrive now; store large changes of the waves that they send as jumps.
+def solve_nodes_again(past, places, tables, t, y, state, changes, sharp, times):
+    """Solve the nodes with the waves that arrive now; the changes of the waves that they send are added to `changes`.
 
-    y : states, corrected; state : values of the right-hand side before the jump, replaced by the solution
-    sharp : handle, see the module; time : arrival time of the jump [s]; times : result of `change_times`
+    y : states, corrected; state : values of the right-hand side before the jumps, replaced by the solution
+    sharp : handle, see the module; times : result of `change_times`
     """
     layout, size = tables.layout[0], state.size
     solved = tables.spare[size : 2 * size]
     run_job(CLOSE, t, y, y[:0], solved, sharp)
     for i in range(tables.delays.size):
-        line = tables.delays[i]
-        pipe, at = tables.pipes[line["pipe"]], layout["ends"] + 4 * line["pipe"]
+        pipe, at = tables.pipes[tables.delays[i]["pipe"]], layout["ends"] + 4 * tables.delays[i]["pipe"]
         for side in range(2):
             come = solved[at + 1 + side] - state[at + 1 + side]
             change = solved[at + 3 * side] - state[at + 3 * side]
             end = pipe["to_node"] if side == 1 else pipe["from_node"]
             jumps.correct_store(past, tables, y, solved, pipe, end, come - change, times)
-            if abs(change) > least_jump(past, tables, pipe):
-                store_jump(past, places, end_stretch(line, side), side, time, change, pipe)
+            add_change(changes, 4 * i + side, change)
     jumps.correct_behind_valves(past, tables, y, state, solved, times)
     for i in range(size):
         state[i] = solved[i]

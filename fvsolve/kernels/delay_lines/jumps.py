@@ -64,6 +64,44 @@ def store_large_jump(past, places, tables, s, wave, t, size, pipe):
         store_jump(past, places, s, wave, t, size, pipe)
 
 
+@njit
+def clear_changes(changes):
+    """Prepare an array that collects the jumps of waves by jumps that arrive together, before they are stored.
+
+    Four places for each line: the waves sent at its `from` end and its `to` end, the forward wave sent into its second
+    stretch, the backward wave sent into its last but one. A place is INFINITE until something is added.
+    changes : float64[8 lines + 1]  sums [kg/s], numbers of the places with sums, and their count
+    """
+    n = changes.size // 2
+    for k in range(n):
+        changes[k] = history.INFINITE
+    changes[2 * n] = 0.0
+
+
+@njit(forceinline=True)
+def add_change(changes, place, size):
+    """Add a change of a wave [kg/s] to a place of the array of `clear_changes`."""
+    n = changes.size // 2
+    if changes[place] == history.INFINITE:
+        count = int(changes[2 * n])
+        changes[n + count], changes[2 * n], changes[place] = place, count + 1.0, 0.0
+    changes[place] += size
+
+
+@njit
+def send_changes(past, places, tables, changes, time):
+    """Store the sums of `changes` as jumps sent at `time` [s], without small ones, and clear them (`clear_changes`)."""
+    n = changes.size // 2
+    for k in range(int(changes[2 * n])):
+        place = int(changes[n + k])
+        line, wave = tables.delays[place // 4], place % 2
+        first = place % 4 // 2  # 0 at a node, 1 at a joint
+        s = line["stretch"] + (line["stretches"] - 1 - first if wave == 1 else first)
+        store_large_jump(past, places, tables, s, wave, time, changes[place], tables.pipes[line["pipe"]])
+        changes[place] = history.INFINITE
+    changes[2 * n] = 0.0
+
+
 @njit(forceinline=True)
 def first_waiting_jump(past, places, s, wave):
     """Offset in `past` of the time of the oldest jump of a wave that has not left stretch s; -1 without such a jump."""
@@ -91,25 +129,45 @@ def reflected_part(past, places, line, pipe, q, wave, size, t):
     return before - friction_loss(pipe, line, r, l + size)
 
 
-@njit
-def pass_waiting_jumps(past, places, tables, line, q, wave, t, least):
-    """Pass all jumps of a wave that leave stretch q by t on to the neighbouring stretches, with their reflections.
+@njit(forceinline=True)
+def next_to_leave(past, places, line, q, latest):
+    """(arrival time of the next jump that leaves stretch q [s], its wave, its offset in `past`); INFINITE for none.
 
-    At an end of the line they only arrive. Small jumps join the smooth part (`least_jump`).
-    least : earliest time at which a jump may enter the next stretch [s]
+    Jumps that leave after `latest` are left out.
+    """
+    time, first, at = history.INFINITE, 0, -1
+    for wave in range(2):
+        place = first_waiting_jump(past, places, line["stretch"] + q, wave)
+        arrival = history.arrival_until(past[place], line["tau"], latest) if place >= 0 else history.INFINITE
+        if arrival < time:
+            time, first, at = arrival, wave, place
+    return time, first, at
+
+
+@njit
+def pass_waiting_jumps(past, places, tables, line, q, t, latest, least):
+    """Pass all jumps that leave stretch q by t on to the neighbouring stretches, in order, with their reflections.
+
+    At an end of the line they only arrive. Jumps that leave together pass as one, whatever their wave. Small jumps join
+    the smooth part (`least_jump`).
+    latest : latest time of arrival [s]; least : earliest time at which a jump may enter the next stretch [s]
     """
     queue, pipe, s = int(past[history.JUMP_CAPACITY]), tables.pipes[line["pipe"]], line["stretch"] + q
-    place = first_waiting_jump(past, places, s, wave)
-    while place >= 0 and past[place] + line["tau"] <= t + history.time_tolerance(past):
-        when, size = max(min(past[place] + line["tau"], t), least), past[place + queue]
-        share = reflected_part(past, places, line, pipe, q, wave, size, t)
-        past[history.jump_head(places, s, wave) + history.ARRIVED_COUNT] += 1.0
-        for to in range(2):
-            onward = q + 1 if to == 0 else q - 1
-            if 0 <= onward < line["stretches"]:
-                part = size - share if to == wave else share
-                store_large_jump(past, places, tables, line["stretch"] + onward, to, when, part, pipe)
-        place = first_waiting_jump(past, places, s, wave)
+    time, wave, place = next_to_leave(past, places, line, q, latest)
+    while time <= latest:
+        when, until = max(min(time, t), least), min(latest, max(time, least) + history.time_tolerance(past))
+        ahead, back = 0.0, 0.0
+        while time <= until:
+            size = past[place + queue]
+            share = reflected_part(past, places, line, pipe, q, wave, size, t)
+            past[history.jump_head(places, s, wave) + history.ARRIVED_COUNT] += 1.0
+            ahead += share if wave == 1 else size - share
+            back += share if wave == 0 else size - share
+            time, wave, place = next_to_leave(past, places, line, q, latest)
+        if q + 1 < line["stretches"]:
+            store_large_jump(past, places, tables, s + 1, 0, when, ahead, pipe)
+        if q > 0:
+            store_large_jump(past, places, tables, s - 1, 1, when, back, pipe)
 
 
 @njit
@@ -118,11 +176,11 @@ def pass_jumps_at_joints(past, places, tables, t):
 
     Inner stretches are neither the first nor the last of their line.
     """
+    latest = history.latest_arrival(past, t)
     for number in range(tables.delays.size):
         line = tables.delays[number]
         for q in range(1, line["stretches"] - 1):
-            for wave in range(2):
-                pass_waiting_jumps(past, places, tables, line, q, wave, t, -history.INFINITE)
+            pass_waiting_jumps(past, places, tables, line, q, t, latest, -history.INFINITE)
 
 
 @njit

@@ -10,7 +10,7 @@ changes; waves : bounds of both waves; other arguments are those of `wave_histor
 from fvsolve.jit import njit
 from fvsolve.kernels.delay_lines import wave_bounds
 from fvsolve.kernels.delay_lines import wave_history as history
-from fvsolve.kernels.delay_lines.line_rates import smooth_wave_linear, waves_in_stretch
+from fvsolve.kernels.delay_lines.line_rates import joint_at, smooth_wave_linear, waves_in_stretch
 from fvsolve.kernels.delay_lines.wave_bounds import BOUND_ROUNDING, GRID_ROUNDING, wave_at_jump
 from fvsolve.kernels.dtypes import PIPE_FLOW, PIPE_PRESSURE
 from fvsolve.kernels.observation import update_envelope, update_extremes
@@ -32,22 +32,29 @@ NOWHERE = (history.INFINITE, -history.INFINITE)  # range that contains no wave
 
 
 @njit
-def line_extremes_at_jumps(past, places, clock, line, q, x, sign, begin, span, waves, most, known):
+def line_extremes_at_jumps(past, places, clock, line, both, shares, sign, begin, span, waves, most, known):
     """Extremes of r + sign l on both sides of the jumps that pass a point of a delay line, without friction loss.
 
     Returns (least, time of the least, greatest, time of the greatest) [kg/s, s]; without a jump, least is INFINITE.
     Jumps with values in `known` are left out.
-    r, l : forward and backward wave; sign : 1 for pressure, -1 for flow; x : position as fraction of stretch q
+    r, l : forward and backward wave; sign : 1 for pressure, -1 for flow
+    both : stretches in which both waves pass the point, different ones at a joint
+    shares : fraction of its stretch that each wave has crossed at the point
     begin : positions in the lists of forward and backward jumps to begin with; most : bound of the friction loss [kg/s]
     """
     before, t = span
     least, t_least, greatest, t_greatest = history.INFINITE, t, -history.INFINITE, t
-    queue, tau, s, same = int(past[history.JUMP_CAPACITY]), line["tau"], line["stretch"] + q, clock[4]
-    ring, mask = history.ring_of(places, line, q)
+    queue, tau, s, same = int(past[history.JUMP_CAPACITY]), line["tau"], line["stretch"], clock[4]
     for wave in range(2):
-        head, other = history.jump_head(places, s, wave), history.jump_head(places, s, 1 - wave)
-        share, other_bounds = x if wave == 0 else 1.0 - x, waves[1 - wave]
-        begins, back = before - share * tau + same, (2.0 * share - 1.0) * tau  # a jump meets a wave sent `back` later
+        head = history.jump_head(places, s + both[wave], wave)
+        other = history.jump_head(places, s + both[1 - wave], 1 - wave)
+        (ring, mask), (other_ring, _) = (
+            history.ring_of(places, line, both[wave]),
+            history.ring_of(places, line, both[1 - wave]),
+        )
+        share, other_bounds = shares[wave], waves[1 - wave]
+        # a jump meets a wave sent `back` later
+        begins, back = before - share * tau + same, (share - shares[1 - wave]) * tau
         first, reached = history.count_until(past, places, head, begin[wave], begins), begin[1 - wave]
         for i in range(first, int(past[head + history.JUMP_COUNT])):
             place = history.jump_place(past, places, head, i)
@@ -59,7 +66,7 @@ def line_extremes_at_jumps(past, places, clock, line, q, x, sign, begin, span, w
                 continue
             reached = history.count_until(past, places, other, reached, sent + back + same)
             here = wave_at_jump(past, places, clock, ring, mask, head, wave, i)
-            there = smooth_wave_linear(past, clock, ring, mask, 1 - wave, sent + back)
+            there = smooth_wave_linear(past, clock, other_ring, mask, 1 - wave, sent + back)
             there += history.sum_of_first(past, places, other, reached)
             for side in range(2):
                 moved = here - (1 - side) * size
@@ -206,7 +213,7 @@ def update_stretch_extremes(past, places, clock, tables, line, q, before, t, unc
             floor = max(floor, tables.profile[cell + j])
         known = (floor, envelope[2, cell + j])
         if stays_within(ahead[0], ahead[1], back, most, known):
-            if 2 * n * q <= (2 * j + 1) * stretches < 2 * n * (q + 1):  # the centre is in this stretch
+            if 2 * n * q < (2 * j + 1) * stretches < 2 * n * (q + 1):  # the centre is in this stretch, not at a joint
                 unchanged[j] = 1.0
             continue
         i = history.count_back(past, places, head, i, before - high * tau - reach)
@@ -226,14 +233,19 @@ def extend_envelope(past, places, clock, tables, line, q, j, begin, span, waves,
 
     Other arguments are those of `line_extremes_at_jumps`.
     """
-    x = (j + 0.5) / line["places"] * line["stretches"] - q
-    if not 0.0 <= x < 1.0:
+    share = (j + 0.5) / line["places"]
+    x, joint = share * line["stretches"] - q, joint_at(share, line["stretches"])
+    both, shares, delta = (q, q), (x, 1.0 - x), past[places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q) + 2]
+    if joint > 0:  # as in `waves_at`; the bounds are those of one stretch
+        both, shares, delta = (joint, joint - 1), (0.0, 0.0), 0.0
+        begin, waves = (0, 0), (EVERYWHERE, EVERYWHERE)
+    elif not 0.0 <= x < 1.0:
         return
-    found = line_extremes_at_jumps(past, places, clock, line, q, x, 1.0, begin, span, waves, most, known)
+    found = line_extremes_at_jumps(past, places, clock, line, both, shares, 1.0, begin, span, waves, most, known)
     if found[0] == history.INFINITE:
         return
     pipe, mark = tables.pipes[line["pipe"]], line["pipe"]
-    cell, more = pipe["cell"] + j, (1.0 - 2.0 * x) * past[places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q) + 2]
+    cell, more = pipe["cell"] + j, (1.0 - 2.0 * x) * delta
     if found[0] + more < tables.profile[cell] and tables.marks[mark] != tables.marks[mark]:
         tables.marks[mark] = found[1]
     update_extremes(tables.envelope, cell, found[1], found[0] + more)
@@ -251,13 +263,16 @@ def update_probe_extremes(past, places, clock, tables, before, t):
         if pipe["delay"] < 0:
             continue
         line = tables.delays[pipe["delay"]]
-        share = tables.floats[probe["weights"]] * line["stretches"]
-        q = min(int(share), line["stretches"] - 1)
-        x, sign = share - q, 1.0 if probe["kind"] == PIPE_PRESSURE else -1.0
+        share = tables.floats[probe["weights"]]
+        q, joint = min(int(share * line["stretches"]), line["stretches"] - 1), joint_at(share, line["stretches"])
+        x, sign = share * line["stretches"] - q, 1.0 if probe["kind"] == PIPE_PRESSURE else -1.0
+        both, shares = (q, q), (x, 1.0 - x)
         delta = past[places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q) + 2]
+        if joint > 0:  # as in `waves_at`
+            both, shares, delta = (joint, joint - 1), (0.0, 0.0), 0.0
         more = (1.0 - 2.0 * x) * delta if sign > 0.0 else pipe["flow"] - delta
         least, t_least, greatest, t_greatest = line_extremes_at_jumps(
-            past, places, clock, line, q, x, sign, (0, 0), (before, t), (EVERYWHERE, EVERYWHERE), 0.0, NOWHERE
+            past, places, clock, line, both, shares, sign, (0, 0), (before, t), (EVERYWHERE, EVERYWHERE), 0.0, NOWHERE
         )
         if least < history.INFINITE:
             update_extremes(tables.extremes, k, t_least, probe["scale"] * (least + more) + probe["offset"])
@@ -281,6 +296,19 @@ def update_line_extremes(past, places, clock, tables, line, before, t, unchanged
 
 
 @njit
+def write_waves_at_joints(t, past, places, clock, line, r, l):
+    """Write both waves at the time t of the last entry to the places of a line that are at joints, as in `waves_at`."""
+    stretches, n = line["stretches"], r.size
+    for joint in range(1, stretches):
+        if (2 * n * joint - stretches) % (2 * stretches) == 0:
+            j = (2 * n * joint - stretches) // (2 * stretches)
+            r[j], l[j] = (
+                history.newest_wave(past, places, clock, line, joint, 0, t),
+                history.newest_wave(past, places, clock, line, joint - 1, 1, t),
+            )
+
+
+@njit
 def update_line_envelopes(before, t, places, tables, recorded):
     """Update the pressure envelopes along all delay lines by the values of the last step.
 
@@ -300,6 +328,7 @@ def update_line_envelopes(before, t, places, tables, recorded):
             continue
         for q in range(line["stretches"]):
             j = waves_in_stretch(t, past, places, clock, line, q, j, r, l, unchanged, envelope[2, cell : cell + n])
+        write_waves_at_joints(t, past, places, clock, line, r, l)
         for j in range(n):
             s = r[j] + l[j]
             low += not s >= envelope[0, cell + j]

@@ -26,6 +26,7 @@ from fvsolve.kernels.table_handle import open_tables
 FLOW_TOLERANCE = 1e-6  # relative error of the flow at which Newton stops
 SLOPE_ERROR = 0.2  # relative error of the slope where the friction factor depends on the flow
 MAX_ITERATIONS = 60  # of Newton's method
+JOINT_TOLERANCE = 1e-9  # distance from a joint, as fraction of a stretch, that is rounding
 BEFORE_ALL = -(1 << 62)  # in place of the number of an entry: before all entries, where smooth parts are zero
 
 
@@ -222,14 +223,25 @@ def sent_wave(t, out, tables, number, q, wave, at):
     return l + delta if wave == 1 else r - delta
 
 
+@njit(forceinline=True)
+def joint_at(share, stretches):
+    """Number of the stretch that begins at a fraction `share` of the length of a line; 0 if no inner joint is there."""
+    k = int(share * stretches + 0.5)
+    return k if 0 < k < stretches and abs(share * stretches - k) < JOINT_TOLERANCE else 0
+
+
 @njit
 def waves_at(t, out, tables, number, share):
     """(forward, backward) wave [kg/s] at t of delay line `number` at a fraction `share` of its length from `from`.
 
+    At a joint both waves are those sent there, so that the result does not depend on the direction of the line.
     out : values of the right-hand side at t
     """
     line = tables.delays[number]
     pipe, stretches = tables.pipes[line["pipe"]], line["stretches"]
+    joint = joint_at(share, stretches)
+    if joint > 0:
+        return sent_wave(t, out, tables, number, joint, 0, t), sent_wave(t, out, tables, number, joint - 1, 1, t)
     q = min(int(share * stretches), stretches - 1)
     x, tau = share * stretches - q, line["tau"]
     r = sent_wave(t, out, tables, number, q, 0, t - x * tau)

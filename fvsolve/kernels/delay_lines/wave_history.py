@@ -26,7 +26,7 @@ all lines; wave : 0 forward, 1 backward; side : 0 end at `from`, 1 end at `to`; 
 
 from fvsolve.jit import njit
 
-HEADER_SIZE = 24
+HEADER_SIZE = 32
 COUNT, CAPACITY, JUMP_CAPACITY, STRETCHES = 0, 1, 2, 3  # entries so far, capacity for times, jumps of a wave, stretches
 RING_FACTOR = 4  # factor by which rings are longer than at first
 LAST_STEP, EQUAL_STEPS = 5, 6  # length of the last step [s], number of last steps of that length
@@ -40,6 +40,10 @@ ONLY_PASSED_JUMPS = 16  # 1 while readings include only jumps that have been pas
 MOST_JUMPS_TRAVELLING = 18  # greatest number of jumps travelling at one time
 GREATEST_WAVE = 17  # greatest wave so far, deviation from the initial steady state [Pa]
 RESTATED_ENTRY = 20  # number of the last entry that has been recorded again
+TOLERANCE = 21  # result of `time_tolerance` [s]
+REFLECTION_RATE = 22  # greatest number of stretches that a wave crosses in unit time [1/s]
+FIRST_TIME = 23  # time of the first entry [s]
+SEGMENT_END = 24  # end of the present segment of the run, where schedules may jump; INFINITE in the last segment [s]
 RING_ENTRIES = 19  # capacity of all rings together before they are lengthened
 INFINITE = 1e300  # time [s]
 PROFILE_ENTRIES = 8  # entries of the initial steady state (zeros) before the first entry
@@ -49,7 +53,11 @@ BOUNDS_BEGIN, BOUNDS_SIZE = 2, 4  # values in `bounds` before those of entries, 
 ARRIVALS_SIZE = 3  # values per stretch: backward wave at its beginning, forward wave at its end, delta
 RING_GAP = 8  # numbers between rings, one cache line: else entries of the same time would share a few cache sets
 TIME_TOLERANCE, ROUNDING = 1e-9, 1e-14  # tolerance of equal times: fraction of a step, and at least of the time
-GREATEST_STEP_RATIO = 1.9  # ratio of neighbouring steps, where one was shortened, above which readings are linear
+UNIT_ROUNDING = 2.3e-16  # relative rounding of a time: the sums of two paths round by half of it each at a stretch
+GREATEST_SHARE = 1e-4  # greatest part of a step and of a travel time that counts as rounding of sums
+# ratio of neighbouring steps, where one was shortened, above which readings are linear; no ratio of round times, which
+# rounding would put on either side
+GREATEST_STEP_RATIO = 1.9000019
 NAN = float("nan")
 
 
@@ -117,8 +125,40 @@ def jump_number(past, places, at, place):
 
 @njit(forceinline=True)
 def time_tolerance(past):
-    """Tolerance below which two times count as equal [s]."""
-    return max(TIME_TOLERANCE * past[LAST_STEP], ROUNDING * abs(time_of(past, int(past[COUNT]) - 1)))
+    """Tolerance below which two times count as equal [s], see `update_tolerance`."""
+    return past[TOLERANCE]
+
+
+@njit(forceinline=True)
+def update_tolerance(past, t, h):
+    """Raise the tolerance of equal times at an entry at t, after a step of h [s].
+
+    The arrival time of a jump is a sum of travel times, one for each stretch that it has crossed. Each sum rounds, so
+    the times of jumps that arrive together by several paths differ by more, the more reflections there were. The
+    tolerance never decreases in a run: a jump that has been passed on as arrived must count as arrived later too.
+    """
+    rate = past[REFLECTION_RATE]
+    sums = min(UNIT_ROUNDING * rate * (t - past[FIRST_TIME]) * abs(t), GREATEST_SHARE * min(h, 1.0 / rate))
+    past[TOLERANCE] = max(past[TOLERANCE], TIME_TOLERANCE * h, ROUNDING * abs(t), sums)
+
+
+@njit(forceinline=True)
+def latest_arrival(past, t):
+    """Latest arrival time of a jump that counts as arrived at t [s].
+
+    Jumps that arrive with a jump that ends a step (`NEXT_ARRIVAL`) wait until that jump is admitted.
+    """
+    return min(t + time_tolerance(past), past[NEXT_ARRIVAL] - time_tolerance(past))
+
+
+@njit(forceinline=True)
+def arrival_until(sent, tau, latest):
+    """Arrival time of a jump after a travel time tau, if it is at most `latest`, else INFINITE.
+
+    It is compared as in `arrived_until`, to the same bits: a jump that readings include must be passed on. An event
+    that a jump causes is found where both sides are equal but for rounding.
+    """
+    return min(sent + tau, latest) if sent <= latest - tau else INFINITE
 
 
 @njit(forceinline=True)
@@ -320,12 +360,11 @@ def passed_jumps(past, places, at):
 def arrived_until(past, places, clock, at, t, tau):
     """Sum of the jumps of a wave that have arrived by t, after a travel time tau [kg/s].
 
-    Jumps that arrive from past[NEXT_ARRIVAL] on are left out, because they end a step and are admitted later. While
-    past[ONLY_PASSED_JUMPS] is 1, the result is `passed_jumps`.
+    See `latest_arrival` for jumps that are left out. While past[ONLY_PASSED_JUMPS] is 1, the result is `passed_jumps`.
     """
     if past[ONLY_PASSED_JUMPS] > 0.0:
         return passed_jumps(past, places, at)
-    return jumps_until(past, places, at, min(t + clock[4], past[NEXT_ARRIVAL] - clock[4]) - tau)
+    return jumps_until(past, places, at, min(t + clock[4], past[NEXT_ARRIVAL] - clock[4]) - tau)  # `latest_arrival`
 
 
 @njit(forceinline=True)
@@ -334,6 +373,14 @@ def read_waves(past, places, clock, line, q, t):
     r, l = smooth_waves(past, places, clock, line, q, t)
     until, ahead = t + clock[4], jump_head(places, line["stretch"] + q, 0)
     return r + jumps_until(past, places, ahead, until), l + jumps_until(past, places, ahead + HEAD_SIZE, until)
+
+
+@njit(forceinline=True)
+def newest_wave(past, places, clock, line, q, wave, t):
+    """Wave sent into stretch q of a delay line at the time t of the newest entry, with its jumps up to t [kg/s]."""
+    ring, mask = ring_of(places, line, q)
+    jumps = jumps_until(past, places, jump_head(places, line["stretch"] + q, wave), t + clock[4])
+    return past[ring + 2 * (clock[0] & mask) + wave] + jumps
 
 
 @njit
@@ -398,6 +445,8 @@ def begin_entry(past, t):
     """Begin an entry at t: write its time and the lengths of the last steps to `past`; return its number."""
     mask, k = int(past[CAPACITY]) - 1, int(past[COUNT])
     if k == 0:
+        past[FIRST_TIME] = t
+        update_tolerance(past, t, 0.0)
         past[COUNT], past[EQUAL_STEPS], past[LAST_STEP] = PROFILE_ENTRIES + 1.0, 1e18, 1e-300
         past[STEP_BEFORE], past[EQUAL_STEPS_BEFORE] = past[LAST_STEP], past[EQUAL_STEPS]
         past[HEADER_SIZE + PROFILE_ENTRIES] = t
@@ -410,6 +459,7 @@ def begin_entry(past, t):
         past[EQUAL_STEPS] += 1.0
     else:
         past[EQUAL_STEPS], past[LAST_STEP] = 1.0, h
+    update_tolerance(past, t, h)
     past[HEADER_SIZE + (k & mask)] = t
     past[COUNT] = k + 1.0
     return k

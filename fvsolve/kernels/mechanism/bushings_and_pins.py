@@ -5,7 +5,9 @@ A bushing is a spring with a damper, for displacement and for rotation. The forc
 docs/course.md) and the relative angular velocity. R is the attitude of the body of `to` in axes of the body of `from`,
 and R_d is R at the attitudes that the case states; an equilibrium start may deviate from it. With the Euler parameters
 eta and eps of R~, the torque is proportional to 2 eta eps, the vector of the skew part of R~; eps . eps =
-(3 - trace R~) / 4. The force acts on both bodies at the point `to`, so its power is force times d(rho)/dt.
+(3 - trace R~) / 4. The rate of the gap is its rate in axes that turn with the mean of both angular velocities, and the
+force acts on both bodies at the middle of the gap. So its power is force times rate, a common rotation of both bodies
+is not damped, their angular momentum is conserved, and `from` and `to` may be exchanged.
 
 link : row of a bushing or pin
 
@@ -33,7 +35,7 @@ from fvsolve.kernels.mechanism import mass_matrix as mass
 from fvsolve.kernels.mechanism.body_kinematics import body_of_point, point_at, spin_of
 from fvsolve.kernels.mechanism.body_layout import add_force, add_torque, body_row
 from fvsolve.kernels.mechanism.body_values import acceleration_at
-from fvsolve.kernels.mechanism.vectors import cross, minus, rotate, scalar_product, scaled, vector
+from fvsolve.kernels.mechanism.vectors import cross, minus, plus, rotate, scalar_product, scaled, vector, vector_product
 from fvsolve.kernels.table_handle import open_tables
 
 
@@ -77,9 +79,8 @@ def relative_motion(out, tables, link):
 
 
 @njit
-def add_pair_load(out, tables, link, f):
-    """Add a force f [N] to the body of `to`, and -f to the body of `from`, both at the point `to`."""
-    p = point_at(out, tables, link["to_point"], layout.POSITION)
+def add_pair_load(out, tables, link, p, f):
+    """Add a force f [N] to the body of `to`, and -f to the body of `from`, both at the position p."""
     for end, sign in ((link["to_point"], 1.0), (link["from_point"], -1.0)):
         i = body_of_point(tables, end)
         if i >= 0:
@@ -88,6 +89,21 @@ def add_pair_load(out, tables, link, f):
 
 
 # bushings ----------
+
+
+@njit
+def bushing_motion(out, tables, bushing):
+    """Gap of a bushing [m], its rate [m/s] in axes that turn with both bodies on average, and the middle of the gap.
+
+    gap = r_to - r_from, rate = v_to - v_from - (w_to + w_from) x gap / 2, with the positions r and velocities v of its
+    points and the angular velocities w of their bodies : three vectors in axes of the world
+    """
+    to = point_at(out, tables, bushing["to_point"], layout.POSITION)
+    begin = point_at(out, tables, bushing["from_point"], layout.POSITION)
+    gap, velocity = minus(to, begin), minus(to[3:], begin[3:])
+    turning = plus(spin_of(out, tables, bushing["to_point"]), spin_of(out, tables, bushing["from_point"]))
+    half = scaled(0.5, gap)
+    return gap, minus(velocity, vector_product(turning, half)), minus(to, half)
 
 
 @njit(forceinline=True)
@@ -133,7 +149,7 @@ def rotation_deviation(out, tables, bushing):
 @njit
 def bushing_loads(out, tables, bushing):
     """Force [N] and torque [N m] of a bushing on the body of `to`, two vectors in axes of the world."""
-    gap, rate = relative_motion(out, tables, bushing)
+    gap, rate, _ = bushing_motion(out, tables, bushing)
     turn, turning, _ = rotation_deviation(out, tables, bushing)
     force = minus(scaled(-bushing["stiffness"], gap), scaled(bushing["damping"], rate))
     torque = minus(scaled(-bushing["turn_stiffness"], turn), scaled(bushing["turn_damping"], turning))
@@ -147,7 +163,7 @@ def add_bushing_loads(t, y, dydt, out, handle):
     bushings = tables.bushings
     for k in range(bushings.size):
         force, torque = bushing_loads(out, tables, bushings[k])
-        add_pair_load(out, tables, bushings[k], force)
+        add_pair_load(out, tables, bushings[k], bushing_motion(out, tables, bushings[k])[2], force)
         add_element_end_force(out, tables, bushings[k]["to_point"], ABOUT, torque)
         add_element_end_force(out, tables, bushings[k]["from_point"], ABOUT, scaled(-1.0, torque))
 
@@ -166,7 +182,7 @@ def bushing_rate_limit(t, y, dydt, out, handle):
     for k in range(bushings.size):
         bushing = bushings[k]
         i, j = body_of_point(tables, bushing["from_point"]), body_of_point(tables, bushing["to_point"])
-        p = point_at(out, tables, bushing["to_point"], layout.POSITION)[:3]
+        p = bushing_motion(out, tables, bushing)[2]
         for axis in range(6):
             along = 1.0 * (axis % 3 == 0), 1.0 * (axis % 3 == 1), 1.0 * (axis % 3 == 2)
             mass.clear_column(tables, at)
@@ -189,7 +205,7 @@ def observe_bushings(t, y, out, handle, values):
     for k in range(probes.size):
         if probes[k]["kind"] == BUSHING_VALUE:
             bushing = tables.bushings[probes[k]["index"]]
-            value, (force, torque) = relative_motion(out, tables, bushing)[0], bushing_loads(out, tables, bushing)
+            value, (force, torque) = bushing_motion(out, tables, bushing)[0], bushing_loads(out, tables, bushing)
             if probes[k]["side"] == 1:
                 value = force
             elif probes[k]["side"] == 2:
@@ -204,7 +220,7 @@ def power_bushings(t, y, dydt, out, handle, power):
     at = bushing_power_row(tables, power)
     for k in range(tables.bushings.size):
         bushing = tables.bushings[k]
-        gap, rate = relative_motion(out, tables, bushing)
+        gap, rate, _ = bushing_motion(out, tables, bushing)
         turn, turning, _ = rotation_deviation(out, tables, bushing)
         power[at] = bushing["stiffness"] * scalar_product(gap, rate)
         power[at] += bushing["turn_stiffness"] * scalar_product(turn, turning)
@@ -222,7 +238,7 @@ def stored_bushings(t, y, dydt, out, handle, stored):
     tables = open_tables(handle)
     at = bushing_stored_row(tables, stored)
     for k in range(tables.bushings.size):
-        bushing, gap = tables.bushings[k], relative_motion(out, tables, tables.bushings[k])[0]
+        bushing, gap = tables.bushings[k], bushing_motion(out, tables, tables.bushings[k])[0]
         eps = rotation_deviation(out, tables, bushing)[2]
         own = 0.5 * bushing["stiffness"] * scalar_product(gap, gap) + 2.0 * bushing["turn_stiffness"] * eps
         stored[at + k] = own - bushing["energy"]
@@ -341,7 +357,7 @@ def add_start_pin_forces(t, y, dydt, out, handle):
     for k in range(pins.size):
         for r in range(pins[k]["rows"]):
             force = scaled(pins[k]["force"][r], pin_direction(out, tables, pins[k], r))
-            add_pair_load(out, tables, pins[k], force)
+            add_pair_load(out, tables, pins[k], point_at(out, tables, pins[k]["to_point"], layout.POSITION), force)
 
 
 @njit
@@ -374,7 +390,7 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
         rate = max(rate, pins[k]["pull"])
         for r in range(pins[k]["rows"]):
             force = scaled(work[last + row], pin_direction(out, tables, pins[k], r))
-            add_pair_load(out, tables, pins[k], force)
+            add_pair_load(out, tables, pins[k], point_at(out, tables, pins[k]["to_point"], layout.POSITION), force)
             out[at + 3 * k + r] = pins[k]["force"][r] + work[last + row]
             row += 1
     mass.spread_accelerations(out, tables)

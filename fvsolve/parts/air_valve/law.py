@@ -180,6 +180,8 @@ def events(t, y, out, tables, device, g):
     event_pair(tables, g, at, margin)
     if has_throttled_outlet(floats, device["data"]):
         gauge = air_state(st, floats, node, device["data"], fluid, y[device["y"]])[0]
+        if tables.armed[at] <= 0.0:  # while it is shut no air moves, and the sign of its pressure is that of rounding
+            gauge = max(gauge, 0.5 * PRESSURE_MARGIN)
         event_pair(
             tables, g, at + 2, -gauge if tables.armed[at + 2] > 0.0 else throttling_margin(out, tables, device, gauge)
         )

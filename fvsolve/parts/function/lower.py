@@ -19,6 +19,8 @@ class FunctionRows(StaticRows, kind="function"):
             return [0.0, 0.0, float(draft.schedules.add_program(program, located=False)), -1.0]
         for time in program.break_times:
             draft.schedules.breaks[time] = True
+        for time in program.pulses(*draft.schedules.span) if not program.names else ():
+            draft.schedules.breaks.setdefault(time, False)
         flag = draft.flags(name, ())
         return [0.0, 0.0, float(draft.schedules.add_program(program)), float(flag)]
 

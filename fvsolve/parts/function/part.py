@@ -68,9 +68,11 @@ class FormulaBlock(Control, kind="function"):
         if sound and isinstance(formula, str) and isinstance(unit, str):
             output = setting.block_units[1]
             try:
-                program_in(unit if output else "", output, formula, tuple(names), setting.ambient)
+                program = program_in(unit if output else "", output, formula, tuple(names), setting.ambient)
             except ValueFault as error:
                 raise ValueFault(error.faults, given) from None
+            if not names and setting.span is not None and (text := program.pole_fault(*setting.span)):
+                raise ValueFault([(("formula",), text)], given)
         return given
 
     def program(self, dimension: str, ambient: float) -> Program:

@@ -1,4 +1,4 @@
-"""Flow through the lid of a manhole, down from the street at its end `from` or up from the shaft at its end `to`.
+"""Flow through the lid of a manhole, down from the street or up from the shaft.
 
 Down: the lesser of a weir along the perimeter and an orifice. Up: an orifice, from a shaft with a level above the lid.
 Sources: Rubinato, Lee, Martins, Shucksmith 2018 (doi 10.1007/s11269-018-1971-z); coefficients of Itzi for an open lid.
@@ -10,7 +10,8 @@ from fvsolve.jit import njit, specialise
 from fvsolve.kernels import structures
 from fvsolve.kernels.structures import DROWNED, FREE, LINEAR_FALL, NONE, weir_flow
 
-CREST, WEIR, ORIFICE = range(3)  # numbers: height [m], 2/3 Cw P sqrt(2 g) [m^1.5/s], Co A sqrt(2 g) [m^2.5/s]
+# Numbers: height [m], 2/3 Cw P sqrt(2 g) [m^1.5/s], Co A sqrt(2 g) [m^2.5/s], 1 if the street is at `from`, else 0
+CREST, WEIR, ORIFICE, STREET_FIRST = range(4)
 
 
 @njit
@@ -20,7 +21,7 @@ def rule(floats, at, setting, ahead, z, fall):
     if h <= 0.0:
         return 0.0, NONE
     orifice = floats[at + ORIFICE] * (sqrt(drive) if drive >= LINEAR_FALL else drive / sqrt(LINEAR_FALL))
-    if ahead:
+    if ahead == (floats[at + STREET_FIRST] == 1.0):
         weir, regime = weir_flow(floats[at + WEIR], h, fall)
         if weir <= orifice:
             return weir, regime

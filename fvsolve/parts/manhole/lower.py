@@ -19,4 +19,11 @@ class ManholeRows(StructureRows, kind="manhole"):
         return part.orifice_coefficient * part.area * math.sqrt(2.0 * draft.case.gravity)
 
     def numbers(self, draft, name, part) -> list[float]:
-        return [part.crest, weir_size(draft, part.perimeter, part.weir_coefficient), self.size(draft, part)]
+        drop = weir_size(draft, part.perimeter, part.weir_coefficient)
+        return [part.crest, drop, self.size(draft, part), float(not is_reversed(draft.case, part))]
+
+
+def is_reversed(case, part) -> bool:
+    """True if the street is at the end `to`: a patch of a basin, while the end `from` is none."""
+    ends = (case.places[end].kind.startswith("patch") for end in (part.from_, part.to))
+    return tuple(ends) == (False, True)

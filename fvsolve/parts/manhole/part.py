@@ -10,7 +10,9 @@ COEFFICIENTS = UsualRange(0.05, 2.1, "Rubinato et al. 2018, Itzi")
 
 
 class Manhole(HydraulicStructure, kind="manhole"):
-    """Lid through which water falls from a street (`from`) into a shaft (`to`), or rises from a full shaft.
+    """Lid through which water falls from a street into a shaft, or rises from a full shaft.
+
+    The street is the end at a patch of a basin; if both ends or none are patches, it is `from`.
 
     Down: the lesser of a weir, 2/3 Cw P sqrt(2 g) h^1.5, times (1 - r^1.5)^0.385 while the shaft is above the crest,
     and an orifice, Co A sqrt(2 g (z - max(H, crest))). Up: Co A sqrt(2 g (H - max(z, crest))). z is the level of the

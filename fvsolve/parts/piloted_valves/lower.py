@@ -1,6 +1,6 @@
 """Piloted valves in the tables of a model, and their states at the steady start."""
 
-from fvsolve.assembly.lowering import Device, opening_of
+from fvsolve.assembly.lowering import Device
 from fvsolve.errors import Notice
 from fvsolve.parts.self_acting import law_relief_valve
 from fvsolve.parts.self_acting.law_disc import FREE_BACK, SENSED
@@ -37,11 +37,6 @@ class PilotedDisc(ReliefDisc, kind=""):
         """Results of `LiftedValve.flow_at`; below the seat the flow stays linear in the lift, for Newton's method."""
         full, steep, rise = super().flow_at(start, k, drop, 1.0)
         return lift * full, max(lift, 0.0) * steep, rise
-
-    def lift_at_start(self, start, k):
-        if start.valve_flows()[k] <= 0.0:
-            return min(max(self.lifting_pressure(start, k) / self.part(start, k).overpressure, 0.0), 1.0)
-        return opening_of(start, k)
 
     def check_columns(self, draft, name: str) -> None:
         """Add a notice if a rigid column ends at the valve, whose exchange of flow and lift no step resolves."""

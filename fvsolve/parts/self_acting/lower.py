@@ -123,7 +123,12 @@ class LiftedValve(Device, kind=""):
         return [text] if start.rest and target > SMALL_LIFT else []
 
     def lift_at_start(self, start, k: int) -> float:
-        """Lift of the partly lifted valve k at the start, with which it passes its steady flow."""
+        """Lift of the partly lifted valve k at the start, with which it passes its steady flow.
+
+        A reversed flow, or none, does not determine the lift; it then follows from the lifting pressure.
+        """
+        if start.valve_flows()[k] <= 0.0:
+            return min(max(self.lifting_pressure(start, k) / self.part(start, k).overpressure, 0.0), 1.0)
         return opening_of(start, k)
 
     def store_lift(self, start, row, x: float, target: float) -> None:

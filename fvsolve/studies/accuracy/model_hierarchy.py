@@ -27,6 +27,7 @@ from fvsolve.model.model_facts import velocities
 from fvsolve.studies.distance import Deviation, moving_probes
 from fvsolve.studies.outcome import GIVEN_UP, Outcome, capped, outcome, refuse_basins, study_model
 from fvsolve.studies.reference import reference_of_run
+from fvsolve.studies.resolution import refined_keys
 from fvsolve.studies.result_table import PlainData
 
 SLOSHING = ("frozen", "modes", "cells")
@@ -184,6 +185,9 @@ DEFAULT_TARGET = 1e-2
 BEST_OF, BRIEF_RUN = 3, 0.3  # timed runs of a level; time of the first run above which it is not repeated [s]
 LEVEL_CPU_LIMIT = 8.0  # CPU time after which a level is given up [s]
 STRAIN_FACTOR = 3.0  # a difference of the laws above this multiple of dp/K has another cause
+LINES = ("delay lines", "linear")  # level and law with a bound of its own
+LINE_REFINEMENT, LINE_SAFETY = 4.0, 1.5
+DECIDED = 0.1  # own error of the reference, in targets, at which it is not refined further
 MAX_DOUBLINGS = 6  # greatest number of doublings of the cells, to find the error of the richest level itself
 REFINED_COST = 4.0  # ratio of computing times, for twice the cells and twice the steps
 SCHEDULE_SAMPLES = 4001  # sample times of each schedule, to find its steepest slope
@@ -241,8 +245,8 @@ class LawDifference:
 class Hierarchy(PlainData):
     """Levels of the model hierarchy of a case, with rules of thumb for the choice of a model.
 
-    rungs : all levels, simplest first; target : acceptable error [-]; cheapest : fastest level with an error within
-    `target`
+    rungs : all levels, simplest first; target : acceptable error [-]; cheapest : fastest level whose error plus
+    `own_error` is within `target`, or `richest`
     richest : level that is the reference of all others, with the most cells and the most complete density law that
     runs; its cells are refined until its own error is within `target`
     travel_time : greatest travel time of a wave along a pipe [s]
@@ -352,33 +356,43 @@ def ladder(
     if at is None:
         raise FvsolveError(f"the case itself does not run: {runs[-1].reason}")
     own_run, law = runs[at], models[at][1]
+
+    def enough(reference: Outcome, own: float) -> bool:
+        known = [_level_of(*names, entry, reference) for names, entry in zip(models, runs, strict=True)]
+        known = [entry for entry in known if not is_sure(entry, target, sure)]
+        return own <= target and (own <= DECIDED * target or not undecided(known, target, own))
+
+    of_law = {pair[1]: entry for entry, pair in zip(runs, models, strict=True) if pair[0] == models[at][0]}
+    difference = law_difference(of_law.get("linear", own_run), own_run)
+    sure = line_bound(case, dict(zip(models, runs, strict=True)), 0.0 if difference is None else difference.error)
+
     finer_runs, own = refine_richest(
-        case, law, own_run, target, lambda name: report(len(models), len(models) + 1, f"{name}, {law}")
+        case, law, own_run, enough, lambda name: report(len(models), len(models) + 1, f"{name}, {law}")
     )
     richest = finer_runs[-1][1] if finer_runs else own_run
     models, runs = [*models, *((name, law) for name, _ in finer_runs)], [*runs, *(entry for _, entry in finer_runs)]
     levels = [_level_of(*names, entry, richest) for names, entry in zip(models, runs, strict=True)]
-    accurate = [entry for entry in levels if entry.error is not None and entry.error <= target]
-    if not accurate:
+    if all(entry.error is None for entry in levels):
         reason = "no probe changes, so models have no errors"
         raise FvsolveError(f"{reason}. Try a probe that changes, or an input that does")
+    top = levels[-1] if finer_runs else levels[at]
+    accurate = [*within(levels, target, own or 0.0), *(entry for entry in levels if is_sure(entry, target, sure)), top]
     cheapest = min(accurate, key=lambda level: level.seconds)
     change = change_time(richest.model)
     travel = max((pipe.length / pipe.wave_speed for pipe in richest.model.pipes), default=0.0)
-    of_law = {pair[1]: entry for entry, pair in zip(runs, models, strict=True) if pair[0] == models[at][0]}
-    difference = law_difference(of_law.get("linear", own_run), own_run)
     strain = max((float(np.max(np.abs(p - p[0]))) for p in probe_pressures(richest)), default=0.0)
     strain /= least_stiffness(richest)
-    top, notes = levels[-1] if finer_runs else levels[at], tuple(shallow_water_notes(case, target))
+    notes = tuple(shallow_water_notes(case, target))
     return Hierarchy(levels, top, target, cheapest, travel, change, strain, difference, own, notes, case)
 
 
 def refine_richest(
-    case, law: str, own_run: Outcome, target: float, report: Callable[[str], None]
+    case, law: str, own_run: Outcome, enough: Callable[[Outcome, float], bool], report: Callable[[str], None]
 ) -> tuple[list, float | None]:
-    """Run levels with 2, 4, ... times the cells until the error of the last level is within `target`.
+    """Run levels with 2, 4, ... times the cells until the last level is accurate enough as a reference.
 
     own_run : run with the cells of the case; law : density law; report : called with the name of each level
+    enough(run, error) : True if a run with this error needs no finer level
 
     Returns ([(name, run) of each finer level], error of the last of these levels, or of `own_run` without them).
     The error of a level is d / (1 - r), with its difference d to the next level and the ratio r of successive
@@ -401,10 +415,53 @@ def refine_richest(
         differences.append(max((_rms_error(gap) for gap in gaps), default=0.0))
         if len(differences) > 1 and differences[-2] > 0.0:
             ratio = min(max(differences[-1] / differences[-2], 0.1), 0.9)
-        if differences[-1] <= target * (1.0 - ratio):
-            return runs[1:], differences[-1] / (1.0 - ratio)
+        error = differences[-1] / (1.0 - ratio)
+        if enough(runs[-1][1], error):
+            return runs[1:], error
         runs.append((name, run))
     return runs[1:], differences[-1] * ratio / (1.0 - ratio) if differences else None
+
+
+def load_case(case, keys: Mapping):
+    """Case with changed keys."""
+    from fvsolve.case import load
+
+    return load(case, keys)
+
+
+def line_bound(case, runs: dict[tuple[str, str], Outcome], law_error: float) -> float:
+    """Bound of the error of the level "delay lines" without a reference of cells; inf if it is not known.
+
+    It is the change by a fourth of the steps and of the delay tolerance, times a factor of safety, plus the difference
+    of the laws. Cells smear jumps, so a reference of cells may have a greater error than this level.
+    runs : (level, law) -> run; law_error : difference of the linear law from the law of the reference
+    """
+    own = runs.get(LINES)
+    if own is None or not own.ok:
+        return math.inf
+    keys = {**level_keys(case, LINES[0]), "fluid.law": LINES[1]}
+    finer = outcome(case, keys | refined_keys(load_case(case, keys), LINE_REFINEMENT), run=capped(LEVEL_CPU_LIMIT))
+    if not finer.ok:
+        return math.inf
+    gaps = moving_probes(own, reference_of_run(finer)).values()
+    return LINE_SAFETY * max((_rms_error(gap) for gap in gaps), default=math.inf) + law_error
+
+
+def is_sure(level: ModelLevel, target: float, sure: float) -> bool:
+    """True for the level "delay lines" if its own bound `sure`, as from `line_bound`, is within `target`."""
+    return (level.name, level.law) == LINES and level.error is not None and sure <= target
+
+
+def within(levels: list[ModelLevel], target: float, own: float) -> list[ModelLevel]:
+    """Levels whose error is within `target`, for every possible reference; own : error of the reference."""
+    return [entry for entry in levels if entry.error is not None and entry.error + own <= target]
+
+
+def undecided(levels: list[ModelLevel], target: float, own: float) -> bool:
+    """True if a level may be within `target` that is faster than all that are; own : error of the reference."""
+    fastest = min((level.seconds for level in within(levels, target, own)), default=math.inf)
+    near = [entry for entry in levels if entry.error is not None and target - own < entry.error <= target + own]
+    return any(entry.seconds < fastest for entry in near)
 
 
 def possible_laws(case) -> list[str]:
@@ -457,10 +514,13 @@ def _rms_error(gap: Deviation) -> float:
 
 
 def law_difference(linear: Outcome, richest: Outcome) -> LawDifference | None:
-    """Difference of a run with the linear law from `richest`; None if both are the same, or the linear run failed."""
-    if linear is richest or not linear.ok:
+    """Difference of a run with the linear law from `richest`.
+
+    It is None if both are the same, if the linear run failed, or if no probe changes.
+    """
+    gaps = {} if linear is richest or not linear.ok else moving_probes(linear, reference_of_run(richest))
+    if not gaps:
         return None
-    gaps = moving_probes(linear, reference_of_run(richest))
     probe = max(gaps, key=lambda name: _rms_error(gaps[name]))
     values = richest.rows[:, 1 + richest.probes.index(probe)]
     level = max((float(abs(change[0])) for change in probe_pressures(richest)), default=0.0) / least_stiffness(richest)

@@ -344,6 +344,8 @@ def write_history(past: np.ndarray, delays: np.ndarray, t: float, h: float, hist
     numbers = at.PROFILE_ENTRIES + np.arange(count)
     past[at.COUNT] = at.PROFILE_ENTRIES + count
     past[[at.LAST_STEP, at.STEP_BEFORE]], past[[at.EQUAL_STEPS, at.EQUAL_STEPS_BEFORE]] = h, 1e18
+    past[at.FIRST_TIME] = t - count * h
+    at.update_tolerance(past, t, h)
     past[at.HEADER_SIZE + (numbers & (int(past[at.CAPACITY]) - 1))] = t + h * np.arange(-count, 0)
     for where, s, wave in ring_offsets(places, delays, numbers):
         past[where] = history[:, wave, s]

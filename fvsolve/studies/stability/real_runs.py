@@ -243,9 +243,12 @@ def measure_limit(
 
 
 def fixed_step_loop(model, structure: Callable, method: str, h: float, t: float) -> RunLoop:
-    """Run loop with fixed steps of h [s] from the time t [s]; structure : function that returns the `Structure`."""
+    """Run loop with fixed steps of h [s] from the time t [s]; structure : function that returns the `Structure`.
+
+    No step is divided, because the runs show at which step a method fails.
+    """
     changes = {"method": method, "step": h, "courant": None, "rtol": None}
     numerics = model.case.numerics.model_copy(update=changes)
     loop = RunLoop(replace(model, case=replace(model.case, numerics=numerics)), structure)
-    loop.state["t"] = t
+    loop.state["t"], loop.control["dividing_rate"] = t, 0.0
     return loop
