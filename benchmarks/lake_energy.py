@@ -32,7 +32,10 @@ from fvsolve.mesh import Mesh, read, rectangle
 from fvsolve.schemes import LIMITERS
 
 BAR, G, C, COURANT = 1.001, 9.80665, 10.0, 0.45
-SCHEMES = {"upwind": (UPWIND, 2.0), "muscl minmod": (MUSCL, 1.0), "muscl van-leer": (MUSCL, LIMITERS["van-leer"].overshoot)}
+SCHEMES = {
+    "upwind": (UPWIND, 2.0),
+    **{f"muscl {name}": (MUSCL, LIMITERS[name].overshoot) for name in ("minmod", "van-leer")},
+}
 RIPPLES = (1e-4, 0.01, 0.05)  # [m]
 
 

@@ -32,7 +32,7 @@ SETTLE_MARGIN = 0.5 * STOP_MARGIN  # share of the span by which it comes to rest
 DIRECTION_TIME = 1e-6  # time over 1 / w that its speed is extrapolated for the direction of motion
 ALMOST_SHUT = 1e-6  # lift below which its flow may be rounding
 BACK_MARGIN = 1e-3  # reverse drop that starts reverse flow through a seated disc [Pa]
-FORWARD_MARGIN = 1e-10  # flow over that at a drop of the span from which a reversed flow is forward again, above rounding
+FORWARD_MARGIN = 1e-10  # flow over that at a drop of the span from which a reversed flow is forward again
 SLAM_TIME = 1e-9  # time over T or 1 / w before the seat at which a closing disc counts as seated
 
 
