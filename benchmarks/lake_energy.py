@@ -29,9 +29,13 @@ from fvsolve.basins.mesh_blocks import work_size
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import MUSCL, UPWIND
 from fvsolve.mesh import Mesh, read, rectangle
+from fvsolve.schemes import LIMITERS
 
 BAR, G, C, COURANT = 1.001, 9.80665, 10.0, 0.45
-SCHEMES = {"upwind": (UPWIND, 2.0), "muscl minmod": (MUSCL, 1.0), "muscl van-leer": (MUSCL, 2.0)}
+SCHEMES = {
+    "upwind": (UPWIND, 2.0),
+    **{f"muscl {name}": (MUSCL, LIMITERS[name].overshoot) for name in ("minmod", "van-leer")},
+}
 RIPPLES = (1e-4, 0.01, 0.05)  # [m]
 
 

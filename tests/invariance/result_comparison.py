@@ -23,7 +23,7 @@ class Told:
     result: fvsolve.Result | None = None
 
 
-REFUSALS = ("above every source", "no steady state")
+REFUSALS = ("above every source", "no steady state", "follows the flow of this valve at once")
 # Relative error of a step: rounding may decide which steps Newton's method divides (summary key `parted`).
 IN_PARTS = 1e-3
 SCENES = {"built": 0, "dear": 0}

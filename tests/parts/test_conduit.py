@@ -486,6 +486,31 @@ def test_an_invert_below_the_bottom_of_a_tank_is_named():
         fvsolve.load(two_tanks(0.3, inverts=[-0.1, 0.0]))
 
 
+def filling(**numerics) -> dict:
+    """Case of a dry conduit between a reservoir whose head rises above its invert and a low reservoir."""
+    nodes = {
+        "a": {"type": "reservoir", "head": {"time": [0.0, 10.0], "value": [-0.4, 3.0]}},
+        "b": {"type": "reservoir", "head": -1.0},
+    }
+    numerics = {"courant": 0.5, "method": "ssp-rk3", **numerics}
+    return sewer(nodes, {"s": pipe(inverts=[0.1, 0.0])}, ["s.flow", "s.flow@1"], 10.0, 40, **numerics)
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl"])
+@pytest.mark.parametrize("method", ["euler", "ssp-rk2", "ssp-rk3"])
+def test_a_dry_conduit_below_a_rising_head_takes_no_step_over_the_rise(method, scheme):
+    """Without a wave that limits it, the first step was the whole run, and `ok` was true."""
+    fine = fvsolve.run(filling(scheme=scheme, courant=0.1))
+    last = slice(10, None)
+    scale = np.ptp(fine["s.flow"])
+    for courant in (0.9, 0.4):
+        run = fvsolve.run(filling(scheme=scheme, method=method, courant=courant))
+        assert run.ok and abs(run.ledger["mass"]["relative"]) < 1e-12
+        for probe in ("s.flow", "s.flow@1"):
+            assert run[probe].min() > -1e-4 * scale and run.extremes[probe].maximum < 1.1 * scale
+            assert np.abs(run[probe] - fine[probe])[last].mean() < 0.03 * scale
+
+
 def test_check_foresees_the_steps_of_full_conduits():
     """Within 15 % (their speed is |u| + a) for a sewer that a flood fills; none for a conduit full at the start."""
     flood = {"time": [0.0, 1.0], "value": [0.02, 0.35]}

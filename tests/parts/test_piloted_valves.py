@@ -10,7 +10,7 @@ from model.test_sparsity import stray
 from reference import lifted_valves
 from reference.folders import CASES
 from reference.refusals import refused
-from reference.scenes import AMBIENT, WATER, chamber, junction, pipe, reservoir, scene, valve
+from reference.scenes import AMBIENT, WATER, chamber, junction, lake, pipe, reservoir, scene, valve
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from solve.test_implicit_runs import killed_and_resumed
@@ -593,3 +593,32 @@ def test_the_page_has_a_brake_valve():
     result = circuit("Brake valve")
     assert result["brake.flow"][0] > 0.9 * 10e-3 / 60.0 and result["return.pressure"][0] < 40e5
     assert result["brake.flow"][-1] == 0.0 and 160e5 < result["return.pressure"].max() < 185e5
+
+
+@pytest.mark.parametrize("disc", [{}, {"time_constant": 0.01}, {"natural_frequency": 20.0, "damping_ratio": 0.7}])
+@pytest.mark.parametrize("method", [
+    {"method": "ssp-rk3", "courant": 0.5},
+    {"method": "euler", "courant": 0.2},
+    {"method": "tr-bdf2", "rtol": 1e-6},
+    {"method": "dormand-prince", "rtol": 1e-6},
+])  # fmt: skip
+def test_a_counterbalance_valve_whose_flow_reverses_at_half_lift_changes_its_mode_once_each_time(disc, method):
+    """At a drop of zero the flow changes with the last digits of the pressures, and so does its sign in each mode."""
+    heads = {"time": [0.0, 0.3, 0.5, 0.8], "value": [30.0, 30.0, 12.0, 35.0]}
+    nodes = {"up": lake(heads), "down": lake(20.0), "a": junction(), "b": junction()}
+    friction = {"model": "steady", "factor": 0.02}
+    links = {
+        "in": pipe("up", "a", 60.0, 0.1, 1000.0, 4, friction=friction),
+        "out": pipe("down", "b", 60.0, 0.1, 1000.0, 4, friction=friction),
+        "hold": {
+            "type": "counterbalance", "from": "a", "to": "b", "area": 1e-4, "set_pressure": 3e5, "overpressure": 2e4,
+            "pilot": "up", "pilot_ratio": 0.5, **disc,
+        },
+    }  # fmt: skip
+    case = scene(nodes, links, 1.0, {"scheme": "muscl", **method}, ["links.hold.flow", "links.hold.opening"], 1e-3)
+    result = fvsolve.run(case | {"ambient_pressure": AMBIENT})
+    assert result.reason.startswith("finished")
+    assert result["links.hold.flow"].min() < -1e-4
+    assert result["links.hold.flow"][-1] > 5e-4
+    assert len(result.summary["events"]) <= 8
+    assert abs(result.ledger["mass"]["relative"]) < 1e-12

@@ -24,6 +24,7 @@ from fvsolve.parts.conduit.law_section import area_of, celerity, depth_of, secti
 PACKAGE = __package__
 QUANTITIES = {"depth": OF_DEPTH, "head": OF_DEPTH, "filling": OF_AREA, "flow": OF_FLOW}
 SMALL = 0.1  # small deviation of the filling, for scales of states
+SHALLOW = 0.1  # depth over the diameter up to which a conduit counts as dry at the start
 
 
 class ConduitWaterRows(RowsWithFriction):
@@ -134,6 +135,16 @@ class ConduitWaterRows(RowsWithFriction):
             depth = np.maximum(low + (high - low) * (np.arange(self.n) + 0.5) / self.n - self.bed, 0.0)
         change = np.zeros(self.n) if np.array_equal(depth, self.depth) else self.areas(depth) - self.area
         return np.array([change, np.where(self.area + change > 0.0, flow, 0.0)])
+
+    def filling_step(self) -> float:
+        """Longest explicit step while no wave limits steps, at Courant number 1 [s]; infinite with a deep cell.
+
+        It is the time in which a wave in water as deep as the diameter crosses a cell. Without it the first step into a
+        dry conduit would last until the next break of a schedule.
+        """
+        shallow = float(self.depths(self.start()).max()) <= SHALLOW * self.conduit.diameter
+        step = self.conduit.length / self.n / math.sqrt(self.case.gravity * self.conduit.diameter)
+        return step if shallow else math.inf
 
     def greatest_outflow(self, patch, work: np.ndarray) -> float:
         """Critical outflow of an end [m3/s]; patch : its row of the table; work : work array with the state inside."""

@@ -32,6 +32,7 @@ SETTLE_MARGIN = 0.5 * STOP_MARGIN  # share of the span by which it comes to rest
 DIRECTION_TIME = 1e-6  # time over 1 / w that its speed is extrapolated for the direction of motion
 ALMOST_SHUT = 1e-6  # lift below which its flow may be rounding
 BACK_MARGIN = 1e-3  # reverse drop that starts reverse flow through a seated disc [Pa]
+FORWARD_MARGIN = 1e-10  # flow over that at a drop of the span from which a reversed flow is forward again
 SLAM_TIME = 1e-9  # time over T or 1 / w before the seat at which a closing disc counts as seated
 
 
@@ -152,7 +153,8 @@ def events(t, y, out, tables, device, g):
     controlling a rigid column, or begins to.
     While the disc rests there, the distance from stop or seat is replaced by the drive away from it, minus STOP_MARGIN.
     The drive is the target minus the lift on the seat, and its negative at the stop. In mode FREE_BACK a fourth event
-    function is the flow [kg/s], or for a disc on its seat the drop plus BACK_MARGIN [Pa].
+    function is the flow [kg/s], less a margin while it is reversed, or for a disc on its seat the drop plus BACK_MARGIN
+    [Pa].
     """
     armed, at, o = tables.armed, device["event"], device["y"]
     x, drive = disc_lift(y, tables, device), disc_drive(y, out, tables, device)
@@ -177,6 +179,9 @@ def events(t, y, out, tables, device, g):
         flow = out[tables.layout[0]["valve"] + device["valve"]]
         if armed[at + 6] == 0.0 and (x <= ALMOST_SHUT or flow == 0.0):
             flow = head_drop(tables, out, device["valve"])[1] + BACK_MARGIN
+        elif armed[at + 6] > 0.0:
+            span = tables.floats[device["data"] + SPAN]
+            flow -= FORWARD_MARGIN * sqrt(tables.valves[device["valve"]]["conductance"] * span)
         event_pair(tables, g, at + 6, flow)
 
 

@@ -22,7 +22,7 @@ from fvsolve.kernels.restrictions import (
 from fvsolve.kernels.self_acting_valves import event_pair, sensed_pressure
 
 FREE_BACK = 1  # mode
-RELUCTANCE = 1e-10  # margin of lift at events, so that rounding does not open the valve
+RELUCTANCE = 1e-10  # margin at events of the lift, and of a flow over that at a drop of the span, against rounding
 ALMOST_SHUT = 1e-6  # lift below which its flow may be rounding
 BACK_MARGIN = 1e-3  # reverse drop that opens a shut valve to reverse flow [Pa]
 
@@ -61,7 +61,7 @@ def events(t, y, out, tables, device, g):
         if armed[at + 2] == 0.0:
             left = max(left, -ahead)
         if armed[at] == 0.0:
-            missing = min(missing, ahead)
+            missing = min(missing, ahead - RELUCTANCE if armed[at + 2] > 0.0 else ahead)
     event_pair(tables, g, at, left)
     event_pair(tables, g, at + 2, missing)
 
