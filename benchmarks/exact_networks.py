@@ -345,22 +345,26 @@ class Solution:
 def solution(network: Network, largest: int = LARGEST) -> Solution:
     """Extremes of a network by characteristics on two grids, the finer with half the step; see `ACCURATE`.
 
-    The uncertainty is the difference of both grids.
+    The uncertainty is the difference of both grids, or the height of a smooth peak between two points of the finer
+    grid: its points include those of the coarser grid, so both may miss a peak by the same amount.
     """
     heads, flows = steady_state(network)
     division = 4
-    coarse, _ = march(network, heads, flows, division)
+    coarse, _, _ = march(network, heads, flows, division)
     while True:
         division *= 2
-        fine, shut = march(network, heads, flows, division)
+        fine, shut, bends = march(network, heads, flows, division)
         off, span = np.abs(fine - coarse), np.ptp(fine, axis=1, keepdims=True)
         if division >= largest or np.all(off <= ACCURATE * span + 1e-9):
-            return Solution(fine, off, division, shut)
+            return Solution(fine, np.maximum(off, np.minimum(0.125 * bends, ACCURATE * span)), division, shut)
         coarse = fine
 
 
-def march(network: Network, heads: np.ndarray, flows: np.ndarray, division: int) -> tuple[np.ndarray, int]:
-    """Extremes of all probes with steps of the time unit over `division`, and the number of closures."""
+def march(network: Network, heads: np.ndarray, flows: np.ndarray, division: int) -> tuple[np.ndarray, int, np.ndarray]:
+    """Extremes of all probes with steps of the time unit over `division`, number of closures, and second differences.
+
+    The second differences are those of the values in time around each extreme.
+    """
     pipes, dt, many = network.pipes, network.unit / division, len(network.elevations)
     steps = network.end * division
     cells = np.array([pipe.units * division for pipe in pipes])
@@ -400,7 +404,7 @@ def march(network: Network, heads: np.ndarray, flows: np.ndarray, division: int)
 
 @numba.njit(cache=False, error_model="numpy")
 def characteristics(H, Q, first, rows, ends, dt, steps, lake, drawn, opened, jumps, beyond, pairs, vessels, places):
-    """Extremes of heads of nodes (without the lake), flows into pipes and heads at places; number of closures.
+    """Extremes of heads of nodes (without the lake), flows into pipes, heads at places; closures; bends of `march`.
 
     H, Q : heads [m] and flows [m3/s] at all points of all pipes at the start; rows : impedance a / (g A), loss
     coefficient of a step and exponent, of each pipe; opened : Cd A sqrt(2 g) of valves at the nodes
@@ -410,13 +414,14 @@ def characteristics(H, Q, first, rows, ends, dt, steps, lake, drawn, opened, jum
     total = many - 1 + count + len(places)
     found = np.empty((total, 2))
     found[:, 0], found[:, 1] = np.inf, -np.inf
+    past, fresh, bends = np.zeros((total, 2)), np.zeros((total, 2), np.bool_), np.zeros((total, 2))
     effort, admittance, heads = np.zeros(many), np.zeros(many), np.zeros(many)
     through, volume, inflow = np.zeros(many), vessels[:, 1].copy(), np.zeros(many)
     is_open = np.ones(len(pairs), np.bool_)
     closures = 0
     for k in range(count):
         heads[ends[k, 0]], heads[ends[k, 1]] = H[first[k]], H[first[k + 1] - 1]
-    record(found, heads, H, Q, first, places, many, count)
+    record(found, past, fresh, bends, heads, H, Q, first, places, many, count)
     for step in range(1, steps + 1):
         effort[:], admittance[:] = 0.0, 0.0
         for k in range(count):
@@ -474,13 +479,16 @@ def characteristics(H, Q, first, rows, ends, dt, steps, lake, drawn, opened, jum
             new_H[i], new_H[last] = heads[ends[k, 0]], heads[ends[k, 1]]
         H, new_H = new_H, H
         Q, new_Q = new_Q, Q
-        record(found, heads, H, Q, first, places, many, count)
-    return found, closures
+        record(found, past, fresh, bends, heads, H, Q, first, places, many, count)
+    return found, closures, bends
 
 
 @numba.njit(cache=False, error_model="numpy")
-def record(found, heads, H, Q, first, places, many, count):
-    """Update the extremes of all probes."""
+def record(found, past, fresh, bends, heads, H, Q, first, places, many, count):
+    """Update the extremes of all probes.
+
+    past : last two values; fresh : True if the last value was a new extreme; bends : second difference around extremes
+    """
     for j in range(many - 1 + count + len(places)):
         if j < many - 1:
             value = heads[j + 1]
@@ -488,8 +496,13 @@ def record(found, heads, H, Q, first, places, many, count):
             value = Q[first[j - many + 1]]
         else:
             value = H[places[j - many + 1 - count]]
-        found[j, 0] = min(found[j, 0], value)
-        found[j, 1] = max(found[j, 1], value)
+        for side in range(2):
+            if fresh[j, side]:
+                bends[j, side] = abs(past[j, 1] - 2.0 * past[j, 0] + value)
+            fresh[j, side] = value < found[j, side] if side == 0 else value > found[j, side]
+            if fresh[j, side]:
+                found[j, side], bends[j, side] = value, 0.0
+        past[j, 1], past[j, 0] = past[j, 0], value
 
 
 @numba.njit(cache=False, error_model="numpy")

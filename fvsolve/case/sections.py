@@ -247,6 +247,10 @@ class Numerics(Table):
         "allowed error of pipe models chosen by auto, and size below which jumps in a delay line are smoothed; "
         "both as a fraction of the largest jump", changes=SHAPE,
     )] = DEFAULT_ACCURACY  # fmt: skip
+    delay_velocity: Annotated[float, Quantity(
+        "velocity", val.nonnegative, "velocity up to which the friction of delay lines is within delay_tolerance; at "
+        "least that at the start", changes=SHAPE,
+    )] = 0.0  # fmt: skip
     below_vapor: Annotated[str, Choice(
         "choice", ("continue", "stop"),
         "action at pressures below vapour pressure: mark the results and continue, or stop",

@@ -321,8 +321,44 @@ def end_admittance_ratio(draft, pipe) -> float:
     return float((1.0 - beta) / (1.0 + beta))
 
 
+def friction_attenuation(pipe, travel: float, flow: float) -> float:
+    """Attenuation of a wave by friction in a pipe; pipe : its row; travel : travel time [s]; flow : [kg/s]."""
+    return travel * float(drag_and_slope(pipe, flow)[1])
+
+
+def friction_notices(model, extremes: np.ndarray) -> list[Notice]:
+    """Notices of delay lines in which the flow has grown, so that their friction needs more stretches.
+
+    A line that is at rest at the start has one stretch. The flows of a run are known where they are probed.
+    extremes : float64[4, probes] as in `RunData`
+    """
+    greatest: dict[str, float] = {}
+    for k, probe in enumerate(model.probes):
+        if probe.part == "links" and probe.quantity == "flow":
+            flow = float(np.abs(extremes[[0, 2], k]).max())
+            greatest[probe.name] = max(greatest.get(probe.name, 0.0), flow * model.case.properties.density)
+    notices, tolerance = [], model.case.numerics.delay_tolerance
+    for row in model.tables.delays:
+        pipe, name = model.tables.pipes[row["pipe"]], model.pipes[row["pipe"]].name
+        flow, count = greatest.get(name, 0.0), int(row["stretches"])
+        attenuation = friction_attenuation(pipe, float(row["tau"]) * count, flow)
+        bound, velocity = 0.25 * attenuation / count, flow / float(pipe["area"]) / model.case.properties.density
+        if bound > tolerance and flow > planned_flow(model.case, pipe):
+            shown = model.case.amount(velocity, "velocity", 3)
+            text = (f"{name}: its flow grew to {shown}, and the friction of so fast a flow may cause an error in its "
+                    f"waves of {bound:.2g} times a change; set numerics.delay_velocity to {shown}")  # fmt: skip
+            notices.append(Notice("lines", f"links.{name}", text, "pipe_model", bound, tolerance))
+    return notices
+
+
+def planned_flow(case, pipe) -> float:
+    """Mass flow for whose friction the stretches of a delay line are made [kg/s]; pipe : its row."""
+    planned = case.properties.density * case.numerics.delay_velocity * float(pipe["area"])
+    return max(abs(float(pipe["flow"])) + float(pipe["admittance"]) * FRICTION_PRESSURE, planned)
+
+
 def divide_lines(draft) -> list[str]:
-    """Divide all delay lines into stretches by friction at the start; write their facts for `fvsolve check`.
+    """Divide all delay lines into stretches by friction at `planned_flow`; write their facts for `fvsolve check`.
 
     Returns the names of lines that must be computed with cells instead: under `auto` their error bound exceeds the
     tolerance, or friction does not balance their pressure drop at the start. Adds a fault where a pipe is stated to be
@@ -337,8 +373,7 @@ def divide_lines(draft) -> list[str]:
         name = draft.pipe_names[row["pipe"]]
         pipe, chosen = draft.pipe_table[row["pipe"]], draft.followed[name]
         travel = float(row["tau"] * row["stretches"])
-        flow = abs(float(pipe["flow"])) + float(pipe["admittance"]) * FRICTION_PRESSURE
-        attenuation = travel * float(drag_and_slope(pipe, flow)[1])
+        attenuation = friction_attenuation(pipe, travel, planned_flow(case, pipe))
         limit = max(1, math.floor(travel / chosen.longest * (1.0 + 1e-9)))
         count = min(limit, max(1, math.ceil(0.5 * attenuation / case.numerics.delay_tolerance)))
         if row["now"] > 0.0:

@@ -194,10 +194,11 @@ def step_and_reason(model) -> tuple[float | None, str]:
         rate = float(model.evaluate(numerics.start, model.start, numerics.start)[1][rec.RATE])
     else:  # waves only: implicit steps are not limited by other parts
         own, rate = model.wave_rates, model.wave_rate
-    filling = {f"{basin.table}.{basin.name}": basin.filling_step() for basin in model.basins}
+    filling = {basin.name: basin.filling_step() for basin in model.basins}
     if not rate > 0.0 and min(filling.values(), default=np.inf) < np.inf:
-        place = min(filling, key=filling.get)
-        return numerics.courant * filling[place], f"{place}: it is almost dry; waves will limit later steps"
+        name = min(filling, key=filling.get)
+        group = "links" if name in model.case.links else "nodes"
+        return numerics.courant * filling[name], f"{group}.{name}: it is almost dry; waves will limit later steps"
     if not rate > 0.0:
         return None, "no part limits the step"
     if not model.case.law.linear and len(own):

@@ -15,7 +15,7 @@ from fvsolve.case.bodies import free_joints
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.delay_lines.wave_history import CORRECTED_TIME
-from fvsolve.model.delay_lines import jump_overflow_notices
+from fvsolve.model.delay_lines import friction_notices, jump_overflow_notices
 from fvsolve.solve.energy_watch import EnergyWatch
 from fvsolve.solve.run_loop import STATUS_FAILURES
 from fvsolve.step_limits.growing_modes import forcing_sizes, state_ranges, states_outside_cells
@@ -99,7 +99,7 @@ class RunChecks:
         notices += [] if step_error is None else [step_error]
         energy = self.energy.notice()
         notices += [] if energy is None else [energy]
-        notices += jump_overflow_notices(self.run_data.past)
+        notices += jump_overflow_notices(self.run_data.past) + friction_notices(self.model, self.run_data.extremes)
         notices += self.sloshing.notices()
         notices += [] if self.grown is None else [self.grown]
         return notices + [notice for name, ledger in ledgers.items() for notice in ledger_notices(name, ledger)]

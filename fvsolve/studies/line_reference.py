@@ -2,12 +2,15 @@
 
 Under the linear law waves travel along delay lines unchanged except for friction, so pulses and kinks keep their
 shape. The errors of two such runs with short steps and many stretches are far smaller than those of cells, and their
-difference shows them. The second run has a quarter of the step and an eighth of the delay tolerance of the first.
+difference shows them. The second run has a quarter of the step and an eighth of the delay tolerance of the first, and
+stretches for the friction of the greatest flows of the first.
 """
 
 import math
 from collections.abc import Callable
 from typing import Any
+
+import numpy as np
 
 from fvsolve.case import load
 from fvsolve.errors import CaseError, RunError
@@ -45,29 +48,48 @@ def line_references(
         return {}
     first = max(FIRST_STEPS * steps, FEWEST_STEPS)
     try:
-        tolerance = cheap_tolerance(case, duration / (STEP_RATIO * first), STEP_RATIO * first)
-        references = {}
-        for factor, times in ((1, TOLERANCE_RATIO), (STEP_RATIO, 1.0)):
-            if progress is not None:
-                progress("delay lines with short steps")
-            keys = line_keys(case, duration / (factor * first), min(tolerance * times, 1.0))
-            references[factor] = run(load(case, keys), set=settings, pictures=False)
+        step, steps, velocity = duration / (STEP_RATIO * first), STEP_RATIO * first, case.numerics.delay_velocity
+        tolerance = cheap_tolerance(case, step, steps, velocity)
+        if progress is not None:
+            progress("delay lines with short steps")
+        keys = line_keys(case, duration / first, min(tolerance * TOLERANCE_RATIO, 1.0), velocity)
+        flows = {name: [f"links.{name}.flow@{end}" for end in (0, 1)] for name in pipes(case)}
+        probes = [text for pair in flows.values() for text in pair if text not in settings["output.probes"]]
+        coarse = run(
+            load(case, keys), set=settings | {"output.probes": settings["output.probes"] + probes}, pictures=False
+        )
+        if coarse.reason != "finished":
+            return {}
+        if progress is not None:
+            progress("delay lines with short steps")
+        velocity = max(velocity, greatest_velocity(case, coarse, flows))
+        tolerance = cheap_tolerance(case, step, steps, velocity)
+        fine = run(load(case, line_keys(case, step, tolerance, velocity)), set=settings, pictures=False)
     except (CaseError, RunError):
         return {}
-    return references if all(result.reason == "finished" for result in references.values()) else {}
+    return {1: coarse, STEP_RATIO: fine} if fine.reason == "finished" else {}
 
 
-def line_keys(case: Any, step: float, tolerance: float) -> dict[str, Any]:
-    """Overrides with which all pipes are delay lines, with a fixed step [s]; tolerance : `delay_tolerance`."""
-    keys: dict[str, Any] = {"numerics.pipe_model": "delay-line", "numerics.method": METHOD}
-    keys |= {"numerics.step": step, "numerics.delay_tolerance": tolerance}
+def greatest_velocity(case: Any, coarse: Result, flows: dict[str, list[str]]) -> float:
+    """Greatest velocity in the pipes of a run [m/s]; flows : name of a pipe -> probes of its flow at both ends."""
+    sections = {name: 0.25 * math.pi * pipe.diameter**2 for name, pipe in pipes(case).items()}
+    return max(float(np.abs(coarse.si(text)).max()) / sections[name] for name, texts in flows.items() for text in texts)
+
+
+def line_keys(case: Any, step: float, tolerance: float, velocity: float) -> dict[str, Any]:
+    """Overrides with which all pipes are delay lines with a fixed step [s].
+
+    tolerance, velocity : `delay_tolerance` and `delay_velocity` [m/s]
+    """
+    keys: dict[str, Any] = {"numerics.pipe_model": "delay-line", "numerics.method": METHOD, "numerics.step": step}
+    keys |= {"numerics.delay_tolerance": tolerance, "numerics.delay_velocity": velocity}
     return keys | pipe_model_keys({name: "delay-line" for name, line in pipes(case).items() if line.pipe_model})
 
 
-def cheap_tolerance(case: Any, step: float, steps: int) -> float:
+def cheap_tolerance(case: Any, step: float, steps: int, velocity: float) -> float:
     """Least of `TOLERANCES` whose stretches, times the number of steps, are below `MOST_STRETCH_STEPS`."""
     for tolerance in TOLERANCES:
-        model = model_of(load(case, line_keys(case, step, tolerance)))
+        model = model_of(load(case, line_keys(case, step, tolerance, velocity)))
         if tolerance < LEAST_WITH_JUMPS and any(jump for t, jump in model.breaks if t > case.numerics.start):
             continue
         if math.prod((steps, int(model.tables.delays["stretches"].sum()))) <= MOST_STRETCH_STEPS:

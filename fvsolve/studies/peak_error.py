@@ -48,6 +48,7 @@ from fvsolve.studies.resolution import (
     cell_counts,
     delay_lines,
     fixed_choices,
+    pipes,
     pipes_with_cells,
     refined_keys,
     scaled,
@@ -69,7 +70,7 @@ MANY_STEPS = 20.0  # accumulated error of steps between jumps of delay lines, in
 SMOOTHED = 0.05  # effect of jumps below a quarter of numerics.delay_tolerance, smoothed over a step, over that key
 MIN_CELLS = 4  # cells recommended for a pipe, and for the travel time of a short pipe in its neighbour
 REFERENCE_ROWS = 4.0  # rows of references for each row of the run
-REFERENCE_SAFETY = 1.0  # factor on the difference of both references
+REFERENCE_SAFETY = 1.5  # factor on the difference of both references
 DIFFERENCE_SAFETY = 1.2  # factor on the difference to the second reference
 SPREAD_SHARE = 0.5  # fraction of the greatest relative difference of both references that counts for every peak
 MOST_SPREAD = 0.02  # limit of this difference: a single chaotic signal does not widen all bands
@@ -442,6 +443,8 @@ def peak_rows(
     """Entry `peaks` of the summary of `result`, as in `peak_errors`: unit, extremes of each probe, and their errors."""
     summary, largest, rows = result.summary, {"rad": 1.0}, {}
     parts = {probe.text: (probe.part, probe.name) for probe in unresolved.case.probes}
+    flows = {probe.text for probe in unresolved.case.probes if probe.quantity == "flow"}
+    flow_floor = least_flow_error(unresolved.case)
     for extreme in summary["extremes"].values():
         values = [abs(extreme[side] or 0.0) for side in SIDES]
         largest[extreme["unit"]] = max(largest.get(extreme["unit"], 0.0), *values)
@@ -459,6 +462,7 @@ def peak_rows(
             span = (extreme["maximum"] or 0.0) - (extreme["minimum"] or 0.0)
             if error is not None:
                 least = 2.0 * (missed + ROUNDING * largest[extreme["unit"]]) + RELATIVE_FLOOR * abs(extreme[side])
+                least += float(result.column(name).from_si(flow_floor)) if name in flows else 0.0
                 error += least + abs(sign * extreme[side] - triple[1]) + unresolved.tolerance * span
                 span += 2.0 * least / WIDE_ERROR  # so that the rounding error of a constant does not count as wide
             rows[name][side] = {
@@ -470,6 +474,15 @@ def peak_rows(
             if references and not is_pair(references):
                 rows[name][side]["first"] = first_of(places[0](references), sign, ceiling)
     return rows
+
+
+def least_flow_error(case: Any) -> float:
+    """Least error of a flow [m3/s]: `RELATIVE_FLOOR` of the flow of a wave of 1 bar in the widest pipe.
+
+    Where water is at rest, its flow is the remainder of the steady start.
+    """
+    wide = (0.25 * math.pi * pipe.diameter**2 / case.wave_speed(name) for name, pipe in pipes(case).items())
+    return RELATIVE_FLOOR * 1e5 * max(wide, default=0.0) / case.properties.density
 
 
 def extreme_of(run: Result, name: str, side: str) -> float | None:

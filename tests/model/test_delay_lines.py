@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from invariance.result_comparison import broken_off_and_whole
+from reference import scenes
 from reference.delays import (
     AREA,
     BORE,
@@ -21,7 +22,7 @@ from reference.delays import (
     square,
     turned,
 )
-from reference.scenes import RHO, scene
+from reference.scenes import RHO, junction, lake, ramp, scene, valve
 
 import fvsolve
 from fvsolve import studies
@@ -444,3 +445,30 @@ def test_steps_by_tolerance_beside_cells_of_a_quicker_pipe():
     found = fvsolve.run(case)
     assert found.reason == "finished"
     assert np.abs(known(found, "gate.pressure")[1] - known(truth, "gate.pressure")[1]).max() < 0.02 * JUMP
+
+
+def opening(**numerics) -> dict:
+    """Case of a valve at the end of a rough pipe at rest, which opens within 0.15 s."""
+    nodes = {"lake": lake(51.6), "end": junction(), "out": lake(9.6)}
+    links = {
+        "main": scenes.pipe("lake", "end", 31.8, 0.2229, 530.0, 20, friction={"model": "steady", "factor": 0.025}),
+        "gate": valve("end", "out", 0.61 * 0.02519, ramp(0.19, 0.15, 0.0, 0.5624)),
+    }
+    return scene(nodes, links, 0.68, numerics, ["links.main.flow@0", "links.main.flow@1"], 0.01)
+
+
+def test_a_line_at_rest_whose_flow_grows_states_the_velocity_for_its_stretches():
+    """With this velocity as `delay_velocity` its flow is that of fine cells, and there is no notice."""
+    cells = opening(scheme="weno5", method="ssp-rk3", courant=0.5)
+    cells["links"]["main"]["cells"] = 400
+    right = fvsolve.run(cells)["links.main.flow@0"]
+    lines = {"pipe_model": "delay-line", "method": "rk4", "step": 5e-4, "delay_tolerance": 1e-3}
+    own = fvsolve.run(opening(**lines))
+    (notice,) = [n for n in own.warnings if n.kind == "lines"]
+    velocity = float(notice.text.rpartition("delay_velocity to ")[2].split()[0])
+    area = 0.25 * np.pi * 0.2229**2
+    assert velocity == pytest.approx(np.abs(own["links.main.flow@0"]).max() / area, rel=0.02)
+    better = fvsolve.run(opening(**lines, delay_velocity=velocity))
+    assert not [n for n in better.warnings if n.kind == "lines"]
+    errors = [np.abs(run["links.main.flow@0"] - right).max() / np.ptp(right) for run in (own, better)]
+    assert errors[0] > 2e-3 and errors[0] < notice.value and errors[1] < 0.2 * errors[0]
