@@ -18,11 +18,11 @@ from fvsolve.model.delay_lines import reason_for_cells
 from fvsolve.run import Result, model_of, run
 from fvsolve.studies.resolution import pipe_model_keys, pipes
 
-FIRST_STEPS, FEWEST_STEPS = 4, 1000  # steps of the first reference: for each step of the run, and at least
+FIRST_STEPS, FEWEST_STEPS = 4, 4000  # steps of the first reference: for each step of the run, and at least
 STEP_RATIO, TOLERANCE_RATIO = 4, 8.0
 TOLERANCES = (2.5e-5, 1e-4, 4e-4, 1.6e-3, 6.4e-3)  # of the second reference: the least that is cheap enough
 LEAST_WITH_JUMPS = 4e-4  # least tolerance if schedules jump, because smaller reflections of jumps are many
-MOST_STRETCH_STEPS = 1e7  # number of steps times stretches below which a tolerance is cheap enough
+MOST_STRETCH_STEPS = 2e7  # number of steps times stretches below which a tolerance is cheap enough
 METHOD = "rk4"
 
 
@@ -54,10 +54,9 @@ def line_references(
             progress("delay lines with short steps")
         keys = line_keys(case, duration / first, min(tolerance * TOLERANCE_RATIO, 1.0), velocity)
         flows = {name: [f"links.{name}.flow@{end}" for end in (0, 1)] for name in pipes(case)}
-        probes = [text for pair in flows.values() for text in pair if text not in settings["output.probes"]]
-        coarse = run(
-            load(case, keys), set=settings | {"output.probes": settings["output.probes"] + probes}, pictures=False
-        )
+        named = settings.get("output.probes", [probe.text for probe in case.output.probes])
+        added = [text for pair in flows.values() for text in pair if text not in named]
+        coarse = run(load(case, keys), set=settings | {"output.probes": [*named, *added]}, pictures=False)
         if coarse.reason != "finished":
             return {}
         if progress is not None:

@@ -44,7 +44,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/solve": (3044, 12),
     "fvsolve/step_limits": (1720, 7),
     "fvsolve/steppers": (7640, 34),
-    "fvsolve/studies": (15407, 53),
+    "fvsolve/studies": (15406, 53),
     "fvsolve/validation": (1463, 11),
     "tests/attitude": (447, 2),
     "tests/basins": (10460, 36),
@@ -68,7 +68,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/solve": (2404, 12),
     "tests/step_limits": (1100, 5),
     "tests/steppers": (2630, 15),
-    "tests/studies": (8577, 25),
+    "tests/studies": (8585, 25),
     "tests/units": (268, 1),
     "tests/validation": (319, 1),
 }
