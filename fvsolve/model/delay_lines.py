@@ -346,7 +346,8 @@ def friction_notices(model, extremes: np.ndarray) -> list[Notice]:
         if bound > tolerance and flow > planned_flow(model.case, pipe):
             shown = model.case.amount(velocity, "velocity", 3)
             text = (f"{name}: its flow grew to {shown}, and the friction of so fast a flow may cause an error in its "
-                    f"waves of {bound:.2g} times a change; set numerics.delay_velocity to {shown}")  # fmt: skip
+                    f"waves of {bound:.2g} times a change; set numerics.delay_velocity to {shown}, with steps that "
+                    "are short beside all changes of schedules")  # fmt: skip
             notices.append(Notice("lines", f"links.{name}", text, "pipe_model", bound, tolerance))
     return notices
 

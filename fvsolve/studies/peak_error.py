@@ -340,7 +340,8 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
     summary["verdicts"] = [verdict([limit_row(runs, references, k, j, row, unresolved) for j, row in enumerate(rows)])
                         for k, rows in enumerate(own.places)]  # fmt: skip
     for k, claim in enumerate(summary["expectations"]):
-        claim["error"] = expectation_error(runs, references, case.expect[claim["text"]], k, summary["peaks"])
+        error = expectation_error(runs, references, case.expect[claim["text"]], k, summary["peaks"], claim["found"])
+        claim["error"] = error
     words = description(runs, case)
     if references:
         words += "; errors from " + (LINES_TEXT if is_pair(references) else FINEST_TEXT)
@@ -583,6 +584,7 @@ def limit_row(
     if error is not None:
         spread = span if math.isfinite(span) else 0.0
         error += RELATIVE_FLOOR * (size + spread) + unresolved.tolerance * spread  # gauge values have another zero
+        error += abs((row["margin"] or 0.0) + triple[1])  # other rows change steps
     doubtful = error is None or not abs(row["margin"] or 0.0) >= error
     span_and_floor = span + 2.0 * RELATIVE_FLOOR / WIDE_ERROR * size
     difference = reference_difference(references, margin_of, row["margin"])
@@ -601,9 +603,12 @@ def exceedance(values: np.ndarray, sign: float, allowed: float, magnitude: bool)
 
 
 def expectation_error(
-    runs: dict[float, Result], references: dict[int, Result], expect: Any, k: int, peak_rows: dict[str, Any]
-) -> float | None:
+    runs: dict[float, Result], references: dict[int, Result], expect: Any, k: int, peak_rows: dict[str, Any],
+    found: float,
+) -> float | None:  # fmt: skip
     """Error of the value in an expectation: the error of the peak if it is a peak, else from the values of all runs.
+
+    found : value in the run itself, whose steps differ with the rows
 
     expect : expectation of the case; k : its index in the summaries; peak_rows : entry `peaks` of the summary
     """
@@ -612,7 +617,7 @@ def expectation_error(
         return peak_rows[expect.probe.text][side]["error"]
     error = error_estimate(runs, references, lambda run: run.summary["expectations"][k]["found"], 1.0, [])
     own = runs[1.0].summary["expectations"][k]["found"]
-    return None if error is None else error + RELATIVE_FLOOR * abs(own)
+    return None if error is None else error + RELATIVE_FLOOR * abs(own) + abs(found - own)
 
 
 def values_of_runs(runs: dict[float, Result], of: Callable, sign: float = 1.0) -> tuple[float | None, ...]:
