@@ -136,7 +136,7 @@ def test_the_references_of_a_lossless_pipe_are_exact() -> None:
 
 
 def test_the_error_of_a_limit_includes_the_change_by_steps_that_end_at_other_rows():
-    """The run that is compared with references has more rows and other steps: its peak was 6 m higher, the error 1 m."""
+    """The run that is compared with references has more rows and other steps: its peak was 6 m higher."""
     sine = {"mean": 0.06376, "amplitude": 0.06376, "period": 3.3298}
     nodes = {
         "lake": lake(58.656), "n1": junction(), "n2": junction(sine),
