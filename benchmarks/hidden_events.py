@@ -222,9 +222,13 @@ def by_mark(result, drive) -> bool:
 
 
 def by_force(result, drive) -> bool:
-    """True if the stop was loaded in an accepted state."""
-    force = result.extremes["stop.force"]
-    return force.maximum > 0.0 or force.minimum < 0.0
+    """True if a step ended where contact begins, or the stop was loaded in an accepted state.
+
+    A step may span the whole contact: then it ends where contact does, and no accepted state is loaded.
+    """
+    force, position = result.extremes["stop.force"], result.extremes["m.position"]
+    begins = abs(position.maximum - drive.threshold) < 1e-9 * drive.rise
+    return begins or force.maximum > 0.0 or force.minimum < 0.0
 
 
 KINDS: dict[str, tuple[Callable, Callable]] = {
