@@ -57,7 +57,7 @@ def fastest(case, folder: Path, **more) -> tuple[float, float]:
     """(greatest velocity in rows and frames, that of all accepted steps) [m/s] of the basins of a run."""
     run = fvsolve.run(case, out=folder / "run", force=True, pictures=False, **more)
     steps = max(float(np.nanmax(fields["max_speed"])) for fields in run.maxima.values())
-    shown = max((float(run[name].max()) for name in run if ".speed@" in name), default=0.0)
+    shown = max((float(run[name].max()) for name in run.units if ".speed@" in name), default=0.0)
     for name in run.maxima:
         for path in (folder / "run" / "fields").glob(f"{name}-*.vtu"):
             for velocity in meshio.read(path).cell_data["velocity"]:
