@@ -119,6 +119,9 @@ def main() -> int:
                 print(f"{case:22} {method:8} no stable step")
                 continue
             model = model_with(case, method, changes, step=limit)
+            if model.basins and first_step(model_with(case, method, changes, courant=1.0)) == 0.0:
+                print(f"{case:22} {method:8} starts dry: no wave limits the first step")
+                continue
             ways = ["step"] + (["courant"] if model.cells or model.basins else [])
             for key in ways:
                 line = f"{case:22} {method:8} {key:8} limit {limit:9.3g} s:"
