@@ -23,7 +23,9 @@ CHANGE = 1e-6  # change of a level for its slope [m]
 NEAR = 1e-6  # relative difference of flows below which the tangent replaces the chord
 CHORD_ERROR = 1e-2  # error of the fall at the present flow, over the length of the chord
 SWEEPS = 40
-LEAST_SLOPE = 1e-9  # least slope of Newton's method, so that dry structures leave a level determined [m2/s]
+# Least slope of Newton's method, so that dry structures leave a level determined: over the flow [1/m], and without flow
+# [m2/s]. It must be far below that of the chord over a rise of metres, however small the flow is.
+LEAST_SLOPE, TINY_SLOPE = 1e-6, 1e-300
 FARTHEST = 1e6  # greatest fall of the search for a flow [m]
 RULE = FLOW = SLOPES = CHORD = LINE = None  # constants of the templates
 
@@ -104,7 +106,7 @@ def line_template(floats, at, setting, z, fall, present):
     if abs(flow - m) > NEAR * (abs(flow) + abs(m)):
         by_fall = CHORD(floats, at, setting, ahead, high, size, flow, m, False)
         by_fall += max(CHORD(floats, at, setting, ahead, high, size, flow, m, True) - by_level, 0.0)
-    by_fall = max(by_fall, LEAST_SLOPE)
+    by_fall = max(by_fall, LEAST_SLOPE * max(abs(flow), abs(m)), TINY_SLOPE)
     if ahead:
         return flow, by_fall, by_level
     return -flow, by_fall + by_level, -by_level

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 QUICK, SLOW, GROWTH = 0.25, 0.6, 2.0  # limits of r, and of the factor for differences that grow
-SAFETY = 1.3
+SAFETY = 1.8
 RISE = 0.05  # drop between two separate maxima, as a fraction of the range of a signal
 FIRST_SHARE = 0.25  # rise of the first peak above the start, as a fraction of that of the greatest
 Signal = tuple[np.ndarray, np.ndarray]  # times and values

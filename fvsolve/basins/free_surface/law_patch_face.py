@@ -7,7 +7,9 @@ rest is the sum of this pressure and the drop over rho g. The flow is that of `p
 from fvsolve.basins.free_surface.patch_closures import DEEPEST, faces_inside, lowest_bed, patch_flow, solve_level
 from fvsolve.jit import njit
 
-LEAST_SLOPE = 1e-12  # least derivative of the flow by the level [m2/s]; critical outflow does not depend on the level
+# Least derivative of the flow by the level [m2/s], over the flow and where there is none; critical outflow does not depend
+# on the level. It must be far below the flow over the rise of a structure that takes it, however small the flow is.
+LEAST_SLOPE, TINY_SLOPE = 1e-6, 1e-300
 SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
 NEAR = 1e-12  # least length of a chord [m]
 DRY_SPEED = 0.1  # derivative at dry faces over their length: speed of waves in a millimetre of water [m/s]
@@ -38,11 +40,12 @@ def level_step(g, faces, z, target):
         long += faces[3][m]
     if q == 0.0 and target == 0.0:
         return 0.0, DRY_SPEED * long
+    least = max(LEAST_SLOPE * max(abs(q), abs(target)), TINY_SLOPE)
     if not target > q + SAME_FLOW * abs(q):
         deeper = z - (lowest_bed(faces) - DEEPEST)
-        return (q + DRY_SPEED * long * deeper - target, DRY_SPEED * long) if deeper < 0.0 else (q - target, LEAST_SLOPE)
+        return (q + DRY_SPEED * long * deeper - target, DRY_SPEED * long) if deeper < 0.0 else (q - target, least)
     level = solve_level(g, faces, target, 0.0, faces[0][:0], faces[0][:0])
-    return q - target, max((target - q) / max(level - z, NEAR), LEAST_SLOPE)
+    return q - target, max((target - q) / max(level - z, NEAR), least)
 
 
 @njit

@@ -17,7 +17,9 @@ from fvsolve.parts.conduit.law_section import SlottedSection, celerity, riemann_
 
 NUMBERS = len(SlottedSection._fields)  # of a section
 INSIDE = 7  # numbers of the state inside an end, see `end_state`
-LEAST_SLOPE = 1e-12  # least derivative of the flow by the head [m2/s]; critical outflow does not depend on the head
+# Least derivative of the flow by the head, over the flow [1/m] and where there is none [m2/s]; critical outflow does not
+# depend on the head.
+LEAST_SLOPE, TINY_SLOPE = 1e-6, 1e-300
 SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
 DRY_CELERITY = 1e-4  # celerity at a dry end for its least derivative [m/s]; far below that of films of water
 ROUNDING = 1e-14  # relative error of depths that solve an equation
@@ -143,12 +145,13 @@ def level_step(section, z, target, inside):
     if slope > 0.0 and abs(q - target) <= CHORD * section.area * sqrt(section.g * section.diameter):
         return q - target, slope
     least = end_flow(section, inside[1] - inside[0], inside)[0]
+    flat = max(LEAST_SLOPE * max(abs(q), abs(target)), TINY_SLOPE)
     if not target > least + SAME_FLOW * abs(least):
         if slope > 0.0:
             return q - target, slope
-        return q - target, DRY_CELERITY * section.diameter if q == 0.0 else LEAST_SLOPE
+        return q - target, DRY_CELERITY * section.diameter if q == 0.0 else flat
     reach = z - passing_head(section, target, inside)
-    return q - target, max(slope, (q - target) / reach if reach != 0.0 else 0.0, LEAST_SLOPE)
+    return q - target, max(slope, (q - target) / reach if reach != 0.0 else 0.0, flat)
 
 
 @njit
