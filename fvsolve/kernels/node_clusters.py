@@ -48,8 +48,8 @@ NEARLY_CONVERGED = 1e-9  # relative change of Newton below which it may be round
 FIRST_RISE = 1e4  # greatest change of a pressure in the first limited step of Newton [Pa]
 NOT_BALANCED = 1e300  # in place of a change of Newton: the step was limited
 LEAST_RISE = 1e-9  # least limit of such a step [Pa]
-BRACKETED = 3e-8  # limits of all nodes below which their pressures are known but for rounding [Pa]
-STEEP_CHANGE = 1e-3  # relative change of flow that rounding of the pressures causes where a law is steep, at most
+BRACKETED = 3e-8  # limits of all nodes at which their pressures are known but for rounding [Pa]
+STEEP_CHANGE = 1e-3  # relative change of flow by this rounding where a law is steep, at most
 FAILED_CHANGE = 1e-5  # relative change of flow above which Newton has failed; smaller changes may be rounding
 # Errors of valve flows against their laws up to this fraction of the node's imbalance cannot reverse a Newton step.
 FLOW_ERROR = 0.01
@@ -697,17 +697,13 @@ def put_law_flows(cluster, tables, out, g, m, c, connected, slope, wide, work):
 
 
 @njit
-def step_between(cluster, tables, out, g, m, c, connected, slope, wide, work):
-    """Make a Newton step without limits where limits have bracketed all pressures; arguments as for `newton_step`.
-
-    A law may be steeper than rounding resolves: at a drop of zero its flow changes with the last digits of a pressure.
-    Returns (change, change of flows): (0, 0) if the pressures stay between their brackets and flows balance.
-    """
-    _, flows, _ = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, work[:0], work)
-    rise = largest_magnitude(step_arrays(c.size, g.size, work)[1])
-    if rise <= BRACKETED and flows <= STEEP_CHANGE:
-        return 0.0, 0.0
-    return NOT_BALANCED, NOT_BALANCED
+def have_bracketed(limits):
+    """True if limits have bracketed all pressures but for rounding; then they are set to BRACKETED."""
+    if largest_magnitude(limits) > BRACKETED:
+        return False
+    for i in range(limits.size):
+        limits[i] = copysign(BRACKETED, limits[i])
+    return True
 
 
 @njit
@@ -736,11 +732,12 @@ def solve_cluster(out, tables, index):
             change, wide, limits = 1e300, True, group
             for i in range(n):
                 limits[i] = FIRST_RISE
+        bracketed = limits.size > 0 and have_bracketed(limits)
         if limits.size > 0:
             put_law_flows(cluster, tables, out, g, m, c, connected, slope, wide, rest)
         change, flows, _ = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, limits, rest)
-        if limits.size > 0 and largest_magnitude(limits) <= BRACKETED:
-            change, flows = step_between(cluster, tables, out, g, m, c, connected, slope, wide, rest)
+        if bracketed and flows <= STEEP_CHANGE:  # at a drop of zero a flow changes with the last digits of a pressure
+            change, flows = 0.0, 0.0
         if has_converged(change, last_change):
             if not (wide and has_backflow(cluster, tables, m)):
                 break
