@@ -500,7 +500,10 @@ BODY_OUT = 45  # numbers of each body in `out`
 GN = 14  # index of g_n among the numbers of a frame, see `basins.basin_frames`
 TANK_OUT = 24  # numbers in `out` of each basin on a body, see `mechanism.body_layout`
 RATE, STATUS, WHERE, CLOSING, ARRIVES, LONGEST = 0, 1, 2, 3, 4, 5  # first entries of `out`
-OUT_HEAD = 6
+# Least slope [m2/s] of laws between levels in Newton's method; 0: it follows the flow. FIRM_SLOPE is that of limited
+# steps and of the steady start.
+FIRM, FIRM_SLOPE = 6, 1e-9
+OUT_HEAD = 7
 # RATE before a call if the rate that limits the step is not needed, which holds at all stages of a step but the first.
 # Functions that spend time on this rate leave the value; others raise it as always.
 RATE_UNWANTED = -1.0

@@ -30,7 +30,7 @@ space : work arrays of `node_work`
 from math import copysign, sqrt
 
 from fvsolve.jit import njit, specialise
-from fvsolve.kernels.dtypes import NO_SOLUTION, NOT_CONVERGED, STATUS, WHERE
+from fvsolve.kernels.dtypes import FIRM, FIRM_SLOPE, NO_SOLUTION, NOT_CONVERGED, STATUS, WHERE
 from fvsolve.kernels.isolated_nodes import check_demand, find_connected, inner_row, isolated_pressures
 from fvsolve.kernels.restrictions import (
     conductance,
@@ -48,6 +48,7 @@ NEARLY_CONVERGED = 1e-9  # relative change of Newton below which it may be round
 FIRST_RISE = 1e4  # greatest change of a pressure in the first limited step of Newton [Pa]
 NOT_BALANCED = 1e300  # in place of a change of Newton: the step was limited
 LEAST_RISE = 1e-9  # least limit of such a step [Pa]
+MOST_RISE = 1e8  # greatest step of a pressure without such limits: a trickle may leave levels nearly undetermined [Pa]
 BRACKETED = 3e-8  # limits of all nodes at which their pressures are known but for rounding [Pa]
 STEEP_CHANGE = 1e-3  # relative change of flow by this rounding where a law is steep, at most
 FAILED_CHANGE = 1e-5  # relative change of flow above which Newton has failed; smaller changes may be rounding
@@ -307,6 +308,17 @@ def limit_step(most, a, right):
 
 
 @njit
+def cut_steps(right):
+    """Cut the steps of pressures `right` [Pa] to MOST_RISE; return True if one was longer, or not finite."""
+    limited = False
+    for i in range(right.size):
+        if not abs(right[i]) <= MOST_RISE:
+            right[i] = copysign(MOST_RISE, right[i]) if right[i] == right[i] else 0.0
+            limited = True
+    return limited
+
+
+@njit
 def limit_each_step(limits, right):
     """Limit the step of each pressure, and renew its limit; return True if a step was longer than its limit.
 
@@ -406,7 +418,7 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, limits, 
         for e in range(k):
             flow_error += a[e] * a[e] / max(abs(m[e] + a[e]), 1e-300)
         limit_step(tables.settings[0]["beta"], a, right)
-    limited = limit_each_step(limits, right) if limits.size > 0 else False
+    limited = limit_each_step(limits, right) if limits.size > 0 else cut_steps(right)
     pressures, flows = apply_step(cluster, tables, out, m, a, s, lift, right)
     if limited:
         return NOT_BALANCED, NOT_BALANCED, False
@@ -663,7 +675,7 @@ def write_cluster(cluster, tables, out, g, m, c, connected, group, change):
             m[e] = 0.0
         out[tables.layout[0]["valve"] + k] = m[e]
         scale = max(scale, abs(tables.valves[k]["flow"]), sqrt(tables.valves[k]["conductance"]))
-    if change > FAILED_CHANGE:
+    if not change <= FAILED_CHANGE:
         out[STATUS], out[WHERE] = NOT_CONVERGED, tables.integers[cluster["first_node"]]
     for i in range(connected.size):
         if connected[i] == 0.0:
@@ -720,7 +732,7 @@ def solve_cluster(out, tables, index):
     undisturbed = total_inflows(cluster, tables, out, c) and unchanged
     find_connected(cluster, tables, g, connected)
     zero_isolated(cluster, tables, g, m, connected)
-    change, flows, wide, limits = 1e300, 0.0, True, group[:0]
+    change, flows, wide, limits, out[FIRM] = 1e300, 0.0, True, group[:0], 0.0
     for sweep in range(MAX_SWEEPS + LIMITED_SWEEPS):
         if undisturbed:
             change = 0.0
@@ -729,7 +741,7 @@ def solve_cluster(out, tables, index):
         if sweep == MAX_SWEEPS:  # steps may have alternated, or led far away
             prepare_cluster(cluster, tables, out, g, m)
             zero_isolated(cluster, tables, g, m, connected)
-            change, wide, limits = 1e300, True, group
+            change, wide, limits, out[FIRM] = 1e300, True, group, FIRM_SLOPE
             for i in range(n):
                 limits[i] = FIRST_RISE
         bracketed = limits.size > 0 and have_bracketed(limits)
@@ -742,6 +754,7 @@ def solve_cluster(out, tables, index):
             if not (wide and has_backflow(cluster, tables, m)):
                 break
             change, flows, wide = 1e300, 1e300, False
+    out[FIRM] = 0.0
     write_cluster(cluster, tables, out, g, m, c, connected, group, flows)
 
 

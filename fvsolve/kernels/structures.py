@@ -12,7 +12,7 @@ from math import exp, expm1, log, log1p, sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import enthalpy
-from fvsolve.kernels.dtypes import LAW_LINEAR
+from fvsolve.kernels.dtypes import FIRM, LAW_LINEAR
 from fvsolve.kernels.isolated_nodes import inner_row
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedule_pieces import schedule_value
@@ -25,7 +25,7 @@ CHORD_ERROR = 1e-2  # error of the fall at the present flow, over the length of 
 SWEEPS = 40
 # Least slope of Newton's method, so that dry structures leave a level determined: over the flow [1/m], and without flow
 # [m2/s]. It must be far below that of the chord over a rise of metres, however small the flow is.
-LEAST_SLOPE, TINY_SLOPE = 1e-6, 1e-300
+LEAST_SLOPE, TINY_SLOPE = 1e-6, 1e-60
 FARTHEST = 1e6  # greatest fall of the search for a flow [m]
 RULE = FLOW = SLOPES = CHORD = LINE = None  # constants of the templates
 
@@ -90,11 +90,11 @@ def chord_template(floats, at, setting, ahead, z, fall, flow, present, by_level)
     return (flow - present) / (begin - own) if own != begin else 0.0
 
 
-def line_template(floats, at, setting, z, fall, present):
+def line_template(floats, at, setting, z, fall, present, least):
     """(flow [m3/s], its slope over the fall, its slope over the level `z` [m2/s]) for the next step of Newton's method.
 
     z, fall : level at the end `from`, and fall from there to the end `to`, of any sign [m]
-    present : flow before the step [m3/s]
+    present : flow before the step [m3/s]; least : least slope over the fall [m2/s], beside that by the flow
     Laws are concave in the fall and partly in the level, so that tangents might alternate. Therefore the slope over the
     fall is that of the chord, plus the excess of the chord over the level above the tangent.
     """
@@ -106,7 +106,7 @@ def line_template(floats, at, setting, z, fall, present):
     if abs(flow - m) > NEAR * (abs(flow) + abs(m)):
         by_fall = CHORD(floats, at, setting, ahead, high, size, flow, m, False)
         by_fall += max(CHORD(floats, at, setting, ahead, high, size, flow, m, True) - by_level, 0.0)
-    by_fall = max(by_fall, LEAST_SLOPE * max(abs(flow), abs(m)), TINY_SLOPE)
+    by_fall = max(by_fall, LEAST_SLOPE * max(abs(flow), abs(m)), least)
     if ahead:
         return flow, by_fall, by_level
     return -flow, by_fall + by_level, -by_level
@@ -177,7 +177,7 @@ def step_template(out, tables, k, g, m, drop, denser, wide):
         flow = rho * FLOW(floats, at, setting, ahead, z, fall)[0]
         return (flow if ahead else -flow) - m, 0.0
     z, fall = level_and_fall(tables, out, k, drop)
-    flow, by_fall, _ = LINE(floats, at, setting, z, fall, m / rho)
+    flow, by_fall, _ = LINE(floats, at, setting, z, fall, m / rho, max(out[FIRM], TINY_SLOPE))
     return rho * flow - m, denser * by_fall / st["gravity"]
 
 

@@ -123,7 +123,7 @@ class PatchFaceRows(Restriction, kind="patch-face"):
 
         def step(flow, drop):
             z = rest + float(drop) / (rho * gravity)
-            a, s = law_patch_face.level_step(gravity, faces, z, float(flow) / rho)
+            a, s = law_patch_face.level_step(gravity, faces, z, float(flow) / rho, rec.FIRM_SLOPE)
             return rho * a, s / gravity
 
         return step

@@ -64,7 +64,9 @@ class ConduitEndRows(Restriction, kind="conduit-end"):
 
         def step(flow, drop):
             z = lowest + float(drop) / (rho * start.case.gravity)
-            a, s = law.level_step(basin.section, z, float(flow) / rho, law.end_state(basin.section, h, e, 0.0))
+            a, s = law.level_step(
+                basin.section, z, float(flow) / rho, law.end_state(basin.section, h, e, 0.0), rec.FIRM_SLOPE
+            )
             return rho * a, s / start.case.gravity
 
         return step

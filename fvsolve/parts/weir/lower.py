@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from fvsolve.assembly.lowering import CREST, TYPICAL_DROP, Device, Input
 from fvsolve.errors import Notice
+from fvsolve.kernels.dtypes import FIRM_SLOPE
 from fvsolve.kernels.structures import LINEAR_FALL
 from fvsolve.steady import Edge
 
@@ -72,7 +73,9 @@ class StructureRows(Device, kind=""):
 
         def linear(flow, drop, potential):
             z = (potential - ambient) / weight
-            q, *slopes = self.law.line(floats, at, setting, float(z), float(drop / weight), float(flow / rho))
+            q, *slopes = self.law.line(
+                floats, at, setting, float(z), float(drop / weight), float(flow / rho), FIRM_SLOPE
+            )
             return rho * q, *(slope / start.case.gravity for slope in slopes)
 
         return linear
