@@ -24,7 +24,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests": (967, 7),
     "benchmarks": (8556, 60),
     "fvsolve/assembly": (1971, 10),
-    "fvsolve/basins": (12885, 61),
+    "fvsolve/basins": (12887, 61),
     "fvsolve/case": (8165, 30),
     "fvsolve/cli": (3530, 17),
     "fvsolve/compile": (1357, 7),

@@ -148,13 +148,15 @@ def add_interior_flow(tables, patch, inflow, y, dydt, out):
     for m in range(patch["count"] if leaves else 0):
         i = tables.integers[patch["first"] + m]
         volume += plane[basin["area"] + i] * near.depth_at_patch(plane, basin, i, y)
-    flow = inflow / tables.settings[0]["rho"]
+    flow, least = inflow / tables.settings[0]["rho"], near.LEAST_DEPTH * near.patch_area(tables, patch)
     if leaves:
-        out[RATE] = max(out[RATE], -2.0 * flow / max(volume, near.LEAST_DEPTH * near.patch_area(tables, patch)))
+        out[RATE] = max(out[RATE], -2.0 * flow / max(volume, least))
+        if volume < least:  # a film of nanometres cannot give it all: the rest comes from outside
+            out[tables.layout[0]["supply"] + patch["node"]] += (volume / least - 1.0) * inflow
     for m in range(patch["count"] if dydt.size > 0 else 0):
         i = tables.integers[patch["first"] + m]
         if leaves:
-            rate = flow / max(volume, near.LEAST_DEPTH * near.patch_area(tables, patch))
+            rate = flow / max(volume, least)
             dydt[o + i] += rate * near.depth_at_patch(plane, basin, i, y)
             dydt[o + n + i] += rate * y[o + n + i]
             dydt[o + 2 * n + i] += rate * y[o + 2 * n + i]
