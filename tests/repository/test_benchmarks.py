@@ -92,6 +92,27 @@ def test_bands_of_random_networks_hold_the_true_peaks(model: str):
     assert count.bands >= 20 and not count.missed and not count.wrong
 
 
+@pytest.mark.parametrize("seed", [2, 27, 71, 117, 164])
+def test_random_streets_run_to_their_end_with_a_closed_ledger(seed, tmp_path):
+    """Newton failed where a film passes a trickle (2, 71), between levels without flow (27, 117); 164 made water."""
+    import random_streets
+
+    assert random_streets.run_street(seed, tmp_path).fault == ""
+
+
+@pytest.mark.parametrize("seed", [(2, 52), (1, 44), (2, 71)])
+def test_bands_hold_where_the_flow_of_delay_lines_grows_from_rest(seed):
+    """One stretch at the start had to carry the friction of all flows, in the run and in both references."""
+    import exact_networks
+    import network_bands
+
+    count, network = network_bands.Count(), exact_networks.random_network(seed)
+    truth = exact_networks.solution(network)
+    given = network_bands.case_with(network, truth, "delay-line", seed)
+    network_bands.compare(count, str(seed), given, network, truth)
+    assert count.bands >= 6 and not count.missed and not count.wrong
+
+
 def test_every_script_has_quick():
     """`quick.py` needs the option `--quick`; scripts read their options only through `measure.parser`."""
     import quick

@@ -63,7 +63,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/parts": (18560, 49),
     "tests/reference": (3560, 34),
     "tests/report": (861, 4),
-    "tests/repository": (3220, 18),
+    "tests/repository": (3241, 18),
     "tests/schemes": (569, 2),
     "tests/solve": (2404, 12),
     "tests/step_limits": (1100, 5),
