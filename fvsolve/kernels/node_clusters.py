@@ -418,7 +418,11 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, limits, 
         for e in range(k):
             flow_error += a[e] * a[e] / max(abs(m[e] + a[e]), 1e-300)
         limit_step(tables.settings[0]["beta"], a, right)
-    limited = limit_each_step(limits, right) if limits.size > 0 else cut_steps(right)
+    limited = False
+    if limits.size > 0:
+        limited = limit_each_step(limits, right)
+    elif not BAROTROPIC:
+        limited = cut_steps(right)
     pressures, flows = apply_step(cluster, tables, out, m, a, s, lift, right)
     if limited:
         return NOT_BALANCED, NOT_BALANCED, False
@@ -675,7 +679,7 @@ def write_cluster(cluster, tables, out, g, m, c, connected, group, change):
             m[e] = 0.0
         out[tables.layout[0]["valve"] + k] = m[e]
         scale = max(scale, abs(tables.valves[k]["flow"]), sqrt(tables.valves[k]["conductance"]))
-    if not change <= FAILED_CHANGE:
+    if change > FAILED_CHANGE:
         out[STATUS], out[WHERE] = NOT_CONVERGED, tables.integers[cluster["first_node"]]
     for i in range(connected.size):
         if connected[i] == 0.0:
@@ -755,7 +759,8 @@ def solve_cluster(out, tables, index):
                 break
             change, flows, wide = 1e300, 1e300, False
     out[FIRM] = 0.0
-    write_cluster(cluster, tables, out, g, m, c, connected, group, flows)
+    failed = flows != flows  # not a number; under other laws the rates show this fault
+    write_cluster(cluster, tables, out, g, m, c, connected, group, NOT_BALANCED if failed else flows)
 
 
 @njit

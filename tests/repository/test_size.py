@@ -34,7 +34,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/exact": (1462, 7),
     "fvsolve/fluid": (1091, 4),
     "fvsolve/fmi": (439, 5),
-    "fvsolve/kernels": (17356, 72),
+    "fvsolve/kernels": (17361, 72),
     "fvsolve/mesh": (1240, 5),
     "fvsolve/model": (9419, 27),
     "fvsolve/output": (1901, 11),
