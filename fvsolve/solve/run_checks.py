@@ -282,7 +282,9 @@ class StepDoubling:
         self.least[:] = self.greatest[:] = model.start[self.states]
         self.restart_data[3], self.stepper, self.implicit = 1.0, None, not method.explicit
         if self.states.size:
-            steps = (numerics.end - numerics.start) / (self.step or first_step(model))
+            size = self.step or first_step(model)
+            dry = STEPS_BETWEEN_CHECKS * EXPLICIT_CHECKS  # no wave sets the first step: their number is not known
+            steps = (numerics.end - numerics.start) / size if size > 0.0 else dry
             self.interval = max(1.0, steps // IMPLICIT_CHECKS)
             if method.explicit:
                 self.interval = max(1.0, steps // EXPLICIT_CHECKS, min(STEPS_BETWEEN_CHECKS, steps // FEWEST_CHECKS))

@@ -41,7 +41,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/parts": (19782, 151),
     "fvsolve/report": (2058, 7),
     "fvsolve/run": (1744, 7),
-    "fvsolve/solve": (3044, 12),
+    "fvsolve/solve": (3046, 12),
     "fvsolve/step_limits": (1720, 7),
     "fvsolve/steppers": (7640, 34),
     "fvsolve/studies": (15411, 53),
