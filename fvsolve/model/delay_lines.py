@@ -329,14 +329,16 @@ def friction_attenuation(pipe, travel: float, flow: float) -> float:
 def friction_notices(model, extremes: np.ndarray) -> list[Notice]:
     """Notices of delay lines in which the flow has grown, so that their friction needs more stretches.
 
-    A line that is at rest at the start has one stretch. The flows of a run are known where they are probed.
+    A line that is at rest at the start has one stretch. The flows of a run are known where they are probed or limited.
     extremes : float64[4, probes] as in `RunData`
     """
     greatest: dict[str, float] = {}
-    for k, probe in enumerate(model.probes):
-        if probe.part == "links" and probe.quantity == "flow":
-            flow = float(np.abs(extremes[[0, 2], k]).max())
-            greatest[probe.name] = max(greatest.get(probe.name, 0.0), flow * model.case.properties.density)
+    areas = {pipe.name: float(row["area"]) for pipe, row in zip(model.pipes, model.tables.pipes, strict=True)}
+    for k, probe in enumerate([*model.probes, *model.watched]):
+        if probe.part == "links" and probe.name in areas and probe.quantity in ("flow", "velocity"):
+            per = 1.0 if probe.quantity == "flow" else areas[probe.name]
+            flow = float(np.abs(extremes[[0, 2], k]).max()) * per * model.case.properties.density
+            greatest[probe.name] = max(greatest.get(probe.name, 0.0), flow)
     notices, tolerance = [], model.case.numerics.delay_tolerance
     for row in model.tables.delays:
         pipe, name = model.tables.pipes[row["pipe"]], model.pipes[row["pipe"]].name

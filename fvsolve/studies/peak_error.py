@@ -608,9 +608,8 @@ def expectation_error(
 ) -> float | None:  # fmt: skip
     """Error of the value in an expectation: the error of the peak if it is a peak, else from the values of all runs.
 
-    found : value in the run itself, whose steps differ with the rows
-
     expect : expectation of the case; k : its index in the summaries; peak_rows : entry `peaks` of the summary
+    found : value in the run itself, whose steps differ with the rows
     """
     side = {"min": "minimum", "max": "maximum"}.get(expect.function)
     if side is not None and expect.probe is not None and expect.probe.text in peak_rows:

@@ -468,6 +468,9 @@ def test_a_line_at_rest_whose_flow_grows_states_the_velocity_for_its_stretches()
     velocity = float(notice.text.rpartition("delay_velocity to ")[2].split()[0])
     area = 0.25 * np.pi * 0.2229**2
     assert velocity == pytest.approx(np.abs(own["links.main.flow@0"]).max() / area, rel=0.02)
+    by_velocity = opening(**lines)
+    by_velocity["output"]["probes"] = ["links.main.velocity@0"]
+    assert [n.text for n in fvsolve.run(by_velocity).warnings if n.kind == "lines"] == [notice.text]
     better = fvsolve.run(opening(**lines, delay_velocity=velocity))
     assert not [n for n in better.warnings if n.kind == "lines"]
     errors = [np.abs(run["links.main.flow@0"] - right).max() / np.ptp(right) for run in (own, better)]

@@ -123,7 +123,8 @@ class PatchFaceRows(Restriction, kind="patch-face"):
 
         def step(flow, drop):
             z = rest + float(drop) / (rho * gravity)
-            a, s = law_patch_face.level_step(gravity, faces, z, float(flow) / rho, rec.FIRM_SLOPE)
+            firm = law_patch_face.FIRM_SHARE * rec.FIRM_SLOPE
+            a, s = law_patch_face.level_step(gravity, faces, z, float(flow) / rho, firm)
             return rho * a, s / gravity
 
         return step

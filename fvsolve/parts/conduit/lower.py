@@ -64,9 +64,8 @@ class ConduitEndRows(Restriction, kind="conduit-end"):
 
         def step(flow, drop):
             z = lowest + float(drop) / (rho * start.case.gravity)
-            a, s = law.level_step(
-                basin.section, z, float(flow) / rho, law.end_state(basin.section, h, e, 0.0), rec.FIRM_SLOPE
-            )
+            inside, firm = law.end_state(basin.section, h, e, 0.0), law.FIRM_SHARE * rec.FIRM_SLOPE
+            a, s = law.level_step(basin.section, z, float(flow) / rho, inside, firm)
             return rho * a, s / start.case.gravity
 
         return step
