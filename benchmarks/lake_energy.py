@@ -140,7 +140,9 @@ def main() -> None:
                 return float(area @ ((C * y[0]) ** 2 + y[1] ** 2 + y[2] ** 2))
 
             for name, (scheme, wide) in SCHEMES.items():
-                water = surface_mesh.MeshWater(G, scheme, wide, np.stack([depth, 0.0 * depth]), None)
+                water = surface_mesh.MeshWater(
+                    G, scheme, min(wide, surface_mesh.MOST_OVERSHOOT), np.stack([depth, 0.0 * depth]), None
+                )
                 liquid = LiquidScheme(C, 1000.0, None, False, scheme, 0, 0.0, wide)
                 ratios = {
                     "water": greatest_energy(

@@ -189,8 +189,8 @@ class Limiter(NamedTuple):
     of values to the cells behind and ahead. The slope of van Leer's limiter is smooth: its branches are the tangents at
     d = e, at d = 0 and at e = 0
     overshoot : factor on the range of the neighbouring cells, which bounds the values at the sides of a cell of an
-        unstructured mesh. It is 1 without overshoot; linear fields on distorted meshes need more than 1. Above
-        MOST_OVERSHOOT waves of the size of cells gain energy over a rough bed (benchmarks/lake_energy.py).
+        unstructured mesh. It is 1 without overshoot; linear fields on distorted meshes need more than 1. Water
+        has its own bound, see `surface_mesh.MOST_OVERSHOOT`.
     own : function of a user's limiter; its tangents are samples of its slope
     """
 
@@ -226,12 +226,11 @@ class Limiter(NamedTuple):
         return not (self.own and self.own.departures)
 
 
-MOST_OVERSHOOT = 1.5
 UNITY, DOUBLE, HALF, ZERO = Fraction(1), Fraction(2), Fraction(1, 2), Fraction(0)
 LIMITERS = {
     "minmod": Limiter(((UNITY, ZERO), (ZERO, UNITY)), 1.0),
-    "van-leer": Limiter(((HALF, HALF), (DOUBLE, ZERO), (ZERO, DOUBLE)), MOST_OVERSHOOT),
-    "monotonized-central": Limiter(((HALF, HALF), (DOUBLE, ZERO), (ZERO, DOUBLE)), MOST_OVERSHOOT),
+    "van-leer": Limiter(((HALF, HALF), (DOUBLE, ZERO), (ZERO, DOUBLE)), 2.0),
+    "monotonized-central": Limiter(((HALF, HALF), (DOUBLE, ZERO), (ZERO, DOUBLE)), 2.0),
 }
 
 

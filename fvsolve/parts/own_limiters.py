@@ -17,7 +17,7 @@ import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, TEXT, validated
 from fvsolve.errors import FvsolveError
-from fvsolve.schemes import LIMITERS, MOST_OVERSHOOT, Limiter, OwnLimiter
+from fvsolve.schemes import LIMITERS, Limiter, OwnLimiter
 from fvsolve.units import show
 
 VARIABLE = "FVSOLVE_LIMITERS"  # environment variable with the limiters of users, for other processes
@@ -100,7 +100,7 @@ def limiter(phi: Callable, values: np.ndarray, data: str) -> Limiter:
     digest = hashlib.sha256(data.encode()).hexdigest()[:16]
     costs = [*order_cost(phi), *(lost := asymmetry(phi))]
     own = OwnLimiter(phi, not lost, digest, tuple(departures(values)), tuple(costs), Fraction(steepest))
-    return Limiter(tuple(slopes), min(steepest, MOST_OVERSHOOT), own)
+    return Limiter(tuple(slopes), min(steepest, 2.0), own)
 
 
 def tangent(phi: Callable, r: float, side: int) -> tuple[Fraction, Fraction]:

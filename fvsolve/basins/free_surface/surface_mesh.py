@@ -23,6 +23,8 @@ from fvsolve.basins.mesh_blocks import own_sides
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import UPWIND
 
+# Greatest `wide_by`: with 2, exact for linear fields, ripples on a lake over a rough bed gain energy.
+MOST_OVERSHOOT = 1.5
 DEPTH, SURFACE = 0, 1  # rows of plan: depth of the profile, its surface above the level
 FIELDS, ROWS_OF_CELLS, SHOWN = 4, 6, 2  # see `mesh_blocks`
 

@@ -223,7 +223,8 @@ def mesh_rates(tables, b, y, rates, out, moves, faces, marks):
     flow = work[:0]
     if f >= 0:  # needed for scalars
         flow = work[f : f + basin["faces"]]
-    water = surface_mesh.MeshWater(grid.g, basin["scheme"], basin["wide"], grid.plan, faces, marks)
+    wide = min(basin["wide"], surface_mesh.MOST_OVERSHOOT)
+    water = surface_mesh.MeshWater(grid.g, basin["scheme"], wide, grid.plan, faces, marks)
     floats, integers = tables.plane[basin["mesh"] :], tables.integers[basin["links"] :]
     states = seen[o : o + n], seen[o + n : o + 2 * n], seen[o + 2 * n : o + 3 * n]
     passing, scratch = work[max(through, 0) :][: basin["outer_given"] if through >= 0 else 0], work[basin["work"] :]
