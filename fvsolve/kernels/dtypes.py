@@ -501,7 +501,7 @@ GN = 14  # index of g_n among the numbers of a frame, see `basins.basin_frames`
 TANK_OUT = 24  # numbers in `out` of each basin on a body, see `mechanism.body_layout`
 RATE, STATUS, WHERE, CLOSING, ARRIVES, LONGEST = 0, 1, 2, 3, 4, 5  # first entries of `out`
 # Least slope [m2/s] of laws between levels in Newton's method; 0: it follows the flow. FIRM_SLOPE is that of limited
-# steps and of the steady start.
+# steps, of the steady start, and of the density laws other than `linear`.
 FIRM, FIRM_SLOPE = 6, 1e-9
 OUT_HEAD = 7
 # RATE before a call if the rate that limits the step is not needed, which holds at all stages of a step but the first.

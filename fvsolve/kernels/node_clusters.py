@@ -589,7 +589,7 @@ def begin_clusters(out, tables, space):
     flows from pipe ends later.
     """
     clusters, (_, c, connected, _, g, m, _), (done, change, _, wide, _) = tables.clusters, space, cluster_work(tables)
-    a, b = 0, 0
+    a, b, out[FIRM] = 0, 0, FIRM_SLOPE
     for k in range(clusters.size):
         cluster = clusters[k]
         i, j = a + cluster["nodes"], b + cluster["valves"]

@@ -23,9 +23,8 @@ CHANGE = 1e-6  # change of a level for its slope [m]
 NEAR = 1e-6  # relative difference of flows below which the tangent replaces the chord
 CHORD_ERROR = 1e-2  # error of the fall at the present flow, over the length of the chord
 SWEEPS = 40
-# Least slope of Newton's method, so that dry structures leave a level determined: over the flow [1/m], and without flow
-# [m2/s]. It must be far below that of the chord over a rise of metres, however small the flow is.
-LEAST_SLOPE, TINY_SLOPE = 1e-6, 1e-60
+LEAST_SLOPE, TINY_SLOPE = 1e-6, 1e-60  # least slope over the flow [1/m], and without flow [m2/s]
+FACE_SHARE = 1e-3  # firm slope of faces of water over that of structures, so that structures set a level at rest
 FARTHEST = 1e6  # greatest fall of the search for a flow [m]
 RULE = FLOW = SLOPES = CHORD = LINE = None  # constants of the templates
 
@@ -62,6 +61,16 @@ def slopes_template(floats, at, setting, ahead, z, fall):
     return by_fall / (high - low), by_level / (2.0 * CHANGE)
 
 
+@njit(forceinline=True)
+def least_slope(flow, present, firm):
+    """Least slope of a law between levels in Newton's method [m2/s], so that a level without flow is determined.
+
+    flow, present : flow by the law, and before the step [m3/s]; firm : least value, see `dtypes.FIRM`
+    It is far below the flow over the rise of metres of a structure that takes it, however small the flow is.
+    """
+    return max(LEAST_SLOPE * max(abs(flow), abs(present)), firm, TINY_SLOPE)
+
+
 def chord_template(floats, at, setting, ahead, z, fall, flow, present, by_level):
     """Slope [m2/s] of the chord between the flow at a level and a fall and the present flow, over one of both.
 
@@ -90,11 +99,11 @@ def chord_template(floats, at, setting, ahead, z, fall, flow, present, by_level)
     return (flow - present) / (begin - own) if own != begin else 0.0
 
 
-def line_template(floats, at, setting, z, fall, present, least):
+def line_template(floats, at, setting, z, fall, present, firm):
     """(flow [m3/s], its slope over the fall, its slope over the level `z` [m2/s]) for the next step of Newton's method.
 
     z, fall : level at the end `from`, and fall from there to the end `to`, of any sign [m]
-    present : flow before the step [m3/s]; least : least slope over the fall [m2/s], beside that by the flow
+    present : flow before the step [m3/s]; firm : as for `least_slope`
     Laws are concave in the fall and partly in the level, so that tangents might alternate. Therefore the slope over the
     fall is that of the chord, plus the excess of the chord over the level above the tangent.
     """
@@ -106,7 +115,7 @@ def line_template(floats, at, setting, z, fall, present, least):
     if abs(flow - m) > NEAR * (abs(flow) + abs(m)):
         by_fall = CHORD(floats, at, setting, ahead, high, size, flow, m, False)
         by_fall += max(CHORD(floats, at, setting, ahead, high, size, flow, m, True) - by_level, 0.0)
-    by_fall = max(by_fall, LEAST_SLOPE * max(abs(flow), abs(m)), least)
+    by_fall = max(by_fall, least_slope(flow, m, firm))
     if ahead:
         return flow, by_fall, by_level
     return -flow, by_fall + by_level, -by_level
@@ -177,7 +186,7 @@ def step_template(out, tables, k, g, m, drop, denser, wide):
         flow = rho * FLOW(floats, at, setting, ahead, z, fall)[0]
         return (flow if ahead else -flow) - m, 0.0
     z, fall = level_and_fall(tables, out, k, drop)
-    flow, by_fall, _ = LINE(floats, at, setting, z, fall, m / rho, max(out[FIRM], TINY_SLOPE))
+    flow, by_fall, _ = LINE(floats, at, setting, z, fall, m / rho, out[FIRM])
     return rho * flow - m, denser * by_fall / st["gravity"]
 
 

@@ -7,11 +7,8 @@ rest is the sum of this pressure and the drop over rho g. The flow is that of `p
 from fvsolve.basins.free_surface.patch_closures import DEEPEST, faces_inside, lowest_bed, patch_flow, solve_level
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import FIRM
+from fvsolve.kernels.structures import FACE_SHARE, least_slope
 
-# Least derivative of the flow by the level: over the flow [1/m], and without flow [m2/s]. Critical outflow does not
-# depend on the level. The slope must be far below that of a structure which takes the flow, however small this is.
-LEAST_SLOPE, TINY_SLOPE = 1e-6, 1e-60
-FIRM_SHARE = 1e-3  # least slope over that of structures, so that the level at rest is set by them
 SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
 NEAR = 1e-12  # least length of a chord [m]
 DRY_SPEED = 0.1  # derivative at dry faces over their length: speed of waves in a millimetre of water [m/s]
@@ -32,7 +29,7 @@ def level_step(g, faces, z, target, firm):
     At or below critical outflow, and below dry faces, the flow has no derivative by the level. If the target is
     greater, it is that of the chord to the level at which the target passes: with any slope of its own a patch that
     stays dry would keep Newton's method from its root. A smaller target has the level of `DEEPEST`.
-    g : gravity; faces : as for `patch_flow`; firm : least slope, beside that by the flow
+    g : gravity; faces : as for `patch_flow`; firm : as for `structures.least_slope`
     """
     q, change = patch_flow(g, z, faces)
     if change > 0.0:
@@ -42,7 +39,7 @@ def level_step(g, faces, z, target, firm):
         long += faces[3][m]
     if q == 0.0 and target == 0.0:
         return 0.0, DRY_SPEED * long
-    least = max(LEAST_SLOPE * max(abs(q), abs(target)), firm, TINY_SLOPE)
+    least = least_slope(q, target, firm)  # critical outflow does not depend on the level
     if not target > q + SAME_FLOW * abs(q):
         deeper = z - (lowest_bed(faces) - DEEPEST)
         return (q + DRY_SPEED * long * deeper - target, DRY_SPEED * long) if deeper < 0.0 else (q - target, least)
@@ -55,7 +52,7 @@ def step(out, tables, k, g, m, drop, denser, wide):
     """(a, s) of `restrictions.restriction_step`: Newton's step."""
     patch, st = tables.patches[int(tables.floats[tables.valves[k]["data"]])], tables.settings[0]
     z = junction_level(out, tables, patch, drop)
-    a, s = level_step(st["gravity"], faces_inside(tables, patch), z, m / st["rho"], FIRM_SHARE * out[FIRM])
+    a, s = level_step(st["gravity"], faces_inside(tables, patch), z, m / st["rho"], FACE_SHARE * out[FIRM])
     return st["rho"] * a, s / st["gravity"]
 
 

@@ -30,6 +30,7 @@ from fvsolve.case.basins import patch_names
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import RhsTerms
+from fvsolve.kernels.structures import FACE_SHARE
 from fvsolve.parts.field_series import SpatialSeries
 from fvsolve.parts.formula import SpatialField, means, samples
 from fvsolve.parts.schedule import Schedule
@@ -123,7 +124,7 @@ class PatchFaceRows(Restriction, kind="patch-face"):
 
         def step(flow, drop):
             z = rest + float(drop) / (rho * gravity)
-            firm = law_patch_face.FIRM_SHARE * rec.FIRM_SLOPE
+            firm = FACE_SHARE * rec.FIRM_SLOPE
             a, s = law_patch_face.level_step(gravity, faces, z, float(flow) / rho, firm)
             return rho * a, s / gravity
 

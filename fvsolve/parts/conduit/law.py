@@ -14,14 +14,11 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import FIRM
 from fvsolve.kernels.isolated_nodes import inner_row
+from fvsolve.kernels.structures import FACE_SHARE, least_slope
 from fvsolve.parts.conduit.law_section import SlottedSection, celerity, riemann_function, section_at_depth
 
 NUMBERS = len(SlottedSection._fields)  # of a section
 INSIDE = 7  # numbers of the state inside an end, see `end_state`
-# Least derivative of the flow by the head: over the flow [1/m], and without flow [m2/s]. Critical outflow does not
-# depend on the head.
-LEAST_SLOPE, TINY_SLOPE = 1e-6, 1e-60
-FIRM_SHARE = 1e-3  # least slope over that of structures
 SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
 DRY_CELERITY = 1e-4  # celerity at a dry end for its least derivative [m/s]; far below that of films of water
 ROUNDING = 1e-14  # relative error of depths that solve an equation
@@ -141,13 +138,13 @@ def level_step(section, z, target, inside, firm):
 
     Far from the target the slope is at least that of the chord to the head at which the target passes: the slope
     changes by the factor T_s / D at the crown and vanishes at critical outflow, where tangents would alternate.
-    inside : result of `end_state`; firm : least slope, beside that by the flow
+    inside : result of `end_state`; firm : as for `structures.least_slope`
     """
     q, slope, _ = end_flow(section, z, inside)
     if slope > 0.0 and abs(q - target) <= CHORD * section.area * sqrt(section.g * section.diameter):
         return q - target, slope
     least = end_flow(section, inside[1] - inside[0], inside)[0]
-    flat = max(LEAST_SLOPE * max(abs(q), abs(target)), firm, TINY_SLOPE)
+    flat = least_slope(q, target, firm)  # critical outflow does not depend on the head
     if not target > least + SAME_FLOW * abs(least):
         if slope > 0.0:
             return q - target, slope
@@ -177,7 +174,7 @@ def step(out, tables, k, g, m, drop, denser, wide):
     if inner_row(tables.nodes, tables.valves[k]["from_node"]) < 0:
         q, s, _ = end_flow(section, z, inside)
         return rho * q - m, s / tables.settings[0]["gravity"]
-    a, s = level_step(section, z, m / rho, inside, FIRM_SHARE * out[FIRM])
+    a, s = level_step(section, z, m / rho, inside, FACE_SHARE * out[FIRM])
     return rho * a, s / tables.settings[0]["gravity"]
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from fvsolve.assembly.lowering import Lowering, Restriction
 from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.structures import FACE_SHARE
 
 from . import law
 from .law_section import section_of
@@ -64,7 +65,7 @@ class ConduitEndRows(Restriction, kind="conduit-end"):
 
         def step(flow, drop):
             z = lowest + float(drop) / (rho * start.case.gravity)
-            inside, firm = law.end_state(basin.section, h, e, 0.0), law.FIRM_SHARE * rec.FIRM_SLOPE
+            inside, firm = law.end_state(basin.section, h, e, 0.0), FACE_SHARE * rec.FIRM_SLOPE
             a, s = law.level_step(basin.section, z, float(flow) / rho, inside, firm)
             return rho * a, s / start.case.gravity
 
