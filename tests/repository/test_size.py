@@ -68,7 +68,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/solve": (2404, 12),
     "tests/step_limits": (1100, 5),
     "tests/steppers": (2630, 15),
-    "tests/studies": (8619, 25),
+    "tests/studies": (8618, 25),
     "tests/units": (268, 1),
     "tests/validation": (319, 1),
 }
