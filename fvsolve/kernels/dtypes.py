@@ -555,6 +555,7 @@ BASIN = record(
     given=i8,  # 1: flows through its faces follow a given velocity, in `plane`; others are in `work`
     scheme=i8,
     limiter=i8,  # on rectangles
+    kerbs=i8,  # offset in `plane` of flags of rows of a grid, see `free_surface.surface_grid.WaterGrid`
     wide=f8,  # limiter of meshes: how far values at sides of cells may exceed those of neighbours
     steepest=f8,  # bound of gradients in cells of meshes, see `basins.cell_sides.gradient_share`
     n=i8,  # number of cells

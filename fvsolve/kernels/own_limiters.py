@@ -31,6 +31,7 @@ LOOPS = {
     "faces_limited": ("fvsolve.basins.liquid.liquid_sides", "VVVV", ""),
     "faces_upwind_limited": ("fvsolve.basins.liquid.grid_nonlinear", "VVVVVVV", ""),
     "put_sloped": ("fvsolve.basins.free_surface.surface_rows", "iVVVV", ""),
+    "put_sloped_at_kerbs": ("fvsolve.basins.free_surface.surface_rows", "iVVVV", ""),
     "put_slopes": ("fvsolve.basins.conduit.conduit_cells", "iV", ""),
     "put_face_values": (ADVECTION, "FtVVVVVV", ""),
     "single_face_value": (ADVECTION, "Fbtttt", "t"),

@@ -8,7 +8,7 @@ from pytest import approx
 from scipy.optimize import brentq
 
 from fvsolve.basins.free_surface.bed_friction import add_capped_friction
-from fvsolve.basins.free_surface.surface_grid import PLANS, WORK, FaceFlows, WaterGrid, grid_rates
+from fvsolve.basins.free_surface.surface_grid import PLANS, WORK, FaceFlows, WaterGrid, grid_rates, kerbs_of
 from fvsolve.basins.free_surface.surface_rows import SURFACE, put_push
 from fvsolve.jit import njit
 from fvsolve.kernels.cube_root import cube_root_reciprocal, estimate
@@ -41,7 +41,8 @@ class Water:
     def rates(self, y, out):
         a, b = y.reshape(3, -1), out.reshape(3, -1)
         spacing = self.kx, self.ky
-        grid = WaterGrid(G, self.scheme, self.limiter, self.nx, self.ny, *spacing, self.reflect, self.plan)
+        kerbs = kerbs_of(self.bed)
+        grid = WaterGrid(G, self.scheme, self.limiter, self.nx, self.ny, *spacing, self.reflect, self.plan, kerbs)
         flows = FaceFlows(self.flow_x, self.flow_y, NONE)
         rate = grid_rates(grid, 0, self.ny, (a[0], a[1], a[2]), flows, self.work, (b[0], b[1], b[2]), None, None)
         if self.friction is not None:

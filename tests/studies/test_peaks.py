@@ -13,7 +13,6 @@ from fvsolve.case.text import write
 from fvsolve.report.report_files import write_report
 from fvsolve.studies import scenarios
 from fvsolve.studies.peak_error import (
-    RELATIVE_FLOOR,
     between_rows,
     differing_events,
     greatest_error,

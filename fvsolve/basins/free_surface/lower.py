@@ -303,6 +303,8 @@ class FreeSurfaceRows(RowsWithFriction):
             dry = not (self.depth.min() > 0.0 and (self.depth + self.start()[0]).min() > 0.0)
             row["unsplit"] = SHORE_COURANT_FACTOR if dry and self.is_fifth_order else COURANT_FACTOR
             row["work"] = draft.to_work(surface_grid.MOVING if self.moves else surface_grid.WORK)
+            kerbs = surface_grid.kerbs_of(self.bed.reshape(self.mesh.grid.ny, self.mesh.grid.nx))
+            row["kerbs"] = draft.to_plane(kerbs)
         else:
             row["work"] = draft.to_work(mesh_blocks.work_size(surface_mesh, self.integers))
         row["plan"] = draft.to_plane(plan)

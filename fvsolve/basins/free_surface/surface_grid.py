@@ -45,6 +45,7 @@ class WaterGrid(NamedTuple):
     """Grid of nx columns and ny rows of water, and the scheme of its rates.
 
     g : gravity normal to the basin [m/s2]; scheme : UPWIND, MUSCL, LINEAR (upwind5) or WENO5; limiter : of MUSCL
+    kerbs : float64[2 ny]  for each row the depth below which its bed has kerbs along it, then across it, see `kerbs_of`
     kx, ky : float64[nx], float64[ny]  1 / widths of columns, 1 / heights of rows [1/m]
     reflect : float64[2 (nx + ny)]  1 for a wall and 0 for open, in the order west, east, south, north; empty: all walls
     plan : float64[PLANS, n]  depth at rest and surface at rest above the level [m]
@@ -60,7 +61,15 @@ class WaterGrid(NamedTuple):
     ky: np.ndarray
     reflect: np.ndarray
     plan: np.ndarray
+    kerbs: np.ndarray
     marks: MarkedFaces | None = None
+
+
+def kerbs_of(bed):
+    """`WaterGrid.kerbs` of a bed : float64[ny, nx]: four times the greatest second differences."""
+    bends = np.zeros((2, *bed.shape))
+    bends[0, :, 1:-1], bends[1, 1:-1] = np.diff(bed, 2, axis=1), np.diff(bed, 2, axis=0)
+    return 4.0 * np.abs(bends).max(axis=2).ravel()
 
 
 class FaceFlows(NamedTuple):
@@ -294,7 +303,8 @@ def column_rates(grid, begin, stop, fresh, first, last, states, flows, work, rat
         a, b = rows.cells[ring_offset(j - 2, 0) :], rows.cells[ring_offset(j - 1, 0) :]
         d, e = rows.cells[ring_offset(j + 1, 0) :], rows.cells[ring_offset(j + 2, 0) :]
         c, sides = rows.cells[ring_offset(j, 0) :], rows.sides[(j & 1) * SIDE :]
-        put_values(grid, last - first, a, b, c, d, e, sides, rows.deep)
+        kerbs = grid.kerbs[grid.ny + min(max(j, 0), grid.ny - 1)]
+        put_values(grid, last - first, kerbs, (a, b, c, d, e), sides, rows.deep)
         if grid.scheme == MUSCL:
             flatten_across(grid.marks, grid.ny, j, first, last, b, c, d, sides)
         if j >= begin:
@@ -308,12 +318,14 @@ def column_rates(grid, begin, stop, fresh, first, last, states, flows, work, rat
 
 
 @inline
-def put_values(grid, n, a, b, c, d, e, sides, deep):
-    """Write the values at both faces of n cells c to `sides`.
+def put_values(grid, n, kerbs, cells, sides, deep):
+    """Write the values at both faces of n cells to `sides`.
 
-    a, b, d, e : neighbours two and one before c, and one and two after it; deep : see `surface_rows.put_smooth`
+    kerbs : entry of `grid.kerbs`; cells : neighbours two and one before the cells, the cells, neighbours one and two
+    after; deep : see `surface_rows.put_smooth`
     """
-    rows_of.put_limited(grid.scheme, grid.limiter, n, b, c, d, sides)
+    a, b, c, d, e = cells
+    rows_of.put_limited(grid.scheme, grid.limiter, kerbs, n, b, c, d, sides)
     if is_fifth_order(grid.scheme):
         rows_of.put_smooth(grid.g, grid.scheme, a, b, c, d, e, sides, deep[:n])
 
@@ -363,7 +375,8 @@ def put_fluxes_along(grid, j, first, last, rows, flows, moves, faces):
     cell, after = rows.cells[ring_offset(j, -1) :], rows.cells[ring_offset(j, 0) :]
     a, b, e = rows.cells[ring_offset(j, -3) :], rows.cells[ring_offset(j, -2) :], rows.cells[ring_offset(j, 1) :]
     count = (n + 8) // 8 * 8
-    put_values(grid, (n + 9) // 8 * 8, a, b, cell, after, e, rows.ends, rows.deep)  # padded to whole vectors
+    size = (n + 9) // 8 * 8  # padded to whole vectors
+    put_values(grid, size, grid.kerbs[j], (a, b, cell, after, e), rows.ends, rows.deep)
     if grid.scheme == MUSCL:
         flatten_along(grid.marks, ny + 1 + j, nx, first, last, b, rows.ends)
     along, left, right = rows.along, rows.ends[HIGH:], rows.ends[1:]

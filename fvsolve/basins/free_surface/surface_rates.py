@@ -163,7 +163,8 @@ def grid_of(tables, basin, marks):
     plan = plane[at : at + surface_grid.PLANS * n].reshape((surface_grid.PLANS, n))
     reflect = plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]]
     g, kx, ky = normal_gravity(tables.settings[0], plane, basin), plane[k : k + nx], plane[k + nx : k + nx + ny]
-    return surface_grid.WaterGrid(g, basin["scheme"], basin["limiter"], nx, ny, kx, ky, reflect, plan, marks)
+    kerbs = plane[basin["kerbs"] : basin["kerbs"] + 2 * ny]
+    return surface_grid.WaterGrid(g, basin["scheme"], basin["limiter"], nx, ny, kx, ky, reflect, plan, kerbs, marks)
 
 
 @njit(forceinline=True)

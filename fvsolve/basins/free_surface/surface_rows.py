@@ -16,7 +16,7 @@ from math import sqrt
 
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import UPWIND, WENO5
-from fvsolve.kernels.reconstruction import by_limiter, half_slopes, minmod, slope, value_weno5
+from fvsolve.kernels.reconstruction import by_limiter, half_slopes, slope, value_weno5
 
 THIN = 1e-6  # depth below which velocities fade to zero [m]
 TINY, HUGE = 1e-300, 1e300
@@ -167,45 +167,78 @@ def put_side(i, hl, el, ul, vl, hr, er, ur, vr, push, sides):
 
 
 @inline
+def put_with_velocities(limiter, i, a, b, before, here, after, sides):
+    """Write the values at both faces of cell i, and its push, see `put_side`.
+
+    a, b : changes of depth and surface from the cell to the face after it; other arguments as for `put_limited`
+    """
+    h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
+    c, d = half_slopes(limiter, u - before[i + EAST], after[i + EAST] - u, v - before[i + NORTH], after[i + NORTH] - v)
+    put_side(i, h - a, e - b, u - c, v - d, h + a, e + b, u + c, v + d, h * (2.0 * b), sides)
+
+
+@inline
 def put_sloped(limiter, n, before, here, after, sides):
     """Write the values at both faces of n cells with slopes by a limiter function; arguments as for `put_limited`.
 
     The change of the depth to a side is that of the surface minus that of the bed, up to h / 16; from h / 8 on it is
     that of the limited depths, and in between it lies between both.
-    At a kerb, where the second difference of the bed exceeds h / 4 and no cell is dry, the slope of the bed differs
-    from that by minmod by no more than the film allows. That of minmod never raises the side of a cell above the next
+    """
+    for i in range(n):
+        h, e = here[i], here[i + SURFACE]
+        below, above, low, high = h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e
+        bed, b = half_slopes(limiter, low - below, high - above, low, high)
+        own, change = 0.5 * slope(limiter, below, above), b - bed
+        most = max(0.5 * h - 4.0 * abs(change), 0.0)
+        put_with_velocities(limiter, i, own + min(max(change - own, -most), most), b, before, here, after, sides)
+
+
+@inline
+def put_sloped_at_kerbs(limiter, n, before, here, after, sides):
+    """Do the same as `put_sloped`, but otherwise at kerbs.
+
+    At a kerb, where the second difference of the bed exceeds h / 4 and no cell is dry, the slope of the bed exceeds
+    that by minmod by no more than the film allows. That of minmod never raises the side of a cell above the next
     side uphill, where a film would have to pond. For the same reason the change of the surface lies between zero and
     that of bed and depth there: beside a pond it would tilt the bed of a film, and beside a film on a bank a pond.
     """
     for i in range(n):
-        h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
+        h, e = here[i], here[i + SURFACE]
         below, above, low, high = h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e
-        least, bend = min(h, min(before[i], after[i])), abs((high - above) - (low - below))
-        allowed = 0.25 * h if least > THIN else HUGE
-        thin, safe = least if bend > allowed else h, 0.5 * slope(minmod, low - below, high - above)
-        bed, b = half_slopes(limiter, low - below, high - above, low, high)
-        lip = 0.125 * thin if bend > allowed else HUGE
-        bed = min(max(bed, safe - lip), safe + lip)
+        rise, next_rise, least = low - below, high - above, min(h, min(before[i], after[i]))
+        is_kerb = abs(next_rise - rise) > (0.25 * h if least > THIN else HUGE)
+        bed, b = half_slopes(limiter, rise, next_rise, low, high)
+        steepest = 0.5 * min(abs(rise), abs(next_rise)) + 0.125 * least if is_kerb else HUGE
+        bed = min(max(bed, -steepest), steepest)
         own, change = 0.5 * slope(limiter, below, above), b - bed
-        most = max(min(0.5 * h, 4.0 * thin - 0.5 * h) - 4.0 * abs(change), 0.0)
+        film = 4.0 * least - 0.5 * h if is_kerb else HUGE
+        most = max(min(0.5 * h, film) - 4.0 * abs(change), 0.0)
         a = own + min(max(change - own, -most), most)
-        b = min(max(bed + a if bend > allowed else b, min(b, 0.0)), max(b, 0.0))
-        c, d = half_slopes(
-            limiter, u - before[i + EAST], after[i + EAST] - u, v - before[i + NORTH], after[i + NORTH] - v
-        )
-        put_side(i, h - a, e - b, u - c, v - d, h + a, e + b, u + c, v + d, h * (2.0 * b), sides)
+        held = min(max(bed + a, min(b, 0.0)), max(b, 0.0))
+        put_with_velocities(limiter, i, a, held if is_kerb else b, before, here, after, sides)
 
 
 @njit
-def put_limited(scheme, limiter, n, before, here, after, sides):
+def has_films(n, kerbs, here):
+    """True if water in one of n cells is thin enough for a kerb: below the depth `kerbs`, and not dry."""
+    films = 0
+    for i in range(n):
+        films += 1 if THIN < here[i] < kerbs else 0
+    return films > 0
+
+
+@njit
+def put_limited(scheme, limiter, kerbs, n, before, here, after, sides):
     """Write the values at both faces of n cells to `sides`: cell values under UPWIND, else with limited slopes.
 
-    before, here, after : values of the cells and of their neighbours before and after
+    kerbs : greatest depth of cells at kerbs [m]; before, here, after : values of the cells, and of their neighbours
     """
     if scheme == UPWIND:
         for i in range(n):
             h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
             put_side(i, h, e, u, v, h, e, u, v, 0.0, sides)
+    elif kerbs > THIN and has_films(n, kerbs, here):
+        by_limiter(put_sloped_at_kerbs, limiter, n, before, here, after, sides)
     else:
         by_limiter(put_sloped, limiter, n, before, here, after, sides)
 

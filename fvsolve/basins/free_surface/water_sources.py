@@ -12,7 +12,8 @@ little. Green and Ampt's F(T) is the root of q(F) = F - S ln(1 + F / S) = K T. I
 step could follow f_p(F). While T is below EARLY, the rate is therefore multiplied by 1 + (T - q(F) / K) g, with g from
 1 / s at first to 1 / DRAIN_TIME: F returns to F(T) from any error of the first steps. This rate is at most twice what
 the next DRAIN_TIME needs, by the bound F(T) <= sqrt(2 S K T) + K T. A supply s, above this bound, limits the
-infiltration in the first instant only, until F = K S / s: time then lags by K S / (2 s^2).
+infiltration in the first instant only, until F = K S / s: time then lags by K S / (2 s^2). From EARLY on F alone gives
+the capacity, and T stays as it is.
 """
 
 from math import exp, log1p, sqrt
@@ -25,6 +26,7 @@ DRAIN_TIME = 10.0  # [s]
 EARLY = 20.0 * DRAIN_TIME  # condensed time in which errors of the first steps vanish [s]
 FIRST = 2.0  # condensed time in which a lag of the first instant is spread [s]
 TINY = 1e-300
+UNKNOWN = -1.0  # in place of the rate of a condensed time
 # Numbers in `work`: mean rate of rain [m/s]; position among the frames of rain
 RATE_OF_RAIN, POSITION = range(2)
 PRESENT_NUMBERS = 2
@@ -111,29 +113,53 @@ def limit_by_green_ampt(soil, supply, heights, times, rates, aging):
     k, s, early = soil
     least = 1e300
     for i in range(rates.size):
-        capacity = k[i] + k[i] * s[i] / max(heights[i], TINY)
-        rates[i] = min(capacity, supply[i])
-        aging[i] = rates[i] / max(capacity, TINY)
+        rates[i] = min(k[i] + k[i] * s[i] / max(heights[i], TINY), supply[i])
+        aging[i] = 0.0
         least = min(least, heights[i] - early[i])
-    for i in range(rates.size if least < 0.0 else 0):
-        if heights[i] < early[i]:
-            height = max(heights[i], TINY)
-            store = max(s[i], TINY)
+    if least < 0.0:
+        limit_early(soil, supply, heights, times, rates, aging)
+
+
+@njit
+def limit_early(soil, supply, heights, times, rates, aging):
+    """Replace the rates of `limit_by_green_ampt` in cells whose condensed time is below EARLY."""
+    k, s, early = soil
+    for i in range(rates.size):
+        # A lower bound of the capacity, as 2 x / (2 + x) is one of the logarithm: most cells take the whole supply.
+        height, time = max(heights[i], TINY), max(times[i], 0.0)
+        ratio, steeper = height / max(s[i], TINY), 1.0 + s[i] / height
+        lag = k[i] * times[i] - height * (ratio / (2.0 + ratio))
+        least = min(steeper * (k[i] + lag * gain(time)), most_early(k[i], s[i], time, height))
+        takes_all, is_early = least > supply[i], heights[i] < early[i]
+        rates[i] = supply[i] if is_early and takes_all else rates[i]
+        slow = min(supply[i] / max(steeper * k[i], TINY), 1.0)
+        aging[i] = (slow if takes_all else UNKNOWN) if is_early else 0.0
+    for i in range(rates.size):
+        if aging[i] == UNKNOWN:
+            height, store, time = max(heights[i], TINY), max(s[i], TINY), max(times[i], 0.0)
             steeper = 1.0 + s[i] / height
             # by the lag of the height behind its condensed time
             lag = k[i] * times[i] - (height - store * log1p(height / store))
-            gain = max(1.0 / DRAIN_TIME, 3.0 / (3.0 + max(times[i], 0.0)))  # [1/s]
-            ahead = k[i] * (max(times[i], 0.0) + DRAIN_TIME)
-            capacity = min(
-                steeper * (k[i] + lag * gain),
-                (sqrt(2.0 * store * ahead) + ahead - height) * (2.0 / DRAIN_TIME),
-            )
+            capacity = min(steeper * (k[i] + lag * gain(time)), most_early(k[i], s[i], time, height))
             rates[i] = min(max(capacity, 0.0), supply[i])
             if capacity <= supply[i]:  # at capacity time passes, less the lag of the first instant
                 lost = min(0.5 * k[i] * store / max(supply[i] * supply[i], TINY), FIRST)
                 aging[i] = 1.0 - lost * (1.0 / FIRST) * exp(-times[i] * (1.0 / FIRST))
             else:
                 aging[i] = min(supply[i] / max(steeper * k[i], TINY), 1.0)
+
+
+@njit(forceinline=True)
+def gain(time):
+    """Rate at which a height returns to that of its condensed time [1/s]."""
+    return max(1.0 / DRAIN_TIME, 3.0 / (3.0 + time))
+
+
+@njit(forceinline=True)
+def most_early(k, s, time, height):
+    """Greatest rate of infiltration [m/s]: twice what the next DRAIN_TIME needs."""
+    ahead = k * (time + DRAIN_TIME)
+    return (sqrt(2.0 * max(s, TINY) * ahead) + ahead - height) * (2.0 / DRAIN_TIME)
 
 
 @njit
