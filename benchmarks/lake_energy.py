@@ -140,9 +140,8 @@ def main() -> None:
                 return float(area @ ((C * y[0]) ** 2 + y[1] ** 2 + y[2] ** 2))
 
             for name, (scheme, wide) in SCHEMES.items():
-                water = surface_mesh.MeshWater(
-                    G, scheme, min(wide, surface_mesh.MOST_OVERSHOOT), np.stack([depth, 0.0 * depth]), None
-                )
+                most, plan = min(wide, surface_mesh.MOST_OVERSHOOT), np.stack([depth, 0.0 * depth])
+                water = surface_mesh.MeshWater(G, scheme, most, plan, surface_mesh.kerbs_of(mesh, -depth), None)
                 liquid = LiquidScheme(C, 1000.0, None, False, scheme, 0, 0.0, wide)
                 ratios = {
                     "water": greatest_energy(

@@ -50,10 +50,8 @@ class Field:
     def shallow(self, scheme, plan, y, reflect=NONE, flow=NONE, wide=WIDE):
         """Return (rates, greatest rate); work starts as NaN, to detect values that are read before they are written."""
         work, found = np.full(work_size(surface_mesh, self.integers), np.nan), np.full_like(y, np.nan)
-        water, states = (
-            surface_mesh.MeshWater(G, scheme, min(wide, surface_mesh.MOST_OVERSHOOT), plan, None),
-            tuple(np.ascontiguousarray(y)),
-        )
+        kerbs, wide = surface_mesh.kerbs_of(self.mesh, plan[1] - plan[0]), min(wide, surface_mesh.MOST_OVERSHOOT)
+        water, states = surface_mesh.MeshWater(G, scheme, wide, plan, kerbs, None), tuple(np.ascontiguousarray(y))
         rate = water_mesh_rates(
             water, self.floats, self.integers, reflect, states, flow, NONE, work, tuple(found), self.band, None, None
         )

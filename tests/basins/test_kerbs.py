@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
+from reference.meshes import write
 from reference.scenes import scene
 
 import fvsolve
@@ -63,3 +64,36 @@ def test_kerbs_of_other_slopes_rains_and_cells(scheme, limiter, slope, rain):
         numerics = {"scheme": scheme, "limiter": limiter}
         share, _ = hillside(plane(slope, kerb), rain / 3.6e6, end, numerics, cells=cells)
         assert np.abs(share - 1.0).max() < 1e-3, (kerb, cells)
+
+
+def triangles(folder, mixed):
+    """Mesh file of 20 m by 2 m, cells of 1 m cut into triangles, shaken but at 15 m; its lower end is `east`."""
+    x, y = np.meshgrid(np.arange(21.0), np.arange(3.0))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    inner = (points[:, 1] == 1.0) & (points[:, 0] % 20 > 0.0) & (points[:, 0] != 15.0)
+    points[inner] += np.random.default_rng(1).uniform(-0.25, 0.25, (inner.sum(), 2))
+    cells = []
+    for k in (k for k in range(41) if k != 20):
+        a, b, c, d = k, k + 1, k + 22, k + 21
+        whole = mixed and k % 2 == 0
+        cells += [[a, b, c, d]] if whole else [[a, b, c], [a, c, d]] if k % 3 else [[a, b, d], [b, c, d]]
+    return write(folder / "hill.msh", points, cells, {"east": [[20, 41], [41, 62]]})
+
+
+@pytest.mark.parametrize("mixed", [False, True])
+def test_a_film_over_a_kerb_of_triangles_comes_to_rest_at_the_rain(tmp_path, mixed):
+    path = str(triangles(tmp_path, mixed))
+    for slope, rain, kerb, at in [
+        (0.05, 60.0, 0.02, 15.0), (0.05, 60.0, 0.05, 15.0), (0.05, 60.0, 0.1, 15.0), (0.05, 60.0, -0.05, 15.0),
+        (0.05, 60.0, 0.1, 13.3), (0.15, 200.0, 0.05, 15.0), (0.02, 10.0, 0.05, 13.3),
+    ]:  # fmt: skip
+        rate, end = rain / 3.6e6, 1500.0 * (60.0 / rain) ** 0.6
+        hill = {"type": "basin", "level": -1.0, "elevation": 0.0, "mesh": {"file": path}, "manning": 0.02, "rain": rate,
+                "bed": plane(slope, kerb).replace("(s)", "x").replace("- s", "- x").replace("x < 15", f"x < {at}"),
+                "patches": {"east": {"boundary": "critical"}}}  # fmt: skip
+        probes = ["hill.east.flow", "hill.depth@7.5,1.1"]
+        found = fvsolve.run(scene({"hill": hill}, {}, end, {"scheme": "muscl"}, probes, every=end / 200))
+        share = -found["hill.east.flow"][100:] / (rate * 2.0 * LONG)
+        assert np.abs(share - 1.0).max() < 5e-3, (slope, rain, kerb, at)
+        right = (0.02 * rate * 7.5 / math.sqrt(slope)) ** 0.6
+        assert found["hill.depth@7.5,1.1"][-1] == approx(right, rel=0.02)

@@ -307,6 +307,7 @@ class FreeSurfaceRows(RowsWithFriction):
             row["kerbs"] = draft.to_plane(kerbs)
         else:
             row["work"] = draft.to_work(mesh_blocks.work_size(surface_mesh, self.integers))
+            row["kerbs"] = draft.to_plane(surface_mesh.kerbs_of(self.mesh, self.bed))
         row["plan"] = draft.to_plane(plan)
         lower_marks(draft, self, row)
         has_faces = self.driven or self.marks.faces.size

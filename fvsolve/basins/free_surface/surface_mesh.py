@@ -6,6 +6,9 @@ of the cell. So every term is zero where the surface is level: a lake at rest st
 With `muscl` the flux of tangential momentum over an uneven bed has a term for its jump: without it, vortices of the
 size of cells, which HLLC does not damp in water at rest, are coupled with waves by the differences of depth, and grow.
 Cells have depth, surface, both velocities, wave speed and bed; depths at sides are limited surface minus limited bed.
+At a kerb, where neighbours are farther from a common plane than a quarter of the depth of a film, bed and surface are
+nearly level within the cell: their limited slopes differ by more than the film, which would pulse. The bed of a bowl is
+no kerb: films on its shore would drain too slowly.
 """
 
 from math import sqrt
@@ -25,6 +28,7 @@ from fvsolve.kernels.dtypes import UPWIND
 
 # Greatest `wide_by`: with 2, exact for linear fields, ripples on a lake over a rough bed gain energy.
 MOST_OVERSHOOT = 1.5
+SMOOTH = 1.0 / 16.0  # part of the rise to a neighbour that the bend of a smooth bed may reach, which is no kerb
 DEPTH, SURFACE = 0, 1  # rows of plan: depth of the profile, its surface above the level
 FIELDS, ROWS_OF_CELLS, SHOWN = 4, 6, 2  # see `mesh_blocks`
 
@@ -43,6 +47,7 @@ class MeshWater(NamedTuple):
     g : gravity normal to the basin [m/s2]; scheme : UPWIND or MUSCL
     wide_by : factor on the range of the neighbours that limits values at sides; with 1 they stay within that range
     plan : float64[2, n]  depth at rest and surface at rest above the level [m]
+    kerbs : float64[BLOCK blocks]  for each cell the depth below which its bed is a kerb [m], see `kerbs_of`
     faces : None, or the `DrivenFaces` of driven patches; marks : None, or the `MarkedFaces` of walls and sections
     """
 
@@ -50,6 +55,7 @@ class MeshWater(NamedTuple):
     scheme: int
     wide_by: float
     plan: np.ndarray
+    kerbs: np.ndarray
     faces: DrivenFaces | None
     marks: MarkedFaces | None = None
 
@@ -69,6 +75,28 @@ def put_cells(water, mesh, j, states, cells, phi):
     put_primitives(water.g, plan[DEPTH, a:z], plan[SURFACE, a:z], dh[a:z], qx[a:z], qy[a:z], h, e, u, v, c)
     for i in range(z - a):
         cells[5, o + i] = plan[SURFACE, a + i] - plan[DEPTH, a + i]
+
+
+def kerbs_of(mesh, bed):
+    """`MeshWater.kerbs` of a bed : float64[n].
+
+    It is four times the greatest distance of the bed in neighbours from the plane that fits them and the cell best,
+    beyond that of a smooth bed.
+    """
+    inner, n = mesh.right >= 0, bed.size
+    left, right = mesh.left[inner], mesh.right[inner]
+    across, rise = mesh.centre[right] - mesh.centre[left], bed[right] - bed[left]
+    own, across, rise = np.append(left, right), np.append(across, -across, axis=0), np.append(rise, -rise)
+    weight = 1.0 / np.sum(across**2, axis=1)
+    # what is added determines the plane of cells whose neighbours lie in a line
+    squares, products = np.tile(1e-9 * np.eye(2), (n, 1, 1)), np.zeros((n, 2, 1))
+    np.add.at(squares, own, weight[:, None, None] * across[:, :, None] * across[:, None, :])
+    np.add.at(products[..., 0], own, (weight * rise)[:, None] * across)
+    on_plane = np.sum(across * np.linalg.solve(squares, products)[own, :, 0], axis=1)
+    distances, rises = np.zeros((2, -(-n // BLOCK) * BLOCK))
+    np.maximum.at(distances, own, np.abs(rise - on_plane))
+    np.maximum.at(rises, own, np.abs(on_plane))
+    return 4.0 * np.maximum(distances - SMOOTH * rises, 0.0)
 
 
 @njit
@@ -97,7 +125,7 @@ def put_sides(water, mesh, j, first, last, reflect, cells, sides, shown, w, move
         i = ring_place(mesh.edges[q], mesh.ring)
         shown[q], shown[b + q] = cells[5, i], e[i]
     put_beyond(water.faces, moves, mesh, first, last, BEYOND, shown)
-    put_shores(h[o:], shore)
+    put_shores(water.kerbs[j * BLOCK :], h[o:], shore)
     limited_sides(j, floats, integers, cells[5], wide_by, shore, su, edges, w[_C:], sides[0])
     side.gather_beyond(j, integers, e, w)
     lower_shores(mesh.slots, h[o:], e[o:], w)
@@ -318,13 +346,16 @@ def put_depths(slots, h, depth, surface):
 
 
 @njit
-def put_shores(h, shore):
-    """Write the allowed difference of the surface between a cell and its sides: 0 for dry cells, else HUGE.
+def put_shores(kerbs, h, shore):
+    """Write the allowed differences of bed and surface between a cell and its sides: 0 for dry cells, else HUGE.
 
-    h : depths of a block of cells; shore : the allowed differences
+    At a kerb they are h / 8 at half the depth from which on it is none, less for thinner films, and grow without bound
+    up to that depth.
+    kerbs : see `MeshWater`; h : depths of a block of cells; shore : the allowed differences
     """
     for i in range(BLOCK):
-        shore[i] = HUGE if h[i] > 0.0 else 0.0
+        film = h[i] * h[i] / (8.0 * max(kerbs[i] - h[i], TINY)) if h[i] < kerbs[i] else HUGE
+        shore[i] = film if h[i] > 0.0 else 0.0
 
 
 @inline

@@ -5,7 +5,7 @@ from math import inf
 from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_patches import needs_rates, normal_gravity, physics_code, put_open_flows
 from fvsolve.basins.boundary_cells import band_cells
-from fvsolve.basins.cell_sides import deviations_of
+from fvsolve.basins.cell_sides import BLOCK, deviations_of
 from fvsolve.basins.free_surface import surface_grid, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import add_capped_friction, add_friction, damp_flows
 from fvsolve.basins.free_surface.marked_faces import marked_faces, no_marks
@@ -224,8 +224,9 @@ def mesh_rates(tables, b, y, rates, out, moves, faces, marks):
     flow = work[:0]
     if f >= 0:  # needed for scalars
         flow = work[f : f + basin["faces"]]
+    kerbs = tables.plane[basin["kerbs"] :][: -(-n // BLOCK) * BLOCK]
     wide = min(basin["wide"], surface_mesh.MOST_OVERSHOOT)
-    water = surface_mesh.MeshWater(grid.g, basin["scheme"], wide, grid.plan, faces, marks)
+    water = surface_mesh.MeshWater(grid.g, basin["scheme"], wide, grid.plan, kerbs, faces, marks)
     floats, integers = tables.plane[basin["mesh"] :], tables.integers[basin["links"] :]
     states = seen[o : o + n], seen[o + n : o + 2 * n], seen[o + 2 * n : o + 3 * n]
     passing, scratch = work[max(through, 0) :][: basin["outer_given"] if through >= 0 else 0], work[basin["work"] :]
