@@ -343,21 +343,23 @@ class Solution:
 
 
 def solution(network: Network, largest: int = LARGEST) -> Solution:
-    """Extremes of a network by characteristics on two grids, the finer with half the step; see `ACCURATE`.
+    """Extremes of a network by characteristics on three grids, each with half the step of the last; see `ACCURATE`.
 
-    The uncertainty is the difference of both grids, or the height of a smooth peak between two points of the finer
-    grid: its points include those of the coarser grid, so both may miss a peak by the same amount.
+    The uncertainty is the greater of the last two differences, because a check valve shuts at a point of each grid, and
+    two grids may have the same one; or it is the height of a smooth peak between two points of the finest grid: its
+    points include those of the others, so all may miss a peak by the same amount.
     """
     heads, flows = steady_state(network)
-    division = 4
+    division, last = 4, np.inf
     coarse, _, _ = march(network, heads, flows, division)
     while True:
         division *= 2
         fine, shut, bends = march(network, heads, flows, division)
         off, span = np.abs(fine - coarse), np.ptp(fine, axis=1, keepdims=True)
-        if division >= largest or np.all(off <= ACCURATE * span + 1e-9):
-            return Solution(fine, np.maximum(off, np.minimum(0.125 * bends, ACCURATE * span)), division, shut)
-        coarse = fine
+        uncertain = np.maximum(off, last)
+        if division >= largest or np.all(uncertain <= ACCURATE * span + 1e-9):
+            return Solution(fine, np.maximum(uncertain, np.minimum(0.125 * bends, ACCURATE * span)), division, shut)
+        coarse, last = fine, off
 
 
 def march(network: Network, heads: np.ndarray, flows: np.ndarray, division: int) -> tuple[np.ndarray, int, np.ndarray]:

@@ -89,3 +89,23 @@ def test_jumps_that_arrive_together_by_several_paths(h):
         one, exact = found.extremes[probe], truth.extremes[probe]
         assert one.minimum == pytest.approx(exact.minimum, abs=1e-3 * (exact.maximum - exact.minimum))
         assert one.maximum == pytest.approx(exact.maximum, abs=1e-3 * (exact.maximum - exact.minimum))
+
+
+@pytest.mark.parametrize("pipe_model", ["delay-line", "auto"])
+@pytest.mark.parametrize("share, delay", [(0.5, 0.0), (2.0 / 7.0, 3.0 / 7.0)])
+def test_jumps_that_cross_at_a_probe(pipe_model, share, delay):
+    """Opposite jumps from both ends meet at a probe at the same time: its head stays as it is, until they return.
+
+    delay : times the travel time, by which the jump at the near end begins later
+    """
+    travel, flow = 0.317, 0.01
+    times = [0.5 + delay * travel, 0.5]
+    nodes = {"lake": lake(100.0), "far": lake(100.0),
+             "a": junction({"start": times[0], "duration": 0.0, "value": [0.0, flow]}),
+             "b": junction({"start": times[1], "duration": 0.0, "value": [0.0, -flow]})}  # fmt: skip
+    links = {"p": line("lake", "a", 3000.0), "q": line("a", "b", 1000.0 * travel), "r": line("b", "far", 3000.0)}
+    end = 0.5 + (1.0 - share) * travel + 0.9 * share * travel
+    probe = f"q.head@{share}"
+    case = scene(nodes, links, end, {"pipe_model": pipe_model, "step": 0.0123}, [probe], 0.01)
+    found = fvsolve.run(case).extremes[probe]
+    assert found.minimum == pytest.approx(100.0, abs=1e-6) and found.maximum == pytest.approx(100.0, abs=1e-6)

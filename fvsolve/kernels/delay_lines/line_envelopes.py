@@ -67,10 +67,12 @@ def line_extremes_at_jumps(past, places, clock, line, both, shares, sign, begin,
             reached = history.count_until(past, places, other, reached, sent + back + same)
             here = wave_at_jump(past, places, clock, ring, mask, head, wave, i)
             there = smooth_wave_linear(past, clock, other_ring, mask, 1 - wave, sent + back)
-            there += history.sum_of_first(past, places, other, reached)
+            earlier = history.count_back(past, places, other, reached, sent + back - same)
             for side in range(2):
+                # jumps that cross at the point change both waves at once
                 moved = here - (1 - side) * size
-                value = moved + sign * there if wave == 0 else there + sign * moved
+                met = there + history.sum_of_first(past, places, other, earlier if side == 0 else reached)
+                value = moved + sign * met if wave == 0 else met + sign * moved
                 if value < least:
                     least, t_least = value, sent + share * tau
                 if value > greatest:
