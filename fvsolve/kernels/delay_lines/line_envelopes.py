@@ -71,8 +71,8 @@ def line_extremes_at_jumps(past, places, clock, line, both, shares, sign, begin,
             for side in range(2):
                 # jumps that cross at the point change both waves at once
                 moved = here - (1 - side) * size
-                met = there + history.sum_of_first(past, places, other, earlier if side == 0 else reached)
-                value = moved + sign * met if wave == 0 else met + sign * moved
+                opposite = there + history.sum_of_first(past, places, other, earlier if side == 0 else reached)
+                value = moved + sign * opposite if wave == 0 else opposite + sign * moved
                 if value < least:
                     least, t_least = value, sent + share * tau
                 if value > greatest:
