@@ -50,7 +50,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/attitude": (447, 2),
     "tests/basins": (10498, 36),
     "tests/case": (4535, 16),
-    "tests/cli": (1130, 8),
+    "tests/cli": (1132, 8),
     "tests/draw": (232, 2),
     "tests/epanet": (645, 2),
     "tests/exact": (475, 2),
