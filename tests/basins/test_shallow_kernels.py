@@ -358,3 +358,24 @@ def test_no_water_flows_through_a_wall_to_the_last_bit(scheme):
     along, across = water.flow_x.reshape(7, 10), water.flow_y.reshape(8, 9)
     assert not along[:, [0, -1]].any() and not across[[0, -1]].any()
     assert np.abs(along[:, 1:-1]).min() > 0.0
+
+
+@pytest.mark.parametrize("limiter", [MINMOD, VAN_LEER, MONOTONIZED_CENTRAL])
+@pytest.mark.parametrize("reflect", [NONE, np.zeros(2 * (9 + 7))], ids=["walls", "open"])
+def test_rows_without_kerbs_or_films_have_the_rates_of_all_rows_treated_as_kerbs(limiter, reflect, monkeypatch):
+    """`kerbs_of` only saves work: with every row treated, all bits of the rates are the same."""
+    random = np.random.default_rng(4)
+    bed = np.where(random.random((7, 9)) < 0.3, 0.05, 0.0) * (np.arange(7) % 3 == 0)[:, None] + 0.02 * np.arange(9)
+    water = Water(np.arange(10.0), np.arange(8.0), bed, -1.0, limiter=limiter, reflect=reflect)
+    water.plan[0] = 0.0
+    water.plan[1] = bed.ravel() - bed.min()
+    y, saved, treated = np.zeros((3, 7, 9)), np.zeros((3, 7, 9)), np.zeros((3, 7, 9))
+    y[0] = 10.0 ** random.uniform(-5.0, 0.0, (7, 9)) * (random.random((7, 9)) > 0.1)
+    y[1:] = 0.1 * y[0] * random.standard_normal((2, 7, 9))
+    water.rates(y, saved)
+    monkeypatch.setitem(globals(), "kerbs_of", lambda bed: np.full(2 * len(bed), 1e9))
+    water.rates(y, treated)
+    assert np.array_equal(saved, treated) and np.abs(saved).max() > 0.0
+    monkeypatch.setitem(globals(), "kerbs_of", lambda bed: np.zeros(2 * len(bed)))
+    water.rates(y, treated)
+    assert not np.array_equal(saved, treated)

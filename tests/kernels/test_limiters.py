@@ -65,13 +65,13 @@ def liquid_carried(code: int) -> np.ndarray:
     return found
 
 
-def shallow_sides(code: int, has_kerbs: bool) -> np.ndarray:
+def shallow_sides(code: int, kerbs: float) -> np.ndarray:
     rng, found = np.random.default_rng(7), np.zeros(shallow_rows.PUSH + CELLS)
     rows = [np.zeros(shallow_rows.NORTH + CELLS) for _ in range(3)]
     for row in rows:
         for at in (0, shallow_rows.SURFACE, shallow_rows.EAST, shallow_rows.NORTH):
             row[at : at + CELLS] = rng.random(CELLS)
-    shallow_rows.put_limited(rec.MUSCL, code, has_kerbs, CELLS, *rows, found)
+    shallow_rows.put_limited(rec.MUSCL, code, kerbs, CELLS, *rows, found)
     return found
 
 
@@ -83,8 +83,8 @@ KERNELS = {
     "scalars on grids": carried,
     "liquid on grids": liquid_faces,
     "liquid on grids, momentum": liquid_carried,
-    "free surface on grids": lambda code: shallow_sides(code, False),
-    "free surface on grids, kerbs": lambda code: shallow_sides(code, True),
+    "free surface on grids": lambda code: shallow_sides(code, 0.0),
+    "free surface on grids, kerbs": lambda code: shallow_sides(code, 1.0),
 }
 
 

@@ -349,9 +349,8 @@ def put_depths(slots, h, depth, surface):
 def put_shores(kerbs, h, shore):
     """Write the allowed differences of bed and surface between a cell and its sides: 0 for dry cells, else HUGE.
 
-    At a kerb they are h / 8 at half the depth from which on it is none, less for thinner films, and grow without bound
-    up to that depth.
-    kerbs : see `MeshWater`; h : depths of a block of cells; shore : the allowed differences
+    In a film at a kerb, of a depth h below the depth k of the kerb, they are h^2 / (8 (k - h)).
+    kerbs : k, see `MeshWater`; h : depths of a block of cells; shore : the allowed differences
     """
     for i in range(BLOCK):
         film = h[i] * h[i] / (8.0 * max(kerbs[i] - h[i], TINY)) if h[i] < kerbs[i] else HUGE

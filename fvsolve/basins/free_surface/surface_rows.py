@@ -195,7 +195,7 @@ def put_sloped(limiter, n, before, here, after, sides):
 
 @inline
 def put_sloped_at_kerbs(limiter, n, before, here, after, sides):
-    """Do the same as `put_sloped`, but otherwise at kerbs.
+    """Write the values at both faces of n cells as `put_sloped` does, but with smaller slopes at kerbs.
 
     At a kerb, where the second difference of the bed exceeds h / 4 and no cell is dry, the slope of the bed exceeds
     that by minmod by no more than the film allows. That of minmod never raises the side of a cell above the next
