@@ -1,5 +1,9 @@
 """Entry point of `python -m fvsolve`."""
 
-from fvsolve.cli import main
+from fvsolve.child_process import forget_present_folder
+
+forget_present_folder()
+
+from fvsolve.cli import main  # noqa: E402
 
 main()

@@ -13,6 +13,7 @@ from fvsolve.compile.cache_folders import (
     code_folder,
     is_cold,
     other_caches,
+    reading_folders,
     source_hash,
 )
 from fvsolve.compile.functions import (
@@ -32,5 +33,5 @@ from fvsolve.compile.functions import (
 __all__ = [
     "ARRAYS", "COMPILING", "DeclaredFunction", "Intrinsic", "add_sources", "cache_folder", "code_folder",
     "compile_in_parallel", "compile_once", "compile_signature", "declare_function", "inline", "is_cold", "njit",
-    "other_caches", "plain_kinds", "source_hash", "specialise",
+    "other_caches", "plain_kinds", "reading_folders", "source_hash", "specialise",
 ]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import functools
 import hashlib
@@ -12,7 +13,8 @@ import tempfile
 import warnings
 from pathlib import Path
 
-from fvsolve.compile import store
+from fvsolve.compile import file_access, store
+from fvsolve.errors import FvsolveError
 
 TEST_BYTES = 65536  # bytes that are written to test if a folder can hold caches
 KEPT_GENERATIONS = 3  # generations of compiled code kept in addition to the present one
@@ -29,15 +31,50 @@ EXTRA_FOLDERS: dict[Path, str] = {}  # other folders with compiled functions -> 
 
 @functools.cache
 def cache_folder() -> Path:
-    """Folder of cached data: compiled code and fluid properties.
+    """Folder in which cached data are stored: compiled code and fluid properties.
 
-    It is `FVSOLVE_CACHE` if set, else the cache folder of the user; if not writable, a folder below the temporary
-    folder.
+    It is `FVSOLVE_CACHE` if set, else the cache folder of the user; if not writable, a private folder below the
+    temporary folder. Raises FvsolveError if another user can write in the preferred folder: its code would run.
     """
-    for folder in (_preferred_folder(), Path(tempfile.gettempdir()) / f"fvsolve-cache-{_user()}"):
-        if _writable(folder):
-            return folder
-    return Path(tempfile.mkdtemp(prefix="fvsolve-cache-"))
+    preferred = _preferred_folder()
+    _check_access(preferred)
+    if _writable(preferred):
+        _check_access(preferred)  # another user may have created it in between
+        return preferred
+    return _private_folder()
+
+
+@functools.cache
+def reading_folders() -> tuple[Path, ...]:
+    """Folders from which cached data are read: `cache_folder`, and before it a preferred folder that is read-only."""
+    return tuple(dict.fromkeys(folder for folder in (_preferred_folder(), cache_folder()) if folder.is_dir()))
+
+
+def _check_access(folder: Path) -> None:
+    """Raise FvsolveError if another user can write in an existing folder."""
+    if fault := file_access.fault(folder):
+        stated = "FVSOLVE_CACHE = " if os.environ.get("FVSOLVE_CACHE") else ""
+        raise FvsolveError(
+            f"{stated}{folder}: {fault}, so that another user could store machine code that would run here. Expected a "
+            f"folder of this user or of root that only its owner can write; {file_access.REMEDY}, or set FVSOLVE_CACHE "
+            "to another folder"
+        )
+
+
+def _private_folder() -> Path:
+    """Folder below the temporary folder that only this user can read and write.
+
+    Its name is the same at each start, so that code is compiled once. If another user occupies the name, the folder
+    has a random name and is deleted at the end of the process.
+    """
+    folder = Path(tempfile.gettempdir()) / f"fvsolve-cache-{_user()}"
+    with contextlib.suppress(OSError):
+        folder.mkdir(mode=0o700)
+    if not folder.is_symlink() and not file_access.fault(folder) and _writable(folder):
+        return folder
+    folder = Path(tempfile.mkdtemp(prefix="fvsolve-cache-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 @functools.cache
@@ -68,7 +105,9 @@ def code_folder() -> Path:
     """
     folder = cache_folder() / "code" / source_hash()
     own = folder / store.target()["name"]
-    own.mkdir(parents=True, exist_ok=True)
+    for path in (folder.parent, folder, own):
+        path.mkdir(mode=0o755, exist_ok=True)
+        _check_access(path)
     with contextlib.suppress(OSError):  # a full disk is reported when code is saved
         store.write_target(own)
     os.utime(folder)
@@ -76,18 +115,28 @@ def code_folder() -> Path:
     return own
 
 
+@functools.cache
+def code_folders() -> tuple[Path, ...]:
+    """Folders from which code is loaded: `code_folder`, and before it that of a preferred folder that is read-only."""
+    below = Path("code", source_hash(), store.target()["name"])
+    others = [folder / below for folder in reading_folders() if folder != cache_folder()]
+    for path in (path for other in others for path in (other, *other.parents[:2]) if path.is_dir()):
+        _check_access(path)
+    return (*(other for other in others if other.is_dir()), code_folder())
+
+
 def is_cold() -> bool:
     """True if compilation is enabled and no function of this version is cached for this machine.
 
     Then they must be compiled first.
     """
-    return COMPILING and not any(code_folder().rglob(f"*{CODE_SUFFIX}"))
+    return COMPILING and not any(path for folder in code_folders() for path in folder.rglob(f"*{CODE_SUFFIX}"))
 
 
 def is_cached(name: str) -> bool:
     """True if the code of a function of the package is cached for this machine."""
     if store.IN_USE:
-        return any(code_folder().glob(f"{name}-*{CODE_SUFFIX}"))
+        return any(path for folder in code_folders() for path in folder.glob(f"{name}-*{CODE_SUFFIX}"))
     return any(code_folder().rglob(f"*.{name}-*{CODE_SUFFIX}"))
 
 
@@ -147,7 +196,7 @@ def _user() -> str:
 
 def _writable(folder: Path) -> bool:
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o755, parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder) as file:
             file.write(bytes(TEST_BYTES))  # fails on a full disk
         return True

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.child_process import python_command, python_environment
 from fvsolve.compile import cache_folders as folders
 from fvsolve.compile import store
 from fvsolve.compile.numba_internals import LOADED_CODE, code_of, dispatcher_class, numba_module
@@ -120,9 +121,8 @@ def compile_in_parallel(code: str, cached: str):
     if not folders.COMPILING or (os.cpu_count() or 1) < 2 or folders.is_cached(cached):
         yield
         return
-    path = os.pathsep.join([str(folders.PACKAGE.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
     quiet = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
-    process = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": path}, **quiet)
+    process = subprocess.Popen(python_command("-c", code), env=python_environment(), **quiet)
     try:
         yield
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -226,15 +226,19 @@ class Function:
         return self.codes[key]
 
     def _stored(self, key: str) -> Code | None:
-        path = self._path(key)
-        return None if path is None else store.read(path, self._identity(key))
+        if (name := self._file_name(key)) is None:
+            return None
+        identity = self._identity(key)
+        codes = (store.read(folder / name, identity) for folder in folders.code_folders())
+        return next((code for code in codes if code is not None), None)
 
     def _compiled(self, key: str, kinds: tuple, wrappers: bool) -> Code:
         compiler = self.numba if wrappers else self.numba.within
         compiler.compile(kinds)
         compiled = compiler.overloads[kinds]
         code = code_of(compiled, wrappers)
-        if (path := self._path(key)) is not None:
+        if (name := self._file_name(key)) is not None:
+            path = folders.code_folder() / name
             try:
                 loaded = LOADED_CODE.get(compiled.fndesc.llvm_func_name)
                 store.write(
@@ -244,8 +248,8 @@ class Function:
                 folders.warn_not_cached(error.strerror or str(error))
         return code
 
-    def _path(self, key: str) -> Path | None:
-        """Path of the file for the machine code of a signature; None for a function whose code is not stored.
+    def _file_name(self, key: str) -> str | None:
+        """File for the machine code of a signature, below the folder of code; None if its code is not stored.
 
         Closures, local functions and functions of sources that are not hashed are not stored; nothing is stored where
         `store.IN_USE` is False.
@@ -254,7 +258,7 @@ class Function:
         if self.folder is None or "<" in self.__qualname__ or self.py_func.__closure__ or not store.IN_USE:
             return None
         digest = hashlib.sha256(self._identity(key).encode()).hexdigest()[:12]
-        return folders.code_folder() / self.folder / f"{self.__name__}-{digest}{store.SUFFIX}"
+        return f"{self.folder}/{self.__name__}-{digest}{store.SUFFIX}".lstrip("/")
 
     def _identity(self, key: str) -> str:
         options = " ".join(f"{name}={value}" for name, value in sorted(self.options.items()))

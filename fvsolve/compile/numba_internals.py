@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import pickle
@@ -11,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from fvsolve.compile import file_access
 from fvsolve.compile.cache_folders import code_folder, warn_not_cached
 from fvsolve.compile.shorter_compilation import shorten_compilation
 from fvsolve.compile.store import IN_USE, Code
@@ -24,8 +26,13 @@ CACHE_DIR_LOCK = threading.Lock()  # locked while numba's cache folder is set
 def numba_module():
     """Module numba, imported at the first compilation; its warning about first-class functions is disabled."""
     import numba
+    from numba.core import config
     from numba.core.errors import NumbaExperimentalFeatureWarning
 
+    # Numba also reads settings from a file of the present folder, at each compilation. Code compiled with the settings
+    # of a stranger's folder would be stored for all later runs.
+    config._config_fname = ""
+    numba.config.reload_config()
     shorten_compilation()
     warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
     return numba
@@ -81,13 +88,18 @@ def cache_file_class() -> type:
 
     class CacheFile(IndexDataCacheFile):
         def _load_index(self) -> dict:
+            if file_access.fault(Path(self._index_path)):
+                return {}
             try:
                 return super()._load_index()
             except Exception:  # any error of pickle in an incomplete file
                 return {}
 
         def _load_data(self, name: str) -> Any:
-            digest, data = (content := Path(self._data_path(name)).read_bytes())[:DIGEST], content[DIGEST:]
+            content = file_access.read(Path(self._data_path(name)))
+            if content is None:
+                raise OSError(f"{name} cannot be read, or others can write it")  # numba then compiles it again
+            digest, data = content[:DIGEST], content[DIGEST:]
             if hashlib.sha256(data).digest() != digest:
                 raise OSError(f"{name} is damaged")  # numba then compiles it again
             content = pickle.loads(data)
@@ -100,6 +112,12 @@ def cache_file_class() -> type:
             data = dumps(data)
             with self._open_for_write(self._data_path(name)) as file:
                 file.write(hashlib.sha256(data).digest() + data)
+
+        @contextlib.contextmanager
+        def _open_for_write(self, path: str):
+            with super()._open_for_write(path) as file:
+                file_access.close_to_others(file.fileno())
+                yield file
 
         def save(self, key: Any, data: Any) -> None:
             try:

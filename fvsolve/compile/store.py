@@ -22,6 +22,8 @@ from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from fvsolve.compile import file_access
+
 DIGEST = hashlib.sha256().digest_size
 SUFFIX = ".code"
 # True if the store is used: LLVM's linker can link numba's objects on all systems but Windows.
@@ -127,7 +129,9 @@ def write(path: Path, identity: str, compiled, code: bytes, wrappers: bool) -> N
 def _replace(path: Path, data: bytes) -> None:
     fresh = path.with_name(f"{path.name}.{os.getpid()}")
     try:
-        fresh.write_bytes(data)
+        with open(fresh, "wb") as file:
+            file_access.close_to_others(file.fileno())
+            file.write(data)
         os.replace(fresh, path)
     except OSError:
         fresh.unlink(missing_ok=True)
@@ -135,14 +139,13 @@ def _replace(path: Path, data: bytes) -> None:
 
 
 def read(path: Path, identity: str) -> Code | None:
-    """Load a function from a file; None if its code is missing, damaged or cannot be used.
+    """Load a function from a file; None if its code is missing, damaged, or cannot be used, or others can write it.
 
     Code for another target, and code that cannot be linked, cause a warning.
     identity : text that identifies function and signature; it must be that of `write`
     """
-    try:
-        content = path.read_bytes()
-    except OSError:
+    content = file_access.read(path)
+    if content is None:
         return None
     digest, data = content[:DIGEST], content[DIGEST:]
     if hashlib.sha256(data).digest() != digest:

@@ -15,9 +15,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
+from fvsolve.child_process import python_command, python_environment
 from fvsolve.display import save
-
-PACKAGE = Path(__file__).resolve().parents[1]
 
 
 class Picture(NamedTuple):
@@ -54,13 +53,12 @@ class PlotProcess:
         self.process = None
         if not second_process or "matplotlib.figure" in sys.modules or processor_count() < 2 or not sys.executable:
             return
-        path = os.pathsep.join([str(PACKAGE.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
         # A process group of its own: Ctrl-C must interrupt only the run, which then reports on pictures.
         options = {"start_new_session": True} if os.name == "posix" else {"creationflags": 0x200}
         with contextlib.suppress(OSError):  # the system allows no second process
-            self.process = subprocess.Popen([sys.executable, "-P", "-m", "fvsolve.draw.plot_process"],
+            self.process = subprocess.Popen(python_command("-m", "fvsolve.draw.plot_process"),
                                             stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                                            env=os.environ | {"PYTHONPATH": path}, **options)  # fmt: skip
+                                            env=python_environment(), **options)  # fmt: skip
 
     def draw(self, pictures: Iterable[Picture]) -> dict[Path, str]:
         """Write pictures; returns the error text of each picture that could not be drawn, by its path."""

@@ -1,12 +1,12 @@
 """Pictures and animations of a field, drawn off screen by matplotlib or PyVista."""
 
-import os
 import pickle
 import re
 import subprocess
 import sys
 from pathlib import Path
 
+from fvsolve.child_process import python_command, python_environment
 from fvsolve.draw.scene import DrawnScene
 from fvsolve.errors import FvsolveError
 
@@ -49,12 +49,11 @@ def view(scene: DrawnScene, out: Path) -> None:
 
 
 def _draw_in_process(scene: DrawnScene, out: Path) -> None:
-    package = str(Path(__file__).resolve().parents[2])
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([package, *sys.path])}
+    environment = python_environment()
     if sys.platform.startswith("linux") and not environment.get("DISPLAY"):
         environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     request = pickle.dumps((scene, str(out)))
-    done = subprocess.run([sys.executable, "-m", "fvsolve.draw.field_canvas"], env=environment, input=request,
+    done = subprocess.run(python_command("-m", "fvsolve.draw.field_canvas"), env=environment, input=request,
                           capture_output=True)  # fmt: skip
     output = done.stderr.decode(errors="replace")
     if lost := re.search(r"No module named '(?:pyvista|vtk).*'", output):

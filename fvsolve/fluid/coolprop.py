@@ -17,10 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.compile.file_access import read as read_closed
 from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.fluid.laws import LAWS
 from fvsolve.fluid.oils import OILS
-from fvsolve.jit import cache_folder
+from fvsolve.jit import cache_folder, reading_folders
 
 TABLE_PRESSURE = 1e8  # upper end of a table [Pa], or twice the reference pressure if that is higher
 TARGET_ERROR = 1e-9  # relative density error at which refinement stops
@@ -224,11 +225,12 @@ def _cached(name: str, about: list, compute: Callable[[], dict[str, Any]]) -> di
     """Result of `compute`, read from a file if it is cached there; name, about : fluid, and further text of the key."""
     key = json.dumps([FORMAT, coolprop_version(), name, *about])
     stem = re.sub(r"[^A-Za-z0-9.-]+", "-", name)[:40]
-    path = cache_folder() / "fluids" / f"{stem}-{hashlib.sha256(key.encode()).hexdigest()[:24]}.json"
-    properties = _read(path, key)
+    file = f"fluids/{stem}-{hashlib.sha256(key.encode()).hexdigest()[:24]}.json"
+    found = (_read(folder / file, key) for folder in reading_folders())
+    properties = next((item for item in found if item is not None), None)
     if properties is None:
         properties = compute()
-        _write(path, key, properties)
+        _write(cache_folder() / file, key, properties)
     return properties
 
 
@@ -241,12 +243,12 @@ def coolprop_version() -> str:
 
 
 def _read(path: Path, key: str) -> dict[str, Any] | None:
-    """Properties in a cache file; None if the file is missing or damaged, or was written for another key.
+    """Properties in a cache file; None if it is missing, damaged, of another key, or open to other users.
 
     key : text of name, state, law and versions
     """
     try:
-        digest, body = path.read_text(encoding="utf-8").split("\n", 1)
+        digest, body = (read_closed(path) or b"").decode().split("\n", 1)
         if digest != hashlib.sha256(body.encode()).hexdigest():
             return None
         stored_key, properties = json.loads(body)
@@ -267,6 +269,7 @@ def _write(path: Path, key: str, properties: dict[str, Any]) -> None:
         handle, part = tempfile.mkstemp(dir=path.parent, suffix=".part")
         with os.fdopen(handle, "w", encoding="utf-8") as file:
             file.write(text)
+        os.chmod(part, 0o644)  # users of a shared folder read it
         os.replace(part, path)
     except OSError:
         return

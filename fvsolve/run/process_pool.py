@@ -11,6 +11,7 @@ from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection
 from typing import Any
 
+from fvsolve.child_process import safe_path
 from fvsolve.errors import RunError
 
 READY = "ready"
@@ -78,7 +79,7 @@ class Worker:
         self.pipe, far_end = context.Pipe()
         self.process = context.Process(target=serve, args=(far_end, work), daemon=True)
         self.started = False
-        with _no_interrupts(), _single_thread():
+        with _no_interrupts(), _single_thread(), safe_path():
             self.process.start()
         far_end.close()  # so that the pipe ends with the process
 
