@@ -2,12 +2,17 @@
 
 import difflib
 import re
+import time
+from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 LONGEST_NAME = 200  # length of a name above which it is not compared with others
+COMPARED: deque[float] = deque(maxlen=100)  # times at which the last names were compared with others [s]
+LONGEST_MESSAGE = 1500  # greatest length of the message of a fault; the rest is cut
+MOST_FAULTS = 50  # faults that a message lists; of further faults it states the number
 # Control characters, direction marks, line ends other than "\n", halves of surrogate pairs.
 INVISIBLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
@@ -27,7 +32,8 @@ class Fault:
 
     def __str__(self) -> str:
         where = "--set " if self.override else f"line {self.line}: " if self.line else ""
-        return f"{where}{self.place}: {self.message}" if self.place else f"{where}{self.message}"
+        cut = self.message if len(self.message) <= LONGEST_MESSAGE else f"{self.message[:LONGEST_MESSAGE]}..."
+        return f"{where}{self.place}: {cut}" if self.place else f"{where}{cut}"
 
 
 @dataclass(frozen=True)
@@ -61,17 +67,22 @@ class FvsolveError(Exception):
 
 
 class CaseError(FvsolveError):
-    """Invalid case, with all its faults: those of the file in the order of their lines, then those of overrides."""
+    """Invalid case, with all its faults: those of the file in the order of their lines, then those of overrides.
 
-    def __init__(self, faults: Iterable[Fault], file: str = "case"):
+    further : number of faults that are counted only, of a file with thousands of faults
+    """
+
+    def __init__(self, faults: Iterable[Fault], file: str = "case", further: int = 0):
         self.faults = sorted(faults, key=lambda fault: (fault.override, fault.line or 0))
-        self.file = str(file)
-        super().__init__(self.faults, self.file)
+        self.file, self.further = str(file), further
+        super().__init__(self.faults, self.file, further)
 
     def __str__(self) -> str:
-        count = len(self.faults)
+        count = len(self.faults) + self.further
         head = f"{self.file}: {count} fault{'' if count == 1 else 's'}"
-        return "\n".join([head, *(f"  {fault}" for fault in self.faults)])
+        listed = [f"  {fault}" for fault in self.faults[:MOST_FAULTS]]
+        further = [f"  and {count - MOST_FAULTS} further faults"] * (count > MOST_FAULTS)
+        return "\n".join([head, *listed, *further])
 
 
 @contextmanager
@@ -116,10 +127,13 @@ def visible(text: str) -> str:
 def nearest(name: str, names: Iterable[str]) -> str | None:
     """Valid name in `names` that is most similar to `name`; None if no name is similar.
 
-    Names longer than `LONGEST_NAME` are not compared.
+    Names longer than `LONGEST_NAME` are not compared. A comparison takes 0.1 ms, so of a hundred thousand names in a
+    second, as in a hostile file, only the first hundred are compared: messages list fewer.
     """
-    if len(name) > LONGEST_NAME:
+    now = time.monotonic()
+    if len(name) > LONGEST_NAME or len(COMPARED) == COMPARED.maxlen and now - COMPARED[0] < 1.0:
         return None
+    COMPARED.append(now)
     names = [valid for valid in dict.fromkeys(names) if len(valid) <= LONGEST_NAME]
     folded = {other.casefold().replace("_", "-"): other for other in names}
     close = difflib.get_close_matches(name.casefold().replace("_", "-"), folded, n=1, cutoff=0.6)

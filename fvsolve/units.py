@@ -132,15 +132,17 @@ def superscript(power: float) -> str:
 
 
 __all__ = [
-    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "begins_as_quantity", "convert", "find",
+    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "begins_as_quantity", "check_magnitude", "convert", "find",
     "is_number_with_unit", "likely", "parse", "show", "span",
     "vacuum", "expected",
 ]  # fmt: skip
 
 LONGEST = 100  # greatest length of a unit [characters]
-MAX_NUMBER = 1e100  # greatest magnitude of a quantity [SI]
+# Least and greatest magnitude of a number other than 0 [SI]: fifth powers and quotients of such numbers stay finite.
+MIN_NUMBER, MAX_NUMBER = 1e-30, 1e30
 WATER_DENSITY = 1000.0  # [kg/m3]
-_NUMBER = re.compile(r"\s*([+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
+# Number and unit of a text without blanks at its ends; it is matched in a time in proportion to the text.
+_NUMBER = re.compile(r"([+-]?(?:\d[\d_]*+\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?)\s*+(.*+)", re.DOTALL)
 
 
 def parse(given: Any, dimension: str) -> Any:
@@ -154,18 +156,28 @@ def parse(given: Any, dimension: str) -> Any:
         value, unit = _parse_text(given, dimension)
     else:
         value, unit = _parse_number(given, dimension), None
-    if not math.isfinite(value):
-        raise ValueError(f"{show(given)} is not finite; {expected(dimension)}")
-    if abs(value) > MAX_NUMBER:
-        raise ValueError(
-            f"{show(given)} has a magnitude above {MAX_NUMBER:g} in SI units, where products overflow; "
-            f"{expected(dimension)}"
-        )
+    check_magnitude(value, given, expected(dimension))
     if (DIMENSIONS[dimension].base or dimension) == "pressure" and DIMENSIONS[dimension].gauge:
         return value, unit is not None and unit.gauge
     if unit is not None and unit.dimension == "kinematic viscosity" and dimension == "viscosity":
         return Kinematic(value)
     return value
+
+
+def check_magnitude(value: float, given: Any, remedy: str) -> None:
+    """Raise ValueError if a number is not finite, or so large or small that products or quotients overflow.
+
+    given : the number as written in the file; remedy : end of the message
+    """
+    if not math.isfinite(value):
+        raise ValueError(f"{show(given)} is not finite; {remedy}")
+    if abs(value) > MAX_NUMBER:
+        raise ValueError(
+            f"{show(given)} has a magnitude above {MAX_NUMBER:g} in SI units, where products overflow; {remedy}"
+        )
+    if 0.0 < abs(value) < MIN_NUMBER:
+        text = f"{show(given)} has a magnitude below {MIN_NUMBER:g} in SI units, where quotients overflow"
+        raise ValueError(f"{text}; {remedy}, or 0")
 
 
 def parse_ratio(given: Any, over: str, under: str) -> float:
@@ -187,8 +199,8 @@ def parse_in(given: Any, si: str, remedy: str) -> float:
     else:
         import pint
 
-        match = _NUMBER.fullmatch(given)
-        if match is None:
+        match = _NUMBER.fullmatch(given.strip())
+        if match is None or len(match[2]) > LONGEST:
             raise ValueError(f"{show(given)} is not a number with a unit; {remedy}")
         number, spelling = match[1], _canonical(match[2])
         if re.match(r",\d", spelling):
@@ -206,8 +218,7 @@ def parse_in(given: Any, si: str, remedy: str) -> float:
         if unit.dimensionality != expected_unit.dimensionality:
             raise ValueError(f"{show(given)} has the unit {spelling or '1'}; {remedy}")
         value = float(number) * float(unit.to_base_units().magnitude)
-    if not math.isfinite(value) or abs(value) > MAX_NUMBER:
-        raise ValueError(f"{show(given)} is not a usable number; expected a finite number")
+    check_magnitude(value, given, remedy)
     return value
 
 
@@ -218,7 +229,7 @@ def is_number_with_unit(text: str) -> bool:
 
 def begins_as_quantity(text: str) -> bool:
     """True if a text begins with a number and the letter of a unit."""
-    match = _NUMBER.fullmatch(text)
+    match = _NUMBER.fullmatch(text.strip())
     return match is not None and bool(match[2]) and match[2][0] not in "*/+-^<>=!("
 
 
@@ -282,7 +293,7 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
 
 def is_unit(spelling: str) -> bool:
     """True for the spelling of a unit in `UNITS`."""
-    return _canonical(spelling) in UNITS
+    return len(spelling) <= LONGEST and _canonical(spelling) in UNITS
 
 
 def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0, ambient: float = 101325.0) -> str:
@@ -291,7 +302,7 @@ def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0, ambient: fl
     vapor_pressure : of the fluid [Pa]; ambient : ambient pressure [Pa]
     """
     below = "a vacuum" if pressure <= 0 else f"not above the vapour pressure of {vapor_pressure:.4g} Pa"
-    match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
+    match = _NUMBER.fullmatch(given.strip()) if isinstance(given, str) else None
     number, spelling = match.groups() if match else (str(given), "Pa")
     if spelling in UNITS and UNITS[spelling].gauge:
         return f"{show(given)} is {pressure:.4g} Pa absolute, {below}"
@@ -322,7 +333,7 @@ def likely(given: Any, dimension: str, least: float, greatest: float) -> str:
 
     least, greatest : usual range of the quantity [SI]
     """
-    match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
+    match = _NUMBER.fullmatch(given.strip()) if isinstance(given, str) else None
     number, spelling = match.groups() if match else (f"{given:g}", DIMENSIONS[dimension].si)
     units = [unit for unit in LIKELY.get(DIMENSIONS[dimension].base or dimension, ()) if unit != _canonical(spelling)]
     weights = {"cSt": WATER_DENSITY}  # a kinematic viscosity instead of a dynamic one
@@ -341,7 +352,10 @@ def show(given: Any) -> str:
     """Text of a value as it stands in a case file, cut to 60 characters."""
     if isinstance(given, bool):
         return str(given).lower()
-    text = f'"{given}"' if isinstance(given, str) else repr(given)
+    try:
+        text = f'"{given}"' if isinstance(given, str) else repr(given)
+    except ValueError:  # of Python, for whole numbers of more than 4300 digits
+        text = "a whole number of thousands of digits"
     return text if len(text) <= 60 else text[:57] + "..."
 
 
@@ -364,7 +378,7 @@ def comma_text(text: str) -> str:
 
 
 def _parse_text(text: str, dimension: str) -> tuple[float, Unit | None]:
-    match = _NUMBER.fullmatch(text.replace("\N{MINUS SIGN}", "-"))
+    match = _NUMBER.fullmatch(text.replace("\N{MINUS SIGN}", "-").strip())
     if match is None:
         raise ValueError(f"{show(text)} is not a number with a unit; {expected(dimension)}")
     number, spelling = match.groups()

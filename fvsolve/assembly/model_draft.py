@@ -197,6 +197,7 @@ class ModelDraft:
 
     # names, in the order of rows; nodes that links own
     node_index: dict[str, int] = field(default_factory=dict)
+    scalar_index: dict[str, int] = field(default_factory=dict)
     owned: set[str] = field(default_factory=set)
     pipe_names: list[str] = field(default_factory=list)
     column_names: list[str] = field(default_factory=list)
@@ -284,6 +285,7 @@ class ModelDraft:
         self.schedules.events = self.events
         self.schedules.span = case.numerics.start, case.numerics.end
         self.node_index = {name: i for i, name in enumerate(case.places)}
+        self.scalar_index = {name: i for i, name in enumerate(case.scalars)}
         self.owned = {f"{name}.{place}" for name, link in case.links.items() for place in link.owns}
 
     def copy_for(self, case: Any) -> ModelDraft:

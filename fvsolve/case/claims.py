@@ -26,7 +26,7 @@ VACUUM, VAPOR = "vacuum", "vapor"
 NAMED = {"vacuum": VACUUM, "vapor": VAPOR, "vapour": VAPOR}
 RUN_UP = "run_up."  # begins the name of a run-up in an expectation
 BOUNDS = ("minimum", "maximum", "class_fraction")
-_CLAIM = re.compile(r"\s*(\w+)\s*\(\s*([^()]+?)\s*\)\s*")
+_CLAIM = re.compile(r"(\w++)\s*+\(([^()]++)\)")  # of a text without blanks at its ends
 _BARE = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
 
@@ -126,13 +126,13 @@ def read_claim(
     of a probe.
     kinds : as for `read_probe`; routes : routes by name, None if faulty
     """
-    match = _CLAIM.fullmatch(claim)
-    if match is None or match[1] not in FUNCTIONS:
+    match = _CLAIM.fullmatch(claim.strip())
+    if match is None or match[1] not in FUNCTIONS or not match[2].strip():
         hint = did_you_mean(match[1], FUNCTIONS) if match else ""
         forms = "max(PROBE), min(PROBE), mean(PROBE), final(PROBE), at(PROBE, TIME), max(PART.QUANTITY) or "
         forms += f"min(PART.QUANTITY), max({RUN_UP}NAME) or at({RUN_UP}NAME, PLACE)"
         raise ValueError(f"is not a claim; expected {forms}{hint}")
-    function, probe_text = match.groups()
+    function, probe_text = match[1], match[2].strip()
     if probe_text.startswith(RUN_UP) and "run_up" not in kinds["nodes"] | kinds["links"]:
         return function, None, read_run_up(function, probe_text.removeprefix(RUN_UP), kinds["run_up"], setting), None
     when = None

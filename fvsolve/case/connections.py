@@ -4,7 +4,7 @@ Arguments of most functions are keys as in the file: nodes, links : name -> keys
 """
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from fvsolve.case.bodies import WORLD
@@ -24,7 +24,7 @@ def network(table: dict[str, Any]) -> Faults:
     table : nested dicts of the case as in the file
     """
     nodes, links = ({n: p for n, p in _dict(table.get(group)).items()} for group in ("nodes", "links"))
-    gone = [name for name in (*nodes, *links) if has_unknown_places(name, nodes, links)]
+    gone = {name: None for name in (*nodes, *links) if has_unknown_places(name, nodes, links)}
     places = _places(nodes, links, gone)
     ends: dict[str, list[str]] = {}
     unjoined = 0  # ports that join no known place
@@ -200,7 +200,7 @@ def _fits(domain: str, domains: str) -> bool:
     return domain in domains.split(" or ")
 
 
-def _places(nodes: dict[str, Any], links: dict[str, Any], gone: list[str]) -> dict[str, str | None]:
+def _places(nodes: dict[str, Any], links: dict[str, Any], gone: Iterable[str]) -> dict[str, str | None]:
     """Domain of every place that links can join, by full name; None if its part is faulty.
 
     gone : parts whose points, patches or chambers are not known; the names that links use for these are included

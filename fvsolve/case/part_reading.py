@@ -108,7 +108,7 @@ def part_kind(reading: Reading, group: str, name: str, part: dict[str, Any]) -> 
     if isinstance(kind, str) and kind in KINDS[other]:
         hint = f"; it belongs under [{other}]"
     synonym = read_table("part_synonyms").get(str(kind).casefold().replace("_", "-").replace(" ", "-"))
-    hint = f"; use {synonym}" if synonym else f"; types are {listing(sorted(known))}{hint}"
+    hint = f"; use {synonym}" if synonym else f"; types are {listing(known)}{hint}"
     return reading.fault((group, name, "type"), f"unknown type {show(kind)}{hint}")
 
 

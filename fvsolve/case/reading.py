@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.case import text
-from fvsolve.case.text import key_lines
+from fvsolve.case.text import KeyPath, key_lines
 from fvsolve.errors import CaseError, Fault, article, did_you_mean, listing
 from fvsolve.parts import KINDS, Pipe
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
@@ -24,7 +24,11 @@ from fvsolve.parts.table_model import exclusive_key_faults
 from fvsolve.parts.value import ROOT, ReadContext, Value, faults_of
 from fvsolve.units import show
 
-DEEPEST = 40
+WHOLE_BITS = 63  # of a whole number without its sign
+KEPT_FAULTS = 1000  # faults of a case that are kept; further faults are counted
+LONGEST_LINE = 500  # length of a line above which its names are not examined
+DEEPEST = 40  # levels of tables
+MOST_BYTES = 20_000_000  # of a TOML file; a network of 10 000 pipes has 2 MB
 WITH_DEFAULTS = {"pipe": Pipe}  # types of links that may have defaults
 NOT_DEFAULT = ("from", "to")  # keys that each part must state itself
 COMPLETED = ("wall", "friction")  # tables that other keys may complete: checked only with their part
@@ -87,19 +91,27 @@ def read_raw(source: Any) -> Raw:
     if not isinstance(source, (str, Path)):
         raise CaseError([Fault("", f"{article(type(source).__name__)} is not a case; expected a path or a dict")])
     path = Path(source)
-    text = _read_text(path)
+    table, content = read_toml(path)
+    return Raw(_copy(table), path.stem, path, path.parent.absolute(), content)
+
+
+def read_toml(path: Path) -> tuple[dict[str, Any], str]:
+    """Table and text of a TOML file. Raises CaseError for a file that cannot be read, is too large or is not TOML."""
+    content = _read_text(path)
+    if (line := text.find_long_key(content, DEEPEST)) is not None:
+        message = f"a key has more than {DEEPEST} names; expected at most {DEEPEST} levels of tables"
+        raise CaseError([Fault("", message, line)], path.name)
     try:
-        table = tomllib.loads(text)
+        return tomllib.loads(content), content
     except RecursionError:
         raise CaseError(
             [Fault("", f"tables or lists are nested too deep; expected at most {DEEPEST} levels")], path.name
         ) from None
     except ValueError as error:
-        if re.search(r"^\s*\[(JUNCTIONS|RESERVOIRS|PIPES)\]", text, re.MULTILINE | re.IGNORECASE):
+        if re.search(r"^[ \t]*\[(JUNCTIONS|RESERVOIRS|PIPES)\]", content, re.MULTILINE | re.IGNORECASE):
             message = f"is an EPANET network, not a case; fvsolve import {path} translates it"
             raise CaseError([Fault("", message)], path.name) from None
-        raise CaseError([syntax_fault(error, text)], path.name) from None
-    return Raw(_copy(table), path.stem, path, path.parent.absolute(), text)
+        raise CaseError([syntax_fault(error, content)], path.name) from None
 
 
 def copy_paths(table: dict[str, Any], paths: list[tuple[str, ...]]) -> dict[str, Any]:
@@ -174,7 +186,14 @@ def locate_faults(error: CaseError, case: Any) -> CaseError:
 
 def _read_text(path: Path) -> str:
     try:
-        return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
+        with open(path, "rb") as file:
+            data = file.read(MOST_BYTES + 1)
+        if len(data) > MOST_BYTES:
+            text = (
+                f"has more than {MOST_BYTES / 1e6:g} MB; expected a TOML file, with long tables in files of their own"
+            )
+            raise CaseError([Fault("", text)], str(path))
+        return data.decode("utf-8-sig").replace("\r\n", "\n")
     except FileNotFoundError:
         near = [other.name for other in path.parent.glob("*.toml")] if path.parent.is_dir() else []
         raise CaseError([Fault("", f"there is no such file{did_you_mean(path.name, near)}")], str(path)) from None
@@ -208,6 +227,8 @@ def syntax_fault(error: ValueError, text: str) -> Fault:
 
 def _bare_name(line_text: str) -> str:
     """Description of an invalid unquoted name in a line of TOML; "" if all names are valid."""
+    if len(line_text) > LONGEST_LINE:
+        return ""
     match = re.fullmatch(r"\[+([^\[\]\"']+)\]+\s*(?:#.*)?|([^=\[\]\"'#]+?)\s*=.*", line_text)
     names = [name.strip() for name in (match[1] or match[2]).split(".")] if match else []
     odd = next((name for name in names if name and not re.fullmatch(r"[A-Za-z0-9_-]+", name)), None)
@@ -223,21 +244,25 @@ def _bare_name(line_text: str) -> str:
     return f"an unquoted name has only letters, digits, _ and -; expected quotes: {show(odd)}"
 
 
-def _copy(value: Any, depth: int = 0) -> Any:
+def _copy(value: Any, keys: KeyPath = ()) -> Any:
     """Copy of a value as plain dicts, lists and scalars, without types of NumPy.
 
-    Raises CaseError for more than `DEEPEST` nested levels.
+    Raises CaseError for more than `DEEPEST` nested levels, and for whole numbers that TOML does not allow.
+    keys : key path of the value
     """
-    if depth > DEEPEST:
+    if len(keys) > DEEPEST:
         raise CaseError([Fault("", f"tables or lists are nested too deep; expected at most {DEEPEST} levels")])
     if isinstance(value, Mapping):
-        return {str(key): _copy(item, depth + 1) for key, item in value.items()}
+        return {str(key): _copy(item, (*keys, str(key))) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_copy(item, depth + 1) for item in value]
+        return [_copy(item, (*keys, n)) for n, item in enumerate(value)]
     if isinstance(value, Path):
         return str(value)
     if type(value).__module__ == "numpy" and hasattr(value, "tolist"):
-        return _copy(value.tolist(), depth + 1)
+        return _copy(value.tolist(), keys)
+    if type(value) is int and abs(value) >> WHOLE_BITS:
+        message = f"{show(value)} is a whole number of more than 64 bits; expected an exponent, for example 1e20"
+        raise CaseError([Fault(text.path(keys), message)])
     return value
 
 
@@ -396,14 +421,18 @@ class Reading:
         self.read: dict[tuple, tuple[Any, Any]] = {}
         self.known: dict[tuple, tuple[Any, Any]] = {}
         self.origin: dict[tuple, tuple] = {}
+        self.further = 0  # number of faults beyond `KEPT_FAULTS`
 
     def stop(self) -> None:
         """Raise CaseError if faults were found."""
         if self.faults:
-            raise CaseError(dict.fromkeys(self.faults), self.raw.file)
+            raise CaseError(dict.fromkeys(self.faults), self.raw.file, self.further)
 
     def fault(self, keys: tuple, message: str) -> None:
         """Add a fault at a key path of the case; after `ROOT` in the path, it starts at the top of the case."""
+        if len(self.faults) >= KEPT_FAULTS:
+            self.further += 1
+            return
         if ROOT in keys:
             keys = keys[len(keys) - keys[::-1].index(ROOT) :]
         own = (*self.origin.get(keys[:2], keys[:2]), *keys[2:])

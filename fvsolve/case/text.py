@@ -73,6 +73,44 @@ def _text(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
+# Strings end at the first closing quote: the quantifiers take all they can and give nothing back, so that a search
+# without a closing quote takes a time in proportion to the text.
+_STRINGS = {
+    '"': re.compile(r'(?:[^"\\\n]|\\.)*+"'), "'": re.compile(r"[^'\n]*+'"),
+    '"""': re.compile(r'(?:[^"\\]|\\.|"(?!""))*+"{3,5}', re.DOTALL), "'''": re.compile(r"(?:[^']|'(?!''))*+'{3,5}"),
+}  # fmt: skip
+_TOKEN = re.compile(r'"""|\'\'\'|["\'#.]|[A-Za-z0-9_-]+|[ \t]+|[^A-Za-z0-9_"\'#. \t-]+')
+
+
+def find_long_key(text: str, limit: int) -> int | None:
+    """Line number of the first dotted key of more than `limit` names in a TOML text; None without such a key.
+
+    tomllib takes time and memory that grow with the square of the number of names.
+    """
+    if all(line.count(".") < limit for line in text.split("\n")):
+        return None
+    at, dots = 0, 0
+    while at < len(text):
+        token = _TOKEN.match(text, at)[0]
+        start, at = at, at + len(token)
+        if token in _STRINGS:
+            end = _STRINGS[token].match(text, at)
+            if end is None:  # not valid TOML
+                return None
+            at = end.end()
+        elif token == ".":
+            dots += 1
+            if dots >= limit:
+                return text.count("\n", 0, start) + 1
+        elif token == "#":
+            at = text.find("\n", at)
+            if at < 0:
+                return None
+        elif not (token[0] in " \t" or token[0].isalnum() or token[0] in "_-"):
+            dots = 0
+    return None
+
+
 def key_lines(text: str) -> dict[KeyPath, int]:
     """Line number (from 1) of every key path of a TOML text that tomllib has checked.
 

@@ -27,7 +27,7 @@ MEASURES = (*FUNCTIONS, CROSSING, *ERRORS, DIFFERENCE, PROFILE)
 OF_SERIES = (*ERRORS, DIFFERENCE)
 OF_ERROR = (*OF_SERIES, PROFILE)  # their reference value is 0
 FINER = val.between(1.0, 16.0, open=True)  # a run at the same resolution would agree with itself
-_MEASURE = re.compile(r"\s*(\w+)\s*\(\s*(.*?)\s*\)\s*")
+_MEASURE = re.compile(r"(\w++)\s*+\((.*)\)")  # of a text without blanks at its ends
 _SUM = re.compile(r"sha256:[0-9a-f]{64}(?:, \d+ bytes)?")
 
 
@@ -353,7 +353,7 @@ def gate_faults(values: Mapping[str, Any], measure: Measure | None) -> list[tupl
 
 def read_measure(given: Any, kinds: Kinds, routes: Mapping[str, Any], reading: Reading) -> Measure | None:
     """Measure from its text, such as "time(tank.depth@1,0, 2 cm)"; None if its part is faulty. Raises ValueError."""
-    match = _MEASURE.fullmatch(given) if isinstance(given, str) else None
+    match = _MEASURE.fullmatch(given.strip()) if isinstance(given, str) else None
     if match is None or match[1] not in MEASURES:
         near = did_you_mean(match[1], MEASURES) if match else ""
         raise ValueError(f"{show(given)} is not a measure; expected FUNCTION(PROBE) with {listing(MEASURES)}{near}")

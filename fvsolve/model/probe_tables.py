@@ -58,7 +58,7 @@ def scalar_probe(draft, row, probe) -> None:
 
     Along a pipe its value is interpolated linearly between cell centres.
     """
-    row["scalar"] = list(draft.case.scalars).index(probe.quantity)
+    row["scalar"] = draft.scalar_index[probe.quantity]
     if probe.part == "nodes":
         row["kind"], row["index"] = rec.NODE_SCALAR, draft.node_index[draft.inside(probe.name)]
     elif probe.name in draft.case.meshes:
@@ -101,7 +101,7 @@ def lower_basin_point(draft, row, probe) -> None:
     draft.integers += cells.tolist()
     draft.floats += weights.tolist()
     if probe.quantity in draft.case.scalars:
-        row["kind"], row["scalar"] = rec.CELL_SCALAR, list(draft.case.scalars).index(probe.quantity)
+        row["kind"], row["scalar"] = rec.CELL_SCALAR, draft.scalar_index[probe.quantity]
     else:
         row["kind"] = rec.CELL_FIELD
         basin.lower_probe(row, probe.quantity, cells, weights)

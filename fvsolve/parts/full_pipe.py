@@ -57,12 +57,13 @@ FITTINGS: dict[str, Callable[[Any, float, float], float]] = {
 }
 
 
-WHOLE, MIXED = r"\d+(?:\.\d+)?", r"(?:\d+(?:\s+|\s*-\s*))?[1-9]\d*\s*/\s*[1-9]\d*"  # 1.5; 1/2, 1-1/2, 1 1/2
+# 1.5; 1/2, 1-1/2, 1 1/2, of a text without two blanks in a row
+WHOLE, MIXED = r"\d+(?:\.\d+)?", r"(?:\d+(?: | ?- ?))?[1-9]\d* ?/ ?[1-9]\d*"
 
 
 def parse_inches(text: str) -> float:
     """Number of a text such as "1.5", "1/2", "1-1/2" or "1 1/2"."""
-    *whole, last = re.split(r"\s*-\s*|(?<!/)(?<!/ )\s+(?!/)", text)
+    *whole, last = re.split(r" ?- ?|(?<!/)(?<!/ ) (?!/)", " ".join(text.split()))
     top, _, bottom = last.partition("/")
     return sum(map(float, whole)) + float(top) / float(bottom or 1)
 
@@ -74,7 +75,7 @@ def pipe_bore(nominal: str, schedule: str) -> tuple[float, float]:
     """
     from fluids.piping import nearest_pipe, schedule_lookup
 
-    match = re.fullmatch(rf"(DN|NPS)\s*({WHOLE}|{MIXED})", nominal.strip(), re.IGNORECASE)
+    match = re.fullmatch(rf"(DN|NPS) ?({WHOLE}|{MIXED})", " ".join(nominal.split()), re.IGNORECASE)
     if match is None:
         raise ValueError(f'{show(nominal)} is not a nominal size; expected for example "DN100", "NPS 4" or "NPS 1-1/2"')
     if schedule not in schedule_lookup:

@@ -41,6 +41,7 @@ class Kinds(dict[str, Any]):
     def __init__(self) -> None:
         super().__init__()
         self.imported: set[str] = set()
+        self.complete = False  # True if the modules of all types are imported
 
     def load(self, *kinds: object) -> None:
         """Import the modules that declare these types."""
@@ -74,7 +75,9 @@ class Kinds(dict[str, Any]):
         return super().get(kind, default)
 
     def __iter__(self) -> Iterator[str]:
-        self.load(*modules_of_types())
+        if not self.complete:
+            self.load(*modules_of_types())
+            self.complete = True
         return iter(sorted(super().keys()))
 
     def __len__(self) -> int:

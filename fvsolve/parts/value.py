@@ -22,6 +22,8 @@ NEEDED = object()  # instead of a default: the key is required
 OF_TIME = re.compile(r"[*/+(-] ?t\b(?![\w.])|(?<![\w.])t ?[*/+)<>^-]")  # formula with the name t
 CHANGING = ("control", "formula", "signal", "time")  # keys of schedules
 
+GREATEST_WHOLE = 10**15  # of a whole number; floats contain it exactly
+
 # Effect of a changed value on an existing model
 VALUE = "value"  # only numbers in its tables change; the initial state stays
 PROFILE = "profile"  # the initial state changes too; sizes, names and whole numbers of the tables stay
@@ -54,8 +56,8 @@ def pydantic_faults(error: Any, known: list[str], synonyms: Mapping[str, str]) -
 
     known : keys of the table; synonyms : keys of other programs -> equivalent here
     """
-    result = []
-    for entry in error.errors(include_url=False):
+    result: list[tuple[tuple[Any, ...], str]] = []
+    for entry in error.errors(include_url=False, include_input=False):
         place, cause = tuple(entry["loc"]), entry.get("ctx", {}).get("error")
         if isinstance(cause, ValueFault):
             result += [(place + below, message) for below, message in cause.faults]
@@ -270,6 +272,8 @@ class Whole(Value):
     def read(self, given: Any, setting: ReadContext) -> int:
         if isinstance(given, bool) or not isinstance(given, int):
             raise ValueError(f"{show(given)} is not a whole number; expected a whole number {self.range}")
+        if abs(given) > GREATEST_WHOLE:
+            raise ValueError(f"{show(given)} is above {GREATEST_WHOLE:g}; expected a whole number {self.range}")
         self.range.check(given, given)
         return given
 

@@ -4,14 +4,13 @@ import csv
 import itertools
 import json
 import os
-import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from fvsolve.case import Case, load, shipped
-from fvsolve.case.reading import split_key, syntax_fault
+from fvsolve.case.reading import read_toml, split_key
 from fvsolve.case.text import key_lines
 from fvsolve.errors import CaseError, Fault, FvsolveError, did_you_mean
 from fvsolve.output.directory import clear_reports
@@ -55,7 +54,8 @@ def read_scenarios(path: str | Path) -> Scenarios:
     """
     path, shipped_file = Path(path), shipped.folder() / "studies" / f"{path}.toml"
     path = shipped_file if not path.exists() and shipped_file.is_file() else path
-    data, lines = read_text(path)
+    data, content = read_toml(path)
+    lines = key_lines(content)
     faults: dict[tuple, Fault] = {}
 
     def fault(keys: tuple, message: str) -> None:
@@ -98,21 +98,6 @@ def possible_paths(keys: tuple) -> Iterator[tuple]:
         yield (*keys[:2], *below[:n])
         yield (*keys[:2], ".".join(below[:n]))
     yield from (keys[:n] for n in range(min(len(keys), 2), 0, -1))
-
-
-def read_text(path: Path) -> tuple[dict[str, Any], dict[tuple, int]]:
-    """Read a TOML file: (data, path of each key -> line). Raises CaseError if it is missing, unreadable or invalid."""
-    text = ""
-    try:
-        text = path.read_text(encoding="utf-8-sig").replace("\r\n", "\n")
-        return tomllib.loads(text), key_lines(text)
-    except FileNotFoundError:
-        near = [other.name for other in path.parent.glob("*.toml")] if path.parent.is_dir() else []
-        raise CaseError([Fault("", f"there is no such file{did_you_mean(path.name, near)}")], str(path)) from None
-    except OSError as error:
-        raise CaseError([Fault("", f"cannot be read: {error.strerror or error}")], path.name) from None
-    except ValueError as error:
-        raise CaseError([syntax_fault(error, text)], path.name) from None
 
 
 def case_path(case: Any, folder: Path, fault: AddFault) -> Path | None:

@@ -25,7 +25,7 @@ INTERIOR_TRIALS = 8  # greatest number of trials between two ends if limits fail
 MOST_TRIALS = 30  # the same where the margins nearby allow a value with which all limits hold
 MAX_RUNS = 60
 GUESS_MARGIN = 0.1  # least distance of the next value from the ends of the bracket, as a fraction of its width
-_VALUE = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
+_VALUE = re.compile(r"([+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?)\s*+(.*+)")  # of a text without blanks at its ends
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def number_and_unit(given: Any) -> tuple[float, str]:
     """Split a value such as "2 m3" into (number, unit); the unit of a bare number is "". Raises ValueError."""
     if isinstance(given, (int, float)) and not isinstance(given, bool):
         return float(given), ""
-    match = _VALUE.fullmatch(given) if isinstance(given, str) else None
+    match = _VALUE.fullmatch(given.strip()) if isinstance(given, str) else None
     if match is None:
         raise ValueError(f'{show(given)} is not a number. Expected a value such as 2 or "2 m3"')
     return float(match[1]), match[2]
