@@ -132,7 +132,7 @@ def superscript(power: float) -> str:
 
 
 __all__ = [
-    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "begins_as_quantity", "check_magnitude", "convert", "find",
+    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "begins_as_quantity", "convert", "find",
     "is_number_with_unit", "likely", "parse", "show", "span",
     "vacuum", "expected",
 ]  # fmt: skip
@@ -156,7 +156,8 @@ def parse(given: Any, dimension: str) -> Any:
         value, unit = _parse_text(given, dimension)
     else:
         value, unit = _parse_number(given, dimension), None
-    check_magnitude(value, given, expected(dimension))
+    if not is_possible(value):
+        raise ValueError(magnitude_fault(value, given, expected(dimension)))
     if (DIMENSIONS[dimension].base or dimension) == "pressure" and DIMENSIONS[dimension].gauge:
         return value, unit is not None and unit.gauge
     if unit is not None and unit.dimension == "kinematic viscosity" and dimension == "viscosity":
@@ -164,20 +165,21 @@ def parse(given: Any, dimension: str) -> Any:
     return value
 
 
-def check_magnitude(value: float, given: Any, remedy: str) -> None:
-    """Raise ValueError if a number is not finite, or so large or small that products or quotients overflow.
+def is_possible(value: float) -> bool:
+    """True if a number is 0, or neither so large nor so small that products or quotients overflow."""
+    return value == 0.0 or MIN_NUMBER <= abs(value) <= MAX_NUMBER
+
+
+def magnitude_fault(value: float, given: Any, remedy: str) -> str:
+    """Text of the fault of a number that is not possible.
 
     given : the number as written in the file; remedy : end of the message
     """
     if not math.isfinite(value):
-        raise ValueError(f"{show(given)} is not finite; {remedy}")
-    if abs(value) > MAX_NUMBER:
-        raise ValueError(
-            f"{show(given)} has a magnitude above {MAX_NUMBER:g} in SI units, where products overflow; {remedy}"
-        )
-    if 0.0 < abs(value) < MIN_NUMBER:
-        text = f"{show(given)} has a magnitude below {MIN_NUMBER:g} in SI units, where quotients overflow"
-        raise ValueError(f"{text}; {remedy}, or 0")
+        return f"{show(given)} is not finite; {remedy}"
+    limit = f"above {MAX_NUMBER:g}" if abs(value) > MAX_NUMBER else f"below {MIN_NUMBER:g}"
+    results = "products" if abs(value) > MAX_NUMBER else "quotients"
+    return f"{show(given)} has a magnitude {limit} in SI units, where {results} overflow; {remedy}"
 
 
 def parse_ratio(given: Any, over: str, under: str) -> float:
@@ -218,7 +220,8 @@ def parse_in(given: Any, si: str, remedy: str) -> float:
         if unit.dimensionality != expected_unit.dimensionality:
             raise ValueError(f"{show(given)} has the unit {spelling or '1'}; {remedy}")
         value = float(number) * float(unit.to_base_units().magnitude)
-    check_magnitude(value, given, remedy)
+    if not is_possible(value):
+        raise ValueError(magnitude_fault(value, given, remedy))
     return value
 
 

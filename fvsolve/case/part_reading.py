@@ -197,8 +197,10 @@ def network_table(network: chainage.CutTable, parts: Parts) -> dict[str, Any]:
     patches |= {name: connections.named_places(name, links) for name in lost}
     if not patches and not network.unreadable:
         return network.table
-    own = {name: {**nodes[name], "patches": dict.fromkeys(names, {}) | (nodes[name].get("patches") or {})}
-           for name, names in patches.items()}  # fmt: skip
+    own = {}
+    for name, names in patches.items():
+        given = nodes[name].get("patches")  # a value of another type is a fault of its own
+        own[name] = {**nodes[name], "patches": dict.fromkeys(names, {}) | (given if isinstance(given, dict) else {})}
     own |= {name: {"type": "junction"} for group, name in network.unreadable if group == "nodes"}
     unfit = [name for group, name in network.unreadable if group == "links" and not chainage.is_pipe(links[name])]
     links = {name: part for name, part in links.items() if name not in unfit}

@@ -90,7 +90,8 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
         raise ValueError("; ".join(problems))
     if len(probes) > 1:
         raise ValueError(f"a node and a link are named {show(name)}; write nodes.{given} or links.{given}")
-    return probes[0]
+    probe = probes[0]
+    return None if probe is None or not probe.dimension else probe  # of a control whose input is faulty
 
 
 def may_be_piece(name: str, kinds: Kinds) -> bool:

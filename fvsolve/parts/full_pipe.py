@@ -207,7 +207,7 @@ class Fittings(Value):
             raise ValueFault([((), f'{show(given)} is not a list; expected for example ["bend-90", "gate-valve"]')])
         faults = []
         for index, name in enumerate(given):
-            if name not in FITTINGS:
+            if not isinstance(name, str) or name not in FITTINGS:
                 near = did_you_mean(str(name), FITTINGS) or f"; fittings are {listing(list(FITTINGS))}"
                 faults.append(((index,), f"no fitting named {show(name)}{near}"))
         if faults:

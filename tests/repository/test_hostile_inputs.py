@@ -3,8 +3,10 @@
 The quick tests draw 300 inputs; `python tests/try_hostile_inputs.py --seed 1 --count 10000` draws more.
 """
 
+import copy
 import os
 import random
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +15,11 @@ from reference import hostile_inputs
 from try_hostile_inputs import MESSAGE, SECONDS, drawn, harm
 
 import fvsolve
+from fvsolve.case.load import KEYS
+from fvsolve.case.reading import Raw
 from fvsolve.case.text import find_long_key
 from fvsolve.errors import MOST_FAULTS, CaseError, Fault
+from fvsolve.parts import KINDS
 
 SEED = int(os.environ.get("FVSOLVE_HOSTILE_SEED", "59"))
 DRAWN, GROUPS = 300, 20
@@ -47,7 +52,10 @@ def test_a_message_lists_fifty_faults_and_counts_the_others(tmp_path):
         fvsolve.load(tmp_path / "case.toml")
     lines = str(error.value).splitlines()
     assert lines[0] == "case.toml: 100000 faults" and len(lines) == 2 + MOST_FAULTS
-    assert lines[1].startswith("  line 29: numerics.k0: unknown key; keys are") and lines[-1] == "  and 99950 further faults"
+    assert (
+        lines[1].startswith("  line 29: numerics.k0: unknown key; keys are")
+        and lines[-1] == "  and 99950 further faults"
+    )
     (tmp_path / "case.toml").write_text(hostile_inputs.SCENE + "".join(f"k{n} = 1\n" for n in range(MOST_FAULTS)))
     with pytest.raises(CaseError) as error:
         fvsolve.load(tmp_path / "case.toml")
@@ -125,3 +133,70 @@ def test_mutants_change_what_their_names_say():
         assert mutant != source or change == "renamed", change
     names = [item.name for item in hostile_inputs.mutants(draw, 200)]
     assert len({name.split()[0] for name in names}) > 40 and len({name.split()[-1] for name in names}) > 30
+
+
+PARTS = [(group, kind) for group in ("nodes", "links") for kind in KINDS[group]]
+TABLES = [*KEYS]
+WRONG = [
+    5, -5, 5.5, True, "x", "", "5 m", [], [5], [[5]], ["x"], [{}], {}, {"a": 5}, {"a": {}}, {"a": {"type": 5}},
+    {"a": []}, {"x": {"side": 5}}, {"time": 5, "value": {}}, {"file": 5}, {"control": 5}, {"signal": []},
+]  # fmt: skip
+FEW = [5, "x", [5], [], {}, {"a": 5}]
+
+
+def refused(table, place):
+    """Load a table with a wrong value; fail with the place of the value at any error other than a fault."""
+    try:
+        fvsolve.load(table)
+    except CaseError as error:
+        assert str(error)
+    except Exception as error:
+        raise AssertionError(f"{place}: {type(error).__name__}: {error}") from error
+
+
+@pytest.mark.parametrize("group, kind", PARTS, ids=map("-".join, PARTS))
+def test_values_of_a_wrong_type_are_faults_of_every_key_of_a_part(group, kind):
+    scene = tomllib.loads(hostile_inputs.SCENE)
+    for key in [*KINDS[group][kind].values(), "type", "unknown"]:
+        for wrong in WRONG:
+            table = {**scene, group: {**scene[group], "x": {"type": kind, key: wrong}}}
+            refused(table, f"{group}.x.{key} = {wrong!r} of a {kind}")
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_values_of_a_wrong_type_are_faults_of_every_table(name):
+    scene = tomllib.loads(hostile_inputs.SCENE)
+    for wrong in WRONG:
+        refused({**scene, name: wrong}, f"{name} = {wrong!r}")
+        for inner in WRONG:
+            refused({**scene, name: {**scene.get(name, {}), "x": inner}}, f"{name}.x = {inner!r}") if isinstance(
+                scene.get(name, {}), dict
+            ) else None
+
+
+def kinds_of_keys():
+    """Key paths of the shipped cases, each once by the types of its parts : (case, key path)."""
+    found = {}
+    for name, (table, _) in hostile_inputs.tables().items():
+        for path in hostile_inputs.places(table):
+            group, part = path[0], table[path[0]].get(path[1]) if len(path) > 1 and path[0] in NAMED else None
+            kind = (group, str(part.get("type")) if isinstance(part, dict) else "", *path[2:]) if part else path
+            found.setdefault(tuple(0 if isinstance(key, int) else key for key in kind), (name, path))
+    return list(found.values())
+
+
+NAMED = ("nodes", "links", "signals", "controls", "scalars", "reactions", "limits", "routes", "expect", "defaults")
+SHIPPED = kinds_of_keys()
+
+
+@pytest.mark.parametrize("name", sorted({name for name, _ in SHIPPED}))
+def test_values_of_a_wrong_type_are_faults_in_shipped_cases(name):
+    table, folder = hostile_inputs.tables()[name]
+    for path in (path for other, path in SHIPPED if other == name):
+        for wrong in FEW:
+            copied = copy.deepcopy(table)
+            inner = copied
+            for key in path[:-1]:
+                inner = inner[key]
+            inner[path[-1]] = wrong
+            refused(Raw(copied, name, None, folder), f"{'.'.join(map(str, path))} = {wrong!r}")

@@ -70,7 +70,7 @@ class Infiltration(Table):
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
-        own = SOIL_KEYS.get(given.get("model"), ())
+        own = SOIL_KEYS.get(str(given.get("model")), ())
         others = {key for keys in SOIL_KEYS.values() for key in keys} - {*own}
         faults = [((), f"{key} is missing") for key in own if key not in given]
         text = f"is not a key of the model {show(given.get('model'))}, which has {listing(own)}"

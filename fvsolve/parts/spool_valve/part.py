@@ -152,10 +152,10 @@ class SpoolValve(Sized, Link, kind="spool-valve"):
 
     @classmethod
     def variant(cls, given: dict[str, Any]) -> type[Link]:
-        ways, ports = given.get("ways", "4/3"), given.get("ports")
+        ways, ports = str(given.get("ways", "4/3")), given.get("ports")
         if ways not in EDGES and isinstance(ports, dict):  # a fault of its own; its ports tell what is meant
             ways = next((other for other, names in PORTS.items() if {*ports} == {*names}), ways)
-        return {"3/2": ThreeWaySpoolValve, "2/2": TwoWaySpoolValve}.get(str(ways), SpoolValve)
+        return {"3/2": ThreeWaySpoolValve, "2/2": TwoWaySpoolValve}.get(ways, SpoolValve)
 
     def model_post_init(self, context: Any) -> None:
         if self.rated_flow is None:
