@@ -17,7 +17,7 @@ from fvsolve.case import bodies
 from fvsolve.case.interior_patches import interior_patches
 from fvsolve.case.moving_walls import moving_wall_faults, moving_walls
 from fvsolve.case.output_grids import grid_faults
-from fvsolve.case.raster_meshes import raster_extent, rasters_with_holes, terrace_notes
+from fvsolve.case.raster_meshes import raster_extent, rasters_with_holes, stretch_notes, terrace_notes
 from fvsolve.case.resource_checks import BASIN_CELL, byte_text, free_memory, name_faults
 from fvsolve.case.sections import Output
 from fvsolve.errors import MeshError, did_you_mean, listing
@@ -226,12 +226,13 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
             grading = basin.grading or (1.0, 1.0)
             lacks = [raster.lacks for raster in rasters_with_holes(basin, setting)]
             mesh = rectangle(size, cells, corner, grading, sides, basin.holes or (), lacks)
-            mesh = replace(mesh, notes=terrace_notes(basin, mesh.grid))
+            mesh = replace(mesh, notes=terrace_notes(basin, mesh.grid) + stretch_notes(basin, mesh, setting))
             return replace(mesh, interior=interior_patches(basin, mesh))
         if rasters_with_holes(basin, setting):
             raise ValueFault([((), "`outside` of a raster applies to rectangles; leave it out, or cut the mesh file")])
         groups = [wall.group for wall in (getattr(basin, "walls", None) or {}).values()]
         mesh = read(setting.files[basin.mesh.file], basin.mesh.unit, groups)
+        mesh = replace(mesh, notes=(*mesh.notes, *stretch_notes(basin, mesh, setting)))
         return replace(mesh, interior=interior_patches(basin, mesh))
     except MeshError as error:
         if not basin.is_rectangle:  # the faults are in the mesh file, not in keys of the case
