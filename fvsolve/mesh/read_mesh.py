@@ -284,6 +284,8 @@ TAGS = ("gmsh:physical", "medit:ref", "su2:tag")  # names of group numbers in th
 GMSH_REMEDY = "Gmsh: try Mesh.MshFileVersion = 4.1 and Mesh.SaveParametric = 0"
 PLANE_TOLERANCE = 1e-6  # of the extent: allowed range of z
 FAR = 1e100  # beyond it fourth powers overflow
+SOLID_FORMATS = (".node", ".ele")
+LONGEST_LINE, MOST_PRINTED = 10_000, 10_000  # characters of a line of a file, and of the warnings of meshio
 LONGEST_TEXT = 300  # greatest length of a text of meshio in a message [characters]
 LARGE, SMALL = 1e4, 1e-3  # extents that suggest another unit [m]
 
@@ -472,8 +474,12 @@ def _read_by_meshio(path: Path) -> tuple[Any, tuple[str, ...]]:
     """(mesh object of meshio, messages that meshio printed); raises MeshError for an unreadable file."""
     import meshio
 
-    printed = io.StringIO()
+    printed = BoundedText()
     try:
+        if path.suffix.lower() in SOLID_FORMATS:  # meshio does not end at the end of such a file
+            raise ValueError("files of TetGen contain tetrahedra; expected a mesh of one plane surface")
+        if path.suffix.lower() == ".su2" and max(map(len, path.read_bytes().split(b"\n"))) > LONGEST_LINE:
+            raise ValueError(f"a line has more than {LONGEST_LINE} characters")  # meshio takes minutes to print it
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             file_mesh = meshio.read(path)
@@ -488,6 +494,15 @@ def _read_by_meshio(path: Path) -> tuple[Any, tuple[str, ...]]:
     if path.suffix.lower() not in known:
         remedy = f"expected a name that ends in {listing(known, 40)}"
     raise MeshError([Fault("", "; ".join(filter(None, [f"meshio cannot read the file ({text})", remedy])))], path.name)
+
+
+class BoundedText(io.StringIO):
+    """Text that a library prints; raises ValueError above `MOST_PRINTED` characters, as for a fault in each line."""
+
+    def write(self, text: str) -> int:
+        if self.tell() > MOST_PRINTED:
+            raise ValueError(f"more than {MOST_PRINTED} characters of warnings: {self.getvalue()}")
+        return super().write(text)
 
 
 def _single_line(text: str) -> str:
