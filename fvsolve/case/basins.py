@@ -73,9 +73,9 @@ def face_wall_faults(basin: Any, mesh: Any) -> Faults:
         if wall.group is not None and wall.group not in mesh.groups:
             what = "a rectangle has no groups; expected `line`"
             if not basin.is_rectangle:
-                known = patch_names(mesh)
+                known = [*mesh.groups, *patch_names(mesh)]
                 what = f"no such group in {Path(basin.mesh.file).name}{did_you_mean(wall.group, known)}"
-                what += f"; groups of its outline are {listing(known) or 'none'}"
+                what += f"; its groups are {listing(known) or 'none'}"
             yield ("walls", name, "group"), what
         elif not wall.chain(mesh).faces.size:
             low, high = (", ".join(f"{x:.6g}" for x in end) for end in (mesh.points.min(0), mesh.points.max(0)))

@@ -25,7 +25,7 @@ HEADER = re.compile(rb"\$MeshFormat\s+(4(?:\.\d+)?)\s+([01])\s+(\d)\s")
 NAME = re.compile(r'^[ \t]*(\d)[ \t]+(\d+)[ \t]+"(.*)"', re.MULTILINE)  # dimension, number and name of a group
 
 
-class Block(NamedTuple):
+class ElementBlock(NamedTuple):
     """Elements of one type: name of the type as in meshio, and int64[n, points] their points."""
 
     type: str
@@ -41,7 +41,7 @@ class GmshMesh(NamedTuple):
     """
 
     points: np.ndarray
-    cells: list[Block]
+    cells: list[ElementBlock]
     groups: dict[int, np.ndarray]
     field_data: dict[str, tuple[int, int]]
 
@@ -90,7 +90,7 @@ class Numbers:
             raise ValueError(f"section ${self.name} has numbers of points or elements that are not whole numbers")
         return values.astype(np.int64)
 
-    def wholes(self, kind: str) -> list[int]:
+    def counted(self, kind: str) -> list[int]:
         """Next count, and as many whole numbers."""
         return [self.whole(kind) for _ in range(self.whole("u"))]
 
@@ -116,7 +116,7 @@ def read_gmsh_4(data: bytes) -> GmshMesh | None:
     cells, groups, first = [], {}, 0
     for dimension, entity, kind, rows in elements(read["Elements"], old):
         spot = order[np.minimum(np.searchsorted(numbers, rows, sorter=order), max(numbers.size - 1, 0))]
-        cells.append(Block(kind, np.where(numbers[spot] == rows, spot, -1)))
+        cells.append(ElementBlock(kind, np.where(numbers[spot] == rows, spot, -1)))
         if kind == "line":
             for group in {abs(number) for number in physical.get((dimension, entity), ())}:
                 groups.setdefault(group, []).append(first + np.arange(len(rows)))
@@ -157,7 +157,7 @@ def entities(section: Numbers | None, old: bool, partitioned: bool = False) -> d
                 section.take("i", 2)  # dimension and number of the whole entity
                 section.take("i", section.whole("u"))
             section.take("f", 6 if dimension or old else 3)  # its box, or its coordinates
-            groups[dimension, number] = section.wholes("i")
+            groups[dimension, number] = section.counted("i")
             if dimension:
                 section.take("i", section.whole("u"))  # entities around it
     return groups

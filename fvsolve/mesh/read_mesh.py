@@ -344,7 +344,7 @@ def read(path: str | Path, unit: str = "m", walls: Collection[str] = ()) -> Mesh
     notes += ignored
     faults, names, patch = assign_patches(sketch, edges, lines, outline)
     chains = {name: key_of(lines[members], len(sketch.points)) for name, members in content.groups.items()
-              if name in walls}  # fmt: skip
+              if name not in outline}  # fmt: skip
     for name, keys in chains.items():
         if (missing := ~np.isin(keys, edges.key)).any():
             where = _line_location(sketch, edges, lines[content.groups[name]][missing][0])

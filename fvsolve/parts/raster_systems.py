@@ -93,10 +93,10 @@ def are_probably_degrees(low: tuple[float, float], size: tuple[float, float], co
     inside = -180.0 - rim <= low[0] and high[0] <= 360.0 + rim and -90.0 - rim <= low[1] and high[1] <= 90.0 + rim
     if not inside or rim >= MIDDLE:
         return False
-    beside = [max(begin, -end, 0.0) for begin, end in zip(low, high, strict=True)]
+    gaps = [max(begin, -end, 0.0) for begin, end in zip(low, high, strict=True)]
     if all(map(is_fraction_of_degree, size)):
-        return math.hypot(*beside) > max(extent) or extent[0] > 360.0 - rim
-    distant = all(gap > max(FAR * length, LEAST_FAR) for gap, length in zip(beside, extent, strict=True))
+        return math.hypot(*gaps) > max(extent) or extent[0] > 360.0 - rim
+    distant = all(gap > max(FAR * length, LEAST_FAR) for gap, length in zip(gaps, extent, strict=True))
     return distant and rim <= SMALL
 
 
