@@ -458,8 +458,11 @@ def places_on_bodies(nodes: dict[str, Any], meshes: dict[str, Mesh]) -> dict[str
     return result
 
 
-def _patch_hint(basin: Basin, known: tuple[str, ...], name: str) -> str:
-    """Text that lists the patches `known`, or explains how to give the patch `name` its name in the mesh file."""
+def _patch_hint(basin: Basin, mesh: Any, name: str) -> str:
+    """Text that lists the patches of a mesh, or explains how to give the patch `name` its name in the mesh file."""
+    known = patch_names(mesh)
+    if name in mesh.groups:
+        return f"the lines of this group lie between cells, where `walls` may name it; patches are {listing(known)}"
     if known or basin.is_rectangle:
         return f"patches are {listing(known) or 'none'}"
     file = Path(basin.mesh.file).name
@@ -493,7 +496,7 @@ def find_faults(
         yield from moving_wall_faults(name, basin, meshes[name], nodes, joined, times, all_nodes)
         for patch, options in basin.patches.items():
             if patch not in known:
-                yield (*key, "patches", patch), f"the mesh has no such patch; {_patch_hint(basin, known, patch)}"
+                yield (*key, "patches", patch), f"the mesh has no such patch; {_patch_hint(basin, meshes[name], patch)}"
             elif f"{name}.{patch}" in joined and not own.joined:
                 text = "a link joins this patch, but the key `velocity` gives the flow; expected no link"
                 yield (*key, "patches", patch), text
