@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve import units
-from fvsolve.errors import did_you_mean, listing
+from fvsolve.errors import did_you_mean
 from fvsolve.parts.value import ReadContext
 from fvsolve.units import show
 
@@ -66,7 +66,8 @@ class CsvRows:
                 )
             if name in known:
                 return known.index(name)
-        shown = f"{did_you_mean(name, self.header)}; columns are {listing(map(show, self.header), 20)}"
+        shown = f"{did_you_mean(name, self.header)}; columns are {', '.join(map(show, self.header[:20]))}"
+        shown += ", ..." if len(self.header) > 20 else ""
         raise ValueError(f"{self.file} has no column {show(name)}{shown}")
 
     def numbers(self, column: int, dimension: str, ambient: float = 101325.0, stated: str = "") -> np.ndarray:
