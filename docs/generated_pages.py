@@ -9,7 +9,7 @@ from pathlib import Path
 import fvsolve
 import fvsolve.steppers
 import fvsolve.studies
-from fvsolve.units import DIMENSIONS, NEAR_MISSES, UNITS, Unit
+from fvsolve.units import DIMENSIONS, NEAR_MISSES, UNITS, WORDS, Unit
 
 PYTHON_PAGE = (Path(__file__).parent / "python.md").read_text(encoding="utf-8")
 ARGUMENT = re.compile(r"([^\s,]+(?:, [^\s,]+)*) : ")  # beginning of a line of a docstring about arguments or fields
@@ -42,12 +42,14 @@ def units() -> str:
     rows = {}  # by words, because some dimensions differ only in their use
     for name, one in DIMENSIONS.items():
         own = ", ".join(f"`{unit}` {size(found)}" for unit, found in UNITS.items() if found.dimension == name)
-        as_other = f"those of {DIMENSIONS[one.base].words}" if one.base else own
+        as_other = ", ".join(filter(None, [f"those of {DIMENSIONS[one.base].words}" if one.base else "", own]))
         rows.setdefault(one.words, (one.words, f"`{one.si}`", f'`"{one.example}"`', as_other))
+    words = [(f"`{word}`", f"`{symbol}`") for word, symbol in WORDS.items()]
     refused = [(f"`{given}`", f"`{proposal}`") for given, proposal in NEAR_MISSES.items() if proposal]
     return (
         "## Units of each quantity\n\n"
         f"{table(('quantity', 'SI', 'example', 'units, with their size in SI'), rows.values())}\n"
+        f"## Words, in small or capital letters\n\n{table(('word', 'unit'), words)}\n"
         f"## Spellings that are refused\n\n{table(('spelling', 'proposal of the message'), refused)}"
     )
 

@@ -8,6 +8,7 @@ import difflib
 import functools
 import math
 import re
+import warnings
 from collections.abc import Mapping
 from decimal import Decimal, DecimalException
 from typing import Any, NamedTuple
@@ -75,6 +76,7 @@ UNITS: dict[str, Unit] = {
 }
 NEAR_MISSES: dict[str, str] = _TABLES["near_misses"]
 LIKELY: dict[str, list[str]] = _TABLES["likely"]
+WORDS: dict[str, str] = _TABLES["words"]
 
 _SAFE_SPELLING = re.compile(
     r"\(?[^\W\d]+(?: ?(?:\*\*|\^)? ?-?\d)?\)?(?: ?[*/ ] ?\(?[^\W\d]+(?:(?:\*\*|\^)?-?\d)?\)?){0,5}"
@@ -88,6 +90,8 @@ BASE = {
 
 def pint_unit(spelling: str) -> Unit | None:
     """Unit with a spelling that is not in `UNITS`, read by pint; None if pint cannot read it."""
+    if _NEGATIVE_POWER.search(spelling):  # pint subtracts in "m s-1"
+        spelling = _for_pint(_canonical(spelling))
     if not _SAFE_SPELLING.fullmatch(spelling):  # pint would compute 9**9**9
         return None
     import pint
@@ -132,17 +136,22 @@ def superscript(power: float) -> str:
 
 
 __all__ = [
-    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "begins_as_quantity", "convert", "find",
-    "is_number_with_unit", "likely", "parse", "show", "span",
+    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "begins_as_quantity", "convert", "find", "unit_of",
+    "is_number_with_unit", "likely", "parse", "plain_numbers", "show", "span",
     "vacuum", "expected",
 ]  # fmt: skip
 
 LONGEST = 100  # greatest length of a unit [characters]
+SIGNS = ("²", "2"), ("³", "3"), ("¹", "1"), ("⁻", "-"), ("µ", "u"), ("μ", "u"), ("°", "deg"), ("·", " "), ("*", " ")
 # Least and greatest magnitude of a number other than 0 [SI]: fifth powers and quotients of such numbers stay finite.
 MIN_NUMBER, MAX_NUMBER = 1e-30, 1e30
 WATER_DENSITY = 1000.0  # [kg/m3]
-# Number and unit of a text without blanks at its ends; it is matched in a time in proportion to the text.
-_NUMBER = re.compile(r"([+-]?(?:\d[\d_]*+\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?)\s*+(.*+)", re.DOTALL)
+LONGEST_TEXT = 300  # greatest length of a number with a unit [characters]
+_NUMBER = re.compile(r"([+-]?(?:\d[\d_]*(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)", re.DOTALL)
+_NEGATIVE_POWER = re.compile(r"(?<=[A-Za-z])\^?(?:\*\*)?[-⁻](?=[\d¹²³])")
+_PLAIN_NUMBER = re.compile(
+    r"[+-]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?|nan|inf(?:inity)?)", re.ASCII | re.IGNORECASE
+)
 
 
 def parse(given: Any, dimension: str) -> Any:
@@ -201,8 +210,8 @@ def parse_in(given: Any, si: str, remedy: str) -> float:
     else:
         import pint
 
-        match = _NUMBER.fullmatch(given.strip())
-        if match is None or len(match[2]) > LONGEST:
+        match = _split(given)
+        if match is None:
             raise ValueError(f"{show(given)} is not a number with a unit; {remedy}")
         number, spelling = match[1], _canonical(match[2])
         if re.match(r",\d", spelling):
@@ -225,14 +234,42 @@ def parse_in(given: Any, si: str, remedy: str) -> float:
     return value
 
 
+def plain_numbers(text: str, line: int = 1) -> Any:
+    """Numbers of a text, separated by blanks and line ends : float64[n].
+
+    line : number of the first line. Raises ValueError with the first text that is not a number, and its line.
+    """
+    import numpy as np
+
+    if not text or text.isspace():  # NumPy reads blanks as a number
+        return np.empty(0)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", DeprecationWarning)  # of NumPy before 2.4, for a text that is not a number
+            return np.fromstring(text, sep=" ")
+    except (ValueError, DeprecationWarning):
+        faulty = next((item for item in re.finditer(r"\S+", text) if not _PLAIN_NUMBER.fullmatch(item[0])), None)
+    if faulty is None:
+        raise ValueError("the numbers cannot be read")
+    comma = re.match(r"[+-]?\d[\d.]*,\d", faulty[0])
+    fault = comma_text(faulty[0]) if comma else f"{show(faulty[0])} is not a number"
+    raise ValueError(f"line {line + text.count(chr(10), 0, faulty.start())}: {fault}")
+
+
+def _split(text: str) -> re.Match[str] | None:
+    """Match with the number and the unit of a text; None for a text without a number at its start, or a long text."""
+    return _NUMBER.fullmatch(text.strip()) if len(text) <= LONGEST_TEXT else None
+
+
 def is_number_with_unit(text: str) -> bool:
     """True if a text is a number and a spelling that may be that of a unit, such as "12 m3/h", and not a formula."""
-    return begins_as_quantity(text) and not any(sign in text for sign in (" + ", " - ", "<", ">", "=", "(", "*", ","))
+    signs = (" + ", " - ", "<", ">", "=", "(", "*", ",")
+    return begins_as_quantity(text) and not any(sign in text.replace("**", "") for sign in signs)
 
 
 def begins_as_quantity(text: str) -> bool:
     """True if a text begins with a number and the letter of a unit."""
-    match = _NUMBER.fullmatch(text.strip())
+    match = _split(text)
     return match is not None and bool(match[2]) and match[2][0] not in "*/+-^<>=!("
 
 
@@ -266,7 +303,7 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
         text = f"{show(f'{number} {spelling}'.strip())}: unknown unit of {len(spelling)} letters; {expected(dimension)}"
         raise ValueError(text)
     base = DIMENSIONS[dimension].base or dimension
-    unit = UNITS.get(_canonical(spelling))
+    unit = _table_unit(spelling)
     if unit is None:
         folded = _canonical(spelling).casefold().replace(" ", "")
         for known in _spellings(dimension):
@@ -274,14 +311,15 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
                 raise ValueError(f"unknown unit {show(spelling)}; did you mean {show((number + ' ' + known).strip())}?")
         unit = pint_unit(spelling) if _canonical(spelling) not in NEAR_MISSES else None
     text = show(f"{number} {spelling}".strip())
-    suggested = NEAR_MISSES.get(_canonical(spelling), "")
+    suggested = NEAR_MISSES.get(_canonical(spelling)) or NEAR_MISSES.get(_without_words(_canonical(spelling)), "")
     if unit is None:
         if not suggested or UNITS[suggested].dimension != base:
             close = difflib.get_close_matches(_canonical(spelling), _spellings(dimension), n=1)
             suggested = close[0] if close else ""
         hint = f"did you mean {show((number + ' ' + suggested).strip())}?" if suggested else expected(dimension)
         raise ValueError(f"{text}: unknown unit {show(spelling)}; {hint}")
-    if unit.dimension != base and not (dimension == "viscosity" and unit.dimension == "kinematic viscosity"):
+    kinematic = dimension == "viscosity" and unit.dimension == "kinematic viscosity"
+    if unit.dimension not in (base, dimension) and not kinematic:
         hint = expected(dimension)
         if suggested and UNITS[suggested].dimension == base:
             hint = f"expected {DIMENSIONS[dimension].words}; did you mean {show((number + ' ' + suggested).strip())}?"
@@ -294,9 +332,14 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
     return unit
 
 
+def unit_of(spelling: str) -> Unit | None:
+    """Unit with a given spelling, from the table or from pint; None if there is none."""
+    return (_table_unit(spelling) or pint_unit(spelling)) if 0 < len(spelling) <= LONGEST else None
+
+
 def is_unit(spelling: str) -> bool:
     """True for the spelling of a unit in `UNITS`."""
-    return len(spelling) <= LONGEST and _canonical(spelling) in UNITS
+    return len(spelling) <= LONGEST and _table_unit(spelling) is not None
 
 
 def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0, ambient: float = 101325.0) -> str:
@@ -305,7 +348,7 @@ def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0, ambient: fl
     vapor_pressure : of the fluid [Pa]; ambient : ambient pressure [Pa]
     """
     below = "a vacuum" if pressure <= 0 else f"not above the vapour pressure of {vapor_pressure:.4g} Pa"
-    match = _NUMBER.fullmatch(given.strip()) if isinstance(given, str) else None
+    match = _split(given) if isinstance(given, str) else None
     number, spelling = match.groups() if match else (str(given), "Pa")
     if spelling in UNITS and UNITS[spelling].gauge:
         return f"{show(given)} is {pressure:.4g} Pa absolute, {below}"
@@ -327,8 +370,8 @@ def convert(value_si: Any, dimension: str, unit: str, ambient: float = 101325.0)
 
 def span(unit: str) -> str:
     """Unit of a difference of two values in `unit`: "bar" for "barg" and for "bara"."""
-    entry = UNITS.get(unit)
-    return unit[:-1] if entry is not None and (entry.gauge or entry.absolute) else unit
+    entry = _table_unit(unit)
+    return _canonical(unit)[:-1] if entry is not None and (entry.gauge or entry.absolute) else unit
 
 
 def likely(given: Any, dimension: str, least: float, greatest: float) -> str:
@@ -336,7 +379,7 @@ def likely(given: Any, dimension: str, least: float, greatest: float) -> str:
 
     least, greatest : usual range of the quantity [SI]
     """
-    match = _NUMBER.fullmatch(given.strip()) if isinstance(given, str) else None
+    match = _split(given) if isinstance(given, str) else None
     number, spelling = match.groups() if match else (f"{given:g}", DIMENSIONS[dimension].si)
     units = [unit for unit in LIKELY.get(DIMENSIONS[dimension].base or dimension, ()) if unit != _canonical(spelling)]
     weights = {"cSt": WATER_DENSITY}  # a kinematic viscosity instead of a dynamic one
@@ -381,7 +424,7 @@ def comma_text(text: str) -> str:
 
 
 def _parse_text(text: str, dimension: str) -> tuple[float, Unit | None]:
-    match = _NUMBER.fullmatch(text.replace("\N{MINUS SIGN}", "-").strip())
+    match = _split(text.replace("\N{MINUS SIGN}", "-"))
     if match is None:
         raise ValueError(f"{show(text)} is not a number with a unit; {expected(dimension)}")
     number, spelling = match.groups()
@@ -398,17 +441,39 @@ def _parse_text(text: str, dimension: str) -> tuple[float, Unit | None]:
 
 def _spellings(dimension: str) -> list[str]:
     base = DIMENSIONS[dimension].base or dimension
-    names = [name for name, unit in UNITS.items() if unit.dimension == base]
+    names = [name for name, unit in UNITS.items() if unit.dimension in (base, dimension)]
     return [name for name in names if DIMENSIONS[dimension].gauge or not UNITS[name].gauge]
+
+
+def _table_unit(spelling: str) -> Unit | None:
+    """Unit of the table `UNITS` with a given spelling, with words in place of symbols too; None if there is none."""
+    text = _canonical(spelling)
+    return UNITS.get(text) or UNITS.get(_without_words(text))
+
+
+def _without_words(spelling: str) -> str:
+    """Spelling of a unit with symbols in place of words: "metres per second" is "m/s"."""
+    text = re.sub(r" per (?=[A-Za-z])", "/", spelling)
+    return re.sub(r"[A-Za-z_]+", lambda match: WORDS.get(match[0].lower(), match[0]), text)
 
 
 @functools.lru_cache(maxsize=1024)
 def _canonical(spelling: str) -> str:
-    """Spelling as in `UNITS`: `m^3 / h`, `m³/h` and `m**3/h` are `m3/h`; `Pa.s` is `Pa s`."""
+    """Spelling as in `UNITS`: `m^3 / h`, `m³/h` and `m3 h-1` are `m3/h`; `Pa.s` is `Pa s`."""
     text = spelling.strip().replace("**", "").replace("^", "")
-    for old, new in (("²", "2"), ("³", "3"), ("µ", "u"), ("μ", "u"), ("°", "deg"), ("·", " "), ("*", " ")):
+    for old, new in SIGNS:
         text = text.replace(old, new)
-    text = re.sub(r"(?<=[A-Za-z])\.(?=[A-Za-z])", " ", text)
+    text = re.sub(r"(?<=[A-Za-z0-9])\.(?=[A-Za-z])", " ", text)
     gauge = re.fullmatch(r"([A-Za-z0-9]+) ?\(([ag])\)", text)
     text = gauge[1] + gauge[2] if gauge else text
-    return re.sub(r"\s+", " ", re.sub(r"\s*/\s*", "/", text))
+    return _without_negative_powers(re.sub(r"\s+", " ", re.sub(r"\s*/\s*", "/", text)))
+
+
+def _without_negative_powers(spelling: str) -> str:
+    """Spelling of a unit with slashes in place of negative powers, after CF and udunits: `kg m-2 s-1` is `kg/m2/s`."""
+    if not _NEGATIVE_POWER.search(spelling) or any(sign in spelling for sign in "/()"):
+        return spelling
+    factors = [(factor, re.fullmatch(r"([A-Za-z_]+)-(\d)", factor)) for factor in spelling.split(" ")]
+    above = " ".join(factor for factor, power in factors if power is None)
+    below = [power[1] + ("" if power[2] == "1" else power[2]) for _, power in factors if power is not None]
+    return "/".join([above or "1", *below])

@@ -17,7 +17,7 @@ from fvsolve.case import bodies
 from fvsolve.case.interior_patches import interior_patches
 from fvsolve.case.moving_walls import moving_wall_faults, moving_walls
 from fvsolve.case.output_grids import grid_faults
-from fvsolve.case.raster_meshes import raster_extent, rasters_with_holes, terrace_notes
+from fvsolve.case.raster_meshes import raster_extent, rasters_with_holes, stretch_notes, terrace_notes
 from fvsolve.case.resource_checks import BASIN_CELL, byte_text, free_memory, name_faults
 from fvsolve.case.sections import Output
 from fvsolve.errors import MeshError, did_you_mean, listing
@@ -73,9 +73,9 @@ def face_wall_faults(basin: Any, mesh: Any) -> Faults:
         if wall.group is not None and wall.group not in mesh.groups:
             what = "a rectangle has no groups; expected `line`"
             if not basin.is_rectangle:
-                known = patch_names(mesh)
+                known = [*mesh.groups, *patch_names(mesh)]
                 what = f"no such group in {Path(basin.mesh.file).name}{did_you_mean(wall.group, known)}"
-                what += f"; groups of its outline are {listing(known) or 'none'}"
+                what += f"; its groups are {listing(known) or 'none'}"
             yield ("walls", name, "group"), what
         elif not wall.chain(mesh).faces.size:
             low, high = (", ".join(f"{x:.6g}" for x in end) for end in (mesh.points.min(0), mesh.points.max(0)))
@@ -226,12 +226,13 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
             grading = basin.grading or (1.0, 1.0)
             lacks = [raster.lacks for raster in rasters_with_holes(basin, setting)]
             mesh = rectangle(size, cells, corner, grading, sides, basin.holes or (), lacks)
-            mesh = replace(mesh, notes=terrace_notes(basin, mesh.grid))
+            mesh = replace(mesh, notes=terrace_notes(basin, mesh.grid) + stretch_notes(basin, mesh, setting))
             return replace(mesh, interior=interior_patches(basin, mesh))
         if rasters_with_holes(basin, setting):
             raise ValueFault([((), "`outside` of a raster applies to rectangles; leave it out, or cut the mesh file")])
         groups = [wall.group for wall in (getattr(basin, "walls", None) or {}).values()]
         mesh = read(setting.files[basin.mesh.file], basin.mesh.unit, groups)
+        mesh = replace(mesh, notes=(*mesh.notes, *stretch_notes(basin, mesh, setting)))
         return replace(mesh, interior=interior_patches(basin, mesh))
     except MeshError as error:
         if not basin.is_rectangle:  # the faults are in the mesh file, not in keys of the case
@@ -457,8 +458,11 @@ def places_on_bodies(nodes: dict[str, Any], meshes: dict[str, Mesh]) -> dict[str
     return result
 
 
-def _patch_hint(basin: Basin, known: tuple[str, ...], name: str) -> str:
-    """Text that lists the patches `known`, or explains how to give the patch `name` its name in the mesh file."""
+def _patch_hint(basin: Basin, mesh: Any, name: str) -> str:
+    """Text that lists the patches of a mesh, or explains how to give the patch `name` its name in the mesh file."""
+    known = patch_names(mesh)
+    if name in mesh.groups:
+        return f"the lines of this group lie between cells, where `walls` may name it; patches are {listing(known)}"
     if known or basin.is_rectangle:
         return f"patches are {listing(known) or 'none'}"
     file = Path(basin.mesh.file).name
@@ -492,7 +496,7 @@ def find_faults(
         yield from moving_wall_faults(name, basin, meshes[name], nodes, joined, times, all_nodes)
         for patch, options in basin.patches.items():
             if patch not in known:
-                yield (*key, "patches", patch), f"the mesh has no such patch; {_patch_hint(basin, known, patch)}"
+                yield (*key, "patches", patch), f"the mesh has no such patch; {_patch_hint(basin, meshes[name], patch)}"
             elif f"{name}.{patch}" in joined and not own.joined:
                 text = "a link joins this patch, but the key `velocity` gives the flow; expected no link"
                 yield (*key, "patches", patch), text

@@ -10,6 +10,7 @@ import numpy as np
 from fvsolve.parts.formula import SpatialField
 from fvsolve.parts.raster import Raster
 from fvsolve.parts.raster_files import Pixels, check_count, read_pixels
+from fvsolve.parts.raster_systems import stretch
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import ReadContext, ValueFault
 
@@ -65,6 +66,19 @@ def terrace_notes(basin: Any, grid: Any) -> tuple[str, ...]:
         return ()
     text = f"cells of {least:g} m are smaller than the pixels of {raster.name}, so the bed has terraces"
     return (f"{text}, on which thin films are too slow; expected cells at least as large as pixels",)
+
+
+def stretch_notes(basin: Any, mesh: Any, setting: ReadContext) -> tuple[str, ...]:
+    """Remark on a CRS whose lengths are not true, with their factor at the middle of the basin; () without one."""
+    pixels = [field.rule.pixels for field in fields_of(basin) if isinstance(field.rule, Raster)]
+    pixels += [mesh_pixels(basin, setting)[1]] if basin.mesh is not None and basin.mesh.raster else []
+    north = (basin.origin or (0.0, 0.0))[1] + 0.5 * (mesh.points[:, 1].min() + mesh.points[:, 1].max())
+    crs = max([basin.crs or "", *(own.crs for own in pixels)], key=lambda text: stretch(text, north))
+    if (factor := stretch(crs, north)) <= 1.0:
+        return ()
+    latitude = math.degrees(math.acos(1.0 / factor))
+    text = f"{crs} stretches lengths by 1/cos(latitude): {factor:.4g} times the true ones at {latitude:.3g} degrees"
+    return (f"{text}; expected another system in metres, for example UTM, by gdalwarp -t_srs",)
 
 
 def fields_of(table: Table) -> Iterator[SpatialField]:

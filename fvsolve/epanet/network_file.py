@@ -137,7 +137,8 @@ def _clock_faults(path: Path) -> list[str]:
 
 def _fault_message(path: Path, faults: list[str], source: str) -> str:
     """Message that lists every fault once; source : program that reported the faults"""
-    faults = list(dict.fromkeys(faults))
+    hints = {True: "; expected decimal points", False: ""}
+    faults = [f"{fault}{hints[bool(re.search(r'[0-9],[0-9]', fault))]}" for fault in dict.fromkeys(faults)]
     head = f"{path.name}: {len(faults)} fault{'' if len(faults) == 1 else 's'}, reported by {source}"
     return "\n".join([head, *(f"  {fault}" for fault in faults)])
 

@@ -41,7 +41,7 @@ class Mesh:
     middle : float64[f, 2]  middles of faces [m]; ends : int64[f, 2]  points of faces, anticlockwise around left
     patches : names of the patches, the last one always "wall"; grid : grid lines, None if the mesh is not a rectangle
     notes : remarks about the mesh file for the user; interior : cells of each interior patch, name -> int64[count]
-    groups : name -> int64[:] faces between cells that a group of the mesh file contains, of groups that are walls
+    groups : name -> int64[:] faces between cells that a group of the mesh file contains, of groups that are no patches
     """
 
     points: np.ndarray

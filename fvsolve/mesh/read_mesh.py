@@ -1,4 +1,6 @@
-"""Reading of a mesh from a file by meshio, with all checks; clockwise cells are reversed, with a note.
+"""Reading of a mesh from a file, with all checks; clockwise cells are reversed, with a note.
+
+meshio reads all formats except those of Gmsh 4, see `gmsh_files.py`.
 
 Each fault is an entry of an error message. Boundary faces may touch at their common ends only; pairs of faces that
 touch elsewhere are searched.
@@ -17,6 +19,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fvsolve.errors import Fault, MeshError, did_you_mean, listing
+from fvsolve.mesh.gmsh_files import GmshMesh, line_names, read_gmsh_4, sections
 from fvsolve.mesh.mesh import CROWDED, WALL, Edges, Mesh, assemble, corners, cross, edges_of, key_of
 from fvsolve.units import find
 
@@ -97,7 +100,7 @@ def overlap_faults(sketch: Sketch, edges: Edges, number: np.ndarray) -> list[Fau
     reason = "more than two cells share the face" if cells.size > 2 else "both lie on one side of the face"
     more = f" ({faces.size} such faces)" if faces.size > 1 else ""
     where = sketch.face((edges.start[at[0]], edges.stop[at[0]]))
-    remedy = "expected one cell on each side; is a surface meshed twice, or in two physical groups?"
+    remedy = "expected one cell on each side; is a surface meshed twice, or in two physical groups (MSH 2.2)?"
     return [Fault("cells", f"some cells overlap at {where}{more}: {cell_texts}, {reason}; {remedy}")]
 
 
@@ -225,7 +228,7 @@ def assign_patches(
     for name, members in groups.items():
         place = f"groups.{name}"
         if not members.size:
-            remedy = "expected lines of the boundary (Gmsh: try Mesh.SaveAll = 0; 1 leaves out the groups of lines)"
+            remedy = "expected lines of the boundary (Gmsh: try Mesh.SaveAll = 0; 1 leaves out groups in MSH 2.2)"
             faults.append(Fault(place, f"the group contains no line of the file; {remedy}"))
             continue
         member_keys = key_of(lines[members], len(sketch.points))
@@ -247,6 +250,24 @@ def assign_patches(
     return faults, names, patch
 
 
+def _outline(
+    groups: Mapping[str, np.ndarray], lines: np.ndarray, edges: Edges, count: int, walls: Collection[str]
+) -> tuple[dict[str, np.ndarray], list[str]]:
+    """(groups of lines on the boundary, notes on groups that are ignored, since all their lines lie between cells).
+
+    lines : int64[k, 2]  points of the lines; count : number of points; walls : names of groups that are walls
+    """
+    inner = np.setdiff1d(edges.key, edges.key[edges.outer])
+    outline, notes = {}, []
+    for name, members in groups.items():
+        if members.size and name not in walls and np.isin(key_of(lines[members], count), inner).all():
+            text = f'the lines of the group "{name}" lie between cells: ignored'
+            notes.append(f'{text}; `walls` of the basin may name it, for example {{ bank = {{ group = "{name}" }} }}')
+        elif name not in walls:
+            outline[name] = members
+    return outline, notes
+
+
 def _line_location(sketch: Sketch, edges: Edges, ends: np.ndarray) -> str:
     """Text with the location of a line that is not a boundary face. ends : int64[2]  its points, -1 if in no cell"""
     if (ends < 0).any():
@@ -260,8 +281,12 @@ PLANE = {"triangle": 3, "quad": 4}
 IGNORED = {"vertex", "line", *PLANE}
 TAGS = ("gmsh:physical", "medit:ref", "su2:tag")  # names of group numbers in the formats
 
+GMSH_REMEDY = "Gmsh: try Mesh.MshFileVersion = 4.1 and Mesh.SaveParametric = 0"
 PLANE_TOLERANCE = 1e-6  # of the extent: allowed range of z
 FAR = 1e100  # beyond it fourth powers overflow
+SOLID_FORMATS = (".node", ".ele")
+LONGEST_LINE, MOST_PRINTED = 10_000, 10_000  # characters of a line of a file, and of the warnings of meshio
+LONGEST_TEXT = 300  # greatest length of a text of meshio in a message [characters]
 LARGE, SMALL = 1e4, 1e-3  # extents that suggest another unit [m]
 
 
@@ -286,7 +311,8 @@ def read(path: str | Path, unit: str = "m", walls: Collection[str] = ()) -> Mesh
     """Read a plane mesh from a file of any format of meshio, with coordinates in `unit`.
 
     Triangles and quadrilaterals are cells, renumbered so that neighbours are close; physical groups of lines are
-    patches, except `walls`: names of groups whose lines may lie between cells. The file, its coordinates, its cells and
+    patches, except `walls`: names of groups whose lines may lie between cells. Another group, all of whose lines lie
+    between cells, is ignored, with a note. The file, its coordinates, its cells and
     its boundary are checked in this order; MeshError is raised with all faults of the first of these checks that fails.
     """
     path = Path(path)
@@ -314,10 +340,11 @@ def read(path: str | Path, unit: str = "m", walls: Collection[str] = ()) -> Mesh
     faults += overlap_faults(sketch, edges, number)
     if faults:
         raise MeshError(faults, path.name)
-    outline = {name: members for name, members in content.groups.items() if name not in walls}
+    outline, ignored = _outline(content.groups, lines, edges, len(sketch.points), walls)
+    notes += ignored
     faults, names, patch = assign_patches(sketch, edges, lines, outline)
     chains = {name: key_of(lines[members], len(sketch.points)) for name, members in content.groups.items()
-              if name in walls}  # fmt: skip
+              if name not in outline}  # fmt: skip
     for name, keys in chains.items():
         if (missing := ~np.isin(keys, edges.key)).any():
             where = _line_location(sketch, edges, lines[content.groups[name]][missing][0])
@@ -391,7 +418,7 @@ def load_file(path: Path) -> Content:
 
     Raises MeshError if the file is missing, cannot be read, or contains no plane mesh.
     """
-    file_mesh, notes = _read_by_meshio(path)
+    file_mesh, notes = _read_file(path)
     kinds: dict[str, int] = {}
     for block in file_mesh.cells:
         kinds[block.type] = kinds.get(block.type, 0) + len(block.data)
@@ -421,15 +448,38 @@ def load_file(path: Path) -> Content:
     return content
 
 
-def _read_by_meshio(path: Path) -> tuple[Any, tuple[str, ...]]:
-    """(mesh object of meshio, messages that meshio printed); raises MeshError for a missing or unreadable file."""
-    import meshio
+def _read_file(path: Path) -> tuple[Any, tuple[str, ...]]:
+    """(`GmshMesh` or mesh object of meshio, messages that meshio printed).
 
+    Raises MeshError for a missing or unreadable file.
+    """
     if not path.is_file():
         near = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
         raise MeshError([Fault("", f"there is no such file{did_you_mean(path.name, near)}")], str(path))
-    printed = io.StringIO()
+    if path.suffix.lower() != ".msh":
+        return _read_by_meshio(path)
     try:
+        data = path.read_bytes()
+        if (result := read_gmsh_4(data)) is not None:
+            return result, ()
+    except (OSError, ValueError) as error:
+        raise MeshError([Fault("", f"the file cannot be read ({error}); {GMSH_REMEDY}")], path.name) from None
+    file_mesh, notes = _read_by_meshio(path)
+    with contextlib.suppress(ValueError):  # meshio keeps one of two groups of the same name
+        file_mesh.field_data = line_names(dict(sections(data)).get("PhysicalNames", b""))
+    return file_mesh, notes
+
+
+def _read_by_meshio(path: Path) -> tuple[Any, tuple[str, ...]]:
+    """(mesh object of meshio, messages that meshio printed); raises MeshError for an unreadable file."""
+    import meshio
+
+    printed = BoundedText()
+    try:
+        if path.suffix.lower() in SOLID_FORMATS:  # meshio does not end at the end of such a file
+            raise ValueError("files of TetGen contain tetrahedra; expected a mesh of one plane surface")
+        if path.suffix.lower() == ".su2" and max(map(len, path.read_bytes().split(b"\n"))) > LONGEST_LINE:
+            raise ValueError(f"a line has more than {LONGEST_LINE} characters")  # meshio takes minutes to print it
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             file_mesh = meshio.read(path)
@@ -439,15 +489,25 @@ def _read_by_meshio(path: Path) -> tuple[Any, tuple[str, ...]]:
     except (Exception, SystemExit) as error:  # meshio calls exit, or raises errors of any type
         text = printed.getvalue() if isinstance(error, SystemExit) else f"{type(error).__name__}: {error}"
     text = _single_line(text)
-    remedy = "Gmsh: try Mesh.SaveAll = 0, or Mesh.MshFileVersion = 2.2" if path.suffix == ".msh" else ""
+    remedy = GMSH_REMEDY if path.suffix.lower() == ".msh" else ""
     known = sorted(meshio.extension_to_filetypes)
     if path.suffix.lower() not in known:
         remedy = f"expected a name that ends in {listing(known, 40)}"
     raise MeshError([Fault("", "; ".join(filter(None, [f"meshio cannot read the file ({text})", remedy])))], path.name)
 
 
+class BoundedText(io.StringIO):
+    """Text that a library prints; raises ValueError above `MOST_PRINTED` characters, as for a fault in each line."""
+
+    def write(self, text: str) -> int:
+        if self.tell() > MOST_PRINTED:
+            raise ValueError(f"more than {MOST_PRINTED} characters of warnings: {self.getvalue()}")
+        return super().write(text)
+
+
 def _single_line(text: str) -> str:
-    return re.sub(r"\s+", " ", text).strip(" .").removeprefix("Error: ")
+    text = re.sub(r"\s+", " ", text).strip(" .").removeprefix("Error: ")
+    return text if len(text) <= LONGEST_TEXT else text[:LONGEST_TEXT] + "..."
 
 
 def _bad_kinds(kinds: dict[str, int]) -> list[Fault]:
@@ -466,7 +526,9 @@ def _bad_kinds(kinds: dict[str, int]) -> list[Fault]:
         remedy = "Gmsh: Mesh.ElementOrder = 1" if re.search(r"\d", "".join(other)) else "split them"
         return [Fault("cells", f"{', '.join(other)} cannot be used ({counts}); {expected}; {remedy}")]
     if not set(kinds) & set(PLANE):
-        return [Fault("cells", f"there are no two-dimensional cells ({counts}); {expected}; was the surface meshed?")]
+        text = f"there are no two-dimensional cells ({counts}); {expected}; was the surface meshed?"
+        remedy = " Gmsh: if there are physical groups, it writes only those; add one of the surface (Physical Surface)"
+        return [Fault("cells", f"{text}{remedy}")]
     return []
 
 
@@ -484,13 +546,13 @@ def _groups(file_mesh: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
     for k, block in enumerate(file_mesh.cells):
         if block.type != "line":
             continue
-        for name, sets in (file_mesh.cell_sets or {}).items():
+        for name, sets in (getattr(file_mesh, "cell_sets", None) or {}).items():
             if not name.startswith("gmsh:") and sets[k] is not None and len(sets[k]):
                 members.setdefault(name, []).append(first + np.asarray(sets[k], np.int64))
-        for tag, lines in _tagged_lines(file_mesh.cell_data, k):
-            unnamed |= {tag} - set(name_of)
-            members.setdefault(name_of.get(tag, str(tag)), []).append(first + lines)
         first += len(block.data)
+    for tag, lines in _tagged_lines(file_mesh):
+        unnamed |= {tag} - set(name_of)
+        members.setdefault(name_of.get(tag, str(tag)), []).append(lines)
     numbers = ", ".join(map(str, sorted(unnamed)))
     text = f"groups of lines with a number instead of a name in the file: their patches are named {numbers}"
     notes = (text,) if unnamed else ()
@@ -498,13 +560,22 @@ def _groups(file_mesh: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
     return {name: np.unique(np.concatenate(lines or empty)) for name, lines in members.items()}, notes
 
 
-def _tagged_lines(cell_data: Any, k: int) -> Iterable[tuple[int, np.ndarray]]:
-    """Yield (number of the group, indices of its lines in the block) for each group in block k, a block of lines.
+def _tagged_lines(file_mesh: Any) -> Iterable[tuple[int, np.ndarray]]:
+    """Yield (number of a group, numbers of some of its lines).
 
-    The number 0 stands for no group.
+    The number 0 stands for no group; in Gmsh's a negative number marks reversed lines.
     """
-    for key in TAGS:
-        if key in cell_data:
-            tags = np.asarray(cell_data[key][k]).astype(np.int64)
-            for tag in np.unique(tags[tags != 0]):
-                yield int(tag), np.flatnonzero(tags == tag)
+    if isinstance(file_mesh, GmshMesh):
+        yield from file_mesh.groups.items()
+        return
+    first = 0
+    for k, block in enumerate(file_mesh.cells):
+        if block.type != "line":
+            continue
+        for key in TAGS:
+            if key in file_mesh.cell_data:
+                tags = np.asarray(file_mesh.cell_data[key][k]).astype(np.int64)
+                tags = np.abs(tags) if key == "gmsh:physical" else tags
+                for tag in np.unique(tags[tags != 0]):
+                    yield int(tag), first + np.flatnonzero(tags == tag)
+        first += len(block.data)

@@ -18,7 +18,7 @@ from fvsolve.parts.csv_rows import copy_name, find_file
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey, uniform
 from fvsolve.parts.kinds import Kinds
 from fvsolve.parts.nodes_and_links import Node, PlaceOnBody
-from fvsolve.parts.raster_files import is_in_degrees
+from fvsolve.parts.raster_systems import is_in_degrees
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table_model import NamedTables, Nested, Table
 from fvsolve.parts.value import (

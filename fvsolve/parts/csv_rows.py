@@ -20,7 +20,8 @@ from fvsolve.units import show
 COMMA_HINT = "; with decimal commas, separate columns by ; or tabs"
 SEPARATORS = ("\t", ";", ",")
 PLAIN_SIGNS = frozenset("0123456789+-.eE")
-NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?")
+NUMBER = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?")
+MOST_COLUMNS = 4096
 
 
 class CsvError(ValueError):
@@ -65,7 +66,8 @@ class CsvRows:
                 )
             if name in known:
                 return known.index(name)
-        shown = f"{did_you_mean(name, self.header)}; columns are {', '.join(map(show, self.header))}"
+        shown = f"{did_you_mean(name, self.header)}; columns are {', '.join(map(show, self.header[:20]))}"
+        shown += ", ..." if len(self.header) > 20 else ""
         raise ValueError(f"{self.file} has no column {show(name)}{shown}")
 
     def numbers(self, column: int, dimension: str, ambient: float = 101325.0, stated: str = "") -> np.ndarray:
@@ -124,10 +126,11 @@ def split_header(header: str) -> tuple[str, str]:
 
     Text in round brackets that is not a unit belongs to the name.
     """
-    match = re.fullmatch(r"(.*?)\s*(?:\[(.*)\]|\((.*)\))", header)
-    if match is None or not (match[3] is None or units.is_unit(match[3])):
-        return header, ""
-    return match[1], match[2] if match[3] is None else match[3]
+    for opening, closing in ("[]", "()"):
+        name, bracket, unit = header[:-1].partition(opening)
+        if header.endswith(closing) and bracket and (opening == "[" or units.is_unit(unit)):
+            return name.rstrip(), unit
+    return header, ""
 
 
 def number(text: str) -> float | None:
@@ -151,6 +154,8 @@ def read_rows(path: Path) -> CsvRows:
     header, *rows = next(
         (reading for reading in readings.values() if is_uniform(reading)), next(iter(readings.values()))
     )
+    if len(header) > MOST_COLUMNS:
+        raise ValueError(f"{path.name} has {len(header)} columns; expected at most {MOST_COLUMNS}")
     if all(number(name) is not None for name in header):
         raise ValueError(f'{path.name} has no header; expected for example "t [s],opening [-]"')
     for (line, _), row in zip(lines[1:], rows, strict=True):

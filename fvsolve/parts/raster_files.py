@@ -13,29 +13,16 @@ import numpy as np
 from fvsolve import units
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.csv_rows import read_text
+from fvsolve.parts.raster_systems import REFERENCE, SMALL, are_probably_degrees, check_metres, epsg_code, utm_code
 from fvsolve.parts.value import check_increasing
 from fvsolve.units import show
 
 MOST_CELLS = 1e8  # of a grid
-SMALL = 0.01  # [m] or degrees: pixels of rasters in degrees are smaller
 HEAD = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "dx", "dy", "nodata_value")
+HEAD_LINE = re.compile(r"[ \t]*([A-Za-z_]+)[ \t]+(\S+)[ \t]*\r?\n")
 EVEN = 1e-4  # of the spacing: greatest distance of a coordinate from an even grid
 SINCE = re.compile(r"\s*(s|min|h|d|sec|hr|second|minute|hour|day)s?\s+since\s+(\S.*)", re.IGNORECASE)  # after CF
 NORTH = re.compile("y|northing|lat(itude)?|projection_y_coordinate", re.IGNORECASE)  # along y, after CF
-AUTHORITY = re.compile(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d+)"?\]')  # in the text of a CRS; the last is its own
-# Numbers of EPSG up to 9140 for systems in degrees, in ranges without projected and vertical systems (EPSG 12; the
-# ranges include geocentric systems and numbers without a system).
-NUMBERS_IN_DEGREES = """
-    3819-3824 3888-3889 3906 4001-4025 4027-4036 4040-4047 4052-4055 4074-4081 4120-4216 4218-4388 4463-4466 4469-4470
-    4472 4475-4483 4490 4555-4558 4600-4646 4657-4765 4801-4811 4813-4821 4823-4824 4883-5013 5132 5228-5233 5245-5246
-    5251-5252 5263-5264 5323-5324 5340-5342 5353-5354 5359-5360 5364-5365 5370-5381 5392-5393 5451 5464 5467 5488-5489
-    5498-5500 5524-5527 5545-5546 5560-5561 5592-5593 5628 5681 5830 5885-5886 5942 6134-6135 6144 6207 6310-6311
-    6318-6325 6349 6364-6365 6649 6667-6668 6696-6700 6705-6706 6782-6783 6881-6883 6892 6894 6917 6979-6983 6986-6990
-    7034-7042 7072-7073 7084-7088 7133-7139 7372-7373 7400 7404 7406 7409-7410 7414 7423 7657-7686 7797-7798 7816
-    7843-7844 7880-7881 7885-7886 7900-7931 8042-8043 8085-8086 8231-8255 8349-8351 8360 8399-8431 8449 8542-8545
-    8684-8685 8694-8699 8817-8818 8860 8888 8899-8902 8906-8907 8916-8949 8972-9019 9053-9075 9139-9140
-"""
-REFERENCE = "expected a raster with coordinates in metres, for example written by GDAL or QGIS"
 
 
 class Pixels(NamedTuple):
@@ -43,6 +30,7 @@ class Pixels(NamedTuple):
 
     values : float64[ny, nx]  rows from south to north, NaN without data
     x, y : south-west corner [m]; dx, dy : size of a pixel [m]; unit, crs : as stated, "" if unknown
+    metric : True if the file states that its coordinates are lengths
     times : float64[frames]  of a series of frames since the start of the run [s], with values : float64[frames, ny, nx]
     """
 
@@ -54,12 +42,13 @@ class Pixels(NamedTuple):
     unit: str = ""
     crs: str = ""
     times: np.ndarray | None = None
+    metric: bool = False
 
     @property
     def hint(self) -> str:
         """Remark on pixels whose numbers look like degrees; "" for others."""
-        far = max(abs(self.x), abs(self.y)) <= 180.0 and self.dx < SMALL
-        return "; are its coordinates in degrees?" if far else ""
+        near = max(abs(self.x), abs(self.y)) <= 180.0 and self.dx < SMALL and not self.metric
+        return "; are its coordinates in degrees?" if near else ""
 
     def to_basin(self, name: str, origin: tuple[float, float] | None, crs: str | None) -> "Pixels":
         """Pixels in the coordinates of a basin. Raises ValueError if the file `name` states another CRS.
@@ -113,11 +102,26 @@ def _read(path: Path, changed: int, size: int, band: int, variable: str, series:
         check_unused(path, "variable", variable != "", "a NetCDF file")
         check_unused(path, "band", band != 1, "a GeoTIFF")
         result = read_ascii_grid(path)
+    if not result.metric:
+        check_lengths(path, result)
     result.values[~np.isfinite(result.values)] = np.nan
     if np.isnan(result.values).all():
         raise ValueError(f"{path.name} has no data in any pixel; expected a raster with data")
     result.values.flags.writeable = False
     return result
+
+
+def check_lengths(path: Path, pixels: Pixels) -> None:
+    """Raise ValueError for pixels whose coordinates look like degrees, in a file without a coordinate system."""
+    low, size, count = (pixels.x, pixels.y), (pixels.dx, pixels.dy), pixels.values.shape[:-3:-1]
+    if not are_probably_degrees(low, size, count):
+        return
+    utm = utm_code(*(corner + 0.5 * step * number for corner, step, number in zip(low, size, count, strict=True)))
+    text = f"{path.name} states no coordinate system, and its numbers look like degrees: pixels of {size[0]:.6g} by "
+    text += f"{size[1]:.6g} at {low[0]:.6g}, {low[1]:.6g}; expected metres, for example by gdalwarp -s_srs EPSG:4326 "
+    place = "the file" if path.suffix.lower() in (".tif", ".tiff", ".nc") else f"{path.stem}.prj"
+    local = 'LOCAL_CS["local",UNIT["metre",1]]'
+    raise ValueError(f"{text}-t_srs {utm}; if they are metres, state a system in {place}, for example {local}")
 
 
 def check_count(name: str, nx: float, ny: float) -> None:
@@ -127,30 +131,10 @@ def check_count(name: str, nx: float, ny: float) -> None:
         raise ValueError(f"{text}; expected larger cells, or a part of it")
 
 
-def is_in_degrees(crs: str) -> bool:
-    """True for a code such as "EPSG:4326" of a system in degrees, by `NUMBERS_IN_DEGREES`."""
-    if not crs.startswith("EPSG:"):
-        return False
-    ranges = ([int(end) for end in item.split("-")] for item in NUMBERS_IN_DEGREES.split())
-    return any(ends[0] <= int(crs.removeprefix("EPSG:")) <= ends[-1] for ends in ranges)
-
-
-def epsg_code(text: str) -> str:
-    """Code such as "EPSG:32633" of the text of a CRS (WKT or code), "" if none. Raises ValueError for degrees."""
-    if text.lstrip().startswith(("GEOGCS", "GEOGCRS")) or is_in_degrees(text):
-        raise ValueError(f"is in degrees; {REFERENCE}")
-    if text.startswith("EPSG:"):
-        return text
-    codes = AUTHORITY.findall(text)
-    return f"EPSG:{codes[-1]}" if codes else ""
-
-
 def read_ascii_grid(path: Path) -> Pixels:
     """Pixels of an ESRI ASCII grid; a file .prj beside it may state its CRS."""
     text, keys, at = read_text(path), {}, 0
-    for match in re.finditer(r"[ \t]*([A-Za-z_]+)[ \t]+(\S+)[ \t]*\r?\n", text):
-        if match.start() != at or match[1].lower() not in HEAD:
-            break
+    while (match := HEAD_LINE.match(text, at)) is not None and match[1].lower() in HEAD:
         keys[match[1].lower()], at = match[2], match.end()
     if "ncols" not in keys:
         raise ValueError(f"{path.name} is neither a GeoTIFF, NetCDF nor ESRI ASCII grid; {REFERENCE}")
@@ -162,26 +146,35 @@ def read_ascii_grid(path: Path) -> Pixels:
         raise ValueError(f"{path.name} has no georeference: no lines `xllcorner` and `yllcorner`; {REFERENCE}")
     sizes = [keys.get(key, keys.get("cellsize")) for key in ("dx", "dy")]
     try:
-        nx, ny = int(keys["ncols"]), int(keys["nrows"])
-        (x, y), (dx, dy) = (float(keys[key]) for key in corner), map(float, sizes)
-        missing = float(keys.get("nodata_value", "-9999"))
+        nx, ny, x, y, dx, dy, missing = (
+            float(units.plain_numbers(value)[0])
+            for value in (keys["ncols"], keys["nrows"], *(keys[key] for key in corner), *sizes,
+                          keys.get("nodata_value", "-9999"))
+        )  # fmt: skip
     except ValueError as error:
-        raise ValueError(f"{path.name}: {error}; expected numbers in its first lines") from None
+        text = str(error).removeprefix("line 1: ")
+        raise ValueError(f"{path.name}: {text}; expected numbers with decimal points in its first lines") from None
+    if not (np.isfinite([x, y, dx, dy]).all() and min(dx, dy) > 0.0 and nx == nx // 1 >= 1.0 and ny == ny // 1 >= 1.0):
+        text = f"{path.name} has {nx:g} x {ny:g} pixels of {dx:g} x {dy:g} at {x:g}, {y:g}"
+        raise ValueError(f"{text}; expected whole numbers of pixels above 0, sizes above 0, and finite numbers")
+    nx, ny = int(nx), int(ny)
     check_count(path.name, nx, ny)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # texts that are not numbers: reported by their count
-        values = np.fromstring(text[at:], sep=" ")
-    if min(nx, ny) < 1 or min(dx, dy) <= 0.0 or values.size != nx * ny:
-        text = f"{path.name} has {values.size} numbers up to its end or its first text that is not a number"
-        raise ValueError(f"{text}; expected {nx} x {ny}")
+    try:
+        values = units.plain_numbers(text[at:], 1 + text.count("\n", 0, at))
+    except ValueError as error:
+        raise ValueError(f"{path.name}, {error}; expected numbers with decimal points") from None
+    if values.size != nx * ny:
+        raise ValueError(f"{path.name} has {values.size} numbers; expected {nx} x {ny}")
     values[values == missing] = np.nan
     x, y = (low - 0.5 * wide * key.endswith("center") for low, wide, key in zip((x, y), (dx, dy), corner, strict=True))
     projection = path.with_suffix(".prj")
+    stated = read_text(projection) if projection.is_file() else ""
     try:
-        crs = epsg_code(read_text(projection)) if projection.is_file() else ""
+        crs = epsg_code(stated)
+        check_metres(stated)
     except ValueError as error:
         raise ValueError(f"{path.name} {error}") from None
-    return Pixels(values.reshape(ny, nx)[::-1].copy(), x, y, dx, dy, crs=crs)
+    return Pixels(values.reshape(ny, nx)[::-1].copy(), x, y, dx, dy, crs=crs, metric=bool(stated.strip()))
 
 
 def check_unused(path: Path, key: str, given: bool, owner: str) -> None:
@@ -215,7 +208,7 @@ def read_geotiff(path: Path, band: int) -> Pixels:
         data = data * file.scales[band - 1] + file.offsets[band - 1]
         code = crs.to_epsg() if crs is not None else None
         return Pixels(data[::-1].copy(), to.c, to.f + file.height * to.e, to.a, -to.e, file.units[band - 1] or "",
-                      f"EPSG:{code}" if code else "")  # fmt: skip
+                      f"EPSG:{code}" if code else "", metric=crs is not None)  # fmt: skip
 
 
 class NetcdfVariable(NamedTuple):
@@ -291,7 +284,8 @@ def _pixels_of(file: str, known: dict[str, NetcdfVariable], name: str, series: b
         crs = epsg_code(text)
     except ValueError as error:
         raise ValueError(f"{file} {error}") from None
-    return Pixels(values, x, y, abs(dx), abs(dy), str(item.attributes.get("units", "")), crs, times)
+    metric = text.strip() != "" or "units" in known[along].attributes
+    return Pixels(values, x, y, abs(dx), abs(dy), str(item.attributes.get("units", "")), crs, times, metric)
 
 
 def _is_northward(dimension: str, known: dict[str, NetcdfVariable]) -> bool:
@@ -324,7 +318,7 @@ def _frame_times(file: str, name: str, known: dict[str, NetcdfVariable]) -> np.n
 def _even(file: str, name: str, item: NetcdfVariable) -> tuple[float, float]:
     """(lower edge, signed spacing) [m] of the pixels along a coordinate, whose values are their centres."""
     unit, at = str(item.attributes.get("units", "m")), item.read()
-    if unit.startswith("degree"):
+    if unit.startswith("degree") or item.attributes.get("standard_name") in ("longitude", "latitude"):
         raise ValueError(f"{file} is in degrees; {REFERENCE}")
     try:
         at = at if unit in ("m", "") else units.find(unit, "length").si(at)

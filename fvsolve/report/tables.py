@@ -20,7 +20,7 @@ from fvsolve.parts.table_model import plain_value
 from fvsolve.parts.value import Quantity
 from fvsolve.report.long_section import SectionPath, envelope_column
 from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN, not_valid
-from fvsolve.units import DIMENSIONS, UNITS, span
+from fvsolve.units import DIMENSIONS, span
 
 DIGITS = 5  # significant digits of the greatest number of a column
 DECIMALS = 6  # greatest number of decimals, unless the least number of the column needs more
@@ -313,8 +313,8 @@ def _pressure_column(shown, case):
 
     Such quantities are moduli and pressure drops; any other column is returned unchanged.
     """
-    if shown.dimension in ("modulus", "pressure_drop") and (UNITS[shown.unit].gauge or UNITS[shown.unit].absolute):
-        return column(shown.name, shown.dimension, case, shown.unit[:-1])
+    if shown.dimension in ("modulus", "pressure_drop") and span(shown.unit) != shown.unit:
+        return column(shown.name, shown.dimension, case, span(shown.unit))
     return shown
 
 

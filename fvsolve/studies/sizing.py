@@ -18,7 +18,7 @@ from fvsolve.studies.outcome import NO_FIELDS, checked_case, end_if_interrupted
 from fvsolve.studies.peak_error import peak_errors
 from fvsolve.studies.result_table import PlainData
 from fvsolve.studies.sampling import is_known, key_quantity, si_unit_of
-from fvsolve.units import UNITS, show
+from fvsolve.units import show, unit_of
 
 GOALS = ("minimum", "maximum")
 INTERIOR_TRIALS = 8  # greatest number of trials between two ends if limits fail at both
@@ -99,7 +99,7 @@ def parse_range(low: Any, high: Any) -> tuple[float, float, str]:
     except ValueError as error:
         raise FvsolveError(str(error)) from None
     if unit_a != unit_b:
-        first, second = UNITS.get(unit_a), UNITS.get(unit_b)
+        first, second = unit_of(unit_a), unit_of(unit_b)
         if first is None or second is None or first.dimension != second.dimension or first.gauge != second.gauge:
             text = f"{show(low)} and {show(high)} have different kinds of units"
             raise FvsolveError(f"{text}. Use the same unit for both")
@@ -124,7 +124,7 @@ class SizeSearch:
 
     def keys(self, value: float) -> dict[str, Any]:
         """Overrides for a value of the key, and for dependent keys. Raises CaseError if a formula has no value."""
-        unit = UNITS.get(self.unit)
+        unit = unit_of(self.unit)
         x = value if unit is None else float(unit.si(value)) + (self.case.ambient_pressure if unit.gauge else 0.0)
         overrides: dict[str, Any] = {self.key: f"{value!r} {self.unit}" if self.unit else value}
         for tied, rule in self.formulas.items():
@@ -250,7 +250,7 @@ def relative_margin(row: Mapping[str, Any], quantity: str) -> float:
     """
     if row["margin"] is None:
         return -math.inf
-    unit = UNITS.get(row["unit"])
+    unit = unit_of(row["unit"] or "")
     usual = SIZES.get(quantity, 0.0)
     least = usual / abs(float(unit.si(1.0) - unit.si(0.0))) if usual and unit is not None else usual
     return (row["margin"] - (row["error"] or 0.0)) / (max(abs(row["limit"]), least) or abs(row["value"]) or 1.0)

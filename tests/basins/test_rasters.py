@@ -12,7 +12,7 @@ from reference.scenes import scene
 from scipy.io import netcdf_file
 
 import fvsolve
-from fvsolve.parts.raster_files import is_in_degrees
+from fvsolve.parts.raster_systems import is_in_degrees
 
 EAST, NORTH = 412000.0, 5650000.0
 UTM = 32633

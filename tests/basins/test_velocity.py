@@ -140,7 +140,7 @@ def test_velocities_that_cannot_be_had_are_refused_with_what_is_wanted(velocity,
     [
         (None, "No such file"),
         ("", "has no rows; expected a header"),
-        ("x,y,u\n0,0,1\n", "line 1: its header is x, y, u; expected x, y, u, v or x, y, psi"),
+        ("x,y,u\n0,0,1\n", 'line 1: its header is "x, y, u"; expected x, y, u, v or x, y, psi'),
         ("x,y,psi\n0,0,1\n1,0,b\n", 'line 3: "b" is not a number in column "psi"'),
         ("x,y,psi\n0,0,1\n1,0,2\n", "too few points (2); expected at least three"),
         ("x,y,psi\n0,0,1\n1,0,2\n2,0,3\n", "lie on one line"),

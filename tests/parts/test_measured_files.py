@@ -1,5 +1,7 @@
 """CSV files: values are read as written, or the fault names the line; separators, commas, units, encodings."""
 
+import time
+
 import numpy as np
 import pytest
 from pytest import approx
@@ -158,3 +160,20 @@ def test_velocities_are_read_alike(text, tmp_path):
     (tmp_path / "v.csv").write_text("x,y,u,v\n0,0,0,5,0,0\n")
     with pytest.raises(MeshError, match="line 2: 6 cells under 4 headers; with decimal commas"):
         face_flows(mesh, {"file": tmp_path / "v.csv"})
+
+
+@pytest.mark.parametrize("sign", [" ", "9", ",", "\n", "#", "a", "[", "(m) "])
+@pytest.mark.parametrize("place", ["alone", "header", "rows"])
+def test_a_megabyte_of_one_sign_is_read_or_refused_in_bounded_time(sign, place, tmp_path):
+    """100 kB of blanks in a header took minutes, digits before a letter as long."""
+    fill, start = sign * 10**6, time.process_time()
+    texts = {"alone": fill, "header": f"t{fill}b,h\n0,1\n1,2\n", "rows": f"t,h\n0,1\n1,{fill}x\n"}
+    try:
+        columns(tmp_path / "rig.csv", texts[place])
+    except ValueError as error:
+        assert len(str(error)) < 1000
+    assert time.process_time() - start < 5.0
+
+
+def test_a_file_of_very_many_columns_is_refused(tmp_path):
+    assert "has 10001 columns; expected at most 4096" in refusal(tmp_path / "rig.csv", "a," * 10**4 + "b\n" * 2)

@@ -253,17 +253,18 @@ def test_a_margin_that_fails_everywhere_ends_the_search() -> None:
     assert search.search(0.0, 20.0, "minimum", 0.01) == (None, None) and len(search.runs) <= 10
 
 
-def test_ties_follow_in_si() -> None:
+@pytest.mark.parametrize("unit", ["ft", "feet", "international_foot"])  # the last by pint only
+def test_ties_follow_in_si(unit) -> None:
     found = size(
         still(minimum=3e5),
         "nodes.lake.head",
-        "80 ft",
-        "250 ft",
+        f"80 {unit}",
+        f"250 {unit}",
         ties=parse_ties(["links.main.length = 10 * x"]),
         rtol=0.01,
     )
     assert found.ties == ("links.main.length = 10 * x",)
-    assert found.value * 0.3048 == pytest.approx(10.0 + 3e5 / (RHO * GRAVITY), rel=0.02)
+    assert found.unit == unit and found.value * 0.3048 == pytest.approx(10.0 + 3e5 / (RHO * GRAVITY), rel=0.02)
 
 
 def test_the_command_shows_its_runs(fvs, tmp_path) -> None:

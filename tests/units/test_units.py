@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -48,7 +49,9 @@ IMGD: 1e6 imperial_gallon/day | afd: 43560 foot**3/day | AFD: 43560 foot**3/day 
 mm/s: millimeter/second | cm/s: centimeter/second | km/s: kilometer/second | m/min: meter/minute
 m/h: meter/hour | km/h: kilometer/hour | ft/s: foot/second | fps: foot/second | ft/min: foot/minute
 in/s: inch/second | mm/h: millimeter/hour | mm/min: millimeter/minute
-in/h: inch/hour | mph: mile/hour | m/s2: meter/second**2 | cm/s2: centimeter/second**2
+in/h: inch/hour | mm/d: millimeter/day | m/d: meter/day | mph: mile/hour
+kg/m2/s: 0.001 meter/second | kg/m2/h: 0.001 meter/hour | kg/m2/d: 0.001 meter/day
+m/s2: meter/second**2 | cm/s2: centimeter/second**2
 ft/s2: foot/second**2 | kg/m3: kilogram/meter**3 | g/cm3: gram/centimeter**3 | g/ml: gram/milliliter
 g/mL: gram/milliliter | kg/l: kilogram/liter | kg/L: kilogram/liter | kg/dm3: kilogram/decimeter**3
 g/l: gram/liter | g/L: gram/liter | t/m3: metric_ton/meter**3 | lb/ft3: pound/foot**3
@@ -170,6 +173,28 @@ def test_text_is_rounded_once():
         ("3 µm", "length", 3e-6),
         ("50 %", "number", 0.5),
         ("0.5", "number", 0.5),
+        ("3 metre", "length", 3.0),
+        ("3 Meters", "length", 3.0),
+        ("3 metres per second", "velocity", 3.0),
+        ("2 hours", "time", 7200.0),
+        ("10 sec", "time", 10.0),
+        ("3 m s-1", "velocity", 3.0),
+        ("3 m s^-1", "velocity", 3.0),
+        ("3 m s⁻¹", "velocity", 3.0),
+        ("3 m.s-1", "velocity", 3.0),
+        ("36 mm h-1", "rainfall", 1e-5),
+        ("36 mm hr-1", "rainfall", 1e-5),
+        ("36 mm/hr", "rainfall", 1e-5),
+        ("864 mm day-1", "rainfall", 1e-5),
+        ("864 mm d-1", "rainfall", 1e-5),
+        ("0.01 kg m-2 s-1", "rainfall", 1e-5),
+        ("0.01 kg m**-2 s**-1", "rainfall", 1e-5),
+        ("3 m**3 s**-1", "flow", 3.0),
+        ("3 m3 s-1", "flow", 3.0),
+        ("2 s-1", "frequency", 2.0),
+        ("3 kg m-3", "density", 3.0),
+        ("3 W m-2 K-1", "heat_transfer_coefficient", 3.0),
+        ("20 degrees_Celsius", "temperature", 293.15),
         (7, "length", 7.0),
         (2.5, "flow", 2.5),
     ],
@@ -208,7 +233,11 @@ def test_pint_knows_the_rest():
         ("5 bar g", "pressure", 'unknown unit "bar g"; did you mean "5 barg"?'),
         ("5 kg/cm2", "pressure", '"5 kg/cm2": unknown unit "kg/cm2"; did you mean "5 kgf/cm2"?'),
         ("45 m", "pressure", '"45 m" is a length; expected a pressure; did you mean "45 mH2O"?'),
-        ("10 sec", "time", '"10 sec": unknown unit "sec"; did you mean "10 s"?'),
+        ("3 kg m-2 s-1", "velocity", '"3 kg m-2 s-1" is a rate of rain; expected a velocity'),
+        ("3 kg m-2 s-1", "flow", '"3 kg m-2 s-1" is a rate of rain; expected a flow'),
+        ("3 kg s-1", "rainfall", '"3 kg s-1" is a mass flow; expected a rate of rain, for example "25 mm/h"'),
+        ("45 metres", "pressure", '"45 metres" is a length; expected a pressure; did you mean "45 mH2O"?'),
+        ("3 mm/h-1", "rainfall", '"3 mm/h-1" is a quantity of'),
         ("10 Min", "time", 'unknown unit "Min"; did you mean "10 min"?'),
         ("3 kg/s", "flow", '"3 kg/s" is a mass flow; expected a flow, for example "20 l/s"'),
         ("3 lp", "flow", '"3 lp": unknown unit "lp"; did you mean "3 lps"?'),
@@ -263,6 +292,33 @@ def test_convert_is_the_inverse_and_counts_gauge_from_ambient():
     assert convert(3.048, "head", "ft") == approx(10.0)
 
 
+@pytest.mark.parametrize(
+    "text", ["1" * 10**6, "1" + " " * 10**6 + "x", " " * 10**6, "1 a" + " " * 10**6 + "b", "," * 10**6]
+)
+def test_long_texts_are_refused_at_once(text):
+    start = time.process_time()
+    with pytest.raises(ValueError, match="is not a number with a unit; expected a length") as caught:
+        parse(text, "length")
+    assert len(str(caught.value)) < 300 and time.process_time() - start < 5.0
+
+
+def test_a_difference_has_the_unit_without_its_zero_for_each_spelling():
+    assert [units.span(unit) for unit in ("barg", "bar(g)", "bara", "bar", "hectopascal")] == [
+        "bar", "bar", "bar", "bar", "hectopascal"]  # fmt: skip
+
+
+def test_plain_numbers_name_the_first_text_that_is_not_a_number():
+    assert units.plain_numbers("1 2.5\n-3e2\tnan\n").tolist()[:3] == [1.0, 2.5, -300.0]
+    assert units.plain_numbers(" \n ").size == 0
+    for text, fault in {"1 2\n3 0,5": 'line 4: "0,5" has a comma; did you mean "0.5"?', "1 x": 'line 3: "x" is not a',
+                        "1 1_0": '"1_0" is not a number', "1.234,5": 'did you mean "1234.5"?'}.items():  # fmt: skip
+        with pytest.raises(ValueError) as caught:
+            units.plain_numbers(text, 3)
+        assert fault in str(caught.value)
+
+
 def test_the_table_needs_no_pint():
-    code = "import sys; from fvsolve.units import parse; parse('1 l', 'volume'); sys.exit('pint' in sys.modules)"
+    code = "import sys; from fvsolve.units import parse; parse('1 l', 'volume'); parse('3 m s-1', 'velocity')"
+    code += "; parse('3 mm hr-1', 'rainfall'); parse('3 kg m-2 s-1', 'rainfall'); parse('3 metres', 'length')"
+    code += "; sys.exit('pint' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -14,6 +14,7 @@ from fvsolve.errors import CaseError, Fault, MeshError, did_you_mean, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import RhsTerms
 from fvsolve.parts.csv_rows import CsvError, read_rows
+from fvsolve.units import show
 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
@@ -277,7 +278,8 @@ def _columns(path: Path) -> dict[str, np.ndarray]:
     try:
         rows = read_rows(path)
         if set(rows.names) not in map(set, COLUMNS) or len(rows.names) not in map(len, COLUMNS):
-            raise CsvError(path.name, f"its header is {', '.join(rows.header)}; expected x, y, u, v or x, y, psi", 1)
+            header = show(", ".join(rows.header))
+            raise CsvError(path.name, f"its header is {header}; expected x, y, u, v or x, y, psi", 1)
         columns = {name: rows.numbers(k, DIMENSIONS[name]) for k, name in enumerate(rows.names)}
     except CsvError as error:
         raise MeshError([Fault("", error.message, error.line)], str(path)) from None

@@ -9,7 +9,7 @@ from fvsolve.parts.control import Control
 from fvsolve.parts.formula import FUNCTIONS, TIME_NAMES
 from fvsolve.parts.formula_program import Program, program_in
 from fvsolve.parts.value import ReadContext, Text, Value, ValueFault, read_each
-from fvsolve.units import DIMENSIONS, UNITS, show
+from fvsolve.units import DIMENSIONS, show, unit_of
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class FormulaBlock(Control, kind="function"):
 
     @classmethod
     def own_dimension(cls, given: dict[str, Any]) -> str | None:
-        unit = UNITS.get(str(given.get("unit", "")))
+        unit = unit_of(str(given.get("unit", "")))
         return unit.dimension if unit is not None and unit.dimension in DIMENSIONS else None
 
     @classmethod

@@ -168,4 +168,4 @@ def columns_among(names: list[str], source: str) -> tuple[str, ...]:
     for keys in COLUMN_SETS:
         if set(keys) <= set(names):
             return keys
-    raise ValueError(f"{source} are {', '.join(names) or 'none'}; expected chainage and elevation, or {AXES}")
+    raise ValueError(f"{source} are {show(', '.join(names))}; expected chainage and elevation, or {AXES}")
