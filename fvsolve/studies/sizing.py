@@ -267,8 +267,8 @@ def size(
     low, high : numbers, or texts with a unit; goal : "minimum" or "maximum"; set : key -> value for all runs
     ties : dependent key -> formula of x, the value in SI; rtol : relative tolerance of the bracket
     progress : called as progress(runs, text)
-    estimate_error : True to require margins larger than their errors, which `peak_errors` finds by up to three more runs
-    for each value
+    estimate_error : True to require margins larger than their errors, which `peak_errors` finds by up to three more
+    runs for each value
     If limits fail at both ends, values near the one with the greatest margin are tried. Raises CaseError for an invalid
     case, a case without limits, and wrong arguments.
     """

@@ -94,8 +94,8 @@ class ManufacturedStudy(OrderStudy):
 
     initial, source, exact : functions as in `order`, or None. Without a source, runs differ from usual runs by their
     initial state only; with a source they are integrated by `steppers.ode.integrate`.
-    Raises FvsolveError for a case without pipes, for density laws other than `linear`, and if reference = "exact" without the
-    function `exact`.
+    Raises FvsolveError for a case without pipes, for density laws other than `linear`, and for the reference "exact"
+    without the function `exact`.
     """
 
     def __init__(

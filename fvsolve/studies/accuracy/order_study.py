@@ -220,7 +220,7 @@ class OrderStudy:
         """Run and fit all rows, coarsest first; rows against a reference are stored in the cache `points` and reused.
 
         With the reference "auto", each row is compared with the next if a finer run fails, or is not more accurate than
-        the rows. Raises FvsolveError if no row runs, or if a reference that the caller or [exact] states cannot be used.
+        the rows. Raises FvsolveError if no row runs, or if the reference of the caller or [exact] cannot be used.
         """
         if self.against == "richardson":
             return self.richardson(progress)
