@@ -24,8 +24,11 @@ class Kind(NamedTuple):
 
 
 def is_number(value: Any) -> bool:
-    """True if the argument is a finite real number and not a bool."""
-    return not isinstance(value, (bool, np.bool_)) and isinstance(value, Real) and math.isfinite(value)
+    """True if the argument is a real number, within the range of float64, and not a bool."""
+    try:
+        return not isinstance(value, (bool, np.bool_)) and isinstance(value, Real) and math.isfinite(value)
+    except OverflowError:  # an integer beyond this range
+        return False
 
 
 def is_row(value: Any, holds: Callable[[Any], bool]) -> bool:

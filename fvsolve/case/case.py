@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from fvsolve.parts.reaction import Reaction
 
 REPORT_KEYS = ("title", "expect", "compare", "validation")
+STEP_KEYS = ("courant", "step", "rtol", "below_vapor")  # of [numerics], which a continued run may change
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -346,10 +347,15 @@ class Case(Displayable):
 
     @cached_property
     def identity_text(self) -> str:
-        """JSON of `table` without the end time and the keys that change the report of a run, not its numbers."""
+        """JSON of `table` without the end time, `STEP_KEYS`, and the keys that change the report of a run only."""
         table = {key: value for key, value in self.table().items() if key not in REPORT_KEYS}
-        table["numerics"].pop("end")
+        table["numerics"] = {key: x for key, x in table["numerics"].items() if key not in ("end", *STEP_KEYS)}
         return json.dumps(table, sort_keys=True, default=str)
+
+    @cached_property
+    def step_keys(self) -> dict[str, Any]:
+        """Values of `STEP_KEYS`; they change the numbers of a run, but not the meaning of its state."""
+        return {key: value for key, value in self.numerics.table().items() if key in STEP_KEYS}
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Case):

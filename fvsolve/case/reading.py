@@ -14,9 +14,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from fvsolve.case import text
+from fvsolve.case import shipped, text
 from fvsolve.case.text import KeyPath, key_lines
-from fvsolve.errors import CaseError, Fault, article, did_you_mean, listing
+from fvsolve.errors import CaseError, Fault, article, did_you_mean, listing, nearest
 from fvsolve.parts import KINDS, Pipe
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.parts.pipe.part import QUASI_STEADY
@@ -189,14 +189,15 @@ def _read_text(path: Path) -> str:
         with open(path, "rb") as file:
             data = file.read(MOST_BYTES + 1)
         if len(data) > MOST_BYTES:
-            text = (
-                f"has more than {MOST_BYTES / 1e6:g} MB; expected a TOML file, with long tables in files of their own"
-            )
-            raise CaseError([Fault("", text)], str(path))
+            message = f"has more than {MOST_BYTES / 1e6:g} MB; expected a TOML file with long tables in their own files"
+            raise CaseError([Fault("", message)], str(path))
         return data.decode("utf-8-sig").replace("\r\n", "\n")
     except FileNotFoundError:
         near = [other.name for other in path.parent.glob("*.toml")] if path.parent.is_dir() else []
-        raise CaseError([Fault("", f"there is no such file{did_you_mean(path.name, near)}")], str(path)) from None
+        hint = did_you_mean(path.name, near)
+        if not hint and (shipped_case := nearest(path.name.removesuffix(".toml"), shipped.names())):
+            hint = f'; did you mean the shipped case "{shipped_case}"?'
+        raise CaseError([Fault("", f"there is no such file{hint}")], str(path)) from None
     except IsADirectoryError:
         raise CaseError([Fault("", "is a directory; expected a TOML file")], str(path)) from None
     except UnicodeDecodeError as error:

@@ -24,16 +24,16 @@ ORDER_FILE = columns(
 @cli.app.command()
 def chart(
     case: cli.SingleCase,
-    scheme: Annotated[str | None, Option(metavar="LIST", help="schemes to compare (default "
+    scheme: Annotated[str | None, Option(metavar="A,B", help="schemes to compare (default "
         "upwind,muscl,upwind5,weno5)")] = None,
-    method: Annotated[str | None, Option(metavar="LIST", help="methods to compare (default a selection that suits "
+    method: Annotated[str | None, Option(metavar="A,B", help="methods to compare (default a selection that suits "
         "the case)")] = None,
-    cells: Annotated[str | None, Option(metavar="LIST", help="numbers of cells to compare, for example 50,100,200, "
+    cells: Annotated[str | None, Option(metavar="A,B", help="numbers of cells to compare, for example 50,100,200, "
         "of the pipe with the longest travel time or of the basin side with most cells (default up to five numbers "
         "that suit the case)")] = None,
-    rtol: Annotated[str | None, Option(metavar="LIST", help="relative tolerances to compare, for example 1e-3,1e-6, "
+    rtol: Annotated[str | None, Option(metavar="A,B", help="relative tolerances to compare, for example 1e-3,1e-6, "
         "for a case without pipes and basins (default 1e-2 to 1e-10)")] = None,
-    step: Annotated[str | None, Option(metavar="LIST", help="fixed time steps [s] to compare, for example 1e-3,1e-4, "
+    step: Annotated[str | None, Option(metavar="A,B", help="fixed time steps [s] to compare, for example 1e-3,1e-4, "
         "for a case without cells (default seven or eight steps)")] = None,
     target: Annotated[float | None, Option(metavar="ERROR", help="greatest accepted error of a probe, as a fraction "
         "of its range, for which the cheapest settings or model are printed (default none, or 0.01 with "
@@ -229,7 +229,7 @@ def order(
     with progress_line() as progress, ResultCache(folder) as points:
         studies = study(
             loaded, refine=refine, key=key, levels=levels, cells=cells, schemes=cli.comma_list(scheme, "--scheme"),
-            methods=cli.method_names(method), against=reference, out=points, progress=progress, jobs=jobs, dask=dask,
+            methods=cli.method_names(method), reference=reference, out=points, progress=progress, jobs=jobs, dask=dask,
         )  # fmt: skip
     studies = studies if isinstance(studies, list) else [studies]
     cli.clear_files(folder, "order.csv", "order.png", "order-*.png")

@@ -24,8 +24,8 @@ def size(
         'x"; repeat the option for more keys')] = [],  # noqa: B006
     rtol: Annotated[float, Option(help="relative tolerance: greatest distance of the value found from a value that "
         "fails")] = 0.01,
-    error: Annotated[bool, Option("--error", help="require that margins exceed their numerical errors, estimated "
-        "from further runs")] = False,
+    estimate_error: Annotated[bool, Option("--estimate-error", help="require that margins exceed their numerical "
+        "errors, estimated from further runs")] = False,
     set: Set = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:  # fmt: skip
@@ -47,7 +47,7 @@ def size(
         raise CaseError(faults, case)
     with progress_line(resumable=False) as progress:
         result = sizing.size(loaded, key, *values, goal, ties, None, rtol,
-                            lambda done, label: progress(done, sizing.MAX_RUNS, label), error)  # fmt: skip
+                            lambda done, label: progress(done, sizing.MAX_RUNS, label), estimate_error)  # fmt: skip
     present(as_json, result.plain(), size_text(result), code=0 if result.value is not None else 1)
 
 

@@ -45,9 +45,9 @@ def energy(
         "the passivity of schemes and methods)")] = None,
     port: Annotated[str | None, Option(metavar="NODE", help="node at which the passivity of the network is checked: "
         "a reservoir, inflow or junction (default none)")] = None,
-    scheme: Annotated[str | None, Option(metavar="S,S,...", help="schemes to study (default scheme of the case, or "
+    scheme: Annotated[str | None, Option(metavar="A,B", help="schemes to study (default scheme of the case, or "
         "without a case all schemes)")] = None,
-    method: Annotated[str | None, Option(metavar="M,M,...", help="methods to study (default method of the case, or "
+    method: Annotated[str | None, Option(metavar="A,B", help="methods to study (default method of the case, or "
         "without a case all methods)")] = None,
     out: cli.Out = None, set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,

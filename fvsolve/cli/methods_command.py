@@ -13,6 +13,7 @@ from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS, Facts, Method, analyse, method_named
 from fvsolve.steppers.numbers.polynomial import Polynomial, sign
+from fvsolve.steppers.tableau import rounding_text
 
 PICTURES = (".png", ".svg", ".pdf")
 MAX_ENTRY = 28  # greatest length of a tableau entry that is printed in full, in characters
@@ -75,11 +76,11 @@ def _method_text(method: Method, facts: Facts, path: Path) -> Iterator:
     r = facts.stability_function
     up, down = _polynomial(r.numerator), _polynomial(r.denominator)
     yield f"R(s) = {up if r.denominator.degree == 0 else f'({up}) / ({down})'}"
-    yield from _sentences(facts)
+    yield from _sentences(method, facts)
     yield f"stability region: {path}"
 
 
-def _sentences(facts: Facts) -> list[str]:
+def _sentences(method: Method, facts: Facts) -> list[str]:
     estimate = f"error estimate of order {facts.error_order}" if facts.adaptive else "no error estimate"
     kind = [f"{facts.stages} stages", facts.kind]
     kind += ["stiffly accurate"] if facts.stiffly_accurate else []
@@ -96,6 +97,8 @@ def _sentences(facts: Facts) -> list[str]:
     ]
     if facts.pade:
         sentences.append(f"R is the Padé approximation of e^s of degrees {facts.pade[0]} over {facts.pade[1]}")
+    if facts.rounded_order:
+        sentences.append(rounding_text(method.text, facts.rounded_order))
     if facts.digits:
         sentences.append(f"coefficients are used as published, with {facts.digits} digits")
     return sentences

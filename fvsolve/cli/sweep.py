@@ -27,7 +27,7 @@ Ranges = Annotated[
         help="key to vary with --sample and its range, in SI or with units; repeat the option for more keys",
     ),
 ]
-Outcomes = Annotated[
+Quantities = Annotated[
     list[str],
     Option(
         "--quantity",
@@ -50,7 +50,7 @@ def sweep(
     sample: Annotated[str | None, Option(metavar="sobol:N", help="sample of N runs in the ranges of --vary: sobol:N "
         "(Sobol) or lhs:N (Latin hypercube)")] = None,
     vary: Ranges = [],  # noqa: B006
-    seed: cli.Seed = 0, jobs: cli.Jobs = 1, dask: cli.Dask = None, outcome: Outcomes = [],  # noqa: B006
+    seed: cli.Seed = 0, jobs: cli.Jobs = 1, dask: cli.Dask = None, quantity: Quantities = [],  # noqa: B006
     out: cli.Out = None, as_json: cli.Json = False,
 ) -> None:  # fmt: skip
     """Run a case for every combination of values. The table has a row for each run; a failed run has its reason."""
@@ -67,7 +67,7 @@ def sweep(
     with progress_line() as progress:
         result = studies.sweep(loaded, varied, fixed, jobs, folder, progress, points, sample, seed, dask)
     heads = {key: key_with_unit(loaded.raw, key, [row[key] for row in result.rows]) for key in result.keys}
-    charts = write_charts(result, outcome, folder, heads)
+    charts = write_charts(result, quantity, folder, heads)
     facts = result.plain() | {"directory": str(folder), "charts": [str(path) for path in charts]}
     present(as_json, facts, sweep_text(result, folder, heads), code=0 if all(row["ok"] for row in result.rows) else 1)
 
@@ -84,21 +84,21 @@ def ranges(texts: list[str], option: str) -> dict[str, list]:
     return dict(pairs)
 
 
-def write_charts(result, outcomes: list[str], folder: Path, heads: dict[str, str]) -> list[Path]:
-    """Draw a picture of each outcome (default all extremes) in the folder `charts`; returns the paths.
+def write_charts(result, quantities: list[str], folder: Path, heads: dict[str, str]) -> list[Path]:
+    """Draw a picture of each quantity (default all extremes) in the folder `charts`; returns the paths.
 
     Pictures of earlier sweeps in this folder are deleted. heads : key -> heading of the key with its unit
     """
-    from fvsolve.draw.object_pictures import outcome_figure
+    from fvsolve.draw.object_pictures import quantity_figure
 
-    names = [result.outcome(name) for name in outcomes]
-    names = names or [column for column in result.outcomes if column.startswith(("max(", "min("))]
+    names = [result.quantity(name) for name in quantities]
+    names = names or [column for column in result.quantities if column.startswith(("max(", "min("))]
     cli.clear_files(folder / "charts", "*max-*.png", "*min-*.png", "final-*.png")
     paths = []
     for name in names:
         stem = re.sub(r"[^A-Za-z0-9.@_-]+", "-", name.partition(" [")[0]).strip("-")
         path = cli.writable_folder(folder / "charts") / f"{stem}.png"
-        outcome_figure(result, name, heads).savefig(path)
+        quantity_figure(result, name, heads).savefig(path)
         paths.append(path)
     return paths
 
@@ -161,32 +161,32 @@ def sensitivity(
     case: cli.SingleCase,
     vary: Annotated[list[str], Option("--vary", metavar="KEY=LOW,HIGH", help="key to vary and its range, in SI or "
         "with units; repeat the option for more keys")],
-    outcome: Annotated[str, Option(metavar="max(PROBE)", help="outcome to analyse: min, max or final of a probe")],
+    quantity: Annotated[str, Option(metavar="max(PROBE)", help="quantity to analyse: max, min or final of a probe")],
     samples: Annotated[int, Option(metavar="N", help="base sample size, a power of two; for k keys the study makes "
         "about 1.25 N (k + 2) runs")] = 64,
     seed: cli.Seed = 0, jobs: cli.Jobs = 1, dask: cli.Dask = None, set: cli.Set = [],  # noqa: B006
     out: cli.Out = None, as_json: cli.Json = False,
 ) -> None:  # fmt: skip
-    """Compute the sensitivity of an outcome to keys: Sobol indices and Morris effects over ranges."""
+    """Compute the sensitivity of a quantity to keys: Sobol indices and Morris effects over ranges."""
     from fvsolve import studies
 
     loaded = cli.load_case(case, set)
     folder = cli.folder_of(loaded, "sensitivity", out)
     with progress_line() as progress:
         result = studies.sensitivity(
-            loaded, ranges(vary, "--vary"), outcome, samples, seed, None, jobs, dask, folder, progress
+            loaded, ranges(vary, "--vary"), quantity, samples, seed, None, jobs, dask, folder, progress
         )
     cli.clear_files(folder, "sensitivity.csv", "sensitivity.png")
     path = result.sheet.write(folder / "sensitivity.csv")
     result.plot(folder / "sensitivity.png")
-    below = f"{path}: {result.outcome}, {result.runs} runs"
+    below = f"{path}: {result.quantity}, {result.runs} runs"
     present(as_json, result.plain() | {"directory": str(folder)}, [_key_table(result), below])
 
 
 @cli.app.command()
 def calibrate(
     case: cli.SingleCase,
-    parameter: Annotated[list[str], Option(metavar="KEY=LOW,HIGH", help="key to calibrate and its range, in SI or "
+    vary: Annotated[list[str], Option("--vary", metavar="KEY=LOW,HIGH", help="key to calibrate and its range, in SI or "
         "with units; repeat the option for more keys")],
     seed: cli.Seed = 0, jobs: cli.Jobs = 1, dask: cli.Dask = None, set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
@@ -196,7 +196,7 @@ def calibrate(
 
     loaded = cli.load_case(case, set)
     with progress_line(resumable=False) as progress:
-        result = studies.calibrate(loaded, ranges(parameter, "--parameter"), None, seed, jobs, dask, progress)
+        result = studies.calibrate(loaded, ranges(vary, "--vary"), None, seed, jobs, dask, progress)
     present(as_json, result.plain(), calibration_text(loaded, result))
 
 

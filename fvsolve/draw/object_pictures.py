@@ -132,7 +132,7 @@ def sweep_figure(sweep):
 
 
 @style.without_markup
-def outcome_figure(sweep, name: str, heads: Mapping[str, str]):
+def quantity_figure(sweep, name: str, heads: Mapping[str, str]):
     """Figure of a column of a `Sweep` over each varied key, or as a map over two keys; failed runs have another colour.
 
     name : name of the column; heads : key -> label of its axis
@@ -239,7 +239,7 @@ def sensitivity_figure(result):
     """Figure of the Sobol indices of each key with intervals, and of the mean and spread of elementary effects."""
     figure = style.figure(1.1 + 0.5 * max(len(result.keys), 3))
     panels = figure.subplots(1, 2, sharey=True)
-    unit = result.outcome.rpartition(" ")[2] if result.outcome.endswith("]") else ""
+    unit = result.quantity.rpartition(" ")[2] if result.quantity.endswith("]") else ""
     effects = f"elementary effect, per whole range of the key {unit}".strip()
     shown = (("share of the variance", (("S1", "S1, first order"), ("ST", "ST, total"))),
              (effects, (("mu_star", "mean size"), ("sigma", "spread"))))  # fmt: skip
@@ -256,7 +256,7 @@ def sensitivity_figure(result):
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, fontsize=8, borderaxespad=0.2)
     panels[0].set_yticks(range(len(result.keys)), [break_key(key) for key in result.keys], fontsize=8)
     panels[0].invert_yaxis()
-    style.title(figure, result.outcome)
+    style.title(figure, result.quantity)
     return figure
 
 

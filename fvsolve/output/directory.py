@@ -2,14 +2,16 @@
 
 import contextlib
 import shutil
+import tomllib
 from collections.abc import Iterator
 from fnmatch import fnmatch
 from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from fvsolve.case.case import REPORT_KEYS, STEP_KEYS
 from fvsolve.case.resource_checks import LEAST_TEXT, byte_text, disk_size
-from fvsolve.errors import RunError
+from fvsolve.errors import RunError, listing
 from fvsolve.output import csv_files
 from fvsolve.output.csv_files import read_envelope, read_table
 from fvsolve.output.fields import FieldSeries, ParallelBasinWriter
@@ -22,9 +24,10 @@ from fvsolve.output.maxima_files import (
     write_maxima,
     write_run_up,
 )
-from fvsolve.output.restart import Restart, identity, read_restart, write_restart
+from fvsolve.output.restart import OtherCase, Restart, changed_steps, identity, other_steps, read_restart, write_restart
 from fvsolve.output.summary_file import read_summary
 from fvsolve.output.unit_columns import probe_columns, time_column
+from fvsolve.units import show
 
 LOCK_FILE = ".lock"
 RUN_FILES = ("restart.npz", "history.csv", "envelope.csv", "routes.csv", "fields.pvd", "case.toml")
@@ -87,6 +90,7 @@ class RunDirectory:
         self.lock = lock_folder(self.folder, "a run")
         try:
             self.restart = self._checkpoint() if resume else None
+            self.continued = changed_steps(self.restart, model.case) if self.restart else []
             if self.restart is None and not force:
                 _refuse_existing_run(self.folder)
             if self.restart is None:
@@ -104,7 +108,11 @@ class RunDirectory:
         if self.restart is None or not (self.folder / SUMMARY_FILE).is_file():
             return False
         summary = read_summary(self.folder / SUMMARY_FILE)
-        return summary["ok"] and summary["versions"] == self.identity and summary["t"] >= self.model.case.numerics.end
+        ended = summary["ok"] and summary["versions"] == self.identity and summary["t"] >= self.model.case.numerics.end
+        if ended and (changes := other_steps(self.restart, self.model.case)):
+            text = f"{self.folder} holds the finished run, so nothing can be continued with {value_text(changes)}"
+            raise RunError(f"{text}; replace it with --force, or keep both runs with --out DIR")
+        return ended
 
     def begin(self, model, state) -> None:
         """Open the files: new files, or the files of an earlier part of the run, truncated to the checkpoint.
@@ -158,7 +166,8 @@ class RunDirectory:
         with self.report_write_errors():
             size = self.history.flush()
             frames = self.fields.frames if self.fields else 0
-            restart = Restart(state.t, state.y, state.memory, self.history.rows, size, frames)
+            steps = self.model.case.step_keys, self.continued
+            restart = Restart(state.t, state.y, state.memory, self.history.rows, size, frames, *steps)
             write_restart(self.folder / "restart.npz", restart, self.identity)
 
     def end(self, summary) -> None:
@@ -219,7 +228,15 @@ class RunDirectory:
 
     def _checkpoint(self) -> Restart | None:
         path = self.folder / "restart.npz"
-        restart = read_restart(path, self.identity) if path.is_file() else None
+        try:
+            restart = read_restart(path, self.identity) if path.is_file() else None
+        except OtherCase as error:
+            found = listing(_differences(self.folder / "case.toml", self.model.case), 6)
+            text = (
+                f"{error}{': ' if found else ''}{found}. A continued run may change end (which also changes the "
+                f"default of output.every), {', '.join(STEP_KEYS)} of [numerics], title, expectations and comparisons"
+            )
+            raise RunError(f"{text}; start again with --force, or keep both runs with --out DIR") from None
         if restart and restart.y.size != self.model.y_size:
             raise RunError(f"{path} holds {restart.y.size} states, but the case has {self.model.y_size}; start the run "
                            "again with --force")  # fmt: skip
@@ -230,11 +247,40 @@ class RunDirectory:
     def _write_case(self) -> None:
         case = self.model.case
         with self.report_write_errors():
-            (self.folder / "case.toml").write_text(case.resolved(), encoding="utf-8")
+            changes = "".join(f"# {change_text(change)}\n" for change in self.continued)
+            (self.folder / "case.toml").write_text(changes + case.resolved(), encoding="utf-8")
         for name, path in case.copies.items():
             copy = self.folder / name
             if copy.resolve() != Path(path).resolve():
                 shutil.copyfile(path, copy)
+
+
+def change_text(change: dict) -> str:
+    """Text of a change of keys in a continued run, an item of `changed_steps`."""
+    return f"from t = {change['t']:.9g} s on: {value_text(change['keys'])}"
+
+
+def value_text(changes: dict[str, list]) -> str:
+    """Text of keys with their values before and after a change."""
+    texts = {key: [show(x) if x is not None else "not stated" for x in values] for key, values in changes.items()}
+    return ", ".join(f"{key} = {after} (before: {before})" for key, (before, after) in texts.items())
+
+
+def _differences(path: Path, case) -> list[str]:
+    """Texts of keys that differ between a file case.toml and a case; empty if the file cannot be read."""
+    try:
+        tables = [tomllib.loads(text) for text in (path.read_text(encoding="utf-8"), case.resolved())]
+    except (OSError, ValueError):
+        return []
+    before, after = (dict(_leaves(table)) for table in tables)
+    keys = [key for key in before | after if before.get(key) != after.get(key)]
+    keys = [key for key in keys if key.partition(".")[0] not in REPORT_KEYS and key != "numerics.end"]
+    return [f"{key} {show(before.get(key, 'not stated'))} (now {show(after.get(key, 'not stated'))})" for key in keys]
+
+
+def _leaves(table: dict, head: str = "") -> Iterator[tuple[str, object]]:
+    for key, value in table.items():
+        yield from _leaves(value, f"{head}{key}.") if isinstance(value, dict) else [(f"{head}{key}", value)]
 
 
 def read_directory(folder: Path) -> tuple:

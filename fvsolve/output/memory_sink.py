@@ -12,6 +12,7 @@ class MemorySink:
     folder = None
     restart = None
     ended = False
+    continued = ()
     takes_fields = False  # field frames need not be computed
 
     def __init__(self, model):

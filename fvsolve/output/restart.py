@@ -5,7 +5,7 @@ import hashlib
 import json
 import os
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +14,17 @@ from fvsolve.errors import RunError, listing
 from fvsolve.schemes import LIMITERS
 
 
+class OtherCase(RunError):
+    """Error: a checkpoint belongs to another case."""
+
+
 @dataclass(frozen=True)
 class Restart:
     """Checkpoint of a run.
 
     t : time [s]; y : state; memory : arrays of the solver by name, such as those of step control and delay lines
     rows, history_bytes, frames : rows and bytes of history.csv, and frames of fields, written so far
+    step_keys : `Case.step_keys` of the run; continued : earlier changes of these, see `changed_steps`
     """
 
     t: float
@@ -28,6 +33,31 @@ class Restart:
     rows: int
     history_bytes: int
     frames: int
+    step_keys: dict = field(default_factory=dict)
+    continued: list = field(default_factory=list)
+
+
+def other_steps(restart: Restart, case) -> dict[str, list]:
+    """Keys of step control that a case changes: key -> [value of the checkpoint, value of the case]."""
+    before, after = restart.step_keys, case.step_keys
+    keys = sorted(key for key in before.keys() | after.keys() if before.get(key) != after.get(key))
+    return {f"numerics.{key}": [before.get(key), after.get(key)] for key in keys}
+
+
+def changed_steps(restart: Restart, case) -> list[dict]:
+    """Changes of the keys of step control since the start of a run: for each its time [s], and key -> (before, after).
+
+    Raises RunError if the last of these changes is not possible: histories of delays depend on the steps.
+    """
+    values = other_steps(restart, case)
+    if not values:
+        return restart.continued
+    if any(restart.memory[name].size for name in ("past", "histories") if name in restart.memory):
+        raise RunError(f"{next(iter(values))} cannot change in a continued run with delay lines or delays of controls, "
+                       "whose histories belong to the steps; start again with --force")  # fmt: skip
+    if restart.t == case.numerics.start:
+        return restart.continued
+    return [*restart.continued, {"t": restart.t, "keys": values}]
 
 
 def identity(case) -> dict[str, str]:
@@ -75,6 +105,7 @@ def write_restart(path: Path, restart: Restart, who: dict[str, str]) -> None:
     arrays |= {"t": np.float64(restart.t), "y": restart.y}
     arrays["counts"] = np.array([restart.rows, restart.history_bytes, restart.frames])
     arrays["identity"] = np.array(json.dumps(who))
+    arrays["steps"] = np.array(json.dumps([restart.step_keys, restart.continued]))
     fresh = path.with_suffix(".tmp")
     with open(fresh, "wb") as file:
         np.savez(file, **arrays)
@@ -89,7 +120,7 @@ def read_restart(path: Path, who: dict[str, str]) -> Restart:
     try:
         with path.open("rb") as stream, np.load(stream) as file:  # np.load alone leaves a damaged file open
             arrays = {name: file[name] for name in file.files}
-        stored = json.loads(str(arrays.pop("identity")))
+        stored, steps = (json.loads(str(arrays.pop(name))) for name in ("identity", "steps"))
         t, y, counts = (arrays.pop(name) for name in ("t", "y", "counts"))
     except Exception as error:  # zip, numpy and json raise many types on a damaged file
         reason = f"{error} is missing" if isinstance(error, KeyError) else error
@@ -99,19 +130,17 @@ def read_restart(path: Path, who: dict[str, str]) -> Restart:
     damaged = damaged or [name for name, array in (("t", t), ("y", y)) if not np.isfinite(array).all()]
     damaged += ["counts"] if counts.shape != (3,) or counts.dtype.kind != "i" or counts.min() < 0 else []
     damaged += ["identity"] if not isinstance(stored, dict) else []
+    damaged += ["steps"] if [type(item) for item in steps] != [dict, list] else []
     if damaged:
         raise RunError(f"{path}: damaged or edited data ({listing(damaged)}); start the run again with --force")
     _check_identity(path, stored, who)
     memory = {name.removeprefix("memory."): array for name, array in arrays.items()}
-    return Restart(float(t), y, memory, *counts.tolist())
+    return Restart(float(t), y, memory, *counts.tolist(), *steps)
 
 
 def _check_identity(path: Path, stored: dict[str, str], expected: dict[str, str]) -> None:
     if stored.get("case") != expected["case"]:
-        raise RunError(
-            f"{path} belongs to another case: keys other than numerics.end have changed (numerics.end also changes "
-            "the default of [output] every); start again with --force, or keep both runs with --out DIR"
-        )
+        raise OtherCase(f"{path} belongs to another case")
     other = [name for name in expected if stored.get(name) != expected[name]]
     if other:
         listed = ", ".join(f"{name} {stored.get(name)} (now {expected[name]})" for name in other)

@@ -6,7 +6,7 @@ import os
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
 
-from fvsolve.errors import RunError, listing
+from fvsolve.errors import RunError, listing, nearest
 from fvsolve.output.csv_files import envelope_columns
 from fvsolve.output.unit_columns import probe_columns, time_column
 
@@ -69,6 +69,14 @@ def write_summary(path: Path, summary: dict) -> None:
     os.replace(fresh, path)
 
 
+def _similar_run(path: Path) -> str:
+    """Hint for a message: run directory beside a missing summary, or in `runs`, with a similar name; "" without one."""
+    found = {other.parent.name: other.parent for folder in (path.parent.parent, Path("runs"))
+             for other in folder.glob(f"*/{path.name}")}  # fmt: skip
+    close = nearest(path.parent.name, found)
+    return f'; did you mean "{found[close]}"?' if close else ""
+
+
 def read_summary(path: Path) -> dict:
     """Read summary.json; raises RunError if it is missing, damaged or lacks a required key."""
     try:
@@ -80,7 +88,7 @@ def read_summary(path: Path) -> dict:
         return summary
     except FileNotFoundError:
         text = f"does not hold a finished run (no {path.name}); check the path, or finish the run"
-        raise RunError(f"{path.parent} {text}") from None
+        raise RunError(f"{path.parent} {text}{_similar_run(path)}") from None
     except (OSError, ValueError) as error:
         raise RunError(f"{path} cannot be read: {error}") from None
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from fvsolve.argument_checks import COUNT_FROM_ONE, FLAG, FUNCTION, PATH, TABLE, validated
 from fvsolve.draw.plot_process import Picture, PlotProcess
-from fvsolve.errors import CaseError, RunError
-from fvsolve.output.directory import SUMMARY_FILE, RunDirectory, existing_pictures, read_directory
+from fvsolve.errors import CaseError, Notice, RunError
+from fvsolve.output.directory import SUMMARY_FILE, RunDirectory, change_text, existing_pictures, read_directory
 from fvsolve.output.memory_sink import MemorySink
 from fvsolve.output.restart import identity
 from fvsolve.output.summary_file import summary_data, write_summary
@@ -171,6 +171,8 @@ def _result(model, summary, sink, begun: float) -> Result:
     result.case = model.case
     facts |= claims(model, summary, result)
     facts["versions"] = identity(model.case)
+    facts["continued"] = list(sink.continued)
+    facts["warnings"] += [Notice("continued", "numerics", change_text(item)).plain() for item in sink.continued]
     facts["ended"] = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
     if sink.folder is not None:
         facts["files"] = sink.files()

@@ -91,30 +91,30 @@ def series_range(measured: np.ndarray) -> float:
     return float(np.ptp(measured)) or 1.0
 
 
-@validated(free=VARY, set=TABLE, seed=COUNT_FROM_ZERO, jobs=COUNT, dask=TEXT, progress=FUNCTION)
+@validated(vary=VARY, set=TABLE, seed=COUNT_FROM_ZERO, jobs=COUNT, dask=TEXT, progress=FUNCTION)
 def calibrate(
-    case, free: Mapping[str, Sequence[Any]], set: Mapping[str, Any] | None = None, seed: int = 0, jobs: int = 1,
+    case, vary: Mapping[str, Sequence[Any]], set: Mapping[str, Any] | None = None, seed: int = 0, jobs: int = 1,
     dask: str | None = None, progress: Callable[[int, int, str], None] | None = None,
 ) -> Calibration:  # fmt: skip
     """Fit values in a case to its measured series, by least squares (`scipy.optimize.least_squares`).
 
-    case : as for `run`, with measured series under `[compare]`; free : key -> (least, greatest value)
+    case : as for `run`, with measured series under `[compare]`; vary : key -> (least, greatest value)
     set : key -> value for all runs; seed : seed of the sample; jobs, dask : processes for the sample, as in `sweep`
     progress : called as progress(done, total, text)
 
     A sample of values within the ranges is run first. Minimisations start at the best points of the sample, because
     waves out of phase cause many local minima. Several series are weighted by the inverse of their standard deviations
     about the fit, in rounds that begin with equal weights (Aitken 1935).
-    Raises FvsolveError if `free` is empty, if the case has no measured series, and if every run of the sample fails;
+    Raises FvsolveError if `vary` is empty, if the case has no measured series, and if every run of the sample fails;
     CaseError for a fault of the case or of a range.
     """
     loaded = load(case, set)
-    if not free:
+    if not vary:
         raise FvsolveError("no key to fit. Give at least one key and its range: links.main.wave_speed=900,1300")
     if not loaded.compare:
         raise FvsolveError("no measured series to fit to. Expected a series under [compare] in the case")
-    bounds = key_ranges(loaded, free)
-    points = sample_points(loaded, free, f"sobol:{SAMPLE_PER_KEY * len(bounds)}", seed)
+    bounds = key_ranges(loaded, vary)
+    points = sample_points(loaded, vary, f"sobol:{SAMPLE_PER_KEY * len(bounds)}", seed)
     return LeastSquaresFit(loaded, bounds, points, progress or (lambda done, total, text: None)).solve(jobs, dask)
 
 

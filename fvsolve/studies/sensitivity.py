@@ -1,4 +1,4 @@
-"""Global sensitivity analysis: Sobol indices and Morris effects of keys of a case on an outcome, by SALib."""
+"""Global sensitivity analysis: Sobol indices and Morris effects of keys of a case on a quantity, by SALib."""
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -28,16 +28,16 @@ MIN_SAMPLES = 2  # least base sample size of Sobol
 class Sensitivity(Displayable, PlainData):
     """Sensitivity indices of every key, as lists in the order of `keys`.
 
-    outcome : name of the outcome with its unit; runs : number of runs
-    S1, ST : first-order and total index [-], the fraction of the variance of the outcome due to a key alone, and due to
-    the key with all its interactions (Saltelli 2010, Jansen 1999)
+    quantity : name of the quantity with its unit; runs : number of runs
+    S1, ST : first-order and total index [-], the fraction of the variance of the quantity due to a key alone, and due
+    to the key with all its interactions (Saltelli 2010, Jansen 1999)
     mu_star, mu, sigma : mean absolute value, mean and standard deviation of the elementary effect over the whole range
-    (Morris 1991, Campolongo 2007), in the unit of the outcome
+    (Morris 1991, Campolongo 2007), in the unit of the quantity
     *_conf : half widths of the 95 % confidence intervals
     """
 
     keys: tuple[str, ...]
-    outcome: str
+    quantity: str
     runs: int
     S1: list[float]
     S1_conf: list[float]
@@ -52,7 +52,7 @@ class Sensitivity(Displayable, PlainData):
 
     def summary_line(self) -> str:
         strongest = max(range(len(self.keys)), key=lambda k: self.ST[k])
-        return f"of {self.outcome} to {len(self.keys)} keys, {self.runs} runs: greatest for {self.keys[strongest]}"
+        return f"of {self.quantity} to {len(self.keys)} keys, {self.runs} runs: greatest for {self.keys[strongest]}"
 
     @property
     def sheet(self) -> ResultTable:
@@ -64,19 +64,19 @@ class Sensitivity(Displayable, PlainData):
         return self.sheet.table_columns()
 
 
-@validated(vary=VARY, outcome=TEXT, samples=COUNT, seed=COUNT_FROM_ZERO, out=PATH, **STUDY_ARGUMENTS)
+@validated(vary=VARY, quantity=TEXT, samples=COUNT, seed=COUNT_FROM_ZERO, out=PATH, **STUDY_ARGUMENTS)
 def sensitivity(
-    case, vary: Mapping[str, Sequence[Any]], outcome: str | None = None, samples: int = 64, seed: int = 0,
+    case, vary: Mapping[str, Sequence[Any]], quantity: str | None = None, samples: int = 64, seed: int = 0,
     set: Mapping[str, Any] | None = None, jobs: int = 1, dask: str | None = None, out: str | Path | None = None,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> Sensitivity:  # fmt: skip
-    """Compute Sobol and Morris indices of an outcome, such as "max(gate.pressure)", over the ranges of keys.
+    """Compute Sobol and Morris indices of a quantity, such as "max(gate.pressure)", over the ranges of keys.
 
     case : as for `run`, or a function of a dict key -> number; vary : key -> (low, high)
     samples : base sample size N of Sobol (a power of two), which needs N (keys + 2) runs; Morris needs
     max(4, N / 4) (keys + 1) more. Other arguments as for `sweep`, which makes the runs and reuses earlier ones; a
     function is called in this process, and only `samples` and `seed` apply to it.
-    Raises FvsolveError if a run does not have the outcome, if the outcome is constant, and if SALib is not installed.
+    Raises FvsolveError if a run does not have the quantity, if the quantity is constant, and if SALib is not installed.
     """
     if samples < MIN_SAMPLES:
         raise FvsolveError(f"samples = {samples} is too small. Expected {MIN_SAMPLES} or more, a power of two")
@@ -93,17 +93,17 @@ def sensitivity(
         if not np.isfinite(values).all():
             raise FvsolveError("the function is not finite at some points. Expected ranges in which it is finite")
     else:
-        if outcome is None:
-            raise FvsolveError('no outcome. Expected an outcome such as "max(gate.pressure)"')
+        if quantity is None:
+            raise FvsolveError('no quantity. Expected a quantity such as "max(gate.pressure)"')
         sweep_result = sweep(case, set=set, jobs=jobs, out=out, progress=progress, points=points, dask=dask)
-        outcome, values = sweep_result.outcome(outcome), values_of(sweep_result, outcome)
+        quantity, values = sweep_result.quantity(quantity), values_of(sweep_result, quantity)
     indices = analyse_values(bounds, sobol, values[: len(sobol)], morris, values[len(sobol) :], seed)
-    return Sensitivity(tuple(bounds), outcome or "the function", len(points), *indices)
+    return Sensitivity(tuple(bounds), quantity or "the function", len(points), *indices)
 
 
-def values_of(result, outcome: str) -> np.ndarray:
-    """Values of an outcome in all runs of a sweep : float64[runs]. Raises FvsolveError if a run has no value."""
-    name = result.outcome(outcome)
+def values_of(result, quantity: str) -> np.ndarray:
+    """Values of a quantity in all runs of a sweep : float64[runs]. Raises FvsolveError if a run has no value."""
+    name = result.quantity(quantity)
     missing = [row for row in result.rows if row.get(name) is None]
     if missing:
         values = ", ".join(f"{key} = {missing[0][key]:.6g}" for key in result.keys)
@@ -131,17 +131,17 @@ def sample_points(bounds: Mapping[str, tuple[float, float]], samples: int, seed:
 
 
 def analyse_values(bounds, sobol_points, sobol_values, morris_points, morris_values, seed: int) -> list[list[float]]:
-    """Sensitivity indices from the values of an outcome : for each entry of `COLUMNS` a list over the keys.
+    """Sensitivity indices from the values of a quantity : for each entry of `COLUMNS` a list over the keys.
 
-    sobol_points, morris_points : sample points as from `sample_points`; sobol_values, morris_values : outcome at these
+    sobol_points, morris_points : sample points as from `sample_points`; sobol_values, morris_values : quantity at these
     points; bounds, seed : as for `sample_points`
-    Raises FvsolveError if the outcome is constant.
+    Raises FvsolveError if the quantity is constant.
     """
     from SALib.analyze import morris, sobol
 
     problem = salib_problem(bounds)
     if np.ptp(sobol_values) == 0.0:
-        raise FvsolveError(f"the outcome is {show(float(sobol_values[0]))} in all runs: no key changes it")
+        raise FvsolveError(f"the quantity is {show(float(sobol_values[0]))} in all runs: no key changes it")
     scale = float(np.std(sobol_values))  # scaled values keep their digits in the sums of squares of SALib
     shares = sobol.analyze(problem, (sobol_values - sobol_values.mean()) / scale, calc_second_order=False, seed=seed)
     effects = morris.analyze(problem, morris_points, morris_values, num_levels=LEVELS, seed=seed)

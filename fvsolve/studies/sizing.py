@@ -113,12 +113,13 @@ class SizeSearch:
     """Search for the least or greatest value of a key at which all limits hold; all its runs are stored.
 
     unit : unit of the values; ties : dependent key -> formula of x, the value in SI
-    progress : called as progress(runs, text); error : as for `size`
+    progress : called as progress(runs, text); estimate_error : as for `size`
     """
 
     def __init__(self, case: Case, key: str, unit: str, ties: Mapping[str, str], progress: Callable | None,
-                 error: bool = False) -> None:  # fmt: skip
-        self.case, self.key, self.unit, self.progress, self.error = case, key, unit, progress, error
+                 estimate_error: bool = False) -> None:  # fmt: skip
+        self.case, self.key, self.unit, self.progress = case, key, unit, progress
+        self.estimate_error = estimate_error
         self.runs: list[SizeRun] = []
         self.formulas = {tied: Arithmetic(text) for tied, text in ties.items()}
 
@@ -153,7 +154,7 @@ class SizeSearch:
             self.runs.append(SizeRun(value, False, None, "", f"refused: {error.faults[0].message}"))
             return self.runs[-1]
         end_if_interrupted(result.reason)
-        if self.error and result.ok:
+        if self.estimate_error and result.ok:
             peak_errors(result, case)
         self.runs.append(size_run(value, result))
         return self.runs[-1]
@@ -258,21 +259,22 @@ def relative_margin(row: Mapping[str, Any], quantity: str) -> float:
 
 def size(
     case, key: str, low: Any, high: Any, goal: str = "minimum", ties: Mapping[str, str] | None = None,
-    set: Mapping[str, Any] | None = None, rtol: float = 0.01, progress: Callable | None = None, error: bool = False,
+    set: Mapping[str, Any] | None = None, rtol: float = 0.01, progress: Callable | None = None,
+    estimate_error: bool = False,
 ) -> Size:  # fmt: skip
     """Find the least (or greatest) value of a key between `low` and `high` at which all limits of a case hold.
 
     low, high : numbers, or texts with a unit; goal : "minimum" or "maximum"; set : key -> value for all runs
     ties : dependent key -> formula of x, the value in SI; rtol : relative tolerance of the bracket
     progress : called as progress(runs, text)
-    error : True to require margins larger than their errors, which `peak_errors` finds by up to three more runs for
-    each value
+    estimate_error : True to require margins larger than their errors, which `peak_errors` finds by up to three more
+    runs for each value
     If limits fail at both ends, values near the one with the greatest margin are tried. Raises CaseError for an invalid
     case, a case without limits, and wrong arguments.
     """
     loaded = checked_case(case, set, lambda known: find_faults(known, key, (low, high), goal, ties or {}, rtol))
     first, last, unit = parse_range(low, high)
-    search = SizeSearch(loaded, key, unit, ties or {}, progress, error)
+    search = SizeSearch(loaded, key, unit, ties or {}, progress, estimate_error)
     value, bracket = search.search(first, last, goal, rtol)
     tie_texts = tuple(f"{tied} = {text}" for tied, text in (ties or {}).items())
     return Size(key, unit or si_unit_of(loaded.raw, key), goal, value, bracket, search.runs, tie_texts)

@@ -71,16 +71,16 @@ class Sweep(Displayable):
         return [*self.keys, *FIRST_COLUMNS, *(name for name in names if name not in fixed), *LAST_COLUMNS]
 
     @property
-    def outcomes(self) -> list[str]:
+    def quantities(self) -> list[str]:
         """Names of the columns of probes, such as "max(gate.pressure) [bar]"."""
         return self.columns[len(self.keys) + len(FIRST_COLUMNS) : -len(LAST_COLUMNS)]
 
-    def outcome(self, name: str) -> str:
-        """Column of the outcome `name`, given with or without its unit. Raises FvsolveError for an unknown outcome."""
-        by_name = {column.partition(" [")[0]: column for column in self.outcomes}
+    def quantity(self, name: str) -> str:
+        """Column of the quantity `name`, given with or without its unit. Raises FvsolveError for an unknown name."""
+        by_name = {column.partition(" [")[0]: column for column in self.quantities}
         if name not in by_name and name not in by_name.values():
-            hint = did_you_mean(name, by_name) or f". Outcomes are {listing(by_name) or 'none'}"
-            raise FvsolveError(f"no outcome {show(name)}{hint}")
+            hint = did_you_mean(name, by_name) or f". Quantities are {listing(by_name) or 'none'}"
+            raise FvsolveError(f"no quantity {show(name)}{hint}")
         return by_name.get(name, name)
 
     def plain(self) -> dict[str, Any]:

@@ -54,7 +54,7 @@ def test_errors_of_a_smooth_slosh_fall_at_the_order_of_the_scheme():
 
 def test_a_finer_run_judges_as_rows_judge_each_other():
     case = alone(pool((20, 10), SLOSH), 1.2)
-    by_rows, finer = order(case, levels=5), order(case, levels=2, against="finer")
+    by_rows, finer = order(case, levels=5), order(case, levels=2, reference="finer")
     for k in range(2):
         name = "pool at the end: flow_y"
         assert finer.rows[k].errors[name]["L1"] == approx(by_rows.rows[k].errors[name]["L1"], rel=0.1)

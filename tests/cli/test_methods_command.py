@@ -105,3 +105,14 @@ def test_the_page_has_no_other_rows_and_its_examples_run():
     for example in re.findall(r"```python\n(.*?)```", DOCS, re.DOTALL):
         exec(example, found)
     assert found["seen"] == pytest.approx(137.3, abs=0.05)
+
+
+@pytest.mark.filterwarnings("ignore:short-decimals")
+def test_a_tableau_of_few_digits_is_printed_with_its_order_with_exact_numbers(fvs, tmp_path):
+    path = tmp_path / "short-decimals.txt"
+    path.write_text("0 |\n0.3333 | 0.3333\n0.6667 | 0 0.6667\n--+--\n | 0.25 0 0.75\n")
+    code, out, _ = fvs("methods", path, "--out", tmp_path / "region.png")
+    assert code == 0 and "order 1, no error estimate" in out
+    assert "with exact numbers in place of decimals of 4 digits it has order 3" in out
+    said = json.loads(fvs("methods", path, "--out", tmp_path / "region.png", "--json")[1])
+    assert (said["order"], said["rounded_order"]) == (1, 3)

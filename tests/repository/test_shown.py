@@ -83,6 +83,43 @@ def test_a_shipped_case_goes_by_its_name_as_on_the_command_line(tmp_path, monkey
         load(CASE)
 
 
+@pytest.mark.parametrize("name", ["valve-clsure", "valve_closure", "valve-closure.toml", "cases2/valve-clsure.toml"])
+def test_a_misspelled_shipped_case_is_named_in_python(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for function in (
+        run,
+        load,
+        order,
+        chart,
+        lambda case: response(case, "gate"),
+        lambda case: sweep(case, {"a": [1]}),
+    ):
+        with pytest.raises(FvsolveError, match='there is no such file; did you mean the shipped case "valve-closure"'):
+            function(name)
+    (tmp_path / "valve-closer.toml").write_text("")  # a file of the caller takes precedence
+    with pytest.raises(FvsolveError, match='did you mean "valve-closer.toml"'):
+        load("valve-closer")
+
+
+def test_a_misspelled_shipped_case_is_named_by_commands(fvs, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for command in (("run",), ("check",), ("energy",), ("precompile", "--for"), ("new",)):
+        code, _, err = fvs(*command, "valve-clsure")
+        assert code == 2 and 'no shipped case valve-clsure; did you mean "valve-closure"' in err.replace(
+            "no file and ", ""
+        )
+
+
+def test_a_misspelled_run_directory_is_named(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run(CASE, out="runs/two-tanks", pictures=False)
+    for name in ("runs/two-tank", "two-tanks", "two_tanks"):
+        with pytest.raises(FvsolveError, match='no summary.json.*did you mean "runs/two-tanks"'):
+            fvsolve.open_run(name)
+    with pytest.raises(FvsolveError, match="or finish the run$"):
+        fvsolve.open_run("something-else")
+
+
 def test_a_tableau_from_arrays_is_that_of_its_text():
     text = tableau("shown-text", ROW)
     for a in ([[0, 0], [1, 0]], np.array([[0.0, 0.0], [1.0, 0.0]])):

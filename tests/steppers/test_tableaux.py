@@ -1,13 +1,16 @@
 """Tableaux: each has the order of its source and not the next, and invalid tableaux are refused."""
 
+import math
+import warnings
 from fractions import Fraction
 from math import cos, pi, sqrt
 
+import numpy as np
 import pytest
 
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.analysis.trees import Conditions, density, trees
-from fvsolve.steppers.tableau import METHODS, method_named, tableau
+from fvsolve.steppers.tableau import METHODS, estimate_faults, method_named, tableau
 
 # stages, order, order of the embedded solution and stage order of the sources
 PUBLISHED = {
@@ -186,10 +189,167 @@ def test_all_faults_are_said_at_once():
     ]
 
 
+HALF, SIXTH = Fraction(1, 2), Fraction(1, 6)
+HEUN_2 = [[0, 0], [1, 0]]
+FOUR_STAGES = [[0, 0, 0, 0], [HALF, 0, 0, 0], [0, HALF, 0, 0], [HALF, 0, 0, 0]]
+FEHLBERG = """
+    0    |
+    2/27 | 2/27
+    1/9  | 1/36 1/12
+    1/6  | 1/24 0 1/8
+    5/12 | 5/12 0 -25/16 25/16
+    1/2  | 1/20 0 0 1/4 1/5
+    5/6  | -25/108 0 0 125/108 -65/27 125/54
+    1/6  | 31/300 0 0 0 61/225 -2/9 13/900
+    2/3  | 2 0 0 -53/6 704/45 -107/9 67/90 3
+    1/3  | -91/108 0 0 23/108 -976/135 311/54 -19/60 17/6 -1/12
+    1    | 2383/4100 0 0 -341/164 4496/1025 -301/82 2133/4100 45/82 45/164 18/41
+    0    | 3/205 0 0 0 0 -6/41 -3/205 -3/41 3/41 6/41 0
+    1    | -1777/4100 0 0 -341/164 4496/1025 -289/82 2193/4100 51/82 33/164 12/41 0 1
+    -----+----
+         | 41/840 0 0 0 0 34/105 9/35 9/35 9/280 9/280 41/840 0 0
+         | 0      0 0 0 0 34/105 9/35 9/35 9/280 9/280 0 41/840 41/840
+"""
+ALL, LINEAR, TIME = "too small", "zero there", "y' = f(t), so the error estimate is zero there"
+
+
+@pytest.mark.parametrize(
+    "arguments, wanted",
+    [
+        # the scene that was accepted, and gave 60.6 in place of -0.839 for y'' = -y
+        (dict(A=HEUN_2, b=[[0.5, 0.5], [0.5, 0.5]]), "the error estimate is zero"),
+        # stages that are equal although their rows differ
+        (dict(A=[[HALF, 0], [0, HALF]], b=[[HALF, HALF], [1, 0]]), ALL),
+        (
+            dict(
+                A=[[0] * 5, [HALF, 0, 0, 0, 0], [HALF, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 0, 1, 0, 0]],
+                b=[[SIXTH, 4 * SIXTH, 0, SIXTH, 0], [SIXTH, 4 * SIXTH, 0, 0, SIXTH]],
+            ),
+            ALL,
+        ),
+        # f(t, y) is the rate of the first stage, which is the start of the step; or it has no weight
+        (dict(text="0 |\n1 | 1\n--+--\n | 1/2 1/2", start_weight="1/2"), ALL),
+        (dict(text="0 | 0 0\n1 | 1/2 1/2\n--+--\n | 1/2 1/2", start_weight="1/2"), ALL),
+        (dict(text="1 | 1\n--+--\n | 1", start_weight="0"), ALL),
+        # equal errors of order h^3, different errors of order h^4: the estimate falls faster than the error
+        (dict(A=FOUR_STAGES, b=[[0, 0, 1, 0], [0, 0, 1, 0]]), "the error estimate is zero"),
+        # both solutions of y' = lambda y are 1 + z + z^2 / 2
+        (
+            dict(
+                A=[[0, 0, 0], [Fraction(1, 3), 0, 0], [Fraction(2, 3), 0, 0]],
+                b=[[Fraction(1, 4), 0, Fraction(3, 4)], [0, HALF, HALF]],
+            ),
+            "y' = lambda y, so the error estimate is zero there",
+        ),
+        # the midpoint rule with two different rates at the middle
+        (dict(A=[[0, 0, 0], [HALF, 0, 0], [0, HALF, 0]], b=[[0, 1, 0], [0, 0, 1]]), TIME),
+        (dict(text=FEHLBERG), TIME),
+    ],
+)
+def test_an_error_estimate_that_is_zero_for_all_problems_of_a_kind_is_refused(arguments, wanted):
+    with pytest.raises(FvsolveError) as caught:
+        tableau("blind", **arguments)
+    assert wanted in str(caught.value) and "Expected an embedded solution of another order" in str(caught.value)
+    assert "blind" not in METHODS
+
+
+def test_an_estimate_of_a_higher_power_than_the_error_is_refused():
+    """Of order 1 both, with the same coefficient of h^2 and others of h^3: halving rtol leaves the error as it is."""
+    a = [[0, 0, 0], [Fraction(1, 4), 0, 0], [0, HALF, 0]]
+    with pytest.raises(FvsolveError, match=r"has the error of order h\^2 of the new state"):
+        tableau("blind", a, [[0, 1, 0], [HALF, 0, HALF]])
+
+
+@pytest.mark.parametrize("name", [name for name in PUBLISHED if PUBLISHED[name][2]])
+def test_the_estimates_of_the_published_pairs_see_every_kind_of_problem(name):
+    assert estimate_faults(METHODS[name]) == []
+
+
+def test_a_row_of_weights_of_fehlbergs_pair_is_a_method():
+    assert tableau_order(FEHLBERG.rsplit("\n", 2)[0]) == 7
+
+
+@pytest.mark.parametrize(
+    "arguments, wanted",
+    [
+        (dict(A=[[0, 0], [math.nan, 0]], b=[0.5, 0.5]), "A[1, 0] = nan is not a finite number"),
+        (dict(A=[[0, 0], [math.inf, 0]], b=[0.5, 0.5]), "A[1, 0] = inf is not a finite number"),
+        (dict(A=[[0, 0], [10**400, 0]], b=[0.5, 0.5]), "is not a finite number"),
+        (dict(A=HEUN_2, b=[math.nan, 0.5]), "b[0, 0] = nan is not a finite number"),
+        (dict(A=HEUN_2, b=[0.5, 0.5], c=[0, -math.inf]), "c[1] = -inf is not a finite number"),
+        (dict(A=np.array([[0, 0], [math.nan, 0]]), b=np.array([0.5, 0.5])), "A[1, 0] = nan"),
+        (dict(A=[["0", 0], [None, 1j]], b=[0.5, 0.5]), 'A[0, 0] = "0", A[1, 0] = None, A[1, 1] = 1j are not finite'),
+        (dict(A=[[False, 0], [1, 0]], b=[0.5, 0.5]), "A[0, 0] = false is not a finite number"),
+        (dict(A=[[0], [1, 0]], b=[0.5, 0.5]), "A has rows of different lengths"),
+        (dict(A=[[[0, 0], [1, 0]], [1, 0]], b=[0.5, 0.5]), "A has rows of different lengths"),
+        (dict(A=HEUN_2, b=[[0.5, 0.5], [1]]), "b has rows of different lengths"),
+        (dict(A=[HEUN_2], b=[0.5, 0.5]), "A has shape (1, 2, 2)"),
+        (dict(A=HEUN_2, b=[[0.5, 0.5]] * 3), "b (3, 2). Expected"),
+        (dict(A=[], b=[]), "A has shape (1, 0)"),
+        (dict(A={0: 1}, b=[1]), "is not a finite number"),
+        (dict(text="1 | 1\n--\n | 1", digits=0), "digits = 0 is out of range. Expected 1 to 75"),
+        (dict(text="1 | 1\n--\n | 1", digits=10**9), "digits = 1000000000 is out of range"),
+        (dict(text="1 | 1\n--\n | 1", start_weight="nan"), 'start_weight: "nan": unknown symbol'),
+        (dict(text="1 | 1\n--\n | 1", start_weight="1e400"), 'start_weight: "1e400" is beyond 1e+30'),
+        (dict(text="1/2 | 1/2 0\n1/2 | 0 1/2\n--\n | 1 0", start_weight="1/2"), "expected stages at different times"),
+        (dict(text="0 |\n1 | 1\n--\n | 1/2 1/2", dense=[[1]]), "dense: expected 2 rows"),
+        (dict(text="0 |\n1 | 1\n--\n | 1/2 1/2", dense=[[1, 0], [1]]), "with equal numbers of coefficients"),
+        (dict(text="0 |\n1 | 1\n--\n | 1/2 1/2", dense=[1, 2]), "dense: expected 2 rows"),
+        (dict(text="0 |\n1 | 1\n--\n | 1/2 1/2", dense=[[1, math.nan], [0, 0.5]]), 'dense, row 1: "nan"'),
+        (
+            dict(text="0 |\n1 | 1\n--\n | 1/2 1/2", dense=[[1, -1], [0, 0.5]]),
+            "it adds up to 0; expected the weight 1/2",
+        ),
+        (dict(text="g | g\n--\n | 1", numbers={"g": ("x^2-2", math.inf)}), "expected a name, with a polynomial"),
+        (dict(text="g | g\n--\n | 1", numbers={"g": 3}), 'numbers: "g" = 3; expected a name'),
+        (dict(text="g | g\n--\n | 1", numbers={7: ("x^2-2", 1.4)}), "numbers: 7 ="),
+        (dict(text="g | g\n--\n | 1", numbers={"g": ("(x^64)^64-2", 1.0)}), "is too large for exact arithmetic"),
+        (dict(text="((((2^64)^64)^64)^64)^64 | 1\n--\n | 1"), "is too large for exact arithmetic"),
+        (dict(text="(" * 900 + " | 1\n--\n | 1"), "has more than 20 brackets within each other"),
+        (dict(text="1" * 5000 + " | 1\n--\n | 1"), "has 5000 characters. Expected at most 1000"),
+        (dict(text="1 | 1\n" * 10**5 + "--\n | 1"), "more than 100 stages"),
+        (dict(text="x" * (10**6 + 1)), "the text has more than 1000000 characters"),
+        (dict(text="0 | x\n" * 40 + "--\n | 1"), "and 20 more"),
+    ],
+)
+def test_entries_that_are_no_numbers_and_wrong_shapes_are_refused_by_name(arguments, wanted):
+    with pytest.raises(FvsolveError) as caught:
+        tableau("wrong", **arguments)
+    assert wanted in str(caught.value) and len(str(caught.value)) < 5000
+    assert "wrong" not in METHODS
+
+
+def test_arrays_of_single_precision_count_with_their_own_digits():
+    assert tableau("single", np.array([[0, 0], [1 / 3, 0]], np.float32), np.array([-0.5, 1.5], np.float32)).order == 2
+
+
 def test_published_digits_hold_to_their_precision():
     text = "0 |\n0.66666666666667 | 0.66666666666667\n--+--\n | 1/4 3/4"
     assert tableau_order(text) == 2
-    assert tableau_order(text.replace("0.66666666666667", "0.666666")) == 1
+    with pytest.warns(
+        RuntimeWarning, match="order 1; with exact numbers in place of decimals of 6 digits it has order 2"
+    ):
+        assert tableau_order(text.replace("0.66666666666667", "0.666666")) == 1
+
+
+def test_a_refusal_that_follows_from_rounding_names_the_order_with_exact_numbers():
+    """Kutta's method of order 3 has the weights 1/6, 2/3, 1/6, whose four digits add up to 1.0001."""
+    with pytest.raises(FvsolveError) as caught:
+        tableau("kutta", "0 |\n0.5 | 0.5\n1 | -1 2\n--+--\n | 0.1667 0.6667 0.1667")
+    assert (
+        "weights add up to 10001/10000; expected 1; with exact numbers in place of decimals of 4 digits it has order 3"
+        in (str(caught.value))
+    )
+    assert "Expected fractions, or decimals of 7 digits or more" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "row, weights", [("0.5 | 0.5", "0.25 0.75"), ("0.67 | 0.67", "0.25 0.75"), ("1/3 | 1/3", "1 0")]
+)
+def test_short_decimals_and_low_orders_give_no_warning(row, weights):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert tableau("low", f"0 |\n{row}\n--+--\n | {weights}").rounded_order is None
 
 
 def test_digits_too_few_to_tell_prove_no_order():

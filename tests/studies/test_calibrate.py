@@ -94,7 +94,7 @@ def test_what_cannot_be_told_apart_and_what_changes_nothing_is_named(measured):
 
 def test_the_command_prints_values_with_their_sigma(measured, fvs):
     (measured / "line.toml").write_text(write(compared(line(LEAK, SPEED, 20, MODEL))))
-    ask = ("calibrate", measured / "line.toml", "--parameter", "links.valve.area=0.0006,0.001")
+    ask = ("calibrate", measured / "line.toml", "--vary", "links.valve.area=0.0006,0.001")
     code, out, _ = fvs(*ask, "--json")
     said = json.loads(out)
     assert code == 0 and said["values"]["links.valve.area"] == approx(AREA, rel=5e-3)

@@ -112,10 +112,10 @@ def test_a_start_alone_is_judged_by_a_finer_run():
 def test_time_alone_is_judged_on_the_grid_unless_the_exact_solution_is_asked_for():
     grid = order(case(10), methods="ssp-rk3", exact=driven, source=drive, refine="time", levels=4)
     assert grid.kind == "finer" and grid.fits["pressure"]["L2"].order == approx(3.0, abs=0.1)
-    asked = order(case(10), methods="ssp-rk3", exact=free, refine="time", levels=4, against="exact")
+    asked = order(case(10), methods="ssp-rk3", exact=free, refine="time", levels=4, reference="exact")
     assert asked.kind == "function" and asked.rows[-1].errors["pressure"]["L2"] > 1.0  # the error of the grid
     with pytest.raises(FvsolveError, match="needs the function"):
-        order(case(20), initial=lambda pipe, x: free(pipe, x, 0.0), against="exact")
+        order(case(20), initial=lambda pipe, x: free(pipe, x, 0.0), reference="exact")
 
 
 def test_functions_want_pipes_and_the_linear_law():
@@ -181,7 +181,7 @@ def test_averages_over_other_cells_are_those_of_the_same_function(cells):
 
 def test_the_finer_run_and_the_exact_solution_find_the_same_errors():
     case = pulses.case(30, points=pulses.FEW)
-    exact, finer = (order(case, schemes="upwind3", levels=3, against=one) for one in ("exact", "finer"))
+    exact, finer = (order(case, schemes="upwind3", levels=3, reference=one) for one in ("exact", "finer"))
     assert (exact.kind, finer.kind) == ("exact", "finer") and "upwind5" in finer.words
     for a, b in zip(exact.rows, finer.rows, strict=True):
         for variable in ("pressure", "flow", "gate.pressure", "main.pressure@0.37"):
@@ -206,7 +206,7 @@ def test_the_error_that_a_reference_states_of_itself_is_about_its_true_one(case,
 
 def test_rows_that_the_reference_cannot_judge_are_marked_and_said():
     """Rows and reference have a front, which finer grids hardly sharpen: the last rows are as good as the reference."""
-    found = order(pulses.front(), schemes="fromm", against="finer", levels=4)
+    found = order(pulses.front(), schemes="fromm", reference="finer", levels=4)
     assert found.kind == "finer" and "reference" in found.fits["pressure"]["L1"].marks
     assert any("they are not reliable" in note and "[exact]" in note for note in found.notes)
     exact = order(pulses.front(), schemes="fromm", levels=4).fits["pressure"]["L1"]
@@ -217,7 +217,7 @@ def test_a_reference_that_is_no_better_than_the_runs_is_refused_with_a_way_out()
     """Upwind with Euler at Courant number 1 is exact, fronts included, so finer runs cannot judge it."""
     case = pulses.front(50, method="euler", courant=1.0)
     with pytest.raises(FvsolveError, match=r"not more accurate than the rows.*\[exact\].*richardson"):
-        order(case, against="finer", levels=3)
+        order(case, reference="finer", levels=3)
     exact = order(case, levels=3)
     assert all(row.errors["pressure"]["max"] < 1e-4 for row in exact.rows)
 
@@ -233,7 +233,7 @@ def test_where_no_reference_will_do_each_row_is_judged_by_the_next():
 def test_richardson_finds_the_errors_and_the_order_without_a_reference():
     case = pulses.case(30, points=pulses.FEW)
     exact = order(case, schemes="upwind3", levels=5)
-    found = order(case, schemes="upwind3", levels=5, against="richardson")
+    found = order(case, schemes="upwind3", levels=5, reference="richardson")
     assert found.kind == "richardson" and found.fits["pressure"]["L1"].order == approx(3.0, abs=0.1)
     for a, b in list(zip(exact.rows, found.rows, strict=True))[1:-1]:
         assert b.errors["pressure"]["L1"] == approx(a.errors["pressure"]["L1"], rel=0.1)
@@ -252,7 +252,7 @@ def test_refining_space_alone_shows_the_error_of_the_step_as_a_floor():
 
 def test_the_exact_solution_judges_time_alone_only_if_asked_to():
     case = pulses.case(20, method="ssp-rk3", points=pulses.FEW)
-    asked = order(case, refine="time", levels=4, against="exact")
+    asked = order(case, refine="time", levels=4, reference="exact")
     assert (asked.kind, order(case, refine="time", levels=2).kind) == ("exact", "finer")
     fit = asked.fits["pressure"]["L1"]
     assert fit.reason or "floor" in fit.marks  # the error of the grid
@@ -308,7 +308,7 @@ def test_a_reference_that_fails_says_so():
     case["numerics"]["below_vapor"], case["output"]["every"] = "stop", 1e6
     case["nodes"]["gate"] = scenes.junction(scenes.step(0.01, 0.0, 5.0))
     with pytest.raises(FvsolveError, match="reference run failed.*vapour"):
-        order(case, levels=2, cells=4, against="finer")
+        order(case, levels=2, cells=4, reference="finer")
     with pytest.raises(FvsolveError, match="no row could be run.*vapour"):  # nor with the next row as reference
         order(case, levels=2, cells=4)
 
@@ -328,7 +328,7 @@ def test_other_density_laws_are_compared_by_cell_averages_as_well(law):
 @pytest.mark.parametrize(("cells", "levels"), [(24, 4), (28, 4), (20, 5)])
 def test_richardson_gives_no_number_that_its_differences_cannot_show(cells, levels):
     """Upwind smears the pulse: orders of differences stay near 0.42 between coarse rows and approach 1 late."""
-    exact, found = (order(pulses.case(cells, points=pulses.FEW), schemes="upwind", levels=levels, against=way)
+    exact, found = (order(pulses.case(cells, points=pulses.FEW), schemes="upwind", levels=levels, reference=way)
                     for way in ("exact", "richardson"))  # fmt: skip
     for norm, own in found.fits["pressure"].items():
         assert own.reason or abs(own.order - 1.0) <= own.spread + 0.1, (norm, own)
@@ -342,7 +342,7 @@ def test_richardson_gives_no_number_that_its_differences_cannot_show(cells, leve
 
 def test_errors_by_richardson_are_the_true_ones_where_the_order_is_sure():
     case = pulses.case(80, points=pulses.FEW)
-    exact, found = (order(case, schemes="upwind", levels=5, against=way) for way in ("exact", "richardson"))
+    exact, found = (order(case, schemes="upwind", levels=5, reference=way) for way in ("exact", "richardson"))
     assert abs(found.fits["pressure"]["L1"].order - 1.0) <= found.fits["pressure"]["L1"].spread
     for a, b in zip(exact.rows[:-1], found.rows[:-1], strict=True):
         assert b.errors["pressure"]["L1"] == approx(a.errors["pressure"]["L1"], rel=0.15)

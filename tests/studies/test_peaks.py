@@ -398,7 +398,7 @@ def test_a_size_holds_its_limits_by_more_than_their_errors() -> None:
     case["nodes"]["lake"]["head"] = 50.0
     span = "links.tap.opening.duration", "0.02 s", "0.3 s"
     case["numerics"]["end"] = 0.9
-    plain, sure = (size(case, *span, rtol=0.1, error=error) for error in (False, True))
+    plain, sure = (size(case, *span, rtol=0.1, estimate_error=error) for error in (False, True))
     assert sure.value > 1.05 * plain.value
     said = [one for one in sure.runs if one.open]
     assert said and all("heads" in one.open and not one.ok and one.margin < 0.0 for one in said)

@@ -1,4 +1,4 @@
-"""Sensitivity indices: closed forms of functions, and indices of runs from their outcomes."""
+"""Sensitivity indices: closed forms of functions, and indices of runs from their quantitys."""
 
 import json
 import math
@@ -31,7 +31,7 @@ def test_the_ishigami_function_has_its_known_indices():
     assert found.S1 == approx([one / whole for one in first], abs=0.02)
     assert found.ST == approx([(first[0] + both) / whole, first[1] / whole, both / whole], abs=0.02)
     assert np.all(np.abs(np.array(found.S1) - [one / whole for one in first]) < 2.0 * np.array(found.S1_conf))
-    assert found.runs == 4096 * 5 + 1024 * 4 and found.outcome == "the function"
+    assert found.runs == 4096 * 5 + 1024 * 4 and found.quantity == "the function"
     assert found.mu_star[1] > 0.0 and found.mu[1] == approx(0.0, abs=0.5)  # effects of both signs cancel
 
 
@@ -63,7 +63,7 @@ def test_of_joukowskys_rise_speed_and_opening_have_the_shares_that_a_product_has
     a, s = ((sum(one) / 2, (one[1] - one[0]) ** 2 / 12) for one in bounds.values())
     terms = a[1] * s[0] ** 2, s[1] * a[0] ** 2, a[1] * s[1]
     found = sensitivity(line, bounds, "max(gate.pressure)", samples=64)
-    assert found.outcome == "max(gate.pressure) [Pa]"
+    assert found.quantity == "max(gate.pressure) [Pa]"
     assert found.S1 == approx([one / sum(terms) for one in terms[:2]], abs=0.03)
     assert found.ST == approx([(one + terms[2]) / sum(terms) for one in terms[:2]], abs=0.03)
     rise = 0.61 * math.sqrt(2 * (3e6 - 101325.0) * 1000.0) / (math.pi / 4 * 0.3**2)  # rise per speed and area
@@ -93,7 +93,7 @@ def test_no_label_of_its_picture_covers_another_or_leaves_it():
 def test_the_command_says_it_and_finds_its_runs_again(line, fvs, tmp_path):
     (tmp_path / "line.toml").write_text(write(line))
     ask = ("sensitivity", tmp_path / "line.toml", "--vary", "links.main.wave_speed=900 m/s,1300",
-           "--vary", "nodes.out.pressure=1 atm,2 atm", "--outcome", "max(gate.pressure)", "--samples", 4, "--out",
+           "--vary", "nodes.out.pressure=1 atm,2 atm", "--quantity", "max(gate.pressure)", "--samples", 4, "--out",
            tmp_path)  # fmt: skip
     code, out, _ = fvs(*ask, "--json")
     said = json.loads(out)
@@ -109,23 +109,23 @@ def test_the_command_says_it_and_finds_its_runs_again(line, fvs, tmp_path):
 def test_what_cannot_be_asked_is_named(line):
     bounds = {"links.main.wave_speed": [900.0, 1300.0]}
     for given, said in (
-        ({"vary": bounds, "outcome": "max(gate.flow)"}, 'no outcome "max.gate.flow."'),
-        ({"vary": bounds}, "no outcome. Expected an outcome such as"),
-        ({"vary": {}, "outcome": "max(gate.pressure)"}, "no key varies"),
+        ({"vary": bounds, "quantity": "max(gate.flow)"}, 'no quantity "max.gate.flow."'),
+        ({"vary": bounds}, "no quantity. Expected a quantity such as"),
+        ({"vary": {}, "quantity": "max(gate.pressure)"}, "no key varies"),
         (
-            {"vary": bounds, "outcome": "max(gate.pressure)", "samples": 1},
+            {"vary": bounds, "quantity": "max(gate.pressure)", "samples": 1},
             "samples = 1 is too small. Expected 2 or more",
         ),
         (
-            {"vary": {"nodes.gate.position": [0.0, 1.0]}, "outcome": "max(gate.pressure)"},
+            {"vary": {"nodes.gate.position": [0.0, 1.0]}, "quantity": "max(gate.pressure)"},
             "is not a continuous quantity",
         ),
-        ({"vary": {"fluid.viscosity": [1e-3, 2e-3]}, "outcome": "max(gate.pressure)"}, "no key changes it"),
+        ({"vary": {"fluid.viscosity": [1e-3, 2e-3]}, "quantity": "max(gate.pressure)"}, "no key changes it"),
         (
-            {"vary": {"fluid.viscosity": ["1 cSt", "2 cSt"]}, "outcome": "max(gate.pressure)"},
+            {"vary": {"fluid.viscosity": ["1 cSt", "2 cSt"]}, "quantity": "max(gate.pressure)"},
             "is a kinematic viscosity",
         ),
-        ({"vary": bounds, "outcome": "t [s]"}, 'no outcome "t .s."'),
+        ({"vary": bounds, "quantity": "t [s]"}, 'no quantity "t .s."'),
     ):
         with pytest.raises(FvsolveError, match=said):
             sensitivity(line, **({"samples": 2} | given))
@@ -133,7 +133,7 @@ def test_what_cannot_be_asked_is_named(line):
         sensitivity(line, {"links.main.wave_speed": [1300.0, 900.0]}, "max(gate.pressure)")
 
 
-def test_runs_that_have_no_outcome_are_counted_and_the_first_is_named(line):
+def test_runs_that_have_no_quantity_are_counted_and_the_first_is_named(line):
     refused = {"links.main.wave_speed": [900.0, 1300.0]}
     blown = {"numerics.courant": 4.0, "numerics.end": 20.0}
     with pytest.raises(FvsolveError, match=r"runs ha(s|ve) no max\(gate.pressure\).*first at links.main.wave_speed = "):

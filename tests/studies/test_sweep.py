@@ -18,7 +18,7 @@ import fvsolve
 from fvsolve.case.text import write
 from fvsolve.cli.app import value_of
 from fvsolve.cli.sweep import split_list
-from fvsolve.draw.object_pictures import outcome_figure
+from fvsolve.draw.object_pictures import quantity_figure
 from fvsolve.errors import CaseError, FvsolveError, RunError
 from fvsolve.studies import sweep
 from fvsolve.studies.sampling import key_ranges, points_from_file, sample_points
@@ -314,7 +314,7 @@ def test_a_file_that_a_value_names_is_part_of_what_is_reused(line, tmp_path, mon
 def test_numbers_on_the_axes_of_a_sweep_over_four_keys_do_not_overlap():
     keys = ("a.b", "c.d", "e.f", "g.h")
     rows = [dict.fromkeys(keys, x) | {"ok": True, "reason": "finished", "max(x) [m]": x} for x in (0.0008, 0.0014)]
-    figure = outcome_figure(Sweep(keys, rows, 0), "max(x) [m]", {key: key for key in keys})
+    figure = quantity_figure(Sweep(keys, rows, 0), "max(x) [m]", {key: key for key in keys})
     figure.canvas.draw()
     for axes in figure.axes[: len(keys)]:
         low, high = axes.get_xlim()
@@ -327,7 +327,7 @@ def test_numbers_on_the_axes_of_a_sweep_over_four_keys_do_not_overlap():
 def mapped(rows: list[dict]):
     """Axes of the picture of a sweep over two keys."""
     made = Sweep(("a.b", "c.d"), [{"ok": True, "reason": "finished"} | row for row in rows], 0)
-    figure = outcome_figure(made, "max(x) [m]", {"a.b": "a.b [s]", "c.d": "c.d"})
+    figure = quantity_figure(made, "max(x) [m]", {"a.b": "a.b [s]", "c.d": "c.d"})
     figure.canvas.draw()
     return figure.axes
 
@@ -377,7 +377,7 @@ def test_the_table_is_parquet_too_and_every_extreme_has_a_chart(line, fvs, tmp_p
     assert fvs(*again, "--quantity", "final(valve.flow)")[0] == 0
     assert [path.name for path in (tmp_path / "o" / "charts").iterdir()] == ["final-valve.flow.png"]
     code, _, err = fvs(*again, "--quantity", "max(x)")
-    assert code == 2 and 'no outcome "max(x)". Outcomes are' in err
+    assert code == 2 and 'no quantity "max(x)". Quantities are' in err
 
 
 # ----------------------------------------------------------------------------------------------------------------------

@@ -206,6 +206,7 @@ class Facts:
 
     error_order : order of the embedded solution, 0 without an embedded solution
     digits : number of significant digits in the published coefficients, None if they are exact
+    rounded_order : order with exact numbers in place of decimals of few digits, None if it is not above the order
     kind : explicit, diagonal (stages solved one by one), full (stages solved together) or linear (Rosenbrock)
     angle : alpha of A(alpha) stability [degrees], None if the negative real axis is not stable
     real_interval, imaginary_interval : lengths of the stable intervals of h lambda on the negative real and on the
@@ -222,6 +223,7 @@ class Facts:
     stage_order: int
     stages: int
     digits: int | None
+    rounded_order: int | None
     kind: str
     explicit: bool
     diagonally_implicit: bool

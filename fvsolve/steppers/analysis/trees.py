@@ -67,6 +67,42 @@ class Conditions:
                 return Fraction(0)
         return residual
 
+    def differ(self, b: Sequence, other: Sequence, nodes: int, weights: Sequence[tuple[list, list]]) -> bool:
+        """True if sum_i b_i phi_i differs for the weights b and `other`, by more than the rounding of coefficients.
+
+        weights : pairs (phi, bounds of its size) of elementary weights of trees with at most `nodes` nodes
+        """
+        differences = [x - y for x, y in zip(b, other, strict=True)]
+        sizes = [short(abs(x)) + short(abs(y)) for x, y in zip(b, other, strict=True)]
+        for phi, bound in weights:
+            difference = sum((x * y for x, y in zip(differences, phi, strict=True)), Fraction(0))
+            size = sum((x * y for x, y in zip(sizes, bound, strict=True)), Fraction(0)) if self.rounding else 0
+            if abs(difference) > 2 * nodes * self.rounding * size:
+                return True
+        return False
+
+    def all_trees(self, nodes: int) -> list[tuple[list, list]]:
+        """Pairs for `differ`, of all trees with `nodes` nodes."""
+        return [tuple(self._phi((nodes, i), absolute) for absolute in (False, True)) for i in range(len(trees(nodes)))]
+
+    def tall_trees(self) -> list[tuple[list, list]]:
+        """Pairs for `differ`, of trees without branching points: all that act on y' = lambda y."""
+        pairs = [([Fraction(1)] * len(self.a),) * 2]
+        for _ in self.a[1:]:
+            pairs.append(tuple(self._product(row, k) for k, row in enumerate(pairs[-1])))
+        return pairs
+
+    def bushy_trees(self) -> list[tuple[list, list]]:
+        """Pairs for `differ`, of trees whose branches are single nodes: all that act on y' = f(t)."""
+        times, bounds = (self._product([Fraction(1)] * len(self.a), k) for k in range(2))
+        powers = range(len(self.a))
+        return [([x**k for x in times], [x**k for x in bounds]) for k in powers]
+
+    def _product(self, column: Sequence, absolute: int) -> list:
+        """Product of the matrix with a column; absolute : 1 for the absolute values of the matrix"""
+        rows = [[(j, abs(x) if absolute else x) for j, x in row] for row in self.single]
+        return [sum((x * column[j] for j, x in row), Fraction(0)) for row in rows]
+
     def holds(self, nodes: int, b: Sequence) -> bool:
         """True if all conditions for trees of `nodes` nodes hold."""
         return all(self.residual((nodes, i), b) == 0 for i in range(len(trees(nodes))))

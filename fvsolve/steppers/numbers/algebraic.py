@@ -263,6 +263,8 @@ def _isolated(p: Polynomial, near: Fraction, name: str) -> tuple[Fraction, Fract
 
 TOKEN = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3}(?!\d))?|[A-Za-z_]\w*|[-+*/^()]")
 POWER_MOST, ROOT_MOST = 64, 10**9
+LETTERS_MOST, NESTED_MOST = 1000, 20  # greatest length of an expression, and depth of its brackets
+BITS_MOST, DEGREE_MOST = 20_000, 64  # greatest size of a value, and degree of a polynomial, in an expression
 
 
 def value_of(text: str, names: Mapping | None = None):
@@ -271,6 +273,8 @@ def value_of(text: str, names: Mapping | None = None):
     Syntax: + - * / ^, brackets, `sqrt(n)` of an integer, the names in the dict `names`; `7sqrt(6)` and `3(g-1)` are
     products.
     """
+    if len(text) > LETTERS_MOST:
+        raise ValueError(f'"{text[:20]}..." has {len(text)} characters. Expected at most {LETTERS_MOST}')
     tokens = TOKEN.findall(text)
     if "".join(tokens) != re.sub(r"\s", "", text):
         raise ValueError(f'"{text}" is not a number')
@@ -303,7 +307,15 @@ class _Parser:
     """Recursive-descent parser of sums, products, powers, and numbers, names or brackets."""
 
     def __init__(self, text: str, tokens: list[str], names: Mapping):
-        self.text, self.rest, self.names = text, tokens[::-1], names
+        self.text, self.rest, self.names, self.depth = text, tokens[::-1], names, 0
+
+    def checked(self, value):
+        """The value, if it is small enough for exact arithmetic; else raises ValueError."""
+        parts = value.coefficients if isinstance(value, Polynomial) else getattr(value, "parts", (value,))
+        size = max((x.numerator.bit_length() + x.denominator.bit_length() for x in parts), default=0)
+        if size > BITS_MOST or isinstance(value, Polynomial) and value.degree > DEGREE_MOST:
+            raise ValueError(f'"{self.text}" is too large for exact arithmetic')
+        return value
 
     def next(self, *expected: str) -> str | None:
         return self.rest.pop() if self.rest and self.rest[-1] in expected else None
@@ -322,7 +334,7 @@ class _Parser:
             operator = self.next("*", "/")
             factor = self.power()
             try:
-                total = total / factor if operator == "/" else total * factor
+                total = self.checked(total / factor if operator == "/" else total * factor)
             except ZeroDivisionError:
                 raise ValueError(f'"{self.text}" divides by zero') from None
         return total
@@ -334,12 +346,19 @@ class _Parser:
         power = self.rest.pop() if self.rest else ""
         if not power.isdigit() or int(power) > POWER_MOST:
             raise ValueError(f'"{self.text}": expected an integer power from 0 to {POWER_MOST} after "^"')
-        return base ** int(power)
+        result = Fraction(1)
+        for _ in range(int(power)):
+            result = self.checked(result * base)
+        return result
 
     def atom(self):
         token = self.rest.pop() if self.rest else ""
         if token == "(":
+            self.depth += 1
+            if self.depth > NESTED_MOST:
+                raise ValueError(f'"{self.text}" has more than {NESTED_MOST} brackets within each other')
             inside = self.sum()
+            self.depth -= 1
             if not self.next(")"):
                 raise ValueError(f'"{self.text}": a closing ")" is missing')
             return inside

@@ -24,13 +24,13 @@ REFERENCE_KINDS = ("auto", "exact", "finer", "richardson")
 
 
 @validated(
-    refine=TEXT, key=TEXT, levels=COUNT, cells=COUNT, schemes=NAMES, methods=NAMES, against=TEXT, initial=FUNCTION,
+    refine=TEXT, key=TEXT, levels=COUNT, cells=COUNT, schemes=NAMES, methods=NAMES, reference=TEXT, initial=FUNCTION,
     source=FUNCTION, exact=FUNCTION, out=OUT, **STUDY_ARGUMENTS,
 )  # fmt: skip
 def order(
     case, set: Mapping | None = None, *, refine: str | None = None, key: str | None = None, levels: int | None = None,
     cells: int | None = None, schemes: str | Sequence[str] | None = None, methods: str | Sequence[str] | None = None,
-    against: str = "auto", initial: Callable | None = None, source: Callable | None = None,
+    reference: str = "auto", initial: Callable | None = None, source: Callable | None = None,
     exact: Callable | None = None, out: str | Path | ResultCache | None = None, progress: Progress | None = None,
     jobs: int = 1, dask: str | None = None,
 ) -> Order | list[Order]:  # fmt: skip
@@ -39,7 +39,7 @@ def order(
     With several schemes or methods, the result is a list with an `Order` for each pair of scheme and method.
     case, set : as in `run`; refine, key, levels, cells : as in `studies.accuracy.refine.refinement_plan`
     schemes, methods : name or list of names that replace the scheme and method of the case
-    against : reference, "auto", "exact", "finer" (two levels finer, by another scheme and method) or "richardson" (each
+    reference : "auto", "exact", "finer" (two levels finer, by another scheme and method) or "richardson" (each
     row against the next). "auto" is "exact" if the case names an exact solution, otherwise "richardson" with basins and
     "finer" without; if a finer run fails or is too inaccurate, it is "richardson".
     initial : initial(pipe, x) -> pressure [Pa], flow [m3/s] at the start, x float64[k] [m]
@@ -50,9 +50,9 @@ def order(
     jobs, dask : processes that make the runs, as in `sweep`; functions of x and t need this process alone
     Raises CaseError, FvsolveError.
     """
-    if against not in REFERENCE_KINDS:
-        hint = did_you_mean(against, REFERENCE_KINDS) or f". Expected {', '.join(REFERENCE_KINDS)}"
-        raise FvsolveError(f'against = "{against}" is unknown{hint}')
+    if reference not in REFERENCE_KINDS:
+        hint = did_you_mean(reference, REFERENCE_KINDS) or f". Expected {', '.join(REFERENCE_KINDS)}"
+        raise FvsolveError(f'reference = "{reference}" is unknown{hint}')
     given = initial, source, exact
     if any(given) and (jobs != 1 or dask is not None):
         raise FvsolveError("initial, source and exact are functions of this process. Expected jobs = 1 and no dask")
@@ -63,12 +63,12 @@ def order(
             pair_settings = {"numerics.scheme": scheme, "numerics.method": method}
             settings = {**(set or {}), **{name: value for name, value in pair_settings.items() if value is not None}}
             rows = refine, key, levels, cells
-            studies.append(_order_of_pair(case, settings, rows, against, given, points, report, queue))
+            studies.append(_order_of_pair(case, settings, rows, reference, given, points, report, queue))
     return studies[0] if len(studies) == 1 else studies
 
 
 def _order_of_pair(case, settings: Mapping, rows: tuple, against, given, points, progress, queue: RunQueue) -> Order:
-    """Order study of one scheme and method; against and progress are as for `order`.
+    """Order study of one scheme and method; against : reference as for `order`; progress as there.
 
     settings : overrides of the case; rows : (refine, key, levels, cells) as for `order`; given : (initial, source,
     exact) as for `order`; points : cache of earlier rows; queue : makes the runs
@@ -94,8 +94,8 @@ class ManufacturedStudy(OrderStudy):
 
     initial, source, exact : functions as in `order`, or None. Without a source, runs differ from usual runs by their
     initial state only; with a source they are integrated by `steppers.ode.integrate`.
-    Raises FvsolveError for a case without pipes, for density laws other than `linear`, and if against = "exact" without
-    the function `exact`.
+    Raises FvsolveError for a case without pipes, for density laws other than `linear`, and for the reference "exact"
+    without the function `exact`.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class ManufacturedStudy(OrderStudy):
         self.against = against
         if against == "exact" and exact is None:
             raise FvsolveError(
-                'against = "exact" needs the function exact(pipe, x, t). Expected that function, or "finer"'
+                'reference = "exact" needs the function exact(pipe, x, t). Expected that function, or "finer"'
             )
         if not pipes(case):
             raise FvsolveError("initial, source and exact are functions along pipes, but this case has no pipes")

@@ -203,7 +203,7 @@ class OrderStudy:
         self.queue, self.stages = queue, (dict(settings),)
         self.probe_names = tuple(probe.text for probe in case.probes)
         if against == "exact" and case.exact is None:
-            raise FvsolveError('against = "exact": the case names no solution under [exact]. Expected "finer"')
+            raise FvsolveError('reference = "exact": the case names no solution under [exact]. Expected "finer"')
         if against == "auto" and case.exact is None and basins(case):  # 4 times the cells along both axes take too long
             self.against = "richardson"
 
@@ -219,8 +219,8 @@ class OrderStudy:
     def study(self, points: ResultCache | None, progress: Progress) -> Order:
         """Run and fit all rows, coarsest first; rows against a reference are stored in the cache `points` and reused.
 
-        With against = "auto", each row is compared with the next if a finer run fails, or is not more accurate than the
-        rows. Raises FvsolveError if no row runs, or if a reference that `against` or [exact] states cannot be used.
+        With the reference "auto", each row is compared with the next if a finer run fails, or is not more accurate than
+        the rows. Raises FvsolveError if no row runs, or if the reference of the caller or [exact] cannot be used.
         """
         if self.against == "richardson":
             return self.richardson(progress)
