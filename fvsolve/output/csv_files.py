@@ -9,6 +9,7 @@ import numpy as np
 
 from fvsolve.case.pipe_routes import legs
 from fvsolve.errors import RunError
+from fvsolve.file_replacement import replacing, write_file
 from fvsolve.output.unit_columns import UnitColumn, column, split_header, to_column_units
 
 ENVELOPE_QUANTITIES = {
@@ -16,6 +17,7 @@ ENVELOPE_QUANTITIES = {
     "max_pressure": "pressure", "t_max": "time", "min_head": "head", "max_head": "head",
 }  # fmt: skip
 VELOCITY_AXES = {"u": 0, "v": 1}  # of velocities
+BLOCK, LONGEST_LINE = 2**20, 2**24  # bytes that are read at once, and greatest length of a row
 LINE_FILE = re.compile(r"(.+)-(\d{6,})\.csv")
 
 
@@ -35,14 +37,18 @@ class HistoryFile:
         headers = ",".join(csv_quoted(column.header) for column in [self.time, *self.columns])
         self._file.write(f"{headers}\n".encode())
 
-    def continue_from(self, rows: int, size: int) -> None:
-        """Open the file to continue from a checkpoint, at which it had `rows` rows and `size` bytes.
+    def continue_from(self, rows: int, size: int, t: float) -> None:
+        """Open the file to continue from a checkpoint at time `t` [s], at which it had `rows` rows and `size` bytes.
 
-        Later rows are cut off. Raises RunError if the file is missing or shorter.
+        Later rows are cut off. Raises RunError if the file is missing or shorter, or if its rows do not fit.
         """
         if not self.path.is_file() or self.path.stat().st_size < size:
             text = "is missing or shorter than at its checkpoint; start the run again with --force"
             raise RunError(f"{self.path} {text}")
+        lines, last = lines_of(self.path, size)
+        if lines != rows + 1 or (rows and not is_row_until(last, self.time, t)):
+            text = f"its rows do not fit the checkpoint ({rows} rows up to t = {t:.6g} s in {size} B)"
+            raise RunError(f"{self.path}: {text}; start the run again with --force")
         self._file = open(self.path, "r+b")
         self._file.truncate(size)
         self._file.seek(size)
@@ -67,6 +73,28 @@ class HistoryFile:
         if self._file is not None:
             file, self._file = self._file, None
             file.close()
+
+
+def lines_of(path: Path, size: int) -> tuple[int, str]:
+    """Number of complete lines in the first `size` bytes of a file, and the last of them; 0 if they end in a line."""
+    count, last = 0, b""
+    with open(path, "rb") as file:
+        while size > 0 and (block := file.read(min(size, BLOCK))):
+            size -= len(block)
+            count += block.count(b"\n")
+            last = (last + block)[-LONGEST_LINE:]
+    if not last.endswith(b"\n"):
+        return 0, ""
+    return count, last[:-1].rpartition(b"\n")[2].decode("utf-8", "replace")
+
+
+def is_row_until(line: str, time: UnitColumn, t: float) -> bool:
+    """True if the first number of a row is a time not after `t` [s]."""
+    try:
+        found = float(time.to_si(float(line.partition(",")[0])))
+    except ValueError:
+        return False
+    return found <= t + 1e-9 * abs(t)
 
 
 def read_headers(path: Path) -> list[tuple[str, str]]:
@@ -142,7 +170,7 @@ def write_envelope(path: Path, envelope: dict, case) -> None:
     envelope : pipe -> name as in `ENVELOPE_QUANTITIES` -> float64[cells] in the units of the columns
     """
     columns = envelope_columns(case)
-    with open(path, "w", encoding="utf-8", newline="") as file:
+    with replacing(path) as fresh, open(fresh, "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["pipe", *(col.header for col in columns)])
         for pipe, arrays in envelope.items():
@@ -193,7 +221,7 @@ def write_routes(path: Path, envelope: dict, case) -> None:
     """Write routes.csv with a row for each cell along each route. envelope : in the units of envelope.csv"""
     columns = envelope_columns(case)
     headers = ["route", column("chainage", "length", case).header, "pipe", *(item.header for item in columns)]
-    with open(path, "w", encoding="utf-8", newline="") as file:
+    with replacing(path) as fresh, open(fresh, "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(headers)
         for name, item in route_envelopes(envelope, case).items():
@@ -229,7 +257,7 @@ class LineSeries:
     def write(self, number: int, frame: dict) -> None:
         """Write the files of all lines for the frame `number`. frame : basin -> field -> values of cells in SI"""
         for name, line in self.lines.items():
-            self.path(name, number).write_bytes(line.text(frame[line.basin]).encode())
+            write_file(self.path(name, number), line.text(frame[line.basin]))
 
     def path(self, name: str, number: int) -> Path:
         """Path of the file of a line and frame."""

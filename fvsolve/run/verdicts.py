@@ -9,8 +9,8 @@ from fvsolve.case.claims import VACUUM
 from fvsolve.case.pipe_routes import Leg, is_cut, legs, pipe_leg
 from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.output.csv_files import with_points
+from fvsolve.output.summary_shape import FAILS, HOLDS, OPEN, Comparison
 from fvsolve.output.unit_columns import UnitColumn, column, probe_columns
-from fvsolve.run.result import FAILS, HOLDS, OPEN, Comparison
 
 ENVELOPE_KEYS = ("distance", "elevation", "min_pressure", "t_min", "max_pressure", "t_max")
 ROUNDING = 1e-9  # relative to a limit and the typical size of its quantity; a smaller excess is within the limit

@@ -14,6 +14,7 @@ from fvsolve.case import Case, load, shipped
 from fvsolve.case.reading import split_key, syntax_fault
 from fvsolve.case.text import key_lines
 from fvsolve.errors import CaseError, Fault, FvsolveError, did_you_mean
+from fvsolve.file_replacement import replacing, write_file
 from fvsolve.output.directory import clear_reports
 from fvsolve.output.summary_file import plain, write_summary
 from fvsolve.run import run
@@ -360,13 +361,10 @@ def write_study(results: ScenarioResults) -> None:
     for row in data["runs"]:
         row["directory"] = os.path.relpath(row["directory"], results.folder)
     clear_reports(results.folder)
-    temporary = results.folder / f"{STUDY}.tmp"
-    temporary.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    os.replace(temporary, results.folder / STUDY)
     limits = list(dict.fromkeys(verdict["name"] for row in results.rows for verdict in row["verdicts"]))
     quantities = ("value", "margin", "unit", "state", "place", "time [s]")
     columns = [f"{name} {quantity}" for name in limits for quantity in quantities]
-    with open(results.folder / "study.csv", "w", encoding="utf-8", newline="") as file:
+    with replacing(results.folder / "study.csv") as fresh, open(fresh, "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["event", "protection", "ok", "reason", *columns])
         for row in results.rows:
@@ -374,6 +372,7 @@ def write_study(results: ScenarioResults) -> None:
             cells = [verdicts.get(name, {}).get(key) for name in limits
                      for key in ("value", "margin", "unit", "state", "place", "time")]  # fmt: skip
             table.writerow([row["event"] or "", row["protection"] or "", row["ok"], row["reason"], *cells])
+    write_file(results.folder / STUDY, json.dumps(data, indent=1) + "\n")
 
 
 def open_study(folder: str | Path) -> dict[str, Any]:
