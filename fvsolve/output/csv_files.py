@@ -18,6 +18,7 @@ ENVELOPE_QUANTITIES = {
 }  # fmt: skip
 VELOCITY_AXES = {"u": 0, "v": 1}  # of velocities
 BLOCK, LONGEST_LINE = 2**20, 2**24  # bytes that are read at once, and greatest length of a row
+LATEST = 1e100  # limit of times, in any unit
 LINE_FILE = re.compile(r"(.+)-(\d{6,})\.csv")
 
 
@@ -37,11 +38,8 @@ class HistoryFile:
         headers = ",".join(csv_quoted(column.header) for column in [self.time, *self.columns])
         self._file.write(f"{headers}\n".encode())
 
-    def continue_from(self, rows: int, size: int, t: float) -> None:
-        """Open the file to continue from a checkpoint at time `t` [s], at which it had `rows` rows and `size` bytes.
-
-        Later rows are cut off. Raises RunError if the file is missing or shorter, or if its rows do not fit.
-        """
+    def refuse_unfit(self, rows: int, size: int, t: float) -> None:
+        """Raise RunError if the file has not `rows` rows in its first `size` bytes, up to the time `t` [s]."""
         if not self.path.is_file() or self.path.stat().st_size < size:
             text = "is missing or shorter than at its checkpoint; start the run again with --force"
             raise RunError(f"{self.path} {text}")
@@ -49,6 +47,12 @@ class HistoryFile:
         if lines != rows + 1 or (rows and not is_row_until(last, self.time, t)):
             text = f"its rows do not fit the checkpoint ({rows} rows up to t = {t:.6g} s in {size} B)"
             raise RunError(f"{self.path}: {text}; start the run again with --force")
+
+    def continue_from(self, rows: int, size: int) -> None:
+        """Open the file to continue from a checkpoint, at which it had `rows` rows and `size` bytes.
+
+        Later rows are cut off.
+        """
         self._file = open(self.path, "r+b")
         self._file.truncate(size)
         self._file.seek(size)
@@ -99,13 +103,14 @@ def is_row_until(line: str, time: UnitColumn, t: float) -> bool:
 
 def read_headers(path: Path) -> list[tuple[str, str]]:
     """Name and unit of every column of a table, `t` first; raises RunError if the file cannot be read."""
-    import csv
-
     try:
         with open(path, encoding="utf-8", newline="") as file:
             return [split_header(header) for header in next(csv.reader(file), [])]
     except OSError as error:
         raise RunError(f"{path}: {error.strerror}; expected a run directory with this file") from None
+    except (ValueError, csv.Error) as error:
+        text = f"its header is damaged ({error}); run again with --force"
+        raise RunError(f"{path} cannot be read: {text}") from None
 
 
 def read_table(path: Path) -> np.ndarray:
@@ -113,6 +118,10 @@ def read_table(path: Path) -> np.ndarray:
     names = len(read_headers(path))
     with open(path, encoding="utf-8") as file:
         file.readline()
+        start = file.tell()
+        if not file.read(1):  # no rows
+            return np.empty((0, names))
+        file.seek(start)
         try:
             table = np.loadtxt(file, delimiter=",", ndmin=2)
         except ValueError:
@@ -121,6 +130,8 @@ def read_table(path: Path) -> np.ndarray:
     if table.size and table.shape[1] != names:
         text = f"rows have {table.shape[1]} numbers, the header has {names} columns; run again with --force"
         raise RunError(f"{path} cannot be read: {text}")
+    if table.size and not (np.diff(table[:, 0], prepend=-LATEST, append=LATEST) >= 0.0).all():
+        raise RunError(f"{path} cannot be read: its times are not numbers in rising order; run again with --force")
     return table if table.size else np.empty((0, names))
 
 
@@ -187,7 +198,11 @@ def read_envelope(path: Path) -> dict:
             names = [split_header(header)[0] for header in next(rows, [])]
             for row in rows:
                 pipes.setdefault(row[0], []).append([float(text) for text in row[1:]])
-        return {pipe: dict(zip(names[1:], np.array(values).T, strict=True)) for pipe, values in pipes.items()}
+        tables = {pipe: dict(zip(names[1:], np.array(values).T, strict=True)) for pipe, values in pipes.items()}
+        for pipe, arrays in tables.items():
+            if not all(np.isfinite(arrays[name]).all() for name in ("distance", "elevation") if name in arrays):
+                raise ValueError(f"a distance or an elevation of {pipe} is not finite; run again with --force")
+        return tables
     except (OSError, ValueError, IndexError, csv.Error) as error:
         raise RunError(f"{path} cannot be read: {getattr(error, 'strerror', error)}") from None
 

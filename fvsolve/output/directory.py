@@ -110,15 +110,19 @@ class RunDirectory:
     def begin(self, model, state) -> None:
         """Open the files: new files, or the files of an earlier part of the run, truncated to the checkpoint.
 
-        Deletes summary.json, pictures and reports of earlier results. Raises RunError if the files do not fit the
-        checkpoint.
+        Deletes summary.json, pictures and reports of earlier results. Raises RunError, before anything is deleted, if
+        the files do not fit the checkpoint.
         """
+        restart, entries = self.restart, []
+        if restart is not None:
+            self.history.refuse_unfit(restart.rows, restart.history_bytes, restart.t)
+            entries = self.fields.entries_until(restart.frames, restart.t) if self.fields else []
         for path in (self.folder / SUMMARY_FILE, *picture_paths(self.folder), *maxima_paths(self.folder)):
             path.unlink(missing_ok=True)
         clear_reports(self.folder)
         for folder in (self.folder, self.folder / "fields", self.folder / "lines", self.folder / "grids"):
             remove_unfinished(folder)
-        if self.restart is None:
+        if restart is None:
             clear_run_files(self.folder)
             for series in (self.history, self.fields, self.lines):
                 if series:
@@ -127,11 +131,11 @@ class RunDirectory:
             self.checkpoint(state, {})
             return
         self._write_case()
-        self.history.continue_from(self.restart.rows, self.restart.history_bytes, self.restart.t)
+        self.history.continue_from(restart.rows, restart.history_bytes)
         if self.fields:
-            self.fields.continue_from(self.restart.frames, self.restart.t)
+            self.fields.continue_from(restart.frames, entries)
         if self.lines:
-            self.lines.continue_from(self.restart.frames)
+            self.lines.continue_from(restart.frames)
 
     def rows(self, t, values) -> None:
         """Append rows of probe values to history.csv. t : float64[k] [s]; values : float64[k, probes] in SI"""

@@ -148,10 +148,10 @@ class FieldSeries:
         (self.folder / "fields").mkdir(exist_ok=True)
         (self.folder / "fields.pvd").write_bytes((PVD_HEAD + PVD_TAIL).encode())
 
-    def continue_from(self, frames: int, t: float) -> None:
-        """Keep the first `frames` frames of the series and delete later frames, to continue from a checkpoint.
+    def entries_until(self, frames: int, t: float) -> list[str]:
+        """Lines of the index of the first `frames` frames, written up to a checkpoint at time `t` [s].
 
-        t : time of the checkpoint [s]. Raises RunError if frames are missing, or later than the checkpoint.
+        Raises RunError if frames are missing, or later than the checkpoint.
         """
         index = self.folder / "fields.pvd"
         lines = index.read_text(encoding="utf-8").splitlines() if index.is_file() else []
@@ -164,12 +164,19 @@ class FieldSeries:
         if entries and not (time and float(time[1]) <= t + 1e-9 * abs(t)):
             text = f"its frames do not fit the checkpoint ({frames} frames up to t = {t:.6g} s)"
             raise RunError(f"{index}: {text}; start the run again with --force")
+        return entries
+
+    def continue_from(self, frames: int, entries: list[str]) -> None:
+        """Keep the first `frames` frames of the series and delete later frames, to continue from a checkpoint.
+
+        entries : result of `entries_until`
+        """
         (self.folder / "fields").mkdir(exist_ok=True)
         for path in (self.folder / "fields").glob("*.*vtu"):
             number = path.stem.rpartition("-")[2]
             if number.isdecimal() and int(number) >= frames:
                 path.unlink()
-        write_file(index, PVD_HEAD + "".join(entries) + PVD_TAIL)
+        write_file(self.folder / "fields.pvd", PVD_HEAD + "".join(entries) + PVD_TAIL)
         self.frames = frames
 
     def write(self, t: float, frame: dict) -> None:

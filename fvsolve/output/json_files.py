@@ -66,7 +66,7 @@ def faults_of(value: Any, kind: Any, place: str = "") -> Iterator[str]:
     elif kind is Any:
         yield from unreasonable_numbers(value, place)
     elif not fits(value, kind):
-        yield f"{place}: {found_text(value)}. Expected {expected_text(kind)}"
+        yield f"{place}{': ' if place else ''}{found_text(value)}. Expected {expected_text(kind)}"
 
 
 def faults_of_record(value: dict, kind: Any, place: str) -> Iterator[str]:

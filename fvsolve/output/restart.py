@@ -145,7 +145,11 @@ def read_restart(path: Path, who: dict[str, str]) -> Restart:
         stored = json.loads(str(arrays.pop("identity")))
         t, y, counts = (arrays.pop(name) for name in ("t", "y", "counts"))
     except Exception as error:  # zip, numpy and json raise many types on a damaged file
-        reason = f"{error} is missing" if isinstance(error, KeyError) else error
+        reason = (
+            f"{error} is missing"
+            if isinstance(error, KeyError)
+            else (str(error).splitlines() or [type(error).__name__])[0]
+        )
         raise RunError(f"{path} cannot be read ({reason}); start the run again with --force") from None
     damaged = [name for name, array, axes in (("t", t, 0), ("y", y, 1))
               if array.dtype != np.float64 or array.ndim != axes]  # fmt: skip
