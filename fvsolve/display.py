@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import Any, ClassVar
 
 from fvsolve.argument_checks import PATH, validated
+from fvsolve.file_replacement import replacing
 
 TABLE_ROWS = 12  # rows of a table in a notebook; `.frame()` contains all rows
 PICTURE_DPI = 72  # resolution of a plot in a notebook; `.plot()` returns the figure itself
@@ -74,7 +75,8 @@ class Displayable:
 def save(figure, path) -> None:
     """Write a figure to a file. A .png is drawn only once; `savefig` would draw it twice, with an equal result."""
     write = figure.canvas.print_png if str(path).endswith(".png") else figure.savefig
-    write(path)
+    with replacing(path) as fresh:
+        write(fresh)
 
 
 def save_if_path(figure, path):

@@ -2,6 +2,7 @@
 
 import functools
 import math
+import weakref
 from collections.abc import Iterator
 from typing import Any
 
@@ -23,8 +24,7 @@ WALL_KEYS = ("diameter", "nominal", "schedule", "class", "material", "lining")  
 MAX_ENTRIES = 20  # entries of a hand-written schedule; longer schedules are records, of which a run may use a part
 MAX_CLASS_FRACTION = 3.0  # largest plausible limit, as a multiple of the pressure class
 SHOWN = {"rainfall": "mm/h"}  # dimension -> unit of its numbers in notices, where SI is not usual
-MAX_CACHED = 10_000  # cached parts
-CACHE: dict[int, tuple[Table, Any, list]] = {}  # id -> part, its raw table, its unusual values
+CACHE: dict[int, tuple[Any, Any, list]] = {}  # id -> weak reference to a part, its raw table, its unusual values
 TWO_ENTRIES = (
     "smooth through two entries is a straight line; for zero slope at both ends, add an entry with the first value "
     "before the first entry, and an entry with the last value after the last entry"
@@ -78,12 +78,14 @@ def wave_speed_mismatch(case: Any, name: str, pipe: Any) -> tuple[float, float, 
 
 
 def _of_part(part: Table, raw: Any) -> list[tuple[tuple[Any, ...], float, float, str]]:
-    """Result of `_of_table` for a part, cached while `part` and `raw` (its keys in the file) are the same objects."""
-    known = CACHE.get(id(part))
-    if known is None or known[0] is not part or known[1] is not raw:
-        if len(CACHE) >= MAX_CACHED:
-            CACHE.clear()
-        known = CACHE[id(part)] = part, raw, [*_of_table(part, raw)]
+    """Result of `_of_table` for a part, cached while `part` and `raw` (its keys in the file) are the same objects.
+
+    The entry is dropped with the part.
+    """
+    key = id(part)
+    known = CACHE.get(key)
+    if known is None or known[0]() is not part or known[1] is not raw:
+        known = CACHE[key] = weakref.ref(part, lambda _: CACHE.pop(key, None)), raw, [*_of_table(part, raw)]
     return known[2]
 
 

@@ -14,6 +14,7 @@ from fvsolve.case.pipe_routes import Route
 from fvsolve.case.sections import FluidSpec, Numerics, Output, OutputGrid, OutputLine, RunUp
 from fvsolve.case.text import inline
 from fvsolve.errors import FvsolveError, did_you_mean
+from fvsolve.file_replacement import write_file
 from fvsolve.parts import KINDS, Friction, Node, Scalar
 from fvsolve.parts.accumulator.part import Compressor
 from fvsolve.parts.attitude_keys import Attitude
@@ -161,7 +162,7 @@ def main(given: list[str]) -> None:
     """Rewrite the pages (.md) and print the tables that are named in the command line `given`."""
     for argument in given:
         if argument.endswith(".md"):
-            Path(argument).write_text(page(Path(argument).read_text(encoding="utf-8")), encoding="utf-8")
+            write_file(argument, page(Path(argument).read_text(encoding="utf-8")))
         else:
             print(key_table(argument), end="")
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.errors import FvsolveError, did_you_mean, listing
+from fvsolve.file_replacement import replacing
 
 SCHEMA = "schema.json"  # file beside the cases; editors use it for completion and checks
 
@@ -68,5 +69,6 @@ def copy(name: str, to: Path, load: Callable[[Path], Any]) -> list[Path]:
         pairs.append((folder() / SCHEMA, schema))
     for path, target in pairs:
         target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(path, target)
+        with replacing(target) as fresh:
+            shutil.copyfile(path, fresh)
     return [target for _, target in pairs]

@@ -2,6 +2,7 @@
 
 import atexit
 import copy
+import errno
 import gc
 import os
 import re
@@ -10,6 +11,7 @@ import warnings
 from importlib import import_module
 from pathlib import Path
 
+from fvsolve.cli.streams import lasting_streams
 from fvsolve.errors import FvsolveError, visible
 
 __all__ = ["main"]
@@ -47,11 +49,21 @@ def main() -> None:
     """Entry point of `fvsolve`. Every failure is a message on standard error and an exit code, without a traceback.
 
     Exit codes: 0 done; 1 a run stopped early or its results are wrong, an expectation or limit does not hold (it fails
-    or is open), memory is exhausted, or an internal error; 2 bad input; 130 interrupted.
+    or is open), memory is exhausted, or an internal error; 2 bad input, or standard output cannot be written;
+    130 interrupted.
     """
-    for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):  # false if a caller has replaced the stream by another file object
-            stream.reconfigure(errors="backslashreplace")  # a terminal with a small character set must not end a run
+    with lasting_streams() as output:
+        try:
+            run_command()
+        except SystemExit as exit:
+            output.flush()
+            if exit.code or output.error is None or output.error.errno == errno.EPIPE:  # a reader may leave early
+                raise
+            _exit_with(f"standard output: cannot be written: {output.error.strerror}", 2)
+
+
+def run_command() -> None:
+    """Run the command of `sys.argv`, and exit with its code."""
     if sys.argv[1:] == ["--version"]:  # without the imports of any command
         import fvsolve
 
@@ -68,9 +80,6 @@ def main() -> None:
         _exit_with(str(error), 2)
     except KeyboardInterrupt:
         _exit_with("interrupted", 130)
-    except BrokenPipeError:
-        sys.stderr.close()  # the reader of the output is gone: no message can reach it
-        sys.exit(0)
     except OSError as error:
         _exit_with(f"{error.filename or 'fvsolve'}: {error.strerror or error}", 2)
     except MemoryError:

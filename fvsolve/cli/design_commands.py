@@ -156,7 +156,7 @@ def study(
 def study_text(result) -> Iterator:
     """Margins of all limits in all runs of a study, failed and open limits, and protections that hold all limits."""
     from fvsolve.cli import printing
-    from fvsolve.run.result import FAILS, OPEN, LimitVerdict
+    from fvsolve.output.summary_shape import FAILS, OPEN, LimitVerdict
     from fvsolve.studies.scenarios import row_name
 
     if result.design.title:
@@ -197,7 +197,8 @@ def _margin_table(result) -> TextTable:
 
     The status is "FAILS" if the run or a limit fails, else "open" or "holds"; "-" for a good run without limits.
     """
-    from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN, not_valid
+    from fvsolve.output.summary_shape import FAILS, HOLDS, IN_WORDS, OPEN
+    from fvsolve.run.result import not_valid
     from fvsolve.studies.scenarios import row_name
     from fvsolve.units import span
 

@@ -9,6 +9,7 @@ from typer import Argument, Option
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.terminal import TextTable, interrupt_message, present, progress_line, run_progress
+from fvsolve.display import save
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable, cell_text
 
@@ -101,7 +102,7 @@ def ledger(case, port, out, as_json: bool) -> None:
         figure = energy_figure(clock.from_si(result.t), result.supplied, result.stored, result.dissipated,
                                result.numerical(), case.title or case.name, at_port, units)  # fmt: skip
         for name in FILES[1:]:
-            figure.savefig(folder / name)
+            save(figure, folder / name)
     facts = result.plain() | {"directory": str(folder), "files": list(FILES)}
     code = 130 if result.reason == "interrupted" else 0 if result.ok else 1
     present(as_json, facts, ledger_text(result, case, folder), code)

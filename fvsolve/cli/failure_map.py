@@ -8,6 +8,7 @@ from typer import Option
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.terminal import TextTable, present, progress_line
+from fvsolve.display import save
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable
 
@@ -79,7 +80,7 @@ def _write_files(result, folder: Path, head: str) -> list[Path]:
     figure = failure_map_figure(result, f"{result.case}: where methods fail", head)
     pictures = [folder / f"map.{kind}" for kind in ("png", "svg")]
     for picture in pictures:
-        figure.savefig(picture)
+        save(figure, picture)
     return [table, *pictures]
 
 

@@ -13,6 +13,7 @@ from fvsolve.case import shipped
 from fvsolve.cli.app import Json, RunDirectory, app, quantity_of
 from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import FvsolveError, listing
+from fvsolve.file_replacement import replacing, write_file
 
 SHORT = (
     'pipes shorter than a cell, which make steps small with pipe_model = "finite-volume" '
@@ -126,11 +127,12 @@ def import_(
     shortest = _positive("--min-pipe-length", min_pipe_length, "length") if min_pipe_length else 0.0
     network = import_network(source, hour, speed, shortest, day)
     to.parent.mkdir(parents=True, exist_ok=True)
-    to.write_text(network.text, encoding="utf-8")
+    write_file(to, network.text)
     written = [to]
     described = to.parent / shipped.SCHEMA
     if (shipped.folder() / shipped.SCHEMA).is_file() and not described.exists():
-        shutil.copyfile(shipped.folder() / shipped.SCHEMA, described)
+        with replacing(described) as fresh:
+            shutil.copyfile(shipped.folder() / shipped.SCHEMA, fresh)
         written.append(described)
     for path in written:
         print(path)

@@ -9,7 +9,9 @@ from typer import Option
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.terminal import present
+from fvsolve.display import save
 from fvsolve.errors import FvsolveError
+from fvsolve.file_replacement import replacing
 from fvsolve.output.unit_columns import column
 from fvsolve.studies.result_table import Column, ResultTable, write_csv
 
@@ -57,7 +59,7 @@ def write_matrices(folder: Path, system) -> None:
     arrays = {"A": a}
     if system.sparse:
         arrays = {"A_data": a.data, "A_indices": a.indices, "A_indptr": a.indptr, "A_shape": np.array(a.shape)}
-    np.savez(
+    save_arrays(
         folder / "linear.npz", **arrays, B=system.b, C=system.c, D=system.d, states=np.array(names),
         state_units=np.array(system.state_units), inputs=np.array(system.inputs, dtype=str),
         outputs=np.array(system.outputs, dtype=str), input_units=np.array(system.input_units, dtype=str),
@@ -74,6 +76,12 @@ def write_matrices(folder: Path, system) -> None:
     write_csv(folder / "B.csv", ["", *system.inputs], with_names(rates, system.b))
     write_csv(folder / "C.csv", ["", *names], with_names(system.outputs, system.c))
     write_csv(folder / "D.csv", ["", *system.inputs], with_names(system.outputs, system.d))
+
+
+def save_arrays(path: Path, **arrays) -> None:
+    """Write arrays to a .npz file in a single step."""
+    with replacing(path) as fresh:
+        np.savez(fresh, **arrays)
 
 
 def with_names(names, matrix):
@@ -135,7 +143,7 @@ def response(
     cli.warn_replaced(folder, f"{name}.npz")
     cli.clear_files(folder, f"{name}.png", f"{name}.svg")
     write_csv(folder / f"{name}.csv", header, np.column_stack(columns).tolist())
-    np.savez(folder / f"{name}.npz", A=result.a, B=result.b, C=result.c, D=result.d, states=np.array(result.states))
+    save_arrays(folder / f"{name}.npz", A=result.a, B=result.b, C=result.c, D=result.d, states=np.array(result.states))
     unit = output_unit(loaded, result)
     draw(result, folder / name, *unit)
     present(as_json, result.plain() | {"directory": str(folder)}, response_text(result, folder, name, unit[1]))
@@ -161,7 +169,7 @@ def respond(case, port, input, output, at, before, scheme, out, as_json: bool) -
     unit = f"{result.units[1]} / {result.units[0]}"
     figure = response_figure(result.w, h, ("H", unit), title=title, note="real part")
     for ending in ("png", "svg"):
-        figure.savefig(folder / f"{stem}.{ending}")
+        save(figure, folder / f"{stem}.{ending}")
     present(as_json, result.plain() | {"directory": str(folder)}, input_response_text(result, folder, stem))
 
 
@@ -211,7 +219,7 @@ def draw(result, path: Path, size: float, unit: str) -> None:
     labels = (SYMBOLS[result.kind], unit)
     figure = response_figure(result.w, size * result.h, labels, dips, poles, verdict.tolerance, title, text)
     for ending in ("png", "svg"):
-        figure.savefig(path.with_name(f"{path.name}.{ending}"))
+        save(figure, path.with_name(f"{path.name}.{ending}"))
 
 
 def response_text(result, folder: Path, name: str, unit: str) -> Iterator:

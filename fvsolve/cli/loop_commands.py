@@ -9,6 +9,7 @@ from typer import Argument
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.terminal import present
+from fvsolve.display import save
 from fvsolve.studies.result_table import ResultTable, columns, write_csv
 
 POLES_SHOWN = 12  # greatest number of poles on the terminal
@@ -52,7 +53,7 @@ def draw(result, folder: Path, stem: str) -> None:
         step = step_figure(*step_response(result), result.period is not None, title)
         figures |= {"bode": bode_figure(result, title), "nyquist": nyquist_figure(result, title), "step": step}
     for kind, figure in figures.items():
-        figure.savefig(folder / f"{stem}.{kind}.png")
+        save(figure, folder / f"{stem}.{kind}.png")
 
 
 def loop_text(result, folder: Path, stem: str) -> Iterator:

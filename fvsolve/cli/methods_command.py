@@ -10,6 +10,7 @@ from typer import Argument, Option
 
 from fvsolve.cli.app import Json, app, method_name
 from fvsolve.cli.terminal import TextTable, present
+from fvsolve.display import save
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS, Facts, Method, analyse, method_named
 from fvsolve.steppers.numbers.polynomial import Polynomial, sign
@@ -35,7 +36,7 @@ def single_method(name: str, out: Path | None) -> tuple[dict, Iterator]:
     if path.suffix.lower() not in PICTURES:
         raise FvsolveError(f"{path}: unknown type of picture. Expected a name that ends in {' or '.join(PICTURES)}")
     path.parent.mkdir(parents=True, exist_ok=True)
-    region_figure(facts.stability_function, f"{method.name}: |R(hλ)| ≤ 1").savefig(path)
+    save(region_figure(facts.stability_function, f"{method.name}: |R(hλ)| ≤ 1"), path)
     array = {"a": method.a, "b": method.b, "c": method.c, "error": method.error, "start_error": method.start_error}
     return facts.plain() | array | {"picture": str(path)}, _method_text(method, facts, path)
 

@@ -10,6 +10,7 @@ from typer import Argument, Option
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.terminal import TextTable, present, progress_line
+from fvsolve.display import save
 from fvsolve.errors import FvsolveError
 from fvsolve.step_limits.advection_limit import AdvectionLimit, advection_limits
 from fvsolve.step_limits.symbol import WEIGHTS
@@ -279,7 +280,7 @@ def pictures(result, folder: Path) -> list[str]:
             title = f"{result.case}, {row.method}: spectrum times h = {h:.4g} s"
         figure = spectrum_figure(analyse(row.method).stability_function, h * side.spectrum.values, field, title)
         names.append(f"spectrum-{row.scheme}-{row.method}.png" if row.rate > 0.0 else f"spectrum-{row.method}.png")
-        figure.savefig(folder / names[-1])
+        save(figure, folder / names[-1])
     return names
 
 

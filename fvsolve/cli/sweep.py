@@ -9,6 +9,7 @@ from typer import Option
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.terminal import TextTable, present, progress_line
+from fvsolve.display import save
 from fvsolve.errors import FvsolveError
 
 Values = Annotated[
@@ -98,7 +99,7 @@ def write_charts(result, quantities: list[str], folder: Path, heads: dict[str, s
     for name in names:
         stem = re.sub(r"[^A-Za-z0-9.@_-]+", "-", name.partition(" [")[0]).strip("-")
         path = cli.writable_folder(folder / "charts") / f"{stem}.png"
-        quantity_figure(result, name, heads).savefig(path)
+        save(quantity_figure(result, name, heads), path)
         paths.append(path)
     return paths
 

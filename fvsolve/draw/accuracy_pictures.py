@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.draw import style
+from fvsolve.file_replacement import replacing
 
 MARKERS = {"": "o", "pre-asymptotic": "^", "floor": "v", "reference": "X", "off the line": "D"}
 METHOD_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h", "*", "d")
@@ -141,9 +142,9 @@ def save_picture(figure, path, dpi: float | None = None) -> None:
     """Write a figure to a file; an SVG keeps its texts as text, and equal figures give equal files."""
     from matplotlib import rc_context
 
-    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "fvsolve"}):
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "fvsolve"}), replacing(path) as fresh:
         kind = {"metadata": {"Date": None}} if str(path).endswith(".svg") else {}
-        figure.savefig(path, **kind, **({} if dpi is None else {"dpi": dpi}))
+        figure.savefig(fresh, **kind, **({} if dpi is None else {"dpi": dpi}))
 
 
 def _assign_signs(words, signs) -> dict:

@@ -13,6 +13,7 @@ from fvsolve.draw.network_picture import draw_parts
 from fvsolve.draw.scene import WATER_VIEW, DrawnScene, Projection, box_corners, draw_box, fit_limits, round_scale
 from fvsolve.draw.sheet import COLOUR_MAP, HALF_SYMBOL, WATER, PictureSheet, colour_range, write_animation
 from fvsolve.errors import did_you_mean, listing
+from fvsolve.file_replacement import replacing
 
 FLAT_SHARE = 0.08  # height over width below which bodies are drawn in plan, or depth over width for a profile
 LOW_SHARE = 0.05  # height over width below which basins are drawn with enlarged heights
@@ -82,7 +83,8 @@ class FieldCanvas:
         self.plotter.set_background("white")
         self.plotter.disable_parallel_projection()
         self.plotter.reset_camera()
-        self.plotter.export_html(out)
+        with replacing(out) as fresh:
+            self.plotter.export_html(str(fresh))
 
     def _measure(self) -> None:
         """Find the range of the field and the bounding box, and choose the projection."""

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, Self
 
 from fvsolve.child_process import python_command, python_environment
 from fvsolve.display import save
+from fvsolve.file_replacement import remove_unfinished
 
 
 class Picture(NamedTuple):
@@ -29,16 +30,11 @@ class Picture(NamedTuple):
 
 def draw_picture(picture: Picture) -> str:
     """Write a picture so that its file is complete or missing; returns the error text, or "" on success."""
-    temporary = picture.path.with_name(f"fresh-{picture.path.name}")
     try:
         figure = getattr(import_module("fvsolve.draw.plot"), picture.function)(**picture.arguments)
-        save(figure, temporary)
-        os.replace(temporary, picture.path)
+        save(figure, picture.path)
     except Exception as error:  # a missing picture must not fail the run, whose numbers are complete
         return f"{type(error).__name__}: {error}"
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
     return ""
 
 
@@ -62,14 +58,13 @@ class PlotProcess:
 
     def draw(self, pictures: Iterable[Picture]) -> dict[Path, str]:
         """Write pictures; returns the error text of each picture that could not be drawn, by its path."""
-        pictures = list(pictures)
+        pictures, process = list(pictures), None if self.process is None else self.process.pid
         try:
             faults = {picture.path: self._draw_by_process(picture) for picture in pictures}
         except BaseException:
             self.end()
-            for picture in pictures:
-                with contextlib.suppress(OSError):
-                    picture.path.with_name(f"fresh-{picture.path.name}").unlink()
+            for folder in {picture.path.parent for picture in pictures} if process else ():
+                remove_unfinished(folder, process)
             raise
         return {path: fault for path, fault in faults.items() if fault}
 

@@ -14,6 +14,7 @@ import numpy as np
 from fvsolve.data import read_table
 from fvsolve.draw import style
 from fvsolve.errors import visible
+from fvsolve.file_replacement import replacing
 
 SYMBOLS = read_table("part_symbols")["kinds"]
 OTHER_NODE, OTHER_LINK = (read_table("part_symbols")["other"][key] for key in ("node", "link"))
@@ -181,12 +182,13 @@ def write_animation(stage: Any, count: int, out: Path) -> None:
     for k in range(count):
         stage.show(k)
         pictures.append(stage.sheet.picture())
-    if count == 1:
-        Image.fromarray(pictures[0]).save(out, optimize=True)
-    elif out.suffix == ".mp4":
-        import imageio
+    with replacing(out) as fresh:
+        if count == 1:
+            Image.fromarray(pictures[0]).save(fresh, optimize=True)
+        elif out.suffix == ".mp4":
+            import imageio
 
-        imageio.mimsave(out, pictures, fps=1000 // FRAME_TIME, macro_block_size=1)
-    else:
-        drawn = [Image.fromarray(picture).quantize(255) for picture in pictures]
-        drawn[0].save(out, save_all=True, append_images=drawn[1:], duration=FRAME_TIME, loop=0)
+            imageio.mimsave(fresh, pictures, fps=1000 // FRAME_TIME, macro_block_size=1)
+        else:
+            drawn = [Image.fromarray(picture).quantize(255) for picture in pictures]
+            drawn[0].save(fresh, save_all=True, append_images=drawn[1:], duration=FRAME_TIME, loop=0)

@@ -10,6 +10,7 @@ from pathlib import Path
 import fvsolve
 from fvsolve.case import Case
 from fvsolve.errors import FvsolveError
+from fvsolve.file_replacement import replacing
 from fvsolve.fmi.cosimulation import CASE_FOLDER
 from fvsolve.fmi.model_description import model_description
 from fvsolve.fmi.variables import Variable, variables_of
@@ -84,7 +85,7 @@ def write_fmu(case: Case, path: str | Path | None = None) -> tuple[Path, list[Va
     for file in sorted((package / "resources" / "binaries").rglob("*.*")):
         files[f"binaries/{file.parent.name}/{identifier}{file.suffix}"] = file.read_bytes()
     path.parent.mkdir(parents=True, exist_ok=True)
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+    with replacing(path) as fresh, zipfile.ZipFile(fresh, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in files.items():
             archive.writestr(zipfile.ZipInfo(name, FIXED_DATE), data, zipfile.ZIP_DEFLATED)
     return path, variables

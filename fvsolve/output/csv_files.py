@@ -9,6 +9,7 @@ import numpy as np
 
 from fvsolve.case.pipe_routes import legs
 from fvsolve.errors import RunError
+from fvsolve.file_replacement import replacing, write_file
 from fvsolve.output.unit_columns import UnitColumn, column, split_header, to_column_units
 
 ENVELOPE_QUANTITIES = {
@@ -16,6 +17,8 @@ ENVELOPE_QUANTITIES = {
     "max_pressure": "pressure", "t_max": "time", "min_head": "head", "max_head": "head",
 }  # fmt: skip
 VELOCITY_AXES = {"u": 0, "v": 1}  # of velocities
+BLOCK, LONGEST_LINE = 2**20, 2**24  # bytes that are read at once, and greatest length of a row
+LATEST = 1e100  # limit of times, in any unit
 LINE_FILE = re.compile(r"(.+)-(\d{6,})\.csv")
 
 
@@ -35,14 +38,21 @@ class HistoryFile:
         headers = ",".join(csv_quoted(column.header) for column in [self.time, *self.columns])
         self._file.write(f"{headers}\n".encode())
 
-    def continue_from(self, rows: int, size: int) -> None:
-        """Open the file to continue from a checkpoint, at which it had `rows` rows and `size` bytes.
-
-        Later rows are cut off. Raises RunError if the file is missing or shorter.
-        """
+    def refuse_unfit(self, rows: int, size: int, t: float) -> None:
+        """Raise RunError if the file has not `rows` rows in its first `size` bytes, up to the time `t` [s]."""
         if not self.path.is_file() or self.path.stat().st_size < size:
             text = "is missing or shorter than at its checkpoint; start the run again with --force"
             raise RunError(f"{self.path} {text}")
+        lines, last = lines_of(self.path, size)
+        if lines != rows + 1 or (rows and not is_row_until(last, self.time, t)):
+            text = f"its rows do not fit the checkpoint ({rows} rows up to t = {t:.6g} s in {size} B)"
+            raise RunError(f"{self.path}: {text}; start the run again with --force")
+
+    def continue_from(self, rows: int, size: int) -> None:
+        """Open the file to continue from a checkpoint, at which it had `rows` rows and `size` bytes.
+
+        Later rows are cut off.
+        """
         self._file = open(self.path, "r+b")
         self._file.truncate(size)
         self._file.seek(size)
@@ -69,15 +79,38 @@ class HistoryFile:
             file.close()
 
 
+def lines_of(path: Path, size: int) -> tuple[int, str]:
+    """Number of complete lines in the first `size` bytes of a file, and the last of them; 0 if they end in a line."""
+    count, last = 0, b""
+    with open(path, "rb") as file:
+        while size > 0 and (block := file.read(min(size, BLOCK))):
+            size -= len(block)
+            count += block.count(b"\n")
+            last = (last + block)[-LONGEST_LINE:]
+    if not last.endswith(b"\n"):
+        return 0, ""
+    return count, last[:-1].rpartition(b"\n")[2].decode("utf-8", "replace")
+
+
+def is_row_until(line: str, time: UnitColumn, t: float) -> bool:
+    """True if the first number of a row is a time not after `t` [s]."""
+    try:
+        found = float(time.to_si(float(line.partition(",")[0])))
+    except ValueError:
+        return False
+    return found <= t + 1e-9 * abs(t)
+
+
 def read_headers(path: Path) -> list[tuple[str, str]]:
     """Name and unit of every column of a table, `t` first; raises RunError if the file cannot be read."""
-    import csv
-
     try:
         with open(path, encoding="utf-8", newline="") as file:
             return [split_header(header) for header in next(csv.reader(file), [])]
     except OSError as error:
         raise RunError(f"{path}: {error.strerror}; expected a run directory with this file") from None
+    except (ValueError, csv.Error) as error:
+        text = f"its header is damaged ({error}); run again with --force"
+        raise RunError(f"{path} cannot be read: {text}") from None
 
 
 def read_table(path: Path) -> np.ndarray:
@@ -85,6 +118,10 @@ def read_table(path: Path) -> np.ndarray:
     names = len(read_headers(path))
     with open(path, encoding="utf-8") as file:
         file.readline()
+        start = file.tell()
+        if not file.read(1):  # no rows
+            return np.empty((0, names))
+        file.seek(start)
         try:
             table = np.loadtxt(file, delimiter=",", ndmin=2)
         except ValueError:
@@ -93,6 +130,8 @@ def read_table(path: Path) -> np.ndarray:
     if table.size and table.shape[1] != names:
         text = f"rows have {table.shape[1]} numbers, the header has {names} columns; run again with --force"
         raise RunError(f"{path} cannot be read: {text}")
+    if table.size and not (np.diff(table[:, 0], prepend=-LATEST, append=LATEST) >= 0.0).all():
+        raise RunError(f"{path} cannot be read: its times are not numbers in rising order; run again with --force")
     return table if table.size else np.empty((0, names))
 
 
@@ -142,7 +181,7 @@ def write_envelope(path: Path, envelope: dict, case) -> None:
     envelope : pipe -> name as in `ENVELOPE_QUANTITIES` -> float64[cells] in the units of the columns
     """
     columns = envelope_columns(case)
-    with open(path, "w", encoding="utf-8", newline="") as file:
+    with replacing(path) as fresh, open(fresh, "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["pipe", *(col.header for col in columns)])
         for pipe, arrays in envelope.items():
@@ -159,7 +198,11 @@ def read_envelope(path: Path) -> dict:
             names = [split_header(header)[0] for header in next(rows, [])]
             for row in rows:
                 pipes.setdefault(row[0], []).append([float(text) for text in row[1:]])
-        return {pipe: dict(zip(names[1:], np.array(values).T, strict=True)) for pipe, values in pipes.items()}
+        tables = {pipe: dict(zip(names[1:], np.array(values).T, strict=True)) for pipe, values in pipes.items()}
+        for pipe, arrays in tables.items():
+            if not all(np.isfinite(arrays[name]).all() for name in ("distance", "elevation") if name in arrays):
+                raise ValueError(f"a distance or an elevation of {pipe} is not finite; run again with --force")
+        return tables
     except (OSError, ValueError, IndexError, csv.Error) as error:
         raise RunError(f"{path} cannot be read: {getattr(error, 'strerror', error)}") from None
 
@@ -193,7 +236,7 @@ def write_routes(path: Path, envelope: dict, case) -> None:
     """Write routes.csv with a row for each cell along each route. envelope : in the units of envelope.csv"""
     columns = envelope_columns(case)
     headers = ["route", column("chainage", "length", case).header, "pipe", *(item.header for item in columns)]
-    with open(path, "w", encoding="utf-8", newline="") as file:
+    with replacing(path) as fresh, open(fresh, "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(headers)
         for name, item in route_envelopes(envelope, case).items():
@@ -229,7 +272,7 @@ class LineSeries:
     def write(self, number: int, frame: dict) -> None:
         """Write the files of all lines for the frame `number`. frame : basin -> field -> values of cells in SI"""
         for name, line in self.lines.items():
-            self.path(name, number).write_bytes(line.text(frame[line.basin]).encode())
+            write_file(self.path(name, number), line.text(frame[line.basin]))
 
     def path(self, name: str, number: int) -> Path:
         """Path of the file of a line and frame."""

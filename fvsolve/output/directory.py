@@ -12,6 +12,7 @@ from filelock import FileLock, Timeout
 from fvsolve.case.case import REPORT_KEYS, STEP_KEYS
 from fvsolve.case.resource_checks import LEAST_TEXT, byte_text, disk_size
 from fvsolve.errors import RunError, listing
+from fvsolve.file_replacement import remove_unfinished, replacing, write_file
 from fvsolve.output import csv_files
 from fvsolve.output.csv_files import read_envelope, read_table
 from fvsolve.output.fields import FieldSeries, ParallelBasinWriter
@@ -117,13 +118,19 @@ class RunDirectory:
     def begin(self, model, state) -> None:
         """Open the files: new files, or the files of an earlier part of the run, truncated to the checkpoint.
 
-        Deletes summary.json, pictures and reports of earlier results. Raises RunError if the files do not fit the
-        checkpoint.
+        Deletes summary.json, pictures and reports of earlier results. Raises RunError, before anything is deleted, if
+        the files do not fit the checkpoint.
         """
+        restart, entries = self.restart, []
+        if restart is not None:
+            self.history.refuse_unfit(restart.rows, restart.history_bytes, restart.t)
+            entries = self.fields.entries_until(restart.frames, restart.t) if self.fields else []
         for path in (self.folder / SUMMARY_FILE, *picture_paths(self.folder), *maxima_paths(self.folder)):
             path.unlink(missing_ok=True)
         clear_reports(self.folder)
-        if self.restart is None:
+        for folder in (self.folder, self.folder / "fields", self.folder / "lines", self.folder / "grids"):
+            remove_unfinished(folder)
+        if restart is None:
             clear_run_files(self.folder)
             for series in (self.history, self.fields, self.lines):
                 if series:
@@ -132,10 +139,11 @@ class RunDirectory:
             self.checkpoint(state, {})
             return
         self._write_case()
-        self.history.continue_from(self.restart.rows, self.restart.history_bytes)
-        for series in (self.fields, self.lines):
-            if series:
-                series.continue_from(self.restart.frames)
+        self.history.continue_from(restart.rows, restart.history_bytes)
+        if self.fields:
+            self.fields.continue_from(restart.frames, entries)
+        if self.lines:
+            self.lines.continue_from(restart.frames)
 
     def rows(self, t, values) -> None:
         """Append rows of probe values to history.csv. t : float64[k] [s]; values : float64[k, probes] in SI"""
@@ -240,6 +248,11 @@ class RunDirectory:
         if restart and restart.y.size != self.model.y_size:
             raise RunError(f"{path} holds {restart.y.size} states, but the case has {self.model.y_size}; start the run "
                            "again with --force")  # fmt: skip
+        if restart and not self.model.case.numerics.start <= restart.t:
+            text = f"is at t = {restart.t:.6g} s, before numerics.start"
+            raise RunError(f"{path} {text}; start the run again with --force")
+        if restart and (text := count_fault(restart, self.fields is not None)):
+            raise RunError(f"{path}: {text}; start the run again with --force")
         if restart and restart.t > self.model.case.numerics.end:
             raise RunError(f"{path} is at t = {restart.t:.6g} s, after numerics.end; start the run again with --force")
         return restart
@@ -248,11 +261,28 @@ class RunDirectory:
         case = self.model.case
         with self.report_write_errors():
             changes = "".join(f"# {change_text(change)}\n" for change in self.continued)
-            (self.folder / "case.toml").write_text(changes + case.resolved(), encoding="utf-8")
+            write_file(self.folder / "case.toml", changes + case.resolved())
         for name, path in case.copies.items():
             copy = self.folder / name
             if copy.resolve() != Path(path).resolve():
-                shutil.copyfile(path, copy)
+                with replacing(copy) as fresh:
+                    shutil.copyfile(path, fresh)
+
+
+def count_fault(restart: Restart, has_frames: bool) -> str:
+    """Text if the counts of a checkpoint contradict its record of the steps; "" if they agree or there is no record.
+
+    has_frames : True if the run writes frames
+    """
+    record = restart.memory.get("state")
+    if record is None or record.size != 1 or not {"next_output", "next_field"} <= {*(record.dtype.names or ())}:
+        return ""
+    due = record.reshape(-1)[0]
+    if not restart.rows >= due["next_output"]:  # each output has a row, a jump has more
+        return f"{restart.rows} rows of history.csv; expected at least {due['next_output']:g}"
+    if has_frames and restart.frames != due["next_field"]:
+        return f"{restart.frames} frames of fields; expected {due['next_field']:g}"
+    return ""
 
 
 def change_text(change: dict) -> str:

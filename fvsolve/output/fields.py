@@ -18,6 +18,7 @@ import numpy as np
 
 from fvsolve.case.basins import patch_names
 from fvsolve.errors import RunError
+from fvsolve.file_replacement import write_file
 from fvsolve.kernels.dtypes import BODY_OUT, PRISMATIC
 from fvsolve.kernels.mechanism.body_layout import ATTITUDE, POSITION, SPIN, VELOCITY
 from fvsolve.output import network_layout
@@ -38,6 +39,7 @@ compressor="vtkZLibDataCompressor">
 """
 VTU_TAIL = "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
 FILE_ATTRIBUTE = re.compile('file="([^"]+)"')
+TIME_ATTRIBUTE = re.compile('timestep="([-+.e0-9]+)"')
 PVD_HEAD = """<?xml version="1.0"?>
 <VTKFile type="Collection" version="0.1" byte_order="LittleEndian">
 <Collection>
@@ -146,10 +148,10 @@ class FieldSeries:
         (self.folder / "fields").mkdir(exist_ok=True)
         (self.folder / "fields.pvd").write_bytes((PVD_HEAD + PVD_TAIL).encode())
 
-    def continue_from(self, frames: int) -> None:
-        """Keep the first `frames` frames of the series and delete later frames, to continue from a checkpoint.
+    def entries_until(self, frames: int, t: float) -> list[str]:
+        """Lines of the index of the first `frames` frames, written up to a checkpoint at time `t` [s].
 
-        Raises RunError if frames are missing.
+        Raises RunError if frames are missing, or later than the checkpoint.
         """
         index = self.folder / "fields.pvd"
         lines = index.read_text(encoding="utf-8").splitlines() if index.is_file() else []
@@ -158,12 +160,23 @@ class FieldSeries:
         matches = [FILE_ATTRIBUTE.search(line) for line in entries]
         if len(entries) < n or not all(match and (self.folder / match[1]).is_file() for match in matches):
             raise RunError(f"{index}: frames are missing; start the run again with --force")
+        time = TIME_ATTRIBUTE.search(entries[-1]) if entries else None
+        if entries and not (time and float(time[1]) <= t + 1e-9 * abs(t)):
+            text = f"its frames do not fit the checkpoint ({frames} frames up to t = {t:.6g} s)"
+            raise RunError(f"{index}: {text}; start the run again with --force")
+        return entries
+
+    def continue_from(self, frames: int, entries: list[str]) -> None:
+        """Keep the first `frames` frames of the series and delete later frames, to continue from a checkpoint.
+
+        entries : result of `entries_until`
+        """
         (self.folder / "fields").mkdir(exist_ok=True)
         for path in (self.folder / "fields").glob("*.*vtu"):
             number = path.stem.rpartition("-")[2]
             if number.isdecimal() and int(number) >= frames:
                 path.unlink()
-        index.write_bytes((PVD_HEAD + "".join(entries) + PVD_TAIL).encode())
+        write_file(self.folder / "fields.pvd", PVD_HEAD + "".join(entries) + PVD_TAIL)
         self.frames = frames
 
     def write(self, t: float, frame: dict) -> None:
@@ -231,7 +244,7 @@ def write_frame(path: Path, grid: str, data: dict[str, list], units: dict[str, s
     """
     arrays = ((name, np.concatenate([np.asarray(block) for block in blocks])) for name, blocks in data.items())
     text = "".join(array_xml(name, values, units) for name, values in arrays)
-    path.write_text(f"{grid}<CellData>\n{text}</CellData>\n{VTU_TAIL}", encoding="utf-8")
+    write_file(path, f"{grid}<CellData>\n{text}</CellData>\n{VTU_TAIL}")
 
 
 def reference_xml(basin) -> str:
@@ -427,7 +440,7 @@ class ParallelBasinWriter:
         faults = [item for item in comm.gather(write_piece(path, basin, origin, rows, 0, own, units)) if item]
         if faults:
             raise OSError(*faults[0])
-        path.write_text(pvtu_text(path, comm.size, values, units), encoding="utf-8")
+        write_file(path, pvtu_text(path, comm.size, values, units))
 
 
 def write_piece_of_rank(comm, model, path: str, name: str, rows, origin, layouts: dict, units: dict) -> None:

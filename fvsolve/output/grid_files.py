@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case.output_grids import pixel_counts
+from fvsolve.file_replacement import replacing
 from fvsolve.output.csv_files import VELOCITY_AXES
 from fvsolve.output.fields import FILE_ATTRIBUTE, read_series
 from fvsolve.parts.raster_files import import_library
@@ -87,7 +88,7 @@ class PixelGrid:
         keys = {"driver": "GTiff", "width": self.x.size, "height": self.y.size, "count": 1, "dtype": "float64",
                 "transform": rasterio.Affine(step, 0.0, corner[0], 0.0, -step, corner[1]), "nodata": np.nan,
                 "crs": self.basin.part.crs, "compress": "deflate"}  # fmt: skip
-        with rasterio.open(path, "w", **keys) as file:
+        with replacing(path) as fresh, rasterio.open(fresh, "w", **keys) as file:
             file.write(self.values(cells)[::-1], 1)
             file.set_band_description(1, key)
             file.set_band_unit(1, self.unit(key))
@@ -96,7 +97,7 @@ class PixelGrid:
         """Write the fields as NetCDF-3, after CF-1.8. frames : field -> float64[n] at each of the times [s]"""
         from scipy.io import netcdf_file
 
-        with netcdf_file(path, "w", version=2) as file:
+        with replacing(path) as fresh, netcdf_file(fresh, "w", version=2) as file:
             file.Conventions, file.title = "CF-1.8", self.basin.case.title or self.basin.name
             for axis, unit, word, at in (
                 ("time", "seconds since 1970-01-01 00:00:00", "time", np.array(times)),

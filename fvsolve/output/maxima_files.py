@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.errors import RunError
+from fvsolve.file_replacement import write_file
 from fvsolve.output.csv_files import csv_quoted
 from fvsolve.output.fields import basin_geometry, grid_xml, reference_xml, split_blocks, write_frame
 from fvsolve.output.unit_columns import UnitColumn, column, to_column_units
@@ -52,4 +53,4 @@ def write_run_up(path: Path, table, case) -> None:
     columns = run_up_columns(table, case)
     rows = to_column_units(columns, np.column_stack([table.places, table.run_up, table.points])).tolist()
     lines = [",".join(csv_quoted(item.header) for item in columns), *(",".join(map(repr, row)) for row in rows)]
-    path.write_bytes(("\n".join(lines) + "\n").encode())
+    write_file(path, "\n".join(lines) + "\n")

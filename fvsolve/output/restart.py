@@ -3,15 +3,22 @@
 import functools
 import hashlib
 import json
-import os
+import math
 import sys
+import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from fvsolve.case.resource_checks import byte_text, fits
 from fvsolve.errors import RunError, listing
+from fvsolve.file_replacement import replacing
 from fvsolve.schemes import LIMITERS
+
+SEAL = "seal"  # name of the digest of all other arrays
+END_LENGTH = 22  # end of a zip file without comment: bytes 12 to 15 are the size of its list of names
+MOST_NAMES = 100_000  # greatest size of the list of names [B]
 
 
 class OtherCase(RunError):
@@ -106,10 +113,55 @@ def write_restart(path: Path, restart: Restart, who: dict[str, str]) -> None:
     arrays["counts"] = np.array([restart.rows, restart.history_bytes, restart.frames])
     arrays["identity"] = np.array(json.dumps(who))
     arrays["steps"] = np.array(json.dumps([restart.step_keys, restart.continued]))
-    fresh = path.with_suffix(".tmp")
-    with open(fresh, "wb") as file:
+    arrays[SEAL] = np.array(digest_of(arrays))
+    with replacing(path) as fresh, open(fresh, "wb") as file:
         np.savez(file, **arrays)
-    os.replace(fresh, path)
+
+
+def digest_of(arrays: dict[str, np.ndarray]) -> str:
+    """SHA-256 of the names, types, shapes and values of arrays, as a text."""
+    digest = hashlib.sha256()
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(repr((name, array.dtype.descr, np.shape(arrays[name]))).encode())
+        digest.update(array.view(np.uint8))
+    return digest.hexdigest()
+
+
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Arrays of an .npz file that is not compressed, by name.
+
+    Raises ValueError before memory is taken if an array is larger than its data, or than the free memory; other damage
+    raises errors of many types.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        stream.seek(max(0, size - END_LENGTH))
+        end = stream.read()
+        if end[:4] != b"PK\x05\x06" or int.from_bytes(end[12:16], "little") > MOST_NAMES:
+            raise ValueError("it is cut, or not a checkpoint")
+        with zipfile.ZipFile(stream) as archive:
+            members = archive.infolist()
+            total = sum(member.file_size for member in members)
+            if total > size or any(member.compress_type != zipfile.ZIP_STORED for member in members):
+                raise ValueError("it is compressed, or its arrays overlap")
+            if not fits(total):
+                raise ValueError(f"its arrays of {byte_text(total)} do not fit into the free memory")
+            if len({member.filename for member in members}) < len(members):
+                raise ValueError("two arrays have the same name")
+            return {member.filename.removesuffix(".npy"): read_array(archive, member) for member in members}
+
+
+def read_array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:
+    """Array of a member of an .npz file. Raises ValueError if its shape and type do not fit the size of its data."""
+    with archive.open(member) as file:
+        if np.lib.format.read_magic(file) != (1, 0):
+            raise ValueError(f"{member.filename} is not an array")
+        shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+        if dtype.hasobject or math.prod(shape) * dtype.itemsize != member.file_size - file.tell():
+            raise ValueError(f"the shape of {member.filename} does not fit its data")
+    with archive.open(member) as file:
+        return np.lib.format.read_array(file, allow_pickle=False)
 
 
 def read_restart(path: Path, who: dict[str, str]) -> Restart:
@@ -118,21 +170,29 @@ def read_restart(path: Path, who: dict[str, str]) -> Restart:
     who : expected result of `identity`
     """
     try:
-        with path.open("rb") as stream, np.load(stream) as file:  # np.load alone leaves a damaged file open
-            arrays = {name: file[name] for name in file.files}
+        arrays = read_arrays(path)
+        seal = str(arrays.pop(SEAL))
+        is_sealed = seal == digest_of(arrays)
         stored, steps = (json.loads(str(arrays.pop(name))) for name in ("identity", "steps"))
         t, y, counts = (arrays.pop(name) for name in ("t", "y", "counts"))
     except Exception as error:  # zip, numpy and json raise many types on a damaged file
-        reason = f"{error} is missing" if isinstance(error, KeyError) else error
+        reason = (
+            f"{error} is missing"
+            if isinstance(error, KeyError)
+            else (str(error).splitlines() or [type(error).__name__])[0]
+        )
         raise RunError(f"{path} cannot be read ({reason}); start the run again with --force") from None
     damaged = [name for name, array, axes in (("t", t, 0), ("y", y, 1))
               if array.dtype != np.float64 or array.ndim != axes]  # fmt: skip
     damaged = damaged or [name for name, array in (("t", t), ("y", y)) if not np.isfinite(array).all()]
     damaged += ["counts"] if counts.shape != (3,) or counts.dtype.kind != "i" or counts.min() < 0 else []
     damaged += ["identity"] if not isinstance(stored, dict) else []
-    damaged += ["steps"] if [type(item) for item in steps] != [dict, list] else []
+    damaged += ["steps"] if not isinstance(steps, list) or [*map(type, steps)] != [dict, list] else []
     if damaged:
         raise RunError(f"{path}: damaged or edited data ({listing(damaged)}); start the run again with --force")
+    if not is_sealed:
+        text = "was changed after the run wrote it: the digest of its arrays differs"
+        raise RunError(f"{path} {text}; start the run again with --force")
     _check_identity(path, stored, who)
     memory = {name.removeprefix("memory."): array for name, array in arrays.items()}
     return Restart(float(t), y, memory, *counts.tolist(), *steps)

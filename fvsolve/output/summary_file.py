@@ -2,20 +2,17 @@
 
 import json
 import math
-import os
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
 
 from fvsolve.errors import RunError, listing, nearest
+from fvsolve.file_replacement import write_file
 from fvsolve.output.csv_files import envelope_columns
+from fvsolve.output.json_files import read_json, refuse_faults
+from fvsolve.output.summary_shape import REQUIRED_KEYS, summary_faults
 from fvsolve.output.unit_columns import probe_columns, time_column
 
-# Keys without which summary.json is rejected.
-REQUIRED_KEYS = (
-    "title", "case", "reason", "ok", "t", "invalid_from", "marks",
-    "probes", "time_unit", "envelope_units", "ambient_pressure",
-    "extremes", "ledgers", "expectations", "comparisons", "verdicts", "versions", "warnings", "files",
-)  # fmt: skip
+MOST_MISSING = 5  # missing entries above which a file is not the summary of a run
 
 
 def summary_data(summary, model) -> dict:
@@ -64,9 +61,10 @@ def plain(value):
 
 def write_summary(path: Path, summary: dict) -> None:
     """Write summary.json in a single step: a directory that contains the file holds a finished run."""
-    fresh = path.with_suffix(".json.tmp")
-    fresh.write_text(json.dumps(plain(summary), indent=1) + "\n", encoding="utf-8")
-    os.replace(fresh, path)
+    write_file(path, json.dumps(plain(summary), indent=1) + "\n")
+
+
+AGAIN = "run the case again with --force"
 
 
 def _similar_run(path: Path) -> str:
@@ -78,19 +76,17 @@ def _similar_run(path: Path) -> str:
 
 
 def read_summary(path: Path) -> dict:
-    """Read summary.json; raises RunError if it is missing, damaged or lacks a required key."""
-    try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-        is_object = isinstance(summary, dict)
-        missing = [key for key in REQUIRED_KEYS if key not in summary] if is_object else ["a JSON object"]
-        if missing:
-            raise ValueError(f"this is not the summary of a run (missing: {listing(missing)}); run again with --force")
-        return summary
-    except FileNotFoundError:
+    """Read summary.json; raises RunError if it is missing, damaged, or an entry is missing or has a wrong type."""
+    if not path.is_file():
         text = f"does not hold a finished run (no {path.name}); check the path, or finish the run"
-        raise RunError(f"{path.parent} {text}{_similar_run(path)}") from None
-    except (OSError, ValueError) as error:
-        raise RunError(f"{path} cannot be read: {error}") from None
+        raise RunError(f"{path.parent} {text}{_similar_run(path)}")
+    summary = read_json(path, AGAIN)
+    missing = ["a JSON object"] if not isinstance(summary, dict) else [k for k in REQUIRED_KEYS if k not in summary]
+    if len(missing) > MOST_MISSING or not isinstance(summary, dict):
+        text = f"this is not the summary of a run (missing: {listing(missing)})"
+        raise RunError(f"{path} cannot be read: {text}; {AGAIN}")
+    refuse_faults(path, summary_faults(summary), AGAIN)
+    return summary
 
 
 def _extremes(summary, model) -> dict:

@@ -19,8 +19,9 @@ from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.errors import RunError
 from fvsolve.output.csv_files import ENVELOPE_QUANTITIES, joined_envelopes
 from fvsolve.output.fields import read_pipe_lines, read_series
+from fvsolve.output.summary_shape import FAILS
 from fvsolve.output.unit_columns import UnitColumn
-from fvsolve.run.result import FAILS, not_valid
+from fvsolve.run.result import not_valid
 from fvsolve.run.verdicts import NEAR, Chainages
 
 MAX_SECTIONS = 6  # greatest number of sections of a run, unless it has more routes
@@ -407,7 +408,7 @@ def _violations(result, way: SectionPath, chainage: np.ndarray, along: dict) -> 
         on = limit.extent.on if limit is not None else ()
         for worst in verdict["worst"] if verdict["quantity"] in OF_PRESSURE else []:
             leg = next((leg for leg in way.legs if leg.pipe == worst["place"]), None)
-            if leg is None or worst["state"] != FAILS:
+            if leg is None or worst["state"] != FAILS or worst["chainage"] is None:
                 continue
             at = float(leg.chainage(chainages.leg(leg.pipe, on).distance(worst["chainage"])))
             if leg.begin <= at <= leg.end:

@@ -15,6 +15,7 @@ import numpy as np
 from fvsolve.display import save_if_path
 from fvsolve.draw.plot import history_figure, phase_figure, section_figure
 from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing, visible
+from fvsolve.file_replacement import replacing, write_file
 from fvsolve.output.csv_files import ENVELOPE_QUANTITIES
 from fvsolve.report import import_library, page, tables
 from fvsolve.report.long_section import Section, SectionPath, envelope_column, head_window, section_of, section_paths
@@ -25,7 +26,6 @@ from fvsolve.studies.scenarios import STUDY, open_study
 from fvsolve.units import show
 
 PAGE_FILE = "report.html"
-REQUIRED_KEYS = ("fluid", "cells", "methods", "steps", "rejections", "rhs", "seconds", "events", "cavities")
 MAX_COLUMN_WIDTH = 60  # greatest initial width of a column [letters]
 MAX_SHEET_NAME = 31  # greatest length of the name of a sheet [letters]; it must not contain these signs:
 FORBIDDEN_SIGNS = "[]:*?/\\'"
@@ -57,7 +57,7 @@ def write_report(directory: str | Path, out: str | Path | None = None, xlsx: boo
 def write_page(path: Path, text: str) -> None:
     """Write the text of a page into a file; raises FvsolveError if it cannot be written."""
     try:
-        path.write_text(text, encoding="utf-8")
+        write_file(path, text)
     except OSError as error:
         text = f"{path}: cannot be written: {error.strerror or error}"
         raise FvsolveError(f"{text}; choose another file with --out") from None
@@ -87,8 +87,6 @@ def open_checked_run(directory: Path):
         resume = f"fvsolve run CASE --out {directory} --resume"
         raise RunError(f"{directory} holds an unfinished run: continue it with {resume}, then report it")
     result, again = open_run(directory), f"run the case again with fvsolve run CASE --out {directory} --force"
-    if gaps := [key for key in REQUIRED_KEYS if key not in result.summary]:
-        raise RunError(f"{directory / 'summary.json'} lacks {listing(gaps)}; {again}")
     pipes = {name: link.length for name, link in result.case.links.items() if link.kind == "pipe"}
     for pipe, length in pipes.items():
         arrays = result.envelope.get(pipe, {})
@@ -106,15 +104,17 @@ def write_tables(report_tables: list[ReportTable], path: Path) -> Path:
     Text is stored as text, never as a formula, link or number.
     """
     plain = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
-    book = import_library("xlsxwriter").Workbook(str(path), {**plain, "nan_inf_to_errors": True})
-    bold = book.add_format({"bold": True, "text_wrap": True, "valign": "bottom"})
     taken: set[str] = set()
-    for table in report_tables:
-        _write_sheet(book, table, _sheet_name(table.title, taken), bold)
-    try:
-        book.close()
-    except Exception as error:  # XlsxWriter wraps errors of the operating system
-        raise FvsolveError(f"{path}: cannot be written: {error}; choose another file with --out") from None
+    with replacing(path) as fresh:
+        book = import_library("xlsxwriter").Workbook(str(fresh), {**plain, "nan_inf_to_errors": True})
+        bold = book.add_format({"bold": True, "text_wrap": True, "valign": "bottom"})
+        for table in report_tables:
+            _write_sheet(book, table, _sheet_name(table.title, taken), bold)
+        try:
+            book.close()
+        except Exception as error:  # XlsxWriter wraps errors of the operating system
+            reason = getattr(error.args[0] if error.args else error, "strerror", None) or error
+            raise FvsolveError(f"{path}: cannot be written: {reason}; choose another file with --out") from None
     return path
 
 

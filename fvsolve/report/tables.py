@@ -14,12 +14,13 @@ import numpy as np
 from fvsolve.case.case import default_cells
 from fvsolve.case.text import inline
 from fvsolve.errors import visible
+from fvsolve.output.summary_shape import FAILS, HOLDS, IN_WORDS, OPEN
 from fvsolve.output.unit_columns import UnitColumn, column
 from fvsolve.parts.table_model import Table as Keys
 from fvsolve.parts.table_model import plain_value
 from fvsolve.parts.value import Quantity
 from fvsolve.report.long_section import SectionPath, envelope_column
-from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN, not_valid
+from fvsolve.run.result import not_valid
 from fvsolve.units import DIMENSIONS, span
 
 DIGITS = 5  # significant digits of the greatest number of a column
@@ -567,10 +568,15 @@ def ledgers(result) -> ReportTable | None:
     if not balances:
         return None
     terms = [term for term in LEDGER_TERMS if any(isinstance(row.get(term), float) for row in balances.values())]
-    rows = [[name, LEDGER_UNITS.get(name, ""), *(row.get(term) for term in terms), f"{row['remainder']:.2e}",
-             f"{row['relative']:.1e}" if "relative" in row else None] for name, row in balances.items()]  # fmt: skip
+    rows = [[name, LEDGER_UNITS.get(name, ""), *(row.get(term) for term in terms), _shortened(row["remainder"], ".2e"),
+             _shortened(row.get("relative"), ".1e")] for name, row in balances.items()]  # fmt: skip
     heads = ("ledger", "unit", *(term.replace("_", " ") for term in terms), "remainder", "of the largest term")
     return ReportTable("Ledgers", heads, rows)
+
+
+def _shortened(value: float | None, form: str) -> str | None:
+    """Text of a number; None for None, as in the balances of a diverged run."""
+    return None if value is None else format(value, form)
 
 
 def versions(result) -> ReportTable:

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 from fvsolve.argument_checks import COUNT_FROM_ONE, FLAG, FUNCTION, PATH, TABLE, validated
 from fvsolve.draw.plot_process import Picture, PlotProcess
 from fvsolve.errors import CaseError, Notice, RunError
-from fvsolve.output.directory import SUMMARY_FILE, RunDirectory, change_text, existing_pictures, read_directory
+from fvsolve.output.directory import RunDirectory, change_text, existing_pictures, read_directory
 from fvsolve.output.memory_sink import MemorySink
 from fvsolve.output.restart import identity
 from fvsolve.output.summary_file import summary_data, write_summary
 from fvsolve.run import mpi_run
-from fvsolve.run.result import Result, check_summary
+from fvsolve.run.result import Result
 from fvsolve.run.verdicts import claims
 
 if TYPE_CHECKING:
@@ -65,11 +65,9 @@ def run(
 def open_run(directory: str | Path) -> Result:
     """Read the result of a run from its run directory.
 
-    Raises RunError if the run is not finished, or was written by another version of fvsolve.
+    Raises RunError if the run is not finished, was written by another version of fvsolve, or has damaged files.
     """
-    contents = read_directory(Path(directory))
-    check_summary(contents[0], Path(directory) / SUMMARY_FILE)
-    return Result(*contents)
+    return Result(*read_directory(Path(directory)))
 
 
 def model_of(case, set: Mapping | None = None, like=None):

@@ -1,17 +1,23 @@
-"""Class `Result` of a run: probes over time, extremes, verdicts, pictures; check of the fields of a summary."""
+"""Class `Result` of a run: probes over time, extremes, verdicts, pictures."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import fields
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fvsolve.argument_checks import COUNT_FROM_ZERO, NUMBER, PATH, TEXT, validated
 from fvsolve.display import Displayable, save_if_path
-from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean, listing
+from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean
 from fvsolve.output.fields import read_series
+from fvsolve.output.summary_shape import (
+    Comparison,
+    Expectation,
+    Extremes,
+    LimitVerdict,
+    ResultMark,
+)
 from fvsolve.output.unit_columns import UnitColumn
 from fvsolve.units import show
 
@@ -20,14 +26,6 @@ if TYPE_CHECKING:
 
 KINDS_WITH_FIELDS = frozenset(("pipe", "basin", "body"))  # kinds of parts that frames show
 
-HOLDS, OPEN, FAILS = "holds", "open", "fails"  # states of a limit
-IN_WORDS = {HOLDS: "holds", OPEN: "open", FAILS: "FAILS"}
-NESTED_ROWS = {  # rows within rows
-    ("verdicts", "worst"): ("place", "chainage", "elevation", "time", "bound", "value", "limit", "margin",
-                            "error", "state"),
-    ("peaks", "minimum"): ("error",), ("peaks", "maximum"): ("error",),
-}  # fmt: skip
-
 
 def not_valid(summary: dict) -> str:
     """Text with the time from which the numbers of a diverged run are not valid; "" for other runs."""
@@ -35,102 +33,6 @@ def not_valid(summary: dict) -> str:
         return ""
     clock = UnitColumn("t", "time", summary["time_unit"])
     return f"not valid from t = {float(clock.from_si(summary['invalid_from'])):.6g} {clock.unit} on"
-
-
-class ResultMark(NamedTuple):
-    """First part and time [s] at which the model does not describe what happens; later results are not valid.
-
-    what : name of the event; place : part, such as "links.main"; text : message
-    volume : volume that lacks in a scheduled discharge [m3]; None for other events
-    """
-
-    what: str
-    place: str
-    time: float
-    text: str
-    volume: float | None = None
-
-
-class Extremes(NamedTuple):
-    """Least and greatest value of a probe over all accepted steps and rows, in its unit, and their times [s].
-
-    A value and its time are None if it was reached at or after the time from which a diverged run is not valid.
-    """
-
-    minimum: float
-    t_min: float
-    maximum: float
-    t_max: float
-
-
-class Expectation(NamedTuple):
-    """Claim of `[expect]` and its outcome; `claimed`, `found`, `tolerance` and `error` are in `unit`.
-
-    state : `holds`, `fails`, or `open` if the run cannot decide; ok : True if it holds
-    error : bound of the error of `found`, None without an error estimate
-    """
-
-    text: str
-    claimed: float
-    found: float | None
-    tolerance: float
-    unit: str
-    state: str
-    ok: bool
-    error: float | None
-
-
-class LimitVerdict(NamedTuple):
-    """Limit of `[limits]` and its outcome at the part and time with the least margin.
-
-    Lengths are in m, times in s; value, limit, margin and error are in `unit`.
-    state : `holds`; `fails` if the limit is exceeded; `open` if the run cannot decide or an error exceeds its margin
-    place, chainage, elevation, time : part, position and time of the least margin; ok : True if the limit holds
-    margin : distance of the value from the limit, negative if the limit is exceeded
-    bound : "minimum" or "maximum"; until : end time of the run
-    error : bound of the error of `value`, None without an error estimate; reason : cause of a large or unknown error
-    worst : dicts with these entries for the parts and bounds with the least margins, worst first
-    """
-
-    name: str
-    ok: bool
-    state: str
-    place: str
-    chainage: float | None
-    elevation: float | None
-    time: float | None
-    bound: str
-    value: float | None
-    limit: float | None
-    margin: float | None
-    unit: str
-    quantity: str
-    until: float
-    error: float | None
-    reason: str | None
-    worst: list[dict]
-
-    @property
-    def doubtful(self) -> bool:
-        """True if the limit is not exceeded, but the error of its value is greater than its margin."""
-        return self.state == OPEN and None not in (self.error, self.margin) and self.margin < self.error
-
-
-class Comparison(NamedTuple):
-    """Comparison of a measured series with a probe (`[compare]`): differences and peaks in `unit`, times in s."""
-
-    probe: str
-    unit: str
-    file: str
-    shift: float
-    points: int
-    rms: float | None
-    greatest_difference: float | None
-    t_greatest_difference: float | None
-    measured_peak: float | None
-    t_measured_peak: float | None
-    computed_peak: float | None
-    t_computed_peak: float | None
 
 
 class Result(Displayable):
@@ -422,43 +324,3 @@ class Result(Displayable):
         """Columns of a table of the probes: name, unit, least and greatest value, and their times."""
         columns = {"probe": self.probes, "unit": list(self.units.values())}
         return columns | {key: [getattr(row, key) for row in self.extremes.values()] for key in Extremes._fields}
-
-
-EXACT_ROWS = {  # rows with exactly these fields
-    "marks": ResultMark._fields, "expectations": Expectation._fields, "verdicts": LimitVerdict._fields,
-    "comparisons": Comparison._fields, "warnings": tuple(field.name for field in fields(Notice)),
-}  # fmt: skip
-ROWS = EXACT_ROWS | {
-    "extremes": Extremes._fields, "probes": ("dimension", "unit"), "methods": ("time", "method"),
-    "events": ("time", "name", "what"), "cavities": ("place", "distance", "time", "volume", "t_volume"),
-    "peaks": ("minimum", "maximum"),
-}  # fmt: skip
-
-
-def check_summary(summary: dict[str, Any], path: Path) -> None:
-    """Raise RunError if the entries of a summary were written by another version; path : its file, for the message."""
-    if faults := [*field_faults(summary)]:
-        text = "it was written by another version of fvsolve; run again with --force"
-        raise RunError(f"{path} {'; '.join(faults)}: {text}")
-
-
-def field_faults(summary: dict[str, Any]) -> Iterator[str]:
-    """Yield a text for each key of a summary with missing entries, and for each with unknown entries."""
-    for key, expected in ROWS.items():
-        rows = as_rows(summary.get(key, []))
-        if missing := [name for name in expected if any(name not in entry for entry in rows)]:
-            yield f"lacks {listing(missing)} of {key}"
-        unknown = list(dict.fromkeys(name for entry in rows for name in entry if name not in expected))
-        if key in EXACT_ROWS and unknown:
-            yield f"has {listing(unknown)} of {key}, unknown to this version"
-    for (key, part), expected in NESTED_ROWS.items():
-        rows = [row for entry in as_rows(summary.get(key, [])) for row in as_rows(entry.get(part, []))]
-        if missing := [name for name in expected if any(name not in entry for entry in rows)]:
-            yield f"lacks {listing(missing)} of {key}, {part}"
-
-
-def as_rows(rows: list | dict) -> list[dict]:
-    """List of dicts from a list of dicts, from a dict of dicts, or from a single dict."""
-    if isinstance(rows, dict):
-        return [*rows.values()] if all(isinstance(row, dict) for row in rows.values()) else [rows]
-    return rows

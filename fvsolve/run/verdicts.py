@@ -9,8 +9,8 @@ from fvsolve.case.claims import VACUUM
 from fvsolve.case.pipe_routes import Leg, is_cut, legs, pipe_leg
 from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.output.csv_files import with_points
+from fvsolve.output.summary_shape import FAILS, HOLDS, OPEN, Comparison
 from fvsolve.output.unit_columns import UnitColumn, column, probe_columns
-from fvsolve.run.result import FAILS, HOLDS, OPEN, Comparison
 
 ENVELOPE_KEYS = ("distance", "elevation", "min_pressure", "t_min", "max_pressure", "t_max")
 ROUNDING = 1e-9  # relative to a limit and the typical size of its quantity; a smaller excess is within the limit
@@ -389,6 +389,8 @@ def common_rows(t: np.ndarray, theirs: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
     At a jump (two rows at one time) both rows of one run belong to those of the other, or the later ones do.
     """
+    if not t.size or not theirs.size:  # a run that stopped at its start
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     near = 1e-9 * max(np.abs(t).max(initial=0.0), np.abs(theirs).max(initial=0.0))
     rows: list[tuple[int, int]] = []
     later = [np.append(np.diff(x) > near, True) for x in (t, theirs)]
@@ -406,7 +408,9 @@ def _difference(a, b, probe: str) -> dict:
     column = a.column(probe)
     other = b[probe] if a.units[probe] == b.units[probe] else column.from_si(b.si(probe))
     t, ours, theirs = a.seconds, a[probe], b.seconds
-    if not np.array_equal(t, theirs):
+    if not len(theirs):  # a run that stopped at its start
+        t, ours, theirs = t[:0], ours[:0], theirs[:0]
+    elif not np.array_equal(t, theirs):
         mine, same = common_rows(t, theirs)
         if len(mine) >= max(FEWEST_COMMON, COMMON * min(len(t), len(theirs))):
             t, ours, other = t[mine], ours[mine], other[same]

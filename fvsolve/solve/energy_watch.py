@@ -168,6 +168,11 @@ class EnergyWatch:
         """True if the run is not watched."""
         return self.restart_data.size == 0
 
+    @property
+    def has_valid_place(self) -> bool:
+        """True if the restart data name a part that stores energy."""
+        return self.empty or 0.0 <= self.record[PLACE] < max(1, len(self.terms.places))
+
     def prepare(self, loop) -> float:
         """Let the time loop of a `RunLoop` watch the next state, or return the number of steps up to it.
 

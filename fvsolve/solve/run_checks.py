@@ -63,6 +63,13 @@ class RunChecks:
         return bool(self.sloshing.tanks or (self.predicted and self.moving))
 
     @property
+    def has_valid_counts(self) -> bool:
+        """True if the restart data have counts and numbers of places that a run can have."""
+        own = self.step_doubling.restart_data[:4]
+        is_valid = bool(np.isfinite(own).all() and own.min() >= 0.0)
+        return is_valid and (self.step_doubling.states.size > 0 or own[0] == 0.0) and self.energy.has_valid_place
+
+    @property
     def largest_if_needed(self) -> np.ndarray:
         """Array `largest` if the step exceeds a predicted limit, so that the time loop checks growth; else empty."""
         return np.array(np.broadcast_to(self.largest, self.model.y_size)) if self.predicted else np.zeros(0)

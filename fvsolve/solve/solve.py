@@ -157,7 +157,7 @@ class Run:
 
     def restore(self, memory: dict[str, np.ndarray]) -> None:
         """Restore the result of `memory`; raises ValueError or KeyError if it does not match this run."""
-        loop = self.loop
+        loop, t = self.loop, float(self.loop.state["t"])
         for name in HISTORIES:
             if (memory[name].size == 0) != (getattr(self.run_data, name).size == 0):
                 raise ValueError(f"array {name} does not match")
@@ -179,6 +179,10 @@ class Run:
             if memory[name].shape != view.shape or memory[name].dtype != view.dtype:
                 raise ValueError(f"array {name} does not match")
             view[...] = memory[name]
+        counts = np.array([float(loop.state[name]) for name in loop_records.COUNTS.values()])
+        are_valid = np.isfinite(counts).all() and counts.min() >= 0.0
+        if loop.state["t"] != t or not are_valid or not self.checks.has_valid_counts:
+            raise ValueError("counts that no run has")
         loop.stepper.after_restore()
 
     def state(self) -> State:

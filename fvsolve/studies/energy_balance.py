@@ -8,6 +8,7 @@ import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, TABLE, TEXT, validated
 from fvsolve.errors import CaseError, FvsolveError, did_you_mean
+from fvsolve.file_replacement import write_file
 from fvsolve.kernels.delay_lines.wave_history import JUMPS_TRAVELLING, time_tolerance
 from fvsolve.model.delay_lines import jump_times
 from fvsolve.model.energy_accounts import Account, Accounts, available_energy, datum_of
@@ -524,7 +525,7 @@ def write_table(result: Energy, path: Path) -> None:
     columns |= {"step [J]": result.step, "newton [J]": result.newton, "remainder [J]": result.remainder}
     text = [",".join(columns)]
     text += [",".join(repr(float(x)) for x in row) for row in np.column_stack(list(columns.values()))]
-    path.write_text("\n".join(text) + "\n", encoding="utf-8")
+    write_file(path, "\n".join(text) + "\n")
 
 
 PAIR_COLUMNS = (  # columns of a row

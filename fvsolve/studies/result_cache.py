@@ -26,7 +26,7 @@ class ResultCache:
     The folder is locked until the cache is closed (context manager). Raises RunError if another study has the lock, or
     if the folder cannot be written.
     A result is reused only for the same case (as resolved, with its files), the same extra settings and the same
-    versions and sources of fvsolve and its dependencies.
+    versions and sources of fvsolve and its dependencies. Lines that are damaged or were changed are not used.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
@@ -45,8 +45,9 @@ class ResultCache:
         for line in data[:complete].decode("utf-8", errors="replace").splitlines():
             try:
                 point = json.loads(line)
-                self.results[point["key"]] = point["found"]
-            except (ValueError, KeyError, TypeError):
+                if point["seal"] == seal_of(point["key"], point["found"]):
+                    self.results[point["key"]] = point["found"]
+            except (ValueError, KeyError, TypeError, RecursionError):
                 continue
         if complete < len(data):
             with write_errors(self.path), open(self.path, "r+b") as file:
@@ -91,12 +92,18 @@ class ResultCache:
         result = self.results[key] = plain(result)
         self.new_keys.add(key)
         if self.path is not None:
-            line = json.dumps({"key": key, "of": plain(settings), "found": result}) + "\n"
+            seal = seal_of(key, result)
+            line = json.dumps({"key": key, "of": plain(settings), "found": result, "seal": seal}) + "\n"
             with write_errors(self.path):
                 self.file = self.file or open(self.path, "ab", buffering=0)
                 if self.file.write(line.encode()) < len(line.encode()):
                     raise OSError(28, "No space left on device")
         return result
+
+
+def seal_of(key: str, result: dict) -> str:
+    """Hash of a stored result: a line that was changed after it was written is not used."""
+    return hashlib.sha256(json.dumps([key, result]).encode()).hexdigest()[:24]
 
 
 @contextmanager

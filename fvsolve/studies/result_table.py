@@ -10,6 +10,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, ClassVar
 
+from fvsolve.file_replacement import replacing
 from fvsolve.output.summary_file import plain
 
 
@@ -91,7 +92,7 @@ def cell_text(value: Any, spec: str = "") -> str:
 
 def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) -> Path:
     """Write a CSV file, with an empty field for None; returns the path."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
+    with replacing(path) as fresh, open(fresh, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(header)
         writer.writerows(["" if value is None else value for value in row] for row in rows)

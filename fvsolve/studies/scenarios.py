@@ -6,14 +6,16 @@ import json
 import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
+from pathlib import Path, PurePath
+from typing import Any, TypedDict
 
 from fvsolve.case import Case, load, shipped
 from fvsolve.case.reading import read_toml, split_key
 from fvsolve.case.text import key_lines
 from fvsolve.errors import CaseError, Fault, FvsolveError, did_you_mean
+from fvsolve.file_replacement import replacing, write_file
 from fvsolve.output.directory import clear_reports
+from fvsolve.output.json_files import faults_of, read_json, refuse_faults
 from fvsolve.output.summary_file import plain, write_summary
 from fvsolve.run import run
 from fvsolve.studies.parallel import PickledCase, TaskPool, Work
@@ -345,13 +347,10 @@ def write_study(results: ScenarioResults) -> None:
     for row in data["runs"]:
         row["directory"] = os.path.relpath(row["directory"], results.folder)
     clear_reports(results.folder)
-    temporary = results.folder / f"{STUDY}.tmp"
-    temporary.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    os.replace(temporary, results.folder / STUDY)
     limits = list(dict.fromkeys(verdict["name"] for row in results.rows for verdict in row["verdicts"]))
     quantities = ("value", "margin", "unit", "state", "place", "time [s]")
     columns = [f"{name} {quantity}" for name in limits for quantity in quantities]
-    with open(results.folder / "study.csv", "w", encoding="utf-8", newline="") as file:
+    with replacing(results.folder / "study.csv") as fresh, open(fresh, "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["event", "protection", "ok", "reason", *columns])
         for row in results.rows:
@@ -359,18 +358,61 @@ def write_study(results: ScenarioResults) -> None:
             cells = [verdicts.get(name, {}).get(key) for name in limits
                      for key in ("value", "margin", "unit", "state", "place", "time")]  # fmt: skip
             table.writerow([row["event"] or "", row["protection"] or "", row["ok"], row["reason"], *cells])
+    write_file(results.folder / STUDY, json.dumps(data, indent=1) + "\n")
+
+
+class StudyRow(TypedDict):
+    """Entries of a run of a study; further entries are those of its summary."""
+
+    event: str | None
+    protection: str | None
+    directory: str
+
+
+class StudyChanges(TypedDict):
+    """Keys that events and protections set, by name."""
+
+    events: dict[str, dict[str, Any]]
+    protections: dict[str, dict[str, Any]]
+
+
+class StudyShape(TypedDict):
+    """Entries of study.json."""
+
+    title: str
+    study: str
+    case: str
+    ok: bool
+    events: list[str]
+    protections: list[str]
+    holds: list[str]
+    changes: StudyChanges
+    error: bool
+    runs: list[StudyRow]
 
 
 def open_study(folder: str | Path) -> dict[str, Any]:
     """Read study.json of a folder; the paths of run directories are changed to start with the folder.
 
-    Raises FvsolveError if the file is missing or invalid.
+    Raises FvsolveError if the file is missing or invalid, or names a run directory outside of the folder.
     """
-    folder = Path(folder)
-    try:
-        data = json.loads((folder / STUDY).read_text(encoding="utf-8"))
-        for row in data["runs"]:
-            row["directory"] = str(folder / row["directory"])
-        return data
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise FvsolveError(f"{folder} has no finished study: {STUDY} is missing or invalid ({error})") from None
+    folder, again = Path(folder), "repeat the study with fvsolve study"
+    if not (folder / STUDY).is_file():
+        raise FvsolveError(f"{folder} has no finished study: {STUDY} is missing; {again}")
+    data = read_json(folder / STUDY, again)
+    refuse_faults(folder / STUDY, study_faults(data), again)
+    for row in data["runs"]:
+        row["directory"] = str(folder / row["directory"])
+    return data
+
+
+def study_faults(data: Any) -> Iterator[str]:
+    """Yield a text for each entry of study.json with a wrong type, and for run directories outside of its folder."""
+    faults = list(faults_of(data, StudyShape))
+    if not faults and not data["runs"]:
+        faults = ["runs: an empty list. Expected at least one run"]
+    yield from faults
+    for k, row in enumerate(() if faults else data["runs"]):
+        path = PurePath(row["directory"])
+        if path.is_absolute() or ".." in path.parts or "\0" in row["directory"]:
+            yield f"runs.{k}.directory: {show(row['directory'])} is outside of the folder. Expected a path below it"

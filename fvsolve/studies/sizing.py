@@ -10,9 +10,9 @@ import numpy as np
 
 from fvsolve.case import Case, load
 from fvsolve.errors import CaseError, Fault, FvsolveError, collect_faults, did_you_mean
+from fvsolve.output.summary_shape import FAILS, OPEN
 from fvsolve.parts.formula import Arithmetic
 from fvsolve.run import run
-from fvsolve.run.result import FAILS, OPEN
 from fvsolve.run.verdicts import SIZES
 from fvsolve.studies.outcome import NO_FIELDS, checked_case, end_if_interrupted
 from fvsolve.studies.peak_error import peak_errors

@@ -1,7 +1,6 @@
 """Sweeps: runs of a case with many sets of values; a row of results for each run."""
 
 import hashlib
-import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -16,6 +15,7 @@ from fvsolve.case.reading import read_raw
 from fvsolve.case.text import inline
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing
+from fvsolve.file_replacement import replacing
 from fvsolve.fluid.coolprop import coolprop_version
 from fvsolve.output.restart import program_versions
 from fvsolve.studies.outcome import STUDY_ARGUMENTS
@@ -91,8 +91,7 @@ class Sweep(Displayable):
         """Write the table as CSV, with values of keys in the format of `--set`. The file is replaced atomically."""
         rows = ({name: self._cell(name, x) for name, x in row.items()} for row in self.rows)
         with write_errors(path):
-            temporary = ResultTable([Column(name) for name in self.columns], [*rows]).write(path.with_suffix(".tmp"))
-            os.replace(temporary, path)
+            ResultTable([Column(name) for name in self.columns], [*rows]).write(path)
 
     def write_parquet(self, path: Path) -> bool:
         """Write the table as Parquet, with numeric columns; returns False if pyarrow is not installed."""
@@ -107,9 +106,8 @@ class Sweep(Displayable):
                 columns[name] = [str(self._cell(name, x)) for x in values]
             elif any(isinstance(x, float) for x in values):
                 columns[name] = [None if x is None else float(x) for x in values]
-        with write_errors(path):
-            pyarrow.parquet.write_table(pyarrow.table(columns), path.with_suffix(".tmp"))
-            os.replace(path.with_suffix(".tmp"), path)
+        with write_errors(path), replacing(path) as fresh:
+            pyarrow.parquet.write_table(pyarrow.table(columns), fresh)
         return True
 
     def _cell(self, name: str, value: Any) -> Any:

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from fvsolve.display import save
 from fvsolve.draw.validation_pictures import LinePanel, ValueRow, validation_figure
+from fvsolve.file_replacement import write_file
 from fvsolve.validation.library import RowResult, ValidationResult
 from fvsolve.validation.row_texts import amounts, is_error, limits_of
 from fvsolve.validation.row_verdicts import WITHIN, known_values
@@ -34,7 +36,7 @@ def write_page(folder: Path, results: list[ValidationResult]) -> None:
     for result in results:
         names = write_figures(folder, result)
         parts.append(section(result, names))
-    (folder / PAGE).write_text("\n".join(parts), encoding="utf-8")
+    write_file(folder / PAGE, "\n".join(parts))
 
 
 def summary_table(results: list[ValidationResult]) -> str:
@@ -93,7 +95,7 @@ def write_figures(folder: Path, result: ValidationResult) -> list[str]:
     names = []
     for theme in THEMES:
         names.append(f"{result.name}-{theme}.png")
-        validation_figure(panels, rows, theme).savefig(folder / names[-1])
+        save(validation_figure(panels, rows, theme), folder / names[-1])
     return names
 
 

@@ -12,6 +12,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from reference.checkpoints import write_sealed
 from reference.scenes import branched
 
 import fvsolve
@@ -152,7 +153,7 @@ def test_the_array_that_is_cut_by_one_or_gone_is_named_with_its_file(key, stoppe
         kept = {key: file[key] for key in file.files}
     name = "states" if key == "y" else key.partition(".")[0]
     for harmed in ({**kept, **shorter(key)(kept)}, {one: array for one, array in kept.items() if one != key}):
-        np.savez(out / "restart.npz", **harmed)
+        write_sealed(out / "restart.npz", harmed)
         with pytest.raises(RunError) as error:
             fvsolve.run(case, out=out, resume=True)
         said = str(error.value)
@@ -165,9 +166,89 @@ def test_a_checkpoint_that_no_run_wrote_is_refused(name, stopped, tmp_path):
     case, out = copied(stopped, tmp_path)
     with np.load(out / "restart.npz") as file:
         kept = {key: file[key] for key in file.files}
-    np.savez(out / "restart.npz", **kept | HARM[name](kept))
+    for write in (np.savez, lambda path, **arrays: write_sealed(path, arrays)):
+        write(out / "restart.npz", **kept | HARM[name](kept))
+        with pytest.raises(RunError, match="start (the run )?again with --force"):
+            fvsolve.run(case, out=out, resume=True)
+
+
+def with_entry(key: str, entry: str, value):
+    """Function that changes an entry of a record of a checkpoint."""
+
+    def change(kept):
+        record = kept[key].copy()
+        record[entry] = value
+        return {key: record}
+
+    return change
+
+
+def with_number(key: str, at, value):
+    """Function that changes a number of an array of a checkpoint."""
+
+    def change(kept):
+        array = kept[key].copy()
+        array[at] = value
+        return {key: array}
+
+    return change
+
+
+FORGED = {
+    "a value of a state": with_number("y", 3, 1.0), "the envelope": with_number("memory.envelope", (0, 0), 1.0),
+    "an extreme": with_number("memory.extremes", (0, 0), np.nan), "a time": with_entry("memory.state", "step", 1.0),
+}  # fmt: skip
+COUNTS = {  # refused even with a right digest
+    "fewer rows": with_number("counts", 0, 3), "more rows": with_number("counts", 0, 10**6),
+    "fewer bytes": with_number("counts", 1, 100), "more bytes": with_number("counts", 1, 10**9),
+    "fewer frames": with_number("counts", 2, 0), "more frames": with_number("counts", 2, 9),
+    "rows without end": with_number("counts", 0, 2**62), "an early time": lambda kept: {"t": np.float64(-1.0)},
+    "another time": lambda kept: {"t": kept["t"] + 0.01}, "NaN steps": with_entry("memory.state", "steps", np.nan),
+    "negative steps": with_entry("memory.state", "steps", -1.0), "no end": with_entry("memory.state", "newton", np.inf),
+    "outputs": with_entry("memory.state", "next_output", 1e300),
+    "frames": with_entry("memory.state", "next_field", 9.0),
+    "NaN checks": with_number("memory.step doubling", 0, np.nan), "checks": with_number("memory.step doubling", 0, 5.0),
+    "a part": with_number("memory.energy", 10, 1e300), "NaN part": with_number("memory.energy", 10, np.nan),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FORGED)
+def test_a_checkpoint_that_was_changed_is_refused_by_its_digest(name, stopped, tmp_path):
+    case, out = copied(stopped, tmp_path)
+    with np.load(out / "restart.npz") as file:
+        kept = {key: file[key] for key in file.files}
+    np.savez(out / "restart.npz", **kept | FORGED[name](kept))
+    with pytest.raises(RunError, match=r"restart\.npz was changed after the run wrote it: .*--force"):
+        fvsolve.run(case, out=out, resume=True)
+
+
+@pytest.mark.parametrize("name", COUNTS)
+def test_counts_that_no_run_has_are_refused_even_with_a_right_digest(name, stopped, tmp_path):
+    case, out = copied(stopped, tmp_path)
+    with np.load(out / "restart.npz") as file:
+        kept = {key: file[key] for key in file.files}
+    write_sealed(out / "restart.npz", kept)
+    write_sealed(out / "restart.npz", kept | COUNTS[name](kept))
     with pytest.raises(RunError, match="start (the run )?again with --force"):
         fvsolve.run(case, out=out, resume=True)
+    write_sealed(out / "restart.npz", kept)
+    assert fvsolve.run(case, out=out, resume=True).ok
+    whole = stopped[1].parent / "whole"
+    if not whole.exists():
+        assert fvsolve.run(case, out=whole, pictures=False).ok
+    assert (out / "history.csv").read_bytes() == (whole / "history.csv").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["history.csv", "fields.pvd", "restart.npz"])
+def test_a_finished_run_whose_files_do_not_fit_its_checkpoint_loses_nothing(name, stopped, tmp_path):
+    """A later end continues a finished run from its checkpoint; a refusal comes before its results are deleted."""
+    case, out = copied(stopped, tmp_path)
+    assert fvsolve.run(case, out=out, resume=True).ok
+    (out / name).write_bytes((out / name).read_bytes()[:90])
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    with pytest.raises(RunError, match=rf"{name}.*--force"):
+        fvsolve.run(case, {"numerics.end": 1.5, "output.every": case["output"]["every"]}, out, resume=True)
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
 
 @pytest.mark.parametrize("part", [0.0, 0.3, 0.7, 0.99])

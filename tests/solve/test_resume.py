@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from basins.test_basin import alone, basin
+from reference.checkpoints import write_sealed
 from reference.scenes import branched
 
 import fvsolve
@@ -108,7 +109,7 @@ def test_an_earlier_end_than_the_checkpoint_is_refused(tmp_path):
     place = tmp_path / "run" / "restart.npz"
     with np.load(place) as file:
         arrays = dict(file)
-    np.savez(place, **{**arrays, "t": 7.0})
+    write_sealed(place, {**arrays, "t": np.float64(7.0)})
     with pytest.raises(fvsolve.RunError, match="after numerics.end"):
         fvsolve.run(branched(), out=tmp_path / "run", resume=True)
 
@@ -234,7 +235,7 @@ def test_a_checkpoint_of_other_versions_is_refused_with_a_remedy(tmp_path, key, 
     with np.load(place) as file:
         arrays = dict(file)
     arrays["identity"] = np.array(json.dumps(json.loads(str(arrays["identity"])) | {key: there}))
-    np.savez(place, **arrays)
+    write_sealed(place, arrays)
     with pytest.raises(fvsolve.RunError, match=f"other versions.*{key} {there}.*--force"):
         fvsolve.run(branched(), out=tmp_path / "run", resume=True)
 

@@ -14,7 +14,7 @@ from reference.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, 
 import fvsolve
 from fvsolve.case.text import write
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.run.result import HOLDS, OPEN, LimitVerdict
+from fvsolve.output.summary_shape import HOLDS, OPEN, LimitVerdict
 from fvsolve.studies import optimise, scenarios
 from fvsolve.studies.sizing import SizeRun, SizeSearch, parse_range, parse_ties, size, size_run
 

@@ -1,0 +1,77 @@
+"""Standard streams of a command: a missing, closed or full stream does not stop its work."""
+
+import contextlib
+import errno
+import io
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+
+class LastingStream:
+    """Text stream that discards all text after its first error, so that a command finishes its work.
+
+    error : that error, None without one
+    """
+
+    def __init__(self, stream: Any) -> None:
+        self.stream, self.error = stream, None
+
+    def write(self, text: str) -> int:
+        """Write a text; returns its length."""
+        self._attempt(self.stream.write, text)
+        return len(text)
+
+    def writelines(self, texts: Iterable[str]) -> None:
+        """Write texts."""
+        for text in texts:
+            self.write(text)
+
+    def flush(self) -> None:
+        """Write the text that is still in memory."""
+        self._attempt(self.stream.flush)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.stream, name)
+
+    def _attempt(self, action: Callable, *arguments: str) -> None:
+        if self.error is not None:
+            return
+        try:
+            action(*arguments)
+        except OSError as error:
+            self.error = error
+            with contextlib.suppress(OSError, io.UnsupportedOperation):  # else the end of the interpreter would fail
+                null = os.open(os.devnull, os.O_WRONLY)
+                os.dup2(null, self.stream.fileno())
+                os.close(null)
+        except ValueError:
+            if not self.stream.closed:
+                raise
+            self.error = OSError(errno.EBADF, os.strerror(errno.EBADF))
+
+
+@contextlib.contextmanager
+def lasting_streams() -> Iterator[LastingStream]:
+    """Context manager in which all standard streams exist and last; yields that of standard output."""
+    before = sys.stdin, sys.stdout, sys.stderr
+    for number in range(3):  # else the next file would take the number, and texts of libraries would go into it
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+    with contextlib.ExitStack() as opened:
+        null = opened.enter_context(open(os.devnull, "r+", encoding="utf-8"))
+        for stream in (sys.stdout, sys.stderr):
+            if hasattr(stream, "reconfigure"):  # false if a caller has replaced the stream by another file object
+                stream.reconfigure(errors="backslashreplace")  # a terminal may have a small character set
+        sys.stdin = sys.stdin or null
+        output, sys.stderr = LastingStream(sys.stdout or null), LastingStream(sys.stderr or null)
+        sys.stdout = output
+        try:
+            yield output
+        finally:
+            output.flush()
+            sys.stderr.flush()
+            sys.stdin, sys.stdout, sys.stderr = before
