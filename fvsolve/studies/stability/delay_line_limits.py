@@ -27,16 +27,19 @@ from fvsolve.steppers import loop_records
 from fvsolve.steppers.tableau import Method
 from fvsolve.studies.operating_point import with_held_schedules
 from fvsolve.studies.outcome import study_model
-from fvsolve.studies.stability.growth import STEP_RATIO, StepLimit, WorkLimit, bisect, bisect_limit
+from fvsolve.studies.stability.growth import STEP_RATIO, StepLimit, bisect, bisect_limit, prediction_limit
 from fvsolve.studies.stability.real_runs import SAFE_PARTS, RealRuns, fixed_step_loop, measure_limit
 from fvsolve.studies.stability.stability_row import StabilityRow
+from fvsolve.studies.work_limit import WorkLimit
 
 STENCIL_MARGIN = 4  # entries before the oldest reading, for its interpolation
 DERIVATIVE_STEP = 1e-6  # step of differences in units of the small deviation
 BAR_PRESSURE = 1e5  # pressure of a wave of unit size [Pa]
 GROWTH_ROUNDS = 2  # of all steps: first with random starts, then with their ends as starts
-CALLS_TIME, WAVE_TIME = 5e-5, 1e-7  # CPU time of a stage of a step, and of a past wave [s]
-REMEDY = "use a part of the network, or fewer cells; rates far above those of waves, as of a small chamber, need short steps"
+CALLS_TIME, WAVE_TIME = 5e-5, 1e-6  # CPU time of a stage of a step, and of a past wave [s]
+REMEDY = (
+    "use a part of the network, or fewer cells; rates far above those of waves, as of a small chamber, need short steps"
+)
 VANISHED = 1e-100  # size of a deviation that has left the model
 
 
@@ -180,7 +183,9 @@ class DelayLineSystem:
         self.store_entry(past, K, x, self.arrivals(past, K - 1, at_end))
         first, size, after = self.size(x, history), np.ones(m), 0
         stretches, reach = np.arange(self.delays.size), np.count_nonzero(self.weight, axis=0)
-        squares = np.sum((self.weight[:, None, :, None] * history) ** 2, axis=(0, 1))  # energy of the waves of a stretch
+        squares = np.sum(
+            (self.weight[:, None, :, None] * history) ** 2, axis=(0, 1)
+        )  # energy of the waves of a stretch
         factor = self.weight.max(axis=0)[:, None] ** 2
         if work is not None:
             work.spend(propagation_time(self.method, K, self.delays.size, 0))
@@ -421,7 +426,7 @@ class DelayLineLimits:
         rows = self.base_model.tables.delays
         slowest = float((rows["tau"] * rows["stretches"]).max())
         self.far, self.first = TRAVEL_FACTOR * slowest, slowest / TRAVEL_PARTS
-        self.work = WorkLimit(self.base_model.y_size, steps, REMEDY)
+        self.work = prediction_limit(self.base_model.y_size, steps, REMEDY)
         rates = self.system(self.first).a
         if rates.size:
             self.first = min(self.first, RATE_MARGIN / max(1e-300, float(np.linalg.norm(rates, 2))))

@@ -4,7 +4,8 @@ The growth is the greatest norm of R(h J)^n over n <= N steps, in the energy nor
 the stability function R of the method. A step fails if the growth exceeds 1000.
 
 Arguments of several functions : e, Jacobian in coordinates of the energy norm [1/s]; steps, number of steps over which
-growth counts; threshold, growth above which a step fails; work, `WorkLimit` that a prediction spends; default: a new one
+growth counts; threshold, growth above which a step fails; work, `WorkLimit` that a prediction spends; default: a new
+limit
 """
 
 import functools
@@ -13,49 +14,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fvsolve.errors import FvsolveError
 from fvsolve.steppers import stability_function
 from fvsolve.steppers.tableau import Method
+from fvsolve.studies.work_limit import CALL_TIME, DENSE_RATE, FEWER_CELLS, SPARSE_RATE, WorkLimit
 
-TIME_LIMIT = 30.0  # greatest estimated CPU time of a prediction [s]
-# Rates of a core of 2020 from which the time is estimated, so that all machines refuse the same cases
-DENSE_RATE = 4e10  # operations in products of full matrices [1/s]
-SPARSE_RATE = 2e9  # operations in products of a sparse matrix and a block of vectors [1/s]
-CALL_TIME = 3e-5  # additional time of such a product [s]
 POWER_OPERATIONS = 4.0  # over n^3, of a power of a matrix and the check of its norm
 NORM_TURNS, NORM_ACCURACY = 20, 1.0 + 1e-6  # of a power iteration for a norm; greatest norm over its result
-
-
-FEWER_CELLS = (
-    "give pipes or basins fewer cells, --set links.NAME.cells=100 or nodes.NAME.cells=[20,20] (or, for pipes that state "
-    "no cells, a greater numerics.cell_time; the limit as a Courant number changes little)"
-)
-
-
-class TooLarge(FvsolveError):
-    """Error: the prediction would take longer than its time limit."""
-
-
-class WorkLimit:
-    """Estimated CPU time of a prediction, `spent` [s]; states, steps : numbers of states and steps, for the message."""
-
-    def __init__(self, states: int, steps: int, remedy: str = FEWER_CELLS) -> None:
-        self.states, self.steps, self.remedy, self.spent = states, steps, remedy, 0.0
-
-    def check(self, seconds: float) -> None:
-        """Raise TooLarge if the next operations, of this estimated time [s], exceed the limit."""
-        if self.spent + seconds > TIME_LIMIT:
-            count = f"{self.states} states and {self.steps} steps"
-            raise TooLarge(f"{count} take longer than {TIME_LIMIT:g} s to predict: {self.remedy}, or use fewer --steps")
-
-    def spend(self, seconds: float) -> None:
-        """Add the estimated time of the next operations [s]; raises TooLarge as `check`."""
-        self.check(seconds)
-        self.spent += seconds
-
-
 BRACKET_WIDTH = 1e-4  # relative width of the final bracket
 STEP_RATIO = 1.3  # ratio of consecutive steps of the search upwards
+
+
+def prediction_limit(states: int, steps: int, remedy: str = FEWER_CELLS) -> WorkLimit:
+    """Limit of the time of a prediction of growth for this number of states over this number of steps."""
+    return WorkLimit(f"predictions for {states} states and {steps} steps", f"{remedy}, or use fewer --steps")
 
 
 class StepLimit(NamedTuple):
@@ -269,7 +240,7 @@ class DenseGrowth:
         self, method: Method, e: np.ndarray, steps: int, threshold: float = THRESHOLD, work: WorkLimit | None = None
     ) -> None:
         self.method, self.e, self.steps, self.threshold = method, e, steps, threshold
-        self.size, self.work = float(np.linalg.norm(e, 2)), work or WorkLimit(e.shape[0], steps)
+        self.size, self.work = float(np.linalg.norm(e, 2)), work or prediction_limit(e.shape[0], steps)
 
     def fails(self, h: float, few: bool = False) -> bool:
         """True if a power of the step matrix exceeds the threshold; few : only powers of two and the last power."""
@@ -357,7 +328,7 @@ class VectorGrowth:
         self, method: Method, e: Any, steps: int, threshold: float = THRESHOLD, work: WorkLimit | None = None
     ) -> None:
         self.method, self.e, self.steps, self.threshold = method, e.tocsr(), steps, threshold
-        self.work = work or WorkLimit(e.shape[0], steps)
+        self.work = work or prediction_limit(e.shape[0], steps)
         self.transpose = e.T.tocsr()
         v = np.random.default_rng(2).standard_normal(e.shape[0])
         for _ in range(50):  # power iteration for the 2-norm

@@ -34,10 +34,9 @@ from fvsolve.studies.stability.growth import (
     STEPS,
     THRESHOLD,
     VECTORS,
-    TooLarge,
-    WorkLimit,
     growth_method,
     predicted_limit,
+    prediction_limit,
 )
 from fvsolve.studies.stability.real_runs import RealRuns, measure_limit
 from fvsolve.studies.stability.stability_row import (
@@ -48,6 +47,7 @@ from fvsolve.studies.stability.stability_row import (
     region_limit,
     row_from_json,
 )
+from fvsolve.studies.work_limit import TooLarge
 
 AUTO_NOTE = (
     f"auto starts with {automatic.EXPLICIT}, and its row is that of {automatic.EXPLICIT}; a run continues with "
@@ -290,7 +290,7 @@ class SchemeRows:
         """
         at = self.at(self.scheme)
         limits, starts, left_out = {}, {}, {}
-        work = WorkLimit(at.model.y_size, self.steps)  # of all these predictions together
+        work = prediction_limit(at.model.y_size, self.steps)  # of all these predictions together
         try:
             for name, side in self.frozen_systems():
                 growth = growth_method(method, side.e, self.steps, self.threshold, work)
