@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fvsolve.studies.work_limit import DENSE_RATE, SPARSE_RATE, WorkLimit
+from fvsolve.studies.work_limit import DENSE_RATE, WorkLimit
 
 FIRST_PER_DECADE = 40  # frequencies per decade of the first grid of a winding number
 STEEP = 0.5  # change of the phase between two frequencies above which the grid is refined [rad]
@@ -26,6 +26,9 @@ CHEBYSHEV_POINTS = 48  # of each delay, for estimates of poles
 LEAST_POINTS, COLLOCATED_SIZE = 6, 1000  # least number of these points, and greatest size of the matrix with them
 MANY_STATES, RIGHTMOST = 200, 3  # beyond, only this multiple of the poles that are needed is estimated
 FEW, CHUNK = 4, 2_000_000  # frequencies that are solved one by one; greatest number of entries of an array of many
+BLOCK = 48  # rows of a triangular matrix that are solved together
+EIGENVALUE_OPERATIONS = 25.0  # over n^3
+RESPONSE_RATE = 5e9  # operations in responses on one core of 2020 [1/s]
 NEWTON_TURNS = 30
 ENDLESS = 10**6  # number of unstable poles of delays that grow at all high frequencies
 NEAR = 0.05  # greatest relative distance of a pole from its estimate
@@ -83,7 +86,7 @@ class DelaySystem:
         n = t.shape[0]
         right = np.broadcast_to(right if right.ndim == 3 else right[:, None, :], (n, s.size, right.shape[-1]))
         x = np.zeros(right.shape, complex)
-        if s.size <= FEW and n:
+        if s.size <= FEW and 0 < n <= MANY_STATES:
             from scipy.linalg.lapack import ztrtrs
 
             for k, value in enumerate(s):
@@ -93,16 +96,19 @@ class DelaySystem:
                 x[:, k] = np.inf if singular else x[:, k]
             return x
         flat = x.reshape(n, s.size * right.shape[-1])
-        for i in reversed(range(n)):
-            known = right[i] + (t[i, i + 1 :] @ flat[i + 1 :]).reshape(right[i].shape)
-            x[i] = known / (s - t[i, i])[:, None]
+        for end in range(n, 0, -BLOCK):  # products of matrices for most of the sum
+            start = max(0, end - BLOCK)
+            known = right[start:end] + (t[start:end, end:] @ flat[end:]).reshape(end - start, *right.shape[1:])
+            for i in reversed(range(start, end)):
+                within = (t[i, i + 1 : end] @ flat[i + 1 : end]).reshape(right.shape[1:])
+                x[i] = (known[i - start] + within) / (s - t[i, i])[:, None]
         return x
 
     def in_chunks(self, f: Callable[[np.ndarray], np.ndarray], s: np.ndarray) -> np.ndarray:
         """Values of f at complex numbers s, for so few at a time that arrays stay small; spends the time."""
         n, k = self.a.shape[0], self.delays.size
         each = n * (1 + k) + (1 + k) ** 2
-        self.work.spend(s.size * (4.0 * n**2 * (1 + k) / SPARSE_RATE + 16.0 * k**3 / SPARSE_RATE))
+        self.work.spend(s.size * (4.0 * n**2 * (1 + k) + 16.0 * k**3) / RESPONSE_RATE)
         return np.concatenate([f(part) for part in np.array_split(s, 1 + s.size * each // CHUNK)])
 
     def decay(self, s: np.ndarray) -> np.ndarray:
@@ -275,6 +281,7 @@ class DelaySystem:
         if not self.delays.size:
             return sorted_poles(np.linalg.eigvals(self.a).astype(complex))
         found: list[complex] = []
+        self.work.spend(EIGENVALUE_OPERATIONS * self.collocated_size**3 / DENSE_RATE)
         estimates = self.collocated_poles()
         if estimates.size > MANY_STATES:
             estimates = sorted_poles(estimates)[: RIGHTMOST * most]
@@ -289,11 +296,14 @@ class DelaySystem:
     def collocated_poles(self) -> np.ndarray:
         """Estimates of poles [1/s]: each delay is a transport equation at Chebyshev points, with spectral accuracy.
 
-        All poles without delays; no estimates if there are too many delays. The estimated time is spent.
+        All poles without delays; no estimates if there are too many delays.
         """
-        size = self.a.shape[0] + self.collocation_points * self.delays.size
-        self.work.spend(25.0 * size**3 / DENSE_RATE)
         return np.linalg.eigvals(self.collocated()) if self.collocation_points or not self.delays.size else np.zeros(0)
+
+    @property
+    def collocated_size(self) -> int:
+        """Number of rows of `collocated`."""
+        return self.a.shape[0] + self.collocation_points * self.delays.size
 
     @property
     def collocation_points(self) -> int:

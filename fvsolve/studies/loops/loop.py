@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, NUMBER, TABLE, TEXT, validated
-from fvsolve.studies.loops.delay_system import DelaySystem, sorted_poles
+from fvsolve.studies.loops.delay_system import EIGENVALUE_OPERATIONS, DelaySystem, sorted_poles
 from fvsolve.studies.loops.margins import Margins, find_margins
 from fvsolve.studies.loops.open_loop import block_of, open_loop, open_loop_error
 from fvsolve.studies.loops.sampled import STABLE, SampledLoop, gain_within, nearest_range
@@ -209,7 +209,7 @@ def is_stable_at(system: DelaySystem, gain: float) -> bool | None:
 
 
 LOCUS_GAINS, LEAST_GAINS = 161, 9  # gains of the root locus, and least number of a locus
-LOCUS_TIME = 5.0  # estimated CPU time of a locus, which has fewer gains if it takes longer [s]
+LOCUS_TIME = 2.0  # estimated CPU time of a locus, which has fewer gains if it takes longer [s]
 LOCUS_RANGE = 30.0  # least and greatest gain of the root locus, as factors on 1
 STEP_POINTS, STEP_PERIODS = 1500, 60  # of a step response, continuous and sampled
 
@@ -218,8 +218,9 @@ def locus(result: Loop) -> tuple[np.ndarray, list[np.ndarray]]:
     """(factors on L, poles of the closed loop for each) for a root locus; no poles with too many delays."""
     system = result.system
     sampled = result.period is not None
-    size = system.size if sampled else len(system.a) + system.collocation_points * system.delays.size
-    count = int(np.clip(LOCUS_TIME * DENSE_RATE / (25.0 * max(size, 1) ** 3), LEAST_GAINS, LOCUS_GAINS))
+    size = system.size if sampled else system.collocated_size
+    each = EIGENVALUE_OPERATIONS * max(size, 1) ** 3 / DENSE_RATE
+    count = int(np.clip(LOCUS_TIME / each, LEAST_GAINS, LOCUS_GAINS))
     gains = np.geomspace(1.0 / LOCUS_RANGE, LOCUS_RANGE, count)
     if sampled:
         return gains, [np.linalg.eigvals(system.closed_matrix(float(gain))) for gain in gains]

@@ -22,7 +22,7 @@ from fvsolve.errors import FvsolveError, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.schedule import BLOCK_PREFIX
 from fvsolve.solve.held_inputs import hold
-from fvsolve.studies.loops.delay_system import DelaySystem
+from fvsolve.studies.loops.delay_system import EIGENVALUE_OPERATIONS, DelaySystem
 from fvsolve.studies.loops.open_loop import (
     ANOTHER_POINT,
     MAX_STATES,
@@ -46,7 +46,7 @@ STABLE = 1e-13  # a spectral radius below 1 minus this is stable
 # a kink: sides that differ by this part of the quotient, alike at both widths, and by more than rounding of the value
 KINK, ALIKE, KINK_ROUNDING, LEAST_KINK = 1e-2, 0.25, 1e-6, 1e-12
 REMEDY = "use fewer cells, --set links.NAME.cells=..., or periods of the controls with a shorter common period"
-EIGENVALUE_OPERATIONS, EXPONENTIAL_OPERATIONS = 25.0, 40.0  # over n^3
+EXPONENTIAL_OPERATIONS = 40.0  # over n^3
 
 
 @dataclass(frozen=True)
