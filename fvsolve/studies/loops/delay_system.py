@@ -227,7 +227,10 @@ class DelaySystem:
             ratio = np.where(np.isfinite(ratio) & (ratio > 0.0), ratio, 1.0)[:, None]
             squares[:, i] *= ratio
             squares[:, :, i] /= ratio
-        return np.linalg.norm(np.sqrt(squares) * np.exp(1j * np.angle(p)), 2, axis=(1, 2))
+        scaled, size = np.sqrt(squares) * np.exp(1j * np.angle(p)), np.full(s.size, np.inf)
+        finite = np.isfinite(scaled).all(axis=(1, 2))  # P is infinite at a pole
+        size[finite] = np.linalg.norm(scaled[finite], 2, axis=(1, 2))
+        return size
 
     def grid(self, least: float, high: float) -> np.ndarray:
         """First frequencies of a winding number [rad/s]: logarithmic, at resonances, ten in each turn of a delay.

@@ -121,6 +121,8 @@ def sampled_loop(case, name: str, at: float | None, report: Progress) -> Loop:
         values = sampled.ratio(w)
         if not np.any(values):
             raise open_loop_error(sampled.point, name)
+    elif np.array_equal(sampled.matrix(1.0), sampled.matrix(2.0)):
+        raise open_loop_error(sampled.point, name)
     report(2, STAGES, "range of the gain")
     poles = sorted_poles(np.linalg.eigvals(sampled.closed_matrix(1.0)).astype(complex))
     poles = poles[np.argsort(-np.abs(poles), kind="stable")]
