@@ -77,7 +77,7 @@ def delayed_system(case, set, input: str, output: str, at: float | None, before:
     return linear, system
 
 
-def limits_met(point: OperatingPoint) -> dict[str, float]:
+def outputs_at_limits(point: OperatingPoint) -> dict[str, float]:
     """Controls whose output is at a limit, up to rounding : name -> limit; without those that only switch."""
     result = {}
     for k, (name, row) in enumerate(zip(point.model.block_names, point.model.tables.controls, strict=True)):
@@ -95,7 +95,7 @@ def refuse_limits(point: OperatingPoint, cut: str | None) -> None:
 
     There the loop is open, and a delay passes only a rise or only a fall.
     """
-    for name, limit in limits_met(point).items():
+    for name, limit in outputs_at_limits(point).items():
         block = point.model.case.controls[name]
         if name == cut or block.control.kind == "delay":
             effect = "so its loop is open" if name == cut else "so it passes only a rise or only a fall"
@@ -108,14 +108,14 @@ def linear_with_names(point: OperatingPoint, inputs, outputs: int) -> Linear:
     try:
         return linearise_at(point, inputs, outputs)
     except FvsolveError as error:
-        if met := limits_met(point):
-            raise FvsolveError(f"{error}; at a limit: {at_limits(point, met)}. {ANOTHER_POINT}") from None
+        if stopped := outputs_at_limits(point):
+            raise FvsolveError(f"{error}; at a limit: {at_limits(point, stopped)}. {ANOTHER_POINT}") from None
         raise
 
 
-def at_limits(point: OperatingPoint, met: dict[str, float]) -> str:
-    """Text of controls and their limits; met : as from `limits_met`."""
-    return listing(f"controls.{key} ({limit_text(point.model.case.controls[key], met[key])})" for key in met)
+def at_limits(point: OperatingPoint, stopped: dict[str, float]) -> str:
+    """Text of controls and their limits; stopped : as from `outputs_at_limits`."""
+    return listing(f"controls.{key} ({limit_text(point.model.case.controls[key], stopped[key])})" for key in stopped)
 
 
 def limit_text(block, limit: float) -> str:
@@ -126,9 +126,9 @@ def limit_text(block, limit: float) -> str:
 
 def open_loop_error(point: OperatingPoint, name: str) -> FvsolveError:
     """Error for a control whose output does not affect its input, with the controls that are at a limit."""
-    met = limits_met(point)
-    reason = f"; at a limit: {at_limits(point, met)}" if met else ""
-    remedy = ANOTHER_POINT if met else "Expected a control whose output affects its input"
+    stopped = outputs_at_limits(point)
+    reason = f"; at a limit: {at_limits(point, stopped)}" if stopped else ""
+    remedy = ANOTHER_POINT if stopped else "Expected a control whose output affects its input"
     text = f"the output of controls.{name} does not affect its input at {point.when}, so its loop is open"
     return FvsolveError(f"{text}{reason}. {remedy}")
 

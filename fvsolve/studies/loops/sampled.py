@@ -29,8 +29,8 @@ from fvsolve.studies.loops.open_loop import (
     WIDTHS,
     at_limits,
     delay_blocks,
-    limits_met,
     linear_with_names,
+    outputs_at_limits,
     refuse_limits,
     state_limit_error,
 )
@@ -454,8 +454,8 @@ def checked_slope(point: OperatingPoint, name: str, f: Callable[[float], np.ndar
     sides, greatest = rise - fall, np.maximum(np.abs(rise), np.abs(fall))[1]
     kink = (np.abs(sides[1]) > KINK * greatest) & (np.abs(sides[1] - sides[0]) <= ALIKE * np.abs(sides[1]))
     if np.any(kink & (greatest * widths[1] > KINK_ROUNDING * np.abs(base) + LEAST_KINK)):
-        met = limits_met(point)
-        reason = f"; at a limit: {at_limits(point, met)}" if met else ""
+        stopped = outputs_at_limits(point)
+        reason = f"; at a limit: {at_limits(point, stopped)}" if stopped else ""
         raise FvsolveError(f"controls.{name} cannot be linearised at {point.when}: the slopes of its sample for a rise "
                            f"and a fall differ{reason}. {ANOTHER_POINT}")  # fmt: skip
     coarse, fine = 0.5 * (rise + fall)
