@@ -70,6 +70,7 @@ def run_command() -> None:
         print(f"fvsolve {fvsolve.__version__}")
         sys.exit(0)
     atexit.register(gc.freeze)  # at the end Python would search all modules for unused objects, a fifth of a short run
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # more threads of linear algebra cost time for these matrices
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else pydantic searches all installed packages
     if sys.argv[1:2] == ["run"]:
         gc.disable()  # until `run` has imported its modules, none of which becomes unused

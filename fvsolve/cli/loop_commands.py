@@ -8,7 +8,7 @@ import numpy as np
 from typer import Argument
 
 from fvsolve.cli import app as cli
-from fvsolve.cli.terminal import present
+from fvsolve.cli.terminal import present, progress_line
 from fvsolve.display import save
 from fvsolve.studies.result_table import ResultTable, columns, write_csv
 
@@ -28,7 +28,8 @@ def loop(
     from fvsolve.studies.loops.loop import loop as ask
 
     loaded = cli.load_case(case, set)
-    result = ask(loaded, name, cli.quantity_of(at, "time", f"--at {at}"))
+    with progress_line(resumable=False) as progress:
+        result = ask(loaded, name, cli.quantity_of(at, "time", f"--at {at}"), progress=progress)
     folder = cli.folder_of(loaded, "loop", out)
     stem = f"{result.control}.loop"
     cli.warn_replaced(folder, f"{stem}.csv")

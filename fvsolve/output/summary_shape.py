@@ -253,6 +253,13 @@ class Versions(TypedDict):
     fvsolve: str
 
 
+class ChangedSteps(TypedDict):
+    """Keys that a continued run changed at time t [s] : key -> value before and after, None if not stated."""
+
+    t: float
+    keys: dict[str, list[float | str | None]]
+
+
 class SummaryShape(TypedDict):
     """Entries of summary.json; those that are not required depend on the command."""
 
@@ -297,6 +304,7 @@ class SummaryShape(TypedDict):
     seconds_total: NotRequired[float]
     peaks: NotRequired[dict[str, PeakRow]]
     resolution: NotRequired[Resolution]
+    continued: NotRequired[list[ChangedSteps]]
 
 
 REQUIRED_KEYS = tuple(key for key in SummaryShape.__annotations__ if key in SummaryShape.__required_keys__)

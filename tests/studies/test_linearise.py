@@ -30,10 +30,10 @@ from fvsolve.model.energy_norm import energy_form
 from fvsolve.solve import initial_state
 from fvsolve.solve.advance import advance
 from fvsolve.solve.held_inputs import hold
-from fvsolve.studies import operating_point
+from fvsolve.studies import operating_point, work_limit
 from fvsolve.studies.linearise import eigenvalues_near, find_eigenvalues, linearise, linearise_at, poles_of
 from fvsolve.studies.ports.response import response
-from fvsolve.studies.stability import growth, real_runs
+from fvsolve.studies.stability import real_runs
 from fvsolve.studies.stability.stability import stability
 
 K = 2.2e9
@@ -398,7 +398,7 @@ def test_an_eigenvalue_that_is_too_late_is_left_out_and_said():
 
 
 def test_what_takes_too_long_to_predict_is_refused_with_the_way_out(monkeypatch):
-    monkeypatch.setattr(growth, "TIME_LIMIT", -1.0)
+    monkeypatch.setattr(work_limit, "TIME_LIMIT", -1.0)
     with pytest.raises(FvsolveError, match="600 states and 100 steps take longer.*--set links.NAME.cells=100.*--steps"):
         stability(line(300), steps=100)
 

@@ -3,6 +3,7 @@
 import json
 import tomllib
 from math import pi
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,8 +19,12 @@ from scipy.special import lambertw
 
 import fvsolve
 from fvsolve.errors import FvsolveError
+from fvsolve.studies import work_limit
+from fvsolve.studies.loops.delay_system import DelaySystem
 from fvsolve.studies.loops.input_response import input_response
 from fvsolve.studies.loops.loop import ReturnRatio, loop, step_response
+from fvsolve.studies.loops.margins import roots
+from fvsolve.studies.work_limit import TIME_LIMIT
 
 CLOSE = 1e-9
 
@@ -357,6 +362,149 @@ def test_faults_of_loops_are_named():
     sampled["controls"]["other"] = lag("inner", [1.0], [1.0, 1.0])
     with pytest.raises(FvsolveError, match="controls.inner delays what changes between samples"):
         loop(sampled, "gain")
+
+
+KINDS = {
+    "pi": {"type": "pi", "input": "controls.plant", "setpoint": 0.0, "gain": 2.0, "integral_time": 1.0},
+    "pid": {"type": "pid", "input": "controls.plant", "setpoint": 0.0, "gain": 2.0, "derivative_time": 0.1},
+    "function": {"type": "function", "inputs": {"u": "controls.plant"}, "formula": "-u"},
+    "table": {"type": "table", "input": "controls.plant", "table": {"input": [-10.0, 10.0], "output": [10.0, -10.0]}},
+    "transfer-function": lag("plant", [-1.0], [1.0, 1.0], initial=0.0),
+    "rate-limit": {"type": "rate-limit", "input": "controls.plant", "rising": 1.0, "falling": 1.0,
+                   "time_constant": 0.5, "initial": 0.0},
+    "delay": {"type": "delay", "input": "controls.plant", "delay": 0.3},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("limits", [[0.0, 1.0], [-1.0, 0.0], [-1e-13, 1.0], [-1.0, 1e-13]])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_control_at_a_limit_is_refused_by_name(kind, limits):
+    """The output at the start is 0, at the lower or the upper limit, exactly or up to rounding."""
+    for period in (None, 0.1):
+        if period is None or kind not in ("rate-limit", "delay"):
+            own = KINDS[kind] | {"limits": limits} | ({} if period is None else {"period": period})
+            case = blocks({"plant": lag("hold", [1.0], [0.5, 1.0], initial=0.0), "hold": own}, 5.0)
+            with pytest.raises(FvsolveError, match="controls.hold is at a limit.*its loop is open"):
+                loop(case, "hold")
+            own["limits"] = [-1.0, 1.0]
+            assert loop(case, "hold").frequency.size
+
+
+def through_another(formula, hold_period=None, **inner):
+    """Case of a proportional control of a lag through another block, whose output is at its limit 0."""
+    hold = KINDS["function"] | ({} if hold_period is None else {"period": hold_period})
+    second = {"type": "function", "inputs": {"u": "controls.hold"}, "formula": formula, "limits": [0.0, 1.0]}
+    return blocks({"plant": lag("inner", [1.0], [0.5, 1.0], initial=0.0), "hold": hold, "inner": second | inner}, 5.0)
+
+
+@pytest.mark.parametrize(("formula", "reason"), [("u", "slopes.*differ"), ("u - 2", "does not affect its input")])
+def test_a_loop_through_another_control_at_a_limit_names_it(formula, reason):
+    for hold_period, inner in ((None, {}), (0.1, {}), (None, {"period": 0.1}), (0.1, {"period": 0.1})):
+        with pytest.raises(FvsolveError, match=rf"{reason}.*at a limit: controls.inner \(0\)"):
+            loop(through_another(formula, hold_period, **inner), "hold")
+    with pytest.raises(FvsolveError, match="controls.inner is at a limit, 0, .*passes only a rise or only a fall"):
+        late = through_another(formula)
+        late["controls"]["inner"] = {"type": "delay", "input": "controls.hold", "delay": 0.3, "limits": [0.0, 1.0]}
+        loop(late, "hold")
+
+
+@pytest.mark.parametrize("opening", [0.0, 1.0])
+def test_a_control_of_a_valve_at_the_end_of_its_range_is_refused_by_name(opening):
+    """The range of the opening is the limit of its control."""
+    level = pi_control(4.0, 0.8, 120.0) | {"initial": opening}
+    level.pop("limits", None)
+    for period in ({}, {"period": 1.0}):
+        case = tower({"control": "hold"}, 0.5, controls={"hold": level | period})
+        with pytest.raises(FvsolveError, match=f"controls.hold is at a limit, {opening:g}, at the start"):
+            loop(case, "hold")
+
+
+AT_ITS_LIMIT = """
+[nodes]
+a = {type = "reservoir", head = 10.0}
+b = {type = "tank", area = 10.0, level = 1.0}
+[links]
+v = {type = "valve", from = "a", to = "b", area = 1e-6, opening = {control = "p"}}
+[controls]
+q = {type = "function", inputs = {u = "controls.p"}, formula = "u - 0.5"}
+p = {type = "pid", input = "controls.plant", setpoint = 0, gain = 1, period = 0.05}
+[controls.plant]
+type = "transfer-function"
+input = "controls.q"
+initial = 0
+numerator = [43.42624]
+denominator = [1, 2.513274, 39.47842]
+[numerics]
+end = 1.0
+method = "rodas-5p"
+rtol = 1e-6
+"""
+
+
+def test_an_output_that_is_its_limit_up_to_rounding_is_refused():
+    """The balanced output is 8.6e-42, at the lower end of the opening; with another start the margins are known."""
+    case = tomllib.loads(AT_ITS_LIMIT) | {"fluid": WATER}
+    with pytest.raises(FvsolveError, match="controls.p is at a limit, 0, at the start, so its loop is open"):
+        loop(case, "p")
+    del case["controls"]["plant"]["initial"]
+    margins = loop(case, "p").margins
+    assert margins.gain_margin == pytest.approx(2.3842, abs=1e-4)  # of python-control, for the sampled plant
+    assert margins.phase_margin == pytest.approx(18.161, abs=1e-3)
+
+
+# work -------------------------------------------------------------------------------------------------------------
+
+AXIS = Path(__file__).parents[1] / "reference" / "press-axis.toml"
+
+
+def test_a_loop_through_many_stretches_of_delay_lines_ends():
+    """Two hoses of 8 m as delay lines of 6 stretches each: gain and poles are those of cells."""
+    labels = []
+    lines = loop(AXIS, "pos", set={"numerics.pipe_model": "delay-line"}, progress=lambda *now: labels.append(now))
+    assert lines.system.delays.size > 20 and 0.0 < lines.system.work.spent < TIME_LIMIT
+    cells = loop(AXIS, "pos")
+    assert lines.gain_range == (None, pytest.approx(cells.gain_range[1], rel=2e-3))
+    assert lines.poles[0] == pytest.approx(cells.poles[0], rel=1e-3)
+    done = [now[0] for now in labels]
+    assert done == sorted(done) and {now[1] for now in labels} == {4} and "delays" in labels[1][2]
+
+
+def test_a_loop_that_takes_too_long_is_refused_with_a_remedy(monkeypatch):
+    monkeypatch.setattr(work_limit, "TIME_LIMIT", 1e-6)
+    with pytest.raises(FvsolveError, match="loop with delays take longer than .*fewer delays"):
+        loop(two_lags(delay=0.3), "hold")
+    sampled = two_lags(2.0, period=0.1)
+    sampled["controls"]["other"] = KINDS["function"] | {"period": 0.07}
+    with pytest.raises(FvsolveError, match="maps of .* numbers with .* events take longer than .*common period"):
+        loop(sampled, "hold")
+
+
+def test_the_frequencies_of_a_winding_number_end_where_delays_cannot_matter():
+    """From the last frequency on no eigenvalue of P E reaches the unit circle."""
+    system = loop(two_lags(delay=0.3), "hold").system.closed()
+    last = system.last_frequency(0.0)
+    w = np.geomspace(last, 1e3 * last, 400)
+    assert last < system.fastest
+    assert np.all(np.abs(np.linalg.eigvals(system.loop_matrices(1j * w))) < 1.0)
+
+
+def test_responses_one_by_one_and_together_are_those_of_the_inverse():
+    rng = np.random.default_rng(3)
+    a = rng.standard_normal((130, 130))
+    system = DelaySystem(a, rng.standard_normal((130, 2)), rng.standard_normal((2, 130)), np.eye(2), 1, 1, np.ones(1))
+    s = 1j * np.geomspace(0.1, 100.0, 9)
+    exact = [system.d + system.c @ np.linalg.solve(x * np.eye(130) - a, system.b) for x in s]
+    assert system.cut_response(s) == pytest.approx(np.array(exact), rel=1e-9, abs=1e-9)
+    assert system.cut_response(s[:2]) == pytest.approx(np.array(exact[:2]), rel=1e-9, abs=1e-9)
+
+
+def test_the_roots_of_many_brackets_are_found_together():
+    centres = np.geomspace(1e-6, 1e6, 40)
+    found = roots(lambda w: np.tanh(w / centres[np.argmin(np.abs(np.log(w[:, None] / centres)), axis=1)] - 1.0) ** 3,
+                  0.9 * centres, 1.2 * centres)  # fmt: skip
+    assert found == pytest.approx(centres, rel=1e-5)
+    found = roots(lambda w: np.cos(w), np.array([1.0, 4.0, 7.0]), np.array([2.0, 5.0, 8.0]))
+    assert found == pytest.approx(np.array([0.5, 1.5, 2.5]) * pi, rel=1e-15)
 
 
 def test_the_command_writes_margins_and_pictures(fvs, tmp_path):

@@ -408,3 +408,11 @@ def test_a_verdict_is_plain_for_json():
     assert said["positive_real"] is False and said["axis_poles"][1]["frequency"] == 2.0
     assert said["numerator"] == ["1", "-1"] and isinstance(said["reason"], str)
     assert positive_real([1, 0], [1]).plain()["axis_poles"][0]["frequency"] is None
+
+
+def test_coefficients_of_too_many_digits_are_refused():
+    """Floats of degree 30 took more than three minutes; whole numbers of this degree take a second."""
+    roots = np.random.default_rng(0).uniform(0.1, 10.0, (2, 30))
+    with pytest.raises(FvsolveError, match="degree 30 with up to .* binary digits take too long.*rounded"):
+        positive_real(*map(list, map(np.poly, -roots)))
+    assert positive_real([1] * 31, [1] * 31).positive_real

@@ -16,13 +16,17 @@ from fvsolve import build, load, studies
 from fvsolve.errors import FvsolveError
 from fvsolve.model.energy_norm import energy_form
 from fvsolve.steppers import METHODS, method_named, stability_function
+from fvsolve.studies import work_limit
 from fvsolve.studies.linearise import linearise, linearise_at
 from fvsolve.studies.operating_point import operating_point, with_held_schedules
 from fvsolve.studies.stability.delay_line_limits import DelayLineLimits, DelayLineRuns, DelayLineSystem, read_history
 from fvsolve.studies.stability.growth import (
     DenseGrowth,
     VectorGrowth,
+    growth_method,
     matrix_powers,
+    norm_exceeds,
+    norm_near,
     power_growth,
     predicted_limit,
     step_function,
@@ -193,8 +197,63 @@ def test_a_vector_carried_along_takes_the_same_step_as_the_matrix(name):
 
     e, rng = matrix(shut(6, "upwind5")), np.random.default_rng(2)
     v = rng.standard_normal((e.shape[0], 2))
-    found = step_function(method_named(name), 0.01, csr_array(e))(v)
+    found = step_function(method_named(name), 0.01, csr_array(e))[0](v)
     assert found == pytest.approx(step_matrix(method_named(name), 0.01 * e) @ v, abs=1e-11)
+
+
+def test_norms_that_cheap_bounds_do_not_decide_are_those_of_singular_values():
+    rng = np.random.default_rng(4)
+    for n in (1, 7, 90):
+        m = rng.standard_normal((n, n))
+        exact = np.linalg.norm(m, 2)
+        assert norm_exceeds(m, 0.999 * exact) and not norm_exceeds(m, 1.001 * exact)
+        assert norm_near(m, rng.standard_normal(n))[0] == pytest.approx(exact, rel=2e-6)
+    assert norm_exceeds(np.array([[np.inf]]), 1e3) and not norm_exceeds(np.zeros((2, 2)), 1.0)
+
+
+def test_steps_of_a_lossless_pipe_are_those_of_its_eigenvalues_though_pivots_could_grow():
+    """With all states of a stage together, elimination met a pivot of 1e-76 at this step: an internal error."""
+    skew = np.eye(500, k=1) - np.eye(500, k=-1)
+    c = 11.24554069519575 / np.linalg.norm(skew, 2)
+    values, vectors = np.linalg.eigh(1j * skew)
+    r = stability_function(method_named("radau-iia-5"))(-1j * c * values)
+    exact = (vectors * r @ vectors.conj().T).real
+    assert step_matrix(method_named("radau-iia-5"), c * skew) == pytest.approx(exact, abs=1e-12)
+
+
+@pytest.mark.parametrize("states", [90, 600])
+def test_both_ways_to_a_prediction_spend_one_limit(states, monkeypatch):
+    e = 10.0 * (np.eye(states, k=-1) - np.eye(states))
+    growth = growth_method(method_named("rk4"), e, 50)
+    assert isinstance(growth, DenseGrowth if states < 500 else VectorGrowth)
+    growth.fails(0.01)
+    assert 0.0 < growth.work.spent < 1.0
+    monkeypatch.setattr(work_limit, "TIME_LIMIT", growth.work.spent)
+    with pytest.raises(FvsolveError, match=f"{states} states and 50 steps take longer.*fewer cells.*fewer --steps"):
+        growth.fails(0.02)
+
+
+def test_a_basin_of_384_states_is_predicted_within_the_limit():
+    """As many products of matrices as powers are checked, not as many singular values; runs confirm the limit."""
+    pool = {"type": "basin", "physics": "liquid", "size": [2.0, 1.0], "cells": [16, 8], "thickness": 0.1,
+            "pressure": 5e5, "patches": {"port": {"side": "west", "span": [0.25, 0.75]}}}  # fmt: skip
+    hole = {"type": "orifice", "laminar_reynolds": 1e6, "from": "pool.port", "to": "o", "area": 0.004}
+    case = scene({"o": reservoir(5e5), "pool": pool}, {"g": hole}, 0.004,
+                 {"scheme": "upwind", "method": "rk4", "courant": 0.8})  # fmt: skip
+    side = LinearSystem(operating_point(case))
+    growth = growth_method(method_named("rk4"), side.e, 100)
+    found = predicted_limit(growth)
+    assert side.e.shape == (384, 384) and growth.work.spent < 10.0
+    small, large = (np.linalg.matrix_power(growth.matrix(h), 100) for h in (0.9 * found.step, 1.1 * found.fails))
+    assert np.linalg.norm(small, 2) < 1e3 < np.linalg.norm(large, 2)
+
+
+def test_powers_below_a_bound_are_not_computed(monkeypatch):
+    """A step matrix of norm 1 needs one check, and its powers none."""
+    rotation = np.array([[0.0, 3.0], [-3.0, 0.0]])
+    growth, seen = DenseGrowth(method_named("implicit-midpoint"), rotation, 1000), []
+    monkeypatch.setattr(growth, "powers", lambda m, few: (seen.append(n) or (n, p) for n, p in matrix_powers(m, 1000)))
+    assert not growth.fails(0.5) and seen == [1]
 
 
 PAIRS = [
@@ -378,6 +437,24 @@ def test_what_check_tells_to_grow_has_a_limit_below_the_step():
             fvsolve.load(vessel(method, 0.01, 30.0, volume)), "upwind", method_named(method), 3000, 30.0
         )
         assert made.fails(0.01) == grows
+
+
+def test_the_energy_of_waves_in_lines_is_summed_as_they_enter_and_leave():
+    """From a random start the growth after 60 steps, of the running sum, is the energy of the whole history."""
+    made = system(vessel("rk4", 0.01, volume=0.15), "rk4", 0.01)
+    x, before = made.starts()
+    for steps in (1, 7, 60):
+        size, after, end, history = made.propagate(x, before, steps, np.inf)
+        if after == steps:
+            growth = made.size(end, history) / made.size(x, before)
+            assert growth.max() == pytest.approx(size[np.argmax(growth)], rel=1e-9)
+    assert made.propagate(x, before, 1, np.inf)[1] <= 1
+
+
+def test_lines_beside_a_small_chamber_are_refused_before_their_waves_are_stored():
+    """0.1 s of a line in steps for a chamber of 1e-8 m3: 1e10 past waves, for which there is no memory."""
+    with pytest.raises(FvsolveError, match="states and 1000 steps take longer than.*as of a small chamber"):
+        studies.stability(vessel("rk4", 0.01, volume=1e-8), methods=["rk4"])
 
 
 def test_where_no_store_is_no_step_fails():

@@ -42,8 +42,8 @@ from fvsolve.studies.ports.response import response
 from fvsolve.studies.reference import candidates, find_reference
 from fvsolve.studies.result_cache import ResultCache
 from fvsolve.studies.stability import stability as room
-from fvsolve.studies.stability.growth import TooLarge
 from fvsolve.studies.stability.stability import stability
+from fvsolve.studies.work_limit import TooLarge
 
 
 def case(name, **numerics):
@@ -415,7 +415,7 @@ def test_a_map_names_the_probe_that_its_reference_does_not_know():
 
 
 def test_a_basin_too_large_to_be_predicted_is_measured_and_drawn_no_spectrum(tmp_path, fvs, monkeypatch):
-    monkeypatch.setattr(import_module("fvsolve.studies.stability.stability"), "TIME_LIMIT", 0.0)
+    monkeypatch.setattr(import_module("fvsolve.studies.work_limit"), "TIME_LIMIT", 0.0)
     pool = {"type": "basin", "size": [1.0, 1.0], "cells": [20, 20], "level": 0.3, "start": {"level": "0.3 + 0.001 * x"}}
     case = scene({"b": pool}, {}, 1.0, {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.5}, ["b.depth@0.1,0.1"])
     (tmp_path / "pool.toml").write_text(write(case))

@@ -6,21 +6,39 @@ frequency s, without any rational approximation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+
+from fvsolve.studies.work_limit import DENSE_RATE, WorkLimit
 
 FIRST_PER_DECADE = 40  # frequencies per decade of the first grid of a winding number
 STEEP = 0.5  # change of the phase between two frequencies above which the grid is refined [rad]
 MOST_ROUNDS = 40  # of refinement
 AXIS = 1e-9  # of the fastest rate: poles closer to the imaginary axis count as stable
 FAR = 1e3  # ratio of the highest frequency to the fastest rate
+QUIET_PER_DECADE = 10  # frequencies per decade of the search for the last one of a winding number
+SCALING_TURNS = 20  # of the scaling of a matrix
+TURNS_POINTS = 200_000  # greatest number of frequencies for turns of delays
 CHEBYSHEV_POINTS = 48  # of each delay, for estimates of poles
+LEAST_POINTS, COLLOCATED_SIZE = 6, 1000  # least number of these points, and greatest size of the matrix with them
+MANY_STATES, RIGHTMOST = 200, 3  # beyond, only this multiple of the poles that are needed is estimated
+FEW, CHUNK = 4, 2_000_000  # frequencies that are solved one by one; greatest number of entries of an array of many
+BLOCK = 48  # rows of a triangular matrix that are solved together
+EIGENVALUE_OPERATIONS = 25.0  # over n^3
+RESPONSE_RATE = 5e9  # operations in responses on one core of 2020 [1/s]
 NEWTON_TURNS = 30
 ENDLESS = 10**6  # number of unstable poles of delays that grow at all high frequencies
 NEAR = 0.05  # greatest relative distance of a pole from its estimate
 POLE_TOLERANCE = 1e-12  # relative change of a pole at which Newton has converged
+
+
+FEWER_DELAYS = (
+    "use fewer delays or shorter ones; with delay lines fewer lines, or cells in place of some of them, --set "
+    "links.NAME.pipe_model=finite-volume"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +46,7 @@ class DelaySystem:
     """System of the module docstring; b, d, ... : columns of u first, then of w; c, d : rows of y first, then of s.
 
     inputs, outputs : numbers of u and of y; delays : float64[k]  tau of each channel [s]
+    work : spends the estimated time of winding numbers and responses, which raise TooLarge above its limit
     """
 
     a: np.ndarray
@@ -37,6 +56,7 @@ class DelaySystem:
     inputs: int
     outputs: int
     delays: np.ndarray
+    work: WorkLimit = field(default_factory=lambda: WorkLimit("responses of a loop with delays", FEWER_DELAYS))
 
     @cached_property
     def schur(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -56,13 +76,40 @@ class DelaySystem:
 
     def cut_response(self, s: np.ndarray) -> np.ndarray:
         """D + C (s - A)^-1 B with all delays cut : complex128[len(s), rows, columns]."""
-        t, left, right = self.schur
-        x = np.zeros((t.shape[0], s.size, right.shape[1]), complex)
+        left = self.schur[1]
         with np.errstate(divide="ignore", invalid="ignore"):
-            for i in reversed(range(t.shape[0])):
-                known = right[i] + np.tensordot(t[i, i + 1 :], x[i + 1 :], 1)
-                x[i] = known / (s - t[i, i])[:, None]
-            return self.d + np.moveaxis(np.tensordot(left, x, 1), 0, 1)
+            return self.d + np.moveaxis(np.tensordot(left, self.states_at(s, self.schur[2]), 1), 0, 1)
+
+    def states_at(self, s: np.ndarray, right: np.ndarray) -> np.ndarray:
+        """Solution (s - T)^-1 of a matrix, or of one for each s : complex128[states, len(s), columns]."""
+        t = self.schur[0]
+        n = t.shape[0]
+        right = np.broadcast_to(right if right.ndim == 3 else right[:, None, :], (n, s.size, right.shape[-1]))
+        x = np.zeros(right.shape, complex)
+        if s.size <= FEW and 0 < n <= MANY_STATES:
+            from scipy.linalg.lapack import ztrtrs
+
+            for k, value in enumerate(s):
+                matrix = -t
+                matrix[np.diag_indices(n)] += value
+                x[:, k], singular = ztrtrs(matrix, right[:, k])
+                x[:, k] = np.inf if singular else x[:, k]
+            return x
+        flat = x.reshape(n, s.size * right.shape[-1])
+        for end in range(n, 0, -BLOCK):  # products of matrices for most of the sum
+            start = max(0, end - BLOCK)
+            known = right[start:end] + (t[start:end, end:] @ flat[end:]).reshape(end - start, *right.shape[1:])
+            for i in reversed(range(start, end)):
+                within = (t[i, i + 1 : end] @ flat[i + 1 : end]).reshape(right.shape[1:])
+                x[i] = (known[i - start] + within) / (s - t[i, i])[:, None]
+        return x
+
+    def in_chunks(self, f: Callable[[np.ndarray], np.ndarray], s: np.ndarray) -> np.ndarray:
+        """Values of f at complex numbers s, for so few at a time that arrays stay small; spends the time."""
+        n, k = self.a.shape[0], self.delays.size
+        each = n * (1 + k) + (1 + k) ** 2
+        self.work.spend(s.size * (4.0 * n**2 * (1 + k) + 16.0 * k**3) / RESPONSE_RATE)
+        return np.concatenate([f(part) for part in np.array_split(s, 1 + s.size * each // CHUNK)])
 
     def decay(self, s: np.ndarray) -> np.ndarray:
         """Factor exp(-s tau) of each delay : complex128[len(s), delays]."""
@@ -70,6 +117,10 @@ class DelaySystem:
 
     def response(self, s: np.ndarray) -> np.ndarray:
         """Transfer functions from u to y with all delays closed, at complex numbers s : complex128[len(s), y, u]."""
+        return self.in_chunks(self.response_at_once, s)
+
+    def response_at_once(self, s: np.ndarray) -> np.ndarray:
+        """Transfer functions of `response`, with arrays for all s together."""
         cut, m, p = self.cut_response(s), self.inputs, self.outputs
         if not self.delays.size:
             return cut
@@ -123,9 +174,10 @@ class DelaySystem:
     def winding(self, shift: float) -> float | None:
         """Winding number of det(1 - P E) along Re s = shift, upwards; None if the delays alone grow at high frequency.
 
-        Beyond the last frequency P is constant, and the phase that remains follows from the eigenvalues of P E.
+        Beyond the last frequency all eigenvalues of P E are within the unit circle, so that the phase that remains
+        follows from them.
         """
-        frequency = np.concatenate([[0.0], self.grid(shift)])
+        frequency = np.concatenate([[0.0], self.grid(shift, self.last_frequency(shift))])
         value = self.determinant(shift + 1j * frequency)
         for _ in range(MOST_ROUNDS):
             steep = np.flatnonzero(np.abs(np.angle(value[1:] / value[:-1])) > STEEP)
@@ -142,13 +194,53 @@ class DelaySystem:
 
     def determinant(self, s: np.ndarray) -> np.ndarray:
         """det(1 - P E) at complex numbers s : complex128[len(s)]."""
-        return np.linalg.det(np.eye(self.delays.size) - self.loop_matrices(s))
+        eye = np.eye(self.delays.size)
+        return self.in_chunks(lambda part: np.linalg.det(eye - self.loop_matrices(part)), s)
 
-    def grid(self, least: float) -> np.ndarray:
-        """First frequencies of a winding number [rad/s]: logarithmic, at resonances, ten in each turn of a delay."""
+    def last_frequency(self, shift: float) -> float:
+        """Least frequency from which no delay can make an eigenvalue of P E as great as 1, on Re s = shift [rad/s].
+
+        There a norm of P in scaled channels is below the middle of 1 and its limit, at sampled frequencies and at all
+        resonances. Without such a frequency it is `FAR` times the fastest rate, where P is constant.
+        """
         high = FAR * self.fastest
+        count = int(QUIET_PER_DECADE * np.log10(high / self.slowest)) + 2
+        grid = np.unique(np.concatenate([np.geomspace(self.slowest, high, count), np.abs(self.rates.imag)]))
+        size = self.in_chunks(self.scaled_norms, shift + 1j * grid)
+        loud = np.flatnonzero(size >= 0.5 * (1.0 + size[-1]))
+        if size[-1] >= 1.0 or not loud.size:
+            return high if size[-1] >= 1.0 else float(grid[0])
+        return float(grid[min(loud[-1] + 1, grid.size - 1)])
+
+    def scaled_norms(self, s: np.ndarray) -> np.ndarray:
+        """2-norms of P at complex numbers s, each in channels scaled so that it is small : float64[len(s)].
+
+        Row and column of each channel get equal sizes (Osborne 1960); such a scaling changes no eigenvalue of P E.
+        """
+        p = self.cut_response(s)[:, self.outputs :, self.inputs :]
+        squares = np.abs(p) ** 2
+        for i in list(range(self.delays.size)) * SCALING_TURNS:
+            own = squares[:, i, i]
+            row, column = squares[:, i].sum(axis=1) - own, squares[:, :, i].sum(axis=1) - own
+            with np.errstate(divide="ignore", invalid="ignore"):
+                ratio = np.sqrt(column / row)
+            ratio = np.where(np.isfinite(ratio) & (ratio > 0.0), ratio, 1.0)[:, None]
+            squares[:, i] *= ratio
+            squares[:, :, i] /= ratio
+        scaled, size = np.sqrt(squares) * np.exp(1j * np.angle(p)), np.full(s.size, np.inf)
+        finite = np.isfinite(scaled).all(axis=(1, 2))  # P is infinite at a pole
+        size[finite] = np.linalg.norm(scaled[finite], 2, axis=(1, 2))
+        return size
+
+    def grid(self, least: float, high: float) -> np.ndarray:
+        """First frequencies of a winding number [rad/s]: logarithmic, at resonances, ten in each turn of a delay.
+
+        least, high : range of frequencies [rad/s]; of turns at most `TURNS_POINTS` frequencies
+        """
+        high = max(high, 2.0 * least)
         count = int(FIRST_PER_DECADE * np.log10(high / least)) + 1
-        turns = np.arange(0.0, 200.0 * np.pi, 0.2 * np.pi) / float(self.delays.max(initial=1e-300))
+        turn = 0.2 * np.pi / float(self.delays.max(initial=1e-300))
+        turns = turn * np.arange(1.0, min(high / turn, TURNS_POINTS) + 1.0)
         parts = [np.geomspace(least, high, count), np.abs(self.rates.imag), turns]
         return np.unique(np.concatenate([part[(part > 0.0) & (part <= high)] for part in parts]))
 
@@ -192,7 +284,10 @@ class DelaySystem:
         if not self.delays.size:
             return sorted_poles(np.linalg.eigvals(self.a).astype(complex))
         found: list[complex] = []
-        estimates = self.collocated().rates
+        self.work.spend(EIGENVALUE_OPERATIONS * self.collocated_size**3 / DENSE_RATE)
+        estimates = self.collocated_poles()
+        if estimates.size > MANY_STATES:
+            estimates = sorted_poles(estimates)[: RIGHTMOST * most]
         for guess in estimates[np.argsort(np.abs(estimates))]:
             pole = self.newton(complex(guess))
             if pole is None or abs(pole - guess) > NEAR * abs(guess):  # beyond the resolution of the collocation
@@ -201,9 +296,29 @@ class DelaySystem:
                 found.append(pole)
         return sorted_poles(np.array(found))[:most]
 
-    def collocated(self) -> DelaySystem:
-        """System without delays: each delay is a transport equation at Chebyshev points, with spectral accuracy."""
-        k, n = CHEBYSHEV_POINTS, self.a.shape[0]
+    def collocated_poles(self) -> np.ndarray:
+        """Estimates of poles [1/s]: each delay is a transport equation at Chebyshev points, with spectral accuracy.
+
+        All poles without delays; no estimates if there are too many delays.
+        """
+        return np.linalg.eigvals(self.collocated()) if self.collocation_points or not self.delays.size else np.zeros(0)
+
+    @property
+    def collocated_size(self) -> int:
+        """Number of rows of `collocated`."""
+        return self.a.shape[0] + self.collocation_points * self.delays.size
+
+    @property
+    def collocation_points(self) -> int:
+        """Number of Chebyshev points of each delay, so few that the matrix is not too large; 0 for too many delays."""
+        points = min(CHEBYSHEV_POINTS, (COLLOCATED_SIZE - self.a.shape[0]) // max(1, self.delays.size))
+        return points if points >= LEAST_POINTS else 0
+
+    def collocated(self) -> np.ndarray:
+        """Matrix of the states and of the values at the Chebyshev points of all delays [1/s]."""
+        k, n = self.collocation_points, self.a.shape[0]
+        if not self.delays.size:
+            return self.a
         theta = np.pi * np.arange(k + 1) / k
         place, weight = np.cos(theta), np.r_[2.0, np.ones(k - 1), 2.0] * (-1.0) ** np.arange(k + 1)
         slope = np.outer(weight, 1.0 / weight) / (place[:, None] - place[None, :] + np.eye(k + 1))
@@ -221,22 +336,24 @@ class DelaySystem:
                 last = n + k * i + k - 1
                 a[own, last] += entry * self.d[p + j, m + i]
             a[:n, own[-1]] += self.b[:, m + j]
-        none = np.zeros((a.shape[0], 0))
-        return DelaySystem(a, none, none.T, np.zeros((0, 0)), 0, 0, np.zeros(0))
+        return a
 
     def newton(self, s: complex) -> complex | None:
-        """Pole near s [1/s] by Newton's method on det(s - A - B E (1 - D E)^-1 C); None without success."""
+        """Pole near s [1/s] by Newton's method on f = det(s - A) det(1 - P E); None without success.
+
+        f'/f = sum of 1 / (s - rates) + trace((1 - P E)^-1 (P T - P') E), with P' = -C (s - A)^-2 B and the delays T.
+        """
         m, p, start = self.inputs, self.outputs, s
-        b, c, d = self.b[:, m:], self.c[p:], self.d[p:, m:]
+        left, right, d = self.schur[1][p:], self.schur[2][:, m:], self.d[p:, m:]
         for _ in range(NEWTON_TURNS):
-            decay = np.exp(-s * self.delays)
-            # rows of states, then of w = E s : M = [[s - A, -B], [-E C, 1 - E D]], dM/ds = [[1, 0], [tau E C, tau E D]]
-            matrix = np.block([[s * np.eye(len(self.a)) - self.a, -b],
-                               [-decay[:, None] * c, np.eye(d.shape[0]) - decay[:, None] * d]])  # fmt: skip
-            late = (self.delays * decay)[:, None]
-            slope = np.block([[np.eye(len(self.a)), np.zeros(b.shape)], [late * c, late * d]])
+            if np.any(self.rates == s):
+                return s
+            here, decay = np.array([s]), np.exp(-s * self.delays)
+            x = self.states_at(here, right)
+            p_here, slope = d + left @ x[:, 0], -left @ self.states_at(here, x)[:, 0]
             try:
-                step = 1.0 / np.trace(np.linalg.solve(matrix, slope))
+                change = np.linalg.solve(np.eye(d.shape[0]) - p_here * decay, (p_here * self.delays - slope) * decay)
+                step = 1.0 / (np.sum(1.0 / (s - self.rates)) + np.trace(change))
             except np.linalg.LinAlgError:
                 return s
             s -= step

@@ -7,12 +7,14 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from fvsolve.argument_checks import NUMBER, TABLE, TEXT, validated
-from fvsolve.studies.loops.delay_system import DelaySystem, sorted_poles
+from fvsolve.argument_checks import FUNCTION, NUMBER, TABLE, TEXT, validated
+from fvsolve.studies.loops.delay_system import EIGENVALUE_OPERATIONS, DelaySystem, sorted_poles
 from fvsolve.studies.loops.margins import Margins, find_margins
-from fvsolve.studies.loops.open_loop import block_of, open_loop
-from fvsolve.studies.loops.sampled import STABLE, SampledLoop, gain_within
+from fvsolve.studies.loops.open_loop import block_of, open_loop, open_loop_error
+from fvsolve.studies.loops.sampled import STABLE, SampledLoop, gain_within, nearest_range
+from fvsolve.studies.outcome import Progress
 from fvsolve.studies.result_table import PlainData, plain
+from fvsolve.studies.work_limit import DENSE_RATE
 
 PER_DECADE = 200  # frequencies of the table
 DECADES = 3.0  # below the slowest and above the fastest rate
@@ -63,26 +65,37 @@ class Loop(PlainData):
         }  # fmt: skip
 
 
-@validated(name=TEXT, at=NUMBER, set=TABLE)
-def loop(case, name: str, at: float | None = None, set: Mapping | None = None) -> Loop:
+STAGES = 4  # of a study, for `progress`
+
+
+@validated(name=TEXT, at=NUMBER, set=TABLE, progress=FUNCTION)
+def loop(
+    case, name: str, at: float | None = None, set: Mapping | None = None, progress: Progress | None = None
+) -> Loop:
     """Study the loop of a control of a case, linearised at its start or at the time `at` [s].
 
     The loop is cut at the output of the control; L(s) is its return ratio, and 1 + L(s) = 0 the closed loop.
-    set : changed keys of the case. Raises CaseError, and FvsolveError for an unknown control, a control without slope
-    or at a limit, a state that cannot be linearised, and more than 800 states.
+    set : changed keys of the case; progress : function of (stages done, stages in total, next stage)
+    Raises CaseError, and FvsolveError for an unknown control, a control without slope or at a limit, a loop that is
+    open, a state that cannot be linearised, more than 800 states, and a study that takes too long.
     """
     from fvsolve.case import load
 
-    case = load(case, dict(set or {}))
+    case, report = load(case, dict(set or {})), progress or (lambda *_: None)
     name = block_of(case, name)
+    report(0, STAGES, "state and linear system")
     if any(block.control.period is not None for block in case.controls.values()):
-        return sampled_loop(case, name, at)
+        return sampled_loop(case, name, at, report)
     system, point = open_loop(case, name, at)
     ratio = ReturnRatio(system)
+    report(1, STAGES, f"return ratio of {len(system.a)} states and {system.delays.size} delays")
     w = frequencies(system, ratio)
     at_zero = value_at_zero(system)
     margins, gains = find_margins(ratio, w, {} if at_zero is None else {0.0: complex(at_zero)})
-    gain_range, stable = stable_gains(system, gains)
+    if not np.any(ratio(w)):
+        raise open_loop_error(point, name)
+    gain_range, stable = stable_gains(system, gains, report)
+    report(3, STAGES, "poles")
     closed = system.closed()
     return Loop(
         case.name, name, point.when, stable, margins, gain_range, tuple(system.delays.tolist()), None,
@@ -90,12 +103,13 @@ def loop(case, name: str, at: float | None = None, set: Mapping | None = None) -
     )  # fmt: skip
 
 
-def sampled_loop(case, name: str, at: float | None) -> Loop:
+def sampled_loop(case, name: str, at: float | None, report: Progress) -> Loop:
     """Study as `loop` for a case with sampled controls, by the map over their common period.
 
     There are margins if the control is sampled once in this period; the range of the gain is found in every case.
     """
     sampled = SampledLoop(case, name, at)
+    report(1, STAGES, f"return ratio of {sampled.size} numbers and {len(sampled.events)} events")
     w, values, gains = np.zeros(0), np.zeros(0, complex), np.zeros(0)
     margins = Margins(*[None] * len(fields(Margins)))
     if sampled.acts_once:
@@ -105,6 +119,11 @@ def sampled_loop(case, name: str, at: float | None) -> Loop:
         ends = {at: value for at, value in zip((0.0, fastest), sampled.real_ends(), strict=True) if value is not None}
         margins, gains = find_margins(sampled.ratio, w, ends)
         values = sampled.ratio(w)
+        if not np.any(values):
+            raise open_loop_error(sampled.point, name)
+    elif np.array_equal(sampled.matrix(1.0), sampled.matrix(2.0)):
+        raise open_loop_error(sampled.point, name)
+    report(2, STAGES, "range of the gain")
     poles = sorted_poles(np.linalg.eigvals(sampled.closed_matrix(1.0)).astype(complex))
     poles = poles[np.argsort(-np.abs(poles), kind="stable")]
     point = sampled.point
@@ -145,7 +164,9 @@ def frequencies(system: DelaySystem, ratio: Callable[[np.ndarray], np.ndarray]) 
     return np.unique(np.concatenate(parts))
 
 
-def stable_gains(system: DelaySystem, gains: np.ndarray) -> tuple[tuple[float | None, float | None], bool | None]:
+def stable_gains(
+    system: DelaySystem, gains: np.ndarray, report: Progress
+) -> tuple[tuple[float | None, float | None], bool | None]:
     """((least, greatest factor on L of a stable closed loop), True if it is stable with the factor 1).
 
     The number of unstable poles changes only at the gains 1 / |L| where L is real and negative, at any frequency. If
@@ -153,22 +174,14 @@ def stable_gains(system: DelaySystem, gains: np.ndarray) -> tuple[tuple[float | 
     gains : these factors at frequencies above 0
     """
     limits = [0.0, *sorted({*map(float, gains), *ends(system)}), np.inf]
-    stable = [is_stable(system, low, high) for low, high in zip(limits, limits[1:], strict=False)]
-    here = next(k for k in range(len(stable)) if limits[k] <= 1.0 < limits[k + 1])
-    own = is_stable_at(system, 1.0)
-    if 1.0 in limits:
-        own = False
-    order = sorted(range(len(stable)), key=lambda k: 0.0 if k == here else distance(limits[k], limits[k + 1]))
-    nearest = next((k for k in order if stable[k]), None)
-    if nearest is None:
-        return (None, None), own
-    first = last = nearest
-    while first > 0 and stable[first - 1]:
-        first -= 1
-    while last + 1 < len(stable) and stable[last + 1]:
-        last += 1
-    low, high = limits[first], limits[last + 1]
-    return (low if low > 0.0 else None, high if np.isfinite(high) else None), own
+    own = False if 1.0 in limits else is_stable_at(system, 1.0)
+
+    def stable(low: float, high: float) -> bool:
+        gain = gain_within(low, high)
+        report(2, STAGES, f"stability with {gain:.4g} times the gain, one of up to {len(limits) - 1} ranges")
+        return bool(is_stable_at(system, gain))
+
+    return nearest_range(limits, stable, distance), own
 
 
 def distance(low: float, high: float) -> float:
@@ -191,30 +204,29 @@ def value_at_zero(system: DelaySystem) -> float | None:
     return None if abs(nearer) > 1.5 * abs(near) or not np.isfinite(zero) else float(zero)
 
 
-def is_stable(system: DelaySystem, low: float, high: float) -> bool | None:
-    """True if the closed loop is stable with gains between two limits."""
-    return is_stable_at(system, gain_within(low, high))
-
-
 def is_stable_at(system: DelaySystem, gain: float) -> bool | None:
     """True if the closed loop is stable with a factor `gain` on L; None if it is undecided."""
     count = system.closed(gain).unstable_count()
     return None if count is None else count == 0
 
 
-LOCUS_GAINS, FEW_GAINS, LARGE = 161, 21, 200  # gains of the root locus, and of one with more states than the last
+LOCUS_GAINS, LEAST_GAINS = 161, 9  # gains of the root locus, and least number of a locus
+LOCUS_TIME = 2.0  # estimated CPU time of a locus, which has fewer gains if it takes longer [s]
 LOCUS_RANGE = 30.0  # least and greatest gain of the root locus, as factors on 1
 STEP_POINTS, STEP_PERIODS = 1500, 60  # of a step response, continuous and sampled
 
 
 def locus(result: Loop) -> tuple[np.ndarray, list[np.ndarray]]:
-    """(factors on L, poles of the closed loop for each) for a root locus."""
-    count = FEW_GAINS if len(result.system.a) > LARGE else LOCUS_GAINS
+    """(factors on L, poles of the closed loop for each) for a root locus; no poles with too many delays."""
+    system = result.system
+    sampled = result.period is not None
+    size = system.size if sampled else system.collocated_size
+    each = EIGENVALUE_OPERATIONS * max(size, 1) ** 3 / DENSE_RATE
+    count = int(np.clip(LOCUS_TIME / each, LEAST_GAINS, LOCUS_GAINS))
     gains = np.geomspace(1.0 / LOCUS_RANGE, LOCUS_RANGE, count)
-    if result.period is not None:
-        return gains, [np.linalg.eigvals(result.system.closed_matrix(float(gain))) for gain in gains]
-    closed = (result.system.closed(float(gain)) for gain in gains)
-    return gains, [(item.collocated() if item.delays.size else item).rates for item in closed]
+    if sampled:
+        return gains, [np.linalg.eigvals(system.closed_matrix(float(gain))) for gain in gains]
+    return gains, [system.closed(float(gain)).collocated_poles() for gain in gains]
 
 
 def step_response(result: Loop) -> tuple[np.ndarray, np.ndarray]:

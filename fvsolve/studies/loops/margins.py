@@ -11,6 +11,7 @@ from fvsolve.studies.result_table import PlainData
 
 ReturnRatio = Callable[[np.ndarray], np.ndarray]  # frequencies [rad/s] -> L(j w)
 POLE = 1e6  # of |L| at the frequencies beside it: a greater |L| is a pole of L, at which its sign changes too
+ROOT_TURNS, ROOT_ROUNDING = 60, 1e-15  # greatest number of turns of a search; relative change at which it ends
 REAL = 1e-9  # of |L|: imaginary parts below are zero where L is real
 
 
@@ -44,15 +45,15 @@ def find_margins(ratio: ReturnRatio, w: np.ndarray, ends: dict[float, complex]) 
     values = ratio(w)
     phase = [(at, float(-1.0 / value.real)) for at, value in ends.items() if value.real < 0.0]
     gain = []
-    for k in np.flatnonzero(np.diff(np.signbit(values.imag))):
-        at = root(lambda x: ratio(x).imag, w[k], w[k + 1])
-        value = ratio(np.array([at]))[0]
+    turns = np.flatnonzero(np.diff(np.signbit(values.imag)))
+    places = roots(lambda x: ratio(x).imag, w[turns], w[turns + 1])
+    for k, at, value in zip(turns, places.tolist(), ratio(places), strict=True):
         pole = abs(value) > POLE * max(abs(values[k]), abs(values[k + 1]))
         if value.real < 0.0 and abs(value.imag) <= REAL * abs(value) and not pole:
             phase.append((at, float(-1.0 / value.real)))
-    for k in np.flatnonzero(np.diff(np.signbit(np.abs(values) - 1.0))):
-        at = root(lambda x: np.log(np.abs(ratio(x))), w[k], w[k + 1])
-        value = ratio(np.array([at]))[0]
+    turns = np.flatnonzero(np.diff(np.signbit(np.abs(values) - 1.0)))
+    places = roots(lambda x: np.log(np.abs(ratio(x))), w[turns], w[turns + 1])
+    for at, value in zip(places.tolist(), ratio(places), strict=True):
         if abs(abs(value) - 1.0) <= 1e-6:
             gain.append((at, float(np.degrees(np.angle(-value)))))
     nearest = min(phase, key=lambda pair: abs(np.log(pair[1])), default=(None, None))
@@ -64,14 +65,38 @@ def find_margins(ratio: ReturnRatio, w: np.ndarray, ends: dict[float, complex]) 
     return margins, np.array([pair[1] for pair in phase])
 
 
-def root(f: Callable[[np.ndarray], np.ndarray], low: float, high: float) -> float:
-    """Root of f between two frequencies at which it has unlike signs, but for rounding [rad/s]."""
-    from scipy.optimize import brentq
+def roots(f: ReturnRatio, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Roots of f between pairs of frequencies at which it has unlike signs, but for rounding [rad/s].
 
-    first, last = (float(f(np.array([x]))[0]) for x in (low, high))
-    if not first * last < 0.0:  # one of both is zero, or rounding
-        return low if abs(first) <= abs(last) else high
-    return float(brentq(lambda x: float(f(np.array([x]))[0]), low, high, xtol=4e-16 * high, rtol=1e-15))
+    Ridders' method for all pairs together. Of a pair with a zero, or with equal signs, it is the end with less |f|.
+    """
+    a, b = low.copy(), high.copy()
+    fa, fb = f(a), f(b)
+    found = np.where(np.abs(fa) <= np.abs(fb), a, b)
+    active = np.flatnonzero((fa < 0.0) & (fb > 0.0) | (fa > 0.0) & (fb < 0.0))
+    for _ in range(ROOT_TURNS):
+        if not active.size:
+            break
+        left, right, f_left, f_right = a[active], b[active], fa[active], fb[active]
+        middle = 0.5 * (left + right)
+        f_middle = f(middle)
+        size = np.maximum(np.abs(f_middle), np.maximum(np.abs(f_left), np.abs(f_right)))
+        root = np.sqrt((f_middle / size) ** 2 - (f_left / size) * (f_right / size))
+        x = middle + (middle - left) * np.sign(f_left - f_right) * (f_middle / size) / root
+        fx = f(x)
+        # three points divide the pair: the two that enclose the root stay
+        points = np.sort(np.stack([middle, x]), axis=0)
+        f_points = np.where(middle <= x, np.stack([f_middle, fx]), np.stack([fx, f_middle]))
+        is_left = np.sign(f_points) == np.sign(f_left)
+        a[active] = np.where(is_left[1], points[1], np.where(is_left[0], points[0], left))
+        fa[active] = np.where(is_left[1], f_points[1], np.where(is_left[0], f_points[0], f_left))
+        b[active] = np.where(is_left[1], right, np.where(is_left[0], points[1], points[0]))
+        fb[active] = np.where(is_left[1], f_right, np.where(is_left[0], f_points[1], f_points[0]))
+        moved = np.abs(x - found[active])
+        found[active] = x
+        near = (moved <= ROOT_ROUNDING * x) | (fx == 0.0) | (b[active] - a[active] <= ROOT_ROUNDING * x)
+        active = active[~(near | ~np.isfinite(fx))]
+    return found
 
 
 def closest(

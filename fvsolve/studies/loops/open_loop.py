@@ -10,17 +10,20 @@ from dataclasses import replace
 
 import numpy as np
 
+from fvsolve.assembly.control_rows import small_change
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.kernels.delay_lines import wave_history as history
 from fvsolve.parts.schedule import BLOCK_PREFIX
 from fvsolve.solve.held_inputs import hold
-from fvsolve.studies.linearise import linearise_at
+from fvsolve.studies.linearise import Linear, linearise_at
 from fvsolve.studies.loops.delay_system import DelaySystem
 from fvsolve.studies.operating_point import OperatingPoint, operating_point
 from fvsolve.studies.stability.delay_line_limits import reflected_share
-from fvsolve.units import show
+from fvsolve.units import DIMENSIONS, show
 
 MAX_STATES = 800  # greatest number of states
+SAME_OUTPUT = 1e-9  # distance of an output from its limit, relative to the range of the output, that is rounding
+ANOTHER_POINT = "Expected an output between its limits: another time (--at), initial output or setpoint"
 
 
 def block_of(case, name: str) -> str:
@@ -51,7 +54,6 @@ def open_loop(case, name: str, at: float | None) -> tuple[DelaySystem, Operating
     """
     own = f"{BLOCK_PREFIX}{name}.output"
     linear, system = delayed_system(case, None, own, own, at)
-    refuse_limit(linear.at, name)
     return system, linear.at
 
 
@@ -63,8 +65,10 @@ def delayed_system(case, set, input: str, output: str, at: float | None, before:
     delays = [key for key, block in case.controls.items() if block.control.kind == "delay"]
     probes = list(dict.fromkeys([output, *(f"{BLOCK_PREFIX}{key}.input" for key in delays)]))
     point = operating_point(case, set, at, before, probes, lines=True)
+    cut = input.removeprefix(BLOCK_PREFIX).removesuffix(".output") if input == output else None
+    refuse_limits(point, cut)
     inputs = list(dict.fromkeys([input, *(f"{BLOCK_PREFIX}{key}.output" for key in delays)]))
-    linear = linearise_at(point, inputs, len(probes))
+    linear = linear_with_names(point, inputs, len(probes))
     system = with_delays(linear, input, output, delay_blocks(point.model))
     if len(point.model.tables.delays):
         waves = [f"{BLOCK_PREFIX}{key}" for key in delay_blocks(point.model)]
@@ -73,15 +77,60 @@ def delayed_system(case, set, input: str, output: str, at: float | None, before:
     return linear, system
 
 
-def refuse_limit(point: OperatingPoint, name: str) -> None:
-    """Raise FvsolveError if the output of a control is at one of its limits, where its loop is open."""
-    number = point.model.block_names.index(name)
-    row = point.model.tables.controls[number]
-    flag, output = int(row["flag"]), float(point.outputs[number])
-    stopped = flag >= 0 and point.armed is not None and (point.armed[flag] > 0.0 or point.armed[flag + 2] > 0.0)
-    if stopped or row["period"] > 0.0 and not row["least"] < output < row["greatest"]:
-        raise FvsolveError(f"the output of controls.{name} is at a limit at {point.when}, so its loop is open. "
-                           "Expected another time (--at)")  # fmt: skip
+def outputs_at_limits(point: OperatingPoint) -> dict[str, float]:
+    """Controls whose output is at a limit, up to rounding : name -> limit; without those that only switch."""
+    result = {}
+    for k, (name, row) in enumerate(zip(point.model.block_names, point.model.tables.controls, strict=True)):
+        block, span = point.model.case.controls[name], row["greatest"] - row["least"]
+        for limit in (float(row["least"]), float(row["greatest"])):
+            size = span if np.isfinite(span) else max(abs(limit), small_change(block.dimensions[1]))
+            near = np.isfinite(limit) and abs(point.outputs[k] - limit) <= SAME_OUTPUT * size
+            if near and not block.control.switches:
+                result[name] = limit
+    return result
+
+
+def refuse_limits(point: OperatingPoint, cut: str | None) -> None:
+    """Raise FvsolveError if the output of the control `cut`, or of a delay, is at one of its limits.
+
+    There the loop is open, and a delay passes only a rise or only a fall.
+    """
+    for name, limit in outputs_at_limits(point).items():
+        block = point.model.case.controls[name]
+        if name == cut or block.control.kind == "delay":
+            effect = "so its loop is open" if name == cut else "so it passes only a rise or only a fall"
+            raise FvsolveError(f"the output of controls.{name} is at a limit, {limit_text(block, limit)}, at "
+                               f"{point.when}, {effect}. {ANOTHER_POINT}")  # fmt: skip
+
+
+def linear_with_names(point: OperatingPoint, inputs, outputs: int) -> Linear:
+    """Result of `linearise_at`, whose errors name the controls that are at a limit."""
+    try:
+        return linearise_at(point, inputs, outputs)
+    except FvsolveError as error:
+        if stopped := outputs_at_limits(point):
+            raise FvsolveError(f"{error}; at a limit: {at_limits(point, stopped)}. {ANOTHER_POINT}") from None
+        raise
+
+
+def at_limits(point: OperatingPoint, stopped: dict[str, float]) -> str:
+    """Text of controls and their limits; stopped : as from `outputs_at_limits`."""
+    return listing(f"controls.{key} ({limit_text(point.model.case.controls[key], stopped[key])})" for key in stopped)
+
+
+def limit_text(block, limit: float) -> str:
+    """Text of a limit of a control, with the SI unit of its output."""
+    unit = DIMENSIONS[block.dimensions[1]].si
+    return f"{limit:.6g}" + ("" if unit in ("", "-") else f" {unit}")
+
+
+def open_loop_error(point: OperatingPoint, name: str) -> FvsolveError:
+    """Error for a control whose output does not affect its input, with the controls that are at a limit."""
+    stopped = outputs_at_limits(point)
+    reason = f"; at a limit: {at_limits(point, stopped)}" if stopped else ""
+    remedy = ANOTHER_POINT if stopped else "Expected a control whose output affects its input"
+    text = f"the output of controls.{name} does not affect its input at {point.when}, so its loop is open"
+    return FvsolveError(f"{text}{reason}. {remedy}")
 
 
 def state_limit_error(count: int) -> FvsolveError:

@@ -9,6 +9,8 @@ times).
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, partial
@@ -20,9 +22,20 @@ from fvsolve.errors import FvsolveError, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.schedule import BLOCK_PREFIX
 from fvsolve.solve.held_inputs import hold
-from fvsolve.studies.linearise import linearise_at
-from fvsolve.studies.loops.open_loop import MAX_STATES, delay_blocks, refuse_limit, slope, state_limit_error
+from fvsolve.studies.loops.delay_system import EIGENVALUE_OPERATIONS, DelaySystem
+from fvsolve.studies.loops.open_loop import (
+    ANOTHER_POINT,
+    MAX_STATES,
+    WIDTHS,
+    at_limits,
+    delay_blocks,
+    linear_with_names,
+    outputs_at_limits,
+    refuse_limits,
+    state_limit_error,
+)
 from fvsolve.studies.operating_point import OperatingPoint, operating_point
+from fvsolve.studies.work_limit import DENSE_RATE, WorkLimit
 
 MOST_TICKS = 10_000  # samples in the common period
 RATIONAL = 10**6  # greatest denominator of a ratio of two periods
@@ -30,6 +43,10 @@ SAME = 1e-9  # of the common period: times closer than this are the same
 ARRIVE, TICK, SEND = range(3)  # events, in their order at one time
 SINGULAR = 1e12  # condition number of z - M above which L has a pole at z
 STABLE = 1e-13  # a spectral radius below 1 minus this is stable
+# a kink: sides that differ by this part of the quotient, alike at both widths, and by more than rounding of the value
+KINK, ALIKE, KINK_ROUNDING, LEAST_KINK = 1e-2, 0.25, 1e-6, 1e-12
+REMEDY = "use fewer cells, --set links.NAME.cells=..., or periods of the controls with a shorter common period"
+EXPONENTIAL_OPERATIONS = 40.0  # over n^3
 
 
 @dataclass(frozen=True)
@@ -48,7 +65,8 @@ class LoopEvent:
 class SampledLoop:
     """Loop of a control in a case with sampled controls; name : control at whose output the loop is cut.
 
-    Raises FvsolveError for a case that has no common period, and for delays of neither kind in the module docstring.
+    Raises FvsolveError for a case that has no common period, for delays of neither kind in the module docstring, and
+    TooLarge if the estimated time of its maps exceeds a limit.
     """
 
     def __init__(self, case, name: str, at: float | None) -> None:
@@ -62,10 +80,10 @@ class SampledLoop:
         own = f"{BLOCK_PREFIX}{name}.output"
         probes = list(dict.fromkeys([own, *(f"{BLOCK_PREFIX}{key}.input" for key in delays)]))
         self.point = operating_point(case, None, at, False, probes)
-        refuse_limit(self.point, name)
-        self.delays, self.flows = delay_blocks(self.point.model), {}
+        refuse_limits(self.point, name)
+        self.delays, self.flows, self.flows_gain = delay_blocks(self.point.model), {}, np.nan
         inputs = list(dict.fromkeys([own, *(f"{BLOCK_PREFIX}{key}.output" for key in (*self.sampled, *self.delays))]))
-        system = linearise_at(self.point, inputs, len(probes))
+        system = linear_with_names(self.point, inputs, len(probes))
         if len(system.states) > MAX_STATES:
             raise state_limit_error(len(system.states))
         self.a = system.a if isinstance(system.a, np.ndarray) else system.a.toarray()
@@ -89,6 +107,7 @@ class SampledLoop:
         for key in self.delays:  # w, then registers from the newest
             self.places[key], n = n + np.arange(1 + self.registers[key]), n + 1 + self.registers[key]
         self.size = n
+        self.work = WorkLimit(f"maps of {n} numbers with {len(self.events)} events", REMEDY)
 
     def feeds_states(self, key: str) -> bool:
         """True if the output of a delay drives states, or another delay, between samples."""
@@ -151,15 +170,18 @@ class SampledLoop:
         """Map of z over a length of time without events [s], with a factor `gain` on the output of the control."""
         from scipy.linalg import expm
 
-        if (gain, length) not in self.flows:
+        if gain != self.flows_gain:  # those of other gains are not needed again
+            self.flows, self.flows_gain = {}, gain
+        if length not in self.flows:
             n, rates = len(self.a), np.zeros((self.size, self.size))
             rates[:n, :n] = self.a
             for key in (*self.sampled, *self.delays):
                 rates[:n, self.places[key][0]] += self.factor(key, gain) * self.column[key]
             if self.name not in self.places:
                 rates[:n] += gain * np.outer(self.column[self.name], self.signal_row(self.name, gain))
-            self.flows[gain, length] = expm(rates * length)
-        return self.flows[gain, length]
+            self.work.spend(EXPONENTIAL_OPERATIONS * self.size**3 / DENSE_RATE)
+            self.flows[length] = expm(rates * length)
+        return self.flows[length]
 
     def signal_row(self, key: str, gain: float) -> np.ndarray:
         """Row of a signal, the input of a delay or the output of the control, as a function of z."""
@@ -172,28 +194,26 @@ class SampledLoop:
                 row += gain * value * self.signal_row(self.name, gain)
         return row
 
-    def jump(self, event: LoopEvent, gain: float) -> np.ndarray:
-        """Map of z at an event, with a factor `gain` on the output of the control."""
-        matrix, places = np.eye(self.size), self.places[event.control]
+    def apply_jump(self, event: LoopEvent, gain: float, z: np.ndarray) -> None:
+        """Multiply z : float64[size, m] by the map at an event, in place; gain : factor on the output."""
+        places, before = self.places[event.control], z[self.places[event.control]]
         if event.kind == ARRIVE:
-            matrix[places[0]] = 0.0
-            matrix[places[0], places[event.age]] = 1.0
+            z[places[0]] = before[event.age]
         elif event.kind == SEND:
-            matrix[places[1:]] = 0.0
-            matrix[places[2:], places[1:-1]] = 1.0
-            matrix[places[1]] = self.signal_row(event.control, gain)
+            sent = self.signal_row(event.control, gain) @ z
+            z[places[2:]] = before[1:-1]
+            z[places[1]] = sent
         else:
             by_state, by_number = self.differences[event.control]
-            matrix[places] = 0.0
-            matrix[places, : len(self.a)] = by_state
+            after = by_state @ z[: len(self.a)]
             for key, columns in by_number.items():
                 if key in self.places:
                     scaled = columns.copy()
                     scaled[:, 0] *= self.factor(key, gain)
-                    matrix[np.ix_(places, self.places[key][: columns.shape[1]])] += scaled
+                    after += scaled @ z[self.places[key][: columns.shape[1]]]
                 else:  # the output of the control, which is continuous
-                    matrix[places] += gain * np.outer(columns[:, 0], self.signal_row(self.name, gain))
-        return matrix
+                    after += gain * np.outer(columns[:, 0], self.signal_row(self.name, gain) @ z)
+            z[places] = after
 
     def matrix(self, gain: float = 1.0) -> np.ndarray:
         """Map of z over the common period, with a factor `gain` on the output of the control."""
@@ -201,7 +221,8 @@ class SampledLoop:
         for event in self.events:
             if event.time - now > SAME * self.period:
                 result, now = self.flow(gain, event.time - now) @ result, event.time
-            result = self.jump(event, gain) @ result
+                self.work.spend(2.0 * self.size**3 / DENSE_RATE)
+            self.apply_jump(event, gain, result)
         if self.period - now > SAME * self.period:
             result = self.flow(gain, self.period - now) @ result
         return result
@@ -232,12 +253,17 @@ class SampledLoop:
 
     def ratio(self, w: np.ndarray) -> np.ndarray:
         """Return ratio L(exp(j w h)) of a control that is sampled once in a period h; w : frequencies [rad/s]."""
-        place, z = self.places[self.name][0], np.exp(1j * np.asarray(w, float) * self.period)
-        matrices = z[:, None, None] * np.eye(self.size) - self.open_matrix
-        return -np.linalg.solve(matrices, np.broadcast_to(self.drive[:, None], (z.size, self.size, 1)))[:, place, 0]
+        return -self.open_system.response(np.exp(1j * np.asarray(w, float) * self.period))[:, 0, 0]
+
+    @cached_property
+    def open_system(self) -> DelaySystem:
+        """System with the transfer function -L(z) of a control that is sampled once."""
+        row = np.eye(1, self.size, self.places[self.name][0])
+        return DelaySystem(self.open_matrix, self.drive[:, None], row, np.zeros((1, 1)), 1, 1, np.zeros(0))
 
     def radius(self, gain: float) -> float:
         """Spectral radius of the map."""
+        self.work.spend(EIGENVALUE_OPERATIONS * self.size**3 / DENSE_RATE)
         return float(np.max(np.abs(np.linalg.eigvals(self.closed_matrix(gain)))))
 
     def real_ends(self) -> tuple[complex | None, complex | None]:
@@ -261,19 +287,7 @@ class SampledLoop:
             stable = [self.radius(gain) < 1.0 - STABLE for gain in gains]
             limits = [self.limit(*gains[k : k + 2]) for k in range(gains.size - 1) if stable[k] != stable[k + 1]]
         bounds = [0.0, *sorted({float(limit) for limit in limits}), np.inf]
-        inside = [gain_within(low, high) for low, high in zip(bounds, bounds[1:], strict=False)]
-        stable = [self.radius(gain) < 1.0 - STABLE for gain in inside]
-        if not any(stable):
-            return None, None
-        here = min((k for k in range(len(stable)) if stable[k]), key=lambda k: (
-            not bounds[k] <= 1.0 < bounds[k + 1], abs(np.log(inside[k]))))  # fmt: skip
-        first = here
-        while first > 0 and stable[first - 1]:
-            first -= 1
-        while here + 1 < len(stable) and stable[here + 1]:
-            here += 1
-        low, high = bounds[first], bounds[here + 1]
-        return low if low > 0.0 else None, high if high < np.inf else None
+        return nearest_range(bounds, lambda low, high: self.radius(gain_within(low, high)) < 1.0 - STABLE, distance_of)
 
     def limit(self, low: float, high: float) -> float:
         """Gain between two others at which the spectral radius is 1."""
@@ -288,6 +302,34 @@ class SampledLoop:
             values.append(-z[place])
             z = self.open_matrix @ z + self.drive * (1.0 + z[place])
         return self.period * np.arange(periods), np.array(values)
+
+
+def nearest_range(
+    bounds: list[float], stable: Callable[[float, float], bool], distance: Callable[[float, float], float]
+) -> tuple[float | None, float | None]:
+    """Ends of the range of gains around 1 that is stable, or of the nearest one that is; None for an open end.
+
+    bounds : rising gains from 0 to infinity, at which stability may change; stable : of an interval between two of them
+    distance : of an interval from the gain 1, where those at equal distances are searched from below
+    """
+    count = len(bounds) - 1
+    known = functools.cache(lambda k: stable(bounds[k], bounds[k + 1]))
+    here = next(k for k in range(count) if bounds[k] <= 1.0 < bounds[k + 1])
+    order = sorted(range(count), key=lambda k: (k != here, distance(bounds[k], bounds[k + 1])))
+    first = last = next((k for k in order if known(k)), None)
+    if first is None:
+        return None, None
+    while first > 0 and known(first - 1):
+        first -= 1
+    while last + 1 < count and known(last + 1):
+        last += 1
+    low, high = bounds[first], bounds[last + 1]
+    return low if low > 0.0 else None, high if high < np.inf else None
+
+
+def distance_of(low: float, high: float) -> float:
+    """Distance of a gain within an interval from 1, in logarithms."""
+    return abs(float(np.log(gain_within(low, high))))
 
 
 def gain_within(low: float, high: float) -> float:
@@ -385,18 +427,39 @@ def tick_differences(point: OperatingPoint, sampled: list[str], others: list[str
     y, base = point.y, point.discrete
     result = {}
     for due in sampled:
-        by_state = [slope(partial(after_state, after, due, y, base, j), model.scale[j]) for j in range(model.y_size)]
+        quotients = partial(checked_slope, point, due)
+        by_state = [
+            quotients(partial(after_state, after, due, y, base, j), scale) for j, scale in enumerate(model.scale)
+        ]
         state = np.array(by_state).reshape(-1, len(numbers[due])).T
         by_number = {}
         for name in sampled:
-            columns = [slope(partial(after_number, after, due, y, base, place), max(1.0, abs(float(base[place]))))
+            columns = [quotients(partial(after_number, after, due, y, base, place), max(1.0, abs(float(base[place]))))
                        for place in numbers[name]]  # fmt: skip
             by_number[name] = np.array(columns).T
         for name in others:
             size = max(1.0, abs(float(controls["held"][names.index(name)])))
-            by_number[name] = slope(partial(after_output, after, due, y, base, name), size)[:, None]
+            by_number[name] = quotients(partial(after_output, after, due, y, base, name), size)[:, None]
         result[due] = state, by_number
     return result
+
+
+def checked_slope(point: OperatingPoint, name: str, f: Callable[[float], np.ndarray], size: float) -> np.ndarray:
+    """Derivative at 0 of the numbers of a sampled control after a sample, by Richardson's differences.
+
+    size : of a small deviation of the argument of f. Raises FvsolveError if the slopes for a rise and a fall differ.
+    """
+    widths, base = np.array(WIDTHS)[:, None] * size, f(0.0)
+    rise, fall = (np.array([side * (f(side * w) - base) / w for w in widths[:, 0]]) for side in (1.0, -1.0))
+    sides, greatest = rise - fall, np.maximum(np.abs(rise), np.abs(fall))[1]
+    kink = (np.abs(sides[1]) > KINK * greatest) & (np.abs(sides[1] - sides[0]) <= ALIKE * np.abs(sides[1]))
+    if np.any(kink & (greatest * widths[1] > KINK_ROUNDING * np.abs(base) + LEAST_KINK)):
+        stopped = outputs_at_limits(point)
+        reason = f"; at a limit: {at_limits(point, stopped)}" if stopped else ""
+        raise FvsolveError(f"controls.{name} cannot be linearised at {point.when}: the slopes of its sample for a rise "
+                           f"and a fall differ{reason}. {ANOTHER_POINT}")  # fmt: skip
+    coarse, fine = 0.5 * (rise + fall)
+    return (4.0 * fine - coarse) / 3.0
 
 
 def after_state(after, due: str, y: np.ndarray, discrete: np.ndarray, j: int, h: float) -> np.ndarray:

@@ -314,10 +314,11 @@ def positive_real(numerator, denominator) -> Verdict:
     Exact conditions, after common factors are removed: no pole with Re s > 0 (Cauchy index), simple poles with positive
     real residue on the imaginary axis and at infinity, and Re N(jw) D(-jw) >= 0 for all w, with numerator N and
     denominator D (Sturm). Coefficients are whole numbers, fractions, text such as "0.1" or floats. A float is taken as
-    its binary fraction, so that 0.1 is not 1/10. Raises FvsolveError for invalid coefficients and for a zero
-    denominator.
+    its binary fraction, so that 0.1 is not 1/10. Raises FvsolveError for invalid coefficients, for a zero denominator,
+    and for so many digits that exact arithmetic takes minutes.
     """
     n, d = coefficients(numerator, "numerator"), coefficients(denominator, "denominator")
+    refuse_digits(n, d)
     if d.degree < 0:
         raise FvsolveError("the denominator is zero. Expected at least one coefficient other than 0")
     common = n.gcd(d)
@@ -340,6 +341,19 @@ def positive_real(numerator, denominator) -> Verdict:
         holds, strictly, lossless, (*reasons, *_hidden_text(hidden)), poles,
         tuple(axis), tuple(bands), tuple(zeros), hidden, n.coefficients[::-1] or (Fraction(0),), d.coefficients[::-1],
     )  # fmt: skip
+
+
+MOST_DIGITS = 50_000  # binary digits of the longest coefficient times the squared degree, about 10 s
+
+
+def refuse_digits(n: Polynomial, d: Polynomial) -> None:
+    """Raise FvsolveError if the degree and the digits of coefficients are too great for exact arithmetic."""
+    values = [part for x in (*n.coefficients, *d.coefficients) for part in (x.numerator, x.denominator)]
+    degree, digits = max(n.degree, d.degree), max((value.bit_length() for value in values), default=0)
+    if degree**2 * digits > MOST_DIGITS:
+        raise FvsolveError(f"coefficients of degree {degree} with up to {digits} binary digits take too long in exact "
+                           f"arithmetic. Expected {MOST_DIGITS // digits} or less for the squared degree: give rounded "
+                           "coefficients as texts, or the state-space form to state_positive_real")  # fmt: skip
 
 
 # poles ----------------------------------------------------------------------------------------------------------

@@ -27,14 +27,19 @@ from fvsolve.steppers import loop_records
 from fvsolve.steppers.tableau import Method
 from fvsolve.studies.operating_point import with_held_schedules
 from fvsolve.studies.outcome import study_model
-from fvsolve.studies.stability.growth import STEP_RATIO, StepLimit, bisect, bisect_limit
+from fvsolve.studies.stability.growth import STEP_RATIO, StepLimit, bisect, bisect_limit, prediction_limit
 from fvsolve.studies.stability.real_runs import SAFE_PARTS, RealRuns, fixed_step_loop, measure_limit
 from fvsolve.studies.stability.stability_row import StabilityRow
+from fvsolve.studies.work_limit import WorkLimit
 
 STENCIL_MARGIN = 4  # entries before the oldest reading, for its interpolation
 DERIVATIVE_STEP = 1e-6  # step of differences in units of the small deviation
 BAR_PRESSURE = 1e5  # pressure of a wave of unit size [Pa]
 GROWTH_ROUNDS = 2  # of all steps: first with random starts, then with their ends as starts
+CALLS_TIME, WAVE_TIME = 5e-5, 1e-6  # CPU time of a stage of a step, and of a past wave [s]
+REMEDY = (
+    "use a part of the network, or fewer cells; rates far above those of waves, as of a small chamber, need short steps"
+)
 VANISHED = 1e-100  # size of a deviation that has left the model
 
 
@@ -97,7 +102,10 @@ class DelayLineSystem:
         over the stages of matrix times arriving waves.
         """
         method, n, s = self.method, self.states.size, self.method.stages
-        inverse = np.linalg.inv(np.eye(s * n) - self.h * np.kron(method.a, self.a)) if n else np.zeros((0, 0))
+        inverse = np.zeros((0, 0))
+        if n:  # in the order of `growth.step_matrix`, then with all states of a stage together
+            inverse = np.linalg.inv(np.eye(s * n) - self.h * np.kron(self.a, method.a))
+            inverse = inverse.reshape(n, s, n, s).transpose(1, 0, 3, 2).reshape(s * n, s * n)
         weights = self.h * np.kron(method.b, np.eye(n)) @ inverse
         step = np.eye(n) + weights @ np.kron(np.ones((s, 1)), self.a)
         return step, [weights[:, i * n : (i + 1) * n] @ self.b for i in range(s)]
@@ -157,12 +165,14 @@ class DelayLineSystem:
         waves = self.weight[:, None, :, None] * history
         return np.sqrt(np.sum((self.energy_rows @ x) ** 2, axis=0) + np.sum(waves**2, axis=(0, 1, 2)))
 
-    def propagate(self, x: np.ndarray, history: np.ndarray, steps: int, threshold: float) -> tuple:
+    def propagate(
+        self, x: np.ndarray, history: np.ndarray, steps: int, threshold: float, work: WorkLimit | None = None
+    ) -> tuple:
         """Take up to `steps` steps with m deviations; ends when the growth of a deviation exceeds the threshold.
 
         Returns (greatest growth of each deviation : float64[m], number of steps after which a growth last increased,
         states at the end, past waves at the end).
-        x, history : states and past waves at the start, as in `size`
+        x, history : states and past waves at the start, as in `size`; work : spends the estimated time
         """
         K, m = self.history_steps, x.shape[1]
         past = np.zeros((K + steps + 2, *history.shape[1:]))
@@ -172,11 +182,23 @@ class DelayLineSystem:
         at_end = self.reading_weights(1.0)
         self.store_entry(past, K, x, self.arrivals(past, K - 1, at_end))
         first, size, after = self.size(x, history), np.ones(m), 0
+        stretches, reach = np.arange(self.delays.size), np.count_nonzero(self.weight, axis=0)
+        squares = np.sum(
+            (self.weight[:, None, :, None] * history) ** 2, axis=(0, 1)
+        )  # energy of the waves of a stretch
+        factor = self.weight.max(axis=0)[:, None] ** 2
+        if work is not None:
+            work.spend(propagation_time(self.method, K, self.delays.size, 0))
         for n in range(steps):
+            if work is not None:
+                work.spend(propagation_time(self.method, 0, 0, 1))
             arrivals = [self.node_arrivals(self.arrivals(past, K + n, reading)) for reading in readings]
             x = step @ x + sum((matrix @ w for matrix, w in zip(inputs, arrivals, strict=True)), np.zeros_like(x))
             self.store_entry(past, K + n + 1, x, self.arrivals(past, K + n, at_end))
-            growth = self.size(x, past[n + 1 : n + 1 + K]) / first
+            left = past[K + n - reach, :, stretches].swapaxes(0, 1)  # the sum changes by one entry at each end
+            squares += factor * np.sum(past[K + n] ** 2 - left**2, axis=0)
+            stored = np.sum((self.energy_rows @ x) ** 2, axis=0)
+            growth = np.sqrt(np.maximum(stored + squares.sum(axis=0), 0.0)) / first
             if not np.all(growth <= size):
                 size, after = np.fmax(size, growth), n + 1
             if not growth.max() <= threshold:
@@ -199,11 +221,12 @@ class DelayLineSystem:
         x = stored * np.array([1.0, 0.0, 1.0])
         return x, np.stack([equal, opposite, np.zeros_like(equal)], axis=-1)
 
-    def growth(self, steps: int, threshold: float) -> DelayedGrowth:
+    def growth(self, steps: int, threshold: float, work: WorkLimit | None = None) -> DelayedGrowth:
         """Greatest growth found within `steps` steps, a lower bound; nan for Rosenbrock methods (not modelled).
 
         The steps are taken twice: from the random deviations of `starts`, then from the deviations at the end of these
         steps, which are close to the deviation that grows most. The search ends if a growth exceeds the threshold.
+        work : spends the estimated time; raises TooLarge above its limit
         """
         start = self.starts()
         for _ in range(GROWTH_ROUNDS):
@@ -211,7 +234,7 @@ class DelayLineSystem:
             start = tuple(values[..., unit > VANISHED] / unit[unit > VANISHED] for values in start)
             if self.method.kind == "linear":
                 return DelayedGrowth(np.nan, 0, *(values[..., 0] for values in (*start, *start)))
-            size, after, *end = self.propagate(*start, steps, threshold)
+            size, after, *end = self.propagate(*start, steps, threshold, work)
             worst = int(np.argmax(np.nan_to_num(size, nan=np.inf)))
             growth = DelayedGrowth(float(size[worst]), after, *(values[..., worst] for values in (*start, *end)))
             if not size.max() <= threshold or not self.size(*end).min() > VANISHED:
@@ -230,6 +253,11 @@ class DelayLineSystem:
             shares[name] = shares.get(name, 0.0) + float(waves[first : last + 1].sum())
         part, total = max(shares, key=shares.get), sum(shares.values())
         return part, shares[part] / total if total > 0.0 else np.nan
+
+
+def propagation_time(method: Method, history_steps: int, stretches: int, steps: int) -> float:
+    """Estimated CPU time of `DelayLineSystem.propagate` [s]."""
+    return CALLS_TIME * (method.stages + 2) * steps + WAVE_TIME * history_steps * stretches
 
 
 def reflected_share(pipe, tau: float) -> float:
@@ -398,6 +426,7 @@ class DelayLineLimits:
         rows = self.base_model.tables.delays
         slowest = float((rows["tau"] * rows["stretches"]).max())
         self.far, self.first = TRAVEL_FACTOR * slowest, slowest / TRAVEL_PARTS
+        self.work = prediction_limit(self.base_model.y_size, steps, REMEDY)
         rates = self.system(self.first).a
         if rates.size:
             self.first = min(self.first, RATE_MARGIN / max(1e-300, float(np.linalg.norm(rates, 2))))
@@ -424,13 +453,16 @@ class DelayLineLimits:
         return with_held_schedules(model, model.case.numerics.start)
 
     def system(self, h: float) -> DelayLineSystem:
-        """Linear system that describes the model with steps of h [s]."""
+        """Linear system that describes the model with steps of h [s]; raises TooLarge if it has too many past waves."""
+        rows = self.base_model.tables.delays
+        longest = float((rows["tau"] * rows["stretches"]).max())
+        self.work.check(propagation_time(self.method, int(longest / h), len(rows), self.steps))
         return DelayLineSystem(self.model(h), self.method, h)
 
     def fails(self, h: float) -> bool:
         """True if the growth of a deviation exceeds the threshold, or the case is refused with steps of h [s]."""
         try:
-            return not self.system(h).growth(self.steps, self.threshold).size <= self.threshold
+            return not self.system(h).growth(self.steps, self.threshold, self.work).size <= self.threshold
         except CaseError as error:
             self.refused[h] = error.faults[0].message
             return True

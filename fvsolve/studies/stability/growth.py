@@ -4,23 +4,29 @@ The growth is the greatest norm of R(h J)^n over n <= N steps, in the energy nor
 the stability function R of the method. A step fails if the growth exceeds 1000.
 
 Arguments of several functions : e, Jacobian in coordinates of the energy norm [1/s]; steps, number of steps over which
-growth counts; threshold, growth above which a step fails; latest, time of the monotonic clock [s] from which
-`VectorGrowth` raises TooLarge; default: in 30 s
+growth counts; threshold, growth above which a step fails; work, `WorkLimit` that a prediction spends; default: a new
+limit
 """
 
 import functools
-import time
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fvsolve.errors import FvsolveError
 from fvsolve.steppers import stability_function
 from fvsolve.steppers.tableau import Method
+from fvsolve.studies.work_limit import CALL_TIME, DENSE_RATE, FEWER_CELLS, SPARSE_RATE, WorkLimit
 
+POWER_OPERATIONS = 4.0  # over n^3, of a power of a matrix and the check of its norm
+NORM_TURNS, NORM_ACCURACY = 20, 1.0 + 1e-6  # of a power iteration for a norm; greatest norm over its result
 BRACKET_WIDTH = 1e-4  # relative width of the final bracket
 STEP_RATIO = 1.3  # ratio of consecutive steps of the search upwards
+
+
+def prediction_limit(states: int, steps: int, remedy: str = FEWER_CELLS) -> WorkLimit:
+    """Limit of the time of a prediction of growth for this number of states over this number of steps."""
+    return WorkLimit(f"predictions for {states} states and {steps} steps", f"{remedy}, or use fewer --steps")
 
 
 class StepLimit(NamedTuple):
@@ -113,19 +119,55 @@ def step_matrix(method: Method, e: np.ndarray) -> np.ndarray:
             right = e + e @ sum((a[i, j] * stages[j] for j in range(i) if a[i, j] != 0.0), np.zeros((n, n)))
             stages.append(np.linalg.solve(np.eye(n) - a[i, i] * e, right) if a[i, i] != 0.0 else right)
     else:
-        solved = np.linalg.solve(np.eye(s * n) - np.kron(a, e), np.tile(e, (s, 1)))
-        stages = [solved[i * n : (i + 1) * n] for i in range(s)]
+        # the stages of a state stay together: in the other order pivots grew to 1e76 for a lossless pipe of 250 cells
+        solved = np.linalg.solve(np.eye(s * n) - np.kron(e, a), np.repeat(e, s, axis=0))
+        stages = [solved[i::s] for i in range(s)]
     return np.eye(n) + sum(b[i] * stages[i] for i in range(s))
 
 
+def step_operations(method: Method, n: int) -> float:
+    """Number of floating-point operations of `step_matrix` for n states."""
+    if method.explicit:
+        return 2.0 * n**3 * method.stages
+    if np.any(np.triu(method.a, 1)):
+        return (2.0 * method.stages + 2.0 / 3.0 * method.stages**3) * n**3 + 2.0 * method.stages**2 * n**3
+    return (2.0 + 8.0 / 3.0) * n**3 * method.stages
+
+
 def norm_exceeds(m: np.ndarray, threshold: float) -> bool:
-    """True if the 2-norm of the matrix m exceeds the threshold or is not finite; cheap bounds are checked first."""
+    """True if the 2-norm of the matrix m exceeds the threshold or is not finite; cheap bounds are checked first.
+
+    If these do not decide, t^2 - m^T m with the threshold t has a Cholesky factor only if the norm is less than t. This
+    takes less time than a product of two matrices, and singular values that of twenty.
+    """
     if not np.all(np.isfinite(m)):
         return True
     squares = np.einsum("ij,ij->j", m, m)
     if np.sum(squares) <= threshold**2:
         return False
-    return bool(np.max(squares) > threshold**2) or float(np.linalg.norm(m, 2)) > threshold
+    if np.max(squares) > threshold**2:
+        return True
+    try:
+        np.linalg.cholesky(threshold**2 * np.eye(m.shape[1]) - m.T @ m)
+    except np.linalg.LinAlgError:
+        return True
+    return False
+
+
+def norm_near(m: np.ndarray, v: np.ndarray) -> tuple[float, np.ndarray]:
+    """(2-norm of a matrix, to 1e-6; vector of norm 1 that it stretches most).
+
+    v : first vector of a power iteration, such as that of a similar matrix. If the iteration has not found the greatest
+    norm, singular values are computed.
+    """
+    for _ in range(NORM_TURNS):
+        turned = m.T @ (m @ v)
+        size = np.linalg.norm(turned)
+        if not 0.0 < size < np.inf:
+            break
+        v = turned / size
+    size = float(np.linalg.norm(m @ v))
+    return float(np.linalg.norm(m, 2)) if norm_exceeds(m, NORM_ACCURACY * size) else size, v
 
 
 CONSECUTIVE_POWERS = 64  # number of first and of last powers that are all checked; between, sixteen for each doubling
@@ -175,12 +217,13 @@ def matrix_powers(m: np.ndarray, steps: int, few: bool = False) -> Iterator[tupl
 def power_growth(m: np.ndarray, steps: int = STEPS) -> Growth:
     """Greatest 2-norm of the powers m^n over the n <= steps of `matrix_powers`, with its deviation (see `Growth`)."""
     size, after, greatest = 1.0, 0, np.eye(m.shape[0])
+    v = np.random.default_rng(5).standard_normal(m.shape[0])
     for n, power in matrix_powers(m, steps):
         if not np.all(np.isfinite(power)):
             size, after = np.inf, n
             break
-        if np.linalg.norm(power) > size:
-            norm = float(np.linalg.norm(power, 2))
+        if norm_exceeds(power, size):
+            norm, v = norm_near(power, v)
             if norm > size:
                 size, after, greatest = norm, n, power
     ends, _, starts = np.linalg.svd(greatest)
@@ -190,18 +233,44 @@ def power_growth(m: np.ndarray, steps: int = STEPS) -> Growth:
 class DenseGrowth:
     """Growth over the steps of one method on a small system, from powers of the step matrix.
 
-    e : float64[n, n]  Jacobian; size : its 2-norm
+    e : float64[n, n]  Jacobian; size : its 2-norm. Methods raise TooLarge if the estimated time exceeds its limit.
     """
 
-    def __init__(self, method: Method, e: np.ndarray, steps: int, threshold: float = THRESHOLD) -> None:
+    def __init__(
+        self, method: Method, e: np.ndarray, steps: int, threshold: float = THRESHOLD, work: WorkLimit | None = None
+    ) -> None:
         self.method, self.e, self.steps, self.threshold = method, e, steps, threshold
-        self.size = float(np.linalg.norm(e, 2))
+        self.size, self.work = float(np.linalg.norm(e, 2)), work or prediction_limit(e.shape[0], steps)
 
     def fails(self, h: float, few: bool = False) -> bool:
         """True if a power of the step matrix exceeds the threshold; few : only powers of two and the last power."""
-        m = self.matrix(h)
+        m, bound = self.matrix(h), 1.0
         with np.errstate(over="ignore", invalid="ignore"):
-            return any(norm_exceeds(power, self.threshold) for _, power in matrix_powers(m, self.steps, few))
+            for n, power in self.powers(m, few):
+                if norm_exceeds(power, self.threshold):
+                    return True
+                if few or n > CONSECUTIVE_POWERS:
+                    continue
+                if n & (n - 1) == 0 and self.stays_below(power, n, bound):
+                    return False
+                bound = max(bound, float(np.linalg.norm(power)))
+            return False
+
+    def stays_below(self, power: np.ndarray, n: int, bound: float) -> bool:
+        """True if no power up to the last exceeds the threshold, as ||m^(q n + r)|| <= ||m^n||^q ||m^r||.
+
+        power : m^n; bound : of the norms of all lower powers
+        """
+        if bound > self.threshold:
+            return False
+        self.work.spend(POWER_OPERATIONS * len(power) ** 3 / DENSE_RATE)
+        return not norm_exceeds(power, (self.threshold / bound) ** (n / self.steps))
+
+    def powers(self, m: np.ndarray, few: bool = False) -> Iterator[tuple[int, np.ndarray]]:
+        """Powers of `matrix_powers`, whose time is spent."""
+        for n, power in matrix_powers(m, self.steps, few):
+            self.work.spend(POWER_OPERATIONS * len(m) ** 3 / DENSE_RATE)
+            yield n, power
 
     def limit(self) -> StepLimit:
         """Limit of the step: first from few powers, which give an upper bound, then from all checked powers."""
@@ -221,7 +290,7 @@ class DenseGrowth:
     def failing_after(self, h: float) -> int:
         """First number of steps of h [s] in `matrix_powers` after which growth exceeds the threshold; 0 for none."""
         with np.errstate(over="ignore", invalid="ignore"):
-            powers = matrix_powers(self.matrix(h), self.steps)
+            powers = self.powers(self.matrix(h))
             return next((n for n, power in powers if norm_exceeds(power, self.threshold)), 0)
 
     def growth(self, h: float) -> Growth:
@@ -229,18 +298,20 @@ class DenseGrowth:
 
         Growth far above the threshold is inaccurate, because repeated squaring amplifies round-off.
         """
+        count = len(checked_powers(self.steps))
+        self.work.spend(2.0 * count * POWER_OPERATIONS * len(self.e) ** 3 / DENSE_RATE)
         with np.errstate(over="ignore", invalid="ignore"):
             return power_growth(self.matrix(h), self.steps)
 
     def matrix(self, h: float) -> np.ndarray:
         """Matrix of a step of h [s] : float64[n, n]."""
+        self.work.spend(step_operations(self.method, len(self.e)) / DENSE_RATE)
         with np.errstate(over="ignore", invalid="ignore"):
             return step_matrix(self.method, h * self.e)
 
 
 # vectors ----------------------------------------------------------------------------------------------------------
 
-TIME_LIMIT = 30.0  # time limit of a prediction [s]
 VECTORS, PASSES = 4, 4  # vectors in a block; passes forward and back
 NORM_MARGIN = 2.0  # greatest norm of a power over that of a random block, and over the root of the number of states
 
@@ -254,10 +325,10 @@ class VectorGrowth:
     """
 
     def __init__(
-        self, method: Method, e: Any, steps: int, threshold: float = THRESHOLD, latest: float | None = None
+        self, method: Method, e: Any, steps: int, threshold: float = THRESHOLD, work: WorkLimit | None = None
     ) -> None:
         self.method, self.e, self.steps, self.threshold = method, e.tocsr(), steps, threshold
-        self.latest = time.monotonic() + TIME_LIMIT if latest is None else latest
+        self.work = work or prediction_limit(e.shape[0], steps)
         self.transpose = e.T.tocsr()
         v = np.random.default_rng(2).standard_normal(e.shape[0])
         for _ in range(50):  # power iteration for the 2-norm
@@ -282,14 +353,14 @@ class VectorGrowth:
         """Greatest growth found with steps of h [s], and the deviation with this growth.
 
         The search ends when the growth exceeds a finite `enough`, or is so far below it after a pass that the norm of
-        no power can reach it. Raises TooLarge at the time limit.
+        no power can reach it. Raises TooLarge if the estimated time exceeds its limit.
         """
-        forth, back = step_function(self.method, h, self.e), step_function(self.method, h, self.transpose)
+        (forth, time), (back, _) = (step_function(self.method, h, e, self.work) for e in (self.e, self.transpose))
         v, unit = self.start_block, self.start_block[:, 0] / np.linalg.norm(self.start_block[:, 0])
         best = Growth(1.0, 0, unit, unit)
         for _ in range(PASSES):
             start = np.linalg.qr(v)[0]
-            size, steps, block = self.propagate(forth, start, enough)
+            size, steps, block = self.propagate(forth, time, start, enough)
             if steps == 0 or not np.isfinite(size):
                 return best if steps == 0 else best._replace(size=size, steps=steps)
             if size > best.size:
@@ -298,25 +369,21 @@ class VectorGrowth:
             if size > enough or size * NORM_MARGIN * np.sqrt(v.shape[0]) < enough < np.inf:
                 return best
             v = block
+            self.work.spend(steps * time)
             for _ in range(steps):
                 v = back(v)
         return best
 
-    def propagate(self, step: Callable, v: np.ndarray, enough: float) -> tuple[float, int, np.ndarray]:
+    def propagate(self, step: Callable, time: float, v: np.ndarray, enough: float) -> tuple[float, int, np.ndarray]:
         """(greatest norm of a block v of vectors over the steps, number of steps when it is reached, block then).
 
-        step : function that multiplies a block by the step matrix; enough : norm above which the steps end
+        step, time : function that multiplies a block by the step matrix, and its time [s]
+        enough : norm above which the steps end
         """
         size, steps, block, done = 1.0, 0, v, 0
         with np.errstate(over="ignore", invalid="ignore"):
             for n in checked_powers(self.steps):
-                if time.monotonic() > self.latest:
-                    raise TooLarge(
-                        f"{self.e.shape[0]} states and {self.steps} steps take longer than {TIME_LIMIT:g} s to predict"
-                        ": give pipes or basins fewer cells, --set links.NAME.cells=100 or nodes.NAME.cells=[20,20] "
-                        "(or, for pipes that state no cells, a greater numerics.cell_time; the limit as a Courant "
-                        "number changes little), or use fewer --steps"
-                    )
+                self.work.spend((n - done) * time + CALL_TIME)
                 for _ in range(n - done):
                     v = step(v)
                 done = n
@@ -330,15 +397,17 @@ class VectorGrowth:
         return size, steps, block
 
 
-class TooLarge(FvsolveError):
-    """Error: the prediction has taken longer than its time limit."""
+def step_function(
+    method: Method, h: float, e: Any, work: WorkLimit | None = None
+) -> tuple[Callable[[np.ndarray], np.ndarray], float]:
+    """(function that multiplies a block of vectors : float64[n, k] by the matrix of a step of h [s], its time [s]).
 
-
-def step_function(method: Method, h: float, e: Any) -> Callable[[np.ndarray], np.ndarray]:
-    """Function that multiplies a block of vectors : float64[n, k] by the matrix of a step of h [s]; e : Jacobian."""
+    e : sparse Jacobian. The time is an estimate for `VECTORS` vectors; work : spends that of factors
+    """
+    scaled, n, s = h * e, e.shape[0], method.stages
+    product_time = CALL_TIME + 2.0 * VECTORS * (e.nnz + n) / SPARSE_RATE
     if method.explicit:
         coefficients = [float(x) for x in stability_function(method).numerator.coefficients]
-        scaled = h * e
 
         def explicit(v: np.ndarray) -> np.ndarray:
             result = coefficients[-1] * v
@@ -346,30 +415,32 @@ def step_function(method: Method, h: float, e: Any) -> Callable[[np.ndarray], np
                 result = scaled @ result + x * v
             return result
 
-        return explicit
+        return explicit, s * product_time
     from scipy.sparse import eye_array, kron
     from scipy.sparse.linalg import splu
 
-    n, s = e.shape[0], method.stages
-    scaled = (h * e).tocsc()
-    factors = splu((eye_array(s * n) - kron(method.a, scaled)).tocsc())
+    scaled = scaled.tocsc()
+    factors = splu((eye_array(s * n) - kron(scaled, method.a)).tocsc())  # in the order of `step_matrix`
+    entries = factors.nnz
+    if work is not None:
+        work.spend(entries**2 / (s * n) / SPARSE_RATE)  # less than the sum of squares over the columns
 
     def implicit(v: np.ndarray) -> np.ndarray:
-        stages = factors.solve(np.tile(scaled @ v, (s, 1)))
-        return v + sum(method.b[i] * stages[i * n : (i + 1) * n] for i in range(s))
+        stages = factors.solve(np.repeat(scaled @ v, s, axis=0))
+        return v + sum(method.b[i] * stages[i::s] for i in range(s))
 
-    return implicit
+    return implicit, product_time + 2.0 * VECTORS * entries / SPARSE_RATE
 
 
 def growth_method(
-    method: Method, e: Any, steps: int = STEPS, threshold: float = THRESHOLD, latest: float | None = None
+    method: Method, e: Any, steps: int = STEPS, threshold: float = THRESHOLD, work: WorkLimit | None = None
 ) -> Any:
     """Object that computes the growth of deviations: `DenseGrowth` for up to 500 states, `VectorGrowth` for more."""
     if e.shape[0] <= DENSE:
-        return DenseGrowth(method, e if isinstance(e, np.ndarray) else e.toarray(), steps, threshold)
+        return DenseGrowth(method, e if isinstance(e, np.ndarray) else e.toarray(), steps, threshold, work)
     from scipy.sparse import csr_array
 
-    return VectorGrowth(method, csr_array(e), steps, threshold, latest)
+    return VectorGrowth(method, csr_array(e), steps, threshold, work)
 
 
 def predicted_limit(growth: Any) -> StepLimit:

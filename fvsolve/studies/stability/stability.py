@@ -7,7 +7,6 @@ this growth is the greatest norm of the powers R(h J)^n, with the Jacobian J and
 from __future__ import annotations
 
 import itertools
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -34,11 +33,10 @@ from fvsolve.studies.stability.growth import (
     DENSE,
     STEPS,
     THRESHOLD,
-    TIME_LIMIT,
     VECTORS,
-    TooLarge,
     growth_method,
     predicted_limit,
+    prediction_limit,
 )
 from fvsolve.studies.stability.real_runs import RealRuns, measure_limit
 from fvsolve.studies.stability.stability_row import (
@@ -49,6 +47,7 @@ from fvsolve.studies.stability.stability_row import (
     region_limit,
     row_from_json,
 )
+from fvsolve.studies.work_limit import TooLarge
 
 AUTO_NOTE = (
     f"auto starts with {automatic.EXPLICIT}, and its row is that of {automatic.EXPLICIT}; a run continues with "
@@ -290,10 +289,11 @@ class SchemeRows:
         For Euler it has also the limit of runs of ten times as many steps.
         """
         at = self.at(self.scheme)
-        limits, starts, left_out, latest = {}, {}, {}, time.monotonic() + TIME_LIMIT
+        limits, starts, left_out = {}, {}, {}
+        work = prediction_limit(at.model.y_size, self.steps)  # of all these predictions together
         try:
             for name, side in self.frozen_systems():
-                growth = growth_method(method, side.e, self.steps, self.threshold, latest)
+                growth = growth_method(method, side.e, self.steps, self.threshold, work)
                 limit = predicted_limit(growth)
                 limits[name] = limit.step
                 if 0.0 < limit.step < np.inf:

@@ -13,7 +13,8 @@ from fvsolve.steppers import analyse
 from fvsolve.steppers.tableau import Method
 from fvsolve.studies.linearise import ZERO_TOLERANCE
 from fvsolve.studies.operating_point import has_limiter
-from fvsolve.studies.stability.growth import TooLarge, bisect_limit
+from fvsolve.studies.stability.growth import bisect_limit
+from fvsolve.studies.work_limit import TooLarge
 
 
 @dataclass(frozen=True)
