@@ -11,7 +11,7 @@ import warnings
 from importlib import import_module
 from pathlib import Path
 
-from fvsolve.cli.streams import lasting_streams
+from fvsolve.cli.streams import safe_streams
 from fvsolve.errors import FvsolveError, visible
 
 __all__ = ["main"]
@@ -52,7 +52,7 @@ def main() -> None:
     or is open), memory is exhausted, or an internal error; 2 bad input, or standard output cannot be written;
     130 interrupted.
     """
-    with lasting_streams() as output:
+    with safe_streams() as output:
         try:
             run_command()
         except SystemExit as exit:

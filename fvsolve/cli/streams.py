@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 
-class LastingStream:
+class SafeStream:
     """Text stream that discards all text after its first error, so that a command finishes its work.
 
     error : that error, None without one
@@ -53,8 +53,8 @@ class LastingStream:
 
 
 @contextlib.contextmanager
-def lasting_streams() -> Iterator[LastingStream]:
-    """Context manager in which all standard streams exist and last; yields that of standard output."""
+def safe_streams() -> Iterator[SafeStream]:
+    """Context manager in which all standard streams exist and accept text; yields that of standard output."""
     before = sys.stdin, sys.stdout, sys.stderr
     for number in range(3):  # else the next file would take the number, and texts of libraries would go into it
         try:
@@ -67,7 +67,7 @@ def lasting_streams() -> Iterator[LastingStream]:
             if hasattr(stream, "reconfigure"):  # false if a caller has replaced the stream by another file object
                 stream.reconfigure(errors="backslashreplace")  # a terminal may have a small character set
         sys.stdin = sys.stdin or null
-        output, sys.stderr = LastingStream(sys.stdout or null), LastingStream(sys.stderr or null)
+        output, sys.stderr = SafeStream(sys.stdout or null), SafeStream(sys.stderr or null)
         sys.stdout = output
         try:
             yield output

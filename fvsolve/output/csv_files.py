@@ -95,10 +95,10 @@ def lines_of(path: Path, size: int) -> tuple[int, str]:
 def is_row_until(line: str, time: UnitColumn, t: float) -> bool:
     """True if the first number of a row is a time not after `t` [s]."""
     try:
-        found = float(time.to_si(float(line.partition(",")[0])))
+        row_time = float(time.to_si(float(line.partition(",")[0])))
     except ValueError:
         return False
-    return found <= t + 1e-9 * abs(t)
+    return row_time <= t + 1e-9 * abs(t)
 
 
 def read_headers(path: Path) -> list[tuple[str, str]]:

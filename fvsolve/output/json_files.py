@@ -41,10 +41,10 @@ def read_json(path: Path, remedy: str) -> Any:
 
 def refuse_faults(path: Path, faults: Iterator[str], remedy: str) -> None:
     """Raise RunError with the first faults of a file, if there are any; remedy : as for `read_json`."""
-    found = list(faults)
-    if found:
-        more = [f"and {len(found) - MOST_FAULTS} more"] if len(found) > MOST_FAULTS else []
-        raise RunError(f"{path}: {'; '.join(found[:MOST_FAULTS] + more)}. It seems that {AGAIN}; {remedy}")
+    texts = list(faults)
+    if texts:
+        more = [f"and {len(texts) - MOST_FAULTS} more"] if len(texts) > MOST_FAULTS else []
+        raise RunError(f"{path}: {'; '.join(texts[:MOST_FAULTS] + more)}. It seems that {AGAIN}; {remedy}")
 
 
 def faults_of(value: Any, kind: Any, place: str = "") -> Iterator[str]:
@@ -66,7 +66,7 @@ def faults_of(value: Any, kind: Any, place: str = "") -> Iterator[str]:
     elif kind is Any:
         yield from unreasonable_numbers(value, place)
     elif not fits(value, kind):
-        yield f"{place}{': ' if place else ''}{found_text(value)}. Expected {expected_text(kind)}"
+        yield f"{place}{': ' if place else ''}{value_and_type(value)}. Expected {expected_text(kind)}"
 
 
 def faults_of_record(value: dict, kind: Any, place: str) -> Iterator[str]:
@@ -87,7 +87,7 @@ def unreasonable_numbers(value: Any, place: str) -> Iterator[str]:
         for key, item in value.items() if isinstance(value, dict) else enumerate(value):
             yield from unreasonable_numbers(item, joined(place, key))
     elif type(value) in (int, float) and not fits(value, float):
-        yield f"{place}: {found_text(value)}. Expected a finite number"
+        yield f"{place}: {value_and_type(value)}. Expected a finite number"
 
 
 @functools.cache
@@ -109,7 +109,7 @@ def fits(value: Any, kind: Any) -> bool:
     if origin is typing.Literal:
         return isinstance(value, str) and value in inner
     if origin in (types.UnionType, typing.Union):
-        return any(fits(value, one) for one in inner)
+        return any(fits(value, part) for part in inner)
     if kind in (None, type(None)):
         return value is None
     if kind is float:
@@ -122,7 +122,7 @@ def fits(value: Any, kind: Any) -> bool:
     return kind in (str, bool) and type(value) is kind
 
 
-def found_text(value: Any) -> str:
+def value_and_type(value: Any) -> str:
     """Text of a value of a wrong type, and its type."""
     if type(value) is int and abs(value) >= GREATEST_WHOLE:
         return f"a whole number of more than {len(str(GREATEST_WHOLE))} digits"

@@ -11,7 +11,7 @@ from reference.scenes import still
 
 import fvsolve
 from fvsolve.cli import main
-from fvsolve.cli.streams import LastingStream, lasting_streams
+from fvsolve.cli.streams import SafeStream, safe_streams
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the shell of POSIX")
 FILES = ["case.toml", "history.csv", "history.png", "restart.npz", "summary.json"]
@@ -78,19 +78,19 @@ class Full(io.StringIO):
 
 
 def test_a_stream_discards_text_after_its_first_error():
-    stream = LastingStream(Full())
+    stream = SafeStream(Full())
     assert stream.write("abc") == 3 and stream.error.errno == errno.ENOSPC
     stream.writelines(["a", "b"])
     stream.flush()
     closed = io.StringIO()
     closed.close()
-    stream = LastingStream(closed)
+    stream = SafeStream(closed)
     assert stream.write("abc") == 3 and stream.error.errno == errno.EBADF
 
 
 def test_streams_are_restored(monkeypatch):
     before = sys.stdin, sys.stdout, sys.stderr
-    with pytest.raises(ZeroDivisionError), lasting_streams() as output:
+    with pytest.raises(ZeroDivisionError), safe_streams() as output:
         assert sys.stdout is output
         1 / 0  # noqa: B018
     assert (sys.stdin, sys.stdout, sys.stderr) == before
