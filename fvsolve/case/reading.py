@@ -269,7 +269,13 @@ def _copy(value: Any, keys: KeyPath = ()) -> Any:
 
 @functools.lru_cache(maxsize=4096)
 def split_key(key: str) -> tuple[str, ...]:
-    """Keys of a dotted path as in TOML, such as "links.valve.area"; a text that is not valid is split at its dots."""
+    """Keys of a dotted path as in TOML, such as "links.valve.area"; a text that is not valid is split at its dots.
+
+    Raises CaseError for more than `DEEPEST` keys.
+    """
+    if key.count(".") >= DEEPEST:
+        message = f"has more than {DEEPEST} names; expected at most {DEEPEST} levels of tables"
+        raise CaseError([Fault(show(key), message, override=True)])
     try:
         table: Any = tomllib.loads(f"{key} = 0") if "\n" not in key and "=" not in key else None
     except ValueError:
@@ -285,7 +291,7 @@ def split_key(key: str) -> tuple[str, ...]:
 
 
 def parsed(value: Any) -> Any:
-    if not isinstance(value, str):
+    if not isinstance(value, str) or text.find_long_key(f"value = {value}", DEEPEST) is not None:
         return value
     try:
         table = tomllib.loads(f"value = {value}")

@@ -85,6 +85,14 @@ def test_impossible_numbers_are_refused_by_name(key, value, tmp_path):
     assert error.value.faults[0].place.startswith(key)
 
 
+def test_overrides_of_many_names_are_refused(tmp_path):
+    (tmp_path / "case.toml").write_text(hostile_inputs.SCENE)
+    with pytest.raises(CaseError, match="has more than 40 names"):
+        fvsolve.load(tmp_path / "case.toml", set={"a." * 20_000 + "a": 1})
+    with pytest.raises(CaseError, match="links.main.length"):
+        fvsolve.load(tmp_path / "case.toml", set={"links.main.length": "{ " + "a." * 20_000 + "a = 1 }"})
+
+
 def test_zero_and_rounding_errors_are_numbers(tmp_path):
     (tmp_path / "case.toml").write_text(hostile_inputs.SCENE)
     for value in (0.0, -0.0, 5.6e-17, "-1e-16 m"):
