@@ -125,10 +125,10 @@ def test_rows_are_not_kept_in_memory(tmp_path):
     history = HistoryFile(tmp_path / "history.csv", UnitColumn("t", "time", "s"), columns)
     history.start()
     block = np.random.default_rng(1).random((1000, 4))
-    history.write(block[:, 0], block)
+    history.write(np.arange(1000.0), block)
     tracemalloc.start()
-    for _ in range(50):
-        history.write(block[:, 0], block)
+    for k in range(1, 51):
+        history.write(1000.0 * k + np.arange(1000.0), block)
     kept = tracemalloc.get_traced_memory()[0]
     tracemalloc.stop()
     history.close()

@@ -24,7 +24,7 @@ IN_NAMES = frozenset(
 IN_TEXTS = re.compile(
     r"\b(wanted|wants|is none|(?<!there )is no [a-z]+|are none|told|asked for|heeded|nobody|bears|meant)\b"
 )
-PUBLIC = frozenset({"what", "found", "told", "rungs", "kept"})  # fields of JSON files
+PUBLIC = frozenset({"what", "found", "told", "rungs", "kept", "why"})  # fields of JSON files
 OPENINGS = re.compile(r"(What|Which|Whether|That|As|The same)\b")
 
 
