@@ -424,6 +424,9 @@ def comma_text(text: str) -> str:
 
 
 def _parse_text(text: str, dimension: str) -> tuple[float, Unit | None]:
+    if len(text) > LONGEST_TEXT:
+        count = f"{len(text)} letters, more than a number with its unit"
+        raise ValueError(f"{show(text)} has {count}; {expected(dimension)}")
     match = _split(text.replace("\N{MINUS SIGN}", "-"))
     if match is None:
         raise ValueError(f"{show(text)} is not a number with a unit; {expected(dimension)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -380,6 +381,15 @@ def quantities_of(kind: Any) -> dict[str, str]:
 
 def only_dimension(quantity: str) -> str | None:
     """Dimension of a quantity in all types of parts; None if no type has it, or if the dimensions differ."""
-    kinds = [kind for group in KINDS.values() for kind in group.values()]
-    dimensions = {quantities_of(kind).get(quantity) for kind in kinds} - {None}
-    return dimensions.pop() if len(dimensions) == 1 else None
+    dimensions = _dimensions(tuple(kind for group in KINDS.values() for kind in group)).get(quantity, ())
+    return next(iter(dimensions)) if len(dimensions) == 1 else None
+
+
+@functools.cache
+def _dimensions(types: tuple[str, ...]) -> dict[str, set[str]]:
+    """Dimensions of each quantity in all types of parts; types : their names, to which a plugin may add."""
+    result: dict[str, set[str]] = {}
+    for kind in (kind for group in KINDS.values() for kind in group.values()):
+        for quantity, dimension in quantities_of(kind).items():
+            result.setdefault(quantity, set()).add(dimension)
+    return result

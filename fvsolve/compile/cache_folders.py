@@ -44,7 +44,6 @@ def cache_folder() -> Path:
     return _private_folder()
 
 
-@functools.cache
 def reading_folders() -> tuple[Path, ...]:
     """Folders from which cached data are read: `cache_folder`, and before it a preferred folder that is read-only."""
     return tuple(dict.fromkeys(folder for folder in (_preferred_folder(), cache_folder()) if folder.is_dir()))

@@ -26,7 +26,7 @@ def fault(path: Path) -> str:
 
 
 def fault_of(status: os.stat_result) -> str:
-    """As `fault`, for the result of `os.stat` or `os.fstat`."""
+    """Text on the owner and rights in a result of `os.stat`; "" if no other user can write. See `fault`."""
     if not CHECKED:
         return ""
     if status.st_uid not in (0, os.geteuid()):

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import fvsolve
-from fvsolve import jit
+from fvsolve import child_process, errors, jit
 from fvsolve.compile import cache_folders, store
 from fvsolve.steppers.run_handle import no_algebra
 
@@ -81,12 +81,13 @@ for function in (sum_of_squares, sum_of_cubes):
 
 @pytest.fixture
 def package(tmp_path):
-    """Small copy of the package: jit.py, the folder compile, and two compiled functions; the second calls the first."""
+    """Small copy of the package: what compiles, and two compiled functions; the second calls the first."""
     folder = tmp_path / "fvsolve"
     for room in (folder, folder / "kernels", folder / "steppers"):
         room.mkdir()
         (room / "__init__.py").touch()
-    shutil.copy(jit.__file__, folder)
+    for module in (jit, errors, child_process):
+        shutil.copy(module.__file__, folder)
     shutil.copytree(Path(store.__file__).parent, folder / "compile", ignore=shutil.ignore_patterns("__pycache__"))
     (folder / "kernels" / "law.py").write_text(LAW.format(factor=2.0))
     (folder / "steppers" / "loop.py").write_text(LOOP)

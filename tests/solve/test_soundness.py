@@ -368,7 +368,7 @@ def blown(step: float = 0.02, scheme: str = "muscl", **more) -> dict:
              "tap": valve("gate", "air", 0.02 * area(0.2), ramp(0.5, 0.1, 1.0, 0.0))}  # fmt: skip
     limits = {"top": {"on": "main", "maximum": "200 bar"}, "low": {"on": "main", "quantity": "head", "minimum": -1e3},
               "start": {"on": "main", "quantity": "head", "maximum": 40.0}}  # fmt: skip
-    claims = {text: {"value": 0.0, "atol": 1e60}
+    claims = {text: {"value": 0.0, "atol": 1e29}
               for text in ("max(gate.head)", "final(gate.head)", "max(main.head)", "mean(gate.head)")}  # fmt: skip
     numerics = {"scheme": scheme, "method": "ssp-rk2", "step": step}
     return scene(nodes, links, 5.0, numerics, ["gate.head", "lake.pressure"], limits=limits, expect=claims, **more)
@@ -390,7 +390,7 @@ def test_extremes_margins_and_claims_are_no_numbers(step: float, scheme: str) ->
     said = result.summary
     assert not result.ok and said["invalid_from"] is not None and said["invalid_from"] <= said["t"]
     heads = [one for key in ("extremes", "verdicts", "expectations") for one in numbers(said[key])]
-    assert max(map(abs, heads)) <= 1e60  # tolerance of the expectations
+    assert max(map(abs, heads)) <= 1e29  # tolerance of the expectations
     assert max(map(abs, numbers({name: one for name, one in said["extremes"].items() if "head" in name}))) < LARGEST
     assert {one.state for one in result.expectations} == {"open"}
     states = {one.name: one.state for one in result.verdicts}

@@ -297,7 +297,9 @@ def test_convert_is_the_inverse_and_counts_gauge_from_ambient():
 )
 def test_long_texts_are_refused_at_once(text):
     start = time.process_time()
-    with pytest.raises(ValueError, match="is not a number with a unit; expected a length") as caught:
+    with pytest.raises(
+        ValueError, match="(has [0-9]+ letters, more than|is not) a number with (its|a) unit; expected a length"
+    ) as caught:
         parse(text, "length")
     assert len(str(caught.value)) < 300 and time.process_time() - start < 5.0
 
