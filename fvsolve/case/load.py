@@ -30,6 +30,7 @@ from fvsolve.parts.table_model import read_keys
 from fvsolve.units import Kinematic, show
 
 SCHEMA = 1
+MOST_SCALARS = 500  # each has a value in each cell and at each node, and a default probe at each node
 PRESENCE_KEYS = ("required_pressure",)  # keys of parts whose presence alone changes the case
 # Tables with names that other tables refer to.
 NAME_TABLES = ("nodes", "links", "signals", "controls", "scalars", "reactions", "routes", "defaults")
@@ -259,7 +260,10 @@ def check_names(reading: Reading) -> None:
 def read_scalars(reading: Reading) -> dict[str, Any]:
     """Scalars by name, None for a faulty scalar."""
     result: dict[str, Any] = {}
-    for name, given in reading.group("scalars").items():
+    table = reading.group("scalars")
+    if len(table) > MOST_SCALARS:
+        reading.fault(("scalars",), f"has {len(table)} scalars; expected at most {MOST_SCALARS}")
+    for name, given in list(table.items())[:MOST_SCALARS]:
         result[name] = None
         with reading.catch("scalars", name):
             result[name] = Scalar.model_validate(given, context=reading.setting)
@@ -303,6 +307,7 @@ def check_unused_signals(reading: Reading) -> None:
         for dimension in dimensions:
             try:
                 Scheduled(dimension).read(given, reading.setting)
+                break
             except ValueError as error:
                 problems.append(error)
         if len(problems) == len(dimensions):

@@ -36,7 +36,8 @@ def test_drawn_inputs_do_no_harm(group, tmp_path):
 
 LONG = ["dots of a key", "quoted dots of a key", "dots of a header", "dots of an inline key", "unknown keys",
         "unknown parts", "blanks of a claim", "blanks after a claim", "blanks of a probe", "blanks of a unit",
-        "brackets", "digits", "digits in quotes", "empty lines", "formula", "parentheses"]  # fmt: skip
+        "brackets", "digits", "digits in quotes", "empty lines", "formula", "parentheses", "signals", "scalars",
+        "limits", "parts", "claims"]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", LONG)
