@@ -12,7 +12,7 @@ from typing import Any, TypedDict
 from fvsolve.case import Case, load, shipped
 from fvsolve.case.reading import read_toml, split_key
 from fvsolve.case.text import key_lines
-from fvsolve.errors import CaseError, Fault, FvsolveError, did_you_mean
+from fvsolve.errors import CaseError, Fault, FvsolveError, RunError, did_you_mean
 from fvsolve.file_replacement import replacing, write_file
 from fvsolve.output.directory import clear_reports
 from fvsolve.output.json_files import faults_of, read_json, refuse_faults
@@ -317,7 +317,11 @@ class ScenarioRun(Work):
         place = Path(task["directory"])
         case: Case = load(self.sent.source, task["keys"])
         place.parent.mkdir(parents=True, exist_ok=True)
-        result = run(case, out=place, force=self.force, resume=not self.force and place.exists())
+        resume = not self.force and place.exists()
+        if resume and (place / "case.toml").is_file() and load(place / "case.toml").step_keys != case.step_keys:
+            text = "holds a run with other time steps, and a study has no runs with mixed steps"
+            raise RunError(f"{place} {text}; repeat the study with --force")
+        result = run(case, out=place, force=self.force, resume=resume)
         if self.error and "peaks" not in result.summary:
             from fvsolve.studies.peak_error import peak_errors
 

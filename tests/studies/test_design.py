@@ -13,7 +13,7 @@ from reference.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, 
 
 import fvsolve
 from fvsolve.case.text import write
-from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.errors import CaseError, FvsolveError, RunError
 from fvsolve.output.summary_shape import HOLDS, OPEN, LimitVerdict
 from fvsolve.studies import optimise, scenarios
 from fvsolve.studies.sizing import SizeRun, SizeSearch, parse_range, parse_ties, size, size_run
@@ -81,6 +81,19 @@ def test_every_event_meets_every_protection_as_runs_of_their_own_do(study, tmp_p
     (tmp_path / "out" / "report.html").touch()  # report of the runs before
     scenarios.study(study, tmp_path / "out")
     assert not (tmp_path / "out" / "report.html").exists()
+
+
+def test_runs_of_a_study_have_the_same_steps(study, tmp_path) -> None:
+    study.write_text(FAST)
+    scenarios.study(study, tmp_path / "out")
+    for summary in (tmp_path / "out").glob("*/summary.json"):
+        summary.unlink()  # as if each run had been interrupted
+    assert scenarios.study(study, tmp_path / "out").ok
+    case = tmp_path / "main.toml"
+    case.write_text(re.sub(r"courant = [\d.]+", "courant = 0.4", case.read_text()))
+    with pytest.raises(RunError, match="holds a run with other time steps.*--force"):
+        scenarios.study(study, tmp_path / "out")
+    assert scenarios.study(study, tmp_path / "out", force=True).ok
 
 
 def test_processes_and_errors_change_no_verdict(study, tmp_path) -> None:
