@@ -2,15 +2,13 @@
 
 import difflib
 import re
-import time
-from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 LONGEST_NAME = 200  # length of a name above which it is not compared with others
-COMPARED: deque[float] = deque(maxlen=100)  # times at which the last names were compared with others [s]
+MOST_COMPARED = 500  # names that are compared with others for one error
 LONGEST_MESSAGE = 1500  # greatest length of the message of a fault; the rest is cut
 MOST_FAULTS = 50  # faults that a message lists; of further faults it states the number
 # Control characters, direction marks, line ends other than "\n", halves of surrogate pairs.
@@ -63,7 +61,16 @@ class Notice:
 
 
 class FvsolveError(Exception):
-    """Base class of all errors that fvsolve raises deliberately; `str` gives the message for the user."""
+    """Base class of all errors that fvsolve raises deliberately; `str` gives the message for the user.
+
+    compared : number of names that were compared with others since the last error, see `nearest`
+    """
+
+    compared: ClassVar[int] = 0
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        FvsolveError.compared = 0
 
 
 class CaseError(FvsolveError):
@@ -127,13 +134,12 @@ def visible(text: str) -> str:
 def nearest(name: str, names: Iterable[str]) -> str | None:
     """Valid name in `names` that is most similar to `name`; None if no name is similar.
 
-    Names longer than `LONGEST_NAME` are not compared. A comparison takes 0.1 ms, so of a hundred thousand names in a
-    second, as in a hostile file, only the first hundred are compared: messages list fewer.
+    Names longer than `LONGEST_NAME` are not compared. A comparison takes 0.1 ms, so of a hundred thousand names for one
+    error, as in a hostile file, only the first `MOST_COMPARED` are compared: its message lists fewer.
     """
-    now = time.monotonic()
-    if len(name) > LONGEST_NAME or len(COMPARED) == COMPARED.maxlen and now - COMPARED[0] < 1.0:
+    if len(name) > LONGEST_NAME or FvsolveError.compared >= MOST_COMPARED:
         return None
-    COMPARED.append(now)
+    FvsolveError.compared += 1
     names = [valid for valid in dict.fromkeys(names) if len(valid) <= LONGEST_NAME]
     folded = {other.casefold().replace("_", "-"): other for other in names}
     close = difflib.get_close_matches(name.casefold().replace("_", "-"), folded, n=1, cutoff=0.6)

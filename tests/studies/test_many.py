@@ -218,7 +218,7 @@ def timeless(found):
 
 
 def test_an_order_is_the_same(line):
-    asked = {"levels": 3, "cells": 8, "against": "finer"}
+    asked = {"levels": 3, "cells": 8, "reference": "finer"}
     alone, together = (plain(order(line, jobs=jobs, **asked).plain()) for jobs in (1, 2))
     assert timeless(together) == timeless(alone)
 
@@ -249,7 +249,7 @@ def test_rows_of_stability_are_the_same(line):
 @pytest.mark.parametrize(
     ("study", "asked"),
     [
-        (order, {"levels": 3, "cells": 8, "against": "finer"}),
+        (order, {"levels": 3, "cells": 8, "reference": "finer"}),
         (chart, {"schemes": ["upwind5"], "methods": ["rk4", "ssp-rk3"], "cells": [10, 20]}),
         (failure_map, {"schemes": ["upwind"], "methods": ["euler"], "courants": [0.5, 0.9, 1.5], "tolerance": 0.05}),
         (stability, {"schemes": ["upwind", "upwind5"], "methods": ["euler", "rk4"], "steps": 10}),
