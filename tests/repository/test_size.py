@@ -63,7 +63,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/parts": (18579, 49),
     "tests/reference": (3830, 36),
     "tests/report": (863, 4),
-    "tests/repository": (4573, 25),
+    "tests/repository": (4575, 25),
     "tests/schemes": (569, 2),
     "tests/solve": (2487, 12),
     "tests/step_limits": (1100, 5),
