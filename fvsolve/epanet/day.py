@@ -1,285 +1,380 @@
 """Translation of an EPANET network over a day: patterns as signals, controls and rules as blocks, no waves."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
-from fvsolve.epanet import part_tables
-from fvsolve.epanet.network_file import HourState
-from fvsolve.epanet.switching import Statement, Untranslatable, clause_of, opposite, relay_keys, schedule_keys
-from fvsolve.epanet.translating import US_UNITS, Translation
+from fvsolve.epanet import part_tables, switching
+from fvsolve.epanet.network_file import Link, Network, Node, Solution
+from fvsolve.epanet.switching import DAY, Clause, Source, Statement
+from fvsolve.epanet.translating import STALL_FLOW, Translation, initial_action
 
-DAY = 86400.0  # length of the run [s]
-DAY_LOSS = 1e-4  # loss coefficient of a valve that opens and shuts a link without loss in EPANET
 STEP_WIDTH = 1e-3  # difference of levels over which the area of a tank changes at a point of its volume curve [m]
 OPEN, CLOSED = 1.0, 0.0
-RULE_TOLERANCE, FOOT = 1e-3, 0.3048  # of levels in EPANET's rules, in the length unit of the file; foot [m]
+FILTER = "10 s"  # time constant with which a block reads a head or a flow, which would follow its own action at once
+# Set points of a regulating valve that a control holds open: heads of water [m], and a flow [m3/s]
+HELD_OPEN = {"PRV": 1e4, "PSV": -9.0, "FCV": 1e3}
+UNITS = {"PRV": "barg", "PSV": "barg", "FCV": "l/s"}
+
+Action = tuple[Any, ...]
 
 
 class DayTranslation(Translation):
     """Nodes, links, signals and controls of a case over a day, and notes on differences from EPANET.
 
-    network : network of WNTR; hour : EPANET's solution at hour 0
+    solution : EPANET's solution at hour 0; end : of the run [s]
     signals, controls : name -> table of the case file
     """
 
-    def __init__(self, network: Any, hour: HourState) -> None:
+    def __init__(self, network: Network, solution: Solution, end: float = DAY) -> None:
         self.signals: dict[str, part_tables.Part] = {}
         self.controls: dict[str, part_tables.Part] = {}
+        self.end = end
         # relays with outputs 0 and 1: (tank, level at which it turns on, and off, state at the start) -> name
         self.relays: dict[tuple[str, float, float, bool], str] = {}
-        self.inlets: dict[str, str] = {}  # EPANET's name of a tank -> junction before its altitude valve
-        self.step = float(network.options.time.pattern_timestep)
-        self.read_statements(network)
-        super().__init__(network, hour, 0.0, 0.0)
-        for tank, inlet in self.inlets.items():
-            self.altitude_valve(tank, inlet)
+        self.inlets: dict[tuple[str, str], str] = {}  # (tank, link) -> junction before its altitude valve
+        self.openings: dict[str, Any] = {}  # EPANET's name of a link -> value of its key `opening`
+        self.step = float(network.times["pattern_step"])
+        found, self.refused = switching.statements(network, end)
+        self.statements: dict[str, list[Statement]] = {}
+        for item in found:
+            self.statements.setdefault(item.link, []).append(item)
+        self.start_values = switching.values_at_start(network, solution)
+        for name, link in network.links.items():
+            self.start_values["open", name] = float(initial_action(link)[0] != "closed")
+        super().__init__(network, solution, 0.0, 0.0)
 
     # patterns -----------------------------------------------------------------------------------------------
 
     def times(self) -> list[float]:
-        """Times in the day at which patterns change, and its start [s]."""
-        first = self.step - self.clock % self.step
-        return [0.0, *(first + k * self.step for k in range(math.ceil((DAY - first) / self.step)))]
+        """Times in the run at which patterns change, and its start [s]."""
+        first = self.step - self.network.times["pattern_start"] % self.step
+        return [0.0, *(first + k * self.step for k in range(math.ceil((self.end - first) / self.step)))]
 
-    def scheduled(self, series: Any, unit: str, multiplier: float = 1.0) -> Any:
-        """Text or table of a schedule for a time series of EPANET: its base value times its pattern.
+    def scheduled(self, base: float, pattern: int, unit: str) -> Any:
+        """Text or table of a schedule for a base value times a pattern.
 
-        unit : "l/s", "m" or "" ; multiplier : factor on all values
+        pattern : its index, 0 for none; unit : "l/s", "m" or ""
         """
-
-        def text(value):
-            return part_tables.quantity_text(value, unit) if unit else part_tables.rounded_number(value)
-
-        base, pattern = multiplier * series.base_value, series.pattern
-        if pattern is None or not base:
+        text = quantity(unit)
+        if pattern <= 0 or not base:
             return text(base)
-        values = [float(pattern.at(t + self.clock)) for t in self.times()]
+        values = [self.network.pattern_at(pattern, at) for at in self.times()]
         if len(set(values)) == 1:
             return text(base * values[0])
-        name = f"pattern-{self.pattern_name(series.pattern_name)}"
-        self.signals[name] = step_table(self.times(), values)
-        return {"signal": name, "factor": text(base)}
+        return {"signal": self.pattern_signal(pattern, values), "factor": text(base)}
 
-    def pattern_name(self, name: str) -> str:
-        """Name of a pattern with the letters that a case file allows."""
-        return "".join(letter if letter.isalnum() or letter in "_-" else "_" for letter in name)
+    def pattern_signal(self, pattern: int, values: list[float] | None = None) -> str:
+        """Name of the signal of a pattern, which is added if it is new; values : those at `times`"""
+        name = "".join(letter if letter.isascii() and (letter.isalnum() or letter in "_-") else "_"
+                       for letter in self.network.patterns[pattern - 1][0])  # fmt: skip
+        name = f"pattern-{name}"
+        if name not in self.signals:
+            times = self.times()
+            self.signals[name] = step_table(times, values or [self.network.pattern_at(pattern, at) for at in times])
+        return name
 
     # nodes --------------------------------------------------------------------------------------------------
 
-    def junction(self, name: str, node: Any) -> part_tables.Part:
-        part = super().junction(name, node)
-        parts = [item for item in node.demand_timeseries_list if item.base_value]
-        part.pop("demand", None)
-        if len(parts) == 1:
-            demand = self.scheduled(parts[0], "l/s", self.multiplier)
-        else:
-            values = [node.demand_timeseries_list.at(t + self.clock, multiplier=self.multiplier) for t in self.times()]
-            demand = part_tables.quantity_text(values[0], "l/s")
-            if len(set(values)) > 1:
-                texts = [part_tables.quantity_text(value, "l/s") for value in values]
-                demand = step_table(self.times(), texts)
-        if parts:
-            self.demands[self.node_names.given[name]] = sum(item.base_value for item in parts)
-            part["demand"] = demand
-        return part
-
-    def reservoir(self, name: str, node: Any) -> part_tables.Part:
-        return super().reservoir(name, node) | {"head": self.scheduled(node.head_timeseries, "m")}
-
-    def tank(self, name: str, node: Any) -> part_tables.Part:
-        part = super().tank(name, node)
-        if node.vol_curve is not None:
-            part["area"] = area_table(node.vol_curve.points)
-            self.notes_by_text.pop("volume curve: replaced by the area at the initial level", None)
-        if getattr(node, "overflow", False):
+    def junction(self, node: Node) -> part_tables.Part:
+        part = part_tables.junction(self.elevation[node.name], 0.0, node.position)
+        network = self.network
+        amounts = [(base, network.demand_pattern(index)) for base, index in node.demands if base]
+        if not amounts:
             return part
-        del part["height"]
-        self.inlets[name] = self.node_names.new(f"{self.node_names.given[name]}-inlet")
-        self.nodes[self.inlets[name]] = part_tables.junction(self.elevation[name], 0.0, self.position(node))
+        if len({index for _, index in amounts}) == 1:
+            base = sum(base for base, _ in amounts)
+            part["demand"] = self.scheduled(base * self.option["multiplier"], amounts[0][1], "l/s")
+        else:
+            values = [network.demand_at(node, at) for at in self.times()]
+            texts = [part_tables.quantity_text(value, "l/s") for value in values]
+            part["demand"] = step_table(self.times(), texts) if len(set(texts)) > 1 else texts[0]
+        self.demands[self.node_names.given[node.name]] = sum(base for base, _ in amounts)
+        return part | self.pressure_keys(node, max(base for base, _ in amounts) > 0.0)
+
+    def reservoir(self, node: Node) -> part_tables.Part:
+        return super().reservoir(node) | {"head": self.scheduled(node.elevation, node.pattern, "m")}
+
+    def tank(self, node: Node) -> part_tables.Part:
+        part = super().tank(node)
+        if node.volume is not None:
+            part["area"] = area_table(node.volume)
+            self.notes_by_text.pop("volume curve: replaced by the area at the initial level", None)
+        if not node.overflow:
+            del part["height"]
+        name = self.node_names.given[node.name]
+        for link in self.network.links_at[node.name]:
+            inlet = self.inlets[node.name, link.name] = self.node_names.new(f"{name}-inlet")
+            self.nodes[inlet] = part_tables.junction(self.elevation[node.name], 0.0, node.position)
+            self.links[self.link_names.new(f"{name}-altitude")] = self.altitude_valve(node, link, (inlet, name))
         return part
 
-    def altitude_valve(self, name: str, inlet: str) -> None:
-        """Add the valve that shuts a tank when it is full or empty; inlet : junction before it"""
-        node, place = self.network.get_node(name), self.node_names.given[name]
-        pipes = [self.network.get_link(link) for link in self.network.get_links_for_node(name)]
-        diameter = max((pipe.diameter for pipe in pipes if pipe.link_type == "Pipe"), default=0.3)
-        valve = part_tables.valve((inlet, place), diameter, DAY_LOSS) | {"type": "altitude-valve"}
-        valve["full_level"] = part_tables.quantity_text(node.max_level, "m")
-        if node.min_level > 0.0:
-            valve["empty_level"] = part_tables.quantity_text(node.min_level, "m")
-        self.links[self.link_names.new(f"{place}-altitude")] = valve
+    def altitude_valve(self, node: Node, link: Link, ends: tuple[str, str]) -> part_tables.Part:
+        """Table of the valve that shuts a link at a full or an empty tank, as EPANET does for each link by itself."""
+        diameter = link.diameter if link.kind == "pipe" else self.bore(link)
+        valve = part_tables.valve(ends, diameter, 0.0) | {"type": "altitude-valve"}
+        if not node.overflow:
+            valve["full_level"] = part_tables.quantity_text(node.maximum, "m")
+        return valve | {"empty_level": part_tables.quantity_text(node.minimum, "m")}
 
     # links --------------------------------------------------------------------------------------------------
 
-    def ends(self, link: Any) -> tuple[str, str]:
-        names = (link.start_node_name, link.end_node_name)
-        return tuple(self.inlets.get(end, self.node_names.given[end]) for end in names)
+    def ends(self, link: Link) -> tuple[str, str]:
+        return tuple(self.inlets.get((end, link.name), self.node_names.given[end]) for end in (link.start, link.end))
 
-    def pipe(self, name: str, link: Any) -> part_tables.Part:
-        ends, ours = self.ends(link), self.link_names.given[name]
+    def pipe(self, link: Link) -> part_tables.Part:
+        ends, ours = self.ends(link), self.link_names.given[link.name]
         if link.check_valve:
-            place, last = self.node_before_end(name, link)
-            self.links[self.link_names.new(f"{ours}-check")] = (
-                part_tables.check_valve((place, last), link.diameter) | {"loss_coefficient": DAY_LOSS}
-            )  # fmt: skip
-            self.note("check valve: imported as a pipe with a check valve at its end", name)
+            place = self.junction_before_end(link)
+            self.links[self.link_names.new(f"{ours}-check")] = part_tables.check_valve((place, ends[1]), link.diameter)
+            self.note("check valve: imported as a pipe with a check valve at its end", link.name)
             ends = (ends[0], place)
-        elif (opening := self.opening(name, link)) != OPEN:
-            ends = (ends[0], self.shut_off(name, link, link.diameter, opening))
-        law = part_tables.friction(self.formula, link.roughness)
-        length = self.lengths[name] = self.length(link)
-        if length > link.length:
-            law = self.spread(name, link, length)
-            self.note(f"lengthened to {length:.4g} m; the friction loss is that of the original length", name)
-        part = part_tables.pipe(ends, length, link.diameter, law, link.minor_loss, 1.0)
+        elif (opening := self.opening(link.name)) != OPEN:
+            ends = (ends[0], self.shut_off(link, link.diameter, opening))
+        part = self.pipe_table(link, ends)
         del part["wave_speed"]
         return part
 
-    def pump(self, name: str, link: Any) -> part_tables.Part:
-        opening = self.opening(name, link)
+    def pump(self, link: Link) -> part_tables.Part:
+        opening, ends = self.opening(link.name), self.ends(link)
         if opening == CLOSED:
-            self.note("pump is always off: imported as a shut valve", name)
-            return part_tables.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
-        ends, given = self.ends(link), link.pump_type == "POWER"
+            self.note("pump is always off: imported as a shut valve", link.name)
+            return part_tables.valve(ends, self.bore(link), 0.0, opening=0.0)
+        if opening == OPEN and link.power is not None and abs(self.solution.flow[link.name]) < STALL_FLOW:
+            return self.stalled(link, ends)
         if opening != OPEN:
-            ends = (ends[0], self.shut_off(name, link, self.bore(link), opening))
-        law = part_tables.power(self.gravity * link.power) if given else part_tables.curve(link.get_pump_curve().points)
-        part = part_tables.pump(ends, law, 1.0)
-        own = self.statements.get(name, [])
-        speeds = [item for item in own if item.speed]
-        if not speeds:
-            return part | {"speed": self.scheduled(link.speed_timeseries, "")}
-        try:
-            values = sorted({item.value for item in speeds} | {link.base_speed})
-            if len(values) > 2:
-                raise Untranslatable("sets more than two speeds of a pump")
-            on = [(item.clause, item.value == values[-1]) for item in speeds]
-            speed = self.two_states(name, "speed", on, link.base_speed == values[-1], (values[0], values[-1]))
-        except Untranslatable as reason:
-            self.leave_out(speeds, str(reason))
-            speed = part_tables.rounded_number(link.base_speed)
-        return part | {"speed": speed}
+            ends = (ends[0], self.shut_off(link, self.bore(link), opening))
+        part = part_tables.pump(ends, self.head_law(link), 1.0)
+        if link.pattern > 0:
+            return part | {"speed": self.scheduled(1.0, link.pattern, "")}
+        begins = initial_action(link)
+        return part | {"speed": self.switched(link.name, "speed", "", speed_of, speed_of(begins) or 1.0)}
 
-    def valve(self, name: str, link: Any) -> part_tables.Part:
-        own = self.statements.get(name, [])
-        status = [item for item in own if not item.speed]
-        self.leave_out([item for item in own if item.speed], "sets a valve")
-        part = super().valve(name, link)
-        if link.valve_type in ("PBV", "GPV"):
-            self.note(f"{link.valve_type}: its loss coefficient is that of hour 0 all day", name)
-        if not status:
-            return part
-        if part["type"] != "valve":
-            self.leave_out(status, "opens or shuts a regulating valve")
-            return part
-        opening = self.opening(name, link)
-        return part if opening == OPEN else part | {"opening": opening}
+    def valve(self, link: Link) -> part_tables.Part:
+        kind, begins, own = link.kind, initial_action(link), self.statements.get(link.name, [])
+        settings = {action for item in own if (action := item.action)[0] != "closed"} - {begins}
+        opening, ends = self.opening(link.name), self.ends(link)
+        if kind in ("PBV", "GPV"):
+            self.note(f"{kind}: its loss coefficient is that of hour 0 all day", link.name, True)
+        if not settings or kind in ("PBV", "GPV"):
+            self.leave_out([item for item in own if item.action in settings], "sets a valve of this kind")
+            if opening == CLOSED or begins[0] == "closed":
+                begins = ("closed",) if opening == CLOSED else self.open_state(link)
+            if opening not in (OPEN, CLOSED):
+                ends = (ends[0], self.shut_off(link, self.valve_diameter(link), opening))
+            return self.valve_table(link, ends, begins)
+        if opening != OPEN:
+            ends = (ends[0], self.shut_off(link, self.valve_diameter(link), opening))
+        return self.set_valve(link, ends, begins)
 
-    def node_before_end(self, name: str, link: Any) -> tuple[str, str]:
-        """(new junction before the end of a link, node at this end), by their names in the case."""
-        return self.junction_before_end(name, link), self.ends(link)[1]
+    def open_state(self, link: Link) -> Action:
+        """State of a valve that begins closed, after an action opens it: active with its setting, or fixed open."""
+        opens = {item.action for item in self.statements.get(link.name, []) if item.action[0] != "closed"}
+        return ("open",) if ("open",) in opens else ("setting", link.setting)
 
-    def shut_off(self, name: str, link: Any, diameter: float, opening: Any) -> str:
+    def set_valve(self, link: Link, ends: tuple[str, str], begins: Action) -> part_tables.Part:
+        """Table of a valve whose setting follows controls or rules."""
+        kind = link.kind
+        if kind in part_tables.REGULATING:
+
+            def value_of(action: Action) -> float | None:
+                if action[0] == "closed":
+                    return None
+                return self.set_point(link, action[1]) if action[0] == "setting" else HELD_OPEN[kind]
+
+            first = begins if begins[0] != "closed" else self.open_state(link)
+            part = self.valve_table(link, ends, ("setting", link.setting))
+            if part["type"] == "valve":  # its setting is above every source
+                self.leave_out(self.statements[link.name], "sets a valve whose set head is above every source")
+                return part
+            key = "set_flow" if kind == "FCV" else "set_pressure"
+            return part | {key: self.switched(link.name, key, UNITS[kind], value_of, value_of(first))}
+
+        def opening_of(action: Action) -> float | None:
+            """Opening that gives the loss coefficient of a TCV, or the area of a PCV, over that at full opening."""
+            if action[0] == "closed":
+                return None
+            if kind == "PCV":
+                return 1.0 if action[0] == "open" else self.position_share(link, action[1])
+            return math.sqrt(least / max(action[1] if action[0] == "setting" else link.minor_loss, least))
+
+        losses = [item.action[1] for item in self.statements[link.name] if item.action[0] == "setting"]
+        least = max(min([*losses, link.setting]), link.minor_loss, part_tables.NO_LOSS)
+        first = begins if begins[0] != "closed" else self.open_state(link)
+        part = part_tables.valve(ends, link.diameter, least if kind == "TCV" else link.minor_loss)
+        return part | {"opening": self.switched(link.name, "setting", "", opening_of, opening_of(first))}
+
+    def shut_off(self, link: Link, diameter: float, opening: Any) -> str:
         """Add a valve at the end of a link that opens and shuts it; return the junction before the valve."""
-        place, last = self.node_before_end(name, link)
-        valve = part_tables.valve((place, last), diameter, DAY_LOSS)
-        self.links[self.link_names.new(f"{self.link_names.given[name]}-shut")] = valve | {"opening": opening}
-        self.note("opens and shuts by a valve at its end" if opening != CLOSED else "always shut, by a valve", name)
+        last = self.ends(link)[1]
+        place = self.junction_before_end(link)
+        valve = part_tables.valve((place, last), diameter, 0.0)
+        self.links[self.link_names.new(f"{self.link_names.given[link.name]}-shut")] = valve | {"opening": opening}
+        self.note(
+            "opens and shuts by a valve at its end" if opening != CLOSED else "always shut, by a valve", link.name
+        )
         return place
 
     # controls and rules ---------------------------------------------------------------------------------------
 
-    def read_statements(self, network: Any) -> None:
-        """Read what controls and rules do: statements for each link, by EPANET's name, in EPANET's order."""
-        self.statements: dict[str, list[Statement]] = {}
-        self.refused: list[tuple[str, str]] = []  # reason, name of the control or rule
-        clock = float(network.options.time.start_clocktime)
-        tolerance = RULE_TOLERANCE * (FOOT if network.options.hydraulic.inpfile_units in US_UNITS else 1.0)
-        for number, (_, control) in enumerate(network.controls(), start=1):
-            is_rule = type(control).__name__ == "Rule"
-            label = f"rule {control.name}" if is_rule else f"control {number}"
-            try:
-                clause = clause_of(control.condition, clock, DAY, tolerance if is_rule else 0.0)
-                actions = [(action, clause) for action in control._then_actions]
-                actions += [(action, opposite(clause)) for action in control._else_actions]
-            except Untranslatable as reason:
-                self.refused.append((str(reason), label))
-                continue
-            for action, when in actions:
-                link, attribute, value = action._target_obj, action._attribute, float(action._value)
-                speed = attribute in ("base_speed", "setting")
-                if speed and link.link_type == "Pump" and value == 0.0:
-                    speed = False
-                item = Statement(label, when, value, speed)
-                self.statements.setdefault(link.name, []).append(item)
-
     def leave_out(self, statements: list[Statement], reason: str) -> None:
         """Note controls and rules that are not imported."""
         for item in statements:
-            self.note(f"not imported, because it {reason}", item.label)
+            self.note(f"not imported, because it {reason}", item.label, True)
 
-    def opening(self, name: str, link: Any) -> Any:
+    def opening(self, name: str) -> Any:
         """Opening of a link over the day: 1, 0, a schedule, or a table that names a block."""
-        own = [item for item in self.statements.get(name, []) if not item.speed]
-        begins = str(link.initial_status) != "Closed"
-        if not own:
-            return OPEN if begins else CLOSED
-        return self.two_states(name, "opening", [(item.clause, item.value != 0.0) for item in own], begins, (0.0, 1.0))
+        if name not in self.openings:
+            begins = self.start_values["open", name]
+            self.openings[name] = {"control": self.link_names.given[name]}  # what a rule on its own state reads
+            self.openings[name] = self.switched(
+                name, "opening", "", lambda action: float(action[0] != "closed"), begins
+            )
+        return self.openings[name]
 
-    def two_states(self, name: str, key: str, actions: list, begins: bool, values: tuple[float, float]) -> Any:
-        """Value of a key that actions switch between two values: number, schedule, or table that names a block.
+    def switched(
+        self, name: str, key: str, unit: str, value_of: Callable[[Action], float | None], begins: float
+    ) -> Any:
+        """Value of a key that controls and rules switch: number or text, schedule, or table that names a block.
 
-        actions : pairs (clause, True if it sets the second value); begins : True if EPANET starts with the second value
+        value_of : action -> value in SI, None if the action leaves the key as it is; begins : value before hour 0 [SI]
         """
-        state = begins
-        for clause, on in actions:
-            state = on if clause.at_start(self.network) else state
-        output = [part_tables.rounded_number(value) for value in values]
+        actions = [(item.clause, value) for item in self.statements.get(name, ())
+                   if (value := value_of(item.action)) is not None]  # fmt: skip
+        text, value = quantity(unit), begins
+        values = {value for _, value in actions} | {begins}
+        if len(values) == 1:
+            return text(begins)
         if all(clause.intervals is not None for clause, _ in actions):
-            times, states = schedule_keys(actions, begins, DAY)
-            if len(times) == 1:
-                return output[states[0]]
-            return {"time": times, "value": [output[k] for k in states], "kind": "step"}
+            times, found = switching.schedule_keys(actions, begins, self.end)
+            return step_table(times, [text(item) for item in found]) if len(times) > 1 else text(found[0])
+        for clause, result in actions:
+            value = result if clause.holds(self.start_values) else value
         ours = self.link_names.given[name] + ("" if key == "opening" else f"-{key}")
-        probes = {tank: f"nodes.{place}.level" for tank, place in self.node_names.given.items()}
-        keys = relay_keys(actions)
+        if key == "opening":
+            self.start_values["open", name] = value
+        if len(values) == 2:
+            return self.two_states(ours, actions, value, sorted(values), text)
+        return self.many_states(ours, actions, value, sorted(values), text)
+
+    def two_states(
+        self, ours: str, actions: list[tuple[Clause, float]], value: float, values: list[float],
+        text: Callable[[float], Any],
+    ) -> part_tables.Part:  # fmt: skip
+        """Table that names a relay or latch between two values; ours : name of the block, value : that at the start"""
+        state, plain = value == values[1], values == [0.0, 1.0]
+        keys = switching.relay_keys(actions, values[1])
         if keys is not None:
             tank, on, off = keys
-            if (other := self.relays.get((tank, off, on, not state))) is not None and output == [0, 1]:
-                self.controls[ours] = {
-                    "type": "function",
-                    "inputs": {"other": f"controls.{other}"},
-                    "formula": "1 - other",
-                }
+            if plain and (other := self.relays.get((tank, off, on, not state))) is not None:
+                table = {"type": "function", "inputs": {"other": f"controls.{other}"}, "formula": "1 - other"}
+                self.controls[ours] = table
                 return {"control": ours}  # both switch at one time
-            if output == [0, 1]:
+            if plain:
                 other = self.relays.setdefault((tank, on, off, state), ours)
                 if other != ours:
                     return {"control": other}
-            block = {"type": "relay", "input": probes[tank], "on": part_tables.quantity_text(on, "m"),
+            block = {"type": "relay", "input": self.probe(("level", tank)), "on": part_tables.quantity_text(on, "m"),
                      "off": part_tables.quantity_text(off, "m")}  # fmt: skip
         else:
-            block = {"type": "latch"}
-            for side, word in ((True, "set"), (False, "reset")):
-                clauses = [clause for clause, on in actions if on is side]
-                block[word] = f"controls.{ours}-{word}"
-                self.controls[f"{ours}-{word}"] = function_table(clauses, probes)
+            block = self.latch(ours, actions, values[1])
         block["initial"] = int(state)
-        if output != [0, 1]:
-            block["output"] = output
+        if not plain:
+            block["output"] = [text(item) for item in values]
         self.controls[ours] = block
         return {"control": ours}
+
+    def many_states(
+        self, ours: str, actions: list[tuple[Clause, float]], value: float, values: list[float],
+        text: Callable[[float], Any],
+    ) -> part_tables.Part:  # fmt: skip
+        """Table that names a function of latches, one for each value; exactly one latch is on."""
+        names = {item: f"{ours}-{k + 1}" for k, item in enumerate(values)}
+        for item, latch in names.items():
+            self.controls[latch] = self.latch(latch, actions, item) | {"initial": int(item == value)}
+        inputs = {f"on_{k + 1}": f"controls.{latch}" for k, latch in enumerate(names.values())}
+        terms = [f"{in_si(item, text)!r}*{own}" for item, own in zip(values, inputs, strict=True)]
+        self.controls[ours] = {"type": "function", "inputs": inputs, "formula": " + ".join(terms)}
+        return {"control": ours}
+
+    def latch(self, ours: str, actions: list[tuple[Clause, float]], value: float) -> part_tables.Part:
+        """Table of a latch that is on from an action that sets a value until one that sets another value."""
+        sources = list(dict.fromkeys(source for clause, _ in actions for source in clause.sources))
+        names = {source: f"{source[0]}_{k + 1}" for k, source in enumerate(sources)}
+        formulas = switching.prevailing(actions, names)
+        others = [formula for item, formula in formulas.items() if item != value]
+        off = others[0] if len(others) == 1 else f"1 - {'*'.join(f'(1 - ({item}))' for item in others)}"
+        block: part_tables.Part = {"type": "latch"}
+        for word, formula in (("set", formulas.get(value, "0")), ("reset", off)):
+            block[word] = f"controls.{ours}-{word}"
+            self.controls[f"{ours}-{word}"] = self.function(formula, names)
+        return block
+
+    def function(self, formula: str, names: dict[Source, str]) -> part_tables.Part:
+        """Table of a `function` block; names : source -> its name in the formula"""
+        read = {source: name for source, name in names.items() if name in formula}
+        table: part_tables.Part = {"type": "function", "formula": formula}
+        if read:
+            table["inputs"] = {name: self.probe(source) for source, name in read.items()}
+        if any(source[0] in ("head", "flow") for source in read):
+            table["filter"] = FILTER
+        return table
+
+    def probe(self, source: Source) -> str:
+        """Probe of a source of a condition."""
+        kind, name = source
+        if kind == "open":
+            return self.opening_probe(name)
+        if kind == "flow":
+            return f"links.{self.link_names.given[name]}.flow"
+        return f"nodes.{self.node_names.given[name]}.{kind}"
+
+    def opening_probe(self, name: str) -> str:
+        """Name of a block whose output is the opening of a link, which is added for a constant or a schedule."""
+        opening = self.opening(name)
+        if isinstance(opening, dict) and "control" in opening:
+            return f"controls.{opening['control']}"
+        block = f"{self.link_names.given[name]}-open"
+        if isinstance(opening, dict):
+            times, values = [*opening["time"], 2.0 * self.end + 1.0], opening["value"]
+            spans = [(times[k], times[k + 1]) for k, value in enumerate(values) if value]
+            formula = switching.interval_clause(spans).text({})
+        else:
+            formula = f"{opening:g} + 0*t"
+        self.controls[block] = {"type": "function", "formula": formula}
+        return f"controls.{block}"
 
     @property
     def notes(self) -> list[tuple[str, list[str]]]:
         for reason, label in self.refused:
-            self.note(f"not imported, because it {reason}", label)
+            self.note(f"not imported, because it {reason}", label, True)
         return super().notes
 
-    def options(self, hydraulic: Any) -> None:
-        super().options(hydraulic)
+    def note_what_is_left(self) -> None:
+        super().note_what_is_left()
         if self.pressure_driven:
             self.note("demands that depend on pressure follow it at once", "PDA")
+
+
+def speed_of(action: Action) -> float | None:
+    """Relative speed that an action gives a pump: EPANET opens a pump with speed 1; None if the action stops it."""
+    if action[0] == "setting":
+        return action[1] or None
+    return 1.0 if action[0] == "open" else None
+
+
+def quantity(unit: str) -> Callable[[float], Any]:
+    """Function (value [SI]) -> its text in a unit, or its number without unit; heads of water [m] in "barg"."""
+    if unit == "barg":
+        return part_tables.gauge_pressure
+    return (lambda value: part_tables.quantity_text(value, unit)) if unit else part_tables.rounded_number
+
+
+def in_si(value: float, text: Callable[[float], Any]) -> float:
+    """Number of a value in a formula, in SI: an absolute pressure for a head of water in "barg"."""
+    if text is part_tables.gauge_pressure:
+        return part_tables.AMBIENT + part_tables.DENSITY * part_tables.GRAVITY * value
+    return value
 
 
 def step_table(times: list[float], values: list[Any]) -> part_tables.Part:
@@ -301,13 +396,3 @@ def area_table(points: list[tuple[float, float]]) -> part_tables.Part:
         area += [before, after]
     return {"level": [part_tables.rounded_number(z) for z in level],
             "area": [part_tables.rounded_number(a) for a in area]}  # fmt: skip
-
-
-def function_table(clauses: list, probes: dict[str, str]) -> part_tables.Part:
-    """Table of a `function` that is 1 where one of the clauses holds, else 0; probes : tank -> probe of its level"""
-    inputs = list(dict.fromkeys(tank for clause in clauses for tank in clause.tanks))
-    names = {tank: f"level_{k + 1}" for k, tank in enumerate(inputs)}
-    texts = [clause.text(names) for clause in clauses] or ["0"]
-    formula = texts[0] if len(texts) == 1 else f"1 - {'*'.join(f'(1 - {text})' for text in texts)}"
-    table = {"type": "function", "formula": formula}
-    return table | ({"inputs": {names[tank]: probes[tank] for tank in inputs}} if inputs else {})

@@ -3,12 +3,12 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from fvsolve.case import text
-from fvsolve.epanet.day import DAY, DayTranslation
-from fvsolve.epanet.network_file import read_network, state_at
+from fvsolve.epanet.day import DayTranslation
+from fvsolve.epanet.network_file import Network, Solution, read_network, solution_at
 from fvsolve.epanet.part_tables import DENSITY
+from fvsolve.epanet.switching import DAY
 from fvsolve.epanet.translating import Translation
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.parts.pipe.part import QUASI_STEADY
@@ -27,6 +27,8 @@ class Imported:
     text : text of the case file; nodes, links : EPANET's name -> name in the case
     notes : differences from EPANET, as a list of (text, EPANET's names)
     short_pipes : EPANET's names of pipes shorter than a cell, the shortest first
+    network : contents of the file; solution : EPANET's solution at the imported hour
+    causes : notes on what makes heads or flows differ from EPANET
     """
 
     text: str
@@ -34,15 +36,23 @@ class Imported:
     links: dict[str, str]
     notes: list[tuple[str, list[str]]]
     short_pipes: list[str]
+    network: Network
+    solution: Solution
+    causes: list[str]
 
 
 def import_network(
-    path: str | Path, hour: float = 0.0, wave_speed: float = 1200.0, shortest: float = 0.0, day: bool = False
+    path: str | Path,
+    hour: float = 0.0,
+    wave_speed: float = 1200.0,
+    shortest: float = 0.0,
+    day: bool = False,
+    duration: float = DAY,
 ) -> Imported:
     """Import an EPANET file with the state at an hour of EPANET's run, or for a day.
 
-    day : True for a run of 24 h from hour 0 with patterns, controls and rules, and with pipes that follow their losses
-    at once; the other arguments then have no effect
+    day : True for a run from hour 0 with patterns, controls and rules, and with pipes that follow their losses at once;
+    duration : of this run [s]; the other arguments then have no effect
     hour : time from the start of EPANET's run [h]; wave_speed : wave speed of every pipe [m/s]
     shortest : least length of a pipe in the case [m]; a shorter pipe is lengthened, and keeps the friction loss of its
     original length
@@ -51,17 +61,21 @@ def import_network(
     if not (math.isfinite(hour) and hour >= 0.0):
         raise FvsolveError(f"hour {hour:g} is not valid; expected hours from the start of EPANET's run, 0 or more")
     network = read_network(Path(path))
+    solution = solution_at(network, 0.0 if day else hour).solutions[0]
     if day:
-        daily = DayTranslation(network, state_at(network, 0.0))
-        text_of_day = _text(Path(path), network, daily, f"{Path(path).stem} over a day, from EPANET", _day_lines(daily))
-        return Imported(text_of_day, daily.node_names.given, daily.link_names.given, daily.notes, [])
-    time = cell_time([pipe.length for _, pipe in network.pipes()], wave_speed)
-    translation = Translation(network, state_at(network, hour), wave_speed, shortest)
-    lengths = translation.lengths
-    short = sorted((name for name, length in lengths.items() if length < wave_speed * time), key=lengths.get)
-    title = f"{Path(path).stem} at hour {hour:g}, from EPANET"
-    case_text = _text(Path(path), network, translation, title, _hour_lines(translation, time, short))
-    return Imported(case_text, translation.node_names.given, translation.link_names.given, translation.notes, short)
+        translation: Translation = DayTranslation(network, solution, duration)
+        title = f"{Path(path).stem} over {'a day' if duration == DAY else f'{duration / 3600.0:g} h'}, from EPANET"
+        lines, short = _day_lines(translation), []
+    else:
+        time = cell_time([link.length for link in network.links.values() if link.kind == "pipe"], wave_speed)
+        translation = Translation(network, solution, wave_speed, shortest)
+        lengths = translation.lengths
+        short = sorted((name for name, length in lengths.items() if length < wave_speed * time), key=lengths.get)
+        title = f"{Path(path).stem} at hour {hour:g}, from EPANET"
+        lines = _hour_lines(translation, time, short)
+    case_text = _text(Path(path), network, translation, title, lines)
+    names = translation.node_names.given, translation.link_names.given
+    return Imported(case_text, *names, translation.notes, short, network, solution, translation.causes)
 
 
 def cell_time(lengths: list[float], wave_speed: float) -> float:
@@ -72,20 +86,20 @@ def cell_time(lengths: list[float], wave_speed: float) -> float:
     return float(f"{max(CELL_TIME, sum(lengths) / wave_speed / MOST_CELLS):.2g}")
 
 
-def _text(path: Path, network: Any, translation: Translation, title: str, closing: list[str]) -> str:
+def _text(path: Path, network: Network, translation: Translation, title: str, closing: list[str]) -> str:
     """Text of the case file; closing : its lines after nodes and links"""
     lines = ["#:schema schema.json", "schema = 1", f"title = {text.inline(title)}"]
-    description = " ".join(line.strip() for line in network.title if line.strip())
+    description = " ".join(line.strip() for line in network.title)
     if description:
         lines.append(f"description = {text.inline(description)}")
     lines += [f"source = {text.inline(f'{path.name}, by fvsolve import')}"]
     lines += ["", "# Differences from EPANET:"] if translation.notes else []
     lines += [f"# - {note}: {listing(names, 60)}" for note, names in translation.notes]
-    density = DENSITY * network.options.hydraulic.specific_gravity
+    density = DENSITY * network.options["gravity"]
     lines += ["", "[fluid]", 'name = "Water"', 'temperature = "20 degC"', 'law = "linear"']
     lines.append(f'density = "{density:.10g} kg/m3"  # EPANET\'s weight of water')
     if translation.formula == "D-W":
-        lines.append(f'viscosity = "{1.022 * network.options.hydraulic.viscosity:.6g} cSt"')
+        lines.append(f'viscosity = "{1.022 * network.options["viscosity"]:.6g} cSt"')
     for group in ("nodes", "links"):
         lines += ["", f"[{group}]"]
         lines += [f"{name} = {text.inline(part)}" for name, part in getattr(translation, group).items()]
@@ -110,7 +124,7 @@ def _day_lines(translation: DayTranslation) -> list[str]:
     for group in ("signals", "controls"):
         if table := getattr(translation, group):
             lines += ["", f"[{group}]", *(f"{name} = {text.inline(part)}" for name, part in table.items())]
-    numerics = [f'end = "{DAY / 3600.0:g} h"', f'pipe_model = "{QUASI_STEADY}"', f"rtol = {DAY_RTOL:g}"]
+    numerics = [f'end = "{translation.end / 3600.0:g} h"', f'pipe_model = "{QUASI_STEADY}"', f"rtol = {DAY_RTOL:g}"]
     probes = f"probes = {text.inline(_probes(translation))}"
     output = [f'every = "{DAY_ROWS}"', probes, 'units = { flow = "l/s", pressure = "barg", time = "h" }']
     return [*lines, "", "[numerics]", *numerics, "", "[output]", *output]

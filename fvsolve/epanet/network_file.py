@@ -1,178 +1,339 @@
-"""EPANET files, read by WNTR, and EPANET's solution at an hour of its run."""
+"""EPANET files as a network, and EPANET's solution at an hour of its run, both read by EPANET's own toolkit."""
 
-import logging
+import importlib.util
+import json
+import math
 import re
 import subprocess
-import sys
-import tempfile
-import warnings
-from dataclasses import dataclass
+from collections import defaultdict
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from fvsolve.child_process import python_command, python_environment
+from fvsolve.epanet import toolkit_process
 from fvsolve.errors import FvsolveError
 
-ACCURACY, TRIALS = 1e-5, 200  # of EPANET's iteration; EPANET accepts no accuracy below 1e-5
-CLOSED = (0, 1, 2)  # status codes of closed links: pump beyond its head, full or empty tank, closed by a control
-LISTING_TIME = 60.0  # time limit for EPANET to list the faults of a file [s]
+TIME_LIMIT = 600.0  # of EPANET's process [s]
+FOOT = 0.3048
+US_UNITS = toolkit_process.US_UNITS
+# Remedies for EPANET's error codes (its manual, appendix B)
+REMEDIES = {
+    201: "expected the keywords and numbers of this section in EPANET 2.2, with decimal points",
+    202: "expected a number",
+    203: "expected a node of [JUNCTIONS], [RESERVOIRS] or [TANKS]",
+    204: "expected a link of [PIPES], [PUMPS] or [VALVES]",
+    205: "expected a pattern of [PATTERNS]",
+    206: "expected a curve of [CURVES]",
+    207: "a pipe with a check valve cannot be controlled; remove the control, or the check valve",
+    208: "expected a node that the file defines",
+    209: "expected a value in the range that EPANET's manual states",
+    211: "expected a value in the range that EPANET's manual states",
+    213: "expected a number above 0, or a keyword of this section",
+    215: "give each node and each link a name of its own",
+    219: "a PRV, PSV or FCV cannot be next to a tank or reservoir; add a short pipe",
+    220: "two such valves cannot share a node or be in series; add a pipe between both",
+    222: "give the link two different nodes",
+    223: "expected at least two nodes, one of them a tank or reservoir",
+    224: "add a tank or reservoir",
+    225: "expected a level between the minimum and maximum level of the tank",
+    226: "give the pump the keyword HEAD and a curve, or POWER",
+    227: "expected points with rising flow and falling head",
+    230: "expected points with rising first coordinates",
+    233: "join the node to a link, or remove it",
+}
 
 
 @dataclass(frozen=True)
-class HourState:
+class Node:
+    """A node of an EPANET file in SI.
+
+    kind : "junction", "reservoir" or "tank"; elevation : of a reservoir its head [m]; position : coordinates, or None
+    demands : list of (base demand [m3/s], index of its pattern or 0); emitter : flow [m3/s] at 1 m of water
+    pattern : index of the pattern of the head of a reservoir, or 0
+    level, minimum, maximum : levels of a tank above its bottom [m]; diameter [m]
+    volume : points (level [m], volume [m3]), or None; overflow : True if a full tank spills
+    """
+
+    name: str
+    kind: str
+    elevation: float
+    position: list[float] | None = None
+    demands: list[tuple[float, int]] = field(default_factory=list)
+    emitter: float = 0.0
+    pattern: int = 0
+    level: float = 0.0
+    minimum: float = 0.0
+    maximum: float = 0.0
+    diameter: float = 0.0
+    volume: list[list[float]] | None = None
+    overflow: bool = False
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link of an EPANET file in SI.
+
+    kind : "pipe", "pump" or the code of a valve; start, end : names of nodes
+    status : "open", "closed" or "active" before hour 0, a valve that is "open" or "closed" does not regulate
+    setting : relative speed of a pump, head of water [m] of PRV, PSV, PBV, flow [m3/s] of FCV, loss coefficient of TCV,
+    opening in percent of PCV; roughness : as in the file, with D-W [m]
+    curve : points of the head law of a pump (flow [m3/s], head [m]), of a GPV (flow [m3/s], loss [m]), of a PCV
+    (opening, share of the flow area)
+    power [W] : of a pump of constant power; pattern : index of the pattern of the speed
+    efficiency_curve : points (flow [m3/s], efficiency 0 to 1); price : per kWh; price_pattern : index
+    leak_area : of a pipe, as in the file
+    """
+
+    name: str
+    kind: str
+    start: str
+    end: str
+    status: str
+    length: float = 0.0
+    diameter: float = 0.0
+    minor_loss: float = 0.0
+    roughness: float = 0.0
+    check_valve: bool = False
+    leak_area: float = 0.0
+    setting: float = 0.0
+    power: float | None = None
+    curve: list[list[float]] | None = None
+    pattern: int = 0
+    efficiency_curve: list[list[float]] | None = None
+    price: float = 0.0
+    price_pattern: int = 0
+
+
+@dataclass(frozen=True)
+class Network:
+    """Contents of an EPANET file in SI.
+
+    options, times : as `toolkit_process.contents` names them, times in s
+    nodes, links : name -> node, link; patterns : list of (name, values); index 1 is the first
+    controls, rules : as `toolkit_process` reads them; rewritten : lines of EPANET 1 that were rewritten
+    """
+
+    path: Path
+    title: list[str]
+    units: str
+    options: dict[str, Any]
+    times: dict[str, int]
+    nodes: dict[str, Node]
+    links: dict[str, Link]
+    patterns: list[tuple[str, list[float]]]
+    controls: list[dict[str, Any]]
+    rules: list[dict[str, Any]]
+    rewritten: list[str]
+
+    @property
+    def us_units(self) -> bool:
+        """True if the units of the file are those of the United States."""
+        return self.units in US_UNITS
+
+    def tanks(self) -> list[Node]:
+        """Tanks, without reservoirs."""
+        return [node for node in self.nodes.values() if node.kind == "tank"]
+
+    @cached_property
+    def links_at(self) -> dict[str, list[Link]]:
+        """Name of a node -> its links."""
+        found = defaultdict(list)
+        for link in self.links.values():
+            for end in (link.start, link.end):
+                found[end].append(link)
+        return found
+
+    def pattern_at(self, index: int, seconds: float) -> float:
+        """Value of a pattern at a time of the run [s]; 1 for the index 0."""
+        if index <= 0:
+            return 1.0
+        values = self.patterns[index - 1][1]
+        return values[math.floor((seconds + self.times["pattern_start"]) / self.times["pattern_step"]) % len(values)]
+
+    def demand_pattern(self, index: int) -> int:
+        """Index of the pattern of a demand: the default pattern of the file for the index 0."""
+        return index or self.options["default_pattern"]
+
+    def demand_at(self, node: Node, seconds: float) -> float:
+        """Demand of a junction at a time of the run, from its patterns [m3/s]."""
+        amounts = (base * self.pattern_at(self.demand_pattern(index), seconds) for base, index in node.demands)
+        return self.options["multiplier"] * sum(amounts)
+
+
+@dataclass(frozen=True)
+class Solution:
     """EPANET's solution at a time of its run; each dictionary is EPANET's name -> value in SI.
 
-    seconds : time [s]; head, demand : of nodes [m], [m3/s]; flow : of links [m3/s]
-    status : EPANET's code of a link, see `CLOSED`
-    setting : EPANET's setting of a valve, or the relative speed of a pump
-    factor : Darcy friction factor of a pipe
+    seconds : time [s]; head, demand : of nodes [m], [m3/s], demand with the flow of emitters
+    flow, loss : of links [m3/s], [m]; open : of links, True if the link is not closed
+    setting : of valves as in `Link`, relative speed of pumps
     """
 
     seconds: float
     head: dict[str, float]
     demand: dict[str, float]
     flow: dict[str, float]
-    status: dict[str, int]
+    loss: dict[str, float]
+    open: dict[str, bool]
     setting: dict[str, float]
-    factor: dict[str, float]
 
 
-def wntr() -> Any:
-    """Import the package WNTR and return it. Raises FvsolveError with an installation hint if it is missing."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            import wntr
-    except ImportError as error:
-        raise FvsolveError(
-            f"EPANET files are read by WNTR, which is not installed ({error}); "
-            'try `pip install "fvsolve[epanet]"`, or `pip install wntr six`'
-        ) from None
-    logging.getLogger("wntr").setLevel(logging.CRITICAL)  # its warnings repeat our messages, or are no faults
-    return wntr
+@dataclass(frozen=True)
+class EpanetRun:
+    """EPANET's solutions at the times of a run, its warnings and its processor time [s]."""
+
+    solutions: list[Solution]
+    warnings: list[str]
+    cpu_time: float
 
 
-def read_network(path: Path) -> Any:
-    """Read an EPANET file as a network of WNTR.
+def is_installed() -> bool:
+    """True if EPANET's toolkit is installed."""
+    return importlib.util.find_spec("epanet") is not None
 
-    Raises FvsolveError with the faults that EPANET or WNTR finds, with their lines in the file if reported.
+
+def read_network(path: Path) -> Network:
+    """Read an EPANET file by EPANET's toolkit.
+
+    Raises FvsolveError with the faults that EPANET finds, each with its line in the file.
     """
-    package = wntr()
+    reply = ask(path, {"contents": True})
+    table = reply["contents"]
+    nodes = {entry["name"]: Node(**entry) for entry in table["nodes"]}
+    links = {entry["name"]: Link(**entry) for entry in table["links"]}
+    return Network(
+        path,
+        title=[readable(line) for line in table["title"]],
+        units=table["units"],
+        options=table["options"],
+        times=table["times"],
+        nodes=nodes,
+        links=links,
+        patterns=[(entry["name"], entry["values"]) for entry in table["patterns"]],
+        controls=table["controls"],
+        rules=table["rules"],
+        rewritten=reply.get("rewritten", []),
+    )
+
+
+def solution_at(network: Network, hour: float) -> EpanetRun:
+    """Run EPANET on the file of a network up to an hour, with all controls and rules; its state at that hour.
+
+    Raises FvsolveError if EPANET finds no solution, or has no results at the hour.
+    """
+    seconds = round(3600.0 * hour)
+    return run_epanet(network, seconds, None, [seconds])
+
+
+def run_epanet(network: Network, end: int, step: int | None, times: list[int]) -> EpanetRun:
+    """Run EPANET on the file of a network.
+
+    end : of the run [s]; step : hydraulic step [s], None for that of the file; times : of the solutions [s]
+    Raises FvsolveError if EPANET stops before the end.
+    """
+    reply = ask(network.path, {"solutions": [{"seconds": end, "step": step, "rows": times}]})
+    result = reply["solutions"][0]
+    if "error" in result:
+        raise FvsolveError(f"{network.path.name}: EPANET stops: {result['error']}")
+    solutions = [_solution(network, at, row) for at, row in zip(times, result["rows"], strict=True) if row is not None]
+    if len(solutions) < len(times):
+        missing = next(at for at, row in zip(times, result["rows"], strict=True) if row is None)
+        text = f"EPANET's run has no results at hour {missing / 3600.0:g}"
+        raise FvsolveError(f"{network.path.name}: {text}; try an earlier hour")
+    return EpanetRun(solutions, reply["warnings"], result["seconds"])
+
+
+def _solution(network: Network, seconds: int, row: dict[str, list[float]]) -> Solution:
+    """Solution from lists in the order of nodes and links."""
+    nodes, links = network.nodes, network.links
+    unit = {"PRV": "pressure", "PSV": "pressure", "PBV": "pressure", "FCV": "flow"}
+    factors = {"pressure": network.options["pressure_unit"], "flow": network.options["flow_unit"]}
+    setting = {}
+    for (name, link), value in zip(links.items(), row["setting"], strict=True):
+        setting[name] = value * factors.get(unit.get(link.kind, ""), 1.0)
+    return Solution(
+        float(seconds),
+        dict(zip(nodes, row["head"], strict=True)),
+        dict(zip(nodes, row["demand"], strict=True)),
+        dict(zip(links, row["flow"], strict=True)),
+        dict(zip(links, row["loss"], strict=True)),
+        {name: value > 0.0 for name, value in zip(links, row["status"], strict=True)},
+        setting,
+    )
+
+
+def ask(path: Path, request: dict[str, Any]) -> dict[str, Any]:
+    """Reply of EPANET's toolkit to a request on a file, from a process of its own, see `toolkit_process`.
+
+    Raises FvsolveError for a missing file or toolkit, for faults of the file, and if EPANET crashes or does not end.
+    """
+    if not is_installed():
+        raise FvsolveError(
+            "EPANET files are read by EPANET's toolkit, which is not installed; "
+            'try `pip install "fvsolve[epanet]"`, or `pip install owa-epanet`'
+        )
     if not path.is_file():
         raise FvsolveError(f"{path}: no such file; expected an EPANET network (.inp)")
-    network = None
+    if b"\0" in (head := path.read_bytes()[:4096]):
+        text = "expected the text file (.inp) that EPANET writes by File > Export > Network"
+        raise FvsolveError(f"{path.name} is not a text file, first bytes {head[:8]!r}; {text}")
+    command = python_command(str(Path(toolkit_process.__file__)), str(path.resolve()), json.dumps(request))
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            network, faults = package.network.WaterNetworkModel(str(path)), []
-    except Exception as error:  # WNTR raises any exception of its parser
-        faults = _clock_faults(path) or [_root_cause(error)]
-    listed = _listed_faults(package, path)  # also faults that WNTR ignores, for example an undefined pattern
-    if faults or listed:
-        raise FvsolveError(_fault_message(path, listed or faults, "EPANET" if listed else "WNTR"))
-    return network
-
-
-def state_at(network: Any, hour: float) -> HourState:
-    """Run EPANET on a network up to an hour, with all controls and rules; return its state at that hour.
-
-    The options of `network` for accuracy, trials, duration and report are changed.
-    Raises FvsolveError if EPANET rejects the network, finds no solution, or has no results at the hour.
-    """
-    package, seconds = wntr(), round(3600.0 * hour)
-    options = network.options
-    options.hydraulic.accuracy, options.hydraulic.trials = ACCURACY, max(TRIALS, options.hydraulic.trials)
-    options.time.duration, options.time.report_start = seconds, 0
-    options.time.report_timestep = seconds or options.time.hydraulic_timestep
-    options.time.statistic = "NONE"
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        simulator = package.sim.EpanetSimulator(network, reader=package.epanet.io.BinFile(convert_status=False))
-        try:
-            results = simulator.run_sim(file_prefix=str(Path(folder) / "net"), convergence_error=True)
-        except Exception as error:
-            report = Path(folder) / "net.rpt"
-            messages = _report_errors(report) or [_root_cause(error)]
-            raise FvsolveError(_fault_message(Path(network.name), messages, "EPANET")) from None
-    if seconds not in results.node["head"].index:
-        raise FvsolveError(f"{network.name}: EPANET's run has no results at hour {hour:g}; try an earlier hour")
-    rows = [
-        results.node["head"],
-        results.node["demand"],
-        *(results.link[key] for key in ("flowrate", "status", "setting", "friction_factor")),
-    ]
-    return HourState(float(seconds), *({str(k): v for k, v in row.loc[seconds].items()} for row in rows))
-
-
-def _root_cause(error: BaseException) -> str:
-    """Text of the innermost exception in a chain of causes, or of the innermost one with an error code of EPANET."""
-    chain = [error]
-    while chain[-1].__cause__ is not None:
-        chain.append(chain[-1].__cause__)
-    if isinstance(chain[-1], UnicodeDecodeError):
-        cause = chain[-1]
-        return (
-            f"byte {cause.object[cause.start]:#x} is not UTF-8 text (EPANET on Windows uses another encoding); "
-            "convert the file to UTF-8"
+        done = subprocess.run(
+            command, capture_output=True, timeout=TIME_LIMIT, check=False, env=python_environment(), cwd="/"
         )
-    coded = [link for link in chain if "(Error " in str(link)]
-    text = str(coded[-1] if coded else chain[-1]).replace("%s", "").replace(" ()", "")
-    if text[:1] == text[-1:] and text[:1] in "\"'":
-        text = text[1:-1]
-    if not coded and isinstance(chain[-1], KeyError):
-        text = f"unknown to WNTR: {text!r}"
-    return re.sub(r"\s+", " ", re.sub(r"^\(Error \d+\) ", "", text)).strip()
+    except subprocess.TimeoutExpired:
+        text = f"EPANET does not end within {TIME_LIMIT:g} s; expected a network that EPANET itself can run"
+        raise FvsolveError(f"{path.name}: {text}") from None
+    if done.returncode != 0:
+        last = done.stderr.decode("utf-8", "replace").strip().splitlines()
+        text = f"EPANET's toolkit stopped with code {done.returncode}" + (f" ({last[-1]})" if last else "")
+        raise FvsolveError(f"{path.name}: {text}; expected a file that EPANET can open")
+    reply = json.loads(done.stdout)
+    if reply["faults"]:
+        raise FvsolveError(fault_message(path, reply["faults"]))
+    return reply
 
 
-def _clock_faults(path: Path) -> list[str]:
-    """Faults of rules with a clock time that WNTR cannot read: an hour without minutes, such as 6 PM."""
-    rule, faults = "", []
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-        words = line.partition(";")[0].split()
-        rule = words[1] if len(words) > 1 and words[0].upper() == "RULE" else rule
-        if rule and (found := re.search(r"\bCLOCKTIME\s+\S+\s+(\d+) *([AP]M)\b", " ".join(words), re.IGNORECASE)):
-            hour, half = found.groups()
-            faults.append(f'rule {rule}: the time "{hour} {half}" has no minutes; write {hour}:00 {half}')
-    return faults
-
-
-def _fault_message(path: Path, faults: list[str], source: str) -> str:
-    """Message that lists every fault once; source : program that reported the faults"""
-    hints = {True: "; expected decimal points", False: ""}
-    faults = [f"{fault}{hints[bool(re.search(r'[0-9],[0-9]', fault))]}" for fault in dict.fromkeys(faults)]
-    head = f"{path.name}: {len(faults)} fault{'' if len(faults) == 1 else 's'}, reported by {source}"
+def fault_message(path: Path, reported: list[str]) -> str:
+    """Message that lists every fault once, with its line in the file and a remedy; reported : EPANET's own lines"""
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    places: dict[str, int] = {}
+    for number, line in enumerate(lines, start=1):
+        places.setdefault(" ".join(line.split()), number)
+    faults = [_fault(path, readable(item), places) for item in dict.fromkeys(reported)]
+    head = f"{path.name}: {len(faults)} fault{'' if len(faults) == 1 else 's'}, reported by EPANET"
+    if len(faults) >= MOST_FAULTS:
+        head += f" (it lists {MOST_FAULTS} faults at most)"
     return "\n".join([head, *(f"  {fault}" for fault in faults)])
 
 
-def _listed_faults(package: Any, path: Path) -> list[str]:
-    """Faults that EPANET lists for a file; empty if EPANET does not run.
-
-    EPANET runs in a second process, because a faulty file can crash its library.
-    """
-    library = package.epanet.toolkit.ENepanet(version=2.2).ENlib._name
-    with tempfile.TemporaryDirectory() as folder:
-        report = Path(folder) / "net.rpt"
-        call = [
-            sys.executable, "-I", "-S", "-c", _OPEN_SCRIPT, library, str(path), str(report),
-            str(Path(folder) / "net.bin"),
-        ]  # fmt: skip
-        try:
-            subprocess.run(call, capture_output=True, timeout=LISTING_TIME, check=False)
-        except (OSError, subprocess.SubprocessError):
-            return []
-        return _report_errors(report)
+MOST_FAULTS = 10
 
 
-_OPEN_SCRIPT = """
-import ctypes, os, sys
-engine = ctypes.CDLL(sys.argv[1])
-engine.ENopen(*(os.fsencode(name) for name in sys.argv[2:]))
-engine.ENclose()
-"""
+def _fault(path: Path, reported: str, places: dict[str, int]) -> str:
+    """Text of a fault; places : line of the file -> its first number"""
+    match = re.match(r"Error (\d+): (.*)", reported)
+    code, text = (int(match[1]), match[2]) if match else (0, reported)
+    place = ""
+    for at in range(len(text)):  # the line of the file stands at the end of the text
+        if text[at] == " " and (number := places.get(text[at + 1 :])) is not None:
+            place, text = f"{path.name}:{number}: ", f"{text[:at].rstrip(':')}: {text[at + 1 :]}"
+            break
+    remedy = REMEDIES.get(code, "")
+    return f"{place}{text}{f'; {remedy}' if remedy else ''}"
 
 
-def _report_errors(report: Path) -> list[str]:
-    """Texts of the errors in EPANET's report, such as `undefined curve c9 in [PUMPS] section: q r b HEAD c9`."""
-    text = report.read_text(encoding="utf-8", errors="replace") if report.is_file() else ""
-    matches = re.findall(r"^ *Error \d+: (.*(?:\n +\S.*)?)", text, re.MULTILINE)
-    messages = [re.sub(r"\s+", " ", item).strip() for item in matches]
-    return [item for item in messages if not item.startswith("one or more errors")]
+def readable(text: str) -> str:
+    """Text in which bytes that are not UTF-8 are read as Windows text (code page 1252)."""
+    return text.encode("utf-8", "surrogateescape").decode("utf-8") if text.isascii() else _decoded(text)
+
+
+def _decoded(text: str) -> str:
+    data = text.encode("utf-8", "surrogateescape")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")

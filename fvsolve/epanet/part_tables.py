@@ -5,11 +5,11 @@ from typing import Any
 
 Part = dict[str, Any]
 
-NO_LOSS = 0.01  # loss coefficient of an open valve without loss in EPANET: a case needs a positive one
+NO_LOSS = 1e-4  # loss coefficient of an open valve without loss in EPANET: a case needs a positive one
 TIME_CONSTANT = "5 s"  # of regulating valves: EPANET has none
 REGULATING = {"PRV": "pressure-reducing", "PSV": "pressure-sustaining", "FCV": "flow-control"}
 DENSITY = 999.563  # EPANET's density of water: 550 ft lbf/s / 8.814 per hp / gravity [kg/m3]
-GRAVITY = 9.80665
+GRAVITY, AMBIENT = 9.80665, 101325.0  # standard gravity [m/s2], ambient pressure of a case [Pa]
 
 
 def quantity_text(value: float, unit: str) -> str:

@@ -1,15 +1,22 @@
-"""Controls and rules of EPANET: conditions as formulas of levels and of the time, relays and schedules of switches."""
+"""Controls and rules of EPANET: conditions as formulas of levels, heads, flows and the time; relays and schedules."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import operator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from fvsolve.epanet.network_file import FOOT, Network, Solution
+
 DAY = 86400.0
 PULSE = 1.0  # time for which a condition holds that EPANET states for a moment [s]
+RULE_TOLERANCE = 1e-3  # of values in EPANET's rules, in the unit of the file
 
 Interval = tuple[float, float]
+# Input of a condition: ("level", tank), ("head", junction), ("flow", link) or ("open", link), by EPANET's names
+Source = tuple[str, str]
+Values = dict[Source, float]
 
 
 class Untranslatable(Exception):
@@ -20,148 +27,232 @@ class Untranslatable(Exception):
 class Clause:
     """Condition of a control or rule.
 
-    text : function (tank -> name of its level in the formula) -> formula that is 1 while it holds, else 0
-    holds : function (levels of tanks [m]) -> True if it holds at the start
-    tanks : EPANET's names of the tanks whose levels it reads
+    text : function (source -> its name in the formula) -> formula that is 1 while it holds, else 0
+    holds : function (values of sources) -> True if it holds at the start
+    sources : what it reads
     intervals : times [s] between which it holds, for a condition of the time alone; else None
     level : (tank, True if it holds above, level [m]) of a condition on the level of one tank; else None
     """
 
-    text: Callable[[dict[str, str]], str]
-    holds: Callable[[dict[str, float]], bool]
-    tanks: tuple[str, ...] = ()
+    text: Callable[[dict[Source, str]], str]
+    holds: Callable[[Values], bool]
+    sources: tuple[Source, ...] = ()
     intervals: tuple[Interval, ...] | None = None
     level: tuple[str, bool, float] | None = None
-
-    def at_start(self, network: Any) -> bool:
-        """True if it holds at the start; network : network of WNTR"""
-        return self.holds({name: tank.init_level for name, tank in network.tanks()})
 
 
 @dataclass(frozen=True)
 class Statement:
     """Action of a control or rule on a link.
 
-    label : name of the control or rule; value : status (0 closed, 1 open), or a speed if `speed` is True
+    label : name of the control or rule; link : EPANET's name
+    action : ("closed",), ("open",), ("active",) or ("setting", value in SI)
     """
 
     label: str
     clause: Clause
-    value: float
-    speed: bool
+    link: str
+    action: tuple[Any, ...]
 
 
-def clause_of(condition: Any, clock: float, end: float, tolerance: float) -> Clause:
-    """Clause of a condition of WNTR; raises Untranslatable.
+def statements(network: Network, end: float) -> tuple[list[Statement], list[tuple[str, str]]]:
+    """Actions of all controls and rules, and those that have no form in a case as (reason, name of the control).
 
-    clock : clock time at the start of the run [s after midnight]; end : end of the run [s]
-    tolerance : of levels [m], by which EPANET's rules are early for > and <, and late for >= and <=
+    end : end of the run [s]. The last of all actions on a link that hold at one time prevails: EPANET applies controls
+    in their order; rules act more often, that of the highest priority prevails, and the first of equal priority.
     """
-    kind = type(condition).__name__
-    if kind in ("AndCondition", "OrCondition"):
-        return combined(
-            kind == "AndCondition", *(clause_of(part, clock, end, tolerance) for part in parts_of(condition))
+    found, refused = [], []
+    for number, control in enumerate(network.controls, start=1):
+        label = f"control {number}"
+        try:
+            clause = control_clause(network, control, end)
+            found.append(Statement(label, clause, control["link"], tuple(control["action"])))
+        except Untranslatable as reason:
+            refused.append((str(reason), label))
+    for _, rule in sorted(enumerate(network.rules), key=lambda item: (item[1]["priority"], -item[0])):
+        label = f"rule {rule['name']}"
+        try:
+            clause = rule_clause(network, rule["premises"], end)
+        except Untranslatable as reason:
+            refused.append((str(reason), label))
+            continue
+        for side, when in (("else", opposite(clause)), ("then", clause)):
+            found += [Statement(label, when, link, tuple(action)) for link, action in reversed(rule[side])]
+    return found, refused
+
+
+def control_clause(network: Network, control: dict[str, Any], end: float) -> Clause:
+    """Clause of a simple control; raises Untranslatable. A level equal to that of the control counts."""
+    if control["kind"] == "time":
+        return time_clause("=", [float(control["level"])], (0.0, 0.0), end)
+    if control["kind"] == "clock":
+        return time_clause("=", daily_moments(network, control["level"], end), (0.0, 0.0), end)
+    relation = "<=" if control["kind"] == "below" else ">="
+    node = network.nodes[control["node"]]
+    if node.kind == "tank":  # EPANET states the level of a tank, or the pressure of a junction
+        return value_clause(("level", node.name), relation, control["level"])
+    if node.kind == "junction":
+        head = node.elevation + control["level"] / network.options["gravity"]
+        return value_clause(("head", node.name), relation, head)
+    raise Untranslatable("acts by the level of a reservoir, which does not follow from the network")
+
+
+def rule_clause(network: Network, premises: list[dict[str, Any]], end: float) -> Clause:
+    """Clause of the premises of a rule; raises Untranslatable.
+
+    EPANET reads the premises in their order: each `AND` begins a new group, and a rule holds if one premise of each
+    group holds. So `A AND B OR C` is A AND (B OR C).
+    """
+    groups: list[list[Clause]] = []
+    for premise in premises:
+        clause = premise_clause(network, premise, end)
+        if premise["or"] and groups:
+            groups[-1].append(clause)
+        else:
+            groups.append([clause])
+    return combined(True, [combined(False, group) for group in groups])
+
+
+def premise_clause(network: Network, premise: dict[str, Any], end: float) -> Clause:
+    """Clause of a premise of a rule; raises Untranslatable."""
+    variable, relation, value, name = (premise[key] for key in ("variable", "relation", "value", "name"))
+    if premise["object"] == "system":
+        if variable == "time":
+            return time_clause(relation, [float(value)], (2.0 * end, 2.0 * end), end)
+        if variable == "clocktime":
+            since = float(value) % DAY  # midnight
+            return time_clause(relation, daily_moments(network, since, end), (since, DAY - since), end)
+        raise Untranslatable(f"acts by the {variable} of the whole system")
+    if premise["object"] == "node":
+        return node_clause(network, network.nodes[name], variable, relation, value)
+    if variable == "status" and value != "active":
+        opens = (value == "open") == (relation == "=")
+        source = ("open", name)
+        return Clause(
+            lambda names: f"({names[source]} {'>' if opens else '<'} 0.5)",
+            lambda values: (values[source] > 0.5) == opens,
+            (source,),
         )
-    if kind == "SimTimeCondition":
-        return time_clause(condition, [float(condition._threshold)], (2.0 * end, 2.0 * end), end)
-    if kind == "TimeOfDayCondition":
-        since = float(condition._threshold) % DAY  # midnight
-        moments = [(since - clock) % DAY + k * DAY for k in range(-1, int(end // DAY) + 2)]
-        return time_clause(condition, moments, (since, DAY - since), end)
-    source = getattr(condition, "_source_obj", None)
-    if getattr(source, "node_type", "") == "Tank" and condition._source_attr in ("level", "head", "pressure"):
-        return level_clause(condition, source, tolerance)
-    if getattr(source, "node_type", "") == "Junction":
-        raise Untranslatable(
-            f"acts by the {condition._source_attr} of a junction, which follows its own action at once"
-        )
-    if hasattr(source, "link_type"):
-        raise Untranslatable(f"acts by the {condition._source_attr} of a link, which follows its own action at once")
-    raise Untranslatable(f"acts by a condition without a key here ({kind})")
+    if variable == "flow":
+        unit = network.options["flow_unit"]
+        return value_clause(("flow", name), relation, value, RULE_TOLERANCE * unit)
+    raise Untranslatable(f"acts by the {variable} of a link")
 
 
-def parts_of(condition: Any) -> tuple[Any, Any]:
-    """Both conditions that a condition of WNTR combines."""
-    return condition._condition_1, condition._condition_2
+def node_clause(network: Network, node: Any, variable: str, relation: str, value: float) -> Clause:
+    """Clause of a premise on a node, by its level or its head; raises Untranslatable."""
+    gravity, length = network.options["gravity"], FOOT if network.us_units else 1.0
+    tolerance = RULE_TOLERANCE * (network.options["pressure_unit"] / gravity if variable == "pressure" else length)
+    if node.kind == "reservoir" or variable not in ("level", "head", "grade", "pressure"):
+        raise Untranslatable(f"acts by the {variable} of a {node.kind}")
+    above = value / gravity if variable == "pressure" else value  # the bottom of a tank, or the junction [m]
+    if variable in ("head", "grade"):
+        above -= node.elevation
+    if node.kind == "tank":
+        return value_clause(("level", node.name), relation, above, tolerance)
+    if variable == "level":
+        raise Untranslatable("acts by the level of a junction")
+    return value_clause(("head", node.name), relation, node.elevation + above, tolerance)
 
 
-def relation_of(condition: Any) -> tuple[bool, bool, bool]:
-    """(True above the threshold, True for equality alone, True if the threshold belongs to it) of a relation."""
-    name = condition._relation.name
-    if name == "ne":
-        raise Untranslatable("acts where a value differs from a number")
-    return name in ("gt", "ge"), name == "eq", name in ("ge", "le", "eq")
+COMPARE = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
 
 
-def level_clause(condition: Any, tank: Any, tolerance: float) -> Clause:
-    """Clause of a condition on the level of a tank; tolerance : as for `clause_of`"""
-    above, equal, closed = relation_of(condition)
-    if equal:
-        raise Untranslatable("acts where a level equals a number")
-    level = float(condition._threshold) - (tank.elevation if condition._source_attr == "head" else 0.0)
-    level += tolerance if above == closed else -tolerance
-    sign, name = (">" if above else "<") + "=" * closed, tank.name
+def value_clause(source: Source, relation: str, threshold: float, tolerance: float = 0.0) -> Clause:
+    """Clause of a comparison of a source with a threshold.
 
-    def holds(levels):
-        value = levels[name]
-        return value > level or (closed and value == level) if above else value < level or (closed and value == level)
-
-    return Clause(lambda names: f"({names[name]} {sign} {level:.10g})", holds, (name,), None, (name, above, level))
+    tolerance : by which EPANET's rules are early for > and <, and late for >= and <=
+    """
+    if relation in ("=", "<>"):
+        inside = combined(True, [_comparison(source, ">=", threshold - tolerance),
+                                 _comparison(source, "<=", threshold + tolerance)])  # fmt: skip
+        return inside if relation == "=" else opposite(inside)
+    late = tolerance if relation in (">=", "<") else -tolerance
+    return _comparison(source, relation, threshold + late)
 
 
-def time_clause(condition: Any, moments: list[float], reach: tuple[float, float], end: float) -> Clause:
+def _comparison(source: Source, relation: str, threshold: float) -> Clause:
+    shown = "abs({})" if source[0] == "flow" else "{}"
+    level = (source[1], relation in (">", ">="), threshold) if source[0] == "level" else None
+
+    def holds(values: Values) -> bool:
+        value = values[source]
+        return COMPARE[relation](abs(value) if source[0] == "flow" else value, threshold)
+
+    return Clause(
+        lambda names: f"({shown.format(names[source])} {relation} {threshold:.10g})", holds, (source,), None, level
+    )
+
+
+def daily_moments(network: Network, clock: float, end: float) -> list[float]:
+    """Times of the run [s] at which a clock shows a time [s after midnight], from the day before the start."""
+    first = (clock - network.times["start_clock"]) % DAY
+    return [first + k * DAY for k in range(-1, int(end // DAY) + 2)]
+
+
+def time_clause(relation: str, moments: list[float], reach: tuple[float, float], end: float) -> Clause:
     """Clause of a condition on the time.
 
     moments : times at which its threshold is reached [s]; end : end of the run [s]
     reach : times before and after such a moment during which the time is below and above the threshold [s]
     """
-    above, equal, _ = relation_of(condition)
-    if equal:
+    if relation in ("=", "<>"):
         spans = [(at, at + PULSE) for at in moments]
+    elif relation in (">", ">="):
+        spans = [(at, at + reach[1]) for at in moments]
     else:
-        spans = [(at, at + reach[1]) if above else (at - reach[0], at) for at in moments]
-    spans = [(begin, stop) for begin, stop in spans if stop > 0.0 and begin <= end]
+        spans = [(at - reach[0], at) for at in moments]
+    clause = interval_clause([(begin, stop) for begin, stop in spans if stop > 0.0 and begin <= end])
+    return opposite(clause) if relation == "<>" else clause
 
-    def text(names):
-        terms = [f"(t >= {begin:.10g})*(t < {stop:.10g})" for begin, stop in spans]
+
+def interval_clause(spans: Iterable[Interval]) -> Clause:
+    """Clause that holds between times [s]."""
+    kept = tuple(spans)
+
+    def text(names: dict[Source, str]) -> str:
+        terms = [f"(t >= {begin:.10g})*(t < {stop:.10g})" for begin, stop in kept]
         return "(" + (" + ".join(terms) or "0*t") + ")"
 
-    return Clause(text, lambda levels: any(begin <= 0.0 < stop for begin, stop in spans), (), tuple(spans))
+    return Clause(text, lambda values: within(0.0, kept), (), kept)
 
 
-def combined(both: bool, first: Clause, second: Clause) -> Clause:
-    """Clause that holds where both clauses hold, or where one of both holds."""
+def combined(every: bool, clauses: list[Clause]) -> Clause:
+    """Clause that holds where all clauses hold (every), or where one of them holds."""
+    if len(clauses) == 1:
+        return clauses[0]
     spans = None
-    if first.intervals is not None and second.intervals is not None:
-        ends = sorted({at for span in (*first.intervals, *second.intervals) for at in span})
+    if all(clause.intervals is not None for clause in clauses):
+        ends = sorted({at for clause in clauses for span in clause.intervals for at in span})
         pieces = zip(ends[:-1], ends[1:], strict=True)
-        test = all if both else any
-        spans = tuple(
-            piece for piece in pieces if test(within(0.5 * sum(piece), part.intervals) for part in (first, second))
-        )
+        test = all if every else any
+        spans = tuple(piece for piece in pieces if test(within(0.5 * sum(piece), part.intervals) for part in clauses))
 
-    def text(names):
-        a, b = first.text(names), second.text(names)
-        return f"{a}*{b}" if both else f"(1 - (1 - {a})*(1 - {b}))"
+    def text(names: dict[Source, str]) -> str:
+        if every:
+            return "*".join(clause.text(names) for clause in clauses)
+        return f"(1 - {'*'.join(f'(1 - {clause.text(names)})' for clause in clauses)})"
 
     return Clause(
         text,
-        lambda levels: (all if both else any)(part.holds(levels) for part in (first, second)),
-        tuple(dict.fromkeys((*first.tanks, *second.tanks))), spans,
-    )  # fmt: skip
+        lambda values: (all if every else any)(clause.holds(values) for clause in clauses),
+        tuple(dict.fromkeys(source for clause in clauses for source in clause.sources)),
+        spans,
+    )
 
 
 def opposite(clause: Clause) -> Clause:
     """Clause that holds where another clause does not."""
     spans = None
     if clause.intervals is not None:
-        ends = sorted({-DAY, 10.0 * DAY, *(at for span in clause.intervals for at in span)})
+        ends = sorted({-DAY, 1e4 * DAY, *(at for span in clause.intervals for at in span)})
         pieces = zip(ends[:-1], ends[1:], strict=True)
         spans = tuple(piece for piece in pieces if not within(0.5 * sum(piece), clause.intervals))
     level = clause.level and (clause.level[0], not clause.level[1], clause.level[2])
     return Clause(
-        lambda names: f"(1 - {clause.text(names)})", lambda levels: not clause.holds(levels), clause.tanks, spans, level
-    )
+        lambda names: f"(1 - {clause.text(names)})", lambda values: not clause.holds(values), clause.sources, spans,
+        level,
+    )  # fmt: skip
 
 
 def within(time: float, intervals: tuple[Interval, ...]) -> bool:
@@ -169,32 +260,54 @@ def within(time: float, intervals: tuple[Interval, ...]) -> bool:
     return any(begin <= time < stop for begin, stop in intervals)
 
 
-def relay_keys(actions: list[tuple[Clause, bool]]) -> tuple[str, float, float] | None:
+def values_at_start(network: Network, solution: Solution) -> Values:
+    """Values of all sources at the start of the run, except the states of links, from EPANET's solution at hour 0."""
+    values: Values = {("level", tank.name): tank.level for tank in network.tanks()}
+    values |= {("head", name): head for name, head in solution.head.items()}
+    return values | {("flow", name): flow for name, flow in solution.flow.items()}
+
+
+def relay_keys(actions: list[tuple[Clause, Any]], on: Any) -> tuple[str, float, float] | None:
     """(tank, level at which it turns on, level at which it turns off) [m] if a relay does all actions; else None.
 
-    actions : pairs (clause, True if it turns on)
+    actions : pairs (clause, value); on : value that counts as turned on
     """
-    if len(actions) != 2 or {on for _, on in actions} != {True, False}:
+    if len(actions) != 2 or {value == on for _, value in actions} != {True, False}:
         return None
-    on, off = (next(clause.level for clause, own in actions if own is side) for side in (True, False))
-    if on is None or off is None or on[0] != off[0] or on[1] == off[1]:
+    turns_on, turns_off = (next(clause.level for clause, value in actions if (value == on) is side)
+                           for side in (True, False))  # fmt: skip
+    if turns_on is None or turns_off is None or turns_on[0] != turns_off[0] or turns_on[1] == turns_off[1]:
         return None
-    if (on[2] <= off[2]) if on[1] else (on[2] >= off[2]):
+    if (turns_on[2] <= turns_off[2]) if turns_on[1] else (turns_on[2] >= turns_off[2]):
         return None
-    return on[0], on[2], off[2]
+    return turns_on[0], turns_on[2], turns_off[2]
 
 
-def schedule_keys(actions: list[tuple[Clause, bool]], begins: bool, end: float) -> tuple[list[float], list[int]]:
-    """Times [s] and states (0 or 1) of a switch by the time alone.
+def schedule_keys(actions: list[tuple[Clause, Any]], begins: Any, end: float) -> tuple[list[float], list[Any]]:
+    """Times [s] and values of a quantity that is switched by the time alone.
 
-    actions : pairs (clause, state), of which the last that holds prevails; begins : state before any action
+    actions : pairs (clause, value), of which the last that holds prevails; begins : value before any action
     """
     ends = {0.0, *(at for clause, _ in actions for span in clause.intervals for at in span if 0.0 < at < end)}
-    times, states, state = [], [], begins
+    times, values, value = [], [], begins
     for at in sorted(ends):
-        for clause, on in actions:
-            state = on if within(at, clause.intervals) else state
-        if not states or int(state) != states[-1]:
+        for clause, result in actions:
+            value = result if within(at, clause.intervals) else value
+        if not values or value != values[-1]:
             times.append(at)
-            states.append(int(state))
-    return times, states
+            values.append(value)
+    return times, values
+
+
+def prevailing(actions: list[tuple[Clause, Any]], names: dict[Source, str]) -> dict[Any, str]:
+    """Value -> formula that is 1 where an action sets the value and no later action sets another value.
+
+    actions : pairs (clause, value) in the order of precedence, the last prevails
+    """
+    formulas: dict[Any, list[str]] = {}
+    for k, (clause, value) in enumerate(actions):
+        later = [other for other, result in actions[k + 1 :] if result != value]
+        factors = [clause.text(names), *(f"(1 - {other.text(names)})" for other in later)]
+        formulas.setdefault(value, []).append("*".join(factors))
+    return {value: terms[0] if len(terms) == 1 else f"1 - {'*'.join(f'(1 - {term})' for term in terms)}"
+            for value, terms in formulas.items()}  # fmt: skip

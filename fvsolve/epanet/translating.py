@@ -5,15 +5,18 @@ import re
 from typing import Any
 
 from fvsolve.epanet import part_tables
-from fvsolve.epanet.network_file import CLOSED, HourState
+from fvsolve.epanet.network_file import Link, Network, Node, Solution
+from fvsolve.errors import listing
 
 STALL_FLOW = 1e-7  # flow below which EPANET's pumps of constant power have stalled [m3/s]
-MIN_REQUIRED = 0.1  # smallest required pressure of a full demand, in metres or psi as in the file
 MAX_SLOPE = 0.99  # rise per length given to pipes for which the file has more than 1
-SWITCHED_OFF, ACTIVE = 2, 4  # EPANET's codes of a link
-PSI_OF_METRE = 0.4333 / 0.3048
-US_UNITS = ("CFS", "GPM", "MGD", "IMGD", "AFD")
-REGULATING_STATUS = 2  # WNTR's code of a valve that is neither fixed open nor fixed closed
+MOST_PASSES = 50  # of the search for elevations
+LEAST_ROUGHNESS = 1e-9
+REGULATED_END = {"PRV": "end", "PSV": "start"}
+RISE_TOLERANCE = 1e-9  # of the rise over the length of a pipe
+SET_TOLERANCE = 1e-6  # of set heads and heads of sources [m]
+STILL = 1e-6  # velocity below which a pipe counts as still [m/s]
+GRAVITY = part_tables.GRAVITY
 
 
 class FreeNames:
@@ -47,7 +50,7 @@ class FreeNames:
 class Translation:
     """Nodes and links of a case made from an EPANET network, and notes on differences from EPANET.
 
-    network : network of WNTR; hour : EPANET's solution at the imported hour
+    solution : EPANET's solution at the imported hour
     wave_speed : wave speed of every pipe [m/s]; shortest : least length of a pipe [m]
     nodes, links : name -> table of the case file
     demands : name of a junction in the case -> its demand [m3/s]
@@ -55,37 +58,47 @@ class Translation:
     notes : list of (text, EPANET's names)
     """
 
-    def __init__(self, network: Any, hour: HourState, wave_speed: float, shortest: float) -> None:
-        self.network, self.hour, self.speed, self.shortest = network, hour, wave_speed, shortest
+    def __init__(self, network: Network, solution: Solution, wave_speed: float, shortest: float) -> None:
+        self.network, self.solution, self.speed, self.shortest = network, solution, wave_speed, shortest
         self.nodes: dict[str, part_tables.Part] = {}
         self.links: dict[str, part_tables.Part] = {}
         self.lengths: dict[str, float] = {}
         self.notes_by_text: dict[str, list[str]] = {}
+        self.reasons: list[str] = []  # texts of notes on what makes values differ from EPANET
         self.demands: dict[str, float] = {}
         self.node_names, self.link_names = FreeNames(), FreeNames()
-        hydraulic = network.options.hydraulic
-        self.formula, self.multiplier = hydraulic.headloss, hydraulic.demand_multiplier
-        self.gravity = hydraulic.specific_gravity  # pressures in metres refer to water, heads to the fluid
-        self.pressure_driven = hydraulic.demand_model in ("PDA", "PDD")
-        self.clock = hour.seconds + network.options.time.pattern_start
-        self.drawn = any(any(node.coordinates) for _, node in network.nodes())
+        self.option = network.options
+        self.formula, self.gravity = self.option["formula"], self.option["gravity"]
+        self.pressure_driven = self.option["pressure_driven"]
         self.elevation = self.elevations()
-        for name, node in network.nodes():
-            ours = self.node_names.add(name)
-            self.nodes[ours] = getattr(self, node.node_type.lower())(name, node)
-        for name, link in network.links():
-            ours = self.link_names.add(name)
-            self.links[ours] = getattr(self, link.link_type.lower())(name, link)
+        self.widest = max((link.diameter for link in network.links.values() if link.kind == "pipe"), default=1.0)
+        for name in network.nodes:
+            self.node_names.add(name)
+        for name in network.links:
+            self.link_names.add(name)
+        for name, node in network.nodes.items():
+            self.nodes[self.node_names.given[name]] = getattr(self, node.kind)(node)
+        for name, link in network.links.items():
+            kind = link.kind if link.kind in ("pipe", "pump") else "valve"
+            self.links[self.link_names.given[name]] = getattr(self, kind)(link)
         self.emitters()
-        self.options(hydraulic)
+        self.note_what_is_left()
         for names in (self.node_names, self.link_names):
             for name, ours in names.changed().items():
                 self.note("has a different name in fvsolve", f"{name} is {ours}")
 
-    def note(self, text: str, name: str) -> None:
+    def note(self, text: str, name: str, differs: bool = False) -> None:
+        """Add a name to a note; differs : True if heads or flows differ from EPANET for this reason"""
         names = self.notes_by_text.setdefault(text, [])
         if name not in names:
             names.append(name)
+        if differs and text not in self.reasons:
+            self.reasons.append(text)
+
+    @property
+    def causes(self) -> list[str]:
+        """Notes on what makes heads or flows differ from EPANET, with EPANET's names."""
+        return [f"{text} ({listing(names)})" for text, names in self.notes if text in self.reasons]
 
     @property
     def notes(self) -> list[tuple[str, list[str]]]:
@@ -95,123 +108,131 @@ class Translation:
     # nodes ------------------------------------------------------------------------------------------------
 
     def elevations(self) -> dict[str, float]:
-        """Elevation [m] of each junction and tank; one end of a pipe that is shorter than its rise is moved.
+        """Elevation [m] of each junction and tank; a junction at a pipe that is shorter than its rise is moved.
 
         EPANET accepts such pipes, for example 6 m long with a rise of 200 m. Heads and flows of a network do not depend
-        on elevations, except where an outflow depends on pressure. A pipe at such a node is not moved but lengthened,
-        see `length`.
+        on elevations of junctions, except where an outflow depends on pressure. A pipe for which no junction can be
+        moved is lengthened, see `length`.
         """
-        result = {name: node.elevation for name, node in self.network.nodes() if node.node_type != "Reservoir"}
+        network = self.network
+        result = {name: node.elevation for name, node in network.nodes.items() if node.kind != "reservoir"}
         pipes = [
-            pipe for _, pipe in self.network.pipes() if {pipe.start_node_name, pipe.end_node_name} <= result.keys()
+            link for link in network.links.values() if link.kind == "pipe" and {link.start, link.end} <= result.keys()
         ]
-        moved = True
-        while moved:
-            moved = False
-            for pipe in pipes:
-                low, high = sorted((pipe.start_node_name, pipe.end_node_name), key=result.get)
-                if result[high] - result[low] <= pipe.length:
-                    continue
-                if self.depends_on_pressure(low) or self.depends_on_pressure(high):
-                    continue
-                if self.network.get_node(low).node_type == "Junction":
-                    name, result[low] = low, result[high] - MAX_SLOPE * pipe.length
-                else:
-                    name, result[high] = high, result[low] + MAX_SLOPE * pipe.length
-                moved = True
+        for _ in range(MOST_PASSES):
+            moved = [name for pipe in pipes if (name := self.move_junction(pipe, result))]
+            for name in moved:
                 text = "elevation changed, because a pipe cannot be shorter than its rise"
                 self.note(f"{text}; heads and flows do not change", name)
+            if not moved:
+                break
         return result
+
+    def move_junction(self, pipe: Link, elevation: dict[str, float]) -> str:
+        """Move the lower end of a pipe that is shorter than its rise, else its higher end; return the name, or ""."""
+        low, high = sorted((pipe.start, pipe.end), key=elevation.get)
+        if elevation[high] - elevation[low] <= pipe.length * (1.0 + RISE_TOLERANCE):
+            return ""
+        if self.depends_on_pressure(low) or self.depends_on_pressure(high):
+            return ""
+        if self.network.nodes[low].kind == "junction":
+            elevation[low] = elevation[high] - MAX_SLOPE * pipe.length
+            return low
+        if self.network.nodes[high].kind == "junction":
+            elevation[high] = elevation[low] + MAX_SLOPE * pipe.length
+            return high
+        return ""
 
     def depends_on_pressure(self, name: str) -> bool:
         """True if the outflow of a node depends on its pressure, and so on its elevation."""
-        node = self.network.get_node(name)
-        return node.node_type == "Junction" and bool(
-            node.emitter_coefficient or (self.pressure_driven and self.demand_at(node))
+        node = self.network.nodes[name]
+        demand = self.pressure_driven and any(base for base, _ in node.demands)
+        return node.kind == "junction" and bool(node.emitter or demand)
+
+    def junction(self, node: Node) -> part_tables.Part:
+        demand = self.network.demand_at(node, self.solution.seconds)
+        part = part_tables.junction(self.elevation[node.name], demand, node.position)
+        if demand:
+            self.demands[self.node_names.given[node.name]] = demand
+        return part | self.pressure_keys(node, demand > 0.0)
+
+    def pressure_keys(self, node: Node, draws: bool) -> part_tables.Part:
+        """Keys of a demand that depends on pressure, if it does; draws : True for a demand above 0"""
+        if not (self.pressure_driven and draws):
+            return {}
+        option = self.option
+        return part_tables.pressure_demand(
+            option["minimum_pressure"], option["required_pressure"], option["pressure_exponent"]
         )
 
-    def demand_at(self, node: Any) -> float:
-        """Demand [m3/s] of a junction at the imported hour, from its patterns."""
-        return node.demand_timeseries_list.at(self.clock, multiplier=self.multiplier)
-
-    def position(self, node: Any) -> Any:
-        """Coordinates of a node; None if the file has none (WNTR then puts every node at the origin)."""
-        return node.coordinates if self.drawn else None
-
-    def junction(self, name: str, node: Any) -> part_tables.Part:
-        demand = self.demand_at(node)
-        part = part_tables.junction(self.elevation[name], demand, self.position(node))
-        if demand:
-            self.demands[self.node_names.given[name]] = demand
-        if self.pressure_driven and demand > 0.0:
-            hydraulic = self.network.options.hydraulic
-            least = MIN_REQUIRED * (1.0 / PSI_OF_METRE if hydraulic.inpfile_units in US_UNITS else 1.0)
-            required = max(hydraulic.required_pressure, least)
-            part |= part_tables.pressure_demand(hydraulic.minimum_pressure, required, hydraulic.pressure_exponent)
-        return part
-
-    def reservoir(self, name: str, node: Any) -> part_tables.Part:
+    def reservoir(self, node: Node) -> part_tables.Part:
         text = "EPANET has no elevation of a reservoir; that of the other end of its pipe or pump is used"
-        self.note(f"{text}: state `elevation` if vacuum near it matters", name)
-        return part_tables.reservoir(node.head_timeseries.at(self.clock), self.position(node))
+        self.note(f"{text}: state `elevation` if vacuum near it matters", node.name)
+        return part_tables.reservoir(self.solution.head[node.name], node.position)
 
-    def tank(self, name: str, node: Any) -> part_tables.Part:
-        level = node.init_level if self.hour.seconds == 0.0 else self.hour.head[name] - node.elevation
+    def tank(self, node: Node) -> part_tables.Part:
+        level = node.level if self.solution.seconds == 0.0 else self.solution.head[node.name] - node.elevation
         area = math.pi / 4.0 * node.diameter**2
-        if node.vol_curve is not None:
-            area = curve_slope(node.vol_curve.points, level)
-            self.note("volume curve: replaced by the area at the initial level", name)
-        level = min(round(level, 6), node.max_level)  # EPANET's level may exceed it by rounding
-        return part_tables.tank(self.elevation[name], area, level, node.max_level, self.position(node))
+        if node.volume is not None:
+            area = curve_slope(node.volume, level)
+            self.note("volume curve: replaced by the area at the initial level", node.name)
+        level = min(round(level, 6), node.maximum)  # EPANET's level may exceed it by rounding
+        return part_tables.tank(self.elevation[node.name], area, level, node.maximum, node.position)
 
     # links ------------------------------------------------------------------------------------------------
 
-    def ends(self, link: Any) -> tuple[str, str]:
-        return tuple(self.node_names.given[end] for end in (link.start_node_name, link.end_node_name))
+    def ends(self, link: Link) -> tuple[str, str]:
+        return self.node_names.given[link.start], self.node_names.given[link.end]
 
-    def junction_before_end(self, name: str, link: Any) -> str:
+    def junction_before_end(self, link: Link) -> str:
         """Add a junction without demand before the end of a pipe; return its name."""
-        end = self.network.get_node(link.end_node_name)
-        start = link.start_node_name if link.end_node_name not in self.elevation else link.end_node_name
-        place = self.node_names.new(f"{self.link_names.given[name]}-end")
-        self.nodes[place] = part_tables.junction(self.elevation.get(start, 0.0), 0.0, self.position(end))
+        end = self.network.nodes[link.end]
+        start = link.start if link.end not in self.elevation else link.end
+        place = self.node_names.new(f"{self.link_names.given[link.name]}-end")
+        self.nodes[place] = part_tables.junction(self.elevation.get(start, 0.0), 0.0, end.position)
         return place
 
-    def shut(self, name: str) -> bool:
-        return int(self.hour.status[name]) in CLOSED
+    def is_shut(self, link: Link) -> bool:
+        """True if a link is closed at the imported hour."""
+        return not self.solution.open[link.name]
 
-    def pipe(self, name: str, link: Any) -> part_tables.Part:
+    def pipe(self, link: Link) -> part_tables.Part:
         start, end = self.ends(link)
-        if link.check_valve or self.shut(name):
-            place = self.junction_before_end(name, link)
-            ours = self.link_names.new(f"{self.link_names.given[name]}-{'check' if link.check_valve else 'shut'}")
+        if link.check_valve or self.is_shut(link):
+            place = self.junction_before_end(link)
+            ours = self.link_names.new(f"{self.link_names.given[link.name]}-{'check' if link.check_valve else 'shut'}")
             last = (place, end)
             shut = part_tables.valve(last, link.diameter, 0.0, opening=0.0)
             self.links[ours] = part_tables.check_valve(last, link.diameter) if link.check_valve else shut
             reason = "check valve" if link.check_valve else "shut at this hour"
             valve = "a check valve" if link.check_valve else "a shut valve"
-            self.note(f"{reason}: imported as a pipe with {valve} at its end", name)
+            self.note(f"{reason}: imported as a pipe with {valve} at its end", link.name)
             end = place
-        law = part_tables.friction(self.formula, link.roughness)
-        length = self.lengths[name] = self.length(link)
-        if length > link.length:
-            law = self.spread(name, link, length)
-            self.note(f"lengthened to {length:.4g} m; the friction loss is that of the original length", name)
-        return part_tables.pipe((start, end), length, link.diameter, law, link.minor_loss, self.speed)
+        return self.pipe_table(link, (start, end))
 
-    def length(self, link: Any) -> float:
+    def pipe_table(self, link: Link, ends: tuple[str, str]) -> part_tables.Part:
+        """Table of a pipe between two nodes of the case, lengthened if it is too short."""
+        law = part_tables.friction(self.formula, link.roughness)
+        length = self.lengths[link.name] = self.length(link)
+        if length > link.length:
+            law = self.spread(link, length)
+            self.note(f"lengthened to {length:.4g} m; the friction loss is that of the original length", link.name)
+        return part_tables.pipe(ends, length, link.diameter, law, link.minor_loss, self.speed)
+
+    def length(self, link: Link) -> float:
         """Length of a pipe in the case [m], at least `shortest`.
 
         A pipe that is shorter than its rise gets at least the length rise / MAX_SLOPE.
         """
-        low, high = sorted(self.elevation.get(end, 0.0) for end in (link.start_node_name, link.end_node_name))
-        inside = {link.start_node_name, link.end_node_name} <= self.elevation.keys()
-        return max(link.length, self.shortest, (high - low) / MAX_SLOPE if inside and high - low > link.length else 0.0)
+        low, high = sorted(self.elevation.get(end, 0.0) for end in (link.start, link.end))
+        inside = {link.start, link.end} <= self.elevation.keys()
+        too_steep = inside and high - low > link.length * (1.0 + RISE_TOLERANCE)
+        return max(link.length, self.shortest, (high - low) / MAX_SLOPE if too_steep else 0.0)
 
-    def spread(self, name: str, link: Any, length: float) -> part_tables.Part:
+    def spread(self, link: Link, length: float) -> part_tables.Part:
         """Table of the friction of a lengthened pipe, which keeps the friction loss of its original length.
 
-        name : EPANET's name; link : pipe of WNTR; length : length of the pipe in the case [m]
+        length : length of the pipe in the case [m]
         With formula D-W the Darcy factor becomes constant, so the loss is equal only at the flow of this hour.
         """
         ratio = link.length / length
@@ -219,104 +240,180 @@ class Translation:
             return part_tables.friction("H-W", link.roughness * ratio ** (-1.0 / 1.852))
         if self.formula == "C-M":
             return part_tables.friction("C-M", link.roughness * math.sqrt(ratio))
-        return part_tables.darcy(ratio * self.hour.factor[name])
+        return part_tables.darcy(ratio * self.darcy_factor(link))
 
-    def pump(self, name: str, link: Any) -> part_tables.Part:
-        if int(self.hour.status[name]) == SWITCHED_OFF:
-            self.note("pump is off at this hour: imported as a shut valve", name)
-            return part_tables.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
-        if link.pump_type == "POWER" and abs(self.hour.flow[name]) < STALL_FLOW:
-            text = "pump of constant power has zero flow in EPANET, which contradicts its power"
-            self.note(f"{text}: imported as a shut valve", name)
-            return part_tables.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
-        given = link.pump_type == "POWER"
-        law = part_tables.power(self.gravity * link.power) if given else part_tables.curve(link.get_pump_curve().points)
-        return part_tables.pump(self.ends(link), law, float(self.hour.setting[name]))
+    def darcy_factor(self, link: Link) -> float:
+        """Darcy factor of a pipe from EPANET's loss at this hour; that of rough flow for a pipe without flow."""
+        velocity = abs(self.solution.flow[link.name]) / (math.pi / 4.0 * link.diameter**2)
+        loss = abs(self.solution.loss[link.name]) - link.minor_loss * velocity**2 / (2.0 * GRAVITY)
+        if velocity > STILL and loss > 0.0:
+            return loss * link.diameter * 2.0 * GRAVITY / (link.length * velocity**2)
+        return (2.0 * math.log10(3.7 * link.diameter / max(link.roughness, LEAST_ROUGHNESS))) ** -2
 
-    def valve(self, name: str, link: Any) -> part_tables.Part:
-        ends, kind, status = self.ends(link), link.valve_type, int(self.hour.status[name])
-        diameter = self.size(link)
-        if kind in ("PRV", "PSV") and link.initial_status == REGULATING_STATUS and self.set_too_high(name, link):
-            state = "an open" if kind == "PRV" else "a shut"
-            self.note(f"{kind} with a set head above every source: imported as {state} valve", name)
-            return part_tables.valve(ends, diameter, link.minor_loss, opening=1.0 if kind == "PRV" else 0.0)
-        if kind in part_tables.REGULATING and link.initial_status == REGULATING_STATUS:
-            self.note(f"{kind}: EPANET states no time constant, {part_tables.TIME_CONSTANT} is used", name)
-            return part_tables.regulating(kind, ends, diameter, self.setting(name, link), link.minor_loss)
-        if status in CLOSED:
-            self.note(f"{kind} is shut at this hour: imported as a shut valve", name)
+    def pump(self, link: Link) -> part_tables.Part:
+        if self.is_shut(link):
+            self.note("pump is off at this hour: imported as a shut valve", link.name)
+            return part_tables.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
+        if link.power is not None and abs(self.solution.flow[link.name]) < STALL_FLOW:
+            return self.stalled(link, self.ends(link))
+        return part_tables.pump(self.ends(link), self.head_law(link), self.solution.setting[link.name])
+
+    def stalled(self, link: Link, ends: tuple[str, str]) -> part_tables.Part:
+        """Table of a pump of constant power that has no flow in EPANET: a shut valve."""
+        text = "pump of constant power has zero flow in EPANET, which contradicts its power"
+        self.note(f"{text}: imported as a shut valve", link.name, True)
+        return part_tables.valve(ends, self.bore(link), 0.0, opening=0.0)
+
+    def head_law(self, link: Link) -> part_tables.Part:
+        """Key with the head law of a pump at full speed."""
+        if link.power is not None:
+            return part_tables.power(self.gravity * link.power)
+        return part_tables.curve(link.curve or [])
+
+    def valve(self, link: Link) -> part_tables.Part:
+        return self.valve_table(link, self.ends(link), self.valve_state(link))
+
+    def valve_state(self, link: Link) -> tuple[Any, ...]:
+        """State of a valve at the hour, as an action: ("closed",), ("open",) or ("setting", value)."""
+        setting, begins = self.solution.setting[link.name], initial_action(link)
+        if self.solution.seconds == 0.0 and not self.is_controlled(link):
+            return begins
+        if link.kind == "GPV":
+            return ("closed",) if self.is_shut(link) else begins
+        if setting == 0.0 and (begins[0] != "setting" or link.setting != 0.0):  # EPANET states 0 for a fixed valve
+            return ("closed",) if self.is_shut(link) else ("open",)
+        return ("setting", setting)
+
+    def is_controlled(self, link: Link) -> bool:
+        """True if a control or rule acts on a link."""
+        network = self.network
+        acted = {control["link"] for control in network.controls}
+        acted |= {name for rule in network.rules for name, _ in (*rule["then"], *rule["else"])}
+        return link.name in acted
+
+    def valve_table(self, link: Link, ends: tuple[str, str], state: tuple[Any, ...]) -> part_tables.Part:
+        """Table of a valve between two nodes of the case; state : as from `valve_state`"""
+        kind, diameter = link.kind, self.valve_diameter(link)
+        if state[0] == "closed":
+            self.note(f"{kind} is shut: imported as a shut valve", link.name)
             return part_tables.valve(ends, diameter, 0.0, opening=0.0)
-        flow = self.hour.flow[name]
-        drop = self.hour.head[link.start_node_name] - self.hour.head[link.end_node_name]
-        if kind == "TCV" and status == ACTIVE:
-            return part_tables.valve(ends, diameter, self.hour.setting[name])
-        if kind in ("PBV", "GPV") and flow * drop < 0.0:
+        if state[0] == "open":
+            return part_tables.valve(ends, diameter, link.minor_loss)
+        setting = state[1]
+        if kind in ("PRV", "PSV") and self.is_set_too_high(link, setting):
+            word = "an open" if kind == "PRV" else "a shut"
+            self.note(f"{kind} with a set head above every source: imported as {word} valve", link.name)
+            return part_tables.valve(ends, diameter, link.minor_loss, opening=1.0 if kind == "PRV" else 0.0)
+        if kind in part_tables.REGULATING:
+            self.note(f"{kind}: EPANET states no time constant, {part_tables.TIME_CONSTANT} is used", link.name)
+            return part_tables.regulating(kind, ends, diameter, self.set_point(link, setting), link.minor_loss)
+        if kind == "TCV":
+            return part_tables.valve(ends, link.diameter, max(setting, link.minor_loss))
+        if kind == "PCV":
+            share = curve_value(link.curve or [[0.0, 0.0], [1.0, 1.0]], 0.01 * setting)
+            return part_tables.valve(ends, diameter, link.minor_loss, opening=share)
+        return self.fixed_loss(link, ends, diameter)
+
+    def fixed_loss(self, link: Link, ends: tuple[str, str], diameter: float) -> part_tables.Part:
+        """Table of a PBV or GPV: a valve with the constant loss coefficient of this hour."""
+        flow, kind = self.solution.flow[link.name], link.kind
+        drop = self.solution.head[link.start] - self.solution.head[link.end]
+        if flow * drop < 0.0:
             text = f"{kind} raises the head along its flow, which a valve cannot do"
-            self.note(f"{text}: imported as an open valve, so heads differ", name)
-        elif kind in ("PBV", "GPV") and flow and drop:
-            self.note(f"{kind}: imported as a valve with the constant loss coefficient of this hour", name)
-            return part_tables.valve(ends, diameter, part_tables.loss_coefficient(abs(drop), flow, diameter))
+            self.note(f"{text}: imported as an open valve, so heads differ", link.name, True)
+        elif flow and drop:
+            self.note(f"{kind}: imported as a valve with the constant loss coefficient of this hour", link.name)
+            return part_tables.valve(ends, link.diameter, part_tables.loss_coefficient(abs(drop), flow, link.diameter))
         return part_tables.valve(ends, diameter, link.minor_loss)
 
-    def bore(self, link: Any, otherwise: float = 0.1) -> float:
-        """Diameter [m] of the widest pipe at the ends of a link; `otherwise` [m] if there is no pipe."""
-        ends = (link.start_node_name, link.end_node_name)
-        near = [self.network.get_link(other) for end in ends for other in self.network.get_links_for_node(end)]
-        return max((pipe.diameter for pipe in near if pipe.link_type == "Pipe"), default=otherwise)
+    def bore(self, link: Link) -> float:
+        """Diameter [m] of the widest pipe at the ends of a link; of the network if there is no pipe."""
+        near = (other for end in (link.start, link.end) for other in self.network.links_at[end])
+        return max((other.diameter for other in near if other.kind == "pipe"), default=self.widest)
 
-    def size(self, link: Any) -> float:
-        """Diameter of a valve in the case [m].
+    def valve_diameter(self, link: Link) -> float:
+        """Diameter of a valve in the case [m]: that of the widest adjacent pipe, unless it has a loss coefficient.
 
-        It is at most the diameter of the widest adjacent pipe, unless a loss coefficient or a curve refers to the
-        diameter.
+        In EPANET an open valve without loss coefficient has no loss, whatever its diameter.
         """
-        widest = self.bore(link, link.diameter)
-        if link.minor_loss or link.valve_type in ("TCV", "GPV") or widest >= link.diameter:
+        if link.minor_loss:
             return link.diameter
-        self.note("valve wider than every pipe next to it: imported with the diameter of the widest pipe", link.name)
+        widest = self.bore(link)
+        if abs(widest - link.diameter) > 1e-6 * widest:
+            self.note(
+                "valve without loss coefficient: imported with the diameter of the widest pipe next to it", link.name
+            )
         return widest
 
-    def set_too_high(self, name: str, link: Any) -> bool:
+    def is_set_too_high(self, link: Link, setting: float) -> bool:
         """True if the head set for a PRV or PSV exceeds the heads of all sources, in a network without pumps."""
-        network, controlled = self.network, link.end_node_name if link.valve_type == "PRV" else link.start_node_name
-        sources = [*network.reservoir_name_list, *network.tank_name_list]
-        greatest = max(self.hour.head[source] for source in sources)
-        head = self.hour.setting[name] / self.gravity + network.get_node(controlled).elevation
-        return not network.num_pumps and head > greatest
+        network, controlled = self.network, getattr(link, REGULATED_END[link.kind])
+        sources = [name for name, node in network.nodes.items() if node.kind != "junction"]
+        greatest = max(self.solution.head[source] for source in sources)
+        head = setting / self.gravity + network.nodes[controlled].elevation
+        pumps = any(other.kind == "pump" for other in network.links.values())
+        return not pumps and head > greatest - SET_TOLERANCE
 
-    def setting(self, name: str, link: Any) -> float:
+    def set_point(self, link: Link, setting: float) -> float:
         """Set point of a valve: head of water above the controlled end [m], or flow [m3/s] of an FCV.
 
         The head is corrected if the import moves the elevation of that end.
         """
-        controlled = link.end_node_name if link.valve_type == "PRV" else link.start_node_name
-        if link.valve_type == "FCV" or controlled not in self.elevation:
-            return self.hour.setting[name]
-        moved = self.network.get_node(controlled).elevation - self.elevation[controlled]
-        return self.hour.setting[name] + self.gravity * moved
+        if link.kind == "FCV":
+            return setting
+        controlled = getattr(link, REGULATED_END[link.kind])
+        if controlled not in self.elevation:
+            return setting
+        moved = self.network.nodes[controlled].elevation - self.elevation[controlled]
+        return setting + self.gravity * moved
 
     def emitters(self) -> None:
-        """Add emitters as leaks.
+        """Add emitters as leaks."""
+        exponent, backflow = self.option["emitter_exponent"], self.option["emitter_backflow"]
+        for name, node in self.network.nodes.items():
+            if not node.emitter:
+                continue
+            place = self.node_names.given[name]
+            self.links[self.link_names.new(f"{place}-emitter")] = part_tables.leak(place, node.emitter, exponent)
+            if backflow and self.solution.head[name] < node.elevation:
+                text = "emitter above its pressure: EPANET lets it feed the network, here it has no flow"
+                self.note(f"{text} (`EMITTER BACKFLOW NO` in EPANET 2.3), so heads differ", name, True)
 
-        WNTR converts their coefficients from psi to metres as if the exponent were 0.5; this is corrected.
-        """
-        hydraulic = self.network.options.hydraulic
-        exponent = hydraulic.emitter_exponent
-        unit = PSI_OF_METRE ** (exponent - 0.5) if hydraulic.inpfile_units in US_UNITS else 1.0
-        for name, node in self.network.junctions():
-            if node.emitter_coefficient:
-                place = self.node_names.given[name]
-                leak = part_tables.leak(place, unit * node.emitter_coefficient, exponent)
-                self.links[self.link_names.new(f"{place}-emitter")] = leak
-
-    def options(self, hydraulic: Any) -> None:
+    def note_what_is_left(self) -> None:
+        """Note what the file has and the case does not."""
         if self.formula == "D-W":
-            self.note("Darcy factor by Colebrook, in EPANET by Swamee and Jain: both factors agree within 3 %", "D-W")
+            self.note(
+                "Darcy factor by Colebrook, in EPANET by Swamee and Jain: both factors agree within 3 %", "D-W", True
+            )
+        for link in self.network.links.values():
+            if link.leak_area:
+                self.note("leakage of the pipe ([LEAKAGE]) is not imported", link.name, True)
+        if self.network.rewritten:
+            self.note("pumps in the form of EPANET 1 are read as EPANET 2.2 reads them", "[PUMPS]")
 
 
-def curve_slope(points: list[tuple[float, float]], at: float) -> float:
+def initial_action(link: Link) -> tuple[Any, ...]:
+    """State of a link before hour 0, as an action: ("closed",), ("open",) or ("setting", value)."""
+    if link.status == "closed" or (link.kind == "pump" and link.setting == 0.0):
+        return ("closed",)
+    if link.kind == "pump" or link.status == "active" or link.kind == "GPV":
+        return ("setting", link.setting)
+    return ("open",)
+
+
+def curve_slope(points: list[list[float]], at: float) -> float:
     """Slope of a piecewise linear curve at abscissa `at`; beyond its points, the slope of the nearest section."""
     for (x0, y0), (x1, y1) in zip(points[:-1], points[1:], strict=True):
-        if at < x1 or (x1, y1) == tuple(points[-1]):
+        if at < x1 or [x1, y1] == list(points[-1]):
             return (y1 - y0) / (x1 - x0)
     raise ValueError("the curve has fewer than two points; expected at least two")
+
+
+def curve_value(points: list[list[float]], at: float) -> float:
+    """Value of a piecewise linear curve at abscissa `at`, held beyond its ends."""
+    if at <= points[0][0]:
+        return points[0][1]
+    for (x0, y0), (x1, y1) in zip(points[:-1], points[1:], strict=True):
+        if at <= x1:
+            return y0 + (y1 - y0) * (at - x0) / (x1 - x0)
+    return points[-1][1]

@@ -1,0 +1,207 @@
+"""Comparison of an imported case with EPANET's solution of the original file: heads, flows and levels of tanks."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fvsolve.case import Case
+from fvsolve.epanet.importing import Imported
+from fvsolve.epanet.network_file import Network, Solution, run_epanet
+from fvsolve.errors import FvsolveError, listing
+from fvsolve.model.build import build
+
+MOST_HEAD, MOST_FLOW = 0.01, 0.01  # differences of heads [m], and of flows over the largest flow [-], that are named
+STEP = 10  # hydraulic step of EPANET over a day [s]
+ROWS = 150  # time between rows of the day that are compared [s]; not a time at which patterns change
+NO_HEAD = -1e4  # heads below this are EPANET's sign of a demand that nothing can supply [m]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Differences of one quantity between the case and EPANET.
+
+    quantity : "heads", "flows" or "levels"; unit : of values
+    count : number of compared places; name : EPANET's name of the place with the greatest difference
+    ours, epanet : both values there; time : of that row [s], None at the start
+    above : names of places with a difference above `limit`, the greatest first
+    left_out : reason -> names of places that are not compared
+    """
+
+    quantity: str
+    unit: str
+    count: int
+    name: str
+    ours: float
+    epanet: float
+    limit: float
+    above: list[str]
+    left_out: dict[str, list[str]]
+    time: float | None = None
+
+    @property
+    def difference(self) -> float:
+        """Greatest difference."""
+        return abs(self.ours - self.epanet)
+
+
+@dataclass(frozen=True)
+class SelfCheck:
+    """Result of a comparison with EPANET.
+
+    compared : quantities; causes : texts of the notes that explain differences; fault : reason why the case has no
+    values to compare, or ""
+    """
+
+    compared: list[Compared]
+    causes: list[str]
+    fault: str = ""
+
+    @property
+    def agrees(self) -> bool:
+        """True if no difference is above its limit, or each has a named cause."""
+        return not self.fault and (bool(self.causes) or not any(item.above for item in self.compared))
+
+    def lines(self) -> Iterator[str]:
+        """Text of the comparison."""
+        if self.fault:
+            yield f"self-check: the case has no values to compare with EPANET: {self.fault}"
+            return
+        for item in self.compared:
+            at = "" if item.time is None else f" at {item.time / 3600.0:.4g} h"
+            worst = f"greatest difference {item.difference:.2g} {item.unit} at {item.name}{at}"
+            yield (f"self-check: {item.count} {item.quantity}, {worst} ({item.ours:.6g} {item.unit}, EPANET "
+                   f"{item.epanet:.6g} {item.unit})")  # fmt: skip
+            if item.above:
+                cause = "; ".join(self.causes) or "cause unknown to the importer; please report the file"
+                many = f"{len(item.above)} {item.quantity} differ by more than {item.limit:.2g} {item.unit}"
+                yield f"self-check: {many}: {listing(item.above)}. Cause: {cause}"
+            for reason, names in item.left_out.items():
+                yield f"self-check: {len(names)} {item.quantity} are not compared, {reason}: {listing(names)}"
+
+
+def check_start(imported: Imported, case: Case) -> SelfCheck:
+    """Compare heads and flows of a case at its start with EPANET's solution at the imported hour."""
+    try:
+        checks = build(case).checks
+    except FvsolveError as error:
+        return SelfCheck([], [], _unsolved(imported, str(error)))
+    heads = {name: checks["nodes"][ours]["head"] for name, ours in imported.nodes.items()}
+    pipes = checks["pipes"] or {}
+    flows = {name: pipes[ours]["flow"] for name, ours in imported.links.items() if ours in pipes}
+    solution = imported.solution
+    compared = [_compared("heads", "m", heads, solution.head, MOST_HEAD, left_out(imported.network, solution))]
+    if flows:
+        compared.append(_flows(flows, solution.flow))
+    return SelfCheck(compared, imported.causes)
+
+
+def _flows(flows: dict[str, float], known: dict[str, float], time: float | None = None) -> Compared:
+    """Comparison of flows [m3/s], in l/s."""
+    largest = max((abs(value) for value in known.values()), default=0.0)
+    ours, theirs = ({name: 1e3 * value for name, value in table.items()} for table in (flows, known))
+    return _compared("flows", "l/s", ours, theirs, 1e3 * MOST_FLOW * largest, {}, time)
+
+
+def _unsolved(imported: Imported, text: str) -> str:
+    """Reason why a case has no start; where nothing can supply a demand, EPANET states a head of -1e7 m or so."""
+    lost = [name for name, head in imported.solution.head.items() if head < NO_HEAD]
+    if not lost:
+        return text
+    lowest = min(imported.solution.head.values())
+    return (f"{text}\nEPANET has no physical solution either: it states heads down to {lowest:.3g} m, "
+            f"at {listing(lost)}")  # fmt: skip
+
+
+def _compared(
+    quantity: str, unit: str, ours: dict[str, float], known: dict[str, float], limit: float,
+    skipped: dict[str, list[str]], time: float | None = None,
+) -> Compared:  # fmt: skip
+    """Comparison of values by EPANET's names."""
+    hidden = {name for names in skipped.values() for name in names}
+    gaps = {name: abs(value - known[name]) for name, value in ours.items() if name not in hidden}
+    order = sorted(gaps, key=gaps.get, reverse=True)
+    worst = order[0] if order else next(iter(ours))
+    above = [name for name in order if not gaps[name] <= limit]
+    return Compared(quantity, unit, len(gaps), worst, ours[worst], known[worst], limit, above, skipped, time)
+
+
+def left_out(network: Network, solution: Solution) -> dict[str, list[str]]:
+    """Reason -> junctions whose head has no meaning in EPANET: cut off from every source."""
+    reached = {name for name, node in network.nodes.items() if node.kind != "junction"}
+    waiting = list(reached)
+    while waiting:
+        for link in network.links_at[waiting.pop()]:
+            if solution.open[link.name] and not _is_stalled(link, solution):
+                new = {link.start, link.end} - reached
+                reached |= new
+                waiting += new
+    dead = [name for name in network.nodes if name not in reached]
+    return {"since closed links cut them off from every source": dead} if dead else {}
+
+
+def _is_stalled(link: Any, solution: Solution) -> bool:
+    """True if a pump of constant power has no flow, for which it has no head."""
+    return link.kind == "pump" and link.power is not None and abs(solution.flow[link.name]) < STALLED
+
+
+STALLED = 1e-7  # [m3/s]
+
+
+def check_day(imported: Imported, case_text: Any, end: float) -> SelfCheck:
+    """Compare levels, heads and flows of a case over a day with EPANET at steps of `STEP` seconds.
+
+    case_text : table of the case; end : of the run [s]
+    """
+    from fvsolve.case import load
+    from fvsolve.run import run
+
+    network = imported.network
+    tanks = [tank.name for tank in network.tanks()]
+    pipes = [name for name, link in network.links.items() if link.kind == "pipe"]
+    probes = {("levels", name): f"nodes.{imported.nodes[name]}.level" for name in tanks}
+    probes |= {("heads", name): f"nodes.{imported.nodes[name]}.head" for name in network.nodes}
+    probes |= {("flows", name): f"links.{imported.links[name]}.flow" for name in pipes}
+    settings = {"output.probes": list(probes.values()), "output.units": {}, "output.every": ROWS}
+    try:
+        result = run(load(case_text, settings), pictures=False)
+    except FvsolveError as error:
+        return SelfCheck([], [], _unsolved(imported, str(error)))
+    if not result.ok:
+        return SelfCheck([], imported.causes, f"the run is not ok: {result.summary.get('reason', '')}")
+    every = list(range(0, int(end) + 1, ROWS))
+    times = every[1::2]
+    rows = np.searchsorted(result.t, np.array(times) - 1e-6)
+    days = run_epanet(network, int(end), STEP, every).solutions[1::2]
+    compared = []
+    bottoms = {tank.name: tank.elevation for tank in network.tanks()}
+    known = {
+        "levels": lambda solution, name: solution.head[name] - bottoms[name],
+        "heads": lambda solution, name: solution.head[name],
+        "flows": lambda solution, name: 1e3 * solution.flow[name],
+    }
+    series = {
+        key: np.asarray(result[probe])[rows] * (1e3 if key[0] == "flows" else 1.0) for key, probe in probes.items()
+    }
+    largest = max(abs(value) for solution in days for value in solution.flow.values()) * 1e3
+    limits = {"levels": MOST_HEAD, "heads": MOST_HEAD, "flows": MOST_FLOW * largest}
+    hidden = [left_out(network, solution) for solution in days]
+    dead = {name for table in hidden for names in table.values() for name in names}
+    for quantity, names in (("levels", tanks), ("heads", list(network.nodes)), ("flows", pipes)):
+        shown = [name for name in names if quantity != "heads" or name not in dead]
+        if not shown:
+            continue
+        ours = np.array([series[quantity, name] for name in shown])
+        theirs = np.array([[known[quantity](solution, name) for solution in days] for name in shown])
+        gaps = np.abs(ours - theirs)
+        greatest = gaps.max(axis=1)
+        order = np.argsort(-greatest)
+        worst = int(order[0])
+        at = int(gaps[worst].argmax())
+        limit = limits[quantity]
+        compared.append(Compared(
+            quantity, "l/s" if quantity == "flows" else "m", len(shown), shown[worst], float(ours[worst, at]),
+            float(theirs[worst, at]), limit, [shown[k] for k in order if greatest[k] > limit], {}, float(times[at]),
+        ))  # fmt: skip
+    return SelfCheck(compared, imported.causes)

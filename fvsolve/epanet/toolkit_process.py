@@ -1,0 +1,450 @@
+"""EPANET's toolkit in a process of its own: contents of a network file, and EPANET's solution, as JSON.
+
+A faulty file can crash EPANET's library, so that this module runs as a script: `toolkit_process.py FILE REQUEST`, with
+a request as JSON. It imports nothing but the standard library and the toolkit (package `owa-epanet`). All values are
+in SI: m, m3/s, W, s; pressures and settings of pressure are heads of water [m].
+"""
+
+import json
+import re
+import sys
+import tempfile
+import time
+import warnings
+from pathlib import Path
+from typing import Any
+
+FOOT, INCH, HORSEPOWER = 0.3048, 0.0254, 745.699872
+MINUTE, HOUR, DAY = 60.0, 3600.0, 86400.0
+CUBIC_FOOT, GALLON, IMPERIAL_GALLON, ACRE_FOOT = FOOT**3, 3.785411784e-3, 4.54609e-3, 43560.0 * FOOT**3
+# Units of flow [m3/s]; EPANET's own factors are rounded to four or five digits
+FLOW_UNITS = {
+    "CFS": CUBIC_FOOT, "GPM": GALLON / MINUTE, "MGD": 1e6 * GALLON / DAY, "IMGD": 1e6 * IMPERIAL_GALLON / DAY,
+    "AFD": ACRE_FOOT / DAY, "LPS": 1e-3, "LPM": 1e-3 / MINUTE, "MLD": 1e3 / DAY, "CMH": 1.0 / HOUR, "CMD": 1.0 / DAY,
+    "CMS": 1.0,
+}  # fmt: skip
+US_UNITS = ("CFS", "GPM", "MGD", "IMGD", "AFD")
+PSI_PER_FOOT, KPA_PER_PSI, BAR_PER_PSI = 0.4333, 6.895, 0.068948  # EPANET's figures for water
+ACCURACY, TRIALS = 1e-6, 500  # of EPANET's iteration
+MOST_WARNINGS = 200
+
+
+class Units:
+    """Factors from the units of a file to SI.
+
+    flow [m3/s], length [m], diameter [m], pressure : factor to a head of water [m], power [W]
+    """
+
+    def __init__(self, tk: Any, project: Any) -> None:
+        names = {getattr(tk, name): name for name in FLOW_UNITS}
+        self.name = names[tk.getflowunits(project)]
+        self.us = self.name in US_UNITS
+        self.flow = FLOW_UNITS[self.name]
+        self.length = FOOT if self.us else 1.0
+        self.diameter = INCH if self.us else 1e-3
+        self.power = HORSEPOWER if self.us else 1e3
+        per_foot = {
+            tk.PSI: PSI_PER_FOOT, tk.KPA: KPA_PER_PSI * PSI_PER_FOOT, tk.METERS: FOOT,
+            tk.BAR: BAR_PER_PSI * PSI_PER_FOOT, tk.FEET: 1.0,
+        }  # fmt: skip
+        self.pressure = FOOT / per_foot[int(tk.getoption(project, tk.PRESS_UNITS))]
+
+
+def contents(tk: Any, project: Any) -> dict[str, Any]:
+    """Contents of an open network file in SI, as plain lists and dictionaries."""
+    unit = Units(tk, project)
+    count = {key: tk.getcount(project, getattr(tk, key)) for key in (
+        "NODECOUNT", "LINKCOUNT", "PATCOUNT", "CURVECOUNT", "CONTROLCOUNT", "RULECOUNT")}  # fmt: skip
+    return {
+        "version": tk.getversion(),
+        "title": [line for line in tk.gettitle(project) if line.strip()],
+        "units": unit.name,
+        "options": _options(tk, project, unit),
+        "times": {name: tk.gettimeparam(project, getattr(tk, code)) for name, code in TIMES.items()},
+        "patterns": [_pattern(tk, project, k) for k in range(1, count["PATCOUNT"] + 1)],
+        "curves": [_curve(tk, project, k) for k in range(1, count["CURVECOUNT"] + 1)],
+        "nodes": [_node(tk, project, k, unit) for k in range(1, count["NODECOUNT"] + 1)],
+        "links": [_link(tk, project, k, unit) for k in range(1, count["LINKCOUNT"] + 1)],
+        "controls": [_control(tk, project, k, unit) for k in range(1, count["CONTROLCOUNT"] + 1)],
+        "rules": [_rule(tk, project, k, unit) for k in range(1, count["RULECOUNT"] + 1)],
+    }
+
+
+TIMES = {
+    "duration": "DURATION", "hydraulic_step": "HYDSTEP", "pattern_step": "PATTERNSTEP", "pattern_start": "PATTERNSTART",
+    "rule_step": "RULESTEP", "start_clock": "STARTTIME",
+}  # fmt: skip
+
+
+def _options(tk: Any, project: Any, unit: Units) -> dict[str, Any]:
+    kind, minimum, required, exponent = tk.getdemandmodel(project)
+    option = {name: tk.getoption(project, getattr(tk, code)) for name, code in {
+        "formula": "HEADLOSSFORM", "gravity": "SP_GRAVITY", "viscosity": "SP_VISCOS", "multiplier": "DEMANDMULT",
+        "emitter_exponent": "EMITEXPON", "emitter_backflow": "EMITBACKFLOW", "default_pattern": "DEMANDPATTERN",
+        "efficiency": "GLOBALEFFIC", "price": "GLOBALPRICE", "price_pattern": "GLOBALPATTERN",
+        "demand_charge": "DEMANDCHARGE"}.items()}  # fmt: skip
+    quality, _, _, traced = tk.getqualinfo(project)
+    return option | {
+        "formula": {tk.HW: "H-W", tk.DW: "D-W", tk.CM: "C-M"}[int(option["formula"])],
+        "default_pattern": int(option["default_pattern"]),
+        "price_pattern": int(option["price_pattern"]),
+        "pressure_unit": unit.pressure,
+        "flow_unit": unit.flow,
+        "pressure_driven": kind == tk.PDA,
+        "minimum_pressure": minimum * unit.pressure,
+        "required_pressure": required * unit.pressure,
+        "pressure_exponent": exponent,
+        "quality": {tk.NONE: "none", tk.CHEM: "chemical", tk.AGE: "age", tk.TRACE: "trace"}[quality],
+        "traced": traced,
+    }
+
+
+def _pattern(tk: Any, project: Any, index: int) -> dict[str, Any]:
+    values = [tk.getpatternvalue(project, index, k) for k in range(1, tk.getpatternlen(project, index) + 1)]
+    return {"name": tk.getpatternid(project, index), "values": values}
+
+
+def _curve(tk: Any, project: Any, index: int) -> dict[str, Any]:
+    """Points of a curve in the units of the file: its kind is not always stated."""
+    points = [tk.getcurvevalue(project, index, k) for k in range(1, tk.getcurvelen(project, index) + 1)]
+    return {"name": tk.getcurveid(project, index), "points": points}
+
+
+def _coordinates(tk: Any, project: Any, index: int) -> list[float] | None:
+    try:
+        return list(tk.getcoord(project, index))
+    except Exception:  # the toolkit raises Exception for a node without coordinates
+        return None
+
+
+def _points(tk: Any, project: Any, curve: int, x: float, y: float) -> list[list[float]] | None:
+    """Points of a curve in SI; x, y : factors from the units of the file; None for the index 0"""
+    return [[x * p, y * q] for p, q in _curve(tk, project, curve)["points"]] if curve > 0 else None
+
+
+def _node(tk: Any, project: Any, index: int, unit: Units) -> dict[str, Any]:
+    def value(code: str) -> float:
+        return tk.getnodevalue(project, index, getattr(tk, code))
+
+    kind = {tk.JUNCTION: "junction", tk.RESERVOIR: "reservoir", tk.TANK: "tank"}[tk.getnodetype(project, index)]
+    node: dict[str, Any] = {
+        "name": tk.getnodeid(project, index),
+        "kind": kind,
+        "elevation": unit.length * value("ELEVATION"),
+        "position": _coordinates(tk, project, index),
+    }
+    if kind == "junction":
+        amounts = range(1, tk.getnumdemands(project, index) + 1)
+        node["demands"] = [[unit.flow * tk.getbasedemand(project, index, k), tk.getdemandpattern(project, index, k)]
+                           for k in amounts]  # fmt: skip
+        exponent = tk.getoption(project, tk.EMITEXPON)
+        node["emitter"] = value("EMITTER") * unit.flow / unit.pressure**exponent
+    elif kind == "reservoir":
+        node["pattern"] = int(value("PATTERN"))
+    else:
+        curve = int(value("VOLCURVE"))
+        node |= {
+            "level": unit.length * value("TANKLEVEL"),
+            "minimum": unit.length * value("MINLEVEL"),
+            "maximum": unit.length * value("MAXLEVEL"),
+            "diameter": unit.length * value("TANKDIAM"),
+            "volume": _points(tk, project, curve, unit.length, unit.length**3),
+            "overflow": bool(value("CANOVERFLOW")),
+        }
+    return node
+
+
+VALVES = ("PRV", "PSV", "PBV", "FCV", "TCV", "GPV", "PCV")
+
+
+def _link(tk: Any, project: Any, index: int, unit: Units) -> dict[str, Any]:
+    def value(code: str) -> float:
+        return tk.getlinkvalue(project, index, getattr(tk, code))
+
+    code = tk.getlinktype(project, index)
+    kinds = {tk.CVPIPE: "pipe", tk.PIPE: "pipe", tk.PUMP: "pump"} | {getattr(tk, name): name for name in VALVES}
+    kind = kinds[code]
+    start, end = tk.getlinknodes(project, index)
+    link: dict[str, Any] = {
+        "name": tk.getlinkid(project, index),
+        "kind": kind,
+        "start": tk.getnodeid(project, start),
+        "end": tk.getnodeid(project, end),
+        "status": {0: "closed", 1: "open"}.get(int(value("INITSTATUS")), "active"),
+    }
+    if kind == "pipe":
+        rough = value("ROUGHNESS")
+        if int(tk.getoption(project, tk.HEADLOSSFORM)) == tk.DW:
+            rough *= 1e-3 * unit.length  # millimetres, or thousandths of a foot
+        return link | {
+            "length": unit.length * value("LENGTH"),
+            "diameter": unit.diameter * value("DIAMETER"),
+            "minor_loss": value("MINORLOSS"),
+            "roughness": rough,
+            "check_valve": code == tk.CVPIPE,
+            "leak_area": value("LEAK_AREA"),
+        }
+    if kind == "pump":
+        constant = tk.getpumptype(project, index) == tk.CONST_HP
+        head_curve = 0 if constant else tk.getheadcurveindex(project, index)
+        return link | {
+            "setting": value("INITSETTING"),
+            "power": unit.power * value("PUMP_POWER") if constant else None,
+            "curve": _points(tk, project, head_curve, unit.flow, unit.length),
+            "pattern": int(value("LINKPATTERN")),
+            "efficiency_curve": _points(tk, project, int(value("PUMP_ECURVE")), unit.flow, 0.01),
+            "price": value("PUMP_ECOST"),
+            "price_pattern": int(value("PUMP_EPAT")),
+        }
+    setting = value("INITSETTING")
+    table: dict[str, Any] = {"diameter": unit.diameter * value("DIAMETER"), "minor_loss": value("MINORLOSS")}
+    if kind == "GPV":
+        table["curve"] = _points(tk, project, int(value("GPV_CURVE")), unit.flow, unit.length)
+    if kind == "PCV":
+        table["curve"] = _points(tk, project, int(value("PCV_CURVE")), 0.01, 0.01)
+    return link | table | {"setting": setting * _setting_unit(kind, unit)}
+
+
+def _setting_unit(kind: str, unit: Units) -> float:
+    """Factor to SI of the setting of a link."""
+    if kind in ("PRV", "PSV", "PBV"):
+        return unit.pressure
+    return unit.flow if kind == "FCV" else 1.0
+
+
+def _control(tk: Any, project: Any, index: int, unit: Units) -> dict[str, Any]:
+    code, link, setting, node, level = tk.getcontrol(project, index)
+    kind = {tk.LOWLEVEL: "below", tk.HILEVEL: "above", tk.TIMER: "time", tk.TIMEOFDAY: "clock"}[code]
+    valves = {getattr(tk, name): name for name in VALVES}
+    link_code = tk.getlinktype(project, link)
+    control = {
+        "kind": kind,
+        "link": tk.getlinkid(project, link),
+        "action": _action(tk, link_code, setting, _setting_unit(valves.get(link_code, ""), unit)),
+        "level": level,
+    }
+    if kind in ("below", "above"):
+        control["node"] = tk.getnodeid(project, node)
+        tank = tk.getnodetype(project, node) != tk.JUNCTION
+        control["level"] = level * (unit.length if tank else unit.pressure)
+    return control
+
+
+def _action(tk: Any, code: int, setting: float, factor: float) -> list[Any]:
+    """Action as ["open"], ["closed"] or ["setting", value in SI]; code : kind of link"""
+    pipe = code in (tk.PIPE, tk.CVPIPE)
+    if setting == tk.SET_CLOSED or (setting == 0.0 and (pipe or code == tk.PUMP)):
+        return ["closed"]
+    if setting == tk.SET_OPEN or pipe:
+        return ["open"]
+    return ["setting", setting * factor]
+
+
+def _rule(tk: Any, project: Any, index: int, unit: Units) -> dict[str, Any]:
+    premises, thens, elses, priority = tk.getrule(project, index)
+
+    def actions(get: Any, count: int) -> list[Any]:
+        found = []
+        for k in range(1, count + 1):
+            link, status, setting = get(project, index, k)
+            valves = {getattr(tk, name): name for name in VALVES}
+            link_code = tk.getlinktype(project, link)
+            words = {tk.R_IS_OPEN: ["open"], tk.R_IS_CLOSED: ["closed"]}
+            factor = _setting_unit(valves.get(link_code, ""), unit)
+            action = words.get(status) or _action(tk, link_code, setting, factor)
+            found.append([tk.getlinkid(project, link), action])
+        return found
+
+    return {
+        "name": tk.getruleID(project, index),
+        "premises": [_premise(tk, project, index, k, unit) for k in range(1, premises + 1)],
+        "then": actions(tk.getthenaction, thens),
+        "else": actions(tk.getelseaction, elses),
+        "priority": priority,
+    }
+
+
+def _premise(tk: Any, project: Any, rule: int, index: int, unit: Units) -> dict[str, Any]:
+    logic, object_kind, target, variable, relation, status, value = tk.getpremise(project, rule, index)
+    variables = {getattr(tk, f"R_{name}"): name.lower() for name in (
+        "DEMAND", "HEAD", "GRADE", "LEVEL", "PRESSURE", "FLOW", "STATUS", "SETTING", "POWER", "TIME", "CLOCKTIME",
+        "FILLTIME", "DRAINTIME")}  # fmt: skip
+    name = variables[variable]
+    where, kind = "", ""
+    if object_kind == tk.R_NODE:
+        where = tk.getnodeid(project, target)
+    elif object_kind == tk.R_LINK:
+        where = tk.getlinkid(project, target)
+        valves = {getattr(tk, name): name for name in VALVES}
+        kind = valves.get(tk.getlinktype(project, target), "")
+    factor = {
+        "demand": unit.flow, "flow": unit.flow, "head": unit.length, "grade": unit.length, "level": unit.length,
+        "pressure": unit.pressure, "setting": _setting_unit(kind, unit),
+    }.get(name, 1.0)  # fmt: skip
+    relations = {tk.R_EQ: "=", tk.R_NE: "<>", tk.R_LE: "<=", tk.R_GE: ">=", tk.R_LT: "<", tk.R_GT: ">", tk.R_IS: "=",
+                 tk.R_NOT: "<>", tk.R_BELOW: "<", tk.R_ABOVE: ">"}  # fmt: skip
+    states = {tk.R_IS_OPEN: "open", tk.R_IS_CLOSED: "closed", tk.R_IS_ACTIVE: "active"}
+    return {
+        "or": logic == 3,
+        "object": {tk.R_NODE: "node", tk.R_LINK: "link"}.get(object_kind, "system"),
+        "name": where,
+        "variable": name,
+        "relation": relations[relation],
+        "value": states[status] if name == "status" else value * factor,
+    }
+
+
+NODE_VALUES = {"head": "HEAD", "demand": "DEMAND"}
+SWITCHED_OFF = (1.0, 2.0)  # EPANET's codes of a link that is closed for a time, or closed
+LINK_VALUES = {"flow": "FLOW", "status": "STATUS", "setting": "SETTING", "loss": "HEADLOSS"}
+
+
+def solution(tk: Any, project: Any, seconds: int, step: int | None, rows: list[int]) -> dict[str, Any]:
+    """EPANET's solution at times, with all controls and rules.
+
+    seconds : end of the run [s]; step : hydraulic step [s], None for that of the file
+    rows : times of results [s], equally spaced; EPANET ends a hydraulic step at each
+    """
+    unit = Units(tk, project)
+    tk.setoption(project, tk.ACCURACY, ACCURACY)
+    tk.setoption(project, tk.TRIALS, max(TRIALS, tk.getoption(project, tk.TRIALS)))
+    if tk.getoption(project, tk.UNBALANCED) < 0.0:
+        tk.setoption(project, tk.UNBALANCED, 10.0)  # go on after a time without solution
+    tk.settimeparam(project, tk.DURATION, seconds)
+    if step is not None:
+        tk.settimeparam(project, tk.HYDSTEP, step)
+        tk.settimeparam(project, tk.RULESTEP, min(step, 360))
+    if len(rows) > 1:
+        tk.settimeparam(project, tk.REPORTSTART, 0)
+        tk.settimeparam(project, tk.REPORTSTEP, rows[1] - rows[0])
+    nodes, links = tk.getcount(project, tk.NODECOUNT), tk.getcount(project, tk.LINKCOUNT)
+    wanted, table = set(rows), {}
+    tk.openH(project)
+    tk.initH(project, 0)
+    while True:
+        now = tk.runH(project)
+        if now in wanted:
+            table[now] = _row(tk, project, nodes, links, unit)
+        if tk.nextH(project) <= 0:
+            break
+    tk.closeH(project)
+    return {"rows": [table.get(at) for at in rows]}
+
+
+def _row(tk: Any, project: Any, nodes: int, links: int, unit: Units) -> dict[str, list[float]]:
+    """Values of all nodes and links at the present time, in SI; settings as in the file."""
+    row = {}
+    for name, code in NODE_VALUES.items():
+        factor = unit.length if name == "head" else unit.flow
+        row[name] = [factor * tk.getnodevalue(project, k, getattr(tk, code)) for k in range(1, nodes + 1)]
+    for name, code in LINK_VALUES.items():
+        factor = {"flow": unit.flow, "loss": unit.length}.get(name, 1.0)
+        row[name] = [factor * tk.getlinkvalue(project, k, getattr(tk, code)) for k in range(1, links + 1)]
+    for k in range(1, links + 1):
+        if tk.getlinktype(project, k) == tk.PUMP:  # a pump that lacks head counts as closed, but is not switched off
+            row["status"][k - 1] = tk.getlinkvalue(project, k, tk.PUMP_STATE) not in SWITCHED_OFF
+    return row
+
+
+def first_version_pumps(text: str) -> str:
+    """Text of a file with pumps in the form of EPANET 1 rewritten as pumps with curves, which EPANET 2.3 reads.
+
+    The form is `ID node node power`, `... head flow`, or `... head head flow head flow [range]`. EPANET 2.2 computes
+    the shutoff head of the second form as 1.33334 times the head.
+    """
+    lines, curves, section = text.splitlines(), [], ""
+    for number, line in enumerate(lines):
+        words = line.partition(";")[0].split()
+        section = words[0].upper() if words and words[0].startswith("[") else section
+        if not section.startswith("[PUMP") or len(words) < 4 or words[0].startswith("["):
+            continue
+        values = _numbers(words[3:])
+        if values is None:
+            continue
+        name = f"_pump_{len(curves) + 1}"
+        if len(values) == 1:
+            lines[number] = f"{' '.join(words[:3])} POWER {words[3]}"
+            continue
+        if len(values) == 2:
+            head, flow = values
+            points = [(0.0, 1.33334 * head), (flow, head), (2.0 * flow, 0.0)]
+        elif len(values) >= 5:
+            points = [(0.0, values[0]), (values[2], values[1]), (values[4], values[3])]
+        else:
+            continue
+        lines[number] = f"{' '.join(words[:3])} HEAD {name}"
+        curves += [f"{name} {x!r} {y!r}" for x, y in points]
+    end = next((k for k, line in enumerate(lines) if line.strip().upper().startswith("[END")), len(lines))
+    return "\n".join([*lines[:end], "[CURVES]", *curves, *lines[end:]]) + "\n"
+
+
+def _numbers(words: list[str]) -> list[float] | None:
+    try:
+        return [float(word) for word in words]
+    except ValueError:
+        return None
+
+
+def report_lines(text: str, word: str) -> list[str]:
+    """Messages of EPANET's report that begin with a word, such as "Error 203", each with the line that follows it."""
+    matches = re.findall(rf"^ *({word}.*(?:\n +\S.*)?)", text, re.MULTILINE)
+    return [re.sub(r"\s+", " ", item).strip() for item in matches]
+
+
+def answer(path: str, request: dict[str, Any]) -> dict[str, Any]:
+    """Result of a request on a file: its contents and solutions, or the faults that EPANET lists.
+
+    request : "contents" True for the contents; "solutions" : list of arguments of `solution`
+    """
+    from epanet import toolkit as tk
+
+    result: dict[str, Any] = {"faults": []}
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "report.txt"
+        source = path
+        for again in (False, True):
+            project = tk.createproject()
+            try:
+                tk.open(project, source, str(report), str(Path(folder) / "results.bin"))
+                break
+            except Exception as error:  # the toolkit raises Exception
+                tk.close(project)
+                found = report_lines(_read(report), "Error")
+                faults = [line for line in found if not line.startswith("Error 200")] or [str(error)]
+                if again or not any("in [PUMPS] section" in line for line in faults):
+                    return result | {"faults": faults}
+                source = str(Path(folder) / "rewritten.inp")
+                text = Path(path).read_bytes().decode("utf-8", "surrogateescape")
+                Path(source).write_bytes(first_version_pumps(text).encode("utf-8", "surrogateescape"))
+                first_faults = faults
+        if again:
+            result["rewritten"] = first_faults
+        if request.get("contents"):
+            result["contents"] = contents(tk, project)
+        result["solutions"] = []
+        for wanted in request.get("solutions", ()):
+            begun = time.process_time()
+            try:
+                found = solution(tk, project, **wanted)
+            except Exception as error:
+                found = {"error": str(error)}
+            result["solutions"].append(found | {"seconds": time.process_time() - begun})
+        tk.close(project)
+        result["warnings"] = report_lines(_read(report), "WARNING")[:MOST_WARNINGS]
+    return result
+
+
+def _read(path: Path) -> str:
+    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+
+
+def main() -> None:
+    """Print the answer to the request of the command line as JSON."""
+    warnings.simplefilter("ignore")  # the toolkit warns at each time with negative pressures
+    output = sys.stdout.buffer
+    json_text = json.dumps(answer(sys.argv[1], json.loads(sys.argv[2])))
+    output.write(json_text.encode("ascii"))
+
+
+if __name__ == "__main__":
+    main()
