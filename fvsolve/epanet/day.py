@@ -7,7 +7,7 @@ from typing import Any
 from fvsolve.epanet import part_tables, switching
 from fvsolve.epanet.network_file import Link, Network, Node, Solution
 from fvsolve.epanet.switching import DAY, Clause, Source, Statement
-from fvsolve.epanet.translating import STALL_FLOW, Translation, initial_action
+from fvsolve.epanet.translating import NARROW, STALL_FLOW, Translation, initial_action
 
 STEP_WIDTH = 1e-3  # difference of levels over which the area of a tank changes at a point of its volume curve [m]
 OPEN, CLOSED = 1.0, 0.0
@@ -129,6 +129,8 @@ class DayTranslation(Translation):
             self.links[self.link_names.new(f"{ours}-check")] = part_tables.check_valve((place, ends[1]), link.diameter)
             self.note("check valve: imported as a pipe with a check valve at its end", link.name)
             ends = (ends[0], place)
+        elif link.diameter < NARROW and self.opening(link.name) == CLOSED:
+            return self.narrow(link, ends)
         elif (opening := self.opening(link.name)) != OPEN:
             ends = (ends[0], self.shut_off(link, link.diameter, opening))
         part = self.pipe_table(link, ends)

@@ -3,8 +3,10 @@
 import importlib.util
 import json
 import math
+import platform
 import re
 import subprocess
+import sys
 from collections import defaultdict
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -113,6 +115,7 @@ class Network:
     options, times : as `toolkit_process.contents` names them, times in s
     nodes, links : name -> node, link; patterns : list of (name, values); index 1 is the first
     controls, rules : as `toolkit_process` reads them; rewritten : lines of EPANET 1 that were rewritten
+    required_pressure : head of water [m] from which demands that depend on pressure are full; 0 for demands of the file
     """
 
     path: Path
@@ -126,6 +129,7 @@ class Network:
     controls: list[dict[str, Any]]
     rules: list[dict[str, Any]]
     rewritten: list[str]
+    required_pressure: float = 0.0
 
     @property
     def us_units(self) -> bool:
@@ -182,11 +186,17 @@ class Solution:
 
 @dataclass(frozen=True)
 class EpanetRun:
-    """EPANET's solutions at the times of a run, its warnings and its processor time [s]."""
+    """EPANET's solutions at the times of a run.
+
+    warnings : of EPANET's report; unbalanced : number of times without convergence; cpu_time : processor time [s]
+    version : of EPANET, "2.2" or "2.3"
+    """
 
     solutions: list[Solution]
     warnings: list[str]
+    unbalanced: int
     cpu_time: float
+    version: str
 
 
 def is_installed() -> bool:
@@ -194,15 +204,22 @@ def is_installed() -> bool:
     return importlib.util.find_spec("epanet") is not None
 
 
-def read_network(path: Path) -> Network:
+def read_network(path: Path, required_pressure: float = 0.0) -> Network:
     """Read an EPANET file by EPANET's toolkit.
 
+    required_pressure : head of water [m] from which demands are full; below it they depend on pressure, as EPANET's
+    PDA with exponent 0.5. With 0 the demands are those of the file.
     Raises FvsolveError with the faults that EPANET finds, each with its line in the file.
     """
     reply = ask(path, {"contents": True})
     table = reply["contents"]
     nodes = {entry["name"]: Node(**entry) for entry in table["nodes"]}
     links = {entry["name"]: Link(**entry) for entry in table["links"]}
+    if required_pressure:
+        table["options"] |= {
+            "pressure_driven": True, "minimum_pressure": 0.0, "required_pressure": required_pressure,
+            "pressure_exponent": 0.5,
+        }  # fmt: skip
     return Network(
         path,
         title=[readable(line) for line in table["title"]],
@@ -215,7 +232,25 @@ def read_network(path: Path) -> Network:
         controls=table["controls"],
         rules=table["rules"],
         rewritten=reply.get("rewritten", []),
+        required_pressure=required_pressure,
     )
+
+
+def library_2_2() -> str | None:
+    """File of EPANET 2.2's library in the package WNTR, which is not imported; None if it is missing."""
+    found = importlib.util.find_spec("wntr")
+    if found is None or not found.submodule_search_locations:
+        return None
+    folder = Path(found.submodule_search_locations[0]) / "epanet" / "libepanet" / LIBRARY_FOLDERS.get(
+        (sys.platform, platform.machine().lower()), "unknown")  # fmt: skip
+    files = [*folder.glob("*epanet22.*"), *folder.glob("*epanet2.*")]
+    return str(files[0]) if files else None
+
+
+LIBRARY_FOLDERS = {
+    ("linux", "x86_64"): "linux-x64", ("win32", "amd64"): "windows-x64", ("darwin", "x86_64"): "darwin-x64",
+    ("darwin", "arm64"): "darwin-arm",
+}  # fmt: skip
 
 
 def solution_at(network: Network, hour: float) -> EpanetRun:
@@ -233,7 +268,16 @@ def run_epanet(network: Network, end: int, step: int | None, times: list[int]) -
     end : of the run [s]; step : hydraulic step [s], None for that of the file; times : of the solutions [s]
     Raises FvsolveError if EPANET stops before the end.
     """
-    reply = ask(network.path, {"solutions": [{"seconds": end, "step": step, "rows": times}]})
+    request = {"solutions": [{"seconds": end, "step": step, "rows": times}]}
+    if network.required_pressure:
+        request |= {"required_pressure": network.required_pressure, "pressure_unit": network.options["pressure_unit"]}
+    library = library_2_2()
+    try:
+        reply, version = ask(network.path, request | {"library": library}), "2.2" if library else "2.3"
+    except FvsolveError:  # EPANET 2.2 refuses what is new in 2.3
+        if library is None:
+            raise
+        reply, version = ask(network.path, request), "2.3"
     result = reply["solutions"][0]
     if "error" in result:
         raise FvsolveError(f"{network.path.name}: EPANET stops: {result['error']}")
@@ -242,7 +286,7 @@ def run_epanet(network: Network, end: int, step: int | None, times: list[int]) -
         missing = next(at for at, row in zip(times, result["rows"], strict=True) if row is None)
         text = f"EPANET's run has no results at hour {missing / 3600.0:g}"
         raise FvsolveError(f"{network.path.name}: {text}; try an earlier hour")
-    return EpanetRun(solutions, reply["warnings"], result["seconds"])
+    return EpanetRun(solutions, reply["warnings"], result["unbalanced"], result["seconds"], version)
 
 
 def _solution(network: Network, seconds: int, row: dict[str, list[float]]) -> Solution:

@@ -9,13 +9,13 @@ import numpy as np
 from fvsolve.case import Case
 from fvsolve.epanet.importing import Imported
 from fvsolve.epanet.network_file import Network, Solution, run_epanet
+from fvsolve.epanet.toolkit_process import NO_HEAD
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.model.build import build
 
 MOST_HEAD, MOST_FLOW = 0.01, 0.01  # differences of heads [m], and of flows over the largest flow [-], that are named
 STEP = 10  # hydraulic step of EPANET over a day [s]
 ROWS = 150  # time between rows of the day that are compared [s]; not a time at which patterns change
-NO_HEAD = -1e4  # heads below this are EPANET's sign of a demand that nothing can supply [m]
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,9 @@
 """EPANET's toolkit in a process of its own: contents of a network file, and EPANET's solution, as JSON.
 
 A faulty file can crash EPANET's library, so that this module runs as a script: `toolkit_process.py FILE REQUEST`, with
-a request as JSON. It imports nothing but the standard library and the toolkit (package `owa-epanet`). All values are
+a request as JSON. It imports nothing but the standard library and the toolkit (package `owa-epanet`). EPANET 2.3 reads
+all files of 2.2 but solves some networks differently; solutions are those of EPANET 2.2 if its library (package `wntr`)
+is installed. All values are
 in SI: m, m3/s, W, s; pressures and settings of pressure are heads of water [m].
 """
 
@@ -25,15 +27,13 @@ FLOW_UNITS = {
 }  # fmt: skip
 US_UNITS = ("CFS", "GPM", "MGD", "IMGD", "AFD")
 PSI_PER_FOOT, KPA_PER_PSI, BAR_PER_PSI = 0.4333, 6.895, 0.068948  # EPANET's figures for water
-ACCURACY, TRIALS = 1e-6, 500  # of EPANET's iteration
+ACCURACIES, TRIALS = (1e-6, 1e-5), 500  # of EPANET's iteration
+NO_HEAD = -1e4  # heads below this are EPANET's sign of a demand that nothing can supply [m]
 MOST_WARNINGS = 200
 
 
-class Units:
-    """Factors from the units of a file to SI.
-
-    flow [m3/s], length [m], diameter [m], pressure : factor to a head of water [m], power [W]
-    """
+class FlowUnits:
+    """Factors of flow [m3/s] and length [m] from the units of a file to SI."""
 
     def __init__(self, tk: Any, project: Any) -> None:
         names = {getattr(tk, name): name for name in FLOW_UNITS}
@@ -41,6 +41,13 @@ class Units:
         self.us = self.name in US_UNITS
         self.flow = FLOW_UNITS[self.name]
         self.length = FOOT if self.us else 1.0
+
+
+class Units(FlowUnits):
+    """All factors from the units of a file to SI: also diameter [m], pressure to a head of water [m], and power [W]."""
+
+    def __init__(self, tk: Any, project: Any) -> None:
+        super().__init__(tk, project)
         self.diameter = INCH if self.us else 1e-3
         self.power = HORSEPOWER if self.us else 1e3
         per_foot = {
@@ -304,12 +311,12 @@ def solution(tk: Any, project: Any, seconds: int, step: int | None, rows: list[i
 
     seconds : end of the run [s]; step : hydraulic step [s], None for that of the file
     rows : times of results [s], equally spaced; EPANET ends a hydraulic step at each
+    EPANET iterates to `ACCURACIES[0]`. Where it does not converge, or states heads that nothing can have, the best
+    result counts of this accuracy, the next of `ACCURACIES`, and the accuracy and trials of the file.
     """
-    unit = Units(tk, project)
-    tk.setoption(project, tk.ACCURACY, ACCURACY)
-    tk.setoption(project, tk.TRIALS, max(TRIALS, tk.getoption(project, tk.TRIALS)))
+    own = tk.getoption(project, tk.ACCURACY), tk.getoption(project, tk.TRIALS)
     if tk.getoption(project, tk.UNBALANCED) < 0.0:
-        tk.setoption(project, tk.UNBALANCED, 10.0)  # go on after a time without solution
+        tk.setoption(project, tk.UNBALANCED, 10.0)  # go on after a time without convergence
     tk.settimeparam(project, tk.DURATION, seconds)
     if step is not None:
         tk.settimeparam(project, tk.HYDSTEP, step)
@@ -317,21 +324,39 @@ def solution(tk: Any, project: Any, seconds: int, step: int | None, rows: list[i
     if len(rows) > 1:
         tk.settimeparam(project, tk.REPORTSTART, 0)
         tk.settimeparam(project, tk.REPORTSTEP, rows[1] - rows[0])
+    best: dict[str, Any] = {}
+    attempts = [*((accuracy, max(TRIALS, own[1])) for accuracy in ACCURACIES), own]
+    for accuracy, trials in attempts:
+        tk.setoption(project, tk.TRIALS, trials)
+        found = _solved(tk, project, accuracy, set(rows))
+        lost = sum(min(row["head"]) < NO_HEAD for row in found["rows"].values())
+        if not best or found["unbalanced"] + lost < best["faults"]:
+            best = found | {"faults": found["unbalanced"] + lost}
+        if best["faults"] == 0:
+            break
+    return best | {"rows": [best["rows"].get(at) for at in rows]}
+
+
+def _solved(tk: Any, project: Any, accuracy: float, wanted: set[int]) -> dict[str, Any]:
+    """Values at times, and the number of times at which EPANET does not reach an accuracy."""
+    unit = FlowUnits(tk, project)
     nodes, links = tk.getcount(project, tk.NODECOUNT), tk.getcount(project, tk.LINKCOUNT)
-    wanted, table = set(rows), {}
+    table, unbalanced = {}, 0
+    tk.setoption(project, tk.ACCURACY, accuracy)
     tk.openH(project)
     tk.initH(project, 0)
     while True:
         now = tk.runH(project)
+        unbalanced += tk.getstatistic(project, tk.RELATIVEERROR) > accuracy
         if now in wanted:
             table[now] = _row(tk, project, nodes, links, unit)
         if tk.nextH(project) <= 0:
             break
     tk.closeH(project)
-    return {"rows": [table.get(at) for at in rows]}
+    return {"rows": table, "unbalanced": int(unbalanced)}
 
 
-def _row(tk: Any, project: Any, nodes: int, links: int, unit: Units) -> dict[str, list[float]]:
+def _row(tk: Any, project: Any, nodes: int, links: int, unit: FlowUnits) -> dict[str, list[float]]:
     """Values of all nodes and links at the present time, in SI; settings as in the file."""
     row = {}
     for name, code in NODE_VALUES.items():
@@ -391,13 +416,26 @@ def report_lines(text: str, word: str) -> list[str]:
     return [re.sub(r"\s+", " ", item).strip() for item in matches]
 
 
+def toolkit(library: str | None) -> Any:
+    """Toolkit of EPANET 2.3, or of EPANET 2.2 by the file of its library; both cannot be in one process."""
+    if library is None:
+        from epanet import toolkit as module
+
+        return module
+    sys.path.append(str(Path(__file__).parent))
+    from toolkit_library import Library
+
+    return Library(library)
+
+
 def answer(path: str, request: dict[str, Any]) -> dict[str, Any]:
     """Result of a request on a file: its contents and solutions, or the faults that EPANET lists.
 
-    request : "contents" True for the contents; "solutions" : list of arguments of `solution`
+    request : "contents" True for the contents; "solutions" : list of arguments of `solution`; "library" : file of
+    EPANET 2.2's library for the solutions, without it they are those of EPANET 2.3; "required_pressure" : head of water
+    [m] at which demands that depend on pressure are full, without it demands are as in the file
     """
-    from epanet import toolkit as tk
-
+    tk = toolkit(request.get("library"))
     result: dict[str, Any] = {"faults": []}
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.txt"
@@ -419,6 +457,9 @@ def answer(path: str, request: dict[str, Any]) -> dict[str, Any]:
                 first_faults = faults
         if again:
             result["rewritten"] = first_faults
+        if request.get("required_pressure"):
+            pressure = request["required_pressure"] / request["pressure_unit"]
+            tk.setdemandmodel(project, tk.PDA, 0.0, pressure, 0.5)
         if request.get("contents"):
             result["contents"] = contents(tk, project)
         result["solutions"] = []

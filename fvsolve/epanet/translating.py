@@ -14,7 +14,9 @@ MOST_PASSES = 50  # of the search for elevations
 LEAST_ROUGHNESS = 1e-9
 REGULATED_END = {"PRV": "end", "PSV": "start"}
 RISE_TOLERANCE = 1e-9  # of the rise over the length of a pipe
+SUSTAIN_TOLERANCE = 1e-2  # of the head before a PSV [m]
 SET_TOLERANCE = 1e-6  # of set heads and heads of sources [m]
+NARROW = 1e-3  # diameter below which a closed pipe is a shut valve [m]
 STILL = 1e-6  # velocity below which a pipe counts as still [m/s]
 GRAVITY = part_tables.GRAVITY
 
@@ -198,6 +200,8 @@ class Translation:
 
     def pipe(self, link: Link) -> part_tables.Part:
         start, end = self.ends(link)
+        if link.diameter < NARROW and self.is_shut(link):
+            return self.narrow(link, (start, end))
         if link.check_valve or self.is_shut(link):
             place = self.junction_before_end(link)
             ours = self.link_names.new(f"{self.link_names.given[link.name]}-{'check' if link.check_valve else 'shut'}")
@@ -209,6 +213,11 @@ class Translation:
             self.note(f"{reason}: imported as a pipe with {valve} at its end", link.name)
             end = place
         return self.pipe_table(link, (start, end))
+
+    def narrow(self, link: Link, ends: tuple[str, str]) -> part_tables.Part:
+        """Table of a closed pipe that stands for a pipe to be designed, with a diameter of almost 0: a shut valve."""
+        self.note(f"closed pipe narrower than {1e3 * NARROW:g} mm: imported as a shut valve", link.name)
+        return part_tables.valve(ends, NARROW, 0.0, opening=0.0)
 
     def pipe_table(self, link: Link, ends: tuple[str, str]) -> part_tables.Part:
         """Table of a pipe between two nodes of the case, lengthened if it is too short."""
@@ -304,6 +313,10 @@ class Translation:
             word = "an open" if kind == "PRV" else "a shut"
             self.note(f"{kind} with a set head above every source: imported as {word} valve", link.name)
             return part_tables.valve(ends, diameter, link.minor_loss, opening=1.0 if kind == "PRV" else 0.0)
+        if kind == "PSV" and self.cannot_sustain(link, setting):
+            text = "PSV cannot sustain its pressure, and EPANET lets flow pass (its warning 5)"
+            self.note(f"{text}: imported as an open valve", link.name)
+            return part_tables.valve(ends, diameter, link.minor_loss)
         if kind in part_tables.REGULATING:
             self.note(f"{kind}: EPANET states no time constant, {part_tables.TIME_CONSTANT} is used", link.name)
             return part_tables.regulating(kind, ends, diameter, self.set_point(link, setting), link.minor_loss)
@@ -352,7 +365,13 @@ class Translation:
         greatest = max(self.solution.head[source] for source in sources)
         head = setting / self.gravity + network.nodes[controlled].elevation
         pumps = any(other.kind == "pump" for other in network.links.values())
-        return not pumps and head > greatest - SET_TOLERANCE
+        return not pumps and head > greatest + SET_TOLERANCE
+
+    def cannot_sustain(self, link: Link, setting: float) -> bool:
+        """True if a PSV passes flow in EPANET although the head before it is below its set head."""
+        head = setting / self.gravity + self.network.nodes[link.start].elevation
+        below = self.solution.head[link.start] < head - SUSTAIN_TOLERANCE
+        return below and self.solution.flow[link.name] > STALL_FLOW
 
     def set_point(self, link: Link, setting: float) -> float:
         """Set point of a valve: head of water above the controlled end [m], or flow [m3/s] of an FCV.
