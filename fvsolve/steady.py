@@ -17,6 +17,7 @@ DENSE_LIMIT = 150  # number of unknowns up to which a dense solver is faster
 DAMPING = 1e-12  # weight of |x|^2 in the least-squares solution of a singular system
 SMALL_DROP = 1e-12  # relative difference of potentials that counts as rounding
 SMALL = 1e-9  # relative residual below which a node counts as balanced
+LARGEST_IMBALANCE = 1e-6  # relative residual of the balance of a node above which a solution is refused
 LEAST_SCALE = 1e-9  # least typical mass flow of a piece [kg/s]
 
 
@@ -165,6 +166,15 @@ class _Problem:
         self.column |= {("node", i): len(self.active) + k for k, i in enumerate(self.unknown)}
         self.columns = [_columns(self.column, e, self.edges[e]) for e in self.rows]
 
+    def is_balanced(self) -> bool:
+        """True if the flows balance the demands: the least-squares solution of a system without solution does not."""
+        missing = self.demand.copy()
+        for edge, flow in zip(self.edges, self.flow, strict=True):
+            missing[edge.i] += flow
+            missing[edge.j] -= flow
+        largest = max(np.abs(self.flow).max(initial=0.0), np.abs(self.demand[self.unknown]).max(initial=0.0))
+        return bool(np.all(np.abs(missing[self.balances]) <= LARGEST_IMBALANCE * largest))
+
     def pattern(self) -> tuple:
         """Structure of the system: equal for problems that one call of `_newton` solves together."""
         ends = tuple((edge.i, edge.j, edge.shut, isinstance(edge.row, np.ndarray)) for edge in self.edges)
@@ -283,7 +293,7 @@ def _newton(problems: list[_Problem]) -> None:
             break
     for k, problem in enumerate(problems):
         problem.flow, problem.potential = system.flow[k], system.potential[k]
-        problem.converged = bool(ended[k] == 1 or (ended[k] == 0 and sizes[k] < 1e-9))
+        problem.converged = bool(ended[k] == 1 or (ended[k] == 0 and sizes[k] < 1e-9)) and problem.is_balanced()
 
 
 class _System:

@@ -59,6 +59,7 @@ class SteadyStart:
         self.moving: list[str] = []
         self.shut: set[int] = set()  # valves that a device holds shut
         self.valve_modes: dict[int, str] = {}  # modes of valves that regulate
+        self.uncontrolled: set[int] = set()  # valves that cannot sustain a pressure, see `release_regulators`
         self.loads: dict[int, float] = {}  # of closed chambers: pressures that support bodies, held by `solve` [Pa]
 
     @cached_property
@@ -153,6 +154,7 @@ class SteadyStart:
         valves = [self.valve_edge(k) for k in range(len(self.valves))]
         leaks = [self.leak_edge(k) for k in range(len(self.pistons)) if self.pistons[k]["leakage"] > 0.0]
         self.edges = [*pipes, *columns, *valves, *leaks]
+        self.release_regulators(len(pipes) + len(columns))
         sizes = self.flow_scales[: len(self.edges)]
         self.answer = solve_steady(held, self.demand, self.edges, (PRESSURE_SCALE, sizes))
         flow = self.answer.flow
@@ -167,6 +169,35 @@ class SteadyStart:
             self.inflow[nodes] = np.where(np.abs(self.inflow[nodes]) <= tolerance, 0.0, self.inflow[nodes])
         n, m = len(pipes), len(pipes) + len(columns)
         self.pipe_flow, self.column_flow, self.valve_flow = flow[:n], flow[n:m], flow[m : m + len(valves)]
+
+    def release_regulators(self, first: int) -> None:
+        """Open each valve that would sustain a pressure although the demands behind it determine its flow.
+
+        Such a valve is the only way to a group of nodes in which nothing else determines a potential. It is open, or
+        shut if its pressure is too low.
+        first : index of the edge of the first valve
+        """
+        self.uncontrolled = set()
+        holding = [k for k in range(len(self.valves)) if self.edges[first + k].held_potential is not None]
+        while holding:
+            joined = [(edge.i, edge.j) for edge in self.edges
+                      if edge.held_potential is None and not edge.shut and (edge.row is not None or edge.drop)]  # fmt: skip
+            group = union(len(self.nodes), joined)
+            known = {group[i] for i in np.flatnonzero(~np.isnan(self.fixed_potentials)).tolist()}
+            known |= {group[self.edges[first + k].held_potential[0]] for k in holding}
+            lost = next((k for k in holding if self.holds_upstream(first + k)
+                         and group[self.edges[first + k].j] not in known), None)  # fmt: skip
+            if lost is None:
+                return
+            self.valve_lowering(lost).release(self, lost)
+            self.uncontrolled.add(lost)
+            self.edges[first + lost] = self.valve_edge(lost)
+            holding.remove(lost)
+
+    def holds_upstream(self, e: int) -> bool:
+        """True if edge e maintains the potential of its first node."""
+        held = self.edges[e].held_potential
+        return held is not None and held[0] == self.edges[e].i
 
     def boundary_values(self) -> tuple[np.ndarray, np.ndarray]:
         """Fixed potentials of nodes [Pa], nan where unknown, and demands of junctions [kg/s] : float64[nodes] each.

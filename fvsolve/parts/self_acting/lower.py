@@ -426,6 +426,10 @@ class Regulator(Device, kind=""):
     def steady_mode(self, start, k: int) -> str:
         return start.valve_modes.setdefault(k, ACTIVE if self.is_controllable(start, k) else OPEN)
 
+    def release(self, start, k: int) -> None:
+        """Open valve k in the present iteration of the steady start."""
+        start.valve_modes[k] = OPEN
+
     def edge(self, start, k):
         if k in start.shut or self.steady_mode(start, k) == OPEN:
             return None
@@ -445,7 +449,7 @@ class Regulator(Device, kind=""):
         here = SteadyValve(start, k, p_from, p_to, self.target(start, k), flow, loss)
         before = "shut" if k in start.shut else self.steady_mode(start, k)
         after = self.next_mode(here, before)
-        if after == ACTIVE and not self.is_controllable(start, k):
+        if after == ACTIVE and (k in start.uncontrolled or not self.is_controllable(start, k)):
             after = "shut"
         start.shut = start.shut | {k} if after == "shut" else start.shut - {k}
         start.valve_modes[k] = OPEN if after == OPEN else ACTIVE if after == ACTIVE else start.valve_modes[k]
