@@ -336,7 +336,8 @@ class _System:
         laws = [problem.edges[e].row for problem in problems for e in edges]
         self.laws = np.array(laws, dtype=float).reshape(len(problems), len(edges), LAW_SIZE)
         # numbers of the other rows, with their values
-        self.others = [(k, slice(begin[k], begin[k + 1])) for k in range(len(first.rows)) if k not in {*lawful}]
+        by_law = set(lawful)
+        self.others = [(k, slice(begin[k], begin[k + 1])) for k in range(len(first.rows)) if k not in by_law]
 
     def changes(self, numbers: np.ndarray) -> np.ndarray:
         """Changes of the unknowns of some problems in the next iteration; NaN where a number is not finite."""

@@ -8,6 +8,7 @@ in SI: m, m3/s, W, s; pressures and settings of pressure are heads of water [m].
 """
 
 import json
+import os
 import re
 import sys
 import tempfile
@@ -49,7 +50,7 @@ class Units(FlowUnits):
     def __init__(self, tk: Any, project: Any) -> None:
         super().__init__(tk, project)
         self.diameter = INCH if self.us else 1e-3
-        self.power = HORSEPOWER if self.us else 1e3
+        self.power = HORSEPOWER  # the toolkit states horsepower for files in metric units too
         per_foot = {
             tk.PSI: PSI_PER_FOOT, tk.KPA: KPA_PER_PSI * PSI_PER_FOOT, tk.METERS: FOOT,
             tk.BAR: BAR_PER_PSI * PSI_PER_FOOT, tk.FEET: 1.0,
@@ -371,36 +372,43 @@ def _row(tk: Any, project: Any, nodes: int, links: int, unit: FlowUnits) -> dict
     return row
 
 
-def first_version_pumps(text: str) -> str:
-    """Text of a file with pumps in the form of EPANET 1 rewritten as pumps with curves, which EPANET 2.3 reads.
+def first_version(text: str) -> str:
+    """Text of a file of EPANET 1, which EPANET 2.2 reads, in the form that EPANET 2.3 reads too.
 
-    The form is `ID node node power`, `... head flow`, or `... head head flow head flow [range]`. EPANET 2.2 computes
-    the shutoff head of the second form as 1.33334 times the head.
+    Pumps `ID node node power`, `... head flow`, or `... head head flow head flow [range]` get curves. EPANET 2.2
+    computes the shutoff head of the second form as 1.33334 times the head. A line `MULTIPLY factor` of [DEMANDS]
+    becomes an option.
     """
-    lines, curves, section = text.splitlines(), [], ""
+    lines, curves, options, section = text.splitlines(), [], [], ""
     for number, line in enumerate(lines):
         words = line.partition(";")[0].split()
-        section = words[0].upper() if words and words[0].startswith("[") else section
-        if not section.startswith("[PUMP") or len(words) < 4 or words[0].startswith("["):
-            continue
-        values = _numbers(words[3:])
-        if values is None:
-            continue
-        name = f"_pump_{len(curves) + 1}"
-        if len(values) == 1:
-            lines[number] = f"{' '.join(words[:3])} POWER {words[3]}"
-            continue
-        if len(values) == 2:
-            head, flow = values
-            points = [(0.0, 1.33334 * head), (flow, head), (2.0 * flow, 0.0)]
-        elif len(values) >= 5:
-            points = [(0.0, values[0]), (values[2], values[1]), (values[4], values[3])]
-        else:
-            continue
-        lines[number] = f"{' '.join(words[:3])} HEAD {name}"
-        curves += [f"{name} {x!r} {y!r}" for x, y in points]
+        if words and words[0].startswith("["):
+            section = words[0].upper()
+        elif section.startswith("[DEMA") and len(words) == 2 and words[0].upper() == "MULTIPLY":
+            lines[number] = ""
+            options.append(f"DEMAND MULTIPLIER {words[1]}")
+        elif section.startswith("[PUMP") and len(words) > 3 and (values := _numbers(words[3:])) is not None:
+            lines[number] = _pump_line(words, values, curves)
     end = next((k for k, line in enumerate(lines) if line.strip().upper().startswith("[END")), len(lines))
-    return "\n".join([*lines[:end], "[CURVES]", *curves, *lines[end:]]) + "\n"
+    added = ["[CURVES]", *curves, "[OPTIONS]", *options]
+    return "\n".join([*lines[:end], *added, *lines[end:]]) + "\n"
+
+
+def _pump_line(words: list[str], values: list[float], curves: list[str]) -> str:
+    """Line of a pump with a curve, whose lines are added to `curves`; values : numbers of the line of EPANET 1"""
+    pump = " ".join(words[:3])
+    if len(values) == 1:
+        return f"{pump} POWER {words[3]}"
+    if len(values) == 2:
+        head, flow = values
+        points = [(0.0, 1.33334 * head), (flow, head), (2.0 * flow, 0.0)]
+    elif len(values) >= 5:
+        points = [(0.0, values[0]), (values[2], values[1]), (values[4], values[3])]
+    else:
+        return " ".join(words)
+    name = f"_pump_{len(curves) + 1}"
+    curves += [f"{name} {x!r} {y!r}" for x, y in points]
+    return f"{pump} HEAD {name}"
 
 
 def _numbers(words: list[str]) -> list[float] | None:
@@ -414,6 +422,25 @@ def report_lines(text: str, word: str) -> list[str]:
     """Messages of EPANET's report that begin with a word, such as "Error 203", each with the line that follows it."""
     matches = re.findall(rf"^ *({word}.*(?:\n +\S.*)?)", text, re.MULTILINE)
     return [re.sub(r"\s+", " ", item).strip() for item in matches]
+
+
+def opened(tk: Any, path: str, files: tuple[str, str]) -> tuple[Any, list[str]]:
+    """Project of an opened file, and the faults that EPANET lists; files : for its report and its results"""
+    project = tk.createproject()
+    try:
+        tk.open(project, path, *files)
+    except Exception as error:  # the toolkit raises Exception
+        tk.close(project)
+        found = report_lines(_read(Path(files[0])), "Error")
+        return None, [line for line in found if not line.startswith("Error 200")] or [str(error)]
+    if hasattr(tk, "NOCURVE"):  # EPANET 2.3 reads a pump of EPANET 1 with its power alone as a pump without law
+        links = range(1, tk.getcount(project, tk.LINKCOUNT) + 1)
+        pumps = [k for k in links if tk.getlinktype(project, k) == tk.PUMP]
+        bare = [tk.getlinkid(project, k) for k in pumps if tk.getpumptype(project, k) == tk.NOCURVE]
+        if bare:
+            tk.close(project)
+            return None, [f"Error 226: no curve or power of pump {name} in [PUMPS] section" for name in bare]
+    return project, []
 
 
 def toolkit(library: str | None) -> Any:
@@ -439,24 +466,16 @@ def answer(path: str, request: dict[str, Any]) -> dict[str, Any]:
     result: dict[str, Any] = {"faults": []}
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.txt"
-        source = path
-        for again in (False, True):
-            project = tk.createproject()
-            try:
-                tk.open(project, source, str(report), str(Path(folder) / "results.bin"))
-                break
-            except Exception as error:  # the toolkit raises Exception
-                tk.close(project)
-                found = report_lines(_read(report), "Error")
-                faults = [line for line in found if not line.startswith("Error 200")] or [str(error)]
-                if again or not any("in [PUMPS] section" in line for line in faults):
-                    return result | {"faults": faults}
-                source = str(Path(folder) / "rewritten.inp")
-                text = Path(path).read_bytes().decode("utf-8", "surrogateescape")
-                Path(source).write_bytes(first_version_pumps(text).encode("utf-8", "surrogateescape"))
-                first_faults = faults
-        if again:
-            result["rewritten"] = first_faults
+        files = str(report), str(Path(folder) / "results.bin")
+        project, faults = opened(tk, path, files)
+        if any("in [PUMPS]" in line or "MULTIPLY" in line for line in faults):
+            rewritten = Path(folder) / "rewritten.inp"
+            text = Path(path).read_bytes().decode("utf-8", "surrogateescape")
+            rewritten.write_bytes(first_version(text).encode("utf-8", "surrogateescape"))
+            result["rewritten"] = faults
+            project, faults = opened(tk, str(rewritten), files)
+        if faults:
+            return result | {"faults": faults}
         if request.get("required_pressure"):
             pressure = request["required_pressure"] / request["pressure_unit"]
             tk.setdemandmodel(project, tk.PDA, 0.0, pressure, 0.5)
@@ -482,9 +501,11 @@ def _read(path: Path) -> str:
 def main() -> None:
     """Print the answer to the request of the command line as JSON."""
     warnings.simplefilter("ignore")  # the toolkit warns at each time with negative pressures
-    output = sys.stdout.buffer
+    output = os.dup(sys.stdout.fileno())
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # EPANET's library prints some messages
     json_text = json.dumps(answer(sys.argv[1], json.loads(sys.argv[2])))
-    output.write(json_text.encode("ascii"))
+    with os.fdopen(output, "w", encoding="ascii") as stream:
+        stream.write(json_text)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ REGULATED_END = {"PRV": "end", "PSV": "start"}
 RISE_TOLERANCE = 1e-9  # of the rise over the length of a pipe
 SUSTAIN_TOLERANCE = 1e-2  # of the head before a PSV [m]
 SET_TOLERANCE = 1e-6  # of set heads and heads of sources [m]
+LOWEST_HEAD = -9.0  # least set pressure of a case: a head of water near vacuum [m]
 NARROW = 1e-3  # diameter below which a closed pipe is a shut valve [m]
 STILL = 1e-6  # velocity below which a pipe counts as still [m/s]
 GRAVITY = part_tables.GRAVITY
@@ -121,6 +122,7 @@ class Translation:
         pipes = [
             link for link in network.links.values() if link.kind == "pipe" and {link.start, link.end} <= result.keys()
         ]
+        self.lowered = self.lower_regulated(result)
         for _ in range(MOST_PASSES):
             moved = [name for pipe in pipes if (name := self.move_junction(pipe, result))]
             for name in moved:
@@ -130,6 +132,23 @@ class Translation:
                 break
         return result
 
+    def lower_regulated(self, elevation: dict[str, float]) -> set[str]:
+        """Lower junctions at which a valve would keep a pressure below vacuum; return their names.
+
+        EPANET accepts a set pressure of -50 m; the set head stays as in the file.
+        """
+        lowered = set()
+        for link in self.network.links.values():
+            if link.kind not in REGULATED_END or not link.setting < LOWEST_HEAD:
+                continue
+            name = getattr(link, REGULATED_END[link.kind])
+            if self.network.nodes[name].kind == "junction":
+                elevation[name] += link.setting / self.gravity
+                lowered.add(name)
+                text = "elevation lowered, because a valve cannot keep a pressure below vacuum"
+                self.note(f"{text}; heads and flows do not change", name)
+        return lowered
+
     def move_junction(self, pipe: Link, elevation: dict[str, float]) -> str:
         """Move the lower end of a pipe that is shorter than its rise, else its higher end; return the name, or ""."""
         low, high = sorted((pipe.start, pipe.end), key=elevation.get)
@@ -137,10 +156,10 @@ class Translation:
             return ""
         if self.depends_on_pressure(low) or self.depends_on_pressure(high):
             return ""
-        if self.network.nodes[low].kind == "junction":
+        if self.network.nodes[low].kind == "junction" and low not in self.lowered:
             elevation[low] = elevation[high] - MAX_SLOPE * pipe.length
             return low
-        if self.network.nodes[high].kind == "junction":
+        if self.network.nodes[high].kind == "junction" and high not in self.lowered:
             elevation[high] = elevation[low] + MAX_SLOPE * pipe.length
             return high
         return ""

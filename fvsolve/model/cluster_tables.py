@@ -30,7 +30,10 @@ def classify_nodes(draft) -> None:
     couples = rows_by_group(group, inner, zip(short.tolist(), joins, strict=True), touched)
     touched |= rows_by_group(group, inner, enumerate(valves), touched, sensed)
     mark_event_ends(draft, group)
-    members = {root: [i for i in range(len(nodes)) if group[i] == root and inner[i]] for root in touched}
+    members: dict[int, list[int]] = {root: [] for root in touched}
+    for i in np.flatnonzero(inner).tolist():
+        if group[i] in members:
+            members[group[i]].append(i)
     nodes["solve"], clusters = rec.ALONE, []
     for root, ks in touched.items():
         own = couples.get(root, [])

@@ -180,8 +180,8 @@ class SteadyStart:
         self.uncontrolled = set()
         holding = [k for k in range(len(self.valves)) if self.edges[first + k].held_potential is not None]
         while holding:
-            joined = [(edge.i, edge.j) for edge in self.edges
-                      if edge.held_potential is None and not edge.shut and (edge.row is not None or edge.drop)]  # fmt: skip
+            open_edges = (edge for edge in self.edges if edge.held_potential is None and not edge.shut)
+            joined = [(edge.i, edge.j) for edge in open_edges if edge.row is not None or edge.drop]
             group = union(len(self.nodes), joined)
             known = {group[i] for i in np.flatnonzero(~np.isnan(self.fixed_potentials)).tolist()}
             known |= {group[self.edges[first + k].held_potential[0]] for k in holding}
