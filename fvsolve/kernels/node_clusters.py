@@ -31,7 +31,14 @@ from math import copysign, sqrt
 
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels.dtypes import FIRM, FIRM_SLOPE, NO_SOLUTION, NOT_CONVERGED, STATUS, WHERE
-from fvsolve.kernels.isolated_nodes import check_demand, find_connected, inner_row, isolated_pressures
+from fvsolve.kernels.isolated_nodes import (
+    JOINED,
+    find_connected,
+    group_by_open_valves,
+    inner_row,
+    isolated_pressures,
+    mark_isolated,
+)
 from fvsolve.kernels.restrictions import (
     conductance,
     has_lifted_backflow,
@@ -664,7 +671,7 @@ def check_clusters(out, tables, space):
 
 @njit
 def write_cluster(cluster, tables, out, g, m, c, connected, group, change):
-    """Write the valve flows of a cluster, the pressures of its isolated nodes, and STATUS if Newton has failed.
+    """Write the valve flows of a cluster, the pressures and codes of its isolated nodes, and STATUS on failure.
 
     g, m : conductances and flows [kg/s] of valves; c : inflow of nodes except through valves, less the demand [kg/s]
     connected, group : 0 for isolated nodes; work array for their groups
@@ -681,11 +688,14 @@ def write_cluster(cluster, tables, out, g, m, c, connected, group, change):
         scale = max(scale, abs(tables.valves[k]["flow"]), sqrt(tables.valves[k]["conductance"]))
     if change > FAILED_CHANGE:
         out[STATUS], out[WHERE] = NOT_CONVERGED, tables.integers[cluster["first_node"]]
+    isolated = False
     for i in range(connected.size):
-        if connected[i] == 0.0:
-            isolated_pressures(cluster, tables, out, g, connected, group)
-            check_demand(cluster, tables, out, c, connected, group, scale)
-            return
+        isolated = isolated or connected[i] == 0.0
+        out[tables.layout[0]["isolated"] + tables.integers[cluster["first_node"] + i]] = JOINED
+    if isolated:
+        group_by_open_valves(cluster, tables, g, group)
+        mark_isolated(cluster, tables, out, g, c, connected, group, scale)
+        isolated_pressures(cluster, tables, out, g, connected, group)
 
 
 @njit

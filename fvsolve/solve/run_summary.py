@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.errors import Notice
+from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model import Model, RunData
 from fvsolve.solve.run_up import RunUpTable, run_up_table
@@ -199,6 +199,39 @@ def spill_notices(run_data: RunData) -> list[Notice]:
             text = f"{name}: full to its height, it spills from {when} on; the mass ledger contains the lost water"
             notices.append(Notice("spilling", f"nodes.{name}", text, "height", float(time)))
     return notices
+
+
+def unsupplied_demands(
+    run_data: RunData, span: tuple[float, float], entered: np.ndarray, events: list[Event]
+) -> tuple[list[Notice], list[Event]]:
+    """Notices for demands that no open path could supply, one for those that lost their supply at the same time.
+
+    The events are those losses. span : times of start and end of the run [s]
+    entered : float64[nodes]  mass that has entered at each node [kg]; events : of the run
+    """
+    model, marks, notices, losses = run_data.model, run_data.marks, [], []
+    nodes, valves, amount = len(model.node_names), model.valve_names, model.case.amount
+    shut, first, last = np.split(marks[marks.size - 2 * nodes - len(valves) :], [len(valves), len(valves) + nodes])
+    for begin in np.unique(first[np.isfinite(first)]).tolist():
+        own = np.flatnonzero(first == begin)
+        names = [model.node_names[i] for i in own]
+        losses += [Event(begin, name, "is no longer supplied") for name in names]
+        asked = sum(scheduled_volume(model.case.nodes[name].demand, *span) for name in names)
+        lack = asked + float(entered[own].sum()) / model.case.properties.density
+        amounts = f"{amount(lack, 'volume', 4)} lack" if np.isfinite(lack) else "the demand is not met"
+        causes = listing([_shut_by(valves[k], begin, events) for k in np.flatnonzero(shut == begin)], 6)
+        text = (f"{listing(names, 6)}: no open path supplies the demand between {amount(begin, 'time', 6)} and "
+                f"{amount(float(last[own].max()), 'time', 6)}{f'; shut: {causes}' if causes else ''}; {amounts}, and "
+                "the pressure there is that of drained pipes")  # fmt: skip
+        notices.append(Notice("unsupplied", f"nodes.{names[0]}", text, "demand", lack if np.isfinite(lack) else None))
+    return notices, losses
+
+
+def _shut_by(name: str, time: float, events: list[Event]) -> str:
+    """Name of a valve, with the reason of its last event up to a time [s] if that event has one."""
+    *_, last = "", *(event.what for event in events if event.name == name and event.time <= time)
+    reason = last.partition(": ")[2]
+    return f"{name} ({reason})" if reason else name
 
 
 def device_notices(run_data: RunData) -> list[Notice]:

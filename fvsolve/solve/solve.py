@@ -424,14 +424,21 @@ class Run:
         warnings += found.device_notices(self.run_data) + found.spill_notices(self.run_data)
         warnings += found.drift_notices(model, loop.now)
         warnings += split_step_notices(model.case.numerics, loop.stepper.counts())
-        held = found.held_discharges(self.run_data, self.start, loop.t, ledger[:, : len(model.node_names)].sum(axis=0))
+        entered, events = (
+            ledger[:, : len(model.node_names)].sum(axis=0),
+            [Event(t, *model.events[k]) for t, k in loop.switched],
+        )
+        held = found.held_discharges(self.run_data, self.start, loop.t, entered)
+        unsupplied, losses = found.unsupplied_demands(self.run_data, (self.start, loop.t), entered, events)
+        warnings += unsupplied
+        events = sorted([*events, *losses], key=lambda event: event.time)
         ok = reason == "finished" and not held and all(entry.ok for entry in warnings)
         extremes, watched = found.find_extremes(self.run_data)
         summary = Summary(
             reason, ok, loop.t, found.find_marks(self.run_data) + held, ledgers, extremes,
             found.find_envelope(self.run_data), found.find_point_envelopes(self.run_data), watched,
             loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
-            self.setup, [Event(t, *model.events[k]) for t, k in loop.switched],
+            self.setup, events,
             found.find_cavities(self.run_data), warnings, self.threads, self.invalid_from,
             maxima := found.find_maxima(self.run_data, loop.t), found.find_run_ups(model, maxima),
         )  # fmt: skip
