@@ -19,6 +19,7 @@ from fvsolve.kernels.table_handle import make_handle
 from fvsolve.model.mechanics_tables import driven_at_start, start_masses
 from fvsolve.model.network_start import known_potentials, start_network
 from fvsolve.model.run_data import zeros_for_run
+from fvsolve.model.shut_off import shut_off_faults
 from fvsolve.model.static_forces import start_bodies
 from fvsolve.steady import Edge, solve_steady, union
 
@@ -279,14 +280,8 @@ class SteadyStart:
 
         held : float64[n]  fixed potentials of nodes [Pa]
         """
-        names = list(self.case.places)
-        for i in (i for i in self.answer.no_solution if self.demand[i] != 0.0):
-            drawn = self.demand[i] / self.draft.fluid.density
-            reason = f"the demand here is {self.case.amount(drawn, 'flow')}, but every path to it" if drawn > 0.0 else (
-                f"the inflow here is {self.case.amount(-drawn, 'flow')}, but every path out")  # fmt: skip
-            self.draft.fault(
-                f"nodes.{names[i]}", f'no steady state: {reason} is shut; open a valve, or use initial = "rest"'
-            )
+        for place, text in shut_off_faults(self):
+            self.draft.fault(place, text)
         for name, row in zip(self.draft.pipe_names, self.pipes, strict=True):
             ends = [int(row["from_node"]), int(row["to_node"])]
             free = row["friction"] == rec.FRICTION_NONE and self.case.links[name].initial_flow is None
