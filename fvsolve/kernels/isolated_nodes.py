@@ -25,8 +25,11 @@ JOINED, UNDETERMINED, DRAINED, UNSUPPLIED = 0.0, 1.0, 2.0, 3.0
 
 @njit(forceinline=True)
 def marks_of_islands(tables):
-    """Index of the marks of valves that shut off demands; those of demands that are not supplied follow."""
-    return tables.marks.size - 2 * tables.nodes.size - tables.valves.size
+    """Index of the marks of valves that shut off demands.
+
+    Marks of nodes follow, three times: first and last time without supply, first time without a determined pressure.
+    """
+    return tables.marks.size - 3 * tables.nodes.size - tables.valves.size
 
 
 @njit(forceinline=True)

@@ -221,8 +221,11 @@ def record_nodes(t, y, out, handle, values):
     for i in range(nodes.size):
         at = pipes.size + i
         if has_codes and out[layout["isolated"] + i] > JOINED:
+            last = marks.size - nodes.size + i
             if out[layout["isolated"] + i] == UNSUPPLIED:
                 record_unsupplied(t, out, tables, i)
+            elif out[layout["isolated"] + i] == UNDETERMINED and marks[last] != marks[last]:
+                marks[last] = t
             continue
         if lowest < nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:
             marks[at] = t

@@ -1,4 +1,4 @@
-"""Faults of a steady start whose demands or inflows every path shuts off: the group of nodes, and what shuts it off."""
+"""Parts of a network that shut links separate: faults of a steady start, and parts isolated during a whole run."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import listing
+from fvsolve.kernels import dtypes as rec
 from fvsolve.steady import union
 
 NAMES_SHOWN = 6  # names of nodes or links in a fault
@@ -56,3 +57,34 @@ def _name_of(start: Any, e: int) -> str:
     name, row = draft.valve_names[k].removesuffix(".inside"), start.valves[k]
     reason = draft.devices[row["device"]][2].shut_reason(start, k) if row["device"] >= 0 else ""
     return f"{name} ({reason})" if reason else name
+
+
+def isolated_parts(model: Any) -> frozenset[str]:
+    """Key paths of the nodes and links that valves with a constant opening of 0 isolate, where nothing draws or feeds.
+
+    No flow determines the pressure there during a run.
+    """
+    tables, case = model.tables, model.case
+    shut = [row["device"] < 0 and _is_always_zero(getattr(case.conduits[name], "opening", None))
+            for name, row in zip(model.valve_names, tables.valves, strict=True)]  # fmt: skip
+    if not any(shut):
+        return frozenset()
+    rows = [
+        *tables.pipes,
+        *tables.columns,
+        *(row for row, is_shut in zip(tables.valves, shut, strict=True) if not is_shut),
+    ]
+    group = union(len(model.node_names), [(row["from_node"], row["to_node"]) for row in rows])
+    joined = {group[i] for i, (node, row) in enumerate(zip(case.places.values(), tables.nodes, strict=True))
+              if row["kind"] != rec.JUNCTION or not _is_always_zero(node.demand)}  # fmt: skip
+    isolated = {i for i in range(len(group)) if group[i] not in joined}
+    parts = {f"nodes.{model.node_names[i].removesuffix('.inside')}" for i in isolated}
+    names = (*(pipe.name for pipe in model.pipes), *model.column_names)
+    ends = zip(names, [*tables.pipes["from_node"], *tables.columns["from_node"]], strict=True)
+    parts |= {f"links.{name}" for name, i in ends if i in isolated}
+    return frozenset(parts)
+
+
+def _is_always_zero(schedule: Any) -> bool:
+    """True if a schedule is the constant 0."""
+    return schedule is not None and schedule.constant and schedule.first == 0.0

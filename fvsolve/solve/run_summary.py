@@ -12,6 +12,7 @@ from fvsolve.solve.run_up import RunUpTable, run_up_table
 
 INTEGRATION_TIMES = 10001  # times at which a scheduled flow is integrated, beside its own
 HELD = (rec.DISCHARGE, rec.LINKED, rec.INTERIOR)  # closures of patches whose outflow is held at critical flow
+UNRECORDED = np.array([[np.inf], [np.nan], [-np.inf], [np.nan]])  # extremes before the first record
 DRIFT = 1e-6  # deviation of the length of Euler parameters from 1 above which a notice is given
 
 
@@ -211,7 +212,9 @@ def unsupplied_demands(
     """
     model, marks, notices, losses = run_data.model, run_data.marks, [], []
     nodes, valves, amount = len(model.node_names), model.valve_names, model.case.amount
-    shut, first, last = np.split(marks[marks.size - 2 * nodes - len(valves) :], [len(valves), len(valves) + nodes])
+    shut, first, last = np.split(
+        marks[marks.size - 3 * nodes - len(valves) : -nodes], len(valves) + nodes * np.arange(2)
+    )
     for begin in np.unique(first[np.isfinite(first)]).tolist():
         own = np.flatnonzero(first == begin)
         names = [model.node_names[i] for i in own]
@@ -225,6 +228,23 @@ def unsupplied_demands(
                 "the pressure there is that of drained pipes")  # fmt: skip
         notices.append(Notice("unsupplied", f"nodes.{names[0]}", text, "demand", lack if np.isfinite(lack) else None))
     return notices, losses
+
+
+def undetermined_notices(run_data: RunData) -> list[Notice]:
+    """Notice of probed or limited nodes that were isolated without a demand; empty without such nodes."""
+    model, first = run_data.model, run_data.model.case.numerics.start
+    numbers = np.unique(model.tables.probes["index"][run_data.undetermined_probes])
+    names = [model.node_names[i].removesuffix(".inside") for i in numbers]
+    if names:
+        first = float(run_data.marks[run_data.marks.size - len(model.node_names) + numbers].min())
+    probes = zip((*model.probes, *model.watched), run_data.isolated_probes, strict=True)
+    names += [probe.name for probe, isolated in probes if isolated and probe.part == "nodes"]
+    if not names:
+        return []
+    text = (f"{listing(names, 6)}: from {model.case.amount(first, 'time', 6)} on, at least for a time, only shut links "
+            "join this part of the network, which draws nothing: no flow determines its pressure, and extremes and "
+            "limits leave it out")  # fmt: skip
+    return [Notice("isolated", f"nodes.{names[0]}", text)]
 
 
 def _shut_by(name: str, time: float, events: list[Event]) -> str:
@@ -281,7 +301,9 @@ def find_extremes(run_data: RunData) -> tuple[dict, dict]:
     Both are dicts: text of the probe -> (least value, its time [s], greatest value, its time [s]).
     """
     probes, watched = run_data.model.probes, run_data.model.watched
-    rows = [tuple(map(float, column)) for column in run_data.extremes.T]
+    columns, isolated = run_data.extremes.copy(), run_data.isolated_probes
+    columns[:, : isolated.size][:, isolated] = UNRECORDED
+    rows = [tuple(map(float, column)) for column in columns.T]
     found = [(probe.text, row) for probe, row in zip((*probes, *watched), rows, strict=False)]
     return dict(found[: len(probes)]), dict(found[len(probes) :])
 
