@@ -63,6 +63,7 @@ class SteadyState:
 
     converged : True if Newton's method converged
     split : True if the flows of a loop are not unique; then they are those of least norm
+    undetermined : nodes whose potentials a singular system determines least, one for each of its pieces
     no_solution : nodes in sets that have no known potential and whose demands do not add up to zero
     pieces : for each piece of the network its nodes, its edges and its typical mass flow [kg/s]
     """
@@ -71,6 +72,7 @@ class SteadyState:
     flow: np.ndarray
     converged: bool = True
     split: bool = False
+    undetermined: list[int] = field(default_factory=list)
     no_solution: list[int] = field(default_factory=list)
     pieces: list[tuple[np.ndarray, np.ndarray, float]] = field(default_factory=list)
 
@@ -106,6 +108,8 @@ def solve_steady(held: np.ndarray, demand: np.ndarray, edges: list[Edge], scale:
             result.potential[problem.nodes], result.flow[problem.own] = problem.potential, problem.flow
             result.converged &= problem.converged
             result.split |= problem.split
+            if problem.split and problem.weakest >= len(problem.active):
+                result.undetermined.append(int(problem.nodes[problem.unknown[problem.weakest - len(problem.active)]]))
     return result
 
 
@@ -143,7 +147,11 @@ class _Problem:
 
     def __init__(self, held, demand, edges, scale, potential) -> None:
         self.held, self.demand, self.scale, self.potential = held, demand, scale, potential
-        self.converged, self.split = True, False
+        self.converged, self.split, self.weakest = (
+            True,
+            False,
+            -1,
+        )  # weakest : unknown that a singular system leaves open
         quiet = _quiet(held, demand, edges)
         self.edges = [
             replace(edge, row=None, flow=0.0, drop=lambda flow: 0.0) if e in quiet else edge
@@ -387,7 +395,8 @@ def _edge_row(problem, row, flow, potential) -> tuple[list[float], float]:
 def _solve(places, values, right, matrices, size, problems) -> np.ndarray:
     """Solutions of the Newton systems of n problems; the least-squares solution of least norm where one is singular.
 
-    `split` of a problem is set to True for a singular system, and for a large system also if it is not square.
+    `split` of a problem is set to True for a singular system, and for a large system also if it is not square, and
+    `weakest` to the unknown that such a system determines least.
     places : index of each of the `values` in a matrix, row * size + column; values : float64[n, entries]
     right : float64[n, rows]  right-hand sides; matrices : float64[n, rows, size], None for large systems
     size : number of unknowns. A solution is NaN if a number in its values or right-hand side is not finite.
@@ -403,28 +412,29 @@ def _solve(places, values, right, matrices, size, problems) -> np.ndarray:
     solutions = np.full((len(problems), size), np.nan)
     for k in np.flatnonzero(finite):
         if matrices is not None:
-            solutions[k], singular = _solve_dense(matrices[k], right[k])
+            solutions[k], weakest = _solve_dense(matrices[k], right[k])
         else:
-            solutions[k], singular = _solve_sparse(values[k], places // size, places % size, right[k], size)
-        problems[k].split |= singular
+            solutions[k], weakest = _solve_sparse(values[k], places // size, places % size, right[k], size)
+        if weakest >= 0:
+            problems[k].split, problems[k].weakest = True, weakest
     return solutions
 
 
 def _solve_dense(matrix, right):
-    """Solution of a small system A x = b : (x, True if the system is singular); the result is that of least norm."""
+    """Solution of least norm of a small system A x = b : (x, unknown that a singular system leaves open, else -1)."""
     if len(right) == matrix.shape[1]:
         try:
             solution = np.linalg.solve(matrix, right)
             if np.isfinite(solution).all() and np.abs(matrix @ solution - right).max() < 1e-6:
-                return solution, False
+                return solution, -1
         except np.linalg.LinAlgError:
             pass
     solution, _, rank, _ = np.linalg.lstsq(matrix, right, rcond=1e-12)
-    return solution, bool(rank < matrix.shape[1])
+    return solution, int(np.abs(np.linalg.svd(matrix)[2][-1]).argmax()) if rank < matrix.shape[1] else -1
 
 
 def _solve_sparse(values, i, j, right, size):
-    """Solution of a large sparse system A x = b : (x, True if the system is singular or not square).
+    """Solution of a large sparse system A x = b : (x, unknown that the system leaves open, -1 for none).
 
     values, i, j : entries of A with their rows and columns, entries at the same place are added; right : b
     size : number of unknowns
@@ -439,11 +449,15 @@ def _solve_sparse(values, i, j, right, size):
         try:
             solution = splu(matrix).solve(right)
             if np.all(np.isfinite(solution)) and np.max(np.abs(matrix @ solution - right)) < 1e-6:
-                return solution, False
+                return solution, -1
         except RuntimeError:  # singular
             pass
     system = bmat([[identity(len(right)), matrix], [matrix.T, -DAMPING * identity(size)]], format="csc")
-    return splu(system).solve(np.concatenate((right, np.zeros(size))))[len(right) :], True
+    factors = splu(system)
+    # any right-hand side without symmetry: what the equations leave open dominates its solution
+    open_part = factors.solve(np.concatenate((np.zeros(len(right)), np.sin(np.arange(1.0, size + 1.0)))))[len(right) :]
+    solution = factors.solve(np.concatenate((right, np.zeros(size))))[len(right) :]
+    return solution, int(np.abs(open_part).argmax())
 
 
 def _through_shut(problem) -> None:

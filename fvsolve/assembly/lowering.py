@@ -349,6 +349,10 @@ class Device(Restriction):
         """Opening of its restriction k in the steady start, unless it is shut."""
         return 1.0
 
+    def shut_reason(self, start, k: int) -> str:
+        """Reason why its restriction k is shut in the steady start, for faults; "" for none."""
+        return ""
+
     def states_of(self, draft, name: str, part: Any) -> tuple[str, ...]:
         """Names of the states of this part."""
         return self.states

@@ -19,6 +19,7 @@ from fvsolve.parts.formula_program import is_formula
 from fvsolve.parts.nodes_and_links import is_in_network, is_kind
 from fvsolve.parts.pipe.pipe_wall import OF_WALL
 from fvsolve.parts.table_model import CaseContext
+from fvsolve.parts.tolerances import is_shorter_than_rise
 from fvsolve.parts.value import ROOT
 from fvsolve.steppers.loop_records import LEAST_STEP, LEAST_TOLERANCE
 from fvsolve.steppers.tableau import AUTO, METHODS
@@ -154,9 +155,9 @@ def _elevations(nodes: dict[str, Any], links: dict[str, Any], lends: bool) -> Fa
         heights = [heights_of[place] for place in link.ports.values() if place in heights_of]
         if length is None or len(heights) < 2 or None in heights:
             continue
-        if abs(heights[1] - heights[0]) > length:
+        if is_shorter_than_rise(length, heights[0], heights[1]):
             climb = abs(heights[1] - heights[0])
-            text = f"{length:g} m is too short: the ends differ by {climb:g} m in elevation; expected a greater length"
+            text = f"{length:g} m is too short: the ends differ by {climb:g} m in elevation; expected at least that"
             yield ("links", name, "length"), text
 
 

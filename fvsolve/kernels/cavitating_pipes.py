@@ -16,6 +16,7 @@ from fvsolve.kernels.density import force_of_mass, local_speed, mass_of_pressure
 from fvsolve.kernels.density.mixture_law import relative_volume
 from fvsolve.kernels.density.steady_profile import add_slope_force
 from fvsolve.kernels.dtypes import RATE, UPWIND
+from fvsolve.kernels.isolated_nodes import marks_of_islands
 from fvsolve.kernels.reconstruction import value_muscl
 from fvsolve.kernels.riemann import face_flux
 from fvsolve.kernels.table_handle import open_tables
@@ -219,7 +220,7 @@ def record_cavity(t, pipe, r, l, at, tables):
 def record_cavities(t, y, out, handle, values):
     """Record the cavities of all pipes in `marks` after an accepted step, see `record_cavity`."""
     tables = open_tables(handle)
-    pipes, at = tables.pipes, tables.marks.size - 3 * tables.pipes.size
+    pipes, at = tables.pipes, marks_of_islands(tables) - 3 * tables.pipes.size
     for i in range(pipes.size):
         n, o = pipes[i]["cells"], pipes[i]["y"]
         record_cavity(t, pipes[i], y[o : o + n], y[o + n : o + 2 * n], at + 3 * i, tables)

@@ -492,6 +492,7 @@ LAYOUT = record(
     along=i8,  # unit vectors of lines, between their points
     pin=i8,  # forces of pins, three for each [N]
     body=i8,  # data of bodies, see `kernels.mechanism.body_layout`
+    isolated=i8,  # codes of nodes, see `isolated_nodes`
     control=i8,  # of each block of `controls`: output, and first input after its filter
     network=i8,  # sources of networks: change since the start
     size=i8,

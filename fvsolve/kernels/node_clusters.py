@@ -31,7 +31,14 @@ from math import copysign, sqrt
 
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels.dtypes import FIRM, FIRM_SLOPE, NO_SOLUTION, NOT_CONVERGED, STATUS, WHERE
-from fvsolve.kernels.isolated_nodes import check_demand, find_connected, inner_row, isolated_pressures
+from fvsolve.kernels.isolated_nodes import (
+    JOINED,
+    find_connected,
+    group_by_open_valves,
+    inner_row,
+    isolated_pressures,
+    mark_isolated,
+)
 from fvsolve.kernels.restrictions import (
     conductance,
     has_lifted_backflow,
@@ -62,6 +69,7 @@ def solve_dense(a, b, n):
     """Solve a x = b by elimination with partial pivoting; x replaces b. Returns the sign of det a, 0 if a is singular.
 
     a : float64[n * n]  matrix row by row, overwritten
+    If it is singular, b[0] becomes the number of the first unknown that the equations do not determine.
     """
     sign = 1.0
     for i in range(n):
@@ -70,6 +78,7 @@ def solve_dense(a, b, n):
             if abs(a[n * k + i]) > abs(a[n * pivot + i]):
                 pivot = k
         if a[n * pivot + i] == 0.0:
+            b[0] = float(i)
             return 0.0
         if (pivot != i) != (a[n * pivot + i] < 0.0):
             sign = -sign
@@ -290,6 +299,18 @@ def largest_magnitude(a):
     return most
 
 
+@njit(forceinline=True)
+def place_of_greatest(a):
+    """Index of the entry of an array that is not a number, or else of the greatest magnitude; 0 for an empty array."""
+    place, most = 0, -1.0
+    for i in range(a.size):
+        if not abs(a[i]) <= most:
+            place, most = i, abs(a[i])
+        if a[i] != a[i]:
+            return i
+    return place
+
+
 @njit
 def limit_step(most, a, right):
     """Scale a Newton step so that no pressure rises by more than `most` [Pa].
@@ -411,7 +432,7 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, limits, 
         imbalance = largest_magnitude(right) if BAROTROPIC else 0.0
         sign = solve_dense(matrix, right, n)
     if sign == 0.0:
-        out[STATUS], out[WHERE] = NO_SOLUTION, tables.integers[cluster["first_node"]]
+        out[STATUS], out[WHERE] = NO_SOLUTION, tables.integers[cluster["first_node"] + int(right[0])]
         return 0.0, 0.0, True
     flow_error = 0.0
     if BAROTROPIC:
@@ -663,13 +684,13 @@ def check_clusters(out, tables, space):
 
 
 @njit
-def write_cluster(cluster, tables, out, g, m, c, connected, group, change):
-    """Write the valve flows of a cluster, the pressures of its isolated nodes, and STATUS if Newton has failed.
+def write_cluster(cluster, tables, out, g, m, c, connected, group, change, worst):
+    """Write the valve flows of a cluster, the pressures and codes of its isolated nodes, and STATUS on failure.
 
     g, m : conductances and flows [kg/s] of valves; c : inflow of nodes except through valves, less the demand [kg/s]
     connected, group : 0 for isolated nodes; work array for their groups
     change : last relative change of Newton; under the law `linear` that of flows, because a level on which no flow
-    depends may still change
+    depends may still change; worst : number of the node whose pressure changes most, named if Newton has failed
     Flows that are rounding (dead ends) become zero: their sign does not depend on the pressures.
     """
     scale = 1e-300
@@ -680,12 +701,15 @@ def write_cluster(cluster, tables, out, g, m, c, connected, group, change):
         out[tables.layout[0]["valve"] + k] = m[e]
         scale = max(scale, abs(tables.valves[k]["flow"]), sqrt(tables.valves[k]["conductance"]))
     if change > FAILED_CHANGE:
-        out[STATUS], out[WHERE] = NOT_CONVERGED, tables.integers[cluster["first_node"]]
+        out[STATUS], out[WHERE] = NOT_CONVERGED, tables.integers[cluster["first_node"] + worst]
+    isolated = False
     for i in range(connected.size):
-        if connected[i] == 0.0:
-            isolated_pressures(cluster, tables, out, g, connected, group)
-            check_demand(cluster, tables, out, c, connected, group, scale)
-            return
+        isolated = isolated or connected[i] == 0.0
+        out[tables.layout[0]["isolated"] + tables.integers[cluster["first_node"] + i]] = JOINED
+    if isolated:
+        group_by_open_valves(cluster, tables, g, group)
+        mark_isolated(cluster, tables, out, g, c, connected, group, scale)
+        isolated_pressures(cluster, tables, out, g, connected, group)
 
 
 @njit
@@ -695,7 +719,7 @@ def write_clusters(out, tables, space):
     a, b = 0, 0
     for k in range(clusters.size):
         i, j = a + clusters[k]["nodes"], b + clusters[k]["valves"]
-        write_cluster(clusters[k], tables, out, g[b:j], m[b:j], c[a:i], connected[a:i], group[a:i], change[k])
+        write_cluster(clusters[k], tables, out, g[b:j], m[b:j], c[a:i], connected[a:i], group[a:i], change[k], 0)
         a, b = i, j
 
 
@@ -760,7 +784,8 @@ def solve_cluster(out, tables, index):
             change, flows, wide = 1e300, 1e300, False
     out[FIRM] = 0.0
     failed = flows != flows  # not a number; under other laws the rates show this fault
-    write_cluster(cluster, tables, out, g, m, c, connected, group, NOT_BALANCED if failed else flows)
+    worst = place_of_greatest(step_arrays(n, k, rest)[1])
+    write_cluster(cluster, tables, out, g, m, c, connected, group, NOT_BALANCED if failed else flows, worst)
 
 
 @njit

@@ -7,6 +7,7 @@ pressure change; t : present time [s].
 from fvsolve.jit import njit, specialise
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.calls import CLOSE, run_job
+from fvsolve.kernels.isolated_nodes import DRAINED, JOINED, UNDETERMINED, UNSUPPLIED, marks_of_islands
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
 from fvsolve.kernels.tanks import BOTTOM, EVENTS, RIM, is_near, limit_events, mass_per_metre, tank_level
@@ -171,25 +172,61 @@ def record_pipes(t, y, out, handle, values):
         record_pipe(t, y[o : o + n], y[o + n : o + 2 * n], pipes[i], i, tables)
 
 
+@njit(forceinline=True)
+def is_undetermined(tables, out, probe):
+    """True if a probe is the pressure of an isolated node, or of a pipe between such nodes, which nothing determines.
+
+    A probe of a head counts as one of pressure.
+    """
+    at, kind = tables.layout[0]["isolated"], probe["kind"]
+    return (kind == rec.PRESSURE or kind == rec.PRESSURE_BETWEEN) and out[at + probe["index"]] == UNDETERMINED
+
+
+@njit
+def record_unsupplied(t, out, tables, i):
+    """Record in `marks` that the demand of node i is not supplied: first time, last time, valves shut at the first."""
+    marks, layout, first = tables.marks, tables.layout[0], marks_of_islands(tables)
+    at = first + tables.valves.size + i
+    marks[at + tables.nodes.size] = t
+    if marks[at] == marks[at]:
+        return
+    marks[at] = t
+    for k in range(tables.valves.size):
+        valve = tables.valves[k]
+        a = out[layout["isolated"] + valve["from_node"]] >= DRAINED
+        b = out[layout["isolated"] + valve["to_node"]] >= DRAINED
+        if a != b and marks[first + k] != marks[first + k]:
+            marks[first + k] = t
+
+
 @njit
 def record_nodes(t, y, out, handle, values):
     """Update extremes of probes, and first times of low pressures and tank limits, after an accepted step.
 
     Runs after `record_pipes`. The array `marks` holds the first times [s] at which pipes, then nodes, are below vapour
     pressure, tanks are dry, tanks spill; NaN for never. If the case requires it, a pressure below vapour pressure ends
-    the run: out[WHERE] is set.
+    the run: out[WHERE] is set. Pressures of isolated nodes give no mark, and no extremes where nothing determines them.
     """
     tables = open_tables(handle)
-    pipes, nodes, extremes = tables.pipes, tables.nodes, tables.extremes
+    pipes, nodes, extremes, has_codes = tables.pipes, tables.nodes, tables.extremes, tables.clusters.size > 0
     marks, layout, vapor = tables.marks, tables.layout[0], tables.settings[0]["vapor"]
     lowest = tables.settings[0]["unmarked"]
     for k in range(values.size):
+        if has_codes and is_undetermined(tables, out, tables.probes[k]):
+            continue
         update_extremes(extremes, k, t, values[k])
         mark = tables.probes[k]["mark"]
         if mark >= 0 and values[k] < vapor and marks[mark] != marks[mark]:
             marks[mark] = t
     for i in range(nodes.size):
         at = pipes.size + i
+        if has_codes and out[layout["isolated"] + i] > JOINED:
+            last = marks.size - nodes.size + i
+            if out[layout["isolated"] + i] == UNSUPPLIED:
+                record_unsupplied(t, out, tables, i)
+            elif out[layout["isolated"] + i] == UNDETERMINED and marks[last] != marks[last]:
+                marks[last] = t
+            continue
         if lowest < nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:
             marks[at] = t
         if nodes[i]["kind"] == rec.TANK and abs(out[layout["supply"] + i]) > SUPPLY_ROUNDING * mass_per_metre(nodes[i]):

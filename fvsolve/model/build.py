@@ -338,9 +338,11 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     )  # fmt: skip
     pipes, nodes, out = len(draft.pipe_table), len(draft.node_table), int(layout["size"][0])
     # `marks` has the first times at which the model does not hold. Density laws with cavities add three for each pipe:
-    # location of the first cavity, greatest cavity volume, and its time.
+    # location of the first cavity, greatest cavity volume, and its time. The last are: for each valve the time at which
+    # it shut off a demand; for each node the first and the last time at which its demand is not supplied, and the first
+    # at which its pressure is not determined.
     marks = pipes * (4 if draft.case.law.cavitates else 1) + 3 * nodes + len(draft.column_table)
-    marks += 2 * len(draft.device_table) + len(draft.piston_table)
+    marks += 2 * len(draft.device_table) + len(draft.piston_table) + len(draft.valve_table) + 3 * nodes
     # `spare` has a copy of `out`; with delay lines two copies, three values for each probe and node, arrival times of
     # jumps and the changes that they cause
     spare = out
@@ -425,6 +427,7 @@ def layout_of(draft: ModelDraft) -> np.ndarray:
         ("tank", rec.TANK_OUT * len(draft.basin_table) if len(draft.body_table) else 0),
         ("travel", 2 * len(draft.push_names)), ("along", 3 * len(draft.line_table)),
         ("pin", 3 * len(draft.pin_table)), ("body", rec.BODY_OUT * len(draft.body_table)),
+        ("isolated", nodes),
         ("control", 2 * len(draft.control_table)), ("network", len(draft.network_input_table)),
     ):  # fmt: skip
         layout[name], at = at, at + size

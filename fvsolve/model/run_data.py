@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fvsolve.assembly.model_draft import aligned_zeros
+from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.delay_lines.wave_history import COUNT, INFINITE, NEXT_ARRIVAL, SEGMENT_END, time_tolerance
 from fvsolve.model import input_histories
@@ -20,6 +21,7 @@ from fvsolve.model.delay_lines import (
     with_doubled_rings,
 )
 from fvsolve.model.network_elimination import NetworkError
+from fvsolve.model.shut_off import isolated_parts
 
 if TYPE_CHECKING:
     from fvsolve.model.model import Model
@@ -73,6 +75,24 @@ class RunData:
         self.written.bands[1::2] = np.where(basins["nx"] > 0, basins["ny"], basins["n"])  # all
         for array in (self.envelope, self.extremes):
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
+
+    @property
+    def undetermined_probes(self) -> np.ndarray:
+        """True for each probe of a pressure that nothing determined at a step, at isolated nodes : bool[probes]."""
+        probes, nodes = self.tables.probes, len(self.model.node_names)
+        isolated = np.isfinite(self.marks[self.marks.size - nodes :])
+        if not isolated.any():
+            return np.zeros(len(probes), bool)
+        reads_node = np.isin(probes["kind"], (rec.PRESSURE, rec.PRESSURE_BETWEEN))
+        return reads_node & isolated[np.where(reads_node, probes["index"], 0)]
+
+    @cached_property
+    def isolated_probes(self) -> np.ndarray:
+        """True for each probe of a pressure in a part that is isolated during the whole run : bool[probes]."""
+        parts, both = isolated_parts(self.model), (*self.model.probes, *self.model.watched)
+        return np.array(
+            [f"{probe.part}.{probe.name}" in parts and probe.quantity in OF_PRESSURE for probe in both], bool
+        )
 
     @cached_property
     def handle(self) -> np.ndarray:

@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from functools import cached_property
+from itertools import islice
 from random import Random
 from typing import Any
 
@@ -19,6 +20,7 @@ from fvsolve.kernels.table_handle import make_handle
 from fvsolve.model.mechanics_tables import driven_at_start, start_masses
 from fvsolve.model.network_start import known_potentials, start_network
 from fvsolve.model.run_data import zeros_for_run
+from fvsolve.model.shut_off import shut_off_faults
 from fvsolve.model.static_forces import start_bodies
 from fvsolve.steady import Edge, solve_steady, union
 
@@ -103,17 +105,20 @@ class SteadyStart:
         Raises CaseError if no such state is found.
         """
         random, devices = Random(0), list(zip(self.draft.devices, self.draft.device_table, strict=True))
+        changing: dict[str, int] = {}  # device -> last revision in which it changed
         for turn in range(MAX_REVISIONS):
             self.balance()
-            revised = (device.revise_state(self, part, row) for (_, part, device), row in devices)
+            revised = (name for (name, part, device), row in devices if device.revise_state(self, part, row))
             # later one by one, to avoid cycles
-            if not (any(revised) if turn > SIMULTANEOUS_REVISIONS else sum(revised)):
+            now = [*islice(revised, 1 if turn > SIMULTANEOUS_REVISIONS else None)]
+            changing |= dict.fromkeys(now, turn)
+            if not now:
                 return self.report_faults(self.fixed_potentials)
             random.shuffle(devices)
             if turn % RESTART_INTERVAL == RESTART_INTERVAL - 1:
                 self.scatter(random)
         self.report_faults(self.fixed_potentials)
-        names = listing([name for name, _, device in self.draft.devices])
+        names = listing([name for name, turn in changing.items() if turn >= MAX_REVISIONS - RESTART_INTERVAL])
         self.draft.fault("numerics.initial", f"no steady state was found: the states of {names} keep changing; "
                          'try initial = "rest"')  # fmt: skip
         self.draft.check()
@@ -310,14 +315,8 @@ class SteadyStart:
 
         held : float64[n]  fixed potentials of nodes [Pa]
         """
-        names = list(self.case.places)
-        for i in (i for i in self.answer.no_solution if self.demand[i] != 0.0):
-            drawn = self.demand[i] / self.draft.fluid.density
-            reason = f"the demand here is {self.case.amount(drawn, 'flow')}, but every path to it" if drawn > 0.0 else (
-                f"the inflow here is {self.case.amount(-drawn, 'flow')}, but every path out")  # fmt: skip
-            self.draft.fault(
-                f"nodes.{names[i]}", f'no steady state: {reason} is shut; open a valve, or use initial = "rest"'
-            )
+        for place, text in shut_off_faults(self):
+            self.draft.fault(place, text)
         for name, row in zip(self.draft.pipe_names, self.pipes, strict=True):
             ends = [int(row["from_node"]), int(row["to_node"])]
             free = row["friction"] == rec.FRICTION_NONE and self.case.links[name].initial_flow is None
@@ -328,9 +327,17 @@ class SteadyStart:
                                  f"its ends, {a} and {b}; give it `friction` or `initial_flow`, or use "
                                  'initial = "rest"')  # fmt: skip
         if not self.draft.faults and not self.answer.converged:
-            self.draft.fault("numerics.initial", "no steady state was found; check for demands that cannot be supplied "
-                             'and frictionless paths between unequal heads, or use initial = "rest"')  # fmt: skip
+            worst = list(self.case.places)[self.least_balanced()]
+            self.draft.fault("numerics.initial", f"no steady state was found: flows balance least at {worst}; check "
+                             "there for demands that cannot be supplied, links of extreme resistance, and frictionless "
+                             'paths between unequal heads, or use initial = "rest"')  # fmt: skip
         self.draft.check()
+
+    def least_balanced(self) -> int:
+        """Number of the node whose flows balance least in the latest solution, or whose potential is not a number."""
+        free = np.isnan(self.fixed_potentials)
+        errors = np.where(np.isfinite(self.answer.potential), np.abs(self.inflow), np.inf)
+        return int(np.argmax(np.where(free, np.nan_to_num(errors, nan=np.inf), -1.0)))
 
     def report_frictionless(self) -> None:
         """Add notices of frictionless pipes and columns between unequal heads, and of loops without friction.
@@ -354,7 +361,13 @@ class SteadyStart:
         while self.answer.split and loops != before:  # a link to a node that no other link joins is in no loop
             before, counts = loops, Counter(end for pair in loops.values() for end in pair)
             loops = {name: pair for name, pair in loops.items() if min(counts[end] for end in pair) > 1}
-        if self.answer.split and (loops or not swinging):
+        weak = [list(self.case.places)[i] for i in self.answer.undetermined] if not loops else []
+        if weak:
+            text = (f"{listing(weak, 6)}: the equations hardly determine the pressure here, because links of extreme "
+                    "resistance, or frictionless links alone, join this part; check diameters, lengths and openings of "
+                    "its links")  # fmt: skip
+            self.draft.warnings.append(Notice("start", f"nodes.{weak[0]}", text))
+        elif self.answer.split and (loops or not swinging):
             text = f"{listing(loops) or 'paths'}: flow in loops without friction is not unique"
             text += "; the start has the smallest of these flows (least norm)"
             self.draft.warnings.append(Notice("start", f"links.{next(iter(loops))}" if loops else "links", text))

@@ -55,6 +55,11 @@ STATUS_FAILURES = {  # status of the right-hand side -> text
     "`required_pressure`, so that it falls with the pressure; a pump would lose its suction there: trip it earlier",
     rec.NO_WEIGHT: "the water in {name} has no weight left at {when}; reduce the downward acceleration of its body",
 }
+NO_BALANCE = (
+    "no pressure{place} balances the flows there at {when}; all connections to its node are shut, or pass a flow that "
+    "pressure does not change: open one, give a machine a leakage, or replace the node by a chamber"
+)
+NO_WAY_OUT = "the inflow{place} finds no way out at {when}; all connections to its node are shut: open one, or stop it"
 CONDUITS_EXHAUSTED = (
     "the demand of {demand} at {name} cannot be met at {when}: at most {available} leave the conduits there (critical "
     "outflow); draw less, or replace the node by a tank"
@@ -328,6 +333,8 @@ class RunLoop:
             text = STATUS_FAILURES.get(status, "Newton did not converge{place} at {when}; try a smaller step")
             if status == rec.NOT_CONVERGED and (values := self.demand_above_outflow(index)):
                 text, names = CONDUITS_EXHAUSTED, names | values
+            if status == rec.NO_SOLUTION and index >= 0 and self.out[model.layout["supply"] + index] >= 0.0:
+                text = NO_WAY_OUT if self.out[model.layout["supply"] + index] > 0.0 else NO_BALANCE
             if status == rec.NO_WEIGHT:
                 bodies = [*(basin.name for basin in model.basins), *model.node_names]
                 names["name"] = bodies[index].removesuffix(".inside")

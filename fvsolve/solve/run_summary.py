@@ -5,13 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.errors import Notice
+from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model import Model, RunData
 from fvsolve.solve.run_up import RunUpTable, run_up_table
 
 INTEGRATION_TIMES = 10001  # times at which a scheduled flow is integrated, beside its own
 HELD = (rec.DISCHARGE, rec.LINKED, rec.INTERIOR)  # closures of patches whose outflow is held at critical flow
+UNRECORDED = np.array([[np.inf], [np.nan], [-np.inf], [np.nan]])  # extremes before the first record
 DRIFT = 1e-6  # deviation of the length of Euler parameters from 1 above which a notice is given
 
 
@@ -201,6 +202,58 @@ def spill_notices(run_data: RunData) -> list[Notice]:
     return notices
 
 
+def unsupplied_demands(
+    run_data: RunData, span: tuple[float, float], entered: np.ndarray, events: list[Event]
+) -> tuple[list[Notice], list[Event]]:
+    """Notices for demands that no open path could supply, one for those that lost their supply at the same time.
+
+    The events are those losses. span : times of start and end of the run [s]
+    entered : float64[nodes]  mass that has entered at each node [kg]; events : of the run
+    """
+    model, marks, notices, losses = run_data.model, run_data.marks, [], []
+    nodes, valves, amount = len(model.node_names), model.valve_names, model.case.amount
+    shut, first, last = np.split(
+        marks[marks.size - 3 * nodes - len(valves) : -nodes], len(valves) + nodes * np.arange(2)
+    )
+    for begin in np.unique(first[np.isfinite(first)]).tolist():
+        own = np.flatnonzero(first == begin)
+        names = [model.node_names[i] for i in own]
+        losses += [Event(begin, name, "is no longer supplied") for name in names]
+        asked = sum(scheduled_volume(model.case.nodes[name].demand, *span) for name in names)
+        lack = asked + float(entered[own].sum()) / model.case.properties.density
+        amounts = f"{amount(lack, 'volume', 4)} lack" if np.isfinite(lack) else "the demand is not met"
+        causes = listing([_shut_by(valves[k], begin, events) for k in np.flatnonzero(shut == begin)], 6)
+        text = (f"{listing(names, 6)}: no open path supplies the demand between {amount(begin, 'time', 6)} and "
+                f"{amount(float(last[own].max()), 'time', 6)}{f'; shut: {causes}' if causes else ''}; {amounts}, and "
+                "the pressure there is that of drained pipes")  # fmt: skip
+        notices.append(Notice("unsupplied", f"nodes.{names[0]}", text, "demand", lack if np.isfinite(lack) else None))
+    return notices, losses
+
+
+def undetermined_notices(run_data: RunData) -> list[Notice]:
+    """Notice of probed or limited nodes that were isolated without a demand; empty without such nodes."""
+    model, first = run_data.model, run_data.model.case.numerics.start
+    numbers = np.unique(model.tables.probes["index"][run_data.undetermined_probes])
+    names = [model.node_names[i].removesuffix(".inside") for i in numbers]
+    if names:
+        first = float(run_data.marks[run_data.marks.size - len(model.node_names) + numbers].min())
+    probes = zip((*model.probes, *model.watched), run_data.isolated_probes, strict=True)
+    names += [probe.name for probe, isolated in probes if isolated and probe.part == "nodes"]
+    if not names:
+        return []
+    text = (f"{listing(names, 6)}: from {model.case.amount(first, 'time', 6)} on, at least for a time, only shut links "
+            "join this part of the network, which draws nothing: no flow determines its pressure, and extremes and "
+            "limits leave it out")  # fmt: skip
+    return [Notice("isolated", f"nodes.{names[0]}", text)]
+
+
+def _shut_by(name: str, time: float, events: list[Event]) -> str:
+    """Name of a valve, with the reason of its last event up to a time [s] if that event has one."""
+    *_, last = "", *(event.what for event in events if event.name == name and event.time <= time)
+    reason = last.partition(": ")[2]
+    return f"{name} ({reason})" if reason else name
+
+
 def device_notices(run_data: RunData) -> list[Notice]:
     """Notices on devices that ran outside the given data, but within the model, such as pumps that ran down."""
     model, marks = run_data.model, run_data.marks
@@ -248,7 +301,9 @@ def find_extremes(run_data: RunData) -> tuple[dict, dict]:
     Both are dicts: text of the probe -> (least value, its time [s], greatest value, its time [s]).
     """
     probes, watched = run_data.model.probes, run_data.model.watched
-    rows = [tuple(map(float, column)) for column in run_data.extremes.T]
+    columns, isolated = run_data.extremes.copy(), run_data.isolated_probes
+    columns[:, : isolated.size][:, isolated] = UNRECORDED
+    rows = [tuple(map(float, column)) for column in columns.T]
     found = [(probe.text, row) for probe, row in zip((*probes, *watched), rows, strict=False)]
     return dict(found[: len(probes)]), dict(found[len(probes) :])
 

@@ -209,16 +209,17 @@ class Run:
     def update_extremes(self, rows: np.ndarray) -> None:
         """Update the extremes of the probes by output rows between steps, so that no row exceeds the extremes.
 
+        Pressures that were not determined at a step are left out, see `RunData.undetermined_probes`.
         rows : float64[rows, 1 + probes]  time [s] and values of the probes
         """
         least, t_min, greatest, t_max = self.run_data.extremes
         t, values = rows[:, 0], rows[:, 1:]
-        at, each = values.argmin(axis=0), np.arange(values.shape[1])
-        lower = (extreme := values[at, each]) < least
+        at, each, known = values.argmin(axis=0), np.arange(values.shape[1]), ~self.run_data.undetermined_probes
+        lower = ((extreme := values[at, each]) < least) & known
         if lower.any():
             least[lower], t_min[lower] = extreme[lower], t[at][lower]
         at = values.argmax(axis=0)
-        higher = (extreme := values[at, each]) > greatest
+        higher = ((extreme := values[at, each]) > greatest) & known
         if higher.any():
             greatest[higher], t_max[higher] = extreme[higher], t[at][higher]
 
@@ -424,14 +425,21 @@ class Run:
         warnings += found.device_notices(self.run_data) + found.spill_notices(self.run_data)
         warnings += found.drift_notices(model, loop.now)
         warnings += split_step_notices(model.case.numerics, loop.stepper.counts())
-        held = found.held_discharges(self.run_data, self.start, loop.t, ledger[:, : len(model.node_names)].sum(axis=0))
+        entered, events = (
+            ledger[:, : len(model.node_names)].sum(axis=0),
+            [Event(t, *model.events[k]) for t, k in loop.switched],
+        )
+        held = found.held_discharges(self.run_data, self.start, loop.t, entered)
+        unsupplied, losses = found.unsupplied_demands(self.run_data, (self.start, loop.t), entered, events)
+        warnings += unsupplied + found.undetermined_notices(self.run_data)
+        events = sorted([*events, *losses], key=lambda event: event.time)
         ok = reason == "finished" and not held and all(entry.ok for entry in warnings)
         extremes, watched = found.find_extremes(self.run_data)
         summary = Summary(
             reason, ok, loop.t, found.find_marks(self.run_data) + held, ledgers, extremes,
             found.find_envelope(self.run_data), found.find_point_envelopes(self.run_data), watched,
             loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
-            self.setup, [Event(t, *model.events[k]) for t, k in loop.switched],
+            self.setup, events,
             found.find_cavities(self.run_data), warnings, self.threads, self.invalid_from,
             maxima := found.find_maxima(self.run_data, loop.t), found.find_run_ups(model, maxima),
         )  # fmt: skip

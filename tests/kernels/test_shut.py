@@ -63,14 +63,35 @@ def test_a_valve_that_all_but_shuts_keeps_its_junction_between_its_neighbours():
     assert result["X.head"] == pytest.approx(45.0, rel=1e-8)
 
 
-def test_a_demand_behind_shut_valves_stops_the_run_by_name():
-    nodes = {"A": lake(50.0), "B": lake(40.0), "X": junction(1e-3)}
+def with_given_flow_at_x(demand: float, law: str = "linear") -> fvsolve.Result:
+    """Run of a junction X with a given demand [m3/s] between two valves that shut at 1.1 s."""
+    nodes = {"A": lake(50.0), "B": lake(40.0), "X": junction(demand)}
     opening = ramp(1.0, 0.1, 1.0, 0.0)
     links = {"v0": valve("A", "X", 1e-3, opening), "v1": valve("X", "B", 1e-3, opening)}
-    result = fvsolve.run(scene(nodes, links, 2.0, {"rtol": 1e-7, "method": "dormand-prince"}, ["X.head"], 0.05))
+    fluid = {**WATER, "law": law}
+    numerics = {"rtol": 1e-7, "method": "dormand-prince"}
+    return fvsolve.run(scene(nodes, links, 2.0, numerics, ["X.head"], 0.05, fluid=fluid))
+
+
+@pytest.mark.parametrize(
+    ("demand", "law", "words"),
+    [(-1e-3, "linear", "the inflow at X finds no way out"), (1e-3, "log", "the demand at X cannot be supplied")],
+)
+def test_a_given_flow_behind_shut_valves_stops_the_run_by_name(demand, law, words):
+    result = with_given_flow_at_x(demand, law)
     assert not result.ok
-    assert "the demand at X cannot be supplied" in result.reason
+    assert words in result.reason
     assert result.t[-1] <= 1.1 + 1e-9
+    assert abs(result.ledger["mass"]["relative"]) < 1e-9
+
+
+def test_a_demand_behind_shut_valves_is_not_supplied_and_the_run_goes_on():
+    """From 1.1 s on 1 l/s lacks, 0.9 l until the end at 2 s; the junction drains to ambient pressure, a head of 0 m."""
+    result = with_given_flow_at_x(1e-3)
+    assert result.ok and result.t[-1] == 2.0
+    (note,) = [note for note in result.warnings if note.kind == "unsupplied"]
+    assert note.value == pytest.approx(0.9e-3, rel=1e-4) and "shut: v0, v1" in note.text
+    assert result["X.head"][result.t > 1.11] == pytest.approx(0.0, abs=1e-9)
     assert abs(result.ledger["mass"]["relative"]) < 1e-9
 
 

@@ -52,12 +52,12 @@ def test_error_control_rejects_a_step_with_a_faulty_stage(name, functions):
 
 
 def pulse(method: str) -> dict:
-    """Case of a demand between two valves that are shut from t = 0.501 to 0.509 s only; steps end at 0.50 and 0.51 s.
+    """Case of an inflow between two valves that are shut from t = 0.501 to 0.509 s only; steps end at 0.50 and 0.51 s.
 
     The opening 1 - exp(-z^160) is zero to rounding without a kink, so no step has to end there.
     """
     opening = "1 - exp(-((t - 0.505)/5e-3)**160)"
-    nodes = {"A": lake(50.0), "T": tank(1.0, 2.0), "X": junction(1e-3)}
+    nodes = {"A": lake(50.0), "T": tank(1.0, 2.0), "X": junction(-1e-3)}
     links = {"v0": valve("A", "X", 1e-3, opening), "v1": valve("T", "X", 1e-3, opening)}
     return scene(nodes, links, 1.0, {"method": method, "step": 0.01}, ["X.head", "T.level"], 0.1)
 
@@ -67,7 +67,7 @@ def test_given_steps_end_at_a_faulty_stage_as_at_a_faulty_state(method):
     """Without the test of stages the run finished, and only its ledger showed the volume 5e-5 m3 that was not there."""
     result = fvsolve.run(pulse(method))
     assert not result.ok
-    assert result.reason.startswith("stopped: the demand at X cannot be supplied at t = 0.5")
+    assert result.reason.startswith("stopped: the inflow at X finds no way out at t = 0.5")
     assert result.t[-1] <= 0.5 + 1e-9
     assert abs(result.ledger["mass"]["relative"]) < 1e-14
 

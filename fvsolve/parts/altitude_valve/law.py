@@ -4,6 +4,8 @@ The flags armed[event + FULL] and armed[event + EMPTY] are above 0 while it is s
 only. `floats` holds both levels of the tank [m].
 """
 
+from math import sqrt
+
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import LAW_LINEAR
 from fvsolve.kernels.restrictions import head_drop
@@ -12,6 +14,9 @@ from fvsolve.kernels.tanks import tank_level
 
 FULL, EMPTY = 0, 2  # offsets of event flags
 MARGIN = 1.0  # drop in the allowed direction at which it opens, so that rounding does not [Pa]
+# Flow in the other direction at which it shuts at a limit, over its flow at 1 Pa. Without flow it stays open: behind a
+# shut check valve it would else shut, and open again at once by the pressure between both valves, which no flow sets.
+NO_FLOW = 1e-9
 
 
 @njit
@@ -32,15 +37,16 @@ def set(t, y, out, tables, device):
 def events(t, y, out, tables, device, g):
     """Write event functions of both limits and their negatives to g.
 
-    While the valve is open: the distance of the level from the limit [m], and at the limit the flow away from it
-    [kg/s]. While it is shut: the drop towards the allowed direction, less `MARGIN` [Pa].
+    While the valve is open: the distance of the level from the limit [m], and at the limit the flow away from it plus
+    that of `NO_FLOW` [kg/s]. While it is shut: the drop towards the allowed direction, less `MARGIN` [Pa].
     """
     k, at, st = device["valve"], device["event"], tables.settings[0]
     node, flow = tables.nodes[tables.valves[k]["to_node"]], out[tables.layout[0]["valve"] + k]
     rho = st["rho"] if st["law"] == LAW_LINEAR else node["density"]
     level, drop = tank_level(node, tables.floats, rho, y[node["y"]]), head_drop(tables, out, k)[1]
     space, depth = tables.floats[device["data"]] - level, level - tables.floats[device["data"] + 1]
-    full, empty = space if space > 0.0 else -flow, depth if depth > 0.0 else flow
+    least = NO_FLOW * sqrt(tables.valves[k]["conductance"])
+    full, empty = space if space > 0.0 else least - flow, depth if depth > 0.0 else flow + least
     if tables.armed[at + FULL] > 0.0:
         full, empty = -drop - MARGIN, 1.0
     elif tables.armed[at + EMPTY] > 0.0:

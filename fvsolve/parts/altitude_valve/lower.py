@@ -19,6 +19,10 @@ class AltitudeValveRows(Device, kind="altitude-valve"):
         return [NO_LEVEL if part.full_level is None else part.full_level,
                 -NO_LEVEL if part.empty_level is None else part.empty_level]  # fmt: skip
 
+    def shut_reason(self, start, k):
+        part = start.case.conduits[start.draft.valve_names[k]]
+        return "the tank is full" if start.case.nodes[part.to].level == part.full_level else "the tank is empty"
+
     def revise_state(self, start, part, row) -> bool:
         k, level = int(row["valve"]), start.case.nodes[part.to].level
         full, empty = (limit is not None and level == limit for limit in (part.full_level, part.empty_level))

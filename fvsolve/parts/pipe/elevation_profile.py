@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.parts.csv_rows import copy_name, find_file, read_rows
+from fvsolve.parts.tolerances import ROUNDING
 from fvsolve.parts.value import ReadContext, Rows, Value, ValueFault, check_increasing, faults_of
 from fvsolve.units import show
 
@@ -100,7 +101,7 @@ class ProfileValue(Value):
 def check_slope(profile: Profile) -> None:
     """Raise ValueError where the elevation between two points changes by more than the chainage."""
     lengths, rises = np.diff(profile.chainage), np.abs(np.diff(profile.elevation))
-    if (rises > lengths * (1.0 + 1e-9)).any():
+    if (rises > lengths * (1.0 + ROUNDING)).any():
         k = int(np.argmax(rises - lengths))
         text = (
             f"a length of {lengths[k]:g} m from chainage {profile.chainage[k]:g} m is too short to rise or fall by "

@@ -27,6 +27,7 @@ SPEED_TOLERANCE = 1e-6  # difference of heads regarded as rounding [m]
 MAX_VELOCITY = 15.0  # velocity in adjacent pipes at the rated flow, above which a notice is given [m/s]
 MIN_VELOCITY = 0.01  # velocity below which a notice is given: 1/100 of usual mains; a wrong unit gives 1/1000
 INERTIA_RATIO = 30.0  # allowed ratio to the usual inertia: flywheels give 10, a wrong unit gives 1000
+NO_FLOW = 1e-7  # flow below which a pump of constant power has stalled [m3/s]
 ROUNDING = 1e-9
 LEAST_SHARE = 0.02  # least efficiency at the rated flow
 UNITS = (("l/s", 1e-3), ("m3/h", 1.0 / 3600.0), ("l/min", 1e-3 / 60.0))
@@ -48,6 +49,17 @@ def reversed_pump(start, name: str, part, valve) -> list[Notice]:
         f"{name}: it pumps from {part.from_} to {part.to}, {target}; check its direction (`from` is the suction side)"
     )
     return [Notice("range", f"links.{name}", text, "from", float(heads[i] - heads[j]), 0.0)]
+
+
+def stalled_power(start, name: str, part, valve) -> list[Notice]:
+    """Notice if a pump of constant power has no flow at the start, so that its power gives no head; as a list."""
+    flow = float(valve["flow"]) / start.draft.fluid.density
+    if part.power is None or start.rest or valve["open"] <= 0.0 or not abs(flow) < NO_FLOW:
+        return []
+    head = start.case.amount(-float(valve["drop"]) / start.weight, "head", span=True)
+    text = (f"{name}: constant power without flow determines no head; its head here, {head}, and the pressures behind "
+            "it have no meaning; give `curve` instead of `power`, or make it a valve with opening = 0")  # fmt: skip
+    return [Notice("range", f"links.{name}", text, "power", flow, NO_FLOW)]
 
 
 def estimated_inertia(draft, name: str, part) -> list[Notice]:
@@ -243,6 +255,7 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
             moving.append(f"{text}{valve['drive']:.4g}")
         draft.warnings += [
             *reversed_pump(start, name, part, valve), *unusual_flow(draft, name, part),
+            *stalled_power(start, name, part, valve),
             *estimated_inertia(draft, name, part), *rated_point_notes(draft, name, part),
         ]  # fmt: skip
         return moving + self.set_free_shaft(start, part, row, valve)

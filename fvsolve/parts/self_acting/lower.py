@@ -10,6 +10,7 @@ from fvsolve.errors import Notice
 from fvsolve.kernels.restrictions import LEAST, flow_at_drop, flow_slope, transition_of
 from fvsolve.parts.self_acting import law_check_valve, law_disc, law_regulating, law_relief_valve, law_slam
 from fvsolve.parts.self_acting.law_disc import CHECK, RELIEF
+from fvsolve.parts.tolerances import is_head_above
 from fvsolve.steady import Edge
 
 LIFTING, OPEN = "lifting", "open"  # modes of a valve; shut valves are in `start.shut`
@@ -224,6 +225,9 @@ class CheckValveRows(Device, kind="check-valve"):
         start.shut |= {k} if shuts else set()
         return shuts
 
+    def shut_reason(self, start, k):
+        return "passes no reversed flow"
+
 
 class SlamCurveRows(CheckValveRows, kind=""):
     """Conversion to table rows of check valves that shut at the reverse velocity of their manufacturer's curve."""
@@ -386,7 +390,7 @@ class Regulator(Device, kind=""):
         best, source = max(head_of(case, weight, other) for other in case.nodes)
         least = float(np.min(part.set_pressure.value))
         head = (least - case.ambient_pressure) / weight + (case.elevation(place) or 0.0)
-        if head > best:
+        if is_head_above(head, best):
             amount = case.amount
             text = (f"{amount(least, 'pressure', 6)} at {place} is a head of {amount(head, 'head')}, above every "
                     f"source: {source} has {amount(best, 'head')}")  # fmt: skip
@@ -522,6 +526,10 @@ class PressureSustainingRows(Regulator, kind="pressure-sustaining"):
     """
 
     mode, end, verb = law_regulating.SUSTAINING, "from", "open"
+
+    def shut_reason(self, start, k):
+        node = list(start.case.places)[self.regulated_node(start, k)]
+        return f"cannot sustain {start.case.amount(self.set_value(start, k), 'pressure')} at {node}"
 
     def next_mode(self, here, now):
         low, high = here.target - SMALL_PRESSURE, here.target + SMALL_PRESSURE

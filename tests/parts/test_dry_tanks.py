@@ -1,0 +1,172 @@
+"""Days of networks whose tanks run dry or full behind check valves: heads as in EPANET, demands without supply."""
+
+import numpy as np
+import pytest
+from parts.test_controls import METHODS
+from parts.test_quasi_steady_pipe import pipe
+from reference.scenes import junction, lake, scene, tank
+
+import fvsolve
+from fvsolve.studies import energy
+
+HOUR, DAY = 3600.0, 86400.0
+SECTION = 28.27433388  # of a tank of 6 m of diameter [m2]
+PATTERN = (1.0, 1.0, 0.5, 0.5, 0.2, 1.5)  # of each hour, again and again
+STARTS = [hour * HOUR for hour in range(24)]
+# head at b by EPANET 2.2 where the lake alone supplies it, for each value of the pattern [m]
+LAKE_ALONE = {1.0: 35.8806, 0.5: 42.4738, 0.2: 44.5371, 1.5: 25.6764}
+
+
+def demand(flow: float) -> dict:
+    """Demand of a day by the pattern; flow : mean demand [m3/s]"""
+    return {"time": STARTS, "value": [flow * PATTERN[hour % 6] for hour in range(24)], "kind": "step"}
+
+
+def main(start: str, end: str, length: float, diameter: float, coefficient: float = 110.0) -> dict:
+    return pipe(start, end, length, diameter, {"model": "hazen-williams", "coefficient": coefficient})
+
+
+def check(start: str, end: str) -> dict:
+    return {"type": "check-valve", "from": start, "to": end, "diameter": 0.2, "loss_coefficient": 1e-4}
+
+
+def altitude(tank_name: str, **levels: float) -> dict:
+    return {"type": "altitude-valve", "from": f"{tank_name}-inlet", "to": tank_name, "diameter": 0.2,
+            "loss_coefficient": 1e-4, **levels}  # fmt: skip
+
+
+def day(nodes: dict, links: dict, numerics: dict | None = None) -> dict:
+    probes = [f"{name}.level" for name, node in nodes.items() if node["type"] == "tank"] + ["b.head"]
+    return scene(
+        nodes, links, DAY, numerics if "step" in (numerics or {}) else {"rtol": 1e-7, **(numerics or {})}, probes, 600.0
+    )
+
+
+def behind_a_check_valve(numerics: dict | None = None) -> dict:
+    """Town b beside a lake, and a tower that only gives: its pipe has a check valve at b."""
+    nodes = {"a": junction(elevation=5.0), "b": junction(demand(6e-3), elevation=8.0), "lake": lake(45.0),
+             "tower-inlet": junction(elevation=8.0),
+             "tower": tank(SECTION, 3.0, elevation=40.0), "end": junction(elevation=8.0)}  # fmt: skip
+    links = {"p1": main("lake", "a", 400.0, 0.25), "p2": main("a", "b", 900.0, 0.1), "p3-check": check("end", "b"),
+             "p3": main("tower-inlet", "end", 300.0, 0.2, 120.0),
+             "gate": altitude("tower", full_level=6.0, empty_level=2.0)}  # fmt: skip
+    return day(nodes, links, numerics)
+
+
+def restated(case: dict) -> dict:
+    """The same case with its nodes and links in the opposite order, and its pipes turned."""
+    links = {name: dict(link) for name, link in reversed(case["links"].items())}
+    for link in links.values():
+        if link["type"] == "pipe":
+            link["from"], link["to"] = link["to"], link["from"]
+    return {**case, "nodes": dict(reversed(case["nodes"].items())), "links": links}
+
+
+def events_of(run, name: str) -> list[tuple[float, str]]:
+    return [(event["time"] / HOUR, event["what"]) for event in run.summary["events"] if event["name"] == name]
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_dry_tower_behind_a_check_valve_gives_nothing_and_the_day_goes_on(method, turned):
+    """At 8 h both valves shut and opened without end, by a pressure between them that no flow determines."""
+    case = behind_a_check_valve({"method": method})
+    run = fvsolve.run(restated(case) if turned else case)
+    assert run.ok and run.reason == "finished"
+    assert events_of(run, "gate")[0] == (pytest.approx(5.3003, abs=1e-3), "shuts: the tank is empty")  # EPANET: 5.2994
+    assert len(run.summary["events"]) < 30
+    dry = run.t > 5.31 * HOUR
+    assert run["tower.level"][dry] == pytest.approx(2.0, abs=1e-7)
+    within = dry & (run.t % HOUR > 0.0)
+    heads = [LAKE_ALONE[PATTERN[int(t // HOUR) % 6]] for t in run.t[within]]
+    assert run["b.head"][within] == pytest.approx(heads, abs=1e-3)
+    assert not [note for note in run.warnings if note.kind == "unsupplied"]
+    assert abs(run.ledger["mass"]["relative"]) < 1e-12
+
+
+def test_the_same_day_with_given_steps():
+    run = fvsolve.run(behind_a_check_valve({"method": "rk4", "step": 60.0}))
+    assert run.ok and run["tower.level"][-1] == pytest.approx(2.0, abs=1e-7)
+
+
+def test_a_full_tower_behind_a_check_valve_gives_nothing_back_and_takes_no_more():
+    """It fills until 4.50 h; at 5 h the town draws so much that the tower could only give, which the check valve stops.
+
+    Levels and heads of EPANET 2.2 at steps of 5 min.
+    """
+    nodes = {"a": junction(1e-3, elevation=5.0), "b": junction(demand(3e-3), elevation=8.0), "lake": lake(50.0),
+             "end": junction(elevation=3.0), "tower-inlet": junction(elevation=3.0),
+             "tower": tank(SECTION, 3.0, elevation=40.0)}  # fmt: skip
+    links = {"p1": main("lake", "a", 400.0, 0.1), "p2": main("a", "b", 900.0, 0.1), "p3-check": check("b", "end"),
+             "p3": main("end", "tower-inlet", 600.0, 0.2, 120.0),
+             "gate": altitude("tower", full_level=4.0)}  # fmt: skip
+    run = fvsolve.run(day(nodes, links))
+    assert run.ok and len(run.summary["events"]) < 20
+    assert events_of(run, "gate")[0] == (pytest.approx(4.503, abs=2e-3), "shuts: the tank is full")
+    assert run["tower.level"][run.t > 4.6 * HOUR] == pytest.approx(4.0, abs=1e-7)
+
+
+def supplied_by_tanks(numerics: dict | None = None, **levels: float) -> tuple[dict, float]:
+    """(case of a town that only tanks supply, their usable volume [m3]); levels : name of a tank -> its level [m]"""
+    nodes, links = {"b": junction(demand(6e-3), elevation=8.0)}, {}
+    for k, (name, level) in enumerate(levels.items()):
+        nodes |= {f"{name}-inlet": junction(elevation=30.0), name: tank(SECTION, level, elevation=40.0 - 2.0 * k)}
+        links |= {f"{name}-main": main(f"{name}-inlet", "b", 300.0, 0.2), f"{name}-gate": altitude(name, empty_level=0)}
+    return day(nodes, links, numerics), SECTION * sum(levels.values())
+
+
+@pytest.mark.parametrize("levels", [{"tower": 3.0}, {"tower": 3.0, "pond": 4.0}], ids=["one tank", "two tanks"])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_town_with_dry_tanks_alone_is_not_supplied_and_the_run_names_the_tanks_and_the_volume(method, levels):
+    """The volume that lacks is the demand of the day less the water of the tanks."""
+    case, stored = supplied_by_tanks({"method": method}, **levels)
+    asked = 6e-3 * HOUR * 4.0 * sum(PATTERN)
+    for told in (case, restated(case)):
+        run = fvsolve.run(told)
+        (note,) = [note for note in run.warnings if note.kind == "unsupplied"]
+        (lost,) = events_of(run, "b")
+        assert run.ok and run.reason == "finished" and lost[1] == "is no longer supplied"
+        assert note.place == "nodes.b" and note.value == pytest.approx(asked - stored, rel=1e-6)
+        assert all(f"{name}-gate (the tank is empty)" in note.text for name in levels)
+        late = run.t > lost[0] * HOUR + 1.0
+        assert all(run[f"{name}.level"][late] == pytest.approx(0.0, abs=1e-7) for name in levels)
+        assert run["b.head"][late] == pytest.approx(8.0, abs=1e-9)  # ambient pressure at the town
+        assert abs(run.ledger["mass"]["relative"]) < 1e-12 and run.ledger["mass"]["made_up"] < 1e-6
+    ledger = energy(case)
+    assert abs(ledger.remainder[-1]) < 1e-6 * ledger.throughput
+
+
+def test_the_volume_of_a_town_in_other_units_and_a_demand_that_stops_by_itself():
+    """The town draws 2 l/s for 10 h, its tank is dry after 20/36 of them: 16/36 of the demand lack, until 10 h."""
+    case, _ = supplied_by_tanks(tower=1.0)
+    case["nodes"]["tower"] = {"type": "tank", "area": "40 m2", "level": "1 m", "elevation": "40 m"}
+    case["nodes"]["b"]["demand"] = {"time": ["0 h", "10 h"], "value": ["2 l/s", "0 l/s"], "kind": "step"}
+    run = fvsolve.run(case)
+    (note,) = [note for note in run.warnings if note.kind == "unsupplied"]
+    assert note.value == pytest.approx(72.0 - 40.0, rel=1e-7)
+    assert run.ok and "20000 s and 36000 s" in note.text.replace("5.55556 h", "20000 s").replace("10 h", "36000 s")
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_lower_lake_behind_a_check_valve_takes_over_when_the_tower_is_dry(turned):
+    """Between the dry tower and the lake the town has no pressure of its own: it falls until the check valve opens."""
+    nodes = {"b": junction(6e-3, elevation=8.0), "lake": lake(35.0), "end": junction(elevation=8.0),
+             "tower-inlet": junction(elevation=8.0), "tower": tank(SECTION, 3.0, elevation=40.0)}  # fmt: skip
+    links = {"p1": main("lake", "end", 400.0, 0.25), "p1-check": check("end", "b"),
+             "p3": main("tower-inlet", "b", 300.0, 0.2), "gate": altitude("tower", empty_level=0.0)}  # fmt: skip
+    case = day(nodes, links)
+    run = fvsolve.run(restated(case) if turned else case)
+    assert run.ok and not [note for note in run.warnings if note.kind == "unsupplied"]
+    empty = SECTION * 3.0 / 6e-3
+    assert [time * HOUR for time, _ in events_of(run, "p1-check")] == [pytest.approx(empty, rel=1e-6)]
+    late = run.t > empty
+    assert run["tower.level"][late] == pytest.approx(0.0, abs=1e-7)
+    assert np.all((run["b.head"][late] > 34.0) & (run["b.head"][late] < 35.0))
+
+
+def test_an_inflow_that_finds_no_way_out_still_stops_the_run():
+    nodes = {"b": junction(-1e-3, elevation=8.0), "tower-inlet": junction(elevation=8.0),
+             "tower": tank(SECTION, 3.0, elevation=40.0)}  # fmt: skip
+    links = {"p3": main("tower-inlet", "b", 300.0, 0.2), "gate": altitude("tower", full_level=3.5)}
+    run = fvsolve.run(day(nodes, links))
+    assert not run.ok and run.reason.startswith("stopped: the inflow at b finds no way out at t = 14137")
