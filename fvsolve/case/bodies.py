@@ -348,8 +348,9 @@ def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool =
         for end in dict.fromkeys(end for end in ends if is_kind(node_of(end, nodes), "basin")):
             text = f"the reaction of the flow through {end} is not modelled yet; expected a tank instead of the basin"
             yield key, text
-        if link.kind == "leak":
-            yield key, "the reaction of the leak on the body is not modelled yet; expected a valve to a reservoir"
+        if link.kind in ("leak", "hydrant"):
+            text = f"the reaction of the {link.kind} on the body is not modelled yet"
+            yield key, f"{text}; expected a valve to a reservoir"
         elif link.kind == "rigid-column":
             for end in ends:
                 kinds = {other.kind for other in links.values() if end in other.ports.values()}

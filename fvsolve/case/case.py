@@ -24,6 +24,7 @@ from fvsolve.fluid.laws import Law
 from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.parts.pipe.pipe_wall import OF_WALL, elastic_compliance, heat_retardation
+from fvsolve.parts.pump.energy_use import EnergyUse, watched_powers
 from fvsolve.parts.table_model import plain_value
 from fvsolve.schemes import SCHEMES
 from fvsolve.units import show
@@ -67,6 +68,7 @@ class Case(Displayable):
     controls: dict[str, Block]
     reactions: dict[str, Reaction]
     exact: ExactSpec | None
+    energy: EnergyUse | None
     copies: dict[str, Path]
     raw: dict[str, Any] = field(repr=False)  # tables of the file, with overrides
     folder: Path | None = field(repr=False)
@@ -113,6 +115,8 @@ class Case(Displayable):
         extents += [row.measure.extent for row in rows if row.measure.extent is not None]
         for extent in extents:
             named += extent.probes(self.links)
+        powers = watched_powers(self.links) if self.energy is not None else {}
+        named += [Probe(text, "links", *place, None, "power") for text, place in powers.items()]
         return list({probe.text: probe for probe in named}.values())
 
     @property
@@ -340,6 +344,7 @@ class Case(Displayable):
             "compare": {name: item.table() for name, item in self.compare.items()},
             "routes": {name: item.table() for name, item in self.routes.items()},
             "limits": {name: item.table() for name, item in self.limits.items()},
+            "energy": self.energy.table() if self.energy is not None else {},
             "exact": self.exact.table() if self.exact else {},
             "validation": self.raw.get("validation", {}),
         }

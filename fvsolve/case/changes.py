@@ -15,13 +15,14 @@ from fvsolve.case.validation_table import KEYS as VALIDATION_KEYS
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.control import Control
+from fvsolve.parts.pump.energy_use import EnergyUse
 from fvsolve.parts.reaction import Reaction
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table_model import Nested
 from fvsolve.parts.value import BY_CELLS, PROFILE, SHAPE, VALUE, Quantity, Text, Value
 from fvsolve.units import show
 
-TABLES = {"fluid": FluidSpec, "numerics": Numerics, "output": Output, "exact": ExactSpec}
+TABLES = {"fluid": FluidSpec, "numerics": Numerics, "output": Output, "energy": EnergyUse, "exact": ExactSpec}
 CLASSES = (VALUE, PROFILE, SHAPE)
 CHAINAGE = {"on": Text(), "at": Quantity("length", changes=SHAPE)}  # keys of a part that is placed on a pipe
 

@@ -26,6 +26,7 @@ from fvsolve.parts.culvert.part import inlets
 from fvsolve.parts.cylinder import DryFriction
 from fvsolve.parts.nodes_and_links import PlaceOnBody, TwoPort
 from fvsolve.parts.pipe.pipe_wall import SI, Lining, Wall, materials
+from fvsolve.parts.pump.energy_use import EnergyUse
 from fvsolve.parts.reaction import Reaction
 from fvsolve.parts.self_acting.part import Disc
 from fvsolve.parts.table_model import Table, plain_value
@@ -39,7 +40,8 @@ TABLES: dict[str, type[Table]] = {
     "wall": Wall, "lining": Lining, "patch": Patch, "start": BasinStart, "line": OutputLine, "run-up": RunUp,
     "grid": OutputGrid, "mesh": BasinMesh,
     "scalar": Scalar, "reaction": Reaction,
-    "fluid": FluidSpec, "numerics": Numerics, "output": Output, "route": Route, "joint": Joint, "attitude": Attitude,
+    "fluid": FluidSpec, "numerics": Numerics, "output": Output, "energy": EnergyUse, "route": Route, "joint": Joint,
+    "attitude": Attitude,
 }  # fmt: skip
 # base class -> part whose table lists its keys in full
 SHARED = {Node: "", PlaceOnBody: "", TwoPort: "", Sized: "valve", Disc: "check-valve"}

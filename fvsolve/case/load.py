@@ -25,20 +25,21 @@ from fvsolve.parts import value as val
 from fvsolve.parts.carried_scalar import ZEROS
 from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.pipe.pipe_wall import OF_WALL
+from fvsolve.parts.pump.energy_use import EnergyUse, price_faults
 from fvsolve.parts.schedule import Schedule, Scheduled, signal_fault
 from fvsolve.parts.table_model import read_keys
 from fvsolve.units import Kinematic, show
 
 SCHEMA = 1
 MOST_SCALARS = 500  # each has a value in each cell and at each node, and a default probe at each node
-PRESENCE_KEYS = ("required_pressure",)  # keys of parts whose presence alone changes the case
+PRESENCE_KEYS = ("required_pressure", "price")  # keys of parts whose presence alone changes the case
 # Tables with names that other tables refer to.
 NAME_TABLES = ("nodes", "links", "signals", "controls", "scalars", "reactions", "routes", "defaults")
 STUDY_KEYS = {"events", "protections"}
 KEYS = (
     "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
-    "signals", "controls", "scalars", "reactions", "defaults", "numerics", "output", "expect", "compare", "routes",
-    "limits", "exact", "validation",
+    "signals", "controls", "scalars", "reactions", "defaults", "numerics", "output", "energy", "expect", "compare",
+    "routes", "limits", "exact", "validation",
 )  # fmt: skip
 TOP = {
     "schema": (val.Whole(val.between(SCHEMA, SCHEMA)), SCHEMA),
@@ -157,6 +158,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     if state is not None and not reading.faults:
         weight = state.density * general["gravity"]
         waters, lines = water_of_conduits(parts.nodes, links, reading.setting.ambient, weight)
+    energy = read_energy(reading, parts)
     named = reading.table("exact", ExactSpec) if "exact" in reading.raw.table else None
     reading.stop()
     setting, raw = reading.setting, reading.raw
@@ -165,9 +167,17 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
         fluid=fluid, properties=state, nodes=parts.nodes | waters, links=links, meshes=parts.meshes | lines,
         lumped=parts.lumped, signals=dict(setting.used), scalars=scalars, numerics=numerics, output=output,
         expect=expect, compare=compare, routes=routes, limits=limits, controls=blocks, reactions=reactions,
-        exact=named, copies=dict(setting.files), read=reading.read, validation=validation,
+        exact=named, energy=energy, copies=dict(setting.files), read=reading.read, validation=validation,
     )  # fmt: skip
     return case if named is None else with_exact(reading, case)
+
+
+def read_energy(reading: Reading, parts: Parts) -> EnergyUse | None:
+    """Table `[energy]`; None without it or if it is faulty."""
+    if "energy" in reading.raw.table:
+        return reading.table("energy", EnergyUse)
+    reading.add(price_faults(parts.links))
+    return None
 
 
 def read_general(reading: Reading) -> dict[str, Any]:

@@ -128,17 +128,21 @@ def override(raw: Raw, settings: Mapping[str, Any], alternatives_of: Callable) -
     """Override values in the table of `raw`; returns the faults of overrides that cannot be applied.
 
     The key paths are added to `raw.overridden`.
-    settings : dotted key -> value; a text is parsed as TOML where possible
+    settings : dotted key -> value; a text is parsed as TOML where possible, unless it replaces the name of a node or
+    link and is such a name too, which may consist of digits
     alternatives_of : function from the table to groups of keys of which a table in it may have at most one; an override
     removes the other keys of its group that are not overridden too
     """
     faults = []
     groups = {group: raw.get((group,)) for group in ("nodes", "links")}
     before = {group: list(parts) for group, parts in groups.items() if isinstance(parts, dict)}
+    names = {name for parts in before.values() for name in parts}
     for key, value in settings.items():
         keys = split_key(str(key))
+        present, text = raw.get(keys), str(value) if isinstance(value, (int, str)) else ""
+        is_name = isinstance(present, str) and {present, text} <= names
         try:
-            _put(raw.table, keys, _copy(parsed(value)))
+            _put(raw.table, keys, text if is_name else _copy(parsed(value)))
             raw.overridden.append(keys)
         except ValueError as error:
             faults.append(Fault(str(key), str(error), override=True))

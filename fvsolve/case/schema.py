@@ -15,6 +15,7 @@ from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.control import Control
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
+from fvsolve.parts.pump.energy_use import EnergyUse
 from fvsolve.parts.reaction import Reaction
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table_model import keys_json
@@ -42,7 +43,8 @@ def full_schema() -> dict[str, Any]:
     properties: dict[str, Any] = dict.fromkeys(KEYS, {})
     properties |= keys_json(TOP)["properties"]
     properties["ambient_pressure"] = Quantity("pressure").json()
-    for name, model in (("fluid", FluidSpec), ("numerics", Numerics), ("output", Output), ("exact", ExactSpec)):
+    tables = {"fluid": FluidSpec, "numerics": Numerics, "output": Output, "energy": EnergyUse, "exact": ExactSpec}
+    for name, model in tables.items():
         properties[name] = _with_shared_definitions(model, definitions)
     for group, kinds in KINDS.items():
         any_kind = [_typed(kind, part, definitions) for kind, part in sorted(kinds.items())]

@@ -127,6 +127,11 @@ def ledger_text(result, case, folder) -> Iterator:
             rows.append([kind, f"{len(order) - LINES} others", *amount(rest)])
     rows += [["numerical", name, *amount(values[-1])] for name, values in result.numerical().items()]
     yield TextTable(["kind", "part", joules.header, "share [%]"], rows)
+    if result.energy_use:
+        from fvsolve.cli.printing import energy_use_text
+
+        yield ""
+        yield from energy_use_text(result.energy_use)
     yield ""
     text, left = f"remainder {case.amount(result.remainder[-1], 'energy')}", result.newton_counts
     if left:

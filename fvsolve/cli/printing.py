@@ -89,6 +89,8 @@ def result_text(run) -> Iterator:
         yield f"and {more} more event{'s' if more > 1 else ''}; summary.json has all"
     for name, table in summary.get("run_up", {}).items():
         yield _run_up_text(name, table)
+    if "energy_use" in summary:
+        yield from energy_use_text(summary["energy_use"])
     for name, ledger in summary["ledgers"].items():
         relative = f", {_number(ledger['relative'])} of the largest term" if "relative" in ledger else ""
         yield f"{name} ledger: remainder {_number(ledger['remainder'])}{relative}"
@@ -105,6 +107,16 @@ def result_text(run) -> Iterator:
             yield f"error of {text}", "yellow"
     end = "" if "at t = " in summary["reason"] else f" at t = {time_text(summary['t'])}"
     yield f"{summary['reason']}{end}; {_cost_text(summary)}", None if run.ok else "bold red"
+
+
+def energy_use_text(use: dict) -> Iterator:
+    """Table of the electric energy of pumps and its cost; use : entry `energy_use` of a summary"""
+    from fvsolve.parts.pump.energy_use import HEADS, UNITS, table_rows
+
+    heads = [f"{head} [{unit}]" if unit else head for head, unit in zip(HEADS, UNITS, strict=True)]
+    yield TextTable(heads, [[row[0], *map(_number, row[1:])] for row in table_rows(use)])
+    if use["total"]["demand_charge"]:
+        yield f"demand charge for the greatest power of all pumps together: {_number(use['total']['demand_charge'])}"
 
 
 def time_column(summary: dict):

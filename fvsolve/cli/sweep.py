@@ -134,8 +134,9 @@ def split_list(text: str) -> list[str]:
 def sweep_text(result, folder: Path, heads: dict[str, str]) -> Iterator:
     from fvsolve.studies.sweep import as_option_text
 
-    columns = [*result.keys, "ok", *(name for name in result.columns if name.startswith(("min(", "max(")))]
-    shown = columns[len(result.keys) : len(result.keys) + 1 + MAX_COLUMNS]
+    judged = ["verdicts"] * any(row.get("verdicts") is not None for row in result.rows)
+    columns = [*result.keys, "ok", *judged, *(name for name in result.columns if name.startswith(("min(", "max(")))]
+    shown = columns[len(result.keys) : len(result.keys) + 1 + len(judged) + MAX_COLUMNS]
     first_rows = result.rows[:MAX_ROWS]
     rows = [
         [*(as_option_text(row[key]) for key in result.keys), *(_text(row.get(name)) for name in shown)]

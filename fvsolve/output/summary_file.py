@@ -29,7 +29,7 @@ def summary_data(summary, model) -> dict:
         "extremes": _extremes(summary, model), "ledgers": plain(summary.ledgers), **summary.counts,
         "methods": summary.methods, "cells": int(summary.cells), "threads": int(summary.threads),
         "seconds": float(summary.seconds), "seconds_setup": float(summary.seconds_setup), "cost": plain(summary.cost),
-        "run_up": plain(summary.run_ups),
+        "run_up": plain(summary.run_ups), **({"energy_use": plain(summary.energy_use)} if summary.energy_use else {}),
         "warnings": [item.plain() for item in (*model.warnings, *summary.warnings)],
     }  # fmt: skip
 

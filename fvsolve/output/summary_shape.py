@@ -220,6 +220,36 @@ class RunUpRow(TypedDict):
     y: list[float | None]
 
 
+class PumpEnergyRow(TypedDict):
+    """Entries of the electric energy of a pump [SI], see `parts.pump.energy_use`; cost in the currency of the price."""
+
+    running_share: float | None
+    efficiency: float | None
+    specific_energy: float | None
+    mean_power: float | None
+    peak_power: float | None
+    energy: float | None
+    cost: float | None
+    cost_per_day: float | None
+
+
+class EnergyTotal(TypedDict):
+    """Entries of the electric energy of all pumps [SI]."""
+
+    energy: float | None
+    peak_power: float | None
+    cost: float | None
+    cost_per_day: float | None
+    demand_charge: float | None
+
+
+class EnergyUseRows(TypedDict):
+    """Entries of the electric energy of pumps."""
+
+    pumps: dict[str, PumpEnergyRow]
+    total: EnergyTotal
+
+
 class PeakSide(TypedDict):
     """Entries of an extreme with its error."""
 
@@ -300,6 +330,7 @@ class SummaryShape(TypedDict):
     comparisons: list[Comparison]
     versions: Versions
     files: list[str]
+    energy_use: NotRequired[EnergyUseRows]
     ended: NotRequired[str]
     seconds_total: NotRequired[float]
     peaks: NotRequired[dict[str, PeakRow]]

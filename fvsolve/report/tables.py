@@ -537,8 +537,8 @@ def extremes_of_probes(result) -> ReportTable:
 
 
 def numerics_tables(result) -> list[ReportTable | None]:
-    """Tables of settings, ledgers, expected values and measured series; None instead of ledgers without balances."""
-    return [settings(result), ledgers(result), claim_table(result), comparisons(result)]
+    """Tables of electric energy, settings, ledgers, expected values and measured series; None for absent tables."""
+    return [energy_use(result), settings(result), ledgers(result), claim_table(result), comparisons(result)]
 
 
 def settings(result) -> ReportTable:
@@ -577,6 +577,18 @@ def ledgers(result) -> ReportTable | None:
 def _shortened(value: float | None, form: str) -> str | None:
     """Text of a number; None for None, as in the balances of a diverged run."""
     return None if value is None else format(value, form)
+
+
+def energy_use(result) -> ReportTable | None:
+    """Table of the electric energy of pumps and its cost; None for a case without `[energy]`."""
+    from fvsolve.parts.pump.energy_use import HEADS, UNITS, table_rows
+
+    use = result.summary.get("energy_use")
+    if use is None:
+        return None
+    charge = use["total"]["demand_charge"]
+    rows = [*table_rows(use), *([["demand charge", *[None] * 6, charge, None]] if charge else [])]
+    return ReportTable("Electric energy of pumps", HEADS, rows, UNITS)
 
 
 def versions(result) -> ReportTable:

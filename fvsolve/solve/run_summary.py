@@ -96,6 +96,7 @@ class Summary:
     invalid_from: float = np.inf  # time from which results are invalid, because states have grown [s]
     maxima: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)  # result of `find_maxima`
     run_ups: dict[str, RunUpTable] = field(default_factory=dict)  # result of `find_run_ups`
+    energy_use: dict[str, Any] = field(default_factory=dict)  # result of `energy_use` of `parts.pump`
 
     @property
     def finished(self) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.model import Model, State
 from fvsolve.model.scalar_tables import scalar_ledgers
+from fvsolve.parts.pump.energy_use import energy_use
 from fvsolve.solve import run_summary as found
 from fvsolve.solve.parallel_bands import CLOSE_MESSAGE, postponed_interrupts
 from fvsolve.solve.partition import threads_of
@@ -442,6 +443,7 @@ class Run:
             self.setup, events,
             found.find_cavities(self.run_data), warnings, self.threads, self.invalid_from,
             maxima := found.find_maxima(self.run_data, loop.t), found.find_run_ups(model, maxima),
+            energy_use(model, loop.now, watched, loop.t - self.start),
         )  # fmt: skip
         self.sink.end(summary)
         return summary

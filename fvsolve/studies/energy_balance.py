@@ -1,7 +1,7 @@
 """Energy balance of a run: supplied, stored and dissipated energy in each step, and energy changed by the method."""
 
 import functools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -326,6 +326,7 @@ class Energy:
     marks : texts on conditions outside the validity of the model, with the times from which on energies are not
     reliable
     port : passivity at a port, if checked
+    energy_use : electric energy of pumps and its cost, as in the summary of a run; empty without `[energy]`
     """
 
     reason: str
@@ -345,6 +346,7 @@ class Energy:
     steps: int
     marks: list[str]
     port: Port | None = None
+    energy_use: dict[str, object] = field(default_factory=dict)
 
     @property
     def throughput(self) -> float:
@@ -401,6 +403,7 @@ class Energy:
             "step_loss": float(self.step[-1]), "newton_loss": float(self.newton[-1]),
             "remainder": float(self.remainder[-1]), "through": self.throughput, "relative": self.relative,
             "verdict": self.verdict, "datum": self.datum, "at_start": self.at_start, "marks": self.marks, "port": port,
+            **({"energy_use": self.energy_use} if self.energy_use else {}),
         }  # fmt: skip
 
 
@@ -452,7 +455,7 @@ def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
         float(run.model.tables.settings[0]["datum"]), settings | {"cells": run.model.cells}, summary.steps,
         [f"{mark.text}: the energy balance from {run.model.case.amount(mark.time, 'time', 6)} on is not to be trusted"
          for mark in summary.marks],
-        None if port is None else port_verdict(run, port),
+        None if port is None else port_verdict(run, port), summary.energy_use,
     )  # fmt: skip
 
 

@@ -116,6 +116,7 @@ LINKS = {
         "inlet": st.sampled_from(["circular-concrete-square-edge", "circular-metal-mitred"]),
     }),
     "manhole": of("manhole", {"crest": between(15.0, 24.0), "area": st.just(1e-3), "perimeter": st.just(0.1)}),
+    "hydrant": of("hydrant", {"flow": between(1e-4, 5e-3), "opening": OPENING}),
     "leak": of("leak", {"coefficient": between(1e-7, 1e-5), "opening": OPENING}, {"exponent": between(0.5, 1.5)}),
 }  # fmt: skip
 NODES = {
@@ -207,7 +208,7 @@ def joined(draw, table: str, part: dict, settings: dict) -> tuple[dict, dict]:
     """
     stiff = settings["method"] not in METHODS or not METHODS[settings["method"]].explicit
     places, links = draw(neighbours(stiff))
-    if part["type"] == "leak":
+    if part["type"] in ("leak", "hydrant"):
         return places, {**links, "on": valve("a", "b", 1e-3), "part": part | {"from": "a"}}
     if table == "links":
         return places, {**links, "part": part | {"from": "a", "to": "b"}}
@@ -253,8 +254,8 @@ def test_at_rest_it_stays_at_rest(table, kind, data, settings):
     part = data.draw((LINKS if table == "links" else NODES)[kind])
     still = {
         "pump": {"speed": 0.0}, "turbine": {"speed": 0.0}, "displacement-pump": {"speed": 0.0},
-        "displacement-motor": {"speed": 0.0}, "leak": {"opening": 0.0}, "junction": {"demand": 0.0},
-        "inflow": {"flow": 0.0}, "tank": {"level": HEAD}, "reservoir": {"head": HEAD},
+        "displacement-motor": {"speed": 0.0}, "leak": {"opening": 0.0}, "hydrant": {"opening": 0.0},
+        "junction": {"demand": 0.0}, "inflow": {"flow": 0.0}, "tank": {"level": HEAD}, "reservoir": {"head": HEAD},
     }.get(kind, {})  # fmt: skip
     part |= still
     shown = told(made(*data.draw(joined(table, part, settings)), settings))

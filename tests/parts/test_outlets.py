@@ -8,6 +8,7 @@ Leaks: drainage by any power of the pressure, no reverse flow. Rupture discs: ti
 import functools
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,6 +34,7 @@ from scipy.optimize import brentq
 
 import fvsolve
 from fvsolve.parts.outlet.law_outlet import FREE, LEAST_DROP, emitter_drop, emitter_flow, emitter_slope, emitter_step
+from fvsolve.studies import sweep
 from fvsolve.studies.energy_balance import energy
 
 ADAPTIVE = ("auto", "rodas-5p", "rodas-4", "radau-iia-5", "esdirk-4", "tr-bdf2", "dormand-prince", "bogacki-shampine")
@@ -448,3 +450,113 @@ def test_what_is_wrong_with_a_disc_is_said(wrong, said):
     with pytest.raises(fvsolve.CaseError) as error:
         fvsolve.build(fvsolve.load(case))
     assert said in str(error.value)
+
+
+# hydrants -----------------------------------------------------------------------------------------------------------
+
+QUASI = {"numerics.pipe_model": "quasi-steady", "numerics.end": 1.0}
+
+
+def street(**keys):
+    """Scene of a hydrant at the end of a quasi-steady pipe from a lake at 50 m, with a demand of 5 l/s there."""
+    nodes = {"lake": lake(50.0, elevation=40.0), "end": junction(5e-3, elevation=10.0)}
+    main = {"type": "pipe", "from": "lake", "to": "end", "length": 800.0, "diameter": 0.15,
+            "friction": {"model": "steady", "factor": 0.02}, "pipe_model": "quasi-steady"}  # fmt: skip
+    fire = {"type": "hydrant", "from": "end", **keys}
+    return scene(nodes, {"main": main, "fire": fire}, 1.0, {"rtol": 1e-9}, ["fire.flow", "fire.gauge_pressure"], 0.5)
+
+
+def gauge_with(flow: float) -> float:
+    """Gauge pressure [Pa] at the end of `street` with a flow of the hydrant [m3/s]."""
+    velocity = (flow + 5e-3) / area(0.15)
+    return RHO * GRAVITY * 40.0 - 0.02 * 800.0 / 0.15 * RHO * velocity**2 / 2.0
+
+
+def test_a_hydrant_draws_its_flow_or_what_leaves_its_residual_pressure():
+    run = fvsolve.run(street(flow=0.02, residual_pressure=AMBIENT + 1.4e5))
+    assert run["fire.flow"] == pytest.approx(0.02, rel=1e-12)
+    assert run["fire.gauge_pressure"] == pytest.approx(gauge_with(0.02), rel=1e-9)
+    for least in (1.4e5, 0.0):
+        run = fvsolve.run(street(flow=0.5, residual_pressure=AMBIENT + least))
+        q = brentq(lambda q, least=least: gauge_with(q) - least - 100.0 * (q / 0.5) ** 2, 0.0, 0.1, xtol=1e-15)
+        assert run["fire.flow"] == pytest.approx(q, rel=1e-4)  # a cubic below 10 Pa
+        assert least < run["fire.gauge_pressure"][-1] < least + 100.0
+    run = fvsolve.run(street(flow=0.02, residual_pressure=AMBIENT + 5e5))  # above that without the hydrant
+    assert run["fire.flow"] == pytest.approx(0.0, abs=1e-12)
+    assert run["fire.gauge_pressure"] == pytest.approx(gauge_with(0.0), rel=1e-9)
+
+
+def test_a_residual_pressure_below_ambient_is_a_fault():
+    text = refused(street(flow=0.02, residual_pressure=0.9 * AMBIENT))
+    assert "links.fire.residual_pressure: 91192.5 Pa is below ambient pressure, at which nothing can flow out" in str(
+        text
+    )
+
+
+def test_a_name_of_digits_is_a_name_where_it_replaces_a_name():
+    case = street(flow=0.02)
+    case["nodes"] = {name.replace("end", "22"): node for name, node in case["nodes"].items()} | {"31": junction(
+        elevation=20.0)}  # fmt: skip
+    case["links"]["main"]["to"] = case["links"]["fire"]["from"] = "22"
+    case["links"]["rest"] = {**case["links"]["main"], "from": "22", "to": "31", "length": 31.0}
+    rows = sweep(case, {"links.fire.from": [22, "31"]}, {"links.rest.length": 22}).rows
+    assert [row["ok"] for row in rows] == [True, True]
+    assert fvsolve.load(case, {"links.fire.from": "31"}).links["fire"].from_ == "31"
+    assert fvsolve.load(case, {"links.rest.length": "22"}).links["rest"].length == 22.0
+
+
+def epanet_heads(path, folder, node, flow):
+    """Head [m] at a node of an EPANET network at hour 0 with a flow [m3/s] drawn there in addition."""
+    toolkit = pytest.importorskip("wntr.epanet.toolkit")
+    gallons, foot = flow / 6.30901964e-5, 0.3048
+    epanet = toolkit.ENepanet()
+    epanet.ENopen(str(path), str(folder / "net.rpt"), str(folder / "net.bin"))
+    index = epanet.ENgetnodeindex(node)
+    epanet.ENsetnodevalue(index, 1, epanet.ENgetnodevalue(index, 1) + gallons)
+    epanet.ENopenH()
+    epanet.ENinitH(0)
+    epanet.ENrunH()
+    head = epanet.ENgetnodevalue(index, 10) * foot
+    epanet.ENcloseH()
+    epanet.ENclose()
+    return head
+
+
+def test_fire_flows_of_net1_are_those_of_epanet(tmp_path):
+    """Residual heads with 50 l/s within 1 mm, and flows that leave 14 m within 0.01 %, for five nodes."""
+    wntr = pytest.importorskip("wntr", reason="WNTR, the extra `epanet`, is not installed")
+    from fvsolve.epanet import import_network
+
+    source = Path(wntr.__file__).parent / "library" / "networks" / "Net1.inp"
+    text = source.read_text().replace("[OPTIONS]", "[OPTIONS]\n Demand Multiplier 1.0").replace("0.001", "1e-6")
+    (tmp_path / "net.inp").write_text(text)
+    (tmp_path / "net.toml").write_text(
+        import_network(tmp_path / "net.inp").text
+        + """
+[links.fire]
+type = "hydrant"
+from = "22"
+flow = "50 l/s"
+"""
+    )
+    nodes, case = ["22", "23", "31", "32", "13"], fvsolve.load(tmp_path / "net.toml", {"output.units": {}})
+    elevations = {name: case.nodes[name].elevation for name in nodes}
+    weight = case.properties.density * case.gravity
+    keys = QUASI | {"output.probes": ["fire.gauge_pressure", "fire.flow"], "output.units": {}}
+    rows = sweep(case, {"links.fire.from": nodes}, keys).rows
+    for row in rows:
+        node = row["links.fire.from"]
+        head = row["min(fire.gauge_pressure) [Pa]"] / weight + elevations[node]
+        assert head == pytest.approx(epanet_heads(tmp_path / "net.inp", tmp_path, node, 0.05), abs=1e-3), node
+    least = AMBIENT + 14.0 * weight
+    rows = sweep(case, {"links.fire.from": nodes}, keys | {
+        "links.fire.flow": 1.0, "links.fire.residual_pressure": least}).rows  # fmt: skip
+    for row in rows:
+        node, q = row["links.fire.from"], row["min(fire.flow) [m3/s]"]
+        gauge = row["min(fire.gauge_pressure) [Pa]"]
+        assert 0.0 < gauge - 14.0 * weight < 100.0
+
+        def excess(q, node=node):
+            return epanet_heads(tmp_path / "net.inp", tmp_path, node, q) - elevations[node] - 14.0
+
+        assert q == pytest.approx(brentq(excess, 1e-3, 0.8, xtol=1e-9), rel=2e-4), node

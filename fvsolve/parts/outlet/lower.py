@@ -49,10 +49,18 @@ class OutletRows(Restriction, kind="outlet"):
 
     def span(self, draft, link) -> float:
         """Drop at the nominal flow of an outlet minus the drop at which its flow begins [Pa]."""
-        return SPAN if link.upper is None else link.upper - draft.case.ambient_pressure - self.least(draft, link)
+        if link.upper is None:
+            return link.span or SPAN
+        return link.upper - draft.case.ambient_pressure - self.least(draft, link)
 
     def inputs(self, model, name, part):
         return opening_input(model, name)
+
+    def probe(self, draft, name, probe, row) -> None:
+        """Fill the PROBE row of its flow, or of a pressure at the place from which it flows."""
+        super().probe(draft, name, probe, row)
+        if probe.quantity != "flow":
+            row["kind"], row["index"] = rec.PRESSURE, draft.node_index[draft.inside(draft.case.conduits[name].from_)]
 
 
 class RelievingRows(Device, kind=""):

@@ -29,7 +29,8 @@ class Outlet(TwoPort):
     q is the volume flow, p the pressure at the place; there is no backflow.
     flow : flow at p = upper and opening = full [m3/s]; opening : schedule
     least : pressure from which flow begins [Pa], ambient pressure if None
-    upper : pressure of the nominal flow [Pa], 1 bar above least if None; most : greatest value of the power [-]
+    upper : pressure of the nominal flow [Pa], `span` above least if None, by default 1 bar; most : greatest value of
+    the power [-]
     """
 
     kind: ClassVar[str] = "outlet"
@@ -38,6 +39,7 @@ class Outlet(TwoPort):
     exponent: float
     least: float | None = None
     upper: float | None = None
+    span: float | None = None
     most: float = float("inf")
     opening: Any = None
     full: float = 1.0
@@ -84,24 +86,14 @@ class Relieving(Sized, Link):
             yield ("from",), f"{self.from_} {text}"
 
 
-class Leak(Link, kind="leak"):
-    """A leak or emitter, q = opening coefficient (p - ambient)^exponent; no flow where the pressure p is below ambient.
-
-    Port: from; the outflow is at the elevation of its node. Below 10 Pa, a millimetre of head, a cubic joins the power
-    law to zero flow. Stored energy: none. Dissipated power: (p - ambient) q [W].
-    """
+class FromPlace(Link):
+    """Link from a place to ambient, at the elevation of the place."""
 
     joins: ClassVar[dict[str, str]] = {"from": "hydraulic"}
 
-    from_: Annotated[str, Text("place of the leak"), Field(alias="from")]
-    coefficient: Annotated[float, Number(
-        positive, "flow in m3/s at a pressure drop of 1 Pa", UsualRange(1e-15, 0.1, "seeping to a main torn off"),
-    )]  # fmt: skip
-    exponent: Annotated[
-        float, Number(between(0, 3, open=True), "exponent of the pressure drop, 0.5 for a hole of fixed size")
-    ] = 0.5
-    opening: Annotated[Schedule, Scheduled("number", between(0, 1), "relative opening, a factor of `coefficient`")] = (
-        Field(default_factory=lambda: constant(1.0))
+    from_: Annotated[str, Text("place from which it flows"), Field(alias="from")]
+    opening: Annotated[Schedule, Scheduled("number", between(0, 1), "relative opening, a factor of the flow")] = Field(
+        default_factory=lambda: constant(1.0)
     )
 
     @property
@@ -109,14 +101,58 @@ class Leak(Link, kind="leak"):
         """Places that the ports join: port name -> place."""
         return {"from": self.from_}
 
+    def faults(self, name: str, around: CaseContext) -> Faults:
+        if getattr(around.nodes.get(self.from_), "kind", "") == "reservoir":
+            text = f"is a reservoir, whose pressure a {self.kind} cannot change; expected a junction, a tank or"
+            yield ("from",), f"{self.from_} {text} another place"
+
+
+class Leak(FromPlace, kind="leak"):
+    """A leak or emitter, q = opening coefficient (p - ambient)^exponent; no flow where the pressure p is below ambient.
+
+    Port: from; the outflow is at the elevation of its node. Below 10 Pa, a millimetre of head, a cubic joins the power
+    law to zero flow. Stored energy: none. Dissipated power: (p - ambient) q [W].
+    """
+
+    coefficient: Annotated[float, Number(
+        positive, "flow in m3/s at a pressure drop of 1 Pa", UsualRange(1e-15, 0.1, "seeping to a main torn off"),
+    )]  # fmt: skip
+    exponent: Annotated[
+        float, Number(between(0, 3, open=True), "exponent of the pressure drop, 0.5 for a hole of fixed size")
+    ] = 0.5
+
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
         law = {"flow": self.coefficient * 1e5**self.exponent, "exponent": self.exponent, "opening": self.opening}
         return outlet_to_ambient(name, self.from_, **law)
 
+
+HYDRANT_SPAN = 100.0  # pressure above its residual pressure at which a hydrant has its flow, 1 cm of head [Pa]
+
+
+class Hydrant(FromPlace, kind="hydrant"):
+    """A hydrant that draws opening times `flow`, or less, so that its place keeps at least `residual_pressure`.
+
+    Where the network cannot supply `flow` at this pressure, the flow is the available fire flow, and the pressure is
+    at most 100 Pa above it. No flow if the pressure is below it. Port: from. Stored energy: none. Dissipated power:
+    (p - ambient) q [W], with pressure p and flow q.
+    """
+
+    quantities: ClassVar[dict[str, str]] = {"flow": "flow", "gauge_pressure": "gauge_pressure"}
+
+    flow: Annotated[float, Quantity("flow", positive, "flow that it draws, or its greatest flow [m3/s]")]
+    residual_pressure: Annotated[
+        float | None, Quantity("pressure", about="least pressure that it leaves at its place [Pa]; ambient if left out")
+    ] = None
+
+    def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
+        law = {"flow": self.flow, "exponent": 0.5, "opening": self.opening, "most": 1.0, "span": HYDRANT_SPAN}
+        return outlet_to_ambient(name, self.from_, **law, least=self.residual_pressure)
+
     def faults(self, name: str, around: CaseContext) -> Faults:
-        if getattr(around.nodes.get(self.from_), "kind", "") == "reservoir":
-            text = "is a reservoir, whose pressure a leak cannot change; expected a junction, a tank or another place"
-            yield ("from",), f"{self.from_} {text}"
+        yield from super().faults(name, around)
+        if self.residual_pressure is not None and self.residual_pressure < around.ambient:
+            text = f"{self.residual_pressure:g} Pa is below ambient pressure, at which nothing can flow out"
+            yield ("residual_pressure",), f"{text}; expected at least {around.ambient:g} Pa"
 
 
 class RuptureDisc(Relieving, kind="rupture-disc"):

@@ -160,10 +160,11 @@ def zero_head_flow(coefficients: tuple[float, ...]) -> float | None:
     return min(real, default=None)
 
 
+@dataclass(frozen=True)
 class Efficiency(Value):
     """Value of a case file for the efficiency of a pump: a number, or points { flow, efficiency }."""
 
-    about = "efficiency, hydraulic power over shaft power: at the rated point, or over flow; 0.75 if left out"
+    about: str = "efficiency, hydraulic power over shaft power: at the rated point, or over flow; 0.75 if left out"
     takes = "-, or `{ flow = [...], efficiency = [...] }`"
     changes = PROFILE
     number = Number(between(0, 1, open=True))

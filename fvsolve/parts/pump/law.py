@@ -25,6 +25,7 @@ from fvsolve.kernels.dtypes import RATE, RATE_UNWANTED
 from fvsolve.kernels.restrictions import LEAST, head_drop
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.self_acting_valves import event_pair
+from fvsolve.parts.pump import law_energy
 from fvsolve.parts.self_acting.law_check_valve import PRESSURE_MARGIN
 
 CHORD_CHANGE = 1e-9  # relative change of flow below which the tangent replaces the chord
@@ -185,12 +186,13 @@ def curve_step(floats, at, speed, rho, weight, g, m, drop):
 # Numbers of a pump: mode of its speed; 1 with a check valve; schedule of the trip; relative speed at which the shaft
 # begins to run free; J times rated speed [N m s]; unbalanced torque and torque of the fluid at the start [N m]; rated
 # speed [rad/s]; number of points of P, or rated torque of a Suter table; number of given torques; 1 if the shaft power
-# is known. Then pairs (schedule, value at the start) of given torques, then the points of P (flows, then powers) or WB.
-# With a joined table, these follow P: rated torque, correction of WB at the last flow, and WB.
+# is known; offset of the numbers of `law_energy`, which are last. Then pairs (schedule, value at the start) of given
+# torques, then the points of P (flows, then powers) or WB. With a joined table, these follow P: rated torque,
+# correction of WB at the last flow, and WB.
 (
     MODE, CHECK, TRIP, START_SPEED, INERTIA, OFFSET, TORQUE, RATED, COUNT_OR_TORQUE, TORQUE_COUNT, HAS_SHAFT_POWER,
-    OWN_NUMBERS,
-) = range(12)  # fmt: skip
+    ENERGY, OWN_NUMBERS,
+) = range(13)  # fmt: skip
 HELD_SPEED, TRIPPING, TORQUE_DRIVEN = 0, 1, 2  # modes
 MAX_TORQUE_SLOPE = 8.0  # bound of d(torque) / d(speed) of a Suter table, over the rated torque and n + v
 BAR, FLOW_ROUNDING = 1e5, 1e-9  # flow regarded as zero, over the flow at 1 bar
@@ -261,9 +263,14 @@ def fluid_torque(floats, at, curve, n, q, dense):
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Write the rate of the relative speed of a free shaft to `dydt`, and raise out[RATE] to its rate limit."""
+    """Write the rates of a free shaft and of the electric energy to `dydt`; raise out[RATE] to that of the shaft."""
     floats, at = tables.floats, device["data"]
     mode = floats[at + MODE]
+    first = 0 if mode == HELD_SPEED else 1
+    if dydt.size > 0 and device["states"] > first:
+        per, e, q = electric_energy(out, tables, device)
+        price = schedule_value(tables, int(floats[at + int(floats[at + ENERGY]) + law_energy.PRICE]), t)
+        law_energy.rates(per, e, q, price, dydt, device["y"] + first)
     if mode == HELD_SPEED:
         return
     if mode == TRIPPING and not tripped(t, tables, device):
@@ -363,15 +370,43 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Head [m] (quantity 0), relative speed (1), torque of the fluid [N m] (2), or power at the shaft [W] (3)."""
+    """Head [m] (quantity 0), relative speed (1), torque of the fluid [N m] (2), power at the shaft [W] (3).
+
+    Quantity 4 is the electric power [W], and 5 that of this pump and all next ones.
+    """
     floats = tables.floats
     n, q, _ = pump_point(out, tables, device)
+    if quantity >= 4:
+        per, _, flow = electric_energy(out, tables, device)
+        total, k = per * flow, next_pump(tables, device) if quantity == 5 else -1
+        while k >= 0:
+            per, _, flow = electric_energy(out, tables, tables.devices[k])
+            total += per * flow
+            k = next_pump(tables, tables.devices[k])
+        return total
     if quantity == 0:
         return curve_head(floats, tables.valves[device["valve"]]["data"], n, q)[0]
     if quantity == 1:
         return n
     torque = pump_torque(out, tables, device)
     return torque if quantity == 2 else torque * n * floats[device["data"] + RATED]
+
+
+@njit
+def next_pump(tables, device):
+    """Index of the device of the next pump, -1 after the last."""
+    at = device["data"] + int(tables.floats[device["data"] + ENERGY])
+    return int(tables.floats[at + law_energy.NEXT])
+
+
+@njit
+def electric_energy(out, tables, device):
+    """(electric energy per volume [J/m3], overall efficiency, size of the flow [m3/s]) of a pump, see `law_energy`."""
+    floats, at = tables.floats, device["data"] + int(tables.floats[device["data"] + ENERGY])
+    n, q, rho = pump_point(out, tables, device)
+    head = curve_head(floats, tables.valves[device["valve"]]["data"], n, q)[0]
+    per, e = law_energy.energy_per_volume(floats, at, n, q, head, rho * tables.settings[0]["gravity"])
+    return per, e, abs(q)
 
 
 @njit

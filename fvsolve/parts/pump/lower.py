@@ -8,7 +8,8 @@ from fvsolve import units
 from fvsolve.assembly.lowering import SPEED, Device
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
-from fvsolve.parts.pump import law
+from fvsolve.parts.pump import law, law_energy
+from fvsolve.parts.pump.energy_use import STATES, energy_numbers, energy_scales
 from fvsolve.parts.pump.lower_shaft import (
     ShaftLowering,
     curve_numbers,
@@ -132,6 +133,7 @@ def unusual_flow(draft, name: str, part) -> list[Notice]:
     return [Notice("range", f"links.{name}", text, key, speed, limit)]
 
 
+SMALL_SHARE = 1e-6  # flow at which a pump counts as not running, over its rated flow
 SMALL_FLOW = 1e-9  # reverse flow regarded as rounding, over the flow scale of the model
 SMALL_SPECIFIC_SPEED, LARGE_SPECIFIC_SPEED = 20.0, 320.0  # range of specific speeds that the published tables cover
 
@@ -143,7 +145,7 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
     """
 
     law = law
-    quantities = ("head", "speed", "torque", "power")
+    quantities = ("head", "speed", "torque", "power", "electric_power", "total_electric_power")
     events = ("check valve shuts", "check valve opens")
     small = 0.01  # relative speed
     remedy = "replace the check_valve of the pump by a check-valve link with a time_constant"
@@ -165,19 +167,42 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
             law.CHECK: part.check_valve, law.INERTIA: (inertia(part, weight) or np.inf) * rated, law.RATED: rated,
             law.COUNT_OR_TORQUE: own[0], law.HAS_SHAFT_POWER: self.dissipates(part),
         }  # fmt: skip
-        return numbers_of(numbers, self.torque_schedules(draft, name), own[1:])
+        given = self.torque_schedules(draft, name)
+        numbers[law.ENERGY] = law.OWN_NUMBERS + len(given) + len(own) - 1
+        rest = SMALL_SHARE * rated_point(part, weight)[0]
+        return numbers_of(numbers, given, [*own[1:], *energy_numbers(draft, name, part, rest)])
+
+    def states_of(self, draft, name, part):
+        return super().states_of(draft, name, part) + (STATES if draft.case.energy is not None else ())
+
+    def scales(self, draft, name, part):
+        shaft = [self.small for _ in super().states_of(draft, name, part)]
+        if draft.case.energy is None:
+            return shaft
+        weight = draft.fluid.density * draft.case.gravity
+        flow, head = rated_point(part, weight)
+        return shaft + energy_scales(draft, weight * flow * head, flow)
+
+    def schedules_of_rates(self, row, valves, floats):
+        return [int(floats[row["data"] + int(floats[row["data"] + law.ENERGY]) + law_energy.PRICE])]
 
     def dissipates(self, part) -> bool:
         return not part.inertia is part.trip is part.efficiency is part.shaft_power is part.suter is None
 
     def energy_rows(self, model, part, row, y, out) -> list[dict[int, float]]:
-        if row["y"] < 0:
+        if not self.has_free_shaft(model, row):
             return []
         return [{int(row["y"]): part.rated_speed * math.sqrt(0.5 * inertia(part, weight_of(model)))}]
 
     def above(self, model, part, row) -> float:
         speed = float(model.tables.valves[row["valve"]]["drive"])
-        return 0.5 * inertia(part, weight_of(model)) * (part.rated_speed * speed) ** 2 if row["y"] >= 0 else 0.0
+        if not self.has_free_shaft(model, row):
+            return 0.0
+        return 0.5 * inertia(part, weight_of(model)) * (part.rated_speed * speed) ** 2
+
+    def has_free_shaft(self, model, row) -> bool:
+        """True if the speed of the shaft is a state; row : of the device"""
+        return bool(model.tables.floats[int(row["data"]) + law.MODE] != law.HELD_SPEED)
 
     def passing_notice(self, model, name, part, time) -> Notice:
         """Notice that a pump was outside its head curve in a way that its law allows, first at `time` [s]."""

@@ -29,7 +29,8 @@ class Pump(TwoPort, kind="pump"):
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("curve", "power", "suter"),)
     owns: ClassVar[dict[str, str]] = {"shaft": "rotational"}
     quantities: ClassVar[dict[str, str]] = {
-        "flow": "flow", "head": "head", "speed": "number", "torque": "torque", "power": "power"
+        "flow": "flow", "head": "head", "speed": "number", "torque": "torque", "power": "power",
+        "electric_power": "power",
     }  # fmt: skip
 
     curve: Annotated[CurvePoints | None, HeadCurve()] = None
@@ -59,6 +60,13 @@ class Pump(TwoPort, kind="pump"):
     ] = None
     efficiency: Annotated[Any, Efficiency()] = None
     shaft_power: Annotated[CurvePoints | None, ShaftPower()] = None
+    overall_efficiency: Annotated[Any, Efficiency(
+        "hydraulic power over electric power (wire to water), at every flow, or over flow at relative speed 1; that of "
+        "`[energy]` if left out"
+    )] = None  # fmt: skip
+    price: Annotated[Schedule | None, Scheduled(
+        "number", about="price of its electric energy per kWh, with `[energy]`; that of `[energy]` if left out"
+    )] = None  # fmt: skip
     check_valve: Annotated[bool, Flag("ideal check valve: no flow from `to` to `from`, no loss", PROFILE)] = False
 
     @classmethod
