@@ -37,7 +37,7 @@ TINY_FLOW = 1e-5  # a smaller largest flow is no measure: closed links of EPANET
 # Words of notes that explain a difference from EPANET; other notes are about names, time constants and the like.
 CAUSES = (
     "heads differ", "flows differ", "differs", "Darcy factor", "constant loss coefficient", "volume curve",
-    "not imported", "contradicts", "lets it", "all day", "follow it at once",
+    "not imported", "contradicts", "lets it", "all day",
 )  # fmt: skip
 CLOSURE, CLOSURE_END = (1.0, 5.0), "15 s"  # times between which the largest demand stops [s], end of the run
 ROWS, GRACE = 150, 60.0  # interval of rows of a day [s]; time after a limit to end in order [s]
@@ -117,6 +117,25 @@ def reason(row: Row) -> str:
     return "; ".join([*found, *row["causes"]]) or "no note explains it"
 
 
+def day_verdict(day: Row) -> str:
+    """Word for the day of a file: `1 mm`, `1 cm`, `named`, `silent`, `stopped`, or who refused it."""
+    if "level" not in day:
+        return "refused by EPANET" if day.get("error", "").startswith("EPANET") else "refused by us"
+    if not day["ok"]:
+        return "stopped"
+    greatest = max(day["level"]["difference"], day["head"]["difference"])
+    if greatest <= NEAR:
+        return "1 mm" if greatest <= CLOSE else "1 cm"
+    return "named" if day["causes"] or day_unsolved(day) else "silent"
+
+
+def day_unsolved(day: Row) -> list[str]:
+    """Reasons, with times, why EPANET's values of a day are not those that a network could have."""
+    found = day.get("epanet_warnings", {})
+    return [f"EPANET: {text} from {time / 3600.0:.2f} h" for text, time in found.items()
+            if text in epanet_engine.UNSOLVED]  # fmt: skip
+
+
 def counts(rows: list[Row], files: int) -> dict[str, int]:
     """Numbers of files, by verdict; files : number of files before equal ones were left out"""
     words = Counter(verdict(row) for row in rows)
@@ -125,6 +144,7 @@ def counts(rows: list[Row], files: int) -> dict[str, int]:
     found = {
         "files found": files, "distinct files": len(rows), "EPANET runs": len(runs),
         "left out": words["left out"], "imported": sum(row.get("import") == "ok" for row in runs),
+        "imported, its case refused": sum(row.get("import") == "ok" for row in refused),
         "within 1 mm": words["1 mm"],
         "within 1 cm": words["1 mm"] + words["1 cm"], "above, with named cause": words["named"],
         "silent": words["silent"], "refused by us": words["refused by us"],
@@ -134,11 +154,15 @@ def counts(rows: list[Row], files: int) -> dict[str, int]:
     }  # fmt: skip
     days = [row["day"] for row in rows if "day" in row]
     if days:
-        ended = [day for day in days if day.get("ok")]
-        near = [day for day in ended if day["level"]["difference"] <= NEAR and day["head"]["difference"] <= NEAR]
-        fast = sum(day["cpu"] <= 3.0 * day["epanet_cpu"] for day in ended)
-        found |= {"days": len(days), "days to their end": len(ended), "days within 1 cm": len(near),
-                  "days within 3 times EPANET's CPU": fast}  # fmt: skip
+        words = Counter(day_verdict(day) for day in days)
+        ended = [day for day in days if day["ok"]]
+        found |= {
+            "days": len(days), "days to their end": len(ended), "days within 1 mm": words["1 mm"],
+            "days within 1 cm": words["1 mm"] + words["1 cm"], "days above, with named cause": words["named"],
+            "days silent": words["silent"], "days that stop": words["stopped"],
+            "days refused by us": words["refused by us"],
+            "days within 3 times EPANET's CPU": sum(day["cpu"] <= 3.0 * day["epanet_cpu"] for day in ended),
+        }  # fmt: skip
     closures = [row["closure"] for row in rows if "closure" in row]
     if closures:
         found |= {"closures": len(closures), "closures ok": sum(item == "ok" for item in closures)}
@@ -164,6 +188,19 @@ class Record:
         fresh = self.path.with_suffix(".new")
         fresh.write_text(json.dumps(self.row))
         os.replace(fresh, self.path)
+
+
+def set_error(row: Row, stage: str, text: str) -> None:
+    """Write an error to the part of a row that a stage fills."""
+    if stage == "EPANET":
+        row["epanet"] = text
+    elif "day" in stage:
+        row["day"]["error"] = text
+    elif stage == "closure":
+        row["closure"] = text
+    else:
+        row["error"] = text
+        row.setdefault("import", "refused")
 
 
 def examine(path: Path, options: Any, record: Record) -> None:
@@ -195,8 +232,7 @@ def examine(path: Path, options: Any, record: Record) -> None:
             record.stage("closure")
             row["closure"] = closure(case, options.limit)
     except FvsolveError as error:
-        row["error"] = f"{row['stage']}: {error}"
-        row["import"] = row.get("import", "refused")
+        set_error(row, row["stage"], f"{row['stage']}: {error}")
     if options.day and theirs is not None:
         examine_day(path, options, record)
 
@@ -322,8 +358,8 @@ def child(path: Path, options: Any, record: Record) -> None:
     except BaseException as error:  # noqa: BLE001  a fault of the program is a line of the table
         last = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{Path(last.filename).name}:{last.lineno}"
-        record.row["error"] = f"{record.row['stage']}: {type(error).__name__}: {error} ({where})"
-        record.row.setdefault("import", "refused")
+        stage = record.row["stage"]
+        set_error(record.row, stage, f"{stage}: {type(error).__name__}: {error} ({where})")
     record.row["stage"] = "end"
     record.write()
 
@@ -331,32 +367,55 @@ def child(path: Path, options: Any, record: Record) -> None:
 # Table ---------------------------------------------------------------------------------------------------------------
 
 
+class Examination:
+    """Process that examines a file, with the stage that it has reached."""
+
+    def __init__(self, path: Path, options: Any, record: Record) -> None:
+        self.path, self.options, self.record = path, options, record
+        self.stage, self.since, self.late = "EPANET", monotonic(), False
+        record.stage(self.stage)
+        self.process = multiprocessing.get_context("fork").Process(target=child, args=(path, options, record))
+        self.process.start()
+
+    def ended(self) -> bool:
+        """True if the process has ended, or was stopped because a stage exceeded its limit."""
+        stage = json.loads(self.record.path.read_text())["stage"]
+        if stage != self.stage:
+            self.stage, self.since = stage, monotonic()
+        self.late = monotonic() - self.since > limit_of(stage, self.options)
+        if self.late:
+            self.stop()
+        return not self.process.is_alive()
+
+    def stop(self) -> None:
+        """Kill the process and those that it started."""
+        if self.process.is_alive():
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.join()
+
+    def row(self) -> Row:
+        """Row of the file; a process that was killed or crashed has an error with its stage."""
+        row = json.loads(self.record.path.read_text())
+        return with_fate(row, self.late, self.process.exitcode, self.options)
+
+
 def examined(paths: list[Path], options: Any, show: Callable[[Path, Row], None]) -> None:
     """Examine files, `jobs` at a time, and show each row when it is complete."""
-    context, waiting = multiprocessing.get_context("fork"), list(paths)
-    active: dict[Path, tuple[Any, Record, str, float]] = {}
+    waiting, active = list(paths), []
     with tempfile.TemporaryDirectory() as folder:
-        while waiting or active:
-            while waiting and len(active) < options.jobs:
-                path = waiting.pop(0)
-                record = Record(Path(folder) / f"{len(waiting)}.json")
-                record.stage("EPANET")
-                process = context.Process(target=child, args=(path, options, record))
-                process.start()
-                active[path] = process, record, "EPANET", monotonic()
-            sleep(0.02)
-            for path, (process, record, stage, since) in list(active.items()):
-                row = json.loads(record.path.read_text())
-                if row["stage"] != stage:
-                    active[path] = process, record, row["stage"], monotonic()
-                late = monotonic() - since > limit_of(stage, options)
-                if process.is_alive() and not late:
-                    continue
-                if process.is_alive():
-                    os.killpg(process.pid, signal.SIGKILL)
-                process.join()
-                del active[path]
-                show(path, ended(json.loads(record.path.read_text()), late, process.exitcode, options))
+        try:
+            while waiting or active:
+                while waiting and len(active) < options.jobs:
+                    record = Record(Path(folder) / f"{len(waiting)}.json")
+                    active.append(Examination(waiting.pop(0), options, record))
+                sleep(0.02)
+                for item in [item for item in active if item.ended()]:
+                    active.remove(item)
+                    item.process.join()
+                    show(item.path, item.row())
+        finally:
+            for item in active:
+                item.stop()
 
 
 def limit_of(stage: str, options: Any) -> float:
@@ -365,20 +424,12 @@ def limit_of(stage: str, options: Any) -> float:
     return {"day": 2.0 * limit, "closure": limit}.get(stage, limit) + (GRACE if stage in ("day", "closure") else 0.0)
 
 
-def ended(row: Row, late: bool, code: int | None, options: Any) -> Row:
-    """Row of a process that has ended; a killed or crashed one gets its error."""
+def with_fate(row: Row, late: bool, code: int | None, options: Any) -> Row:
+    """Row of a process that has ended; late : True if it was killed, code : its exit status"""
     stage = row.pop("stage")
-    if stage == "end":
-        return row
-    text = f"{stage}: no end within {limit_of(stage, options):g} s" if late else f"{stage}: crash, exit status {code}"
-    if stage == "EPANET":
-        row["epanet"] = text
-    elif "day" in stage:
-        row["day"]["error"] = text
-    elif stage == "closure":
-        row["closure"] = text
-    else:
-        row["error"], row["import"] = text, row.get("import", "refused")
+    if stage != "end":
+        text = f"no end within {limit_of(stage, options):g} s" if late else f"crash, exit status {code}"
+        set_error(row, stage, f"{stage}: {text}")
     return row
 
 
@@ -404,14 +455,15 @@ def line(name: str, row: Row) -> str:
 
 def day_line(day: Row) -> str:
     """Further line of the table: the day of a file."""
-    words = ["    day:"]
+    words = [f"    day: {day_verdict(day):13}"]
     if "level" in day:
         level, head = day["level"], day["head"]
         words.append(f"level {length(level['difference'])} m {level['name']:12.12} at {level['time'] / 3600.0:5.2f} h,")
         words.append(f"head {length(head['difference'])} m {head['name']:12.12} at {head['time'] / 3600.0:5.2f} h,")
         words.append(f"CPU {day['cpu']:.2f} s, {day['steps']} steps; EPANET {day['epanet_cpu']:.2f} s;")
-    told = "" if day.get("ok") else day.get("error") or f"{day['reason']} at {day['end'] / 3600.0:.2f} h"
-    return " ".join([*words, " | ".join(part.replace("\n", " ") for part in [told, *day.get("causes", [])])[:300]])
+    told = "" if day["ok"] else day.get("error") or f"{day.get('reason')} at {day.get('end', 0.0) / 3600.0:.2f} h"
+    parts = [told, *day_unsolved(day), *day.get("causes", [])]
+    return " ".join([*words, " | ".join(part.replace("\n", " ") for part in parts if part)[:300]])
 
 
 HEADER = (
@@ -491,8 +543,6 @@ def small_files(folder: Path) -> None:
 
 def main() -> None:
     """Print the table of the given files."""
-    from fvsolve.errors import FvsolveError
-
     options = parser(__doc__)
     options.add_argument("paths", nargs="*", type=Path, metavar="PATH", help="folders or files (default none)")
     options.add_argument("--day", action="store_true", help="also a day of each network")
@@ -519,10 +569,7 @@ def main() -> None:
             agree("level over the day [m]", good["day"]["level"]["difference"], CLOSE)
             return
         record = Record(Path(folder) / "small.json")  # imports and compiles, before processes are forked
-        try:
-            examine(Path(folder) / "small.inp", options, record)
-        except FvsolveError as error:
-            print(error)
+        examine(Path(folder) / "small.inp", options, record)
         table(options.paths, options)
 
 

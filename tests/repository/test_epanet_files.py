@@ -90,7 +90,8 @@ def test_the_counts_add_up(files):
     rows = [row(files), row(files, {"a": 50.005}), row(files, {"a": 60.0}), row(files, {"a": 60.0}, notes=CAUSE),
             refused, theirs, theirs | {"epanet": "ok", "warnings": [], "left_out": "more than 3 nodes"}]  # fmt: skip
     expected = {
-        "files found": 9, "distinct files": 7, "EPANET runs": 6, "left out": 1, "imported": 4, "within 1 mm": 1,
+        "files found": 9, "distinct files": 7, "EPANET runs": 6, "left out": 1, "imported": 4,
+        "imported, its case refused": 0, "within 1 mm": 1,
         "within 1 cm": 2, "above, with named cause": 1, "silent": 1, "refused by us": 1,
         "of these, without a solution of EPANET": 1, "refused by EPANET": 1, "refused by EPANET, imported": 0,
     }  # fmt: skip
@@ -106,6 +107,24 @@ def test_a_late_switch_is_no_difference_of_heads_but_a_lasting_one_is(files):
     assert files.worst_in_rows(times, files.lasting(apart), names) == {"difference": 2.0, "name": "b", "time": 1050.0}
     apart[0, 1] = np.nan
     assert files.worst_in_rows(times, apart, names)["difference"] == np.inf
+
+
+@pytest.mark.parametrize(
+    "change, word",
+    [
+        ({}, "1 mm"), ({"level": {"difference": 0.02}}, "silent"), ({"head": {"difference": 0.02}}, "silent"),
+        ({"head": {"difference": 0.02}, "causes": ["not imported: rule 1"]}, "named"),
+        ({"head": {"difference": 0.02}, "epanet_warnings": {"unbalanced": 3600.0}}, "named"),
+        ({"ok": False}, "stopped"),
+    ],
+)  # fmt: skip
+def test_a_day_has_a_word_of_its_own(change, word, files):
+    near = {"difference": 0.0, "name": "t", "time": 0.0}
+    day = {"ok": True, "level": near, "head": near, "causes": [], "cpu": 1.0, "epanet_cpu": 0.2, "steps": 3}
+    day |= {key: near | value if isinstance(value, dict) and key in day else value for key, value in change.items()}
+    assert files.day_verdict(day) == word and word in files.day_line(day)
+    found = files.counts([row(files) | {"day": day}, row(files) | {"day": day | {"cpu": 0.1}}], 2)
+    assert found["days"] == 2 and found["days within 3 times EPANET's CPU"] == (word != "stopped")
 
 
 def test_equal_files_are_examined_once_and_equal_names_get_their_folder(files, tmp_path):
