@@ -210,7 +210,12 @@ def start(path: Path, version: str) -> Start:
                 project.option(TRIALS, MOST_TRIALS)
                 project.option(ACCURACY, accuracy)
             project.call("EN_initH", NEW_FLOWS)
-            _, code = project.seconds("EN_runH")
+            try:
+                _, code = project.seconds("EN_runH")
+            except EpanetError:  # EPANET 2.3 may refuse an accuracy that it cannot reach
+                if accuracy is None:
+                    raise
+                continue
             if WARNINGS.get(code) not in UNSOLVED:
                 break
         values, alone = project.heads(), project.dead()
