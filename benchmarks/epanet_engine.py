@@ -67,6 +67,7 @@ class Start:
 class Day:
     """EPANET's heads over a day: times float64[n] [s], heads float64[n, nodes] [m], dead bool[n, nodes], CPU time [s].
 
+    dead : as in `Start`; all nodes where EPANET supplies demands without a source, or has heads beyond 100 km
     end : last time that EPANET reached [s]; steps : number of its solutions; warnings : EPANET's, with their first time
     """
 
@@ -170,6 +171,11 @@ class Project:
         _, group = connected_components(graph, directed=False)
         return ~np.isin(group, group[self.kinds != JUNCTION])
 
+    def absurdities(self, heads: np.ndarray, dead: np.ndarray) -> list[str]:
+        """Reasons why heads [m] are not those of a network, from `UNSOLVED`; dead : as from `dead`"""
+        cut_off = (np.abs(self.demands()[dead]) > NO_DEMAND).any()
+        return [CUT_OFF] * bool(cut_off) + [FAR] * bool(not (np.abs(heads) < FARTHEST).all())
+
     def option(self, code: int, value: float) -> None:
         """Set an option of the analysis."""
         self.call("EN_setoption", code, ctypes.c_double(value))
@@ -220,8 +226,7 @@ def start(path: Path, version: str) -> Start:
                 break
         values, alone = project.heads(), project.dead()
         warnings = [WARNINGS.get(code, f"warning {code}")] if code else []
-        warnings += [CUT_OFF] if (np.abs(project.demands()[alone]) > NO_DEMAND).any() else []
-        warnings += [FAR] if not (np.abs(values) < FARTHEST).all() else []
+        warnings += project.absurdities(values, alone)
         heads = dict(zip(project.nodes, values.tolist(), strict=True))
         flows = dict(zip(project.links, project.flows().tolist(), strict=True))
         dead = [name for name, here in zip(project.nodes, alone, strict=True) if here]
@@ -252,7 +257,11 @@ def day(path: Path, version: str, step: int = 10, rows: int = 150, end: int = 86
             if code:
                 warnings.setdefault(WARNINGS.get(code, f"warning {code}"), float(now))
             if now % (2 * rows) == rows:
-                kept.append((now, project.heads(), project.dead()))
+                values, alone = project.heads(), project.dead()
+                absurd = project.absurdities(values, alone)
+                for text in absurd:
+                    warnings.setdefault(text, float(now))
+                kept.append((now, values, alone | bool(absurd)))
             began = process_time()
             left, _ = project.seconds("EN_nextH")
             cpu += process_time() - began

@@ -177,3 +177,22 @@ def test_epanets_own_values_come_from_the_original_file_in_si(files, tmp_path):
     path.write_text(text.replace("q a b", "").replace("lake a", "lake nowhere"))
     with pytest.raises(engine.EpanetError, match="undefined node nowhere"):
         engine.start(path, version)
+
+
+def test_epanets_day_follows_a_tank_to_its_end_and_says_from_when_a_demand_is_cut_off(files, tmp_path):
+    """A tank of 4 m with 100 m2 loses 10 l/s, so it is empty at 40 000 s; the demand behind it then has no source."""
+    engine = files.epanet_engine
+    version = next((version for version in engine.LIBRARIES if engine.library(version)), None)
+    if version is None:
+        pytest.skip("EPANET is not installed")
+    path, width = tmp_path / "tank.inp", (400.0 / np.pi) ** 0.5
+    text = f"[JUNCTIONS]\na 0 10\n[RESERVOIRS]\nfar 60\n[TANKS]\ntower 50 4 0 9 {width} 0\n[PIPES]\n"
+    path.write_text(
+        text + "p tower a 100 300 120\nq far a 100 300 120 0 Closed\n[OPTIONS]\nUNITS LPS\nHEADLOSS H-W\n[END]\n"
+    )
+    day = engine.day(path, version)
+    level, full = day.heads[:, day.names.index("tower")] - 50.0, day.times < 39900.0
+    assert day.tanks == ["tower"] and day.end == 86400.0 and day.steps > 8640
+    assert level[full] == pytest.approx(4.0 - 0.01 * day.times[full] / 100.0, abs=5e-5)  # 28.317 l in a ft3
+    assert day.warnings[engine.CUT_OFF] == day.times[day.dead.all(axis=1)][0]
+    assert 40000.0 <= day.warnings[engine.CUT_OFF] <= 40350.0 and not day.dead[full].any()
