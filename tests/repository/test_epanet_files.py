@@ -120,7 +120,7 @@ def test_a_late_switch_is_no_difference_of_heads_but_a_lasting_one_is(files):
 )  # fmt: skip
 def test_a_day_has_a_word_of_its_own(change, word, files):
     near = {"difference": 0.0, "name": "t", "time": 0.0}
-    day = {"ok": True, "level": near, "head": near, "causes": [], "cpu": 1.0, "epanet_cpu": 0.2, "steps": 3}
+    day = {"ok": True, "level": near, "head": near, "causes": [], "cpu": 1.0, "epanet_cpu": 0.2, "steps": 3, "step": 10}
     day |= {key: near | value if isinstance(value, dict) and key in day else value for key, value in change.items()}
     assert files.day_verdict(day) == word and word in files.day_line(day)
     found = files.counts([row(files) | {"day": day}, row(files) | {"day": day | {"cpu": 0.1}}], 2)
