@@ -40,6 +40,7 @@ CAUSES = (
     "heads differ", "flows differ", "differs", "Darcy factor", "constant loss coefficient", "volume curve",
     "not imported", "contradicts", "lets it", "all day",
 )  # fmt: skip
+DRY = ("dry",)  # marks of a run that explain a difference: EPANET shuts the links of an empty tank
 CLOSURE, CLOSURE_END = (1.0, 5.0), "15 s"  # times between which the largest demand stops [s], end of the run
 ROWS, GRACE = 150, 60.0  # interval of rows of a day [s]; time after a limit to end in order [s]
 STEPS = (
@@ -339,7 +340,8 @@ def examine_day(path: Path, options: Any, record: Record) -> None:
     summary = run.summary
     steps = {key: summary[key] for key in ("steps", "seconds", "seconds_setup") if key in summary}
     day |= {"ok": run.ok, "reason": run.reason, "end": float(run.seconds[-1]), **steps}
-    day["marks"] = [str(mark) for mark in summary["marks"][:5]]
+    day["marks"] = [f"{mark['text']} at {mark['time'] / 3600.0:.2f} h" for mark in summary["marks"]]
+    day["causes"] += [text for mark, text in zip(summary["marks"], day["marks"], strict=True) if mark["what"] in DRY]
     day |= {"step": STEPS[0], **compare_day(run, imported.nodes, theirs)}
     if run.ok and not is_near(day) and not day_unsolved(day):
         record.stage("EPANET day")
