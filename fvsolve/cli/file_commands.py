@@ -5,9 +5,9 @@ import sys
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-from typer import Argument, Option
+from typer import Argument, Exit, Option
 
 from fvsolve.case import shipped
 from fvsolve.cli.app import Json, RunDirectory, app, quantity_of
@@ -15,6 +15,11 @@ from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.file_replacement import replacing, write_file
 
+if TYPE_CHECKING:
+    from fvsolve.epanet import Imported
+
+DAY = 86400.0  # [s]
+WEIGHT = 999.563 * 9.80665  # weight of EPANET's water [N/m3]
 SHORT = (
     'pipes shorter than a cell, which make steps small with pipe_model = "finite-volume" '
     "(--min-pipe-length lengthens them)"
@@ -112,8 +117,15 @@ def import_(
         'for example "10 m" (default none: pipes keep their lengths)')] = None,
     day: Annotated[bool, Option("--day", help="a run of 24 h from hour 0, with patterns, controls and rules, and with "
         "pipes whose flow follows their losses at once (default a run of seconds, with waves)")] = False,
+    duration: Annotated[str | None, Option(metavar="T", help="duration of the run of --day, in s or with a unit, for "
+        'example "7 d" (default 24 h)')] = None,
+    pressure_dependent: Annotated[str | None, Option(metavar="P", help="pressure from which demands are full, in Pa "
+        'or with a unit, for example "2 bar"; below it they depend on pressure, as with PDA in EPANET (default '
+        "demands as in FILE)")] = None,
+    check: Annotated[bool, Option("--check/--no-check", help="comparison of heads and flows, with --day also of levels "
+        "over a day, with EPANET on FILE")] = True,
 ) -> None:  # fmt: skip
-    """Import an EPANET network: write its case file and print all differences from EPANET."""
+    """Import an EPANET network: write its case file, print all differences from EPANET and compare both."""
     from fvsolve.epanet import import_network
 
     to = case or Path(f"{source.stem}.toml")
@@ -125,7 +137,11 @@ def import_(
         raise FvsolveError(f"{to} exists. Give another file: fvsolve import {source} CASE")
     speed = _positive("--wave-speed", wave_speed, "velocity")
     shortest = _positive("--min-pipe-length", min_pipe_length, "length") if min_pipe_length else 0.0
-    network = import_network(source, hour, speed, shortest, day)
+    if duration and not day:
+        raise FvsolveError(f"--duration {duration} has no effect without --day; add --day, or set numerics.end")
+    end = _positive("--duration", duration, "time") if duration else DAY
+    required = _positive("--pressure-dependent", pressure_dependent, "pressure_drop") if pressure_dependent else 0.0
+    network = import_network(source, hour, speed, shortest, day, end, required / WEIGHT)
     to.parent.mkdir(parents=True, exist_ok=True)
     write_file(to, network.text)
     written = [to]
@@ -138,6 +154,23 @@ def import_(
         print(path)
     for text, names in [*network.notes, *([(SHORT, network.short_pipes)] if network.short_pipes else [])]:
         print(f"{text}: {listing(names)}", file=sys.stderr)
+    if check:
+        _compare(network, to, day)
+
+
+def _compare(network: "Imported", case: Path, day: bool) -> None:
+    """Print the comparison of a case with EPANET on the original file; exit with 1 for a difference without cause."""
+    from fvsolve.case import load
+    from fvsolve.epanet.self_check import check_day, check_start
+
+    found = [check_start(network, load(case))]
+    if day and not found[0].fault:
+        found.append(check_day(network, case))
+    for result in found:
+        for line in result.lines():
+            print(line, file=sys.stderr)
+    if not all(result.agrees for result in found):
+        raise Exit(1)
 
 
 def _positive(option: str, text: str, dimension: str) -> float:

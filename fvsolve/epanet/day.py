@@ -23,12 +23,13 @@ class DayTranslation(Translation):
     """Nodes, links, signals and controls of a case over a day, and notes on differences from EPANET.
 
     solution : EPANET's solution at hour 0; end : of the run [s]
-    signals, controls : name -> table of the case file
+    signals, controls : name -> table of the case file; energy : table with prices and efficiencies of pumps
     """
 
     def __init__(self, network: Network, solution: Solution, end: float = DAY) -> None:
         self.signals: dict[str, part_tables.Part] = {}
         self.controls: dict[str, part_tables.Part] = {}
+        self.energy: part_tables.Part = {}
         self.end = end
         # relays with outputs 0 and 1: (tank, level at which it turns on, and off, state at the start) -> name
         self.relays: dict[tuple[str, float, float, bool], str] = {}
@@ -43,6 +44,7 @@ class DayTranslation(Translation):
         for name, link in network.links.items():
             self.start_values["open", name] = float(initial_action(link)[0] != "closed")
         super().__init__(network, solution, 0.0, 0.0)
+        self.energy = self.energy_table()
 
     # patterns -----------------------------------------------------------------------------------------------
 
@@ -146,11 +148,39 @@ class DayTranslation(Translation):
             return self.stalled(link, ends)
         if opening != OPEN:
             ends = (ends[0], self.shut_off(link, self.bore(link), opening))
-        part = part_tables.pump(ends, self.head_law(link), 1.0)
+        part = part_tables.pump(ends, self.head_law(link), 1.0) | self.energy_keys(link)
         if link.pattern > 0:
             return part | {"speed": self.scheduled(1.0, link.pattern, "")}
         begins = initial_action(link)
         return part | {"speed": self.switched(link.name, "speed", "", speed_of, speed_of(begins) or 1.0)}
+
+    def energy_table(self) -> part_tables.Part:
+        """Table `[energy]` with EPANET's global values; empty if the file states no price and no efficiency curve."""
+        pumps = [link for link in self.network.links.values() if link.kind == "pump"]
+        option = self.option
+        stated = (
+            option["price"] or option["demand_charge"] or any(pump.price or pump.efficiency_curve for pump in pumps)
+        )
+        if not pumps or not stated:
+            return {}
+        table: part_tables.Part = {"overall_efficiency": part_tables.rounded_number(0.01 * option["efficiency"])}
+        if option["price"]:
+            table["price"] = self.scheduled(option["price"], option["price_pattern"], "")
+        if option["demand_charge"]:
+            table["demand_charge"] = part_tables.rounded_number(option["demand_charge"])
+        return table
+
+    def energy_keys(self, link: Link) -> part_tables.Part:
+        """Keys of a pump with its own efficiency curve and price; the global values replace what is missing."""
+        keys: part_tables.Part = {}
+        if link.efficiency_curve:
+            flow, share = zip(*link.efficiency_curve, strict=True)
+            keys["overall_efficiency"] = {"flow": [part_tables.quantity_text(q, "l/s") for q in flow],
+                                          "efficiency": [part_tables.rounded_number(e) for e in share]}  # fmt: skip
+        price = link.price or self.option["price"]
+        pattern = link.price_pattern or self.option["price_pattern"]
+        own = link.price or (link.price_pattern and price)
+        return keys | {"price": self.scheduled(price, pattern, "")} if own else keys
 
     def valve(self, link: Link) -> part_tables.Part:
         kind, begins, own = link.kind, initial_action(link), self.statements.get(link.name, [])

@@ -48,6 +48,7 @@ def import_network(
     shortest: float = 0.0,
     day: bool = False,
     duration: float = DAY,
+    required_pressure: float = 0.0,
 ) -> Imported:
     """Import an EPANET file with the state at an hour of EPANET's run, or for a day.
 
@@ -56,11 +57,13 @@ def import_network(
     hour : time from the start of EPANET's run [h]; wave_speed : wave speed of every pipe [m/s]
     shortest : least length of a pipe in the case [m]; a shorter pipe is lengthened, and keeps the friction loss of its
     original length
-    Raises FvsolveError for an invalid hour, if file or WNTR are missing, or if EPANET finds faults in the file.
+    required_pressure : head of water [m] from which demands are full, as those of EPANET's PDA; 0 for demands as in the
+    file
+    Raises FvsolveError for an invalid hour, if file or toolkit are missing, or if EPANET finds faults in the file.
     """
     if not (math.isfinite(hour) and hour >= 0.0):
         raise FvsolveError(f"hour {hour:g} is not valid; expected hours from the start of EPANET's run, 0 or more")
-    network = read_network(Path(path))
+    network = read_network(Path(path), required_pressure)
     solution = solution_at(network, 0.0 if day else hour).solutions[0]
     if day:
         translation: Translation = DayTranslation(network, solution, duration)
@@ -121,6 +124,8 @@ def _hour_lines(translation: Translation, time: float, short: list[str]) -> list
 def _day_lines(translation: DayTranslation) -> list[str]:
     """Lines of signals, controls, numerics and output for a run over a day."""
     lines = []
+    if translation.energy:
+        lines += ["", "[energy]", *(f"{key} = {text.inline(value)}" for key, value in translation.energy.items())]
     for group in ("signals", "controls"):
         if table := getattr(translation, group):
             lines += ["", f"[{group}]", *(f"{name} = {text.inline(part)}" for name, part in table.items())]

@@ -9,6 +9,7 @@ import numpy as np
 from fvsolve.case import Case
 from fvsolve.epanet.importing import Imported
 from fvsolve.epanet.network_file import Network, Solution, run_epanet
+from fvsolve.epanet.switching import DAY
 from fvsolve.epanet.toolkit_process import NO_HEAD
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.model.build import build
@@ -149,10 +150,10 @@ def _is_stalled(link: Any, solution: Solution) -> bool:
 STALLED = 1e-7  # [m3/s]
 
 
-def check_day(imported: Imported, case_text: Any, end: float) -> SelfCheck:
+def check_day(imported: Imported, case: Any) -> SelfCheck:
     """Compare levels, heads and flows of a case over a day with EPANET at steps of `STEP` seconds.
 
-    case_text : table of the case; end : of the run [s]
+    case : path or table of the case; of a longer run, its first day is compared
     """
     from fvsolve.case import load
     from fvsolve.run import run
@@ -163,9 +164,10 @@ def check_day(imported: Imported, case_text: Any, end: float) -> SelfCheck:
     probes = {("levels", name): f"nodes.{imported.nodes[name]}.level" for name in tanks}
     probes |= {("heads", name): f"nodes.{imported.nodes[name]}.head" for name in network.nodes}
     probes |= {("flows", name): f"links.{imported.links[name]}.flow" for name in pipes}
-    settings = {"output.probes": list(probes.values()), "output.units": {}, "output.every": ROWS}
+    end = min(DAY, load(case).numerics.end)
+    settings = {"numerics.end": end, "output.probes": list(probes.values()), "output.units": {}, "output.every": ROWS}
     try:
-        result = run(load(case_text, settings), pictures=False)
+        result = run(load(case, settings), pictures=False)
     except FvsolveError as error:
         return SelfCheck([], [], _unsolved(imported, str(error)))
     if not result.ok:

@@ -118,7 +118,7 @@ def premise_clause(network: Network, premise: dict[str, Any], end: float) -> Cla
     variable, relation, value, name = (premise[key] for key in ("variable", "relation", "value", "name"))
     if premise["object"] == "system":
         if variable == "time":
-            return time_clause(relation, [float(value)], (2.0 * end, 2.0 * end), end)
+            return time_clause(relation, [float(value)], (float(value) + PULSE, 2.0 * end + PULSE), end)
         if variable == "clocktime":
             since = float(value) % DAY  # midnight
             return time_clause(relation, daily_moments(network, since, end), (since, DAY - since), end)
@@ -199,9 +199,9 @@ def time_clause(relation: str, moments: list[float], reach: tuple[float, float],
     if relation in ("=", "<>"):
         spans = [(at, at + PULSE) for at in moments]
     elif relation in (">", ">="):
-        spans = [(at, at + reach[1]) for at in moments]
+        spans = [(at, at + reach[1]) for at in moments if at <= end]
     else:
-        spans = [(at - reach[0], at) for at in moments]
+        spans = [(at - reach[0], min(at, 2.0 * end + PULSE)) for at in moments]
     clause = interval_clause([(begin, stop) for begin, stop in spans if stop > 0.0 and begin <= end])
     return opposite(clause) if relation == "<>" else clause
 

@@ -176,10 +176,11 @@ class SteadyStart:
         self.pipe_flow, self.column_flow, self.valve_flow = flow[:n], flow[n:m], flow[m : m + len(valves)]
 
     def release_regulators(self, first: int) -> None:
-        """Open each valve that would sustain a pressure although the demands behind it determine its flow.
+        """Open or shut each valve that would hold a pressure although demands alone determine its flow.
 
-        Such a valve is the only way to a group of nodes in which nothing else determines a potential. It is open, or
-        shut if its pressure is too low.
+        Such a valve is the only way to a group of nodes in which nothing else determines a potential. A valve that
+        sustains the pressure before it is open, or shut if this pressure is too low; one that reduces the pressure
+        behind it is shut.
         first : index of the edge of the first valve
         """
         self.uncontrolled = set()
@@ -190,8 +191,7 @@ class SteadyStart:
             group = union(len(self.nodes), joined)
             known = {group[i] for i in np.flatnonzero(~np.isnan(self.fixed_potentials)).tolist()}
             known |= {group[self.edges[first + k].held_potential[0]] for k in holding}
-            lost = next((k for k in holding if self.holds_upstream(first + k)
-                         and group[self.edges[first + k].j] not in known), None)  # fmt: skip
+            lost = next((k for k in holding if group[self.other_end(first + k)] not in known), None)
             if lost is None:
                 return
             self.valve_lowering(lost).release(self, lost)
@@ -199,10 +199,10 @@ class SteadyStart:
             self.edges[first + lost] = self.valve_edge(lost)
             holding.remove(lost)
 
-    def holds_upstream(self, e: int) -> bool:
-        """True if edge e maintains the potential of its first node."""
-        held = self.edges[e].held_potential
-        return held is not None and held[0] == self.edges[e].i
+    def other_end(self, e: int) -> int:
+        """Node of edge e at which it does not hold the potential."""
+        edge = self.edges[e]
+        return edge.j if edge.held_potential[0] == edge.i else edge.i
 
     def boundary_values(self) -> tuple[np.ndarray, np.ndarray]:
         """Fixed potentials of nodes [Pa], nan where unknown, and demands of junctions [kg/s] : float64[nodes] each.

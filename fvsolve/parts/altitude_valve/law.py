@@ -1,7 +1,7 @@
 """An altitude valve: open, shut because its tank is full, or shut because its tank is empty.
 
 The flags armed[event + FULL] and armed[event + EMPTY] are above 0 while it is shut; they change on accepted states
-only. `floats` holds both levels of the tank [m].
+only. `floats` holds both levels of the tank, and the differential between shutting and opening [m].
 """
 
 from math import sqrt
@@ -38,19 +38,21 @@ def events(t, y, out, tables, device, g):
     """Write event functions of both limits and their negatives to g.
 
     While the valve is open: the distance of the level from the limit [m], and at the limit the flow away from it plus
-    that of `NO_FLOW` [kg/s]. While it is shut: the drop towards the allowed direction, less `MARGIN` [Pa].
+    that of `NO_FLOW` [kg/s]. While it is shut: the drop towards the allowed direction, less `MARGIN` [Pa], or the
+    distance of the level from the limit, less the differential [m], whichever is above 0.
     """
     k, at, st = device["valve"], device["event"], tables.settings[0]
     node, flow = tables.nodes[tables.valves[k]["to_node"]], out[tables.layout[0]["valve"] + k]
     rho = st["rho"] if st["law"] == LAW_LINEAR else node["density"]
     level, drop = tank_level(node, tables.floats, rho, y[node["y"]]), head_drop(tables, out, k)[1]
     space, depth = tables.floats[device["data"]] - level, level - tables.floats[device["data"] + 1]
+    differential = tables.floats[device["data"] + 2]
     least = NO_FLOW * sqrt(tables.valves[k]["conductance"])
     full, empty = space if space > 0.0 else least - flow, depth if depth > 0.0 else flow + least
     if tables.armed[at + FULL] > 0.0:
-        full, empty = -drop - MARGIN, 1.0
+        full, empty = max(-drop - MARGIN, space - differential), 1.0
     elif tables.armed[at + EMPTY] > 0.0:
-        full, empty = 1.0, drop - MARGIN
+        full, empty = 1.0, max(drop - MARGIN, depth - differential)
     event_pair(tables, g, at + FULL, full)
     event_pair(tables, g, at + EMPTY, empty)
 

@@ -17,7 +17,7 @@ class AltitudeValveRows(Device, kind="altitude-valve"):
 
     def numbers(self, draft, name, part) -> list[float]:
         return [NO_LEVEL if part.full_level is None else part.full_level,
-                -NO_LEVEL if part.empty_level is None else part.empty_level]  # fmt: skip
+                -NO_LEVEL if part.empty_level is None else part.empty_level, part.differential]  # fmt: skip
 
     def shut_reason(self, start, k):
         part = start.case.conduits[start.draft.valve_names[k]]

@@ -13,7 +13,8 @@ class AltitudeValve(Sized, TwoPort, kind="altitude-valve"):
     """Altitude valve before the tank `to`: q = Cd A sqrt(2 |dp| / rho) sign(dp) while it is open, dp the drop.
 
     At `full_level` it shuts against flow q into the tank, at `empty_level` against flow out of it. It opens as soon as
-    the pressures drive flow in the allowed direction (docs/course.md, 79). Ports: from, to. Stored energy: none.
+    the pressures drive flow in the allowed direction, or the level has moved away from the limit by `differential`,
+    for example by an outlet of its own (docs/course.md, 79). Ports: from, to. Stored energy: none.
     Dissipated power: dp q [W].
     """
 
@@ -26,6 +27,11 @@ class AltitudeValve(Sized, TwoPort, kind="altitude-valve"):
         "level", nonnegative, "level of the tank at which no more flows out of it [m]; no limit if left out", LEVELS,
         SHAPE,
     )] = None  # fmt: skip
+
+    differential: Annotated[float, Quantity(
+        "level", positive, "distance of the level from `full_level` or `empty_level` at which the shut valve opens [m]",
+        LEVELS,
+    )] = 0.005  # fmt: skip
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
