@@ -76,7 +76,7 @@ def isolated_parts(model: Any) -> frozenset[str]:
     ]
     group = union(len(model.node_names), [(row["from_node"], row["to_node"]) for row in rows])
     joined = {group[i] for i, (node, row) in enumerate(zip(case.places.values(), tables.nodes, strict=True))
-              if row["kind"] != rec.JUNCTION or not _is_always_zero(node.demand)}  # fmt: skip
+              if row["kind"] != rec.JUNCTION or not _is_always_zero(getattr(node, "demand", None))}  # fmt: skip
     isolated = {i for i in range(len(group)) if group[i] not in joined}
     parts = {f"nodes.{model.node_names[i].removesuffix('.inside')}" for i in isolated}
     names = (*(pipe.name for pipe in model.pipes), *model.column_names)

@@ -219,9 +219,9 @@ def unsupplied_demands(
     for begin in np.unique(first[np.isfinite(first)]).tolist():
         own = np.flatnonzero(first == begin)
         names = [model.node_names[i] for i in own]
-        losses += [Event(begin, name, "is no longer supplied") for name in names]
-        asked = sum(scheduled_volume(model.case.nodes[name].demand, *span) for name in names)
-        lack = asked + float(entered[own].sum()) / model.case.properties.density
+        losses += [Event(begin, name, "loses its supply") for name in names]
+        demanded = sum(scheduled_volume(model.case.places[name].demand, *span) for name in names)
+        lack = demanded + float(entered[own].sum()) / model.case.properties.density
         amounts = f"{amount(lack, 'volume', 4)} lack" if np.isfinite(lack) else "the demand is not met"
         causes = listing([_shut_by(valves[k], begin, events) for k in np.flatnonzero(shut == begin)], 6)
         text = (f"{listing(names, 6)}: no open path supplies the demand between {amount(begin, 'time', 6)} and "
@@ -284,8 +284,9 @@ def drift_notices(model: Model, y: np.ndarray) -> list[Notice]:
 def find_cavities(run_data: RunData) -> list[Cavity]:
     """First cavity of every pipe whose pressure fell below twice the vapour pressure (more vapour than gas)."""
     model, marks, cavities = run_data.model, run_data.marks, []
+    end = marks.size - 3 * len(model.node_names) - len(model.valve_names)  # the marks of islands follow
     for k, pipe in enumerate(model.pipes if model.cavitates else ()):
-        share, volume, t_volume = (float(x) for x in marks[marks.size - 3 * (len(model.pipes) - k) :][:3])
+        share, volume, t_volume = (float(x) for x in marks[end - 3 * (len(model.pipes) - k) :][:3])
         if np.isfinite(share):
             time, distance = float(marks[k]), share * pipe.length
             amount = model.case.amount

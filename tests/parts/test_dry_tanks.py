@@ -125,7 +125,7 @@ def test_a_town_with_dry_tanks_alone_is_not_supplied_and_the_run_names_the_tanks
         run = fvsolve.run(told)
         (note,) = [note for note in run.warnings if note.kind == "unsupplied"]
         (lost,) = events_of(run, "b")
-        assert run.ok and run.reason == "finished" and lost[1] == "is no longer supplied"
+        assert run.ok and run.reason == "finished" and lost[1] == "loses its supply"
         assert note.place == "nodes.b" and note.value == pytest.approx(asked - stored, rel=1e-6)
         assert all(f"{name}-gate (the tank is empty)" in note.text for name in levels)
         late = run.t > lost[0] * HOUR + 1.0
