@@ -21,7 +21,7 @@ class QuasiSteadyPipe(Pipe, pipe_model=QUASI_STEADY):
     on_request: ClassVar[tuple[str, ...]] = ()
     own_scalars: ClassVar[str] = ""
     no_scalars: ClassVar[str] = (
-        'it has no volume to carry scalars; use pipe_model = "finite-volume", or  for water age and sources'
+        'it has no volume to carry scalars; use pipe_model = "finite-volume", or "fvsolve quality" for water age'
     )
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
