@@ -29,6 +29,7 @@ COMMANDS = dict.fromkeys(("run", "check", "list", "new", "schema", "methods", "c
     "optimise": "design_commands",
     "order": "accuracy_commands",
     "precompile": "file_commands",
+    "quality": "quality",
     "report": "file_commands",
     "plot": "file_commands",
     "fatigue": "file_commands",

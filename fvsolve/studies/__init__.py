@@ -34,6 +34,7 @@ _HOMES = {  # public name -> module of this package
     "state_positive_real": "ports.response",
     "sweep": "sweep",
     "sweep_positive_real": "ports.line_impedance",
+    "water_quality": "water_quality.water_quality",
 }
 
 __all__ = lazy_names(__name__, _HOMES)  # noqa: PLE0605

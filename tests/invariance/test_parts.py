@@ -142,7 +142,8 @@ NODES = {
     ),
     "air-valve": of(
         "air-valve",
-        {"inlet": between(0.02, 0.08), "outlet": between(0.005, 0.05)},
+        {"inlet": st.one_of(between(0.02, 0.08), st.just({"pressure": [2e3, 3e4], "flow": [0.05, 0.15]})),
+         "outlet": st.one_of(between(0.005, 0.05), st.just({"pressure": [5e3, 5e4], "flow": [0.04, 0.1]}))},
         {"automatic": between(1e-3, 3e-3)},
         a=st.sampled_from([{}, *({key: value, "throttled_outlet": 4e-3} for key, value in SWITCHES.items())]),
     ),

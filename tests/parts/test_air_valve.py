@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from reference.air import HEAT, SMALL, bores
+from reference.air import HEAT, SMALL, bores, softened
 from reference.refusals import refused
 from reference.scenes import AMBIENT, RHO, WATER, area, junction, lake, pipe, reservoir, scene, valve
 from scipy.integrate import solve_ivp
@@ -338,3 +338,81 @@ def test_staged_and_resumed_it_is_the_unbroken_run(tmp_path, end):
 def test_what_is_wrong_with_its_stages_is_said(more, said):
     case = staged(**more)
     assert said in str(refused(case))
+
+
+# tables of makers -----------------------------------------------------------------------------------------------------
+
+INTO = {"pressure": [0.02e5, 0.1e5, 0.35e5], "flow": [0.03, 0.06, 0.1]}
+OUT = {"pressure": [0.05e5, 0.3e5, 1.0e5], "flow": [0.01, 0.03, 0.045]}
+
+
+def by_table(p: float) -> float:
+    """Mass flow of air into a chamber at p by the tables `INTO` and `OUT` [kg/s], softened near ambient as a bore."""
+    table, sign, high = (INTO, 1.0, AMBIENT) if p <= AMBIENT else (OUT, -1.0, p)
+    drop, x, y = abs(p - AMBIENT), [0.0, *table["pressure"]], [0.0, *(q * q for q in table["flow"])]
+    k = min(int(np.searchsorted(x, drop, side="left")), len(x) - 1) or 1
+    square = y[k] + (y[k] - y[k - 1]) / (x[k] - x[k - 1]) * (drop - x[k])
+    return sign * AMBIENT / HEAT * math.sqrt(square) * (softened(drop / high) if drop / high < SMALL else 1.0)
+
+
+def test_air_by_the_tables_of_a_maker_follows_scipy():
+    """Air enters and leaves beyond the last points of both tables; the throat is that of the first point."""
+    case = drained(INTO, OUT, RETURN)
+    result = fvsolve.run(case)
+    t = np.asarray(result.t)
+    shut = [event["time"] for event in result.summary["events"] if event["what"] == "shuts"]
+    rows = (t >= 0.6) & (t < shut[0] - 0.02)
+    first = [result[name][rows][0] for name in ("c.flow", "v.air_volume", "v.air_mass")]
+    throat = 30.0**2 * INTO["flow"][0] / (0.6 * math.sqrt(2.0 * INTO["pressure"][0] / 1.2))
+
+    def rates(now, y):
+        p, v = y[2] * HEAT / y[1], y[0] / throat
+        drop = 0.5 * RHO * v * abs(v)
+        return (p - drop - np.interp(now, RETURN["time"], RETURN["value"])) / INERTIA, y[0], by_table(p)
+
+    exact = solve_ivp(rates, (t[rows][0], t[rows][-1]), first, t_eval=t[rows], rtol=1e-11, atol=1e-14, max_step=0.01,
+                      method="DOP853")  # fmt: skip
+    p = exact.y[2] * HEAT / exact.y[1]
+    assert p.min() < AMBIENT - 0.05e5 and p.max() > AMBIENT + 1e5
+    assert result["v.air_mass"][rows] == pytest.approx(exact.y[2], rel=1e-6)
+    assert result["v.air_pressure"][rows] == pytest.approx(p, rel=1e-6)
+    assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+def orifice_table(bore: float, drops, outward: bool) -> dict:
+    """Table of a maker with the flow of an orifice at the given pressure differences."""
+    flows = [abs(bores(AMBIENT + drop if outward else AMBIENT - drop, bore, bore, lambda x: 1.0)) for drop in drops]
+    return {"pressure": list(drops), "flow": [flow * HEAT / AMBIENT for flow in flows]}
+
+
+def test_a_table_of_the_orifice_formula_gives_the_run_of_the_orifice():
+    drops = np.geomspace(200.0, 3e5, 600)
+    tables = {"inlet": orifice_table(0.04, drops[drops < 0.99 * AMBIENT], False),
+              "outlet": orifice_table(0.02, drops, True),
+              "throttled_outlet": orifice_table(0.005, drops, True)}  # fmt: skip
+    plain = {"inlet": 0.04, "outlet": 0.02, "throttled_outlet": 0.005}
+    size = {"volume": 1e-3, "switch": 0.1e5}
+    runs = [fvsolve.run(drained(**keys, **size, low=RETURN, end=4.0)) for keys in (plain, tables)]
+    for name in ("v.air_mass", "v.air_pressure", "c.flow"):
+        a, b = (run[name] for run in runs)
+        assert np.abs(a - b).max() < 2e-4 * np.abs(a).max(), name
+    names = [[(event["name"], event["what"]) for event in run.summary["events"]] for run in runs]
+    assert names[0] == names[1] and ("v", "throttles") in names[0]
+
+
+@pytest.mark.parametrize(
+    "key, given, text",
+    [
+        ("inlet", {"pressure": [0.1e5, 1.1e5], "flow": [0.1, 0.2]},
+         "nodes.v.inlet.pressure: 110000 Pa is not below ambient pressure, 101325 Pa"),
+        ("outlet", {"pressure": [0.1e5, 0.2e5], "flow": [0.2, 0.1]},
+         "nodes.v.outlet.flow[1]: 0.1 comes after 0.2; the flow must not fall as the pressure rises"),
+        ("outlet", {"pressure": [0.1e5], "flow": [0.2, 0.1]},
+         "nodes.v.outlet.flow: has length 2, but `pressure` has length 1; expected equal lengths"),
+        ("outlet", "wide", "nodes.v.outlet"),
+        ("throttled_outlet", {"pressure": [0.1e5], "flow": [0.2]}, "does not throttle; expected less than `outlet`"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_table_of_a_maker_is_said(key, given, text):
+    more = {"switch": 0.1e5} if key == "throttled_outlet" else {}
+    assert text in str(refused(drained(**{"inlet": 0.05, "outlet": 0.05, key: given, **more})))

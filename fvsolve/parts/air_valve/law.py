@@ -10,6 +10,9 @@ in.
 A throttling valve releases air through its wide bore until the air pressure is `SWITCH_PRESSURE` above ambient, or
 until the air is above ambient and fluid flows in at `SWITCH_FLOW`. From then on (armed[event + 2]) it releases air
 through a small bore, until the air is at ambient pressure. An automatic bore releases air in both cases.
+
+A bore may have the table of its maker in place of an area. Between its points, the first of which is no flow, the
+square of the mass flow is linear in the pressure difference, as in an orifice; it goes on so beyond the last point.
 """
 
 from math import expm1, log1p, sqrt
@@ -22,9 +25,11 @@ from fvsolve.kernels.restrictions import flow_at_drop, restriction_slope
 from fvsolve.kernels.self_acting_valves import event_pair
 
 VOLUME, AIR_MASS, RT, INLET_AREA, OUTLET_AREA, SWITCH_PRESSURE, THROTTLED_AREA, SWITCH_FLOW = 0, 1, 2, 3, 4, 5, 6, 7
+INLET_TABLE, OUTLET_TABLE, THROTTLED_TABLE, OWN_NUMBERS = 8, 9, 10, 11
 """Numbers of an air valve: chamber volume V0 [m3], mass of air in V0 at ambient pressure [kg], R T [J/kg], Cd A of the
 inlet and of the outlet [m2]; pressure above ambient from which the valve throttles [Pa], 0 for none; Cd A of the outlet
-while it throttles [m2]; flow of fluid from which it throttles [kg/s], 0 for none."""
+while it throttles [m2]; flow of fluid from which it throttles [kg/s], 0 for none; offsets of the tables of inlet,
+outlet and throttled outlet, 0 for none. A table has a count, pressure differences [Pa] and squares of mass flows."""
 KAPPA = 1.4
 CRITICAL_RATIO = (2.0 / (KAPPA + 1.0)) ** (KAPPA / (KAPPA - 1.0))
 SMALL_DROP = 1e-3  # pressure drop over upstream pressure below which a polynomial replaces the square root
@@ -66,33 +71,70 @@ def has_throttled_outlet(floats, at):
 
 
 @njit
-def outlet_area(tables, device):
-    """Product Cd A [m2] of discharge coefficient and bore area for outflow of air, in the present mode of the valve."""
-    floats, at = tables.floats, device["data"]
-    if has_throttled_outlet(floats, at) and tables.armed[device["event"] + 2] > 0.0:
-        return floats[at + THROTTLED_AREA]
-    return floats[at + OUTLET_AREA]
+def outlet_bore(tables, device):
+    """(number of its area Cd A, number of its table) of the bore for outflow of air, in the present mode of the valve.
+
+    Cd is the discharge coefficient, A the area.
+    """
+    if has_throttled_outlet(tables.floats, device["data"]) and tables.armed[device["event"] + 2] > 0.0:
+        return THROTTLED_AREA, THROTTLED_TABLE
+    return OUTLET_AREA, OUTLET_TABLE
 
 
 @njit
-def air_inflow(st, floats, at, gauge, outlet):
+def table_flow(floats, at, high, drop):
+    """Mass flow of air [kg/s] by the table of a maker; 0 without a table.
+
+    floats[at] : offset of the table from the parameters of the air valve, which are before it; high, drop : upstream
+    pressure and pressure difference [Pa]. Below SMALL_DROP it is a polynomial, as in an orifice.
+    """
+    if floats[at] == 0.0:
+        return 0.0
+    table = at + int(floats[at])
+    count, k = int(floats[table]), 1
+    while k < count and drop > floats[table + k]:
+        k += 1
+    drops, squares = table + k, table + count + k
+    if k == 1:
+        slope = floats[squares] / floats[drops]
+        return flow_at_drop(slope, sqrt(slope * SMALL_DROP * high), drop)
+    slope = (floats[squares] - floats[squares - 1]) / (floats[drops] - floats[drops - 1])
+    return sqrt(floats[squares] + slope * (drop - floats[drops]))
+
+
+@njit
+def bore_flow(floats, at, area, table, p, r):
+    """Mass flow of air [kg/s] from pressure p [Pa] to r p through a bore.
+
+    area, table : numbers of its area and of its table in the parameters of the air valve, floats[at:]
+    """
+    flow = table_flow(floats, at + table, p, (1.0 - r) * p)
+    if floats[at + area] > 0.0:
+        flow += floats[at + area] * p / sqrt(floats[at + RT]) * orifice_flow(r)
+    return flow
+
+
+@njit
+def air_inflow(st, floats, at, gauge, area, table):
     """(mass flow of air into the chamber [kg/s], estimate of its greatest slope over the pressure ratio [kg/s]).
 
     The pressure ratio is the lower of the pressures inside and outside the chamber over the higher one.
-    gauge : gauge pressure of the air in the chamber [Pa]; outlet : result of `outlet_area` [m2]
+    gauge : gauge pressure of the air in the chamber [Pa]; area, table : results of `outlet_bore`
     st : settings of the model; floats[at:] : parameters of the air valve
     """
-    p, root = st["ambient"] + gauge, sqrt(floats[at + RT])
+    p, ambient = st["ambient"] + gauge, st["ambient"]
     if gauge < 0.0:
-        full_flow = floats[at + INLET_AREA] * st["ambient"] / root
-        r, sign = p / st["ambient"], 1.0
+        high, r, sign = ambient, p / ambient, 1.0
+        own, own_table = INLET_AREA, INLET_TABLE
     else:
-        full_flow = outlet * p / root
-        r, sign = st["ambient"] / p, -1.0
-    x, largest = max(1.0 - r, SMALL_DROP), full_flow
+        high, r, sign = p, ambient / p, -1.0
+        own, own_table = area, table
+    x = max(1.0 - r, SMALL_DROP)
+    largest = bore_flow(floats, at, own, own_table, high, 1.0 - x)
     if x < REVERSAL_DROP:
-        largest = max(floats[at + INLET_AREA], outlet) * p / root
-    return sign * full_flow * orifice_flow(r), 1.5 * largest * orifice_flow(1.0 - x) / x
+        into = bore_flow(floats, at, INLET_AREA, INLET_TABLE, p, 1.0 - x)
+        largest = max(into, bore_flow(floats, at, area, table, p, 1.0 - x))
+    return sign * bore_flow(floats, at, own, own_table, high, r), 1.5 * largest / x
 
 
 @njit
@@ -121,7 +163,8 @@ def air_rate(y, tables, device):
     st, floats, at = tables.settings[0], tables.floats, device["data"]
     node = tables.nodes[device["node"]]
     gauge, volume, mass = air_state(st, floats, node, at, y[node["y"]], y[device["y"]])
-    flow, slope = air_inflow(st, floats, at, gauge, outlet_area(tables, device))
+    area, table = outlet_bore(tables, device)
+    flow, slope = air_inflow(st, floats, at, gauge, area, table)
     ambient_mass = st["ambient"] * volume / floats[at + RT]  # mass of the air at ambient pressure
     rate = slope / min(mass, ambient_mass)
     if tables.armed[device["event"]] <= 0.0 and abs(flow) * EQUALISATION_TIME >= abs(ambient_mass - mass):

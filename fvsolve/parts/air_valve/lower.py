@@ -5,6 +5,7 @@ import math
 from fvsolve.assembly.lowering import Device
 from fvsolve.errors import Notice
 from fvsolve.parts.air_valve import law
+from fvsolve.parts.air_valve.part import AirFlow
 
 GAS_CONSTANT = 287.05  # of air [J/kg/K]
 
@@ -36,11 +37,19 @@ class AirValveRows(Device, kind="air-valve"):
     def numbers(self, draft, name, part) -> list[float]:
         rt = GAS_CONSTANT * part.temperature
         air_mass = draft.case.ambient_pressure * part.volume / rt
+        bores = part.inlet, part.outlet, part.throttled_outlet
         into, wide, small, always = (
-            part.discharge_coefficient * math.pi / 4.0 * (d or 0.0) ** 2
-            for d in (part.inlet, part.outlet, part.throttled_outlet, part.automatic)
+            0.0 if d is None or isinstance(d, AirFlow) else part.discharge_coefficient * math.pi / 4.0 * d**2
+            for d in (*bores, part.automatic)
         )
-        return [part.volume, air_mass, rt, into, wide + always, part.switch or 0.0, small + always, 0.0]
+        own = [part.volume, air_mass, rt, into, wide + always, part.switch or 0.0, small + always, 0.0]
+        tables: list[float] = []
+        density = draft.case.ambient_pressure / rt
+        for bore, place in zip(bores, (law.INLET_TABLE, law.OUTLET_TABLE, law.THROTTLED_TABLE), strict=True):
+            given = isinstance(bore, AirFlow)
+            own.append(float(law.OWN_NUMBERS + len(tables) - place) if given else 0.0)
+            tables += [len(bore.pressure), *bore.pressure, *((density * q) ** 2 for q in bore.flow)] if given else []
+        return own + tables
 
     def scales(self, draft, name, part) -> list[float]:
         return [self.numbers(draft, name, part)[law.AIR_MASS]]

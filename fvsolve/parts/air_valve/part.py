@@ -1,20 +1,85 @@
 """Air valves: keys, ranges and faults."""
 
 import math
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.connection import Connection, behind_throat
 from fvsolve.parts.hydraulic_nodes import Junction
 from fvsolve.parts.nodes_and_links import Node
 from fvsolve.parts.schedule import constant
-from fvsolve.parts.table_model import CaseContext, Faults
-from fvsolve.parts.value import Number, Quantity, UsualRange, between, positive
+from fvsolve.parts.table_model import CaseContext, Faults, ListTable, check_table, keys_json, read_lists
+from fvsolve.parts.value import (
+    NEEDED,
+    PROFILE,
+    Number,
+    Quantity,
+    ReadContext,
+    Rows,
+    UsualRange,
+    Value,
+    ValueFault,
+    between,
+    positive,
+)
+from fvsolve.units import show
 
 BORE_RANGE = between(0, 1, open=True)  # m; a plain 50 would be in mm
 CHAMBER_SIZE = 3.0  # diameter and length of the float chamber if its volume is not given, in inlet diameters
 LINE_KINDS = ("pipe", "rigid-column")
 SWITCH_KEYS = ("switch", "switch_velocity")  # thresholds of throttling
+AIR_DENSITY, USUAL_COEFFICIENT = 1.2, 0.6  # [kg/m3], [-] for the size of a bore with the flow of a table
 THROAT_SIZE = 30.0  # diameter of the throat between fluid and air, in inlet diameters; its loss coefficient is 1
+
+
+@dataclass(frozen=True, eq=False)
+class AirFlow(ListTable):
+    """Table of the maker of an air valve: flow of free air [m3/s] over the pressure difference to ambient [Pa].
+
+    Free air is at ambient pressure and at the temperature of the air valve.
+    """
+
+    pressure: tuple[float, ...]
+    flow: tuple[float, ...]
+
+    @property
+    def bore(self) -> float:
+        """Diameter of an orifice with the flow of the first point [m]."""
+        velocity = USUAL_COEFFICIENT * math.sqrt(2.0 * self.pressure[0] / AIR_DENSITY)
+        return math.sqrt(4.0 / math.pi * self.flow[0] / velocity)
+
+
+@dataclass(frozen=True)
+class Bore(Value):
+    """Value of a case file for a bore of an air valve: its diameter, or the table of its maker { pressure, flow }."""
+
+    about: str = ""
+    changes: str = PROFILE
+    takes: ClassVar[str] = "m, above 0, 1 at most, or `{ pressure = [...], flow = [...] }`"
+    keys: ClassVar[dict[str, tuple[Value, Any]]] = {
+        "pressure": (Rows("pressure_drop", positive), NEEDED), "flow": (Rows("flow", positive), NEEDED)
+    }  # fmt: skip
+
+    def read(self, given: Any, setting: ReadContext) -> float | AirFlow:
+        if isinstance(given, AirFlow):
+            return given
+        if not isinstance(given, dict):
+            return Quantity("length", BORE_RANGE).read(given, setting)
+        check_table(given, 'for example { pressure = ["0.1 bar", "0.3 bar"], flow = ["900 m3/h", "1500 m3/h"] }')
+        table = AirFlow(*read_lists(given, self.keys, setting, "pressures"))
+        for k, (before, after) in enumerate(zip(table.flow, table.flow[1:], strict=False)):
+            if after < before:
+                text = f"{show(given['flow'][k + 1])} comes after {show(given['flow'][k])}"
+                raise ValueFault([(("flow", k + 1), f"{text}; the flow must not fall as the pressure rises")])
+        return table
+
+    def json(self) -> dict[str, Any]:
+        return {"anyOf": [Quantity("length").json(), keys_json(self.keys)]}
+
+
+def bore_of(given: float | AirFlow) -> float:
+    """Diameter of a bore [m], or that of an orifice with the flow of its table."""
+    return given.bore if isinstance(given, AirFlow) else given
 
 
 class AirValve(Node, kind="air-valve"):
@@ -34,8 +99,8 @@ class AirValve(Node, kind="air-valve"):
         **Node.quantities, "air_volume": "volume", "air_mass": "mass", "air_pressure": "pressure",
     }  # fmt: skip
 
-    inlet: Annotated[float, Quantity("length", BORE_RANGE, "diameter of the bore for air inflow [m]")]
-    outlet: Annotated[float, Quantity("length", BORE_RANGE, "diameter of the bore for air outflow [m]")]
+    inlet: Annotated[Any, Bore("diameter of the bore for air inflow, or free air over the pressure below ambient")]
+    outlet: Annotated[Any, Bore("diameter of the bore for air outflow, or free air over the pressure above ambient")]
     switch: Annotated[float | None, Quantity(
         "pressure_drop", positive,
         "gauge pressure above which air leaves through `throttled_outlet` instead of `outlet` [Pa]",
@@ -47,7 +112,7 @@ class AirValve(Node, kind="air-valve"):
         UsualRange(0.01, 20.0, "anti-slam discs"),
     )] = None  # fmt: skip
     throttled_outlet: Annotated[
-        float | None, Quantity("length", BORE_RANGE, "diameter of the bore for throttled air outflow [m]")
+        Any, Bore("diameter of the bore for throttled air outflow, or free air over the pressure above ambient")
     ] = None
     automatic: Annotated[
         float | None, Quantity("length", BORE_RANGE, "diameter of the automatic bore, always open for air outflow [m]")
@@ -80,17 +145,21 @@ class AirValve(Node, kind="air-valve"):
         return faults
 
     def faults(self, name: str, around: CaseContext) -> Faults:
-        if self.throttled_outlet is not None and not self.throttled_outlet < self.outlet:
-            text = f"{self.throttled_outlet:g} m does not throttle; expected less than `outlet`, {self.outlet:g} m"
-            yield ("throttled_outlet",), text
+        if isinstance(self.inlet, AirFlow) and self.inlet.pressure[-1] >= around.ambient:
+            text = f"{self.inlet.pressure[-1]:g} Pa is not below ambient pressure, {around.ambient:g} Pa; expected how"
+            yield ("inlet", "pressure"), f"{text} far the pressure is below ambient"
+        if self.throttled_outlet is not None and not bore_of(self.throttled_outlet) < bore_of(self.outlet):
+            small, wide = (bore_of(bore) for bore in (self.throttled_outlet, self.outlet))
+            yield ("throttled_outlet",), f"{small:g} m does not throttle; expected less than `outlet`, {wide:g} m"
         lines = [link for link in around.links.values() if link.kind in LINE_KINDS]
         if self.switch_velocity is not None and not any(name in link.ports.values() for link in lines):
             message = "no pipe or rigid column joins this node to give a fluid velocity; give the key `switch` instead"
             yield ("switch_velocity",), message
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
-        size = Connection.model_construct(area=None, diameter=THROAT_SIZE * self.inlet, loss_in=1.0, loss_out=1.0)
-        volume = self.volume if self.volume is not None else math.pi / 4.0 * (CHAMBER_SIZE * self.inlet) ** 3
+        bore = bore_of(self.inlet)
+        size = Connection.model_construct(area=None, diameter=THROAT_SIZE * bore, loss_in=1.0, loss_out=1.0)
+        volume = self.volume if self.volume is not None else math.pi / 4.0 * (CHAMBER_SIZE * bore) ** 3
         chamber = self.model_copy(update={"volume": volume})
         place = Junction.model_construct(elevation=self.elevation, demand=constant(0.0))
         return behind_throat(name, chamber, place, size)

@@ -6,7 +6,8 @@ the flow q / n. At other speeds 1 - e is that of the points times n^-0.1 (Sarbu 
 
 Numbers, from `at` on: schedule of the price [1/kWh], flow regarded as zero [m3/s], device of the next pump or -1, count
 of points, then their flows and efficiencies; without points a single efficiency.
-States, in the order of `energy_use.STATES`: time of operation [s], its integrals of e [s] and of P / q [J s/m3], electric energy [J], cost [-].
+States, in the order of `energy_use.STATES`: time of operation [s], integrals of e [s] and of P / q [J s/m3] over it,
+electric energy [J], cost [-].
 """
 
 from fvsolve.jit import njit

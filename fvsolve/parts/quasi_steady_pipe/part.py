@@ -20,7 +20,9 @@ class QuasiSteadyPipe(Pipe, pipe_model=QUASI_STEADY):
     quantities: ClassVar[dict[str, str]] = {"flow": "flow"}
     on_request: ClassVar[tuple[str, ...]] = ()
     own_scalars: ClassVar[str] = ""
-    no_scalars: ClassVar[str] = 'it has no volume to carry scalars; use pipe_model = "finite-volume"'
+    no_scalars: ClassVar[str] = (
+        'it has no volume to carry scalars; use pipe_model = "finite-volume", or "fvsolve quality" for water age'
+    )
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         yield from (found for found in super().unusual() if found[0] != ("diameter",))  # short pipes stand for losses
