@@ -15,7 +15,7 @@ from fvsolve.case.claims import Compare, DesignLimit, Expect
 from fvsolve.case.controls import Block
 from fvsolve.case.pipe_routes import Route
 from fvsolve.case.probe import Probe, of_profiles
-from fvsolve.case.reading import driven_keys
+from fvsolve.case.reading import followers
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
@@ -216,7 +216,8 @@ class Case(Displayable):
     def unread_blocks(self) -> set[str]:
         """Names of the blocks of `controls` that no key follows and no other block reads."""
         read = {other for name, block in self.controls.items() for other in block.blocks_read if other != name}
-        return {name for name in self.controls if name not in read and not any(driven_keys(self.raw, "control", name))}
+        followed = {name for name, _ in followers(self.raw, "control")}
+        return self.controls.keys() - read - followed
 
     @cached_property
     def notices(self) -> list[Notice]:

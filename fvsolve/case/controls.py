@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from fvsolve.case.probe import Probe, read_probe
-from fvsolve.case.reading import Reading, driven_keys
+from fvsolve.case.reading import Reading, followers
 from fvsolve.case.resource_checks import name_faults
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.schedule import BLOCK_PREFIX, UNKNOWN
@@ -155,15 +156,23 @@ class Blocks:
             return UNKNOWN if unlike(known) else known[0]
         if self.kind(name).same_unit:
             return self.first_dimension(name)
-        follows = (keys[0] != "controls" for keys in driven_keys(self.reading.raw.table, "control", name))
         if own := self.kind(name).own_dimension(self.given[name]):
             return own
-        return UNKNOWN if any(follows) else "number"
+        return UNKNOWN if name in self.followed else "number"
 
     def find_dimensions(self) -> None:
         """Find the dimensions of all outputs from the keys that they drive."""
         for _ in range(len(self.given) + 1):
-            self.outputs = {name: self.output_dimension(name) for name in self.given}
+            outputs = {name: self.output_dimension(name) for name in self.given}
+            if outputs == self.outputs:
+                return
+            self.outputs = outputs
+
+    @cached_property
+    def followed(self) -> set[str]:
+        """Names of the blocks that a key outside `[controls]` follows."""
+        found = followers(self.reading.raw.table, "control")
+        return {name for name, keys in found if keys[0] != "controls"}
 
     def read(self) -> dict[str, Block | None]:
         """Blocks by name, in the order of the file; None for a faulty block."""

@@ -531,15 +531,24 @@ class Reading:
         return model.model_construct(**values)
 
 
-def driven_keys(table: Any, word: str, name: str = "", keys: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+def driven_keys(table: Any, word: str, name: str = "") -> Iterator[tuple[Any, ...]]:
     """Key paths of all values of a case that follow a signal or a control, outside `[signals]`.
 
-    table : nested dicts of the case as in the file, or a part of them; word : "signal" or "control"
-    name : name of the signal or control, "" for any; keys : key path of `table`
+    table : nested dicts of the case as in the file; word : "signal" or "control"
+    name : name of the signal or control, "" for any
+    """
+    return (keys for followed, keys in followers(table, word) if name in ("", followed))
+
+
+def followers(table: Any, word: str, keys: tuple[Any, ...] = ()) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    """Name of the signal or control, and key path, of each value that follows one; arguments as in `driven_keys`.
+
+    keys : key path of `table`, which is the case or a part of it
     """
     if isinstance(table, dict):
-        if isinstance(table.get(word), str) and name in ("", table[word]) and keys[:1] != ("signals",):
-            yield keys
+        if isinstance(table.get(word), str) and keys[:1] != ("signals",):
+            yield table[word], keys
     if isinstance(table, (dict, list)):
         for key, inner in table.items() if isinstance(table, dict) else enumerate(table):
-            yield from driven_keys(inner, word, name, (*keys, key))
+            if isinstance(inner, (dict, list)):
+                yield from followers(inner, word, (*keys, key))

@@ -107,7 +107,11 @@ class DayTranslation(Translation):
         name = self.node_names.given[node.name]
         for link in self.network.links_at[node.name]:
             inlet = self.inlets[node.name, link.name] = self.node_names.new(f"{name}-inlet")
-            self.nodes[inlet] = part_tables.junction(self.elevation[node.name], 0.0, node.position)
+            other = link.start if link.end == node.name else link.end
+            low = min(
+                self.elevation[node.name], self.elevation.get(other, math.inf)
+            )  # so that a dry tank has no vacuum
+            self.nodes[inlet] = part_tables.junction(low, 0.0, node.position)
             self.links[self.link_names.new(f"{name}-altitude")] = self.altitude_valve(node, link, (inlet, name))
         return part
 

@@ -126,9 +126,13 @@ def power(watts: float) -> Part:
     return {"power": f"{watts * 1e-3:.10g} kW"}
 
 
-def check_valve(ends: tuple[str, str], diameter: float) -> Part:
-    """Table of a check valve with diameter [m]; ends : names of the nodes `from` and `to`"""
-    return _link("check-valve", ends) | {"diameter": quantity_text(diameter, "mm"), "loss_coefficient": NO_LOSS}
+def check_valve(ends: tuple[str, str], diameter: float, loss: float = 0.0) -> Part:
+    """Table of a check valve with diameter [m]; ends : names of the nodes `from` and `to`
+
+    loss : loss coefficient, 0 is replaced by `NO_LOSS`
+    """
+    part = _link("check-valve", ends) | {"diameter": quantity_text(diameter, "mm")}
+    return part | {"loss_coefficient": rounded_number(loss or NO_LOSS)}
 
 
 def regulating(kind: str, ends: tuple[str, str], diameter: float, setting: float, loss: float) -> Part:

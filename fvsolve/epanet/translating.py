@@ -7,6 +7,7 @@ from typing import Any
 from fvsolve.epanet import part_tables
 from fvsolve.epanet.network_file import Link, Network, Node, Solution
 from fvsolve.errors import listing
+from fvsolve.parts.tolerances import is_head_above, is_shorter_than_rise
 
 STALL_FLOW = 1e-7  # flow below which EPANET's pumps of constant power have stalled [m3/s]
 MAX_SLOPE = 0.99  # rise per length given to pipes for which the file has more than 1
@@ -17,6 +18,7 @@ RISE_TOLERANCE = 1e-9  # of the rise over the length of a pipe
 SUSTAIN_TOLERANCE = 1e-2  # of the head before a PSV [m]
 SET_TOLERANCE = 1e-6  # of set heads and heads of sources [m]
 LOWEST_HEAD = -9.0  # least set pressure of a case: a head of water near vacuum [m]
+GRAVITY_SHARE, SMALL_HEAD = 8e-4, 5e-4  # by which EPANET's gravity is greater; differences below [m] need no note
 NARROW = 1e-3  # diameter below which a closed pipe is a shut valve [m]
 STILL = 1e-6  # velocity below which a pipe counts as still [m/s]
 GRAVITY = part_tables.GRAVITY
@@ -152,7 +154,7 @@ class Translation:
     def move_junction(self, pipe: Link, elevation: dict[str, float]) -> str:
         """Move the lower end of a pipe that is shorter than its rise, else its higher end; return the name, or ""."""
         low, high = sorted((pipe.start, pipe.end), key=elevation.get)
-        if elevation[high] - elevation[low] <= pipe.length * (1.0 + RISE_TOLERANCE):
+        if not is_shorter_than_rise(pipe.length, elevation[low], elevation[high]):
             return ""
         if self.depends_on_pressure(low) or self.depends_on_pressure(high):
             return ""
@@ -254,7 +256,7 @@ class Translation:
         """
         low, high = sorted(self.elevation.get(end, 0.0) for end in (link.start, link.end))
         inside = {link.start, link.end} <= self.elevation.keys()
-        too_steep = inside and high - low > link.length * (1.0 + RISE_TOLERANCE)
+        too_steep = inside and is_shorter_than_rise(link.length, low, high)
         return max(link.length, self.shortest, (high - low) / MAX_SLOPE if too_steep else 0.0)
 
     def spread(self, link: Link, length: float) -> part_tables.Part:
@@ -329,13 +331,15 @@ class Translation:
             return part_tables.valve(ends, diameter, link.minor_loss)
         setting = state[1]
         if kind in ("PRV", "PSV") and self.is_set_too_high(link, setting):
-            word = "an open" if kind == "PRV" else "a shut"
-            self.note(f"{kind} with a set head above every source: imported as {word} valve", link.name)
-            return part_tables.valve(ends, diameter, link.minor_loss, opening=1.0 if kind == "PRV" else 0.0)
+            word = "an open check valve" if kind == "PRV" else "a shut valve"
+            self.note(f"{kind} with a set head above every source: imported as {word}", link.name)
+            if kind == "PRV":
+                return part_tables.check_valve(ends, diameter, link.minor_loss)
+            return part_tables.valve(ends, diameter, 0.0, opening=0.0)
         if kind == "PSV" and self.cannot_sustain(link, setting):
             text = "PSV cannot sustain its pressure, and EPANET lets flow pass (its warning 5)"
-            self.note(f"{text}: imported as an open valve", link.name)
-            return part_tables.valve(ends, diameter, link.minor_loss)
+            self.note(f"{text}: imported as a check valve", link.name)
+            return part_tables.check_valve(ends, diameter, link.minor_loss)
         if kind in part_tables.REGULATING:
             self.note(f"{kind}: EPANET states no time constant, {part_tables.TIME_CONSTANT} is used", link.name)
             return part_tables.regulating(kind, ends, diameter, self.set_point(link, setting), link.minor_loss)
@@ -384,7 +388,7 @@ class Translation:
         greatest = max(self.solution.head[source] for source in sources)
         head = setting / self.gravity + network.nodes[controlled].elevation
         pumps = any(other.kind == "pump" for other in network.links.values())
-        return not pumps and head > greatest + SET_TOLERANCE
+        return not pumps and is_head_above(head, greatest)
 
     def cannot_sustain(self, link: Link, setting: float) -> bool:
         """True if a PSV passes flow in EPANET although the head before it is below its set head."""
@@ -419,6 +423,9 @@ class Translation:
 
     def note_what_is_left(self) -> None:
         """Note what the file has and the case does not."""
+        for link in self.network.links.values():
+            if link.minor_loss and link.kind != "pump" and self.minor_head(link) * GRAVITY_SHARE > SMALL_HEAD:
+                self.note("minor losses by standard gravity, in EPANET by 32.2 ft/s2: 0.08 % more", link.name, True)
         if self.formula == "D-W":
             self.note(
                 "Darcy factor by Colebrook, in EPANET by Swamee and Jain: both factors agree within 3 %", "D-W", True
@@ -428,6 +435,11 @@ class Translation:
                 self.note("leakage of the pipe ([LEAKAGE]) is not imported", link.name, True)
         if self.network.rewritten:
             self.note("pumps in the form of EPANET 1 are read as EPANET 2.2 reads them", "[PUMPS]")
+
+    def minor_head(self, link: Link) -> float:
+        """Minor loss of a link at this hour [m]."""
+        velocity = self.solution.flow[link.name] / (math.pi / 4.0 * link.diameter**2)
+        return link.minor_loss * velocity**2 / (2.0 * GRAVITY)
 
 
 def initial_action(link: Link) -> tuple[Any, ...]:

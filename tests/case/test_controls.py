@@ -1,6 +1,8 @@
 """Controls and formulas of time: each fault has one message with its place and remedy; legal input stays legal."""
 
 import copy
+import cProfile
+import pstats
 import re
 import tomllib
 
@@ -791,3 +793,33 @@ def test_a_case_with_controls_or_formulas_reads_back_as_an_equal_case(block):
     again = fvsolve.load(tomllib.loads(case.resolved()))
     assert again == case
     assert [item.control for item in again.controls.values()] == [item.control for item in case.controls.values()]
+
+
+def calls_to_read(blocks):
+    """Number of function calls that reading a case takes, with as many latches and functions for each, and pipes."""
+    nodes = {f"n{k}": {"type": "junction", "elevation": 0.0, "position": [k, 0.0]} for k in range(60)}
+    nodes["n0"] = {"type": "reservoir", "head": 10.0}
+    links = {f"p{k}": {"type": "pipe", "from": f"n{k}", "to": f"n{k + 1}", "length": 100.0, "diameter": 0.1,
+                       "wave_speed": 1000.0} for k in range(59)}  # fmt: skip
+    controls = {}
+    for k in range(blocks):
+        controls |= {
+            f"set-{k}": {"type": "function", "formula": "0"},
+            f"reset-{k}": {"type": "function", "formula": "t"},
+        }
+        controls[f"b{k}"] = {"type": "latch", "set": f"controls.set-{k}", "reset": f"controls.reset-{k}", "initial": 0}
+        links[f"v{k}"] = {"type": "valve", "from": f"n{k}", "to": f"n{k + 1}", "diameter": 0.1,
+                          "opening": {"control": f"b{k}"}}  # fmt: skip
+    profile = cProfile.Profile()
+    profile.enable()
+    case = fvsolve.load({"schema": 1, "fluid": {"name": "Water"}, "nodes": nodes, "links": links, "controls": controls,
+                         "numerics": {"end": 1.0, "cell_time": 0.01}})  # fmt: skip
+    profile.disable()
+    assert len(case.controls) == 3 * blocks and not case.unread_blocks
+    return pstats.Stats(profile).total_calls
+
+
+def test_the_work_to_read_blocks_is_proportional_to_their_number():
+    """An imported network with 25 latches took minutes: each block searched the whole case, once for each block."""
+    few, twice, many = (calls_to_read(blocks) for blocks in (1, 7, 13))
+    assert many - twice < 1.3 * (twice - few)
