@@ -35,18 +35,10 @@ from measure import SKIPPED, agree, parser
 
 CLOSE, NEAR, SHARE = 1e-3, 1e-2, 0.01  # differences of heads [m], and of flows over the largest flow
 TINY_FLOW = 1e-5  # a smaller largest flow is no measure: closed links of EPANET leak 3e-8 [m3/s]
-# Words of notes that explain a difference from EPANET; other notes are about names, time constants and the like.
-CAUSES = (
-    "heads differ", "flows differ", "differs", "Darcy factor", "constant loss coefficient", "volume curve",
-    "not imported", "contradicts", "lets it", "all day",
-)  # fmt: skip
 DRY = ("dry",)  # marks of a run that explain a difference: EPANET shuts the links of an empty tank
 CLOSURE, CLOSURE_END = (1.0, 5.0), "15 s"  # times between which the largest demand stops [s], end of the run
 ROWS, GRACE = 150, 60.0  # interval of rows of a day [s]; time after a limit to end in order [s]
-STEPS = (
-    10,
-    2,
-)  # of EPANET over a day [s]; the second where the first differs, because EPANET delays switches by a step
+STEPS = (10, 2)  # of EPANET over a day [s]; the second where the first differs, because EPANET delays switches by a step
 HARD = {"EPANET day": 1200.0}  # time limits of stages that have no option [s]
 
 Row = dict[str, Any]
@@ -83,11 +75,6 @@ def lasting(apart: np.ndarray) -> np.ndarray:
     """Differences that hold at two rows in a row: the smaller of each and the next; a single row is kept."""
     apart = np.where(np.isfinite(apart), apart, np.inf)
     return np.minimum(apart[:-1], apart[1:]) if len(apart) > 1 else apart
-
-
-def causes(notes: list) -> list[str]:
-    """Notes of an import that explain a difference from EPANET."""
-    return [f"{text}: {', '.join(names[:3])}" for text, names in notes if any(word in text for word in CAUSES)]
 
 
 def verdict(row: Row) -> str:
@@ -233,7 +220,7 @@ def examine(path: Path, options: Any, record: Record) -> None:
     record.stage("import")
     try:
         imported = timed(record, "import", lambda: imported_network(path))
-        row |= {"import": "ok", "notes": imported.notes, "causes": causes(imported.notes)}
+        row |= {"import": "ok", "notes": imported.notes, "causes": imported.causes}
         record.stage("start")
         case = tomllib.loads(imported.text)
         if theirs is not None:
@@ -326,7 +313,7 @@ def examine_day(path: Path, options: Any, record: Record) -> None:
     try:
         record.stage("day import")
         imported = timed(record, "day import", lambda: imported_network(path, day=True))
-        day |= {"notes": imported.notes, "causes": causes(imported.notes)}
+        day |= {"notes": imported.notes, "causes": imported.causes}
         case = tomllib.loads(imported.text)
         case["output"] = {"every": float(ROWS), "probes": [f"nodes.{name}.head" for name in imported.nodes.values()]}
         record.stage("day")

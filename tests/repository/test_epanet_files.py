@@ -37,7 +37,7 @@ def row(files, heads=None, flows=None, notes=(), warnings=(), dead=("behind",)):
     return {
         "epanet": "ok", "import": "ok", "nodes": len(HEADS), "seconds": {}, "warnings": list(warnings),
         "head": files.worst(HEADS | (heads or {}), HEADS, dead), "flow": flow, "dead": list(dead),
-        "causes": files.causes(notes),
+        "causes": [text for text, _ in notes],
     }  # fmt: skip
 
 
