@@ -203,6 +203,14 @@ class DayTranslation(Translation):
             ends = (ends[0], self.shut_off(link, self.valve_diameter(link), opening))
         return self.set_valve(link, ends, begins)
 
+    def regulating(self, link: Link, ends: tuple[str, str], diameter: float, setting: float) -> part_tables.Part:
+        """Table of a regulating valve that acts at once, as in EPANET, unless another one is next to it."""
+        near = (other for end in (link.start, link.end) for other in self.network.links_at[end])
+        if any(other.kind in part_tables.REGULATING and other.name != link.name for other in near):
+            return super().regulating(link, ends, diameter, setting)
+        set_point = self.set_point(link, setting)
+        return part_tables.regulating(link.kind, ends, diameter, set_point, link.minor_loss, "0 s")
+
     def open_state(self, link: Link) -> Action:
         """State of a valve that begins closed, after an action opens it: active with its setting, or fixed open."""
         opens = {item.action for item in self.statements.get(link.name, []) if item.action[0] != "closed"}
@@ -317,7 +325,7 @@ class DayTranslation(Translation):
         block["initial"] = int(state)
         if not plain:
             block["output"] = [text(item) for item in values]
-        self.controls[ours] = block
+        self.controls[ours] = block | limits(values, text)
         return {"control": ours}
 
     def many_states(
@@ -330,7 +338,8 @@ class DayTranslation(Translation):
             self.controls[latch] = self.latch(latch, actions, item) | {"initial": int(item == value)}
         inputs = {f"on_{k + 1}": f"controls.{latch}" for k, latch in enumerate(names.values())}
         terms = [f"{in_si(item, text)!r}*{own}" for item, own in zip(values, inputs, strict=True)]
-        self.controls[ours] = {"type": "function", "inputs": inputs, "formula": " + ".join(terms)}
+        table = {"type": "function", "inputs": inputs, "formula": " + ".join(terms)}
+        self.controls[ours] = table | limits(values, text)
         return {"control": ours}
 
     def latch(self, ours: str, actions: list[tuple[Clause, float]], value: float) -> part_tables.Part:
@@ -404,6 +413,11 @@ def quantity(unit: str) -> Callable[[float], Any]:
     if unit == "barg":
         return part_tables.gauge_pressure
     return (lambda value: part_tables.quantity_text(value, unit)) if unit else part_tables.rounded_number
+
+
+def limits(values: list[float], text: Callable[[float], Any]) -> part_tables.Part:
+    """Key `limits` of a block with given values, which a case requires for a pressure."""
+    return {"limits": [text(values[0]), text(values[-1])]} if text is part_tables.gauge_pressure else {}
 
 
 def in_si(value: float, text: Callable[[float], Any]) -> float:

@@ -238,13 +238,23 @@ def read_network(path: Path, required_pressure: float = 0.0) -> Network:
 
 def library_2_2() -> str | None:
     """File of EPANET 2.2's library in the package WNTR, which is not imported; None if it is missing."""
+    try:
+        folder = wntr_folder() / "epanet" / "libepanet"
+    except FvsolveError:
+        return None
+    machine = LIBRARY_FOLDERS.get((sys.platform, platform.machine().lower()), "unknown")
+    files = [*(folder / machine).glob("*epanet22.*"), *(folder / machine).glob("*epanet2.*")]
+    return str(files[0]) if files else None
+
+
+def wntr_folder() -> Path:
+    """Folder of the package WNTR. Raises FvsolveError with an installation hint if it is missing."""
     found = importlib.util.find_spec("wntr")
     if found is None or not found.submodule_search_locations:
-        return None
-    folder = Path(found.submodule_search_locations[0]) / "epanet" / "libepanet" / LIBRARY_FOLDERS.get(
-        (sys.platform, platform.machine().lower()), "unknown")  # fmt: skip
-    files = [*folder.glob("*epanet22.*"), *folder.glob("*epanet2.*")]
-    return str(files[0]) if files else None
+        raise FvsolveError(
+            'the package WNTR is not installed; try `pip install "fvsolve[epanet]"`, or `pip install wntr six`'
+        )
+    return Path(found.submodule_search_locations[0])
 
 
 LIBRARY_FOLDERS = {

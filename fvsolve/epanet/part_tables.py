@@ -6,7 +6,7 @@ from typing import Any
 Part = dict[str, Any]
 
 NO_LOSS = 1e-4  # loss coefficient of an open valve without loss in EPANET: a case needs a positive one
-TIME_CONSTANT = "5 s"  # of regulating valves: EPANET has none
+TIME_CONSTANT = "5 s"  # of regulating valves in a run with waves: EPANET has none
 REGULATING = {"PRV": "pressure-reducing", "PSV": "pressure-sustaining", "FCV": "flow-control"}
 DENSITY = 999.563  # EPANET's density of water: 550 ft lbf/s / 8.814 per hp / gravity [kg/m3]
 GRAVITY, AMBIENT = 9.80665, 101325.0  # standard gravity [m/s2], ambient pressure of a case [Pa]
@@ -135,7 +135,9 @@ def check_valve(ends: tuple[str, str], diameter: float, loss: float = 0.0) -> Pa
     return part | {"loss_coefficient": rounded_number(loss or NO_LOSS)}
 
 
-def regulating(kind: str, ends: tuple[str, str], diameter: float, setting: float, loss: float) -> Part:
+def regulating(
+    kind: str, ends: tuple[str, str], diameter: float, setting: float, loss: float, time_constant: str = TIME_CONSTANT
+) -> Part:
     """Table of a regulating valve with diameter [m]; ends : names of the nodes `from` and `to`
 
     kind : "PRV", "PSV" or "FCV"; setting : head of water above the controlled end [m], for "FCV" flow [m3/s]
@@ -146,7 +148,7 @@ def regulating(kind: str, ends: tuple[str, str], diameter: float, setting: float
         part["set_flow"] = quantity_text(setting, "l/s")
     else:
         part["set_pressure"] = gauge_pressure(setting)
-    part |= {"time_constant": TIME_CONSTANT, "diameter": quantity_text(diameter, "mm")}
+    part |= {"time_constant": time_constant, "diameter": quantity_text(diameter, "mm")}
     return part | {"loss_coefficient": rounded_number(loss or NO_LOSS)}
 
 

@@ -341,14 +341,18 @@ class Translation:
             self.note(f"{text}: imported as a check valve", link.name)
             return part_tables.check_valve(ends, diameter, link.minor_loss)
         if kind in part_tables.REGULATING:
-            self.note(f"{kind}: EPANET states no time constant, {part_tables.TIME_CONSTANT} is used", link.name)
-            return part_tables.regulating(kind, ends, diameter, self.set_point(link, setting), link.minor_loss)
+            return self.regulating(link, ends, diameter, setting)
         if kind == "TCV":
             return part_tables.valve(ends, link.diameter, max(setting, link.minor_loss))
         if kind == "PCV":
             share = curve_value(link.curve or [[0.0, 0.0], [1.0, 1.0]], 0.01 * setting)
             return part_tables.valve(ends, diameter, link.minor_loss, opening=share)
         return self.fixed_loss(link, ends, diameter)
+
+    def regulating(self, link: Link, ends: tuple[str, str], diameter: float, setting: float) -> part_tables.Part:
+        """Table of a regulating valve that moves with a time constant."""
+        self.note(f"{link.kind}: EPANET states no time constant, {part_tables.TIME_CONSTANT} is used", link.name)
+        return part_tables.regulating(link.kind, ends, diameter, self.set_point(link, setting), link.minor_loss)
 
     def fixed_loss(self, link: Link, ends: tuple[str, str], diameter: float) -> part_tables.Part:
         """Table of a PBV or GPV: a valve with the constant loss coefficient of this hour."""
@@ -419,7 +423,7 @@ class Translation:
             self.links[self.link_names.new(f"{place}-emitter")] = part_tables.leak(place, node.emitter, exponent)
             if backflow and self.solution.head[name] < node.elevation:
                 text = "emitter above its pressure: EPANET lets it feed the network, here it has no flow"
-                self.note(f"{text} (`EMITTER BACKFLOW NO` in EPANET 2.3), so heads differ", name, True)
+                self.note(f"{text} (`BACKFLOW ALLOWED NO` in EPANET 2.3), so heads differ", name, True)
 
     def note_what_is_left(self) -> None:
         """Note what the file has and the case does not."""
@@ -433,6 +437,11 @@ class Translation:
         for link in self.network.links.values():
             if link.leak_area:
                 self.note("leakage of the pipe ([LEAKAGE]) is not imported", link.name, True)
+        study = {"age": "`fvsolve quality`", "trace": "`fvsolve quality --trace NODE`"}.get(self.option["quality"])
+        if study:
+            self.note(f"water {self.option['quality']} is computed from a run over a day by {study}", "[QUALITY]")
+        elif self.option["quality"] == "chemical":
+            self.note("the chemical and its reactions are not imported", "[QUALITY]")
         if self.network.rewritten:
             self.note("pumps in the form of EPANET 1 are read as EPANET 2.2 reads them", "[PUMPS]")
 

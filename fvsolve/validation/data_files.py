@@ -175,9 +175,9 @@ def network_path(name: str, folder: Path) -> Path:
     """Path of an EPANET file in the working folder, or of a network that WNTR ships, such as "Net3"."""
     if (folder / name).is_file():
         return folder / name
-    from fvsolve.epanet.network_file import wntr
+    from fvsolve.epanet.network_file import wntr_folder
 
-    return Path(wntr().__file__).parent / "library" / "networks" / f"{name}.inp"
+    return wntr_folder() / "library" / "networks" / f"{name}.inp"
 
 
 def merged(base: dict[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:

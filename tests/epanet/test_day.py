@@ -186,13 +186,14 @@ def test_controls_rules_and_tanks_act_as_in_epanet(name, tmp_path):
 
 
 def test_what_has_no_key_is_listed_with_its_number(tmp_path):
-    rules = ("RULE 7\nIF JUNCTION b PRESSURE BELOW 20\nTHEN PUMP lift STATUS IS OPEN\n"
-             "RULE 8\nIF LINK p3 FLOW ABOVE 5\nTHEN PIPE p5 STATUS IS CLOSED")  # fmt: skip
-    _, imported = town(tmp_path, rules=rules, controls="LINK p5 CLOSED IF NODE c ABOVE 30")
+    rules = ("RULE 7\nIF SYSTEM DEMAND ABOVE 20\nTHEN PUMP lift STATUS IS OPEN\n"
+             "RULE 8\nIF TANK tower FILLTIME ABOVE 5\nTHEN PIPE p5 STATUS IS CLOSED")  # fmt: skip
+    _, imported = town(tmp_path, rules=rules)
     found = {name: text for text, names in imported.notes for name in names if text.startswith("not imported")}
-    assert set(found) == {"rule 7", "rule 8", "control 1"}
-    assert "pressure of a junction" in found["rule 7"] and "flow of a link" in found["rule 8"]
+    assert set(found) == {"rule 7", "rule 8"}
+    assert "demand of the whole system" in found["rule 7"] and "filltime of a tank" in found["rule 8"]
     assert "# - not imported, because it acts by the" in imported.text and "rule 7" in imported.text
+    assert len(imported.causes) == 2
 
 
 def test_patterns_are_signals_and_the_command_writes_the_case(tmp_path, fvs):

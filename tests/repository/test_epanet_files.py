@@ -13,7 +13,6 @@ import pytest
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 HEADS = {"a": 50.0, "b": 48.0, "c": 47.0, "behind": -3.0}
 FLOWS = {"p1": 0.020, "p2": -0.005}
-NAMES_ONLY = [["has a different name in fvsolve", ["~a is a"]]]
 CAUSE = [["Darcy factor by Colebrook, in EPANET by Swamee and Jain: both factors agree within 3 %", ["D-W"]]]
 
 
@@ -69,10 +68,10 @@ def test_a_dead_node_is_left_out_and_counted(files):
     assert files.verdict(row(files, heads={"behind": 900.0}, dead=())) == "silent"
 
 
-def test_a_difference_is_named_only_by_a_note_that_explains_it(files):
+def test_a_difference_is_named_only_by_a_cause_that_the_import_names(files):
     wrong = {"c": 40.0}
-    assert files.verdict(row(files, wrong, notes=NAMES_ONLY)) == "silent"
-    named = row(files, wrong, notes=NAMES_ONLY + CAUSE)
+    assert files.verdict(row(files, wrong)) == "silent"
+    named = row(files, wrong, notes=CAUSE)
     assert files.verdict(named) == "named" and files.reason(named).startswith("Darcy factor")
     assert "unbalanced" in files.reason(row(files, wrong, warnings=["unbalanced"]))
     assert files.verdict(row(files, wrong, warnings=["negative pressures"])) == "silent"
