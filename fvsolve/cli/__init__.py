@@ -23,6 +23,7 @@ COMMANDS = dict.fromkeys(("run", "check", "list", "new", "schema", "methods", "c
     "failure-map": "failure_map",
     "fmu": "fmu_command",
     "import": "file_commands",
+    "export": "file_commands",
     "linearise": "linear_commands",
     "loop": "loop_commands",
     "methods": "methods_command",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument, Exit, Option
 
 from fvsolve.case import shipped
-from fvsolve.cli.app import Json, RunDirectory, app, quantity_of
+from fvsolve.cli.app import Json, RunDirectory, Set, SingleCase, app, load_case, quantity_of
 from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.file_replacement import replacing, write_file
@@ -156,6 +156,27 @@ def import_(
         print(f"{text}: {listing(names)}", file=sys.stderr)
     if check:
         _compare(network, to, day)
+
+
+@app.command()
+def export(
+    case: SingleCase,
+    epanet: Annotated[Path | None, Option(metavar="FILE", help="EPANET network (.inp) to write (needed)")] = None,
+    set: Set = [],  # noqa: B006
+) -> None:  # fmt: skip
+    """Export a case as an EPANET network: pipes, pumps, valves, tanks, patterns and controls of levels."""
+    from fvsolve.epanet import network_text
+
+    if epanet is None:
+        raise FvsolveError("--epanet FILE is missing; expected the EPANET network to write, for example town.inp")
+    if epanet.exists():
+        raise FvsolveError(f"{epanet} exists. Give another file: --epanet FILE")
+    text, notes = network_text(load_case(case, set))
+    epanet.parent.mkdir(parents=True, exist_ok=True)
+    write_file(epanet, text)
+    print(epanet)
+    for note in notes:
+        print(note, file=sys.stderr)
 
 
 def _compare(network: "Imported", case: Path, day: bool) -> None:
