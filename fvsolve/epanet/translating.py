@@ -87,6 +87,7 @@ class Translation:
             kind = link.kind if link.kind in ("pipe", "pump") else "valve"
             self.links[self.link_names.given[name]] = getattr(self, kind)(link)
         self.emitters()
+        self.join_parts()
         self.note_what_is_left()
         for names in (self.node_names, self.link_names):
             for name, ours in names.changed().items():
@@ -424,6 +425,28 @@ class Translation:
             if backflow and self.solution.head[name] < node.elevation:
                 text = "emitter above its pressure: EPANET lets it feed the network, here it has no flow"
                 self.note(f"{text} (`BACKFLOW ALLOWED NO` in EPANET 2.3), so heads differ", name, True)
+
+    def join_parts(self) -> None:
+        """Join separate networks of the file by shut valves between their sources, since a case is one network."""
+        network = self.network
+        label = {name: name for name in network.nodes}
+
+        def root(name: str) -> str:
+            while label[name] != name:
+                label[name] = name = label[label[name]]
+            return name
+
+        for link in network.links.values():
+            label[root(link.start)] = root(link.end)
+        sources: dict[str, str] = {}
+        for name, node in network.nodes.items():
+            if node.kind != "junction":
+                sources.setdefault(root(name), name)
+        first, *others = sources.values()
+        for other in others:
+            ends = self.node_names.given[first], self.node_names.given[other]
+            self.links[self.link_names.new("separate")] = part_tables.valve(ends, self.widest, 0.0, opening=0.0)
+            self.note("a separate network: joined to the first by a shut valve", other)
 
     def note_what_is_left(self) -> None:
         """Note what the file has and the case does not."""
