@@ -28,7 +28,7 @@ US_UNITS = range(5)  # codes with lengths in feet
 NODES, LINKS = 0, 2  # of EN_getcount
 DEMAND, HEAD, FLOW, STATUS = 9, 10, 8, 11  # of EN_getnodevalue, EN_getlinkvalue
 JUNCTION, TANK, PUMP, CONSTANT_POWER = 0, 2, 2, 0  # kinds of nodes, links, pumps
-ONE_WAY = (0, PUMP, 3, 4)  # links that water passes from their first node alone: check valves, pumps, PRV, PSV
+DIRECTED = (0, PUMP, 3, 4)  # links that water passes from their first node alone: check valves, pumps, PRV, PSV
 TRIALS, ACCURACY = 0, 1  # of EN_setoption
 DURATION, HYDRAULIC_STEP, REPORT_STEP, REPORT_START, RULE_STEP = 0, 1, 5, 6, 7  # of EN_settimeparam
 NEW_FLOWS = 10  # EN_initH: no file of results, first guess of flows
@@ -142,7 +142,7 @@ class Project:
         self.tanks = [name for name, kind in zip(self.nodes, self.kinds, strict=True) if kind == TANK]
         self.ends = np.array([self.ends_of(k + 1) for k in range(links)]).reshape(-1, 2) - 1
         kinds = np.array([self.integer("EN_getlinktype", k + 1) for k in range(links)], dtype=int)
-        self.one_way = np.isin(kinds, ONE_WAY)
+        self.directed = np.isin(kinds, DIRECTED)
         pumps = np.flatnonzero(kinds == PUMP).tolist()
         self.constant = [k for k in pumps if self.integer("EN_getpumptype", k + 1) == CONSTANT_POWER]
 
@@ -170,7 +170,7 @@ class Project:
         if self.constant:
             opened[self.constant] &= np.abs(self.flows()[self.constant]) > STALLED
         start, end = self.ends[opened].T
-        both = ~self.one_way[opened]
+        both = ~self.directed[opened]
         count, sources = len(self.nodes), np.flatnonzero(self.kinds != JUNCTION)
         rows = np.concatenate((start, end[both], np.full(sources.size, count)))  # the last node feeds all sources
         graph = coo_array((np.ones(rows.size), (rows, np.concatenate((end, start[both], sources)))), 2 * (count + 1,))

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from fvsolve.epanet import part_tables, switching
-from fvsolve.epanet.network_file import Link, Network, Node, Solution
+from fvsolve.epanet.network_file import EpanetLink, EpanetNetwork, EpanetNode, EpanetSolution
 from fvsolve.epanet.switching import DAY, Clause, Source, Statement
 from fvsolve.epanet.translating import NARROW, STALL_FLOW, Translation, initial_action
 
@@ -26,7 +26,7 @@ class DayTranslation(Translation):
     signals, controls : name -> table of the case file; energy : table with prices and efficiencies of pumps
     """
 
-    def __init__(self, network: Network, solution: Solution, end: float = DAY) -> None:
+    def __init__(self, network: EpanetNetwork, solution: EpanetSolution, end: float = DAY) -> None:
         self.signals: dict[str, part_tables.Part] = {}
         self.controls: dict[str, part_tables.Part] = {}
         self.energy: part_tables.Part = {}
@@ -78,7 +78,7 @@ class DayTranslation(Translation):
 
     # nodes --------------------------------------------------------------------------------------------------
 
-    def junction(self, node: Node) -> part_tables.Part:
+    def junction(self, node: EpanetNode) -> part_tables.Part:
         part = part_tables.junction(self.elevation[node.name], 0.0, node.position)
         network = self.network
         amounts = [(base, network.demand_pattern(index)) for base, index in node.demands if base]
@@ -94,10 +94,10 @@ class DayTranslation(Translation):
         self.demands[self.node_names.given[node.name]] = sum(base for base, _ in amounts)
         return part | self.pressure_keys(node, max(base for base, _ in amounts) > 0.0)
 
-    def reservoir(self, node: Node) -> part_tables.Part:
+    def reservoir(self, node: EpanetNode) -> part_tables.Part:
         return super().reservoir(node) | {"head": self.scheduled(node.elevation, node.pattern, "m")}
 
-    def tank(self, node: Node) -> part_tables.Part:
+    def tank(self, node: EpanetNode) -> part_tables.Part:
         part = super().tank(node)
         if node.volume is not None:
             part["area"] = area_table(node.volume)
@@ -115,7 +115,7 @@ class DayTranslation(Translation):
             self.links[self.link_names.new(f"{name}-altitude")] = self.altitude_valve(node, link, (inlet, name))
         return part
 
-    def altitude_valve(self, node: Node, link: Link, ends: tuple[str, str]) -> part_tables.Part:
+    def altitude_valve(self, node: EpanetNode, link: EpanetLink, ends: tuple[str, str]) -> part_tables.Part:
         """Table of the valve that shuts a link at a full or an empty tank, as EPANET does for each link by itself."""
         diameter = link.diameter if link.kind == "pipe" else self.bore(link)
         valve = part_tables.valve(ends, diameter, 0.0) | {"type": "altitude-valve"}
@@ -125,10 +125,10 @@ class DayTranslation(Translation):
 
     # links --------------------------------------------------------------------------------------------------
 
-    def ends(self, link: Link) -> tuple[str, str]:
+    def ends(self, link: EpanetLink) -> tuple[str, str]:
         return tuple(self.inlets.get((end, link.name), self.node_names.given[end]) for end in (link.start, link.end))
 
-    def pipe(self, link: Link) -> part_tables.Part:
+    def pipe(self, link: EpanetLink) -> part_tables.Part:
         ends, ours = self.ends(link), self.link_names.given[link.name]
         if link.check_valve:
             place = self.junction_before_end(link)
@@ -143,7 +143,7 @@ class DayTranslation(Translation):
         del part["wave_speed"]
         return part
 
-    def pump(self, link: Link) -> part_tables.Part:
+    def pump(self, link: EpanetLink) -> part_tables.Part:
         opening, ends = self.opening(link.name), self.ends(link)
         if opening == CLOSED:
             self.note("pump is always off: imported as a shut valve", link.name)
@@ -174,7 +174,7 @@ class DayTranslation(Translation):
             table["demand_charge"] = part_tables.rounded_number(option["demand_charge"])
         return table
 
-    def energy_keys(self, link: Link) -> part_tables.Part:
+    def energy_keys(self, link: EpanetLink) -> part_tables.Part:
         """Keys of a pump with its own efficiency curve and price; the global values replace what is missing."""
         keys: part_tables.Part = {}
         if link.efficiency_curve:
@@ -186,7 +186,7 @@ class DayTranslation(Translation):
         own = link.price or (link.price_pattern and price)
         return keys | {"price": self.scheduled(price, pattern, "")} if own else keys
 
-    def valve(self, link: Link) -> part_tables.Part:
+    def valve(self, link: EpanetLink) -> part_tables.Part:
         kind, begins, own = link.kind, initial_action(link), self.statements.get(link.name, [])
         settings = {action for item in own if (action := item.action)[0] != "closed"} - {begins}
         opening, ends = self.opening(link.name), self.ends(link)
@@ -203,7 +203,7 @@ class DayTranslation(Translation):
             ends = (ends[0], self.shut_off(link, self.valve_diameter(link), opening))
         return self.set_valve(link, ends, begins)
 
-    def regulating(self, link: Link, ends: tuple[str, str], diameter: float, setting: float) -> part_tables.Part:
+    def regulating(self, link: EpanetLink, ends: tuple[str, str], diameter: float, setting: float) -> part_tables.Part:
         """Table of a regulating valve that acts at once, as in EPANET, unless another one is next to it."""
         near = (other for end in (link.start, link.end) for other in self.network.links_at[end])
         if any(other.kind in part_tables.REGULATING and other.name != link.name for other in near):
@@ -211,12 +211,12 @@ class DayTranslation(Translation):
         set_point = self.set_point(link, setting)
         return part_tables.regulating(link.kind, ends, diameter, set_point, link.minor_loss, "0 s")
 
-    def open_state(self, link: Link) -> Action:
+    def open_state(self, link: EpanetLink) -> Action:
         """State of a valve that begins closed, after an action opens it: active with its setting, or fixed open."""
         opens = {item.action for item in self.statements.get(link.name, []) if item.action[0] != "closed"}
         return ("open",) if ("open",) in opens else ("setting", link.setting)
 
-    def set_valve(self, link: Link, ends: tuple[str, str], begins: Action) -> part_tables.Part:
+    def set_valve(self, link: EpanetLink, ends: tuple[str, str], begins: Action) -> part_tables.Part:
         """Table of a valve whose setting follows controls or rules."""
         kind = link.kind
         if kind in part_tables.REGULATING:
@@ -248,7 +248,7 @@ class DayTranslation(Translation):
         part = part_tables.valve(ends, link.diameter, least if kind == "TCV" else link.minor_loss)
         return part | {"opening": self.switched(link.name, "setting", "", opening_of, opening_of(first))}
 
-    def shut_off(self, link: Link, diameter: float, opening: Any) -> str:
+    def shut_off(self, link: EpanetLink, diameter: float, opening: Any) -> str:
         """Add a valve at the end of a link that opens and shuts it; return the junction before the valve."""
         last = self.ends(link)[1]
         place = self.junction_before_end(link)
@@ -299,7 +299,7 @@ class DayTranslation(Translation):
             self.start_values["open", name] = value
         if len(values) == 2:
             return self.two_states(ours, actions, value, sorted(values), text)
-        return self.many_states(ours, actions, value, sorted(values), text)
+        return self.several_states(ours, actions, value, sorted(values), text)
 
     def two_states(
         self, ours: str, actions: list[tuple[Clause, float]], value: float, values: list[float],
@@ -328,7 +328,7 @@ class DayTranslation(Translation):
         self.controls[ours] = block | limits(values, text)
         return {"control": ours}
 
-    def many_states(
+    def several_states(
         self, ours: str, actions: list[tuple[Clause, float]], value: float, values: list[float],
         text: Callable[[float], Any],
     ) -> part_tables.Part:  # fmt: skip
@@ -395,8 +395,8 @@ class DayTranslation(Translation):
             self.note(f"not imported, because it {reason}", label, True)
         return super().notes
 
-    def note_what_is_left(self) -> None:
-        super().note_what_is_left()
+    def note_omissions(self) -> None:
+        super().note_omissions()
         if self.pressure_driven:
             self.note("demands that depend on pressure follow it at once", "PDA")
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from fvsolve.case import text
 from fvsolve.epanet.day import DayTranslation
-from fvsolve.epanet.network_file import Network, Solution, read_network, solution_at
+from fvsolve.epanet.network_file import EpanetNetwork, EpanetSolution, read_network, solution_at
 from fvsolve.epanet.part_tables import DENSITY
 from fvsolve.epanet.switching import DAY
 from fvsolve.epanet.translating import Translation
@@ -36,8 +36,8 @@ class Imported:
     links: dict[str, str]
     notes: list[tuple[str, list[str]]]
     short_pipes: list[str]
-    network: Network
-    solution: Solution
+    network: EpanetNetwork
+    solution: EpanetSolution
     causes: list[str]
 
 
@@ -89,7 +89,7 @@ def cell_time(lengths: list[float], wave_speed: float) -> float:
     return float(f"{max(CELL_TIME, sum(lengths) / wave_speed / MOST_CELLS):.2g}")
 
 
-def _text(path: Path, network: Network, translation: Translation, title: str, closing: list[str]) -> str:
+def _text(path: Path, network: EpanetNetwork, translation: Translation, title: str, closing: list[str]) -> str:
     """Text of the case file; closing : its lines after nodes and links"""
     lines = ["#:schema schema.json", "schema = 1", f"title = {text.inline(title)}"]
     description = " ".join(line.strip() for line in network.title)

@@ -48,7 +48,7 @@ REMEDIES = {
 
 
 @dataclass(frozen=True)
-class Node:
+class EpanetNode:
     """A node of an EPANET file in SI.
 
     kind : "junction", "reservoir" or "tank"; elevation : of a reservoir its head [m]; position : coordinates, or None
@@ -74,7 +74,7 @@ class Node:
 
 
 @dataclass(frozen=True)
-class Link:
+class EpanetLink:
     """A link of an EPANET file in SI.
 
     kind : "pipe", "pump" or the code of a valve; start, end : names of nodes
@@ -109,7 +109,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Network:
+class EpanetNetwork:
     """Contents of an EPANET file in SI.
 
     options, times : as `toolkit_process.contents` names them, times in s
@@ -123,8 +123,8 @@ class Network:
     units: str
     options: dict[str, Any]
     times: dict[str, int]
-    nodes: dict[str, Node]
-    links: dict[str, Link]
+    nodes: dict[str, EpanetNode]
+    links: dict[str, EpanetLink]
     patterns: list[tuple[str, list[float]]]
     controls: list[dict[str, Any]]
     rules: list[dict[str, Any]]
@@ -136,12 +136,12 @@ class Network:
         """True if the units of the file are those of the United States."""
         return self.units in US_UNITS
 
-    def tanks(self) -> list[Node]:
+    def tanks(self) -> list[EpanetNode]:
         """Tanks, without reservoirs."""
         return [node for node in self.nodes.values() if node.kind == "tank"]
 
     @cached_property
-    def links_at(self) -> dict[str, list[Link]]:
+    def links_at(self) -> dict[str, list[EpanetLink]]:
         """Name of a node -> its links."""
         found = defaultdict(list)
         for link in self.links.values():
@@ -160,19 +160,19 @@ class Network:
         """Index of the pattern of a demand: the default pattern of the file for the index 0."""
         return index or self.options["default_pattern"]
 
-    def demand_at(self, node: Node, seconds: float) -> float:
+    def demand_at(self, node: EpanetNode, seconds: float) -> float:
         """Demand of a junction at a time of the run, from its patterns [m3/s]."""
         amounts = (base * self.pattern_at(self.demand_pattern(index), seconds) for base, index in node.demands)
         return self.options["multiplier"] * sum(amounts)
 
 
 @dataclass(frozen=True)
-class Solution:
+class EpanetSolution:
     """EPANET's solution at a time of its run; each dictionary is EPANET's name -> value in SI.
 
     seconds : time [s]; head, demand : of nodes [m], [m3/s], demand with the flow of emitters
     flow, loss : of links [m3/s], [m]; open : of links, True if the link is not closed
-    setting : of valves as in `Link`, relative speed of pumps
+    setting : of valves as in `EpanetLink`, relative speed of pumps
     """
 
     seconds: float
@@ -192,7 +192,7 @@ class EpanetRun:
     version : of EPANET, "2.2" or "2.3"
     """
 
-    solutions: list[Solution]
+    solutions: list[EpanetSolution]
     warnings: list[str]
     unbalanced: int
     cpu_time: float
@@ -204,23 +204,23 @@ def is_installed() -> bool:
     return importlib.util.find_spec("epanet") is not None
 
 
-def read_network(path: Path, required_pressure: float = 0.0) -> Network:
+def read_network(path: Path, required_pressure: float = 0.0) -> EpanetNetwork:
     """Read an EPANET file by EPANET's toolkit.
 
     required_pressure : head of water [m] from which demands are full; below it they depend on pressure, as EPANET's
     PDA with exponent 0.5. With 0 the demands are those of the file.
     Raises FvsolveError with the faults that EPANET finds, each with its line in the file.
     """
-    reply = ask(path, {"contents": True})
+    reply = toolkit_reply(path, {"contents": True})
     table = reply["contents"]
-    nodes = {entry["name"]: Node(**entry) for entry in table["nodes"]}
-    links = {entry["name"]: Link(**entry) for entry in table["links"]}
+    nodes = {entry["name"]: EpanetNode(**entry) for entry in table["nodes"]}
+    links = {entry["name"]: EpanetLink(**entry) for entry in table["links"]}
     if required_pressure:
         table["options"] |= {
             "pressure_driven": True, "minimum_pressure": 0.0, "required_pressure": required_pressure,
             "pressure_exponent": 0.5,
         }  # fmt: skip
-    return Network(
+    return EpanetNetwork(
         path,
         title=[readable(line) for line in table["title"]],
         units=table["units"],
@@ -263,7 +263,7 @@ LIBRARY_FOLDERS = {
 }  # fmt: skip
 
 
-def solution_at(network: Network, hour: float) -> EpanetRun:
+def solution_at(network: EpanetNetwork, hour: float) -> EpanetRun:
     """Run EPANET on the file of a network up to an hour, with all controls and rules; its state at that hour.
 
     Raises FvsolveError if EPANET finds no solution, or has no results at the hour.
@@ -272,7 +272,7 @@ def solution_at(network: Network, hour: float) -> EpanetRun:
     return run_epanet(network, seconds, None, [seconds])
 
 
-def run_epanet(network: Network, end: int, step: int | None, times: list[int]) -> EpanetRun:
+def run_epanet(network: EpanetNetwork, end: int, step: int | None, times: list[int]) -> EpanetRun:
     """Run EPANET on the file of a network.
 
     end : of the run [s]; step : hydraulic step [s], None for that of the file; times : of the solutions [s]
@@ -283,11 +283,11 @@ def run_epanet(network: Network, end: int, step: int | None, times: list[int]) -
         request |= {"required_pressure": network.required_pressure, "pressure_unit": network.options["pressure_unit"]}
     library = library_2_2()
     try:
-        reply, version = ask(network.path, request | {"library": library}), "2.2" if library else "2.3"
+        reply, version = toolkit_reply(network.path, request | {"library": library}), "2.2" if library else "2.3"
     except FvsolveError:  # EPANET 2.2 refuses what is new in 2.3
         if library is None:
             raise
-        reply, version = ask(network.path, request), "2.3"
+        reply, version = toolkit_reply(network.path, request), "2.3"
     result = reply["solutions"][0]
     if "error" in result:
         raise FvsolveError(f"{network.path.name}: EPANET stops: {result['error']}")
@@ -299,15 +299,15 @@ def run_epanet(network: Network, end: int, step: int | None, times: list[int]) -
     return EpanetRun(solutions, reply["warnings"], result["unbalanced"], result["seconds"], version)
 
 
-def _solution(network: Network, seconds: int, row: dict[str, list[float]]) -> Solution:
-    """Solution from lists in the order of nodes and links."""
+def _solution(network: EpanetNetwork, seconds: int, row: dict[str, list[float]]) -> EpanetSolution:
+    """EpanetSolution from lists in the order of nodes and links."""
     nodes, links = network.nodes, network.links
     unit = {"PRV": "pressure", "PSV": "pressure", "PBV": "pressure", "FCV": "flow"}
     factors = {"pressure": network.options["pressure_unit"], "flow": network.options["flow_unit"]}
     setting = {}
     for (name, link), value in zip(links.items(), row["setting"], strict=True):
         setting[name] = value * factors.get(unit.get(link.kind, ""), 1.0)
-    return Solution(
+    return EpanetSolution(
         float(seconds),
         dict(zip(nodes, row["head"], strict=True)),
         dict(zip(nodes, row["demand"], strict=True)),
@@ -318,7 +318,7 @@ def _solution(network: Network, seconds: int, row: dict[str, list[float]]) -> So
     )
 
 
-def ask(path: Path, request: dict[str, Any]) -> dict[str, Any]:
+def toolkit_reply(path: Path, request: dict[str, Any]) -> dict[str, Any]:
     """Reply of EPANET's toolkit to a request on a file, from a process of its own, see `toolkit_process`.
 
     Raises FvsolveError for a missing file or toolkit, for faults of the file, and if EPANET crashes or does not end.

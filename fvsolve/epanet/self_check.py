@@ -8,7 +8,7 @@ import numpy as np
 
 from fvsolve.case import Case
 from fvsolve.epanet.importing import Imported
-from fvsolve.epanet.network_file import Network, Solution, run_epanet
+from fvsolve.epanet.network_file import EpanetNetwork, EpanetSolution, run_epanet
 from fvsolve.epanet.switching import DAY
 from fvsolve.epanet.toolkit_process import NO_HEAD
 from fvsolve.errors import FvsolveError, listing
@@ -76,8 +76,8 @@ class SelfCheck:
                    f"{item.epanet:.6g} {item.unit})")  # fmt: skip
             if item.above:
                 cause = "; ".join(self.causes) or "cause unknown to the importer; please report the file"
-                many = f"{len(item.above)} {item.quantity} differ by more than {item.limit:.2g} {item.unit}"
-                yield f"self-check: {many}: {listing(item.above)}. Cause: {cause}"
+                count = f"{len(item.above)} {item.quantity} differ by more than {item.limit:.2g} {item.unit}"
+                yield f"self-check: {count}: {listing(item.above)}. Cause: {cause}"
             for reason, names in item.left_out.items():
                 yield f"self-check: {len(names)} {item.quantity} are not compared, {reason}: {listing(names)}"
 
@@ -128,7 +128,7 @@ def _compared(
     return Compared(quantity, unit, len(gaps), worst, ours[worst], known[worst], limit, above, skipped, time)
 
 
-def left_out(network: Network, solution: Solution) -> dict[str, list[str]]:
+def left_out(network: EpanetNetwork, solution: EpanetSolution) -> dict[str, list[str]]:
     """Reason -> junctions whose head has no meaning in EPANET: cut off from every source.
 
     Water passes pumps, check valves, PRVs and PSVs in one direction only.
@@ -138,8 +138,8 @@ def left_out(network: Network, solution: Solution) -> dict[str, list[str]]:
     while waiting:
         place = waiting.pop()
         for link in network.links_at[place]:
-            one_way = link.kind in ("pump", "PRV", "PSV") or link.check_valve
-            if not solution.open[link.name] or _is_stalled(link, solution) or (one_way and link.start != place):
+            directed = link.kind in ("pump", "PRV", "PSV") or link.check_valve
+            if not solution.open[link.name] or _is_stalled(link, solution) or (directed and link.start != place):
                 continue
             new = {link.start, link.end} - reached
             reached |= new
@@ -148,7 +148,7 @@ def left_out(network: Network, solution: Solution) -> dict[str, list[str]]:
     return {"since closed links cut them off from every source": dead} if dead else {}
 
 
-def _is_stalled(link: Any, solution: Solution) -> bool:
+def _is_stalled(link: Any, solution: EpanetSolution) -> bool:
     """True if a pump of constant power has no flow, for which it has no head."""
     return link.kind == "pump" and link.power is not None and abs(solution.flow[link.name]) < STALLED
 

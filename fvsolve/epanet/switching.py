@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from fvsolve.epanet.network_file import FOOT, Network, Solution
+from fvsolve.epanet.network_file import FOOT, EpanetNetwork, EpanetSolution
 
 DAY = 86400.0
 PULSE = 1.0  # time for which a condition holds that EPANET states for a moment [s]
@@ -55,7 +55,7 @@ class Statement:
     action: tuple[Any, ...]
 
 
-def statements(network: Network, end: float) -> tuple[list[Statement], list[tuple[str, str]]]:
+def statements(network: EpanetNetwork, end: float) -> tuple[list[Statement], list[tuple[str, str]]]:
     """Actions of all controls and rules, and those that have no form in a case as (reason, name of the control).
 
     end : end of the run [s]. The last of all actions on a link that hold at one time prevails: EPANET applies controls
@@ -81,7 +81,7 @@ def statements(network: Network, end: float) -> tuple[list[Statement], list[tupl
     return found, refused
 
 
-def control_clause(network: Network, control: dict[str, Any], end: float) -> Clause:
+def control_clause(network: EpanetNetwork, control: dict[str, Any], end: float) -> Clause:
     """Clause of a simple control; raises Untranslatable. A level equal to that of the control counts."""
     if control["kind"] == "time":
         return time_clause("=", [float(control["level"])], (0.0, 0.0), end)
@@ -97,7 +97,7 @@ def control_clause(network: Network, control: dict[str, Any], end: float) -> Cla
     raise Untranslatable("acts by the level of a reservoir, which does not follow from the network")
 
 
-def rule_clause(network: Network, premises: list[dict[str, Any]], end: float) -> Clause:
+def rule_clause(network: EpanetNetwork, premises: list[dict[str, Any]], end: float) -> Clause:
     """Clause of the premises of a rule; raises Untranslatable.
 
     EPANET reads the premises in their order: each `AND` begins a new group, and a rule holds if one premise of each
@@ -113,7 +113,7 @@ def rule_clause(network: Network, premises: list[dict[str, Any]], end: float) ->
     return combined(True, [combined(False, group) for group in groups])
 
 
-def premise_clause(network: Network, premise: dict[str, Any], end: float) -> Clause:
+def premise_clause(network: EpanetNetwork, premise: dict[str, Any], end: float) -> Clause:
     """Clause of a premise of a rule; raises Untranslatable."""
     variable, relation, value, name = (premise[key] for key in ("variable", "relation", "value", "name"))
     if premise["object"] == "system":
@@ -139,7 +139,7 @@ def premise_clause(network: Network, premise: dict[str, Any], end: float) -> Cla
     raise Untranslatable(f"acts by the {variable} of a link")
 
 
-def node_clause(network: Network, node: Any, variable: str, relation: str, value: float) -> Clause:
+def node_clause(network: EpanetNetwork, node: Any, variable: str, relation: str, value: float) -> Clause:
     """Clause of a premise on a node, by its level or its head; raises Untranslatable."""
     gravity, length = network.options["gravity"], FOOT if network.us_units else 1.0
     tolerance = RULE_TOLERANCE * (network.options["pressure_unit"] / gravity if variable == "pressure" else length)
@@ -184,7 +184,7 @@ def _comparison(source: Source, relation: str, threshold: float) -> Clause:
     )
 
 
-def daily_moments(network: Network, clock: float, end: float) -> list[float]:
+def daily_moments(network: EpanetNetwork, clock: float, end: float) -> list[float]:
     """Times of the run [s] at which a clock shows a time [s after midnight], from the day before the start."""
     first = (clock - network.times["start_clock"]) % DAY
     return [first + k * DAY for k in range(-1, int(end // DAY) + 2)]
@@ -260,7 +260,7 @@ def within(time: float, intervals: tuple[Interval, ...]) -> bool:
     return any(begin <= time < stop for begin, stop in intervals)
 
 
-def values_at_start(network: Network, solution: Solution) -> Values:
+def values_at_start(network: EpanetNetwork, solution: EpanetSolution) -> Values:
     """Values of all sources at the start of the run, except the states of links, from EPANET's solution at hour 0."""
     values: Values = {("level", tank.name): tank.level for tank in network.tanks()}
     values |= {("head", name): head for name, head in solution.head.items()}

@@ -338,7 +338,7 @@ def solution(tk: Any, project: Any, seconds: int, step: int | None, rows: list[i
     return best | {"rows": [best["rows"].get(at) for at in rows]}
 
 
-def _solved(tk: Any, project: Any, accuracy: float, wanted: set[int]) -> dict[str, Any]:
+def _solved(tk: Any, project: Any, accuracy: float, requested: set[int]) -> dict[str, Any]:
     """Values at times, and the number of times at which EPANET does not reach an accuracy."""
     unit = FlowUnits(tk, project)
     nodes, links = tk.getcount(project, tk.NODECOUNT), tk.getcount(project, tk.LINKCOUNT)
@@ -349,7 +349,7 @@ def _solved(tk: Any, project: Any, accuracy: float, wanted: set[int]) -> dict[st
     while True:
         now = tk.runH(project)
         unbalanced += tk.getstatistic(project, tk.RELATIVEERROR) > accuracy
-        if now in wanted:
+        if now in requested:
             table[now] = _row(tk, project, nodes, links, unit)
         if tk.nextH(project) <= 0:
             break
@@ -482,10 +482,10 @@ def answer(path: str, request: dict[str, Any]) -> dict[str, Any]:
         if request.get("contents"):
             result["contents"] = contents(tk, project)
         result["solutions"] = []
-        for wanted in request.get("solutions", ()):
+        for requested in request.get("solutions", ()):
             begun = time.process_time()
             try:
-                found = solution(tk, project, **wanted)
+                found = solution(tk, project, **requested)
             except Exception as error:
                 found = {"error": str(error)}
             result["solutions"].append(found | {"seconds": time.process_time() - begun})

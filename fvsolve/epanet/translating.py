@@ -5,7 +5,7 @@ import re
 from typing import Any
 
 from fvsolve.epanet import part_tables
-from fvsolve.epanet.network_file import Link, Network, Node, Solution
+from fvsolve.epanet.network_file import EpanetLink, EpanetNetwork, EpanetNode, EpanetSolution
 from fvsolve.errors import listing
 from fvsolve.parts.tolerances import is_head_above, is_shorter_than_rise
 
@@ -63,7 +63,7 @@ class Translation:
     notes : list of (text, EPANET's names)
     """
 
-    def __init__(self, network: Network, solution: Solution, wave_speed: float, shortest: float) -> None:
+    def __init__(self, network: EpanetNetwork, solution: EpanetSolution, wave_speed: float, shortest: float) -> None:
         self.network, self.solution, self.speed, self.shortest = network, solution, wave_speed, shortest
         self.nodes: dict[str, part_tables.Part] = {}
         self.links: dict[str, part_tables.Part] = {}
@@ -88,7 +88,7 @@ class Translation:
             self.links[self.link_names.given[name]] = getattr(self, kind)(link)
         self.emitters()
         self.join_parts()
-        self.note_what_is_left()
+        self.note_omissions()
         for names in (self.node_names, self.link_names):
             for name, ours in names.changed().items():
                 self.note("has a different name in fvsolve", f"{name} is {ours}")
@@ -152,7 +152,7 @@ class Translation:
                 self.note(f"{text}; heads and flows do not change", name)
         return lowered
 
-    def move_junction(self, pipe: Link, elevation: dict[str, float]) -> str:
+    def move_junction(self, pipe: EpanetLink, elevation: dict[str, float]) -> str:
         """Move the lower end of a pipe that is shorter than its rise, else its higher end; return the name, or ""."""
         low, high = sorted((pipe.start, pipe.end), key=elevation.get)
         if not is_shorter_than_rise(pipe.length, elevation[low], elevation[high]):
@@ -173,14 +173,14 @@ class Translation:
         demand = self.pressure_driven and any(base for base, _ in node.demands)
         return node.kind == "junction" and bool(node.emitter or demand)
 
-    def junction(self, node: Node) -> part_tables.Part:
+    def junction(self, node: EpanetNode) -> part_tables.Part:
         demand = self.network.demand_at(node, self.solution.seconds)
         part = part_tables.junction(self.elevation[node.name], demand, node.position)
         if demand:
             self.demands[self.node_names.given[node.name]] = demand
         return part | self.pressure_keys(node, demand > 0.0)
 
-    def pressure_keys(self, node: Node, draws: bool) -> part_tables.Part:
+    def pressure_keys(self, node: EpanetNode, draws: bool) -> part_tables.Part:
         """Keys of a demand that depends on pressure, if it does; draws : True for a demand above 0"""
         if not (self.pressure_driven and draws):
             return {}
@@ -189,12 +189,12 @@ class Translation:
             option["minimum_pressure"], option["required_pressure"], option["pressure_exponent"]
         )
 
-    def reservoir(self, node: Node) -> part_tables.Part:
+    def reservoir(self, node: EpanetNode) -> part_tables.Part:
         text = "EPANET has no elevation of a reservoir; that of the other end of its pipe or pump is used"
         self.note(f"{text}: state `elevation` if vacuum near it matters", node.name)
         return part_tables.reservoir(self.solution.head[node.name], node.position)
 
-    def tank(self, node: Node) -> part_tables.Part:
+    def tank(self, node: EpanetNode) -> part_tables.Part:
         level = node.level if self.solution.seconds == 0.0 else self.solution.head[node.name] - node.elevation
         area = math.pi / 4.0 * node.diameter**2
         if node.volume is not None:
@@ -205,10 +205,10 @@ class Translation:
 
     # links ------------------------------------------------------------------------------------------------
 
-    def ends(self, link: Link) -> tuple[str, str]:
+    def ends(self, link: EpanetLink) -> tuple[str, str]:
         return self.node_names.given[link.start], self.node_names.given[link.end]
 
-    def junction_before_end(self, link: Link) -> str:
+    def junction_before_end(self, link: EpanetLink) -> str:
         """Add a junction without demand before the end of a pipe; return its name."""
         end = self.network.nodes[link.end]
         start = link.start if link.end not in self.elevation else link.end
@@ -216,11 +216,11 @@ class Translation:
         self.nodes[place] = part_tables.junction(self.elevation.get(start, 0.0), 0.0, end.position)
         return place
 
-    def is_shut(self, link: Link) -> bool:
+    def is_shut(self, link: EpanetLink) -> bool:
         """True if a link is closed at the imported hour."""
         return not self.solution.open[link.name]
 
-    def pipe(self, link: Link) -> part_tables.Part:
+    def pipe(self, link: EpanetLink) -> part_tables.Part:
         start, end = self.ends(link)
         if link.diameter < NARROW and self.is_shut(link):
             return self.narrow(link, (start, end))
@@ -236,12 +236,12 @@ class Translation:
             end = place
         return self.pipe_table(link, (start, end))
 
-    def narrow(self, link: Link, ends: tuple[str, str]) -> part_tables.Part:
+    def narrow(self, link: EpanetLink, ends: tuple[str, str]) -> part_tables.Part:
         """Table of a closed pipe that stands for a pipe to be designed, with a diameter of almost 0: a shut valve."""
         self.note(f"closed pipe narrower than {1e3 * NARROW:g} mm: imported as a shut valve", link.name)
         return part_tables.valve(ends, NARROW, 0.0, opening=0.0)
 
-    def pipe_table(self, link: Link, ends: tuple[str, str]) -> part_tables.Part:
+    def pipe_table(self, link: EpanetLink, ends: tuple[str, str]) -> part_tables.Part:
         """Table of a pipe between two nodes of the case, lengthened if it is too short."""
         law = part_tables.friction(self.formula, link.roughness)
         length = self.lengths[link.name] = self.length(link)
@@ -250,7 +250,7 @@ class Translation:
             self.note(f"lengthened to {length:.4g} m; the friction loss is that of the original length", link.name)
         return part_tables.pipe(ends, length, link.diameter, law, link.minor_loss, self.speed)
 
-    def length(self, link: Link) -> float:
+    def length(self, link: EpanetLink) -> float:
         """Length of a pipe in the case [m], at least `shortest`.
 
         A pipe that is shorter than its rise gets at least the length rise / MAX_SLOPE.
@@ -260,7 +260,7 @@ class Translation:
         too_steep = inside and is_shorter_than_rise(link.length, low, high)
         return max(link.length, self.shortest, (high - low) / MAX_SLOPE if too_steep else 0.0)
 
-    def spread(self, link: Link, length: float) -> part_tables.Part:
+    def spread(self, link: EpanetLink, length: float) -> part_tables.Part:
         """Table of the friction of a lengthened pipe, which keeps the friction loss of its original length.
 
         length : length of the pipe in the case [m]
@@ -273,7 +273,7 @@ class Translation:
             return part_tables.friction("C-M", link.roughness * math.sqrt(ratio))
         return part_tables.darcy(ratio * self.darcy_factor(link))
 
-    def darcy_factor(self, link: Link) -> float:
+    def darcy_factor(self, link: EpanetLink) -> float:
         """Darcy factor of a pipe from EPANET's loss at this hour; that of rough flow for a pipe without flow."""
         velocity = abs(self.solution.flow[link.name]) / (math.pi / 4.0 * link.diameter**2)
         loss = abs(self.solution.loss[link.name]) - link.minor_loss * velocity**2 / (2.0 * GRAVITY)
@@ -281,7 +281,7 @@ class Translation:
             return loss * link.diameter * 2.0 * GRAVITY / (link.length * velocity**2)
         return (2.0 * math.log10(3.7 * link.diameter / max(link.roughness, LEAST_ROUGHNESS))) ** -2
 
-    def pump(self, link: Link) -> part_tables.Part:
+    def pump(self, link: EpanetLink) -> part_tables.Part:
         if self.is_shut(link):
             self.note("pump is off at this hour: imported as a shut valve", link.name)
             return part_tables.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
@@ -289,22 +289,22 @@ class Translation:
             return self.stalled(link, self.ends(link))
         return part_tables.pump(self.ends(link), self.head_law(link), self.solution.setting[link.name])
 
-    def stalled(self, link: Link, ends: tuple[str, str]) -> part_tables.Part:
+    def stalled(self, link: EpanetLink, ends: tuple[str, str]) -> part_tables.Part:
         """Table of a pump of constant power that has no flow in EPANET: a shut valve."""
         text = "pump of constant power has zero flow in EPANET, which contradicts its power"
         self.note(f"{text}: imported as a shut valve", link.name, True)
         return part_tables.valve(ends, self.bore(link), 0.0, opening=0.0)
 
-    def head_law(self, link: Link) -> part_tables.Part:
+    def head_law(self, link: EpanetLink) -> part_tables.Part:
         """Key with the head law of a pump at full speed."""
         if link.power is not None:
             return part_tables.power(self.gravity * link.power)
         return part_tables.curve(link.curve or [])
 
-    def valve(self, link: Link) -> part_tables.Part:
+    def valve(self, link: EpanetLink) -> part_tables.Part:
         return self.valve_table(link, self.ends(link), self.valve_state(link))
 
-    def valve_state(self, link: Link) -> tuple[Any, ...]:
+    def valve_state(self, link: EpanetLink) -> tuple[Any, ...]:
         """State of a valve at the hour, as an action: ("closed",), ("open",) or ("setting", value)."""
         setting, begins = self.solution.setting[link.name], initial_action(link)
         if self.solution.seconds == 0.0 and not self.is_controlled(link):
@@ -315,14 +315,14 @@ class Translation:
             return ("closed",) if self.is_shut(link) else ("open",)
         return ("setting", setting)
 
-    def is_controlled(self, link: Link) -> bool:
+    def is_controlled(self, link: EpanetLink) -> bool:
         """True if a control or rule acts on a link."""
         network = self.network
         acted = {control["link"] for control in network.controls}
         acted |= {name for rule in network.rules for name, _ in (*rule["then"], *rule["else"])}
         return link.name in acted
 
-    def valve_table(self, link: Link, ends: tuple[str, str], state: tuple[Any, ...]) -> part_tables.Part:
+    def valve_table(self, link: EpanetLink, ends: tuple[str, str], state: tuple[Any, ...]) -> part_tables.Part:
         """Table of a valve between two nodes of the case; state : as from `valve_state`"""
         kind, diameter = link.kind, self.valve_diameter(link)
         if state[0] == "closed":
@@ -350,12 +350,12 @@ class Translation:
             return part_tables.valve(ends, diameter, link.minor_loss, opening=share)
         return self.fixed_loss(link, ends, diameter)
 
-    def regulating(self, link: Link, ends: tuple[str, str], diameter: float, setting: float) -> part_tables.Part:
+    def regulating(self, link: EpanetLink, ends: tuple[str, str], diameter: float, setting: float) -> part_tables.Part:
         """Table of a regulating valve that moves with a time constant."""
         self.note(f"{link.kind}: EPANET states no time constant, {part_tables.TIME_CONSTANT} is used", link.name)
         return part_tables.regulating(link.kind, ends, diameter, self.set_point(link, setting), link.minor_loss)
 
-    def fixed_loss(self, link: Link, ends: tuple[str, str], diameter: float) -> part_tables.Part:
+    def fixed_loss(self, link: EpanetLink, ends: tuple[str, str], diameter: float) -> part_tables.Part:
         """Table of a PBV or GPV: a valve with the constant loss coefficient of this hour."""
         flow, kind = self.solution.flow[link.name], link.kind
         drop = self.solution.head[link.start] - self.solution.head[link.end]
@@ -367,12 +367,12 @@ class Translation:
             return part_tables.valve(ends, link.diameter, part_tables.loss_coefficient(abs(drop), flow, link.diameter))
         return part_tables.valve(ends, diameter, link.minor_loss)
 
-    def bore(self, link: Link) -> float:
+    def bore(self, link: EpanetLink) -> float:
         """Diameter [m] of the widest pipe at the ends of a link; of the network if there is no pipe."""
         near = (other for end in (link.start, link.end) for other in self.network.links_at[end])
         return max((other.diameter for other in near if other.kind == "pipe"), default=self.widest)
 
-    def valve_diameter(self, link: Link) -> float:
+    def valve_diameter(self, link: EpanetLink) -> float:
         """Diameter of a valve in the case [m]: that of the widest adjacent pipe, unless it has a loss coefficient.
 
         In EPANET an open valve without loss coefficient has no loss, whatever its diameter.
@@ -386,7 +386,7 @@ class Translation:
             )
         return widest
 
-    def is_set_too_high(self, link: Link, setting: float) -> bool:
+    def is_set_too_high(self, link: EpanetLink, setting: float) -> bool:
         """True if the head set for a PRV or PSV exceeds the heads of all sources, in a network without pumps."""
         network, controlled = self.network, getattr(link, REGULATED_END[link.kind])
         sources = [name for name, node in network.nodes.items() if node.kind != "junction"]
@@ -395,13 +395,13 @@ class Translation:
         pumps = any(other.kind == "pump" for other in network.links.values())
         return not pumps and is_head_above(head, greatest)
 
-    def cannot_sustain(self, link: Link, setting: float) -> bool:
+    def cannot_sustain(self, link: EpanetLink, setting: float) -> bool:
         """True if a PSV passes flow in EPANET although the head before it is below its set head."""
         head = setting / self.gravity + self.network.nodes[link.start].elevation
         below = self.solution.head[link.start] < head - SUSTAIN_TOLERANCE
         return below and self.solution.flow[link.name] > STALL_FLOW
 
-    def set_point(self, link: Link, setting: float) -> float:
+    def set_point(self, link: EpanetLink, setting: float) -> float:
         """Set point of a valve: head of water above the controlled end [m], or flow [m3/s] of an FCV.
 
         The head is corrected if the import moves the elevation of that end.
@@ -448,7 +448,7 @@ class Translation:
             self.links[self.link_names.new("separate")] = part_tables.valve(ends, self.widest, 0.0, opening=0.0)
             self.note("a separate network: joined to the first by a shut valve", other)
 
-    def note_what_is_left(self) -> None:
+    def note_omissions(self) -> None:
         """Note what the file has and the case does not."""
         for link in self.network.links.values():
             if link.minor_loss and link.kind != "pump" and self.minor_head(link) * GRAVITY_SHARE > SMALL_HEAD:
@@ -468,13 +468,13 @@ class Translation:
         if self.network.rewritten:
             self.note("pumps in the form of EPANET 1 are read as EPANET 2.2 reads them", "[PUMPS]")
 
-    def minor_head(self, link: Link) -> float:
+    def minor_head(self, link: EpanetLink) -> float:
         """Minor loss of a link at this hour [m]."""
         velocity = self.solution.flow[link.name] / (math.pi / 4.0 * link.diameter**2)
         return link.minor_loss * velocity**2 / (2.0 * GRAVITY)
 
 
-def initial_action(link: Link) -> tuple[Any, ...]:
+def initial_action(link: EpanetLink) -> tuple[Any, ...]:
     """State of a link before hour 0, as an action: ("closed",), ("open",) or ("setting", value)."""
     if link.status == "closed" or (link.kind == "pump" and link.setting == 0.0):
         return ("closed",)
