@@ -327,6 +327,10 @@ class Device(Restriction):
         """Name of a further link that the device opens and closes; None for none."""
         return None
 
+    def held_end(self, part: Any) -> str | None:
+        """End at which the restriction may hold the pressure at once, "from" or "to"; "" for its flow, None for none."""
+        return None
+
     def sensed(self, part: Any) -> tuple[tuple[str, float], ...]:
         """Places that the part only senses, at most two, each with its weight in the pressure that lifts its valve."""
         return ()

@@ -23,24 +23,49 @@ def inner_row(nodes, i):
 
 
 @njit
-def find_connected(cluster, tables, g, connected):
-    """Set connected[i] to 1 if open valves join node i of a cluster to a pipe or to a known pressure, else to 0."""
+def root_of(group, i):
+    """Number of the first node of the group of node i; each entry of `group` is a node nearer to it, or the node."""
+    while group[i] != i:
+        group[i] = group[int(group[i])]
+        i = int(group[i])
+    return i
+
+
+@njit
+def join(group, i, j):
+    """Join the groups of the nodes i and j; a group has the number of its first node."""
+    i, j = root_of(group, i), root_of(group, j)
+    group[max(i, j)] = min(i, j)
+
+
+@njit
+def find_connected(cluster, tables, g, connected, group):
+    """Set connected[i] to 1 if open valves join node i of a cluster to a pipe or to a known pressure, else to 0.
+
+    group : float64[nodes]  work array
+    """
     nodes, valves, integers = tables.nodes, tables.valves, tables.integers
+    for i in range(group.size):
+        group[i] = i
+    for e in range(g.size):
+        if g[e] > 0.0:
+            valve = valves[integers[cluster["first_valve"] + e]]
+            i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+            if i >= 0 and j >= 0:
+                join(group, i, j)
     for i in range(connected.size):
-        connected[i] = 1.0 if nodes[integers[cluster["first_node"] + i]]["admittance"] > 0.0 else 0.0
-    for _ in range(connected.size):
-        changed = False
-        for e in range(g.size):
-            if g[e] > 0.0:
-                valve = valves[integers[cluster["first_valve"] + e]]
-                i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
-                from_connected = i < 0 or connected[i] > 0.0
-                to_connected = j < 0 or connected[j] > 0.0
-                if from_connected != to_connected:
-                    connected[j if from_connected else i] = 1.0
-                    changed = True
-        if not changed:
-            return
+        connected[i] = 0.0
+    for i in range(connected.size):
+        if nodes[integers[cluster["first_node"] + i]]["admittance"] > 0.0:
+            connected[root_of(group, i)] = 1.0
+    for e in range(g.size):
+        if g[e] > 0.0:
+            valve = valves[integers[cluster["first_valve"] + e]]
+            i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+            if (i < 0) != (j < 0):
+                connected[root_of(group, max(i, j))] = 1.0
+    for i in range(connected.size):
+        connected[i] = connected[root_of(group, i)]
 
 
 @njit
@@ -52,20 +77,21 @@ def total_pressure(tables, out, i):
 
 
 @njit
-def leak_balance(cluster, tables, out, g, group, number, level):
+def leak_balance(cluster, tables, out, leaks, group, number, level):
     """(sum of sqrt|dP| of the leaks into a group of isolated nodes, least, greatest potential outside the group [Pa]).
 
     The group has the potential `level` [Pa]. dP is the drop of a closed valve between the group and another node;
     outflow counts as negative. The potentials are those of the nodes behind these valves.
+    leaks : numbers in the cluster of closed valves, all those at isolated nodes
     """
     nodes, valves, integers = tables.nodes, tables.valves, tables.integers
     total, low, high = 0.0, 1e300, -1e300
-    for e in range(g.size):
-        valve = valves[integers[cluster["first_valve"] + e]]
+    for k in range(leaks.size):
+        valve = valves[integers[cluster["first_valve"] + int(leaks[k])]]
         i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
         from_inside = i >= 0 and group[i] == number
         to_inside = j >= 0 and group[j] == number
-        if g[e] == 0.0 and from_inside != to_inside:
+        if from_inside != to_inside:
             other = total_pressure(tables, out, valve["to_node"] if from_inside else valve["from_node"])
             low, high = min(low, other), max(high, other)
             leak = sqrt(abs(other - level))
@@ -79,32 +105,52 @@ def group_by_open_valves(cluster, tables, g, group):
     nodes, valves, integers = tables.nodes, tables.valves, tables.integers
     for i in range(group.size):
         group[i] = i
-    for _ in range(group.size):
-        for e in range(g.size):
+    for e in range(g.size):
+        if g[e] < 0.0:  # open, but isolated
             valve = valves[integers[cluster["first_valve"] + e]]
             i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
-            if g[e] < 0.0 and i >= 0 and j >= 0:  # open, but isolated
-                group[i] = group[j] = min(group[i], group[j])
+            if i >= 0 and j >= 0:
+                join(group, i, j)
+    for i in range(group.size):
+        group[i] = root_of(group, i)
 
 
 @njit
-def isolated_pressures(cluster, tables, out, g, connected, group):
-    """Set the pressures of isolated nodes of a cluster by bisection, group by group until no pressure changes."""
+def closed_at_isolated(cluster, tables, g, connected, work):
+    """Write the numbers in the cluster of the closed valves at its isolated nodes to `work`; returns their count."""
+    nodes, valves, integers, count = tables.nodes, tables.valves, tables.integers, 0
+    for e in range(g.size):
+        if g[e] == 0.0:
+            valve = valves[integers[cluster["first_valve"] + e]]
+            i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+            if (i >= 0 and connected[i] == 0.0) or (j >= 0 and connected[j] == 0.0):
+                work[count] = e
+                count += 1
+    return count
+
+
+@njit
+def isolated_pressures(cluster, tables, out, g, connected, group, work):
+    """Set the pressures of isolated nodes of a cluster by bisection, group by group until no pressure changes.
+
+    work : float64[valves]  work array
+    """
     layout, integers = tables.layout[0], tables.integers
     group_by_open_valves(cluster, tables, g, group)
+    leaks = work[: closed_at_isolated(cluster, tables, g, connected, work)]
     for _ in range(200):
         greatest = 0.0
         for number in range(group.size):
             if connected[number] > 0.0 or group[number] != number:
                 continue
-            _, low, high = leak_balance(cluster, tables, out, g, group, number, 0.0)
+            _, low, high = leak_balance(cluster, tables, out, leaks, group, number, 0.0)
             if low > high:
                 continue
             for _ in range(100):
                 level = 0.5 * (low + high)
                 if level <= low or level >= high:
                     break
-                if leak_balance(cluster, tables, out, g, group, number, level)[0] > 0.0:
+                if leak_balance(cluster, tables, out, leaks, group, number, level)[0] > 0.0:
                     low = level
                 else:
                     high = level
@@ -119,15 +165,17 @@ def isolated_pressures(cluster, tables, out, g, connected, group):
 
 
 @njit
-def check_demand(cluster, tables, out, c, connected, group, scale):
+def check_demand(cluster, tables, out, c, connected, group, scale, work):
     """Set STATUS to NO_SOLUTION if a group of isolated nodes has a demand.
 
     c : given inflow of the nodes [kg/s]; scale : flow relative to which a demand counts as rounding [kg/s]
+    work : float64[nodes]  work array
     """
+    for i in range(group.size):
+        work[i] = 0.0
+    for i in range(group.size):
+        work[int(group[i])] += c[i]
     for number in range(group.size):
-        total = 0.0
-        for i in range(group.size):
-            if group[i] == number:
-                total += c[i]
-        if connected[number] == 0.0 and group[number] == number and abs(total) > DEMAND_ROUNDING * scale:
+        isolated = connected[number] == 0.0 and group[number] == number
+        if isolated and abs(work[number]) > DEMAND_ROUNDING * scale:
             out[STATUS], out[WHERE] = NO_SOLUTION, tables.integers[cluster["first_node"] + number]

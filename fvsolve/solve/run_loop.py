@@ -103,6 +103,8 @@ class RunLoop:
         control["step_max"] = longest_step(model)
         control["stop_at"], control["allow_fused"] = NO_LIMIT, fused_allowed
         control["has_jumps"] = model.tables.delays.size > 0
+        # without waves nothing is fast after a switch: the error of the next step limits its length
+        control["keeps_step"] = model.shapes.accepted > 0 and not len(model.tables.pipes)
         set_step_mode(control, numerics)
         if numerics.method == automatic.AUTO:
             automatic.watch(stepper, structure())

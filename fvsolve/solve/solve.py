@@ -26,7 +26,7 @@ FIRST_CHUNK = 1000.0  # steps before the first pause
 # A run under error control ends if this count of attempted steps advances by less than this fraction of the run.
 STALLED_ATTEMPTS, STALLED_ADVANCE = 2000, 1e-10
 FREQUENT_CHECK_STEPS = loop_records.GROWTH_CHECK_STEPS
-PERSISTENT = ("extremes", "envelope", "maxima", "marks", "armed", "discrete")
+PERSISTENT = ("extremes", "envelope", "maxima", "marks", "armed", "discrete", "accepted")
 HISTORIES = ("past", "histories")  # arrays that may grow during a run
 
 

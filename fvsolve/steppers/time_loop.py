@@ -305,7 +305,7 @@ def finish_last_step(handle, r):
         set_flags(r.g, r.armed)
         forget_pace(r)
         progress["switch_pending"], progress["phase"] = 0, rec.FRESH
-        if control["mode"] == rec.TOLERANCE:
+        if control["mode"] == rec.TOLERANCE and control["keeps_step"] == 0:
             state["step"] = 0.0
         discard_stages(r)
         return rec.SWITCHED
@@ -479,7 +479,7 @@ def try_step(handle, run, r, h, last, due, now, new, near_kink):
         return e, h, last
     if found:
         progress["event_known"] = 0
-        state["step"], state["split_remainder"] = 0.0, 0.0
+        state["step"], state["split_remainder"] = state["step"] * r.control[0]["keeps_step"], 0.0
         last = last and state["t"] + length >= r.control[0]["end"]
         e = error_with_ledger(r, length, e)
     return nan if has_faulty_stage(r) else e, length, last
