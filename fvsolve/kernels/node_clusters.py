@@ -55,6 +55,7 @@ from fvsolve.kernels.table_handle import open_tables
 BAR = 1e5
 ROUNDING = 1e-15  # relative rounding of pressures; of a flow, relative to the flow at 1 Pa
 NEARLY_CONVERGED = 1e-9  # relative change of Newton below which it may be rounding
+QUADRATIC, STAGNANT = 1e-4, 1e-7  # ratio of quadratic steps; relative change below which a constant one is rounding
 FIRST_RISE = 1e4  # greatest change of a pressure in the first limited step of Newton [Pa]
 NOT_BALANCED = 1e300  # in place of a change of Newton: the step was limited
 LEAST_RISE = 1e-9  # least limit of such a step [Pa]
@@ -174,6 +175,18 @@ def add_valve(i, j, places, m, a, s, lift, matrix, right):
     if i >= 0 and j >= 0:
         matrix[places[2]] -= s
         matrix[places[3]] -= s + lift
+
+
+@njit(forceinline=True)
+def has_settled(change, last_change):
+    """True if the iteration of a cluster with quasi-steady pipes has converged: its changes are rounding, or will be.
+
+    After a step that is as short, and as much shorter than the last, Newton's next step is rounding. The flow of a
+    valve with hardly any loss changes by the rounding of pressures: it no longer falls.
+    """
+    if change <= NEARLY_CONVERGED and change <= QUADRATIC * last_change:
+        return True
+    return has_converged(change, last_change) or (change <= STAGNANT and change >= 0.999 * last_change)
 
 
 @njit
@@ -867,7 +880,7 @@ def solve_cluster(out, tables, index):
         change, flows, _ = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, limits, rest)
         if bracketed and flows <= STEEP_CHANGE:  # at a drop of zero a flow changes with the last digits of a pressure
             change, flows = 0.0, 0.0
-        if has_converged(change, last_change):
+        if has_settled(change, last_change) if cluster["order"] >= 0 else has_converged(change, last_change):
             if not (wide and has_backflow(cluster, tables, m)):
                 break
             change, flows, wide = 1e300, 1e300, False

@@ -129,6 +129,7 @@ def steady_profile(draft) -> dict[str, Any]:
     start.fill_valves()
     for (_, part, device), row in zip(draft.devices, draft.device_table, strict=True):
         start.moving += device.begin(start, part, row)
+        draft.start_flags |= device.flags_at_start(start, part, row)
     probe_offsets(draft, start)
     unsteady = add_terms(draft)
     return {**start.report(), "unsteady": unsteady, "creep": limit_creep_step(draft, unsteady)}

@@ -36,7 +36,9 @@ def classify_nodes(draft) -> None:
         own = couples.get(root, [])
         valves["chained"][ks] = valves["chained"][ks].any() if ks else 0
         valves["flow_given"][ks] = len(ks) == 1 and not own and not nodes["admittance"][members[root]].any()
-        if not has_single_root(draft, members[root], ks, own):
+        if has_single_root(draft, members[root], ks, own):
+            refuse_holds(draft, [k for k in ks if held_end(draft, k) is not None])
+        else:
             clusters.append(add_cluster(draft, members[root], ks, own))
     fixed = ~inner[valves["from_node"]] & ~inner[valves["to_node"]]
     fixed[list(sensed)] = False
@@ -144,6 +146,7 @@ def add_cluster(draft, members, ks, own) -> tuple[int, ...]:
         order = len(draft.integers)
         draft.integers += matrix.integers()
         size = max(matrix.size, n * n if n <= FULL_MATRIX else 0)
+        refuse_shared_nodes(draft, holds)
         for k in holds:
             held += add_hold(draft, matrix, k, holds[k])
     else:
@@ -180,6 +183,22 @@ def refuse_holds(draft, holds) -> None:
         text = "0 s: the valve acts at once, which needs pipes without waves at its junctions"
         draft.fault(f"links.{draft.valve_names[k]}.time_constant",
                     f'{text}; expected a time above 0 s, or pipe_model = "quasi-steady"')  # fmt: skip
+
+
+def refuse_shared_nodes(draft, holds) -> None:
+    """Add a fault for each valve at whose ends another valve holds the pressure; holds : as for `SparseMatrix`"""
+    names, valves, of_node = list(draft.case.places), draft.valve_table, {}
+    for k in (k for k, end in holds.items() if end):
+        node, name = int(valves[k][f"{holds[k]}_node"]), draft.valve_names[k]
+        if node in of_node:
+            text = f"{of_node[node]} and {name} both hold the pressure at {names[node]} at once"
+            draft.fault(f"links.{name}", f"{text}; expected one such valve, or a time_constant above 0 s")
+        of_node.setdefault(node, name)
+    for k in (k for k, end in holds.items() if end):
+        node, name = int(valves[k]["to_node" if holds[k] == "from" else "from_node"]), draft.valve_names[k]
+        if of_node.get(node, name) != name:
+            text = f"its end {names[node]} is where {of_node[node]} holds the pressure at once"
+            draft.fault(f"links.{name}", f"{text}; expected a pipe between both, or a time_constant above 0 s")
 
 
 class SparseMatrix:

@@ -225,6 +225,9 @@ class CheckValveRows(Device, kind="check-valve"):
         start.shut |= {k} if shuts else set()
         return shuts
 
+    def flags_at_start(self, start, part, row) -> dict[int, bool]:
+        return {int(row["event"]): int(row["valve"]) in start.shut}
+
 
 class SlamCurveRows(CheckValveRows, kind=""):
     """Conversion to table rows of check valves that shut at the reverse velocity of their manufacturer's curve."""
@@ -239,6 +242,9 @@ class SlamCurveRows(CheckValveRows, kind=""):
 
     def scales(self, draft, name, part) -> list[float]:
         return [1.0, 1.0]
+
+    def flags_at_start(self, start, part, row) -> dict[int, bool]:
+        return {}
 
     def apply_event(self, run_data, row, t, y, scale) -> None:
         o, at, curve = row["y"], row["event"], run_data.model.case.conduits[self.name(run_data, row)].deceleration
@@ -577,8 +583,12 @@ class AtOnce:
         valve["drive"] = NOT_HELD if not active else 0.0 if self.end else self.set_value(start, k)
         if not shut and not active and valve["transition"] == 0.0:
             valve["drop"] = abs(valve["flow"]) * valve["flow"] / valve["open"]
-        draft.start_flags |= {int(row["event"]): shut, int(row["event"]) + 2: not shut and not active}
         return []
+
+    def flags_at_start(self, start, part, row) -> dict[int, bool]:
+        k, at = int(row["valve"]), int(row["event"])
+        return {at + law_at_once.SHUT: k in start.shut,
+                at + law_at_once.FULL: k not in start.shut and self.steady_mode(start, k) == OPEN}  # fmt: skip
 
 
 class ReducingAtOnce(AtOnce, PressureReducingRows, kind=""):
