@@ -328,7 +328,7 @@ class Device(Restriction):
         return None
 
     def held_end(self, part: Any) -> str | None:
-        """End at which its restriction may hold the pressure at once, "from" or "to"; "" for its flow, None for none."""
+        """End at which its valve may hold the pressure at once, "from" or "to"; "" for its flow, None for nothing."""
         return None
 
     def sensed(self, part: Any) -> tuple[tuple[str, float], ...]:

@@ -2,6 +2,8 @@
 
 No flow passes there, so any pressure would satisfy the balance. The pressure chosen is that at which equal small leaks
 would balance: sum of sqrt|dP| over the closed valves, each with the sign of its drop dP, is zero. P = p + rho g z.
+A demand draws the pressure below, and an inflow drives it above, those behind all closed valves, so that check valves
+open; if none opens, the demand cannot be supplied.
 
 Arguments common to these functions: `cluster`, row of a cluster (nodes that are solved together); g : conductances of
 its valves [kg2/s2/Pa], 0 if closed, -1 if open at isolated nodes; connected : 0 for its isolated nodes; group : group
@@ -14,6 +16,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import JUNCTION, NO_SOLUTION, STATUS, WHERE
 
 DEMAND_ROUNDING = 1e-9  # relative demand that an isolated node may have: rounding
+DRAWN = 1e4  # pressure by which a demand lowers the pressure of isolated nodes below those behind closed valves [Pa]
 
 
 @njit(forceinline=True)
@@ -130,13 +133,12 @@ def closed_at_isolated(cluster, tables, g, connected, work):
 
 
 @njit
-def isolated_pressures(cluster, tables, out, g, connected, group, work):
+def isolated_pressures(cluster, tables, out, g, connected, group, totals, scale, work):
     """Set the pressures of isolated nodes of a cluster by bisection, group by group until no pressure changes.
 
-    work : float64[valves]  work array
+    group, totals : results of `isolated_inflows`; scale : as for `check_demand`; work : float64[valves]  work array
     """
-    layout, integers = tables.layout[0], tables.integers
-    group_by_open_valves(cluster, tables, g, group)
+    layout, integers, least = tables.layout[0], tables.integers, DEMAND_ROUNDING * scale
     leaks = work[: closed_at_isolated(cluster, tables, g, connected, work)]
     for _ in range(200):
         greatest = 0.0
@@ -154,6 +156,9 @@ def isolated_pressures(cluster, tables, out, g, connected, group, work):
                     low = level
                 else:
                     high = level
+            if abs(totals[number]) > least:
+                _, low, high = leak_balance(cluster, tables, out, leaks, group, number, 0.0)
+                low = high = low - DRAWN if totals[number] < 0.0 else high + DRAWN
             for i in range(group.size):
                 if group[i] == number:
                     node = integers[cluster["first_node"] + i]
@@ -165,17 +170,25 @@ def isolated_pressures(cluster, tables, out, g, connected, group, work):
 
 
 @njit
-def check_demand(cluster, tables, out, c, connected, group, scale, work):
+def isolated_inflows(cluster, tables, g, c, group, totals):
+    """Write the numbers of groups of isolated nodes to `group`, and their given inflows [kg/s] to totals[number].
+
+    c : given inflow of the nodes [kg/s]
+    """
+    group_by_open_valves(cluster, tables, g, group)
+    for i in range(group.size):
+        totals[i] = 0.0
+    for i in range(group.size):
+        totals[int(group[i])] += c[i]
+
+
+@njit
+def check_demand(cluster, tables, out, connected, group, totals, scale):
     """Set STATUS to NO_SOLUTION if a group of isolated nodes has a demand.
 
-    c : given inflow of the nodes [kg/s]; scale : flow relative to which a demand counts as rounding [kg/s]
-    work : float64[nodes]  work array
+    group, totals : results of `isolated_inflows`; scale : flow relative to which a demand counts as rounding [kg/s]
     """
-    for i in range(group.size):
-        work[i] = 0.0
-    for i in range(group.size):
-        work[int(group[i])] += c[i]
     for number in range(group.size):
         isolated = connected[number] == 0.0 and group[number] == number
-        if isolated and abs(work[number]) > DEMAND_ROUNDING * scale:
+        if isolated and abs(totals[number]) > DEMAND_ROUNDING * scale:
             out[STATUS], out[WHERE] = NO_SOLUTION, tables.integers[cluster["first_node"] + number]

@@ -41,7 +41,13 @@ from fvsolve.kernels.dtypes import (
     TO_HELD,
     WHERE,
 )
-from fvsolve.kernels.isolated_nodes import check_demand, find_connected, inner_row, isolated_pressures
+from fvsolve.kernels.isolated_nodes import (
+    check_demand,
+    find_connected,
+    inner_row,
+    isolated_inflows,
+    isolated_pressures,
+)
 from fvsolve.kernels.restrictions import (
     conductance,
     has_lifted_backflow,
@@ -806,8 +812,10 @@ def write_cluster(cluster, tables, out, g, m, c, connected, group, change, work)
         out[STATUS], out[WHERE] = NOT_CONVERGED, tables.integers[cluster["first_node"]]
     for i in range(connected.size):
         if connected[i] == 0.0:
-            isolated_pressures(cluster, tables, out, g, connected, group, work)
-            check_demand(cluster, tables, out, c, connected, group, scale, work)
+            totals, rest = work[: c.size], work[c.size :]
+            isolated_inflows(cluster, tables, g, c, group, totals)
+            isolated_pressures(cluster, tables, out, g, connected, group, totals, scale, rest)
+            check_demand(cluster, tables, out, connected, group, totals, scale)
             return
 
 

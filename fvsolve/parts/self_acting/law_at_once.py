@@ -75,8 +75,8 @@ def events(t, y, out, tables, device, g):
         back = 1.0
     elif tables.valves[k]["hold"] < 0:  # the sensed pressure is given: the valve cannot change it
         back = min(back, error + MARGIN)
-    if armed[at + SHUT] > 0.0:
-        back, full = min(drop, error) - MARGIN, 1.0
+    if armed[at + SHUT] > 0.0:  # it opens again as it was
+        back, full = min(drop, error) - MARGIN, -1.0 if armed[at + FULL] > 0.0 else 1.0
     elif armed[at + FULL] > 0.0:
         full = -error - margin
     if tables.valves[k]["hold"] < 0:
