@@ -18,6 +18,7 @@ DAMPING = 1e-12  # weight of |x|^2 in the least-squares solution of a singular s
 SMALL_DROP = 1e-12  # relative difference of potentials that counts as rounding
 SMALL = 1e-9  # relative residual below which a node counts as balanced
 LARGEST_IMBALANCE = 1e-6  # relative residual of the balance of a node above which a solution is refused
+ROUNDING_SHARE = 1e-12  # flows below this share of the flow scale are rounding
 LEAST_SCALE = 1e-9  # least typical mass flow of a piece [kg/s]
 
 
@@ -181,7 +182,8 @@ class _Problem:
             missing[edge.i] += flow
             missing[edge.j] -= flow
         largest = max(np.abs(self.flow).max(initial=0.0), np.abs(self.demand[self.unknown]).max(initial=0.0))
-        return bool(np.all(np.abs(missing[self.balances]) <= LARGEST_IMBALANCE * largest))
+        least = LARGEST_IMBALANCE * largest + ROUNDING_SHARE * self.scale[1]
+        return bool(np.all(np.abs(missing[self.balances]) <= least))
 
     def pattern(self) -> tuple:
         """Structure of the system: equal for problems that one call of `_newton` solves together."""

@@ -327,6 +327,10 @@ class Device(Restriction):
         """Name of a further link that the device opens and closes; None for none."""
         return None
 
+    def held_end(self, part: Any) -> str | None:
+        """End at which its valve may hold the pressure at once, "from" or "to"; "" for its flow, None for nothing."""
+        return None
+
     def sensed(self, part: Any) -> tuple[tuple[str, float], ...]:
         """Places that the part only senses, at most two, each with its weight in the pressure that lifts its valve."""
         return ()
@@ -381,6 +385,14 @@ class Device(Restriction):
     def begin(self, start, part: Any, row) -> list[str]:
         """Fill in data that depend on the initial steady state; return texts of motions at the start."""
         return []
+
+    def flags_at_start(self, start, part: Any, row) -> dict[int, bool]:
+        """Event flags of its state in the steady start: flag -> True if it is set.
+
+        Other flags follow from the state and its flows. A network in which a shut valve is open may have other flows,
+        for which further valves shut.
+        """
+        return {}
 
     def source_at_start(self, start, part: Any, row, quantity: str, flow: float) -> float:
         """Value at the start of a quantity that a source of the network reads.

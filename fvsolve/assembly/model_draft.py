@@ -382,7 +382,7 @@ class ModelDraft:
         table_rows, at = np.zeros(len(names), record), 0
         if table == "valve":
             table_rows["device"] = table_rows["hooks"] = table_rows["data"] = table_rows["event"] = -1
-            table_rows["command"] = -1
+            table_rows["command"] = table_rows["hold"] = -1
             table_rows["back"] = 1.0
         for key in {"moving_segment", "delay"}.intersection(record.names):
             table_rows[key] = -1

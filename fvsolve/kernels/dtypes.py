@@ -186,6 +186,7 @@ VALVE = record(
     device=i8,  # device that sets its conductance; -1: its schedule sets it
     data=i8,  # offset of the numbers of its law in `floats`
     event=i8,  # offset of its flags in `armed`, for a law with kinks
+    hold=i8,  # offset in `integers` of what it may hold, see `node_clusters.hold_pressures`; -1 for nothing
     command=i8,  # schedule of the position of a spool, from which its own schedule follows; -1 for none
     back=f8,  # square-root law: fraction of the conductance for flow from `to` to `from`
     drive=f8,  # relative speed of a pump in the profile
@@ -193,6 +194,8 @@ VALVE = record(
     flow=f8,  # of the profile [kg/s]
     drop=f8,  # of the profile [Pa]
 )
+TO_HELD, FROM_HELD, FLOW_HELD = range(3)  # held by a valve: pressure at its end `to`, or at `from`, or its flow
+NOT_HELD = 1e300  # in out[drive] of such a valve: it holds nothing at present
 
 COLUMN = record(
     y=i8,
@@ -453,8 +456,10 @@ CLUSTER_RECORD = record(
     first_couple=i8,
     couples=i8,
     inverse=i8,
-    order=i8,  # offset in `integers` of an order of elimination that keeps its matrix sparse; -1: none
+    order=i8,  # offset in `integers` of the places and the elimination of its sparse matrix; -1: a full matrix
+    matrix=i8,  # numbers of its matrix: those of the sparse matrix, or of a full one
     senses=i8,  # 1 if a device senses pressures for one of its valves
+    held=i8,  # numbers of the balances of nodes whose pressures its valves may hold
 )
 
 LAYOUT = record(
@@ -781,7 +786,7 @@ RunArrays = namedtuple("RunArrays",
     (
         "clock", "work", "armed", "marks", "scratch", "spare", "seen", "bands", "joint", "sums", "envelope", "extremes",
         "past", "sharp", "applied", "readings", "sensing", "stack", "discrete", "histories",
-        "network_places", "network_factors", "maxima",
+        "network_places", "network_factors", "maxima", "accepted",
     ),
 )  # fmt: skip
 HandleTables = namedtuple("HandleTables", (*Tables._fields, *RunArrays._fields, "calls", "hooks"))

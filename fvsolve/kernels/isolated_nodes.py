@@ -4,7 +4,7 @@ No flow passes there, so any pressure would satisfy the balance. The pressure ch
 would balance: sum of sqrt|dP| over the closed valves, each with the sign of its drop dP, is zero. P = p + rho g z.
 A demand there is not supplied: it becomes zero, and its nodes drain to ambient pressure at the lowest demand. If a node
 beyond a closed valve has a lower potential, they drain to `OPENING` below it, so that a self-acting valve from there
-opens.
+opens. An inflow drives them above the nodes beyond the closed valves; if no valve opens, it finds no way out.
 
 Arguments common to these functions: `cluster`, row of a cluster (nodes that are solved together); g : conductances of
 its valves [kg2/s2/Pa], 0 if closed, -1 if open at isolated nodes; connected : 0 for its isolated nodes; group : group
@@ -18,8 +18,9 @@ from fvsolve.kernels.dtypes import JUNCTION, LAW_LINEAR, NO_SOLUTION, STATUS, WH
 
 DEMAND_ROUNDING = 1e-9  # relative demand that an isolated node may have: rounding
 OPENING = 100.0  # potential below a neighbour at which self-acting valves open, above their margins [Pa]
+RISE = 1e6  # potential of an inflow without a way out above the nodes beyond closed valves: check valves open [Pa]
 # Codes of nodes in `out`: joined to a pipe or to a known pressure; isolated without demand, so that nothing determines
-# the pressure; isolated beside nodes with demand; isolated with a demand, which is not supplied.
+# the pressure; isolated beside nodes with demand or inflow; isolated with a demand, which is not supplied.
 JOINED, UNDETERMINED, DRAINED, UNSUPPLIED = 0.0, 1.0, 2.0, 3.0
 
 
@@ -39,24 +40,49 @@ def inner_row(nodes, i):
 
 
 @njit
-def find_connected(cluster, tables, g, connected):
-    """Set connected[i] to 1 if open valves join node i of a cluster to a pipe or to a known pressure, else to 0."""
+def root_of(group, i):
+    """Number of the first node of the group of node i; each entry of `group` is a node nearer to it, or the node."""
+    while group[i] != i:
+        group[i] = group[int(group[i])]
+        i = int(group[i])
+    return i
+
+
+@njit
+def join(group, i, j):
+    """Join the groups of the nodes i and j; a group has the number of its first node."""
+    i, j = root_of(group, i), root_of(group, j)
+    group[max(i, j)] = min(i, j)
+
+
+@njit
+def find_connected(cluster, tables, g, connected, group):
+    """Set connected[i] to 1 if open valves join node i of a cluster to a pipe or to a known pressure, else to 0.
+
+    group : float64[nodes]  work array
+    """
     nodes, valves, integers = tables.nodes, tables.valves, tables.integers
+    for i in range(group.size):
+        group[i] = i
+    for e in range(g.size):
+        if g[e] > 0.0:
+            valve = valves[integers[cluster["first_valve"] + e]]
+            i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+            if i >= 0 and j >= 0:
+                join(group, i, j)
     for i in range(connected.size):
-        connected[i] = 1.0 if nodes[integers[cluster["first_node"] + i]]["admittance"] > 0.0 else 0.0
-    for _ in range(connected.size):
-        changed = False
-        for e in range(g.size):
-            if g[e] > 0.0:
-                valve = valves[integers[cluster["first_valve"] + e]]
-                i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
-                from_connected = i < 0 or connected[i] > 0.0
-                to_connected = j < 0 or connected[j] > 0.0
-                if from_connected != to_connected:
-                    connected[j if from_connected else i] = 1.0
-                    changed = True
-        if not changed:
-            return
+        connected[i] = 0.0
+    for i in range(connected.size):
+        if nodes[integers[cluster["first_node"] + i]]["admittance"] > 0.0:
+            connected[root_of(group, i)] = 1.0
+    for e in range(g.size):
+        if g[e] > 0.0:
+            valve = valves[integers[cluster["first_valve"] + e]]
+            i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+            if (i < 0) != (j < 0):
+                connected[root_of(group, max(i, j))] = 1.0
+    for i in range(connected.size):
+        connected[i] = connected[root_of(group, i)]
 
 
 @njit
@@ -68,20 +94,21 @@ def total_pressure(tables, out, i):
 
 
 @njit
-def leak_balance(cluster, tables, out, g, group, number, level):
+def leak_balance(cluster, tables, out, leaks, group, number, level):
     """(sum of sqrt|dP| of the leaks into a group of isolated nodes, least, greatest potential outside the group [Pa]).
 
     The group has the potential `level` [Pa]. dP is the drop of a closed valve between the group and another node;
     outflow counts as negative. The potentials are those of the nodes behind these valves.
+    leaks : numbers in the cluster of closed valves, all those at isolated nodes
     """
     nodes, valves, integers = tables.nodes, tables.valves, tables.integers
     total, low, high = 0.0, 1e300, -1e300
-    for e in range(g.size):
-        valve = valves[integers[cluster["first_valve"] + e]]
+    for k in range(leaks.size):
+        valve = valves[integers[cluster["first_valve"] + int(leaks[k])]]
         i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
         from_inside = i >= 0 and group[i] == number
         to_inside = j >= 0 and group[j] == number
-        if g[e] == 0.0 and from_inside != to_inside:
+        if from_inside != to_inside:
             other = total_pressure(tables, out, valve["to_node"] if from_inside else valve["from_node"])
             low, high = min(low, other), max(high, other)
             leak = sqrt(abs(other - level))
@@ -95,40 +122,53 @@ def group_by_open_valves(cluster, tables, g, group):
     nodes, valves, integers = tables.nodes, tables.valves, tables.integers
     for i in range(group.size):
         group[i] = i
-    for _ in range(group.size):
-        changed = False
-        for e in range(g.size):
-            if g[e] < 0.0:  # open, but isolated
-                valve = valves[integers[cluster["first_valve"] + e]]
-                i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
-                if i >= 0 and j >= 0 and group[i] != group[j]:
-                    group[i] = group[j] = min(group[i], group[j])
-                    changed = True
-        if not changed:
-            return
+    for e in range(g.size):
+        if g[e] < 0.0:  # open, but isolated
+            valve = valves[integers[cluster["first_valve"] + e]]
+            i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+            if i >= 0 and j >= 0:
+                join(group, i, j)
+    for i in range(group.size):
+        group[i] = root_of(group, i)
 
 
 @njit
-def isolated_pressures(cluster, tables, out, g, connected, group):
+def closed_at_isolated(cluster, tables, g, connected, work):
+    """Write the numbers in the cluster of the closed valves at its isolated nodes to `work`; returns their count."""
+    nodes, valves, integers, count = tables.nodes, tables.valves, tables.integers, 0
+    for e in range(g.size):
+        if g[e] == 0.0:
+            valve = valves[integers[cluster["first_valve"] + e]]
+            i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+            if (i >= 0 and connected[i] == 0.0) or (j >= 0 and connected[j] == 0.0):
+                work[count] = e
+                count += 1
+    return count
+
+
+@njit
+def isolated_pressures(cluster, tables, out, g, connected, group, work):
     """Set the pressures of isolated nodes of a cluster by bisection, group by group until no pressure changes.
 
-    Groups with a demand are left as `drain` has set them.
+    Groups with a flow are left as `drain` has set them.
+    work : float64[valves]  work array
     """
     layout, integers = tables.layout[0], tables.integers
+    leaks = work[: closed_at_isolated(cluster, tables, g, connected, work)]
     for _ in range(200):
         greatest = 0.0
         for number in range(group.size):
             at = layout["isolated"] + integers[cluster["first_node"] + number]
             if connected[number] > 0.0 or group[number] != number or out[at] > UNDETERMINED:
                 continue
-            _, low, high = leak_balance(cluster, tables, out, g, group, number, 0.0)
+            _, low, high = leak_balance(cluster, tables, out, leaks, group, number, 0.0)
             if low > high:
                 continue
             for _ in range(100):
                 level = 0.5 * (low + high)
                 if level <= low or level >= high:
                     break
-                if leak_balance(cluster, tables, out, g, group, number, level)[0] > 0.0:
+                if leak_balance(cluster, tables, out, leaks, group, number, level)[0] > 0.0:
                     low = level
                 else:
                     high = level
@@ -143,53 +183,70 @@ def isolated_pressures(cluster, tables, out, g, connected, group):
 
 
 @njit
-def mark_isolated(cluster, tables, out, g, c, connected, group, scale):
+def mark_isolated(cluster, tables, out, g, c, connected, group, scale, work):
     """Write the codes of the nodes of a cluster to out[isolated], and drain groups of isolated nodes with a demand.
 
     STATUS becomes NO_SOLUTION for a group with another given flow, such as an inflow or that of a rigid column, and for
     one with a demand under density laws other than `linear`.
     c : given inflow of the nodes [kg/s]; scale : flow relative to which a demand counts as rounding [kg/s]
+    work : float64[2 nodes + valves]  work array
     """
-    layout, integers = tables.layout[0], tables.integers
-    for i in range(group.size):
-        out[layout["isolated"] + integers[cluster["first_node"] + i]] = UNDETERMINED if connected[i] == 0.0 else JOINED
-    for number in range(group.size):
-        if connected[number] > 0.0 or group[number] != number:
+    layout, integers, n = tables.layout[0], tables.integers, group.size
+    totals, drawn = work[:n], work[n : 2 * n]  # flow of each group; 1 if demands alone draw it
+    leaks = work[2 * n :][: closed_at_isolated(cluster, tables, g, connected, work[2 * n :])]
+    for i in range(n):
+        totals[i], drawn[i] = 0.0, 1.0 if tables.settings[0]["law"] == LAW_LINEAR else 0.0
+    for i in range(n):
+        node, number = integers[cluster["first_node"] + i], int(group[i])
+        out[layout["isolated"] + node] = UNDETERMINED if connected[i] == 0.0 else JOINED
+        totals[number] += c[i]
+        if not (c[i] <= 0.0 and c[i] == out[layout["supply"] + node]):
+            drawn[number] = 0.0
+    for number in range(n):
+        if connected[number] > 0.0 or group[number] != number or abs(totals[number]) <= DEMAND_ROUNDING * scale:
             continue
-        total, drawn = 0.0, tables.settings[0]["law"] == LAW_LINEAR
-        for i in range(group.size):
-            if group[i] == number:
-                total += c[i]
-                drawn = drawn and c[i] <= 0.0 and c[i] == out[layout["supply"] + integers[cluster["first_node"] + i]]
-        if abs(total) <= DEMAND_ROUNDING * scale:
-            continue
-        if drawn:
-            drain(cluster, tables, out, g, connected, group, number)
-        else:
+        low, high = potentials_beyond(cluster, tables, out, leaks, connected, group, number)
+        level = low - OPENING if totals[number] < 0.0 else high + RISE
+        if drawn[number] == 0.0:
             out[STATUS], out[WHERE] = NO_SOLUTION, integers[cluster["first_node"] + number]
+        else:
+            level = drain(cluster, tables, out, group, number, level)
+        for i in range(n):
+            node = integers[cluster["first_node"] + i]
+            if group[i] == number and abs(level) < 1e299:  # there are nodes beyond closed valves
+                out[layout["pressure"] + node] += level - total_pressure(tables, out, node)
+                out[layout["isolated"] + node] = max(out[layout["isolated"] + node], DRAINED)
 
 
 @njit
-def drain(cluster, tables, out, g, connected, group, number):
-    """Set the demands of a group of isolated nodes to zero, and their pressures to those of the drained group."""
-    layout, nodes, valves, integers = tables.layout[0], tables.nodes, tables.valves, tables.integers
-    weight, level = tables.settings[0]["rho"] * tables.settings[0]["gravity"], 1e300
+def potentials_beyond(cluster, tables, out, leaks, connected, group, number):
+    """(least, greatest potential [Pa]) of the connected nodes beyond the closed valves of a group of isolated nodes.
+
+    leaks : as for `leak_balance`
+    """
+    valves, integers, low, high = tables.valves, tables.integers, 1e300, -1e300
+    for k in range(leaks.size):
+        valve = valves[integers[cluster["first_valve"] + int(leaks[k])]]
+        i, j = inner_row(tables.nodes, valve["from_node"]), inner_row(tables.nodes, valve["to_node"])
+        from_inside = i >= 0 and group[i] == number
+        to_inside = j >= 0 and group[j] == number
+        if from_inside != to_inside and (i < 0 or j < 0 or connected[j if from_inside else i] > 0.0):
+            other = total_pressure(tables, out, valve["to_node"] if from_inside else valve["from_node"])
+            low, high = min(low, other), max(high, other)
+    return low, high
+
+
+@njit
+def drain(cluster, tables, out, group, number, level):
+    """Set the demands of a group of isolated nodes to zero; return the potential of the drained group [Pa].
+
+    level : greatest value of this potential [Pa]
+    """
+    layout, nodes, integers = tables.layout[0], tables.nodes, tables.integers
+    weight = tables.settings[0]["rho"] * tables.settings[0]["gravity"]
     for i in range(group.size):
         node = integers[cluster["first_node"] + i]
         if group[i] == number and out[layout["supply"] + node] < 0.0:
             level = min(level, tables.settings[0]["ambient"] + weight * nodes[node]["elevation"])
-    for e in range(g.size):
-        valve = valves[integers[cluster["first_valve"] + e]]
-        i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
-        from_inside = i >= 0 and group[i] == number
-        to_inside = j >= 0 and group[j] == number
-        if from_inside != to_inside and (i < 0 or j < 0 or connected[j if from_inside else i] > 0.0):
-            other = valve["to_node"] if from_inside else valve["from_node"]
-            level = min(level, total_pressure(tables, out, other) - OPENING)
-    for i in range(group.size):
-        if group[i] == number:
-            node = integers[cluster["first_node"] + i]
-            out[layout["pressure"] + node] += level - total_pressure(tables, out, node)
-            out[layout["isolated"] + node] = UNSUPPLIED if out[layout["supply"] + node] < 0.0 else DRAINED
-            if out[layout["supply"] + node] < 0.0:
-                out[layout["supply"] + node] = 0.0
+            out[layout["supply"] + node], out[layout["isolated"] + node] = 0.0, UNSUPPLIED
+    return level

@@ -30,7 +30,17 @@ space : work arrays of `node_work`
 from math import copysign, sqrt
 
 from fvsolve.jit import njit, specialise
-from fvsolve.kernels.dtypes import FIRM, FIRM_SLOPE, NO_SOLUTION, NOT_CONVERGED, STATUS, WHERE
+from fvsolve.kernels.dtypes import (
+    FIRM,
+    FIRM_SLOPE,
+    FLOW_HELD,
+    NO_SOLUTION,
+    NOT_CONVERGED,
+    NOT_HELD,
+    STATUS,
+    TO_HELD,
+    WHERE,
+)
 from fvsolve.kernels.isolated_nodes import (
     JOINED,
     find_connected,
@@ -52,6 +62,7 @@ from fvsolve.kernels.table_handle import open_tables
 BAR = 1e5
 ROUNDING = 1e-15  # relative rounding of pressures; of a flow, relative to the flow at 1 Pa
 NEARLY_CONVERGED = 1e-9  # relative change of Newton below which it may be rounding
+QUADRATIC, STAGNANT = 1e-4, 1e-7  # ratio of quadratic steps; relative change below which a constant one is rounding
 FIRST_RISE = 1e4  # greatest change of a pressure in the first limited step of Newton [Pa]
 NOT_BALANCED = 1e300  # in place of a change of Newton: the step was limited
 LEAST_RISE = 1e-9  # least limit of such a step [Pa]
@@ -101,47 +112,38 @@ def solve_dense(a, b, n):
 
 @njit
 def solve_in_order(a, b, n, integers, at):
-    """Solve a x = b by elimination without pivoting in a given order; x replaces b. Returns 1.0.
+    """Solve a x = b for a sparse matrix by elimination without pivoting in a given order; x replaces b. Returns 1.0.
 
-    The result is 0.0, and b is not the solution, if a pivot is not above 0.
-    a : float64[n * n]  matrix row by row, overwritten in the pattern of the order
-    integers[at:] : for each pivot the place, after `at`, of its node, the count of nodes that its elimination couples,
-    and these nodes
+    The result is 0.0, and b[0] becomes the number of its unknown, if a pivot is not above 0.
+    a : float64[places]  matrix, overwritten: its diagonal, then the other places of the pattern of the order
+    integers[at - 1] : number of places
+    integers[at:] : for each pivot the position, after `at`, of its numbers: its row p, the count of the rows q that its
+    elimination changes, these rows, the place of the first entry (p, q), which the entries (q, p) follow, and for each
+    of these rows the places of its entries in the columns q
     """
     for k in range(n):
         e = at + integers[at + k]
         p, count = integers[e], integers[e + 1]
-        pivot = a[n * p + p]
+        right, places = integers[e + 2 + count], e + 3 + count
+        pivot = a[p]
         if not pivot > 0.0:
+            b[0] = float(p)
             return 0.0
         for u in range(count):
-            row = n * integers[e + 2 + u]
-            f = a[row + p] / pivot
+            f = a[right + count + u] / pivot
             if f != 0.0:
                 for v in range(count):
-                    q = integers[e + 2 + v]
-                    a[row + q] -= f * a[n * p + q]
+                    a[integers[places + v]] -= f * a[right + v]
                 b[integers[e + 2 + u]] -= f * b[p]
+            places += count
     for k in range(n - 1, -1, -1):
         e = at + integers[at + k]
-        p = integers[e]
-        for u in range(integers[e + 1]):
-            q = integers[e + 2 + u]
-            b[p] -= a[n * p + q] * b[q]
-        b[p] /= a[n * p + p]
+        p, count = integers[e], integers[e + 1]
+        right = integers[e + 2 + count]
+        for u in range(count):
+            b[p] -= a[right + u] * b[integers[e + 2 + u]]
+        b[p] /= a[p]
     return 1.0
-
-
-@njit
-def clear_pattern(a, n, integers, at):
-    """Set the entries of a matrix to 0 that `solve_in_order` reads; arguments as there."""
-    for k in range(n):
-        e = at + integers[at + k]
-        p = integers[e]
-        a[n * p + p] = 0.0
-        for u in range(integers[e + 1]):
-            q = integers[e + 2 + u]
-            a[n * p + q] = a[n * q + p] = 0.0
 
 
 @njit(forceinline=True)
@@ -150,25 +152,51 @@ def has_converged(change, last_change):
     return change <= 1e-14 or (change <= NEARLY_CONVERGED and change >= 0.5 * last_change)
 
 
-@njit
-def add_valve(i, j, m, a, s, lift, n, matrix, right):
-    """Add a valve from node i to node j to the linear equations for the pressure steps of n nodes.
+@njit(forceinline=True)
+def places_of(cluster, tables, e, i, j, sparse):
+    """Places in the matrix of a cluster of the entries (i, i), (j, j), (i, j), (j, i) of its link number e.
 
-    i, j : numbers in the cluster, -1 for a known pressure
+    e : number of a valve, or of a delay line after all valves; i, j : numbers of its end nodes, -1 for a known pressure
+    sparse : True for a sparse matrix, see `solve_in_order`
+    """
+    n = cluster["nodes"]
+    if sparse:
+        at = cluster["order"] + n + 4 * e
+        return tables.integers[at], tables.integers[at + 1], tables.integers[at + 2], tables.integers[at + 3]
+    return n * i + i, n * j + j, n * i + j, n * j + i
+
+
+@njit
+def add_valve(i, j, places, m, a, s, lift, matrix, right):
+    """Add a valve from node i to node j to the linear equations for the pressure steps of nodes.
+
+    i, j : numbers in the cluster, -1 for a known pressure; places : result of `places_of`
     m : flow [kg/s]
     a, s : terms of the change of this flow, dM = a + s d(drop) [kg/s, kg/s/Pa]
     lift : derivative of the flow with respect to the upstream pressure at constant drop [kg/s/Pa]
-    matrix, right : float64[n * n], float64[n]  equations, to which the terms of the valve are added
+    matrix, right : float64[places], float64[n]  equations, to which the terms of the valve are added
     """
     if i >= 0:
         right[i] -= m + a
-        matrix[n * i + i] += s + lift
+        matrix[places[0]] += s + lift
     if j >= 0:
         right[j] += m + a
-        matrix[n * j + j] += s
+        matrix[places[1]] += s
     if i >= 0 and j >= 0:
-        matrix[n * i + j] -= s
-        matrix[n * j + i] -= s + lift
+        matrix[places[2]] -= s
+        matrix[places[3]] -= s + lift
+
+
+@njit(forceinline=True)
+def has_settled(change, last_change):
+    """True if the iteration of a cluster with quasi-steady pipes has converged: its changes are rounding, or will be.
+
+    After a step that is as short, and as much shorter than the last, Newton's next step is rounding. The flow of a
+    valve with hardly any loss changes by the rounding of pressures: it no longer falls.
+    """
+    if change <= NEARLY_CONVERGED and change <= QUADRATIC * last_change:
+        return True
+    return has_converged(change, last_change) or (change <= STAGNANT and change >= 0.999 * last_change)
 
 
 @njit
@@ -177,7 +205,7 @@ def add_sensed(cluster, tables, k, i, j, lift, n, matrix):
 
     i, j : numbers of its end nodes in the cluster, -1 for a known pressure
     lift : derivative of the flow with respect to the lifting pressure at constant drop [kg/s/Pa]
-    n, matrix : as for `add_valve`; places outside the cluster have known pressures
+    n, matrix : number of nodes, and full matrix; nodes outside the cluster have known pressures
     """
     device = tables.devices[tables.valves[k]["device"]]
     for node, weight in ((device["node"], device["node_weight"]), (device["second"], device["second_weight"])):
@@ -199,10 +227,10 @@ def sensed_step(cluster, tables, k, right):
 
 
 @njit
-def add_couplings(cluster, tables, out, n, matrix, right):
-    """Add the instantaneous flow between the ends of short delay lines to the equations of a cluster of n nodes.
+def add_couplings(cluster, tables, out, matrix, right, sparse):
+    """Add the instantaneous flow between the ends of short delay lines to the equations of a cluster.
 
-    matrix, right : equations, as for `add_valve`
+    matrix, right : equations, as for `add_valve`; sparse : as for `places_of`
     """
     layout, nodes, integers = tables.layout[0], tables.nodes, tables.integers
     for k in range(cluster["couples"]):
@@ -210,7 +238,64 @@ def add_couplings(cluster, tables, out, n, matrix, right):
         pipe, g = tables.pipes[line["pipe"]], line["couple"]
         i, j = inner_row(nodes, pipe["from_node"]), inner_row(nodes, pipe["to_node"])
         p, q = out[layout["pressure"] + pipe["from_node"]], out[layout["pressure"] + pipe["to_node"]]
-        add_valve(i, j, g * (p - q), 0.0, g, 0.0, n, matrix, right)
+        places = places_of(cluster, tables, cluster["valves"] + k, i, j, sparse)
+        add_valve(i, j, places, g * (p - q), 0.0, g, 0.0, matrix, right)
+
+
+LOOSE = 1e-9  # slope of a held flow over that of an open valve at 1 Pa: it keeps the equations regular
+
+
+@njit(forceinline=True)
+def is_held(tables, out, k):
+    """True if valve k holds a pressure or its flow at present: the value is then out[drive + k]."""
+    return tables.valves[k]["hold"] >= 0 and out[tables.layout[0]["drive"] + k] < NOT_HELD
+
+
+@njit
+def hold_pressures(cluster, tables, out, g, matrix, right, kept):
+    """Put held pressures in place of the balances of their nodes, which are added to those before or behind the valves.
+
+    The flow of the valve then follows from the balance of its held node, see `put_held_flows`.
+    matrix, right : sparse equations, as for `add_valve`; kept : receives these balances
+    """
+    integers, layout, at = tables.integers, tables.layout[0], 0
+    for e in range(g.size):
+        k = integers[cluster["first_valve"] + e]
+        if g[e] <= 0.0 or not is_held(tables, out, k) or integers[tables.valves[k]["hold"]] == FLOW_HELD:
+            continue
+        h = tables.valves[k]["hold"]
+        held, other, count = integers[h + 1], integers[h + 2], integers[h + 3]
+        kept[at] = right[held]
+        for c in range(count):
+            own, place = integers[h + 5 + 3 * c], integers[h + 6 + 3 * c]
+            kept[at + 1 + c] = matrix[own]
+            if other >= 0:
+                matrix[place] += matrix[own]
+            matrix[own] = 0.0
+        if other >= 0:
+            right[other] += right[held]
+        node = integers[cluster["first_node"] + held]
+        matrix[held], right[held] = 1.0, out[layout["drive"] + k] - out[layout["pressure"] + node]
+        at += 1 + count
+
+
+@njit
+def put_held_flows(cluster, tables, out, g, right, kept, a):
+    """Write the changes of the flows of valves that hold a pressure to `a`, by the balances of the held nodes.
+
+    right : steps of pressures [Pa]; kept : balances of `hold_pressures`
+    """
+    integers, at = tables.integers, 0
+    for e in range(g.size):
+        k = integers[cluster["first_valve"] + e]
+        if g[e] <= 0.0 or not is_held(tables, out, k) or integers[tables.valves[k]["hold"]] == FLOW_HELD:
+            continue
+        h = tables.valves[k]["hold"]
+        count, change = integers[h + 3], -kept[at]
+        for c in range(count):
+            change += kept[at + 1 + c] * right[integers[h + 4 + 3 * c]]
+        a[e] = change if integers[h] == TO_HELD else -change
+        at += 1 + count
 
 
 @njit(forceinline=True)
@@ -239,37 +324,42 @@ def linear_drop(tables, out, k):
 
 
 @njit
-def step_arrays(n, k, work):
-    """Parts of a work array for a Newton step of n nodes and k valves.
+def step_arrays(cluster, work):
+    """Parts of a work array for a Newton step of a cluster with n nodes and k valves.
 
-    matrix, right : float64[n * n], float64[n]  equations for the pressure steps of nodes
+    matrix, right : float64[places], float64[n]  equations for the pressure steps of nodes
     a, s, lift : float64[k]  terms of the changes of valve flows, see `add_valve`
+    kept : balances of nodes whose pressures valves hold
     """
-    at = n * n + n
-    return work[: n * n], work[n * n : at], work[at : at + k], work[at + k : at + 2 * k], work[at + 2 * k : at + 3 * k]
+    size, k = cluster["matrix"], cluster["valves"]
+    at = size + cluster["nodes"]
+    end = at + 3 * k
+    return work[:size], work[size:at], work[at : at + k], work[at + k : at + 2 * k], work[at + 2 * k : end], work[end:]
 
 
 def _assemble(cluster, tables, out, g, m, c, connected, slope, wide, work, sparse):
     """Assemble the linear equations for the pressure steps of a cluster; the changes of valve flows are eliminated.
 
     Arguments as for `newton_step`; the equations are written to `work`, see `step_arrays`.
-    sparse : True to clear only the entries of the matrix that `solve_in_order` reads
+    sparse : True for the sparse matrix of `solve_in_order`
     """
-    matrix, right, a, s, lift = step_arrays(c.size, g.size, work)
+    matrix, right, a, s, lift, kept = step_arrays(cluster, work)
     nodes, valves, integers, n = tables.nodes, tables.valves, tables.integers, c.size
     senses = cluster["senses"] == 1
-    if sparse:
-        clear_pattern(matrix, n, integers, cluster["order"])
-    else:
-        for i in range(matrix.size):
-            matrix[i] = 0.0
+    for i in range(integers[cluster["order"] - 1] if sparse else n * n):
+        matrix[i] = 0.0
+    width = 1 if sparse else n + 1
     for i in range(n):
-        right[i], matrix[n * i + i] = BALANCE(cluster, tables, out, c, slope, i)
+        right[i], matrix[width * i] = BALANCE(cluster, tables, out, c, slope, i)
     for e in range(m.size):
         k = integers[cluster["first_valve"] + e]
         i, j = inner_row(nodes, valves[k]["from_node"]), inner_row(nodes, valves[k]["to_node"])
         a[e], s[e], lift[e] = -m[e], 0.0, 0.0
-        if g[e] > 0.0:
+        if sparse and g[e] > 0.0 and is_held(tables, out, k):
+            a[e] = 0.0
+            if integers[valves[k]["hold"]] == FLOW_HELD:
+                a[e], s[e] = out[tables.layout[0]["drive"] + k] - m[e], LOOSE * sqrt(g[e])
+        elif g[e] > 0.0:
             drop, denser = DRIVING(tables, out, k)
             a[e], s[e] = restriction_step(tables, out, k, g[e], m[e], drop, denser, wide)
             lift[e] = restriction_lift(tables, out, k, g[e], drop, denser, wide)
@@ -277,11 +367,13 @@ def _assemble(cluster, tables, out, g, m, c, connected, slope, wide, work, spars
         if senses and upstream != 0.0 and is_sensing(tables, k):
             add_sensed(cluster, tables, k, i, j, upstream, n, matrix)
             upstream = 0.0
-        add_valve(i, j, m[e], a[e], s[e], upstream, n, matrix, right)
-    add_couplings(cluster, tables, out, n, matrix, right)
+        add_valve(i, j, places_of(cluster, tables, e, i, j, sparse), m[e], a[e], s[e], upstream, matrix, right)
+    add_couplings(cluster, tables, out, matrix, right, sparse)
     for i in range(n):
         if connected[i] == 0.0:
-            right[i], matrix[n * i + i] = 0.0, 1.0
+            right[i], matrix[width * i] = 0.0, 1.0
+    if cluster["held"] > 0:
+        hold_pressures(cluster, tables, out, g, matrix, right, kept)
 
 
 assemble_linear = specialise(_assemble, "assemble_linear", BALANCE=linear_balance, DRIVING=linear_drop)
@@ -417,17 +509,17 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, limits, 
     the second-order error of Newton cannot reverse this imbalance. Under `linear` the third result has no meaning.
     """
     n, k = c.size, g.size
-    matrix, right, a, s, lift = step_arrays(n, k, work)
-    sparse = cluster["order"] >= 0
+    matrix, right, a, s, lift, kept = step_arrays(cluster, work)
+    sparse, full = cluster["order"] >= 0, cluster["matrix"] >= n * n and cluster["held"] == 0
     ASSEMBLE(cluster, tables, out, g, m, c, connected, slope, wide, work, sparse)
     imbalance, sign = largest_magnitude(right) if BAROTROPIC else 0.0, 0.0
     if sparse:
         sign = solve_in_order(matrix, right, n, tables.integers, cluster["order"])
-        if sign == 0.0:
+        if sign == 0.0 and full:
             ASSEMBLE(cluster, tables, out, g, m, c, connected, slope, wide, work, False)
-    if sign == 0.0:
+    if sign == 0.0 and full:
         sign = solve_dense(matrix, right, n)
-    if sign <= 0.0 and not wide and close_unstable(cluster, tables, g, m):
+    if full and sign <= 0.0 and not wide and close_unstable(cluster, tables, g, m):
         ASSEMBLE(cluster, tables, out, g, m, c, connected, slope, wide, work, False)
         imbalance = largest_magnitude(right) if BAROTROPIC else 0.0
         sign = solve_dense(matrix, right, n)
@@ -444,6 +536,8 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, limits, 
         limited = limit_each_step(limits, right)
     elif not BAROTROPIC:
         limited = cut_steps(right)
+    if cluster["held"] > 0:
+        put_held_flows(cluster, tables, out, g, right, kept, a)
     pressures, flows = apply_step(cluster, tables, out, m, a, s, lift, right)
     if limited:
         return NOT_BALANCED, NOT_BALANCED, False
@@ -559,6 +653,41 @@ def prepare_cluster(cluster, tables, out, g, m):
 
 
 @njit
+def begin_accepted(cluster, tables, out, g, m):
+    """Set the pressures of a cluster and the flows m of its open valves to those of the last accepted state, if any."""
+    accepted, integers, pressure = tables.accepted, tables.integers, tables.layout[0]["pressure"]
+    if accepted[0] == 0.0:
+        return
+    for i in range(cluster["nodes"]):
+        node = integers[cluster["first_node"] + i]
+        out[pressure + node] = accepted[1 + node]
+    for e in range(g.size):
+        flow = accepted[1 + tables.nodes.size + integers[cluster["first_valve"] + e]]
+        if g[e] > 0.0 and flow != 0.0:
+            m[e] = flow
+
+
+@njit
+def record_clusters(t, y, out, handle, values):
+    """Store the pressures of nodes and the flows of valves of an accepted state, from which later iterations start.
+
+    The values before, from which the iterations of this state began, move to the second half of the array.
+    """
+    tables = open_tables(handle)
+    accepted, layout, n = tables.accepted, tables.layout[0], tables.nodes.size
+    if accepted.size == 0:
+        return
+    half = accepted.size // 2
+    for i in range(half):
+        accepted[half + i] = accepted[i]
+    accepted[0] = 1.0
+    for i in range(n):
+        accepted[1 + i] = out[layout["pressure"] + i]
+    for k in range(tables.valves.size):
+        accepted[1 + n + k] = out[layout["valve"] + k]
+
+
+@njit
 def begin_level(cluster, tables, out):
     """Set nodes behind valves with a level start to the potential at the known end of the valve.
 
@@ -609,7 +738,8 @@ def begin_clusters(out, tables, space):
     A cluster counts as converged if all its values are those of the initial steady state; `step_clusters` checks the
     flows from pipe ends later.
     """
-    clusters, (_, c, connected, _, g, m, _), (done, change, _, wide, _) = tables.clusters, space, cluster_work(tables)
+    clusters, (_, c, connected, group, g, m, _) = tables.clusters, space
+    done, change, _, wide, _ = cluster_work(tables)
     a, b, out[FIRM] = 0, 0, FIRM_SLOPE
     for k in range(clusters.size):
         cluster = clusters[k]
@@ -619,7 +749,7 @@ def begin_clusters(out, tables, space):
         change[k], wide[k] = 1e300, 1.0
         if done[k] == 0.0:
             begin_level(cluster, tables, out)
-        find_connected(cluster, tables, g[b:j], connected[a:i])
+        find_connected(cluster, tables, g[b:j], connected[a:i], group[a:i])
         zero_isolated(cluster, tables, g[b:j], m[b:j], connected[a:i])
         a, b = i, j
 
@@ -684,11 +814,11 @@ def check_clusters(out, tables, space):
 
 
 @njit
-def write_cluster(cluster, tables, out, g, m, c, connected, group, change, worst):
+def write_cluster(cluster, tables, out, g, m, c, connected, group, change, worst, work):
     """Write the valve flows of a cluster, the pressures and codes of its isolated nodes, and STATUS on failure.
 
     g, m : conductances and flows [kg/s] of valves; c : inflow of nodes except through valves, less the demand [kg/s]
-    connected, group : 0 for isolated nodes; work array for their groups
+    connected, group : 0 for isolated nodes; work array for their groups; work : further work array
     change : last relative change of Newton; under the law `linear` that of flows, because a level on which no flow
     depends may still change; worst : number of the node whose pressure changes most, named if Newton has failed
     Flows that are rounding (dead ends) become zero: their sign does not depend on the pressures.
@@ -708,18 +838,18 @@ def write_cluster(cluster, tables, out, g, m, c, connected, group, change, worst
         out[tables.layout[0]["isolated"] + tables.integers[cluster["first_node"] + i]] = JOINED
     if isolated:
         group_by_open_valves(cluster, tables, g, group)
-        mark_isolated(cluster, tables, out, g, c, connected, group, scale)
-        isolated_pressures(cluster, tables, out, g, connected, group)
+        mark_isolated(cluster, tables, out, g, c, connected, group, scale, work)
+        isolated_pressures(cluster, tables, out, g, connected, group, work)
 
 
 @njit
 def write_clusters(out, tables, space):
     """Write the valve flows of all clusters to `out`, and pressures of isolated nodes."""
-    clusters, (_, c, connected, group, g, m, _), change = tables.clusters, space, cluster_work(tables)[1]
+    clusters, (_, c, connected, group, g, m, rest), change = tables.clusters, space, cluster_work(tables)[1]
     a, b = 0, 0
     for k in range(clusters.size):
         i, j = a + clusters[k]["nodes"], b + clusters[k]["valves"]
-        write_cluster(clusters[k], tables, out, g[b:j], m[b:j], c[a:i], connected[a:i], group[a:i], change[k], 0)
+        write_cluster(clusters[k], tables, out, g[b:j], m[b:j], c[a:i], connected[a:i], group[a:i], change[k], 0, rest)
         a, b = i, j
 
 
@@ -729,8 +859,8 @@ def put_law_flows(cluster, tables, out, g, m, c, connected, slope, wide, work):
 
     A valve with a level start keeps the flow that its node needs: its law takes a chord to it where it has no slope.
     """
-    assemble_linear(cluster, tables, out, g, m, c, connected, slope, wide, work, False)
-    a = step_arrays(c.size, g.size, work)[2]
+    assemble_linear(cluster, tables, out, g, m, c, connected, slope, wide, work, cluster["order"] >= 0)
+    a = step_arrays(cluster, work)[2]
     for e in range(m.size):
         if tables.valves[tables.integers[cluster["first_valve"] + e]]["level_start"] == 0:
             m[e] += a[e]
@@ -750,7 +880,8 @@ def have_bracketed(limits):
 def solve_cluster(out, tables, index):
     """Solve the pressures of cluster number `index` and the flows of its valves under the density law `linear`.
 
-    The iteration starts from the initial steady state, so the result depends on (t, y) alone.
+    The iteration starts from the initial steady state, so the result depends on (t, y) alone; in a cluster with
+    quasi-steady pipes it starts from the last accepted state, which a restart file contains.
     """
     cluster, work = tables.clusters[index], tables.scratch
     n, k = cluster["nodes"], cluster["valves"]
@@ -758,7 +889,9 @@ def solve_cluster(out, tables, index):
     g, m, rest = work[at : at + k], work[at + k : at + 2 * k], work[at + 2 * k :]
     unchanged = prepare_cluster(cluster, tables, out, g, m)
     undisturbed = total_inflows(cluster, tables, out, c) and unchanged
-    find_connected(cluster, tables, g, connected)
+    if tables.accepted.size > 0 and cluster["order"] >= 0 and not undisturbed:
+        begin_accepted(cluster, tables, out, g, m)
+    find_connected(cluster, tables, g, connected, group)
     zero_isolated(cluster, tables, g, m, connected)
     change, flows, wide, limits, out[FIRM] = 1e300, 0.0, True, group[:0], 0.0
     for sweep in range(MAX_SWEEPS + LIMITED_SWEEPS):
@@ -778,14 +911,14 @@ def solve_cluster(out, tables, index):
         change, flows, _ = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, limits, rest)
         if bracketed and flows <= STEEP_CHANGE:  # at a drop of zero a flow changes with the last digits of a pressure
             change, flows = 0.0, 0.0
-        if has_converged(change, last_change):
+        if has_settled(change, last_change) if cluster["order"] >= 0 else has_converged(change, last_change):
             if not (wide and has_backflow(cluster, tables, m)):
                 break
             change, flows, wide = 1e300, 1e300, False
     out[FIRM] = 0.0
     failed = flows != flows  # not a number; under other laws the rates show this fault
-    worst = place_of_greatest(step_arrays(n, k, rest)[1])
-    write_cluster(cluster, tables, out, g, m, c, connected, group, NOT_BALANCED if failed else flows, worst)
+    worst, change = place_of_greatest(step_arrays(cluster, rest)[1]), NOT_BALANCED if failed else flows
+    write_cluster(cluster, tables, out, g, m, c, connected, group, change, worst, rest)
 
 
 @njit

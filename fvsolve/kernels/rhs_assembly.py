@@ -141,7 +141,7 @@ COMPONENTS = {
     "valves": RhsTerms(rate_limits="network_balance: valve_rate_limit"),
     "bends": RhsTerms(events="restrictions: restriction_events"),
     "closed": RhsTerms(events="calls: solve_nodes_in_turn"),
-    "clusters": RhsTerms(solve_nodes="node_clusters: solve_clusters"),
+    "clusters": RhsTerms(solve_nodes="node_clusters: solve_clusters", record="node_clusters: record_clusters"),
     "columns": RhsTerms(column_nodes="rigid_columns: column_pressures", move="rigid_columns: column_rates", **COLUMNS),
     "columns, barotropic": RhsTerms(
         column_nodes="rigid_columns: column_pressures_barotropic",

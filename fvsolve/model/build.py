@@ -129,6 +129,7 @@ def steady_profile(draft) -> dict[str, Any]:
     start.fill_valves()
     for (_, part, device), row in zip(draft.devices, draft.device_table, strict=True):
         start.moving += device.begin(start, part, row)
+        draft.start_flags |= device.flags_at_start(start, part, row)
     probe_offsets(draft, start)
     unsteady = add_terms(draft)
     return {**start.report(), "unsteady": unsteady, "creep": limit_creep_step(draft, unsteady)}
@@ -246,7 +247,7 @@ def with_balanced_blocks(packed: ModelDraft) -> ModelDraft:
         draft.steady = start_profile(draft)
         scale_scalars(draft)
         divide_lines(draft)
-        return model_of(draft)
+        return model_of(draft, lambda _: [])
 
     balance = Balance(packed.case, packed, start)
     outputs, starts = balance.find()
@@ -359,8 +360,15 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         histories=histories_size(draft.control_table),
         network_places=0 if draft.network is None else 3 * draft.network.rows.count + draft.network.capacity,
         network_factors=0 if draft.network is None else draft.network.rows.count + draft.network.capacity,
-        maxima=draft.maxima_size,
+        maxima=draft.maxima_size, accepted=accepted_size(draft),
     )  # fmt: skip
+
+
+def accepted_size(draft: ModelDraft) -> int:
+    """Size of the array `accepted`, from which the iterations of clusters with quasi-steady pipes start; else 0."""
+    if not draft.case.law.linear or not (draft.cluster_table["order"] >= 0).any():
+        return 0
+    return 2 * (1 + len(draft.node_table) + len(draft.valve_table))
 
 
 def settings_of(draft: ModelDraft) -> np.ndarray:
@@ -447,7 +455,7 @@ def scratch_size(draft: ModelDraft) -> int:
     """Size of the work array `scratch`: the largest size that a function of the right-hand side needs."""
     scalars, nodes = len(draft.scalar_table), len(draft.node_table)
     most = max([0, *draft.pipe_table["cells"], *draft.delay_table["places"]])
-    system = max((c["nodes"] * (c["nodes"] + 4) + 5 * c["valves"] for c in draft.cluster_table), default=0)
+    system = max((c["matrix"] + 4 * c["nodes"] + 5 * c["valves"] + c["held"] for c in draft.cluster_table), default=0)
     rigid = int(np.sum(draft.node_table["columns"] > 1))
     system = max(system, rigid * (rigid + 3))
     system += 6 * nodes + 2 * len(draft.valve_table) + 5 * len(draft.cluster_table)

@@ -39,7 +39,9 @@ def classify_nodes(draft) -> None:
         own = couples.get(root, [])
         valves["chained"][ks] = valves["chained"][ks].any() if ks else 0
         valves["flow_given"][ks] = len(ks) == 1 and not own and not nodes["admittance"][members[root]].any()
-        if not has_single_root(draft, members[root], ks, own):
+        if has_single_root(draft, members[root], ks, own):
+            refuse_holds(draft, [k for k in ks if held_end(draft, k) is not None])
+        else:
             clusters.append(add_cluster(draft, members[root], ks, own))
     fixed = ~inner[valves["from_node"]] & ~inner[valves["to_node"]]
     fixed[list(sensed)] = False
@@ -128,49 +130,149 @@ def has_single_root(draft, members, ks, own) -> bool:
     return single
 
 
+FULL_MATRIX = 200  # nodes up to which a cluster with a sparse matrix also has space for a full one
+
+
 def add_cluster(draft, members, ks, own) -> tuple[int, ...]:
     """Append a group to `integers`, its nodes, valves and delay lines, and return its `CLUSTER_RECORD`."""
     n, at = len(members), len(draft.integers)
     draft.node_table["row"][members] = np.arange(n)
     inverse = add_inverse(draft, members, own) if own and not ks else -1
     draft.integers += [*members, *ks, *own]
-    order = -1
-    if ks and draft.valve_table["chained"][ks].all():
-        order = len(draft.integers)
-        draft.integers += elimination_order(draft, members, ks, own)
     devices = draft.valve_table["device"][ks]
     senses = (draft.device_table["node"][devices[devices >= 0]] >= 0).any() if ks else False
-    return at, n, at + n, len(ks), at + n + len(ks), len(own), inverse, order, int(senses)
+    order, size, held = -1, n * n, 0
+    holds = {k: end for k in ks if (end := held_end(draft, k)) is not None}
+    if ks and draft.valve_table["chained"][ks].all() and not senses:
+        matrix = SparseMatrix(draft, members, ks, own, holds)
+        draft.integers.append(matrix.size)
+        order = len(draft.integers)
+        draft.integers += matrix.integers()
+        size = max(matrix.size, n * n if n <= FULL_MATRIX else 0)
+        refuse_shared_nodes(draft, holds)
+        for k in holds:
+            held += add_hold(draft, matrix, k, holds[k])
+    else:
+        refuse_holds(draft, holds)
+    return at, n, at + n, len(ks), at + n + len(ks), len(own), inverse, order, size, int(senses), held
 
 
-def elimination_order(draft, members, ks, own) -> list[int]:
-    """Order of elimination of the nodes of a group, least degree first, as `node_clusters.solve_in_order` reads it.
+def held_end(draft, k: int) -> str | None:
+    """End of valve k at which it may hold the pressure, "" if it may hold its flow, None if it holds nothing."""
+    device = draft.valve_table["device"][k]
+    end = None if device < 0 else draft.devices[device][2].held_end(draft.devices[device][1])
+    if end and draft.node_table["kind"][draft.valve_table[k][f"{end}_node"]] != rec.JUNCTION:
+        return None  # its pressure is given
+    return end
+
+
+def add_hold(draft, matrix, k: int, end: str) -> int:
+    """Append to `integers` what valve k may hold, see `node_clusters.hold_pressures`; returns the numbers it needs."""
+    draft.valve_table["hold"][k] = len(draft.integers)
+    if not end:
+        draft.integers.append(rec.FLOW_HELD)
+        return 0
+    held, other = matrix.ends_held(k, end)
+    columns = [held, *sorted(matrix.joined[held])]
+    places = [(q, matrix.place[held, q], matrix.place[other, q] if other >= 0 else -1) for q in columns]
+    draft.integers += [rec.TO_HELD if end == "to" else rec.FROM_HELD, held, other, len(places)]
+    draft.integers += [number for entry in places for number in entry]
+    return 1 + len(places)
+
+
+def refuse_holds(draft, holds) -> None:
+    """Add a fault for each valve that would hold a value at once in a group with waves; holds : rows of the valves"""
+    for k in holds:
+        text = "0 s: the valve acts at once, which needs pipes without waves at its junctions"
+        draft.fault(f"links.{draft.valve_names[k]}.time_constant",
+                    f'{text}; expected a time above 0 s, or pipe_model = "quasi-steady"')  # fmt: skip
+
+
+def refuse_shared_nodes(draft, holds) -> None:
+    """Add a fault for each valve at whose ends another valve holds the pressure; holds : as for `SparseMatrix`"""
+    names, valves, of_node = list(draft.case.places), draft.valve_table, {}
+    for k in (k for k, end in holds.items() if end):
+        node, name = int(valves[k][f"{holds[k]}_node"]), draft.valve_names[k]
+        if node in of_node:
+            text = f"{of_node[node]} and {name} both hold the pressure at {names[node]} at once"
+            draft.fault(f"links.{name}", f"{text}; expected one such valve, or a time_constant above 0 s")
+        of_node.setdefault(node, name)
+    for k in (k for k, end in holds.items() if end):
+        node, name = int(valves[k]["to_node" if holds[k] == "from" else "from_node"]), draft.valve_names[k]
+        if of_node.get(node, name) != name:
+            text = f"its end {names[node]} is where {of_node[node]} holds the pressure at once"
+            draft.fault(f"links.{name}", f"{text}; expected a pipe between both, or a time_constant above 0 s")
+
+
+class SparseMatrix:
+    """Places of the entries of the matrix of a group of nodes, and its elimination, least degree first.
 
     members : indices of the nodes; ks, own : rows of the valves and delay lines that join them
+    holds : row of a valve that may hold a pressure -> end at which it holds it, "" for a flow
+    joined : nodes that links join to each node, by their rows; place : (row, column) -> place; size : number of places
     """
-    rows = {i: k for k, i in enumerate(members)}
-    near: list[set[int]] = [set() for _ in members]
-    joins = [draft.valve_table[k] for k in ks] + [draft.pipe_table[draft.delay_table["pipe"][k]] for k in own]
-    for row in joins:
-        i, j = (rows.get(int(row[end]), -1) for end in ("from_node", "to_node"))
+
+    def __init__(self, draft, members, ks, own, holds) -> None:
+        self.draft, self.rows = draft, {i: k for k, i in enumerate(members)}
+        links = [draft.valve_table[k] for k in ks] + [draft.pipe_table[draft.delay_table["pipe"][k]] for k in own]
+        self.links = [tuple(self.rows.get(int(row[end]), -1) for end in ("from_node", "to_node")) for row in links]
+        self.joined: list[set[int]] = [set() for _ in members]
+        for i, j in self.links:
+            self.join(self.joined, i, j)
+        near = [set(others) for others in self.joined]
+        for k, end in holds.items():  # the balance of a held node is added to that at the other end
+            held, other = self.ends_held(k, end) if end else (-1, -1)
+            for q in self.joined[held] if other >= 0 else ():
+                self.join(near, other, q)
+        self.pivots = self.eliminate(near)
+        self.size, self.place = len(members), {(k, k): k for k in range(len(members))}
+        for p, others in self.pivots:
+            for u, q in enumerate(others):
+                self.place[p, q], self.place[q, p] = self.size + u, self.size + len(others) + u
+            self.size += 2 * len(others)
+
+    @staticmethod
+    def join(near: list[set[int]], i: int, j: int) -> None:
+        """Join the rows i and j; -1 for a known pressure."""
         if i >= 0 and j >= 0 and i != j:
             near[i].add(j)
             near[j].add(i)
-    heap = [(len(others), k) for k, others in enumerate(near)]
-    heapq.heapify(heap)
-    places, entries, eliminated = [], [], set()
-    while heap:
-        degree, k = heapq.heappop(heap)
-        if k in eliminated or degree != len(near[k]):
-            continue  # an entry of an earlier degree
-        eliminated.add(k)
-        places.append(len(members) + len(entries))
-        entries += [k, degree, *sorted(near[k])]
-        for other in near[k]:
-            near[other] |= near[k]
-            near[other] -= {other, k}
-            heapq.heappush(heap, (len(near[other]), other))
-    return places + entries
+
+    def ends_held(self, k: int, end: str) -> tuple[int, int]:
+        """(row of the node whose pressure valve k holds, row of its other end, -1 for a known pressure)."""
+        row, ends = self.draft.valve_table[k], ("from", "to")
+        held, other = (int(row[f"{side}_node"]) for side in (ends if end == "from" else ends[::-1]))
+        return self.rows[held], self.rows.get(other, -1)
+
+    def eliminate(self, near: list[set[int]]) -> list[tuple[int, list[int]]]:
+        """Order of elimination: (row of the pivot, rows that its elimination changes); near : joined rows of each"""
+        heap = [(len(others), k) for k, others in enumerate(near)]
+        heapq.heapify(heap)
+        pivots, eliminated = [], set()
+        while heap:
+            degree, k = heapq.heappop(heap)
+            if k in eliminated or degree != len(near[k]):
+                continue  # an entry of an earlier degree
+            eliminated.add(k)
+            pivots.append((k, sorted(near[k])))
+            for other in near[k]:
+                near[other] |= near[k]
+                near[other] -= {other, k}
+                heapq.heappush(heap, (len(near[other]), other))
+        return pivots
+
+    def integers(self) -> list[int]:
+        """Numbers for `node_clusters.solve_in_order`, with the places of the entries of each link in between."""
+        place, links, entries, starts = self.place, [], [], []
+        for i, j in self.links:
+            both = i >= 0 and j >= 0
+            links += [i, j, place[i, j] if both else -1, place[j, i] if both else -1]
+        first = len(self.pivots) + len(links)
+        for p, others in self.pivots:
+            starts.append(first + len(entries))
+            entries += [p, len(others), *others, place[p, others[0]] if others else -1]
+            entries += [place[q, column] for q in others for column in others]
+        return [*starts, *links, *entries]
 
 
 def mark_event_ends(draft, group) -> None:

@@ -228,19 +228,47 @@ def follows_scalars(draft, row) -> bool:
 class Balance:
     """Outputs of all blocks at the start, such that loops without `initial` are at rest.
 
+    Each evaluation of the start solves the steady state again. So only blocks in a loop with the scene are sought by
+    Newton's method; other outputs follow from stated outputs, levels and time, or have no effect on the scene.
     make : function of a `ModelDraft` -> draft with the steady start, and its model
+    unstated : numbers of the blocks without `initial`; free : those of them that Newton's method seeks
     """
 
     def __init__(self, case, packed, make) -> None:
         self.case, self.packed, self.make = case, packed, make
         self.blocks = {name: case.controls[name] for name in packed.schedules.blocks}
-        self.free = [k for k, block in enumerate(self.blocks.values()) if block.control.initial_output is None]
+        self.unstated = [k for k, block in enumerate(self.blocks.values()) if block.control.initial_output is None]
+        self.free = self.sought()
         low, high = packed.control_table["least"], packed.control_table["greatest"]
         small = [small_change(block.dimensions[1]) for block in self.blocks.values()]
         finite = np.isfinite(low) & np.isfinite(high)
         self.range = np.where(finite, high - low, small)
         self.low, self.high = low, high
         self.stated: set[int] = set()  # as `stated_inputs`
+
+    def sought(self) -> list[int]:
+        """Numbers of the blocks without `initial` whose outputs affect the scene and depend on it.
+
+        A block that integrates counts as affecting it. The levels of tanks at the start do not depend on blocks.
+        """
+        blocks, numbers = list(self.blocks.values()), {name: k for k, name in enumerate(self.blocks)}
+        static = [isinstance(control_rows_of(type(block.control)), StaticRows) for block in blocks]
+        rows = dict(zip([probe.text for probe in self.packed.sensors], self.packed.sensor_table, strict=True))
+        tables = self.packed.tables
+        ahead = {int(tables.pieces[first, 2]) for first, count in tables.schedules.tolist() if count == 0}
+        static = [own and not block.followed for own, block in zip(static, blocks, strict=True)]
+        ahead = (ahead | {k for k in self.unstated if not static[k]}) & {*self.unstated}
+        acting: set[int] = set()
+        while ahead:
+            acting |= ahead
+            ahead = {numbers[name] for k in ahead for name in blocks[k].blocks_read} & {*self.unstated} - acting
+        known = {*range(len(blocks))} - {*self.unstated}
+        for k in self.unstated * static.count(True):
+            own = (item in numbers and numbers[item] in known if isinstance(item, str) else
+                   rows[item.text]["kind"] == rec.LEVEL for item in blocks[k].inputs)  # fmt: skip
+            if k not in known and static[k] and all(own):
+                known.add(k)
+        return sorted(acting - known)
 
     def guess(self) -> np.ndarray:
         """First outputs: as stated, or in the middle of the limits, or 0; 1 for integrals without a unit."""
@@ -263,11 +291,14 @@ class Balance:
         draft.tables.controls["start"] = draft.tables.controls["held"] = outputs
         return draft
 
-    def starts(self, outputs: np.ndarray) -> tuple[list[BlockStart], np.ndarray]:
-        """(values of each block, rates of change of its first input) at the start with these outputs."""
+    def starts(self, outputs: np.ndarray, by_rates: bool = False) -> tuple[list[BlockStart], np.ndarray]:
+        """(values of each block, rates of change of its first input) at the start with these outputs.
+
+        by_rates : False for rates of zero
+        """
         model = self.make(self.draft_with(outputs))
         t, codes = self.case.numerics.start, []
-        values, slopes = sensor_values(model, t)
+        values, slopes = sensor_values(model, t, by_rates)
         starts = []
         for block, row, output in zip(self.blocks.values(), model.tables.controls, outputs, strict=True):
             codes.append(model.tables.integers[row["inputs"] :][: row["input_count"]].tolist())
@@ -294,7 +325,7 @@ class Balance:
         by_rates : True to append the rate of the first input of each block that integrates. It decides where the input
         is stated, such as the level of a tank, and agrees with the setpoint.
         """
-        starts, slopes = self.starts(outputs)
+        starts, slopes = self.starts(outputs, by_rates)
         controls = [block.control for block in self.blocks.values()]
         own = [control_rows_of(type(controls[k])).residual(controls[k], starts[k]) for k in self.free]
         return np.array(own + ([slopes[k] for k in self.free if controls[k].integrates] if by_rates else []))
@@ -307,18 +338,42 @@ class Balance:
     def find(self) -> tuple[np.ndarray, list[BlockStart]]:
         """Balanced outputs, and the values of all blocks. Adds a fault if there is no balance."""
         outputs = self.guess()
-        starts = self.starts(outputs)[0]
+        starts = self.settled(outputs, self.starts(outputs)[0])
         if self.infinite(starts):
             outputs = self.passed_on(starts)
-            starts = self.starts(outputs)[0]
-        if not self.infinite(starts):
+            starts = self.settled(outputs, self.starts(outputs)[0])
+        if self.free and not self.infinite(starts):
             lost = self.iterate(outputs)
-            starts = self.starts(outputs)[0]
+            starts = self.settled(outputs, self.starts(outputs)[0])
             if lost and not self.infinite(starts):
                 self.refuse(lost, starts)
         self.refuse_infinite(starts)
         self.note_limited(starts)
         return outputs, starts
+
+    def settled(self, outputs: np.ndarray, starts: list[BlockStart]) -> list[BlockStart]:
+        """Values of all blocks after the outputs of blocks that are not sought follow their inputs, in `outputs`.
+
+        Where such outputs change the scene, the start is evaluated once more: the levels that they read stay.
+        """
+        numbers, before = {name: k for k, name in enumerate(self.blocks)}, outputs.copy()
+        given = [k for k in self.unstated if k not in self.free]
+        for _ in given:
+            earlier = outputs.copy()
+            for k in given:
+                block = starts[k].block
+                inputs = (outputs[numbers[item]] if isinstance(item, str) else known
+                          for item, known in zip(block.inputs, starts[k].inputs, strict=True))  # fmt: skip
+                starts[k] = starts[k]._replace(inputs=tuple(map(float, inputs)))
+                value = self.residual(starts[k]) + starts[k].output
+                if math.isfinite(value):
+                    outputs[k] = min(max(value, self.low[k]), self.high[k])
+                    starts[k] = starts[k]._replace(output=float(outputs[k]))
+            if np.array_equal(earlier, outputs):
+                break
+        pieces, schedules = self.packed.tables.pieces, self.packed.tables.schedules.tolist()
+        driving = [int(pieces[first, 2]) for first, count in schedules if count == 0]
+        return self.starts(outputs)[0] if np.any(before[driving] != outputs[driving]) else starts
 
     def polish(self, outputs: np.ndarray, matrix: np.ndarray, acts: np.ndarray, by_rates: bool) -> None:
         """Take a last step from residuals on both sides: beside its root a rate of a tank is set to zero as rounding.
@@ -379,7 +434,7 @@ class Balance:
     def passed_on(self, starts: list[BlockStart]) -> np.ndarray:
         """Outputs in which each block that does not integrate has the value that its inputs give."""
         outputs, numbers = np.array([start.output for start in starts]), {name: k for k, name in enumerate(self.blocks)}
-        for k in self.free:
+        for k in self.unstated:
             start, block = starts[k], starts[k].block
             if not block.control.integrates:
                 inputs = (outputs[numbers[item]] if isinstance(item, str) else known
@@ -428,7 +483,7 @@ class Balance:
 
     def note_limited(self, starts: list[BlockStart]) -> None:
         """Add a notice of each block without `limits` whose inputs give an output beyond those of the driven keys."""
-        for k in self.free:
+        for k in self.unstated:
             control, start, name = starts[k].block.control, starts[k], list(self.blocks)[k]
             if isinstance(control_rows_of(type(control)), StaticRows) and control.limits is None:
                 given = self.residual(start) + start.output
@@ -460,11 +515,11 @@ def listing_of(values: dict[str, float]) -> str:
     return ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
 
 
-def sensor_values(model, t: float) -> tuple[np.ndarray, np.ndarray]:
+def sensor_values(model, t: float, with_rates: bool = True) -> tuple[np.ndarray, np.ndarray]:
     """Values of all sensors at the start, and their rates : float64[sensors] each [SI, SI/s].
 
     The rate is the sum over the states that a sensor reads of slope times rate, so that it is exactly zero at rest. It
-    is left at zero for a sensor of many states, which the steady start determines.
+    is left at zero for a sensor of many states, which the steady start determines, and without `with_rates`.
     """
     from fvsolve.model.jacobian_pattern import Couplings  # it imports SciPy, which a run without controls does not need
 
@@ -472,8 +527,8 @@ def sensor_values(model, t: float) -> tuple[np.ndarray, np.ndarray]:
         y = model.start.copy()
         rates, out = data.evaluate(t, y, t)
         value, slopes = read_sensors(model, data, t, y, out), np.zeros(len(model.tables.sensors))
-        couplings = Couplings(model)
-        for k, row in enumerate(model.tables.sensors):
+        couplings = Couplings(model) if with_rates else None
+        for k, row in enumerate(model.tables.sensors if with_rates else ()):
             for j in states if (states := couplings.blocks.sensor(row)).size <= MOST_STATES else ():
                 high, low = y.copy(), y.copy()
                 high[j] += DIFFERENCE * model.scale[j]

@@ -48,6 +48,8 @@ class RunData:
     envelope : float64[4, cells]  least sum of both waves in each cell [kg/s], its time [s], greatest sum, its time
     extremes : float64[4, probes]  least value, its time, greatest value and its time, of probes, then of watched
     quantities
+    accepted : 1 if there is an accepted state, then pressures of nodes and flows of valves there, as in `out`, then all
+    these of the state before; see `kernels.node_clusters.begin_accepted`
     maxima : greatest values of cells of basins over all accepted steps, see `basins.free_surface.surface_maxima`
     bands : for each basin, first row (of a mesh: first cell) that this thread computes, and the one after its last
     joint : see `kernels.band_exchange`, empty if one thread computes all; sums : see `kernels.stage_sums`
@@ -64,7 +66,7 @@ class RunData:
         self.clock, self.full_at = self.written.clock[0], -np.inf  # number of history entries at which rings are full
         self.armed, self.marks = self.written.armed, self.written.marks
         self.envelope, self.extremes = self.written.envelope, self.written.extremes
-        self.maxima = self.written.maxima
+        self.maxima, self.accepted = self.written.maxima, self.written.accepted
         begin_history(self.written.past, model.tables.delays)
         input_histories.reset_histories(self.written.histories, model.tables.controls)
         self.clock["limit"], self.marks[:] = np.inf, np.nan
@@ -118,11 +120,16 @@ class RunData:
     def reset(self, armed: np.ndarray | None = None) -> None:
         """Reset for another state: event flags as given or as at the start, and empty histories."""
         self.armed[:], self.clock["limit"] = self.model.flags if armed is None else armed, np.inf
-        self.discrete[:] = self.model.discrete
+        self.discrete[:], self.accepted[:] = self.model.discrete, 0.0
         self.update_network()
         reset_history(self.past, self.model.tables.delays)
         if self.histories.size:
             input_histories.reset_histories(self.histories, self.model.tables.controls)
+
+    def return_to_earlier(self) -> None:
+        """Let iterations start from the accepted state before the last one, as those of the last one did."""
+        half = self.accepted.size // 2
+        self.accepted[:half] = self.accepted[half:]
 
     @property
     def discrete(self) -> np.ndarray:

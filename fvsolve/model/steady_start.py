@@ -327,8 +327,10 @@ class SteadyStart:
                                  f"its ends, {a} and {b}; give it `friction` or `initial_flow`, or use "
                                  'initial = "rest"')  # fmt: skip
         if not self.draft.faults and not self.answer.converged:
-            worst = list(self.case.places)[self.least_balanced()]
-            self.draft.fault("numerics.initial", f"no steady state was found: flows balance least at {worst}; check "
+            weak = [list(self.case.places)[i] for i in self.answer.undetermined]
+            worst = (f"the equations hardly determine the pressure at {listing(weak, 6)}" if weak else
+                     f"flows balance least at {list(self.case.places)[self.least_balanced()]}")  # fmt: skip
+            self.draft.fault("numerics.initial", f"no steady state was found: {worst}; check "
                              "there for demands that cannot be supplied, links of extreme resistance, and frictionless "
                              'paths between unequal heads, or use initial = "rest"')  # fmt: skip
         self.draft.check()

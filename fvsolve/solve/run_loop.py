@@ -108,7 +108,7 @@ class RunLoop:
         control["step_max"] = longest_step(model)
         control["stop_at"], control["allow_fused"] = NO_LIMIT, fused_allowed
         control["has_jumps"] = model.tables.delays.size > 0
-        set_step_mode(control, numerics)
+        set_step_mode(control, model)
         if numerics.method == automatic.AUTO:
             automatic.watch(stepper, structure())
         # of waves only: implicit steps are stable for the rest
@@ -415,8 +415,13 @@ class RunLoop:
         return f"{parts_text} {verbs} without end at {when}; {remedy}"
 
 
-def set_step_mode(control, numerics) -> None:
-    """Set the mode of the steps and its number: Courant number, given step [s] or tolerance."""
+def set_step_mode(control, model: Model) -> None:
+    """Set the mode of the steps and its number: Courant number, given step [s] or tolerance.
+
+    Without waves nothing is fast after a switch: steps then keep their length, which only their error limits.
+    """
+    numerics = model.case.numerics
+    control["keeps_step"] = model.shapes.accepted > 0 and not len(model.tables.pipes)
     for mode, key in enumerate(("courant", "step", "rtol")):  # COURANT, FIXED_STEP, TOLERANCE of `loop_records`
         if getattr(numerics, key) is not None:
             control["mode"], control["size"] = mode, getattr(numerics, key)

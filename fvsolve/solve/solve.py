@@ -27,7 +27,7 @@ FIRST_CHUNK = 1000.0  # steps before the first pause
 # A run under error control ends if this count of attempted steps advances by less than this fraction of the run.
 STALLED_ATTEMPTS, STALLED_ADVANCE = 2000, 1e-10
 FREQUENT_CHECK_STEPS = loop_records.GROWTH_CHECK_STEPS
-PERSISTENT = ("extremes", "envelope", "maxima", "marks", "armed", "discrete")
+PERSISTENT = ("extremes", "envelope", "maxima", "marks", "armed", "discrete", "accepted")
 HISTORIES = ("past", "histories")  # arrays that may grow during a run
 
 
@@ -180,6 +180,7 @@ class Run:
             if memory[name].shape != view.shape or memory[name].dtype != view.dtype:
                 raise ValueError(f"array {name} does not match")
             view[...] = memory[name]
+        self.run_data.return_to_earlier()  # the run computes the rates of this state once more
         counts = np.array([float(loop.state[name]) for name in loop_records.COUNTS.values()])
         are_valid = np.isfinite(counts).all() and counts.min() >= 0.0
         if loop.state["t"] != t or not are_valid or not self.checks.has_valid_counts:

@@ -178,7 +178,8 @@ class Integrator:
 
     def discard_history(self) -> None:
         """Discard the step size, the last error, the stiffness count and the Jacobian, for a start after a kink."""
-        for name in ("step", "error_old", "switch_count", "split_remainder"):
+        kept = ("step",) if self.control["keeps_step"][0] else ()
+        for name in {"step", "error_old", "switch_count", "split_remainder"}.difference(kept):
             self.state[name] = 0.0
         if self.control["kind"] != rec.EXPLICIT:
             from fvsolve.steppers.newton import reset

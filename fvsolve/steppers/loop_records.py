@@ -36,9 +36,11 @@ COUNTS = {
 # dividing_rate : rate above which a given step is divided into parts of its time constant [1/s]; 0 for none
 # watch_at : count of steps at which the next state is watched, see `run_handle.WATCH`; 0 for none
 # has_jumps : 1 where waves of delay lines arrive, so that event functions may jump
+# keeps_step : 1 where a step after a switch begins with the length of that before, because nothing is fast
 # price : cost of an implicit step in explicit steps; order : power of h of the error estimate; budget : steps left
 CONTROL = _record(
-    "mode kind allow_fused fsal stage_slope watch end_at_rows separate_rows ledger_offset dense_steps has_jumps",
+    "mode kind allow_fused fsal stage_slope watch end_at_rows separate_rows ledger_offset dense_steps has_jumps "
+    "keeps_step",
     "start end every field_every size step_max budget field_count stop_at order price dividing_rate watch_at",
 )
 # Kept between calls while rows remain to be written: phase; 1 after a step; rows of y with the present and the last

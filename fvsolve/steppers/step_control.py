@@ -13,6 +13,7 @@ BOUNDARY = 3.0  # h times spectral radius at the stability boundary: `dormand-pr
 # h times spectral radius above which stability limits the step: then it varies from 1 to 3.5; limited by accuracy it
 # hardly varies.
 LIMITED_BY_STABILITY = 2.5
+WAVES = 1.0  # h times the greatest known rate below which only other parts, such as valves, can limit the step
 COUNT_DECREASE = 0.4  # decrease of the count by a step that stability does not limit
 # Fraction of an opening that may close in one given step; for x ~ (time left)^(1/3) this is half of the time left.
 CLOSING_FRACTION = 0.15
@@ -226,7 +227,7 @@ def watch(control, state, h, e, out_rate):
     """Count the steps for which the other kind of method (explicit or implicit) would have been cheaper.
 
     Returns True if there are enough such steps to change the method. An implicit method would be cheaper if stability
-    limits the explicit step (Hairer and Wanner 1996, IV.2). Where the greatest wave rate is known, the error must also
+    limits the explicit step (Hairer and Wanner 1996, IV.2). Where the greatest wave rate limits it, the error must also
     allow a step longer by more than the cost ratio of an implicit step. An explicit method would be cheaper if its
     steps within the stability boundary cost less than half. Writes the count and the radius to `state`.
     h, e : length and error of the step; out_rate : greatest wave rate [1/s], 0 if not known
@@ -234,9 +235,9 @@ def watch(control, state, h, e, out_rate):
     if control["kind"] == rec.EXPLICIT:
         growth = 0.9 * max(e, 1e-30) ** (-1.0 / control["order"])
         cheaper = h * state["radius"] > LIMITED_BY_STABILITY
-        if out_rate > 0.0:  # `next_step` keeps h within stability; the error gives the possible increase
+        if h * out_rate > WAVES:  # `next_step` keeps h within stability; the error gives the possible increase
             cheaper = h * out_rate > 1.98 and growth > control["price"]
-            state["radius"] = max(state["radius"], out_rate)
+        state["radius"] = max(state["radius"], out_rate)
     else:
         cheaper = 2.0 * max(1.0, h * state["radius"] / BOUNDARY) < control["price"]
     state["switch_count"] = state["switch_count"] + 1.0 if cheaper else max(0.0, state["switch_count"] - COUNT_DECREASE)

@@ -41,6 +41,7 @@ from fvsolve.steppers.step_operations import (
 )
 
 EVENT_TOLERANCE = 1e-13
+SLOW_EVENT_TOLERANCE = 1e-9  # of long steps, whose event functions have the rounding of large networks
 MOST_SEARCHES = 8  # for events before an event within the same step
 SECANT_TURNS = 40  # turns of the Illinois rule, which is slow where an event function is nearly zero at the start
 # attempts of an implicit step by Newton alone at tolerances above LOOSE: shorter steps cost less than sweeps
@@ -103,12 +104,13 @@ def locate(handle, run, r, h, now, new, e):
     t, low, high, at_low, past = r.state[0]["t"], 0.0, h, 1.0, event_ratio(g, g_new)
     guess, at_high, side = h, past, 0
     r.progress[0]["no_sweeps"] = 0
+    tolerance = SLOW_EVENT_TOLERANCE if r.control[0]["keeps_step"] == 1 else EVENT_TOLERANCE
     for turn in range(101):
-        done = turn == 100 or past >= -EVENT_TOLERANCE or high - low <= 4e-16 * max(abs(t), high)
+        done = turn == 100 or past >= -tolerance or high - low <= 4e-16 * max(abs(t), high)
         if done and guess == high:
             break
         guess = high - at_high * (high - low) / (at_high - at_low)
-        guess += 1e-3 * EVENT_TOLERANCE * h
+        guess += 1e-3 * tolerance * h
         if not low < guess < high or turn > SECANT_TURNS:
             guess = 0.5 * (low + high)
         if done:
@@ -305,7 +307,7 @@ def finish_last_step(handle, r):
         set_flags(r.g, r.armed)
         forget_pace(r)
         progress["switch_pending"], progress["phase"] = 0, rec.FRESH
-        if control["mode"] == rec.TOLERANCE:
+        if control["mode"] == rec.TOLERANCE and control["keeps_step"] == 0:
             state["step"] = 0.0
         discard_stages(r)
         return rec.SWITCHED
@@ -479,7 +481,7 @@ def try_step(handle, run, r, h, last, due, now, new, near_kink):
         return e, h, last
     if found:
         progress["event_known"] = 0
-        state["step"], state["split_remainder"] = 0.0, 0.0
+        state["step"], state["split_remainder"] = state["step"] * r.control[0]["keeps_step"], 0.0
         last = last and state["t"] + length >= r.control[0]["end"]
         e = error_with_ledger(r, length, e)
     return nan if has_faulty_stage(r) else e, length, last

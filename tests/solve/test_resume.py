@@ -14,6 +14,7 @@ import pytest
 from basins.test_basin import alone, basin
 from reference.checkpoints import write_sealed
 from reference.scenes import branched
+from solve.test_networks_without_waves import FALLING, reducing, town
 
 import fvsolve
 from fvsolve.output.memory_sink import MemorySink
@@ -316,3 +317,29 @@ def test_a_run_whose_steps_all_write_pauses_and_goes_on_from_there(output, monke
     assert 0.0 < half.t < 2.0 and np.array_equal(same, end)
     rows = whole.table()
     assert np.array_equal(again.table(), rows[rows[:, 0] > half.t])
+
+
+@pytest.mark.parametrize("method", ["dormand-prince", "radau-iia-5", "auto"])
+def test_a_day_without_waves_that_is_resumed_is_the_unbroken_day_to_the_bit(often, method):
+    """The iterations of its network begin at the last accepted state, which checkpoints contain; a valve acts at once.
+
+    The run goes on from each checkpoint: before, between and after the switches of the valve.
+    """
+    case = town(reducing(), source=FALLING, method=method, rtol=1e-7)
+    model = fvsolve.build(fvsolve.load(case))
+
+    def go(state):
+        sink = Keeping(model)
+        run = Run(model, state, sink, None)
+        summary = run.go()
+        assert summary.reason == "finished"
+        return sink, run.loop.now.copy(), summary
+
+    whole, end, first = go(fvsolve.initial_state(model))
+    assert len(whole.states) >= 4 and len(first.events) >= 4
+    rows = whole.table()
+    for state in whole.states:
+        assert state.memory["accepted"][0] == 1.0
+        again, same, second = go(state)
+        assert np.array_equal(same, end) and second.events == first.events
+        assert np.array_equal(again.table(), rows[rows[:, 0] > state.t])

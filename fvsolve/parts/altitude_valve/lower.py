@@ -23,6 +23,10 @@ class AltitudeValveRows(Device, kind="altitude-valve"):
         part = start.case.conduits[start.draft.valve_names[k]]
         return "the tank is full" if start.case.nodes[part.to].level == part.full_level else "the tank is empty"
 
+    def flags_at_start(self, start, part, row) -> dict[int, bool]:
+        shut, level, at = int(row["valve"]) in start.shut, start.case.nodes[part.to].level, int(row["event"])
+        return {at + law.FULL: shut and level == part.full_level, at + law.EMPTY: shut and level == part.empty_level}
+
     def revise_state(self, start, part, row) -> bool:
         k, level = int(row["valve"]), start.case.nodes[part.to].level
         full, empty = (limit is not None and level == limit for limit in (part.full_level, part.empty_level))

@@ -264,6 +264,9 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         start.shut |= {k} if shuts else set()
         return shuts
 
+    def flags_at_start(self, start, part, row) -> dict[int, bool]:
+        return {int(row["event"]): int(row["valve"]) in start.shut}
+
     def begin(self, start, part, row) -> list[str]:
         k, draft = int(row["valve"]), start.draft
         valve, name, moving = start.valves[k], draft.valve_names[k], []

@@ -1,14 +1,15 @@
 """Self-acting valves in the tables of a model, and their states at the steady start."""
 
 import math
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from fvsolve.assembly.lowering import FLOW, SET_PRESSURE, Device, Input, opening_of
 from fvsolve.errors import Notice
+from fvsolve.kernels.dtypes import NOT_HELD
 from fvsolve.kernels.restrictions import LEAST, flow_at_drop, flow_slope, transition_of
-from fvsolve.parts.self_acting import law_check_valve, law_disc, law_regulating, law_relief_valve, law_slam
+from fvsolve.parts.self_acting import law_at_once, law_check_valve, law_disc, law_regulating, law_relief_valve, law_slam
 from fvsolve.parts.self_acting.law_disc import CHECK, RELIEF
 from fvsolve.parts.tolerances import is_head_above
 from fvsolve.steady import Edge
@@ -228,6 +229,9 @@ class CheckValveRows(Device, kind="check-valve"):
     def shut_reason(self, start, k):
         return "passes no reversed flow"
 
+    def flags_at_start(self, start, part, row) -> dict[int, bool]:
+        return {int(row["event"]): int(row["valve"]) in start.shut}
+
 
 class SlamCurveRows(CheckValveRows, kind=""):
     """Conversion to table rows of check valves that shut at the reverse velocity of their manufacturer's curve."""
@@ -242,6 +246,9 @@ class SlamCurveRows(CheckValveRows, kind=""):
 
     def scales(self, draft, name, part) -> list[float]:
         return [1.0, 1.0]
+
+    def flags_at_start(self, start, part, row) -> dict[int, bool]:
+        return {}
 
     def apply_event(self, run_data, row, t, y, scale) -> None:
         o, at, curve = row["y"], row["event"], run_data.model.case.conduits[self.name(run_data, row)].deceleration
@@ -369,6 +376,10 @@ class Regulator(Device, kind=""):
               "leaves its seat", "", "")  # fmt: skip
     remedy = "give the regulating valve a longer time_constant"
     key, end, verb = "set_pressure", "", ""  # key of the set value, end at which it is sensed, verb for messages
+    at_once: ClassVar[type["Regulator"] | None] = None  # conversion of valves with the time constant 0
+
+    def of(self, part) -> Device:
+        return self if part.time_constant > 0.0 or self.at_once is None else self.at_once()
 
     def numbers(self, draft, name, part) -> list[float]:
         scale = 1.0 if self.end else draft.fluid.density
@@ -560,6 +571,56 @@ class FlowControlRows(Regulator, kind="flow-control"):
         if now == "shut":  # it holds nothing back but what is beyond its set flow
             return OPEN
         return ACTIVE if here.flow > here.target + SMALL_FLOW * here.start.flow_scale else now
+
+
+class AtOnce:
+    """Changes to the conversion of a control valve with the time constant 0: it has no state."""
+
+    law, events_only, controlling_event, states, at_once = law_at_once, True, -1, (), None
+    events = ("shuts against reversed flow", "opens again", "is fully open", "leaves full opening")
+    remedy = "give the regulating valve a time_constant"
+
+    def held_end(self, part) -> str:
+        return self.end
+
+    def scales(self, draft, name, part) -> list[float]:
+        return []
+
+    def begin(self, start, part, row) -> list[str]:
+        k, draft = int(row["valve"]), start.draft
+        valve, at, shut = start.valves[k], int(row["data"]), k in start.shut
+        active, error = not shut and self.steady_mode(start, k) == ACTIVE, self.error(start, k)
+        if active and abs(error) > start.set_point_tolerance(self.end):
+            self.refuse(start, k)
+        error, opening = (0.0, opening_of(start, k)) if active else (error, float(not shut))
+        draft.tables.floats[at : at + 3] = opening, error, self.set_value(start, k)
+        valve["open"] = 0.0 if shut else valve["conductance"]
+        valve["drive"] = NOT_HELD if not active else 0.0 if self.end else self.set_value(start, k)
+        if not shut and not active and valve["transition"] == 0.0:
+            valve["drop"] = abs(valve["flow"]) * valve["flow"] / valve["open"]
+        return []
+
+    def flags_at_start(self, start, part, row) -> dict[int, bool]:
+        k, at = int(row["valve"]), int(row["event"])
+        return {at + law_at_once.SHUT: k in start.shut,
+                at + law_at_once.FULL: k not in start.shut and self.steady_mode(start, k) == OPEN}  # fmt: skip
+
+
+class ReducingAtOnce(AtOnce, PressureReducingRows, kind=""):
+    """Conversion to table rows of pressure-reducing valves that act at once."""
+
+
+class SustainingAtOnce(AtOnce, PressureSustainingRows, kind=""):
+    """Conversion to table rows of pressure-sustaining valves that act at once."""
+
+
+class FlowControlAtOnce(AtOnce, FlowControlRows, kind=""):
+    """Conversion to table rows of flow-control valves that act at once."""
+
+
+PressureReducingRows.at_once = ReducingAtOnce
+PressureSustainingRows.at_once = SustainingAtOnce
+FlowControlRows.at_once = FlowControlAtOnce
 
 
 def head_of(case, weight: float, name: str) -> tuple[float, str]:

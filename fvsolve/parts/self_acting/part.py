@@ -9,6 +9,7 @@ from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import ListTable, Table, exclusive_key_faults, keys_json, read_lists
 from fvsolve.parts.value import (
     NEEDED,
+    SHAPE,
     VALUE,
     Number,
     Quantity,
@@ -173,8 +174,9 @@ class Regulating(Sized, TwoPort):
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
     time_constant: Annotated[float, Quantity(
-        "time", positive, "time in which an error of one `band` (or of `set_flow`) opens the shut valve [s]", STROKES,
-        VALUE,
+        "time", nonnegative,
+        "time in which an error of one `band` (or of `set_flow`) opens the shut valve [s]; 0: it acts at once, between "
+        "pipes without waves", STROKES, SHAPE,
     )]  # fmt: skip
 
 

@@ -1,0 +1,256 @@
+"""Days of networks without waves: valves that act at once, sparse solution of the nodes, methods, starts of blocks."""
+
+import math
+from importlib import import_module
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from reference.scenes import AMBIENT, RHO, WATER
+from reference.scenes import GRAVITY as G
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import fvsolve
+from fvsolve.kernels.node_clusters import solve_in_order
+from fvsolve.model.cluster_tables import SparseMatrix
+
+FACTOR, DIAMETER, LENGTH = 0.02, 0.2, 500.0
+LOSS = 8.0 * FACTOR * LENGTH / (math.pi**2 * G * DIAMETER**5)  # head per flow squared [s2/m5]
+SIZE = {"diameter": DIAMETER, "loss_coefficient": 0.5}
+
+
+def pipe(start, end):
+    friction = {"model": "steady", "factor": FACTOR}
+    return {"type": "pipe", "from": start, "to": end, "length": LENGTH, "diameter": DIAMETER, "friction": friction}
+
+
+def town(valve, demand=0.01, source=80.0, **numerics):
+    """Case: lake - pipe - valve - pipe - town with a demand - pipe - tower; heads of the lake as a schedule."""
+    return {
+        "schema": 1, "fluid": WATER,
+        "nodes": {
+            "lake": {"type": "reservoir", "head": source},
+            "a": {"type": "junction", "elevation": 0.0}, "b": {"type": "junction", "elevation": 0.0},
+            "town": {"type": "junction", "elevation": 0.0, "demand": demand},
+            "tower": {"type": "tank", "elevation": 30.0, "area": 50.0, "level": 3.0, "height": 60.0},
+        },
+        "links": {"p1": pipe("lake", "a"), "v": {"from": "a", "to": "b", **SIZE, **valve}, "p2": pipe("b", "town"),
+                  "p3": pipe("town", "tower")},
+        "numerics": {"end": 20000.0, "pipe_model": "quasi-steady", "rtol": 1e-9, **numerics},
+        "output": {"every": 500.0, "probes": ["tower.level", "a.head", "b.head", "v.flow", "v.opening", "p3.flow"]},
+    }  # fmt: skip
+
+
+def reducing(**keys):
+    return {"type": "pressure-reducing", "set_pressure": AMBIENT + 45.0 * RHO * G, "time_constant": 0.0, **keys}
+
+
+def run(case):
+    found = fvsolve.run(fvsolve.load(case))
+    assert found.reason == "finished"
+    return found
+
+
+def signed_root(head):
+    return math.copysign(math.sqrt(abs(head) / LOSS), head)
+
+
+def test_a_reducing_valve_that_acts_at_once_keeps_its_set_pressure():
+    """The pressure behind the valve is given, so two pipes and the tank remain: their equation is solved by SciPy."""
+    found, demand = run(town(reducing())), 0.01
+
+    def fill(level):
+        """Flow into the tower: the flow that leaves b less the demand."""
+
+        def imbalance(head):
+            return signed_root(45.0 - head) - demand - signed_root(head - 30.0 - level)
+
+        return signed_root(brentq(imbalance, 0.0, 100.0, xtol=1e-13) - 30.0 - level)
+
+    exact = solve_ivp(lambda t, y: [fill(y[0]) / 50.0], (0.0, 20000.0), [3.0], rtol=1e-10, atol=1e-10, t_eval=found.t)
+    assert found["tower.level"] == pytest.approx(exact.y[0], abs=1e-6)
+    assert found["b.head"] == pytest.approx(np.full(found.t.size, 45.0), abs=1e-9)
+    assert found["v.flow"] == pytest.approx(found["p3.flow"] + demand, abs=1e-9)
+    full = math.pi / 4.0 * DIAMETER**2 * np.sqrt(2.0 * G * (found["a.head"] - found["b.head"]) / 0.5)
+    assert found["v.opening"] == pytest.approx(found["v.flow"] / full, rel=1e-6)
+    assert found.summary["steps"] < 100
+
+
+def test_a_flow_control_valve_that_acts_at_once_keeps_its_set_flow():
+    valve = {"type": "flow-control", "set_flow": 0.02, "time_constant": 0.0}
+    found = run(town(valve))
+    assert found["v.flow"] == pytest.approx(np.full(found.t.size, 0.02), abs=1e-9)
+    assert found["tower.level"] == pytest.approx(3.0 + (0.02 - 0.01) * found.t / 50.0, abs=1e-6)
+
+
+def test_a_sustaining_valve_that_acts_at_once_keeps_the_pressure_before_it():
+    valve = {"type": "pressure-sustaining", "set_pressure": AMBIENT + 70.0 * RHO * G, "time_constant": 0.0}
+    found = run(town(valve, end=15000.0))
+    assert found["a.head"] == pytest.approx(np.full(found.t.size, 70.0), abs=1e-9)
+    assert found["v.flow"] == pytest.approx(np.full(found.t.size, signed_root(10.0)), abs=1e-9)
+
+
+# lake: falls below the set pressure, then below the tower, then rises: the valve opens fully, shuts, opens, controls
+FALLING = {"time": [0, 4000, 8000, 12000, 16000, 20000], "value": [80, 80, 40, 25, 25, 80]}
+
+
+def test_a_valve_that_acts_at_once_opens_and_shuts_as_a_fast_one():
+    """Its states are those of a valve with a short time constant, and their changes have the same times."""
+    found = run(town(reducing(), source=FALLING))
+    fast = run(town(reducing(time_constant=0.05), source=FALLING, method="radau-iia-5"))
+    assert found["tower.level"] == pytest.approx(fast["tower.level"], abs=1e-4)
+    times = [{event["what"]: event["time"] for event in reversed(one.summary["events"]) if event["name"] == "v"}
+             for one in (found, fast)]  # fmt: skip
+    assert times[0]["is fully open"] == pytest.approx(times[1]["is fully open"], abs=6.0)  # the other valve moves
+    for what in ("shuts against reversed flow", "opens again"):
+        assert times[0][what] == pytest.approx(times[1][what], abs=0.1)
+    last = [one.summary["events"][-1] for one in (found, fast)]
+    assert [event["what"] for event in last] == ["leaves full opening"] * 2
+    assert last[0]["time"] == pytest.approx(last[1]["time"], abs=0.1)
+
+
+def test_methods_agree_for_a_valve_that_acts_at_once():
+    methods = ("dormand-prince", "radau-iia-5", "rodas-5p", "esdirk-5")
+    levels = [run(town(reducing(), source=FALLING, method=method))["tower.level"] for method in methods]
+    for level in levels[1:]:
+        assert level == pytest.approx(levels[0], abs=1e-6)
+
+
+def test_a_valve_acts_at_once_only_between_pipes_without_waves():
+    case = town(reducing())
+    case["numerics"] = {"end": 1.0, "pipe_model": "finite-volume"}
+    for name in ("p1", "p2", "p3"):
+        case["links"][name]["wave_speed"] = 1000.0
+    with pytest.raises(fvsolve.CaseError, match=r"v\.time_constant: 0 s: .*without waves.*quasi-steady"):
+        fvsolve.build(fvsolve.load(case))
+
+
+def test_two_valves_that_act_at_once_cannot_hold_one_node():
+    case = town(reducing())
+    case["links"]["v2"] = {"from": "a", "to": "b", **SIZE, **reducing()}
+    with pytest.raises(fvsolve.CaseError, match="both hold the pressure at b"):
+        fvsolve.build(fvsolve.load(case))
+
+
+def test_a_valve_with_a_time_constant_is_stepped_by_an_implicit_method():
+    """The rates of waves are unknown here: the stiffness is that of the valve. 10 min took 17 253 explicit steps."""
+    found = run(town(reducing(time_constant=5.0), end=600.0, rtol=1e-7))
+    assert found.summary["steps"] < 200
+    assert [entry["method"] for entry in found.summary["methods"]][-1] == "radau-iia-5"
+
+
+def test_a_shut_check_valve_stays_shut_at_the_start():
+    """If `cb` were open at the start, the flow through it from the high lake would shut `ca`, and nothing opens it."""
+    case = town(reducing())
+    case["nodes"] |= {"high": {"type": "reservoir", "head": 200.0}, "c": {"type": "junction", "elevation": 0.0},
+                      "d": {"type": "junction", "elevation": 0.0}, "j": {"type": "junction", "demand": 0.005,
+                                                                         "elevation": 0.0},
+                      "lower": {"type": "reservoir", "head": 50.0}}  # fmt: skip
+    case["links"] |= {"pa": pipe("lower", "c"), "ca": {"type": "check-valve", "from": "c", "to": "j", **SIZE},
+                      "pb": pipe("high", "d"),
+                      "cb": {"type": "check-valve", "from": "j", "to": "d", **SIZE}}  # fmt: skip
+    case["links"]["joint"] = pipe("lake", "lower")  # between given heads
+    case["numerics"]["end"] = 100.0
+    case["output"]["probes"] = ["pa.flow", "pb.flow"]
+    found = run(case)
+    assert found["pa.flow"] == pytest.approx(np.full(found.t.size, 0.005), abs=1e-9)
+    assert found["pb.flow"] == pytest.approx(np.zeros(found.t.size), abs=1e-9)
+
+
+def latches(count):
+    """Blocks that open and shut the valve at the town by the level of the tower, and constants that they read."""
+    blocks = {}
+    for k in range(count):
+        blocks[f"set-{k}"] = {"type": "function", "formula": "0"}
+        blocks[f"reset-{k}"] = {"type": "function", "formula": "(level > 9)", "inputs": {"level": "tower.level"}}
+        blocks[f"latch-{k}"] = {"type": "latch", "set": f"controls.set-{k}", "reset": f"controls.reset-{k}",
+                                "initial": 1}  # fmt: skip
+    return blocks
+
+
+@pytest.mark.parametrize("count", [1, 10])
+def test_constant_blocks_cost_no_steady_states_at_the_start(count, monkeypatch):
+    """The number of steady states that the start needs does not grow with blocks that no key follows at once."""
+    build = import_module("fvsolve.model.build")
+    solved, own = [], build.steady_profile
+    monkeypatch.setattr(build, "steady_profile", lambda draft: solved.append(1) or own(draft))
+    case = town(reducing())
+    case["links"]["v"]["time_constant"] = 5.0
+    case["links"]["p3"]["to"] = "end"
+    case["nodes"]["end"] = {"type": "junction", "elevation": 0.0}
+    case["links"]["gate"] = {"type": "valve", "from": "end", "to": "tower", **SIZE,
+                             "opening": {"control": "inverse"}}  # fmt: skip
+    case["controls"] = latches(count) | {
+        "inverse": {"type": "function", "formula": "1 - 0.5*other", "inputs": {"other": "controls.latch-0"}}
+    }
+    for k in range(1, count):
+        name = f"drain-{k}"
+        case["links"][name] = {"type": "valve", "from": "town", "to": "lake", "diameter": 0.001,
+                               "discharge_coefficient": 0.6, "opening": {"control": f"latch-{k}"}}  # fmt: skip
+    model = fvsolve.build(fvsolve.load(case))
+    assert len(solved) <= 3
+    start = model.tables.controls["start"]
+    names = list(fvsolve.load(case).controls)
+    known = {name: value for name, value in zip(model.tables and sorted(names), start, strict=False)}
+    assert sorted(start) == sorted([0.0] * 2 * count + [1.0] * count + [0.5]) and known
+
+
+def test_the_sparse_elimination_solves_random_matrices():
+    rng = np.random.default_rng(3)
+    for n in (1, 2, 7, 60):
+        ends = [(int(rng.integers(-1, k)), k) for k in range(n)] + [tuple(rng.integers(0, n, 2)) for _ in range(n // 2)]
+        ends = [(i, j) for i, j in ends if i != j]
+        rows = [{"from_node": i if i >= 0 else n, "to_node": j} for i, j in ends]
+        matrix = SparseMatrix(SimpleNamespace(valve_table=rows), list(range(n)), list(range(len(rows))), [], {})
+        full, values = np.diag(rng.uniform(1.0, 2.0, n)), np.zeros(matrix.size)
+        for i, j in ends:
+            if i >= 0:
+                full[i, i] += 3.0
+                full[i, j] -= rng.uniform(0.5, 1.0)
+                full[j, i] -= rng.uniform(0.5, 1.0)
+            full[j, j] += 3.0
+        for (i, j), at in matrix.place.items():
+            values[at] = full[i, j]
+        right = rng.normal(size=n)
+        x, integers = right.copy(), np.array(matrix.integers(), dtype=np.int64)
+        assert solve_in_order(values, x, n, integers, 0) == 1.0
+        assert x == pytest.approx(np.linalg.solve(full, right), rel=1e-10)
+
+
+def test_a_demand_opens_the_check_valve_behind_which_it_is_isolated():
+    """A valve shuts at once what supplies the demand, and a check valve from a lower lake opens at the same moment."""
+    case = town(reducing())
+    case["nodes"] |= {"j": {"type": "junction", "demand": 0.005, "elevation": 0.0},
+                      "c": {"type": "junction", "elevation": 0.0}, "d": {"type": "junction", "elevation": 0.0},
+                      "lower": {"type": "reservoir", "head": 50.0}}  # fmt: skip
+    opening = {"time": [0, 1000], "value": [1, 0], "kind": "step"}
+    case["links"] |= {"pa": pipe("lower", "c"), "ca": {"type": "check-valve", "from": "c", "to": "j", **SIZE},
+                      "pb": pipe("lake", "d"), "gate": {"type": "valve", "from": "d", "to": "j", **SIZE,
+                                                        "opening": opening}}  # fmt: skip
+    case["numerics"]["end"] = 2000.0
+    case["output"] = {"every": 100.0, "probes": ["pa.flow", "pb.flow"]}
+    found = run(case)
+    before, after = found.t < 1000.0, found.t > 1000.0  # there are two rows at 1000 s
+    for name, first, last in (("pa.flow", 0.0, 0.005), ("pb.flow", 0.005, 0.0)):
+        assert found[name][before] == pytest.approx(np.full(before.sum(), first), abs=1e-9)
+        assert found[name][after] == pytest.approx(np.full(after.sum(), last), abs=1e-9)
+
+
+def test_an_inflow_opens_the_check_valve_behind_which_it_is_isolated():
+    """A valve shuts at once what takes the inflow, and a check valve to a higher lake opens at the same moment."""
+    case = town(reducing())
+    case["nodes"] |= {"j": {"type": "junction", "demand": -0.005, "elevation": 0.0},
+                      "c": {"type": "junction", "elevation": 0.0}, "d": {"type": "junction", "elevation": 0.0},
+                      "upper": {"type": "reservoir", "head": 150.0}}  # fmt: skip
+    opening = {"time": [0, 1000], "value": [1, 0], "kind": "step"}
+    case["links"] |= {"pa": pipe("c", "upper"), "ca": {"type": "check-valve", "from": "j", "to": "c", **SIZE},
+                      "pb": pipe("lake", "d"), "gate": {"type": "valve", "from": "d", "to": "j", **SIZE,
+                                                        "opening": opening}}  # fmt: skip
+    case["numerics"]["end"] = 2000.0
+    case["output"] = {"every": 100.0, "probes": ["pa.flow", "pb.flow"]}
+    found = run(case)
+    before, after = found.t < 1000.0, found.t > 1000.0  # there are two rows at 1000 s
+    for name, first, last in (("pa.flow", 0.0, 0.005), ("pb.flow", -0.005, 0.0)):
+        assert found[name][before] == pytest.approx(np.full(before.sum(), first), abs=1e-9)
+        assert found[name][after] == pytest.approx(np.full(after.sum(), last), abs=1e-9)
