@@ -59,7 +59,7 @@ def test_the_networks_of_epanet_have_its_levels_and_switches_all_day(name, tmp_p
     path = SHIPPED / f"{name}.inp"
     imported = import_network(path, day=True)
     run = ours(imported, tmp_path)
-    known = "opens and shuts", "no elevation of a reservoir"
+    known = "opens and shuts", "no elevation of a reservoir", "the chemical", "water age", "water trace"
     assert run.t[-1] == 86400.0 and all(any(one in text for one in known) for text, _ in imported.notes)
     day = agree(path, imported, run, SWITCHED[name], scheduled=("10", "335"))
     if name == "Net3":  # the pump and its bypass switch at one time, the pump by the negation of the relay
