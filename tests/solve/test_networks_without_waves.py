@@ -254,3 +254,14 @@ def test_an_inflow_opens_the_check_valve_behind_which_it_is_isolated():
     for name, first, last in (("pa.flow", 0.0, 0.005), ("pb.flow", -0.005, 0.0)):
         assert found[name][before] == pytest.approx(np.full(before.sum(), first), abs=1e-9)
         assert found[name][after] == pytest.approx(np.full(after.sum(), last), abs=1e-9)
+
+
+def test_the_sparse_elimination_names_the_unknown_without_a_pivot():
+    """Node 2 is joined to nothing: its equation has no term."""
+    rows = [{"from_node": 0, "to_node": 1}]
+    matrix = SparseMatrix(SimpleNamespace(valve_table=rows), [0, 1, 2], [0], [], {})
+    values, right = np.zeros(matrix.size), np.array([7.0, 7.0, 7.0])
+    for (i, j), at in matrix.place.items():
+        values[at] = 0.0 if i == 2 else 2.0 if i == j else -1.0
+    assert solve_in_order(values, right, 3, np.array(matrix.integers(), dtype=np.int64), 0) == 0.0
+    assert right[0] == 2.0
