@@ -198,7 +198,8 @@ def mark_isolated(cluster, tables, out, g, c, connected, group, scale, work):
         totals[i], drawn[i] = 0.0, 1.0 if tables.settings[0]["law"] == LAW_LINEAR else 0.0
     for i in range(n):
         node, number = integers[cluster["first_node"] + i], int(group[i])
-        out[layout["isolated"] + node] = UNDETERMINED if connected[i] == 0.0 else JOINED
+        undetermined = connected[i] == 0.0 and tables.nodes[node]["gates"] < 0  # a rigid column determines a pressure
+        out[layout["isolated"] + node] = UNDETERMINED if undetermined else JOINED
         totals[number] += c[i]
         if not (c[i] <= 0.0 and c[i] == out[layout["supply"] + node]):
             drawn[number] = 0.0

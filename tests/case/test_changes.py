@@ -22,7 +22,7 @@ NAMES = sorted((path.stem for path in CASES.glob("*.toml")), key=lambda name: (n
 NUMBER = re.compile(r"\s*([+-]?[\d._]+(?:[eE][+-]?\d+)?)(\s*\S.*|)")
 HAIR = 1e-4
 # keys of class `shape` that do not change the shape of the shipped case; a separate test shows that they can
-ALIKE = {"loss_in", "loss_out"}
+ALIKE = {"loss_in", "loss_out", "time_constant"}
 
 
 def raw_case(name: str) -> dict:
@@ -242,6 +242,23 @@ def test_losses_alike_are_another_shape_where_a_pipe_joins():
     for key, other in (("loss_in", 1.5), ("loss_out", 1.0)):
         after = fvsolve.build(fvsolve.load(moved(case, ("nodes", "tank", "connection", key), other)))
         assert found_class(before, after) == "shape" == changes(before.case, f"nodes.tank.connection.{key}")
+
+
+def test_a_regulating_valve_that_acts_at_once_is_another_shape():
+    """With `time_constant = 0` the valve has no state; the shipped cases have none of it."""
+    flat = {"model": "hazen-williams", "coefficient": 110}
+    ends = {"length": 100.0, "diameter": 0.1, "friction": flat}
+    links = {
+        "a": {"type": "pipe", "from": "lake", "to": "j", **ends},
+        "v": {"type": "pressure-reducing", "from": "j", "to": "k", "set_pressure": "1.5 bar", "time_constant": 5.0,
+              "diameter": 0.1, "loss_coefficient": 1.0},
+        "b": {"type": "pipe", "from": "k", "to": "sea", **ends},
+    }  # fmt: skip
+    nodes = {"lake": reservoir(3e5), "j": {"type": "junction"}, "k": {"type": "junction"}, "sea": reservoir(1.2e5)}
+    case = scene(nodes, links, 1.0, {"pipe_model": "quasi-steady"})
+    after = fvsolve.build(fvsolve.load(moved(case, ("links", "v", "time_constant"), 0.0)))
+    before = fvsolve.build(fvsolve.load(case))
+    assert found_class(before, after) == "shape" == changes(before.case, "links.v.time_constant")
 
 
 def test_no_key_of_any_shipped_case_changes_more_than_it_says():
