@@ -361,19 +361,23 @@ class Balance:
         for _ in given:
             earlier = outputs.copy()
             for k in given:
-                block = starts[k].block
-                inputs = (outputs[numbers[item]] if isinstance(item, str) else known
-                          for item, known in zip(block.inputs, starts[k].inputs, strict=True))  # fmt: skip
-                starts[k] = starts[k]._replace(inputs=tuple(map(float, inputs)))
+                starts[k] = self.with_inputs(starts[k], outputs, numbers)
                 value = self.residual(starts[k]) + starts[k].output
                 if math.isfinite(value):
                     outputs[k] = min(max(value, self.low[k]), self.high[k])
                     starts[k] = starts[k]._replace(output=float(outputs[k]))
             if np.array_equal(earlier, outputs):
                 break
+        starts = [self.with_inputs(start, outputs, numbers) for start in starts]  # also of blocks with `initial`
         pieces, schedules = self.packed.tables.pieces, self.packed.tables.schedules.tolist()
         driving = [int(pieces[first, 2]) for first, count in schedules if count == 0]
         return self.starts(outputs)[0] if np.any(before[driving] != outputs[driving]) else starts
+
+    def with_inputs(self, start: BlockStart, outputs: np.ndarray, numbers: dict[str, int]) -> BlockStart:
+        """Values of a block whose inputs from other blocks are their outputs; numbers : name of a block -> its number"""
+        inputs = (outputs[numbers[item]] if isinstance(item, str) else known
+                  for item, known in zip(start.block.inputs, start.inputs, strict=True))  # fmt: skip
+        return start._replace(inputs=tuple(map(float, inputs)))
 
     def polish(self, outputs: np.ndarray, matrix: np.ndarray, acts: np.ndarray, by_rates: bool) -> None:
         """Take a last step from residuals on both sides: beside its root a rate of a tank is set to zero as rounding.
