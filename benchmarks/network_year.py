@@ -1,16 +1,17 @@
 """CPU time of EPANET's Net3 over days or a year with repeated patterns, beside EPANET with a hydraulic step of 10 s.
 
-`python benchmarks/network_year.py [DAYS]`, default 365. A first day compiles what is needed, and is left out. The
-difference of levels is the greatest of the first day.
+python benchmarks/network_year.py [--quick] [--days 365]
+
+A first day compiles what is needed, and is left out. The difference of levels is the greatest of the first day.
 """
 
-import sys
 import time
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import wntr
+from measure import parser
 
 import fvsolve
 from fvsolve.epanet import import_network, toolkit_run
@@ -46,7 +47,10 @@ def run_days(days: int):
 
 
 def main() -> None:
-    days = int(sys.argv[1]) if len(sys.argv) > 1 else 365
+    arguments = parser(__doc__)
+    arguments.add_argument("--days", type=int, default=365)
+    given = arguments.parse_args()
+    days = 2 if given.quick else given.days
     day, _ = run_days(1)
     result, spent = run_days(days)
     began = time.process_time()

@@ -110,6 +110,7 @@ FAULTS = [
         "np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])",
         "np.log(e[:-1] / e[1:]) / np.log(1.01 * h[:-1] / h[1:])",
     ),
+    Fault("studies/water_quality/moving_segments.py", "entered += goes * supply", "entered -= goes * supply"),
     Fault("studies/stability/growth.py", "scaled @ result + x * v", "scaled @ result - x * v"),
     Fault(
         "solve/held_inputs.py",

@@ -253,6 +253,13 @@ class Model(Displayable):
         return bool(self.tables.pipes["elements"].any())
 
     @functools.cached_property
+    def isolated(self) -> frozenset[str]:
+        """Key paths of nodes and links whose pressure no flow determines during a run, see `shut_off`."""
+        from fvsolve.model.shut_off import isolated_parts
+
+        return isolated_parts(self)
+
+    @functools.cached_property
     def places(self) -> tuple:
         """Memory addresses of the tables, by which compiled functions read them."""
         from fvsolve.kernels.table_handle import addresses_of

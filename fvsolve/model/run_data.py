@@ -21,7 +21,6 @@ from fvsolve.model.delay_lines import (
     with_doubled_rings,
 )
 from fvsolve.model.network_elimination import NetworkError
-from fvsolve.model.shut_off import isolated_parts
 
 if TYPE_CHECKING:
     from fvsolve.model.model import Model
@@ -91,7 +90,7 @@ class RunData:
     @cached_property
     def isolated_probes(self) -> np.ndarray:
         """True for each probe of a pressure in a part that is isolated during the whole run : bool[probes]."""
-        parts, both = isolated_parts(self.model), (*self.model.probes, *self.model.watched)
+        parts, both = self.model.isolated, (*self.model.probes, *self.model.watched)
         return np.array(
             [f"{probe.part}.{probe.name}" in parts and probe.quantity in OF_PRESSURE for probe in both], bool
         )

@@ -8,7 +8,6 @@ import numpy as np
 from fvsolve.case.claims import VACUUM
 from fvsolve.case.pipe_routes import Leg, is_cut, legs, pipe_leg
 from fvsolve.case.probe import OF_PRESSURE
-from fvsolve.model.shut_off import isolated_parts
 from fvsolve.output.csv_files import with_points
 from fvsolve.output.summary_shape import FAILS, HOLDS, OPEN, Comparison
 from fvsolve.output.unit_columns import UnitColumn, column, probe_columns
@@ -70,7 +69,7 @@ def part_extremes(model, summary, extent) -> list[PartExtremes]:
             z = model.elevation.get(name, np.nan) if group == "nodes" else np.nan
             extremes = summary.watched[f"{group}.{name}.{quantity}"]
             parts.append(PartExtremes(group, name, np.array([np.nan]), np.array([z]), *np.array([extremes]).T))
-    isolated = isolated_parts(model) if is_pressure else ()
+    isolated = model.isolated if is_pressure else ()
     known = [part for part in parts if f"{part.group}.{part.part}" not in isolated and has_extremes(part)]
     parts = known or parts
     return parts if np.isinf(summary.invalid_from) else [valid(probe, summary.invalid_from) for probe in parts]

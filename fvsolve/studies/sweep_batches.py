@@ -117,6 +117,7 @@ class VariantModel:
     watched: list
     pipes: list = field(default_factory=list)
     elevation: dict[str, float] = field(default_factory=dict)
+    isolated: frozenset[str] = frozenset()  # key paths of parts whose pressure no flow determines
 
     def head(self, pressure: np.ndarray, elevation: np.ndarray) -> np.ndarray:
         return self.case.law.head(pressure, elevation)
@@ -234,6 +235,10 @@ class Batch:
         model = VariantModel(case, probes, self.computed, [*case.notices, *notices[0]], self.watched)
         if self.watched:
             self.set_extents(model, own, k, joined, summary)
+        model.isolated = frozenset(
+            f"{group}.{name}" for group in ("nodes", "links") for name in getattr(case, group)
+            if f"{group}.{name}{ending(k)}" in joined.isolated
+        )  # fmt: skip
         rows = np.concatenate((values[:1], values[1 + k * len(probes) :][: len(probes)])).T
         return row_of(model, own, VariantSink(self.columns, time, rows))
 

@@ -72,7 +72,9 @@ def test_two_tanks_are_two_states_and_no_more():
     assert model.state_names == ["high.mass", "low.mass"]
     rows = {name: len(rows) for name in rec.RECORDS if len(rows := getattr(model.tables, name))}
     assert rows == {"settings": 1, "layout": 1, "nodes": 2, "valves": 1, "schedules": 1, "probes": 1}
-    assert model.new_out().size == rec.OUT_HEAD + 3 * 2 + 3  # pressure, supply, net flow; valve, conductance, drive
+    assert (
+        model.new_out().size == rec.OUT_HEAD + 4 * 2 + 3
+    )  # pressure, supply, net flow, code of isolated nodes; three of the valve
     assert RunData(model).envelope.size == 0
 
 

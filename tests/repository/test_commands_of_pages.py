@@ -58,7 +58,8 @@ def commands() -> dict:
 
 
 def options(names) -> set[str]:
-    return {option for name in names for parameter in commands()[name].params for option in parameter.opts}
+    parameters = [parameter for name in names for parameter in commands()[name].params]
+    return {option for parameter in parameters for option in (*parameter.opts, *parameter.secondary_opts)}
 
 
 def wrong_choices(words: list[str]) -> list[str]:
