@@ -374,7 +374,7 @@ class Balance:
         return self.starts(outputs)[0] if np.any(before[driving] != outputs[driving]) else starts
 
     def with_inputs(self, start: BlockStart, outputs: np.ndarray, numbers: dict[str, int]) -> BlockStart:
-        """Values of a block whose inputs from other blocks are their outputs; numbers : name of a block -> its number"""
+        """Values of a block with the outputs of others as inputs; numbers : name of a block -> its number"""
         inputs = (outputs[numbers[item]] if isinstance(item, str) else known
                   for item, known in zip(start.block.inputs, start.inputs, strict=True))  # fmt: skip
         return start._replace(inputs=tuple(map(float, inputs)))
