@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import breadth_first_order
 
 LIBRARIES = {"2.2": ("wntr", "libepanet22.so"), "2.3": ("epanet", "libepanet2.so")}  # package, name of its library
 FOOT, GALLON, IMPERIAL_GALLON, DAY = 0.3048, 3.785411784e-3, 4.54609e-3, 86400.0
@@ -28,6 +28,7 @@ US_UNITS = range(5)  # codes with lengths in feet
 NODES, LINKS = 0, 2  # of EN_getcount
 DEMAND, HEAD, FLOW, STATUS = 9, 10, 8, 11  # of EN_getnodevalue, EN_getlinkvalue
 JUNCTION, TANK, PUMP, CONSTANT_POWER = 0, 2, 2, 0  # kinds of nodes, links, pumps
+DIRECTED = (0, PUMP, 3, 4)  # links that water passes from their first node alone: check valves, pumps, PRV, PSV
 TRIALS, ACCURACY = 0, 1  # of EN_setoption
 DURATION, HYDRAULIC_STEP, REPORT_STEP, REPORT_START, RULE_STEP = 0, 1, 5, 6, 7  # of EN_settimeparam
 NEW_FLOWS = 10  # EN_initH: no file of results, first guess of flows
@@ -140,7 +141,9 @@ class Project:
         self.kinds = np.array([self.integer("EN_getnodetype", k + 1) for k in range(nodes)])
         self.tanks = [name for name, kind in zip(self.nodes, self.kinds, strict=True) if kind == TANK]
         self.ends = np.array([self.ends_of(k + 1) for k in range(links)]).reshape(-1, 2) - 1
-        pumps = [k for k in range(links) if self.integer("EN_getlinktype", k + 1) == PUMP]
+        kinds = np.array([self.integer("EN_getlinktype", k + 1) for k in range(links)], dtype=int)
+        self.directed = np.isin(kinds, DIRECTED)
+        pumps = np.flatnonzero(kinds == PUMP).tolist()
         self.constant = [k for k in pumps if self.integer("EN_getpumptype", k + 1) == CONSTANT_POWER]
 
     def ends_of(self, link: int) -> tuple[int, int]:
@@ -162,14 +165,18 @@ class Project:
         return self.unit * self.values("EN_getlinkvalue", len(self.links), FLOW)
 
     def dead(self) -> np.ndarray:
-        """True at nodes without a path of open links to a reservoir or tank : bool[nodes]."""
+        """True at nodes that no water reaches from a reservoir or tank through open links : bool[nodes]."""
         opened = self.values("EN_getlinkvalue", len(self.links), STATUS) != 0.0
         if self.constant:
             opened[self.constant] &= np.abs(self.flows()[self.constant]) > STALLED
         start, end = self.ends[opened].T
-        graph = coo_array((np.ones(start.size), (start, end)), shape=2 * (len(self.nodes),))
-        _, group = connected_components(graph, directed=False)
-        return ~np.isin(group, group[self.kinds != JUNCTION])
+        both = ~self.directed[opened]
+        count, sources = len(self.nodes), np.flatnonzero(self.kinds != JUNCTION)
+        rows = np.concatenate((start, end[both], np.full(sources.size, count)))  # the last node feeds all sources
+        graph = coo_array((np.ones(rows.size), (rows, np.concatenate((end, start[both], sources)))), 2 * (count + 1,))
+        reached = np.zeros(count + 1, dtype=bool)
+        reached[breadth_first_order(graph.tocsr(), count, return_predecessors=False)] = True
+        return ~reached[:count]
 
     def absurdities(self, heads: np.ndarray, dead: np.ndarray) -> list[str]:
         """Reasons why heads [m] are not those of a network, from `UNSOLVED`; dead : as from `dead`"""
@@ -265,5 +272,7 @@ def day(path: Path, version: str, step: int = 10, rows: int = 150, end: int = 86
             began = process_time()
             left, _ = project.seconds("EN_nextH")
             cpu += process_time() - began
+        if not kept:  # EPANET stops where it does not converge, unless the file has `UNBALANCED CONTINUE`
+            raise EpanetError(f"EPANET stops at {now} s, before the first row of the day: {', '.join(warnings)}")
         columns = [np.array(column) for column in zip(*kept, strict=True)]
         return Day(*columns, project.nodes, project.tanks, cpu, float(now), steps, warnings)

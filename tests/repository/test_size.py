@@ -23,7 +23,7 @@ BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")  # fields of state
 FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve": (2029, 13),
     "tests": (1065, 8),
-    "benchmarks": (9470, 63),
+    "benchmarks": (9476, 63),
     "fvsolve/assembly": (1973, 10),
     "fvsolve/basins": (12998, 61),
     "fvsolve/case": (8305, 30),
@@ -64,7 +64,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/parts": (18579, 49),
     "tests/reference": (3830, 36),
     "tests/report": (863, 4),
-    "tests/repository": (4774, 26),
+    "tests/repository": (4810, 26),
     "tests/schemes": (569, 2),
     "tests/solve": (2487, 12),
     "tests/step_limits": (1100, 5),
