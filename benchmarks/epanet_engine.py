@@ -272,5 +272,7 @@ def day(path: Path, version: str, step: int = 10, rows: int = 150, end: int = 86
             began = process_time()
             left, _ = project.seconds("EN_nextH")
             cpu += process_time() - began
+        if not kept:  # EPANET stops where it does not converge, unless the file has `UNBALANCED CONTINUE`
+            raise EpanetError(f"EPANET stops at {now} s, before the first row of the day: {', '.join(warnings)}")
         columns = [np.array(column) for column in zip(*kept, strict=True)]
         return Day(*columns, project.nodes, project.tanks, cpu, float(now), steps, warnings)

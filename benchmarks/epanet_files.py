@@ -38,10 +38,7 @@ TINY_FLOW = 1e-5  # a smaller largest flow is no measure: closed links of EPANET
 DRY = ("dry",)  # marks of a run that explain a difference: EPANET shuts the links of an empty tank
 CLOSURE, CLOSURE_END = (1.0, 5.0), "15 s"  # times between which the largest demand stops [s], end of the run
 ROWS, GRACE = 150, 60.0  # interval of rows of a day [s]; time after a limit to end in order [s]
-STEPS = (
-    10,
-    2,
-)  # of EPANET over a day [s]; the second where the first differs, because EPANET delays switches by a step
+STEPS = (10, 2)  # of EPANET over a day [s]; the second where the first differs: EPANET delays switches by a step
 HARD = {"EPANET day": 1200.0}  # time limits of stages that have no option [s]
 
 Row = dict[str, Any]

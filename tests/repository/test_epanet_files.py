@@ -195,3 +195,39 @@ def test_epanets_day_follows_a_tank_to_its_end_and_says_from_when_a_demand_is_cu
     assert level[full] == pytest.approx(4.0 - 0.01 * day.times[full] / 100.0, abs=5e-5)  # 28.317 l in a ft3
     assert day.warnings[engine.CUT_OFF] == day.times[day.dead.all(axis=1)][0]
     assert 40000.0 <= day.warnings[engine.CUT_OFF] <= 40350.0 and not day.dead[full].any()
+
+
+ONE_WAY = """[JUNCTIONS]
+behind 10 0
+town 5 4
+[RESERVOIRS]
+lake 60
+[PIPES]
+p1 lake town 400 250 110 0 Open
+p2 behind town 300 200 110 0 {status}
+[OPTIONS]
+UNITS LPS
+[END]
+"""
+
+
+@pytest.mark.parametrize("status, dead", [("CV", ["behind"]), ("Open", [])])
+def test_water_reaches_no_node_against_a_check_valve(status, dead, files, tmp_path):
+    path = tmp_path / "town.inp"
+    path.write_text(ONE_WAY.format(status=status))
+    engine = files.epanet_engine
+    version = next((version for version in engine.LIBRARIES if engine.library(version)), None)
+    if version is None:
+        pytest.skip("no library of EPANET")
+    assert engine.start(path, version).dead == dead
+
+
+def test_a_day_that_epanet_stops_before_its_first_row_is_refused(files, tmp_path):
+    path = tmp_path / "town.inp"
+    path.write_text(ONE_WAY.format(status="Open"))
+    engine = files.epanet_engine
+    version = next((version for version in engine.LIBRARIES if engine.library(version)), None)
+    if version is None:
+        pytest.skip("no library of EPANET")
+    with pytest.raises(engine.EpanetError, match="before the first row"):
+        engine.day(path, version, end=60)

@@ -22,7 +22,7 @@ BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")  # fields of state
 FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve": (2056, 13),
     "tests": (1066, 8),
-    "benchmarks": (9533, 64),
+    "benchmarks": (9532, 64),
     "fvsolve/assembly": (1989, 10),
     "fvsolve/basins": (12998, 61),
     "fvsolve/case": (8331, 30),
@@ -63,7 +63,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/parts": (19206, 51),
     "tests/reference": (3830, 36),
     "tests/report": (863, 4),
-    "tests/repository": (4777, 26),
+    "tests/repository": (4813, 26),
     "tests/schemes": (569, 2),
     "tests/solve": (2850, 14),
     "tests/step_limits": (1100, 5),
