@@ -35,7 +35,7 @@ from fvsolve.steppers.run_handle import JOIN
 
 COPIED = ("state", "control", "progress", "ledger", "carry", "g", "g_new", "pace", "out", "out_row", "values",
           "ledger_rates")  # fmt: skip
-WRITTEN = ("clock", "armed", "marks", "scratch", "spare", "envelope", "extremes", "past")
+WRITTEN = ("clock", "armed", "marks", "scratch", "spare", "envelope", "extremes", "past", "accepted")
 ABORT_DELAY = 0.5  # seconds between a message and the end of all ranks: `mpiexec` loses what it has not yet forwarded
 
 
