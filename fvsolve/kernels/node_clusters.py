@@ -189,7 +189,7 @@ def add_valve(i, j, places, m, a, s, lift, matrix, right):
 
 @njit(forceinline=True)
 def has_settled(change, last_change):
-    """True if the iteration of a cluster with quasi-steady pipes has converged: its changes are rounding, or will be.
+    """True if the iteration of a cluster without waves has converged: its changes are rounding, or will be.
 
     After a step that is as short, and as much shorter than the last, Newton's next step is rounding. The flow of a
     valve with hardly any loss changes by the rounding of pressures: it no longer falls.
@@ -880,8 +880,8 @@ def have_bracketed(limits):
 def solve_cluster(out, tables, index):
     """Solve the pressures of cluster number `index` and the flows of its valves under the density law `linear`.
 
-    The iteration starts from the initial steady state, so the result depends on (t, y) alone; in a cluster with
-    quasi-steady pipes it starts from the last accepted state, which a restart file contains.
+    The iteration starts from the initial steady state, so the result depends on (t, y) alone; without waves, in a
+    cluster with quasi-steady pipes, it starts from the last accepted state, which a restart file contains.
     """
     cluster, work = tables.clusters[index], tables.scratch
     n, k = cluster["nodes"], cluster["valves"]
@@ -889,7 +889,8 @@ def solve_cluster(out, tables, index):
     g, m, rest = work[at : at + k], work[at + k : at + 2 * k], work[at + 2 * k :]
     unchanged = prepare_cluster(cluster, tables, out, g, m)
     undisturbed = total_inflows(cluster, tables, out, c) and unchanged
-    if tables.accepted.size > 0 and cluster["order"] >= 0 and not undisturbed:
+    from_accepted = tables.accepted.size > 0 and cluster["order"] >= 0
+    if from_accepted and not undisturbed:
         begin_accepted(cluster, tables, out, g, m)
     find_connected(cluster, tables, g, connected, group)
     zero_isolated(cluster, tables, g, m, connected)
@@ -911,7 +912,7 @@ def solve_cluster(out, tables, index):
         change, flows, _ = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, limits, rest)
         if bracketed and flows <= STEEP_CHANGE:  # at a drop of zero a flow changes with the last digits of a pressure
             change, flows = 0.0, 0.0
-        if has_settled(change, last_change) if cluster["order"] >= 0 else has_converged(change, last_change):
+        if has_settled(change, last_change) if from_accepted else has_converged(change, last_change):
             if not (wide and has_backflow(cluster, tables, m)):
                 break
             change, flows, wide = 1e300, 1e300, False

@@ -365,8 +365,13 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
 
 
 def accepted_size(draft: ModelDraft) -> int:
-    """Size of the array `accepted`, from which the iterations of clusters with quasi-steady pipes start; else 0."""
-    if not draft.case.law.linear or not (draft.cluster_table["order"] >= 0).any():
+    """Size of the array `accepted`, from which the iterations of clusters of a model without waves start; else 0.
+
+    Waves and surfaces need short steps, over which the state of the start serves as well.
+    """
+    if not draft.case.law.linear or len(draft.pipe_table) or len(draft.basin_table):
+        return 0
+    if not (draft.cluster_table["order"] >= 0).any():
         return 0
     return 2 * (1 + len(draft.node_table) + len(draft.valve_table))
 

@@ -421,7 +421,7 @@ def set_step_mode(control, model: Model) -> None:
     Without waves nothing is fast after a switch: steps then keep their length, which only their error limits.
     """
     numerics = model.case.numerics
-    control["keeps_step"] = model.shapes.accepted > 0 and not len(model.tables.pipes)
+    control["keeps_step"] = model.shapes.accepted > 0
     for mode, key in enumerate(("courant", "step", "rtol")):  # COURANT, FIXED_STEP, TOLERANCE of `loop_records`
         if getattr(numerics, key) is not None:
             control["mode"], control["size"] = mode, getattr(numerics, key)

@@ -29,6 +29,16 @@ def lift(low=10.0, high=40.0, end=7200.0, numerics=None, charges=None, **keys):
     return case | {"energy": charges or {}}
 
 
+def gated(case):
+    """Scene with a valve before the higher reservoir that shuts at half of the time."""
+    case["nodes"]["top"] = junction(elevation=0.0)
+    case["links"]["main"]["to"] = "top"
+    opening = {"time": [0.0, 3600.0], "value": [1.0, 0.0], "kind": "step"}
+    case["links"]["gate"] = {"type": "valve", "from": "top", "to": "hill", "diameter": 0.2, "loss_coefficient": 0.2,
+                             "opening": opening}  # fmt: skip
+    return case
+
+
 def use(case):
     run = fvsolve.run(fvsolve.load(case))
     assert run.ok, run.reason
@@ -63,12 +73,7 @@ def test_energy_and_cost_at_a_constant_flow_are_power_times_time(method, speed):
 
 def test_a_pump_whose_way_is_shut_uses_no_energy():
     """A pump runs half of the time; its valve is shut during the other half, at an event between steps."""
-    case = lift()
-    case["nodes"]["top"] = junction(elevation=0.0)
-    case["links"]["main"]["to"] = "top"
-    opening = {"time": [0.0, 3600.0], "value": [1.0, 0.0], "kind": "step"}
-    case["links"]["gate"] = {"type": "valve", "from": "top", "to": "hill", "diameter": 0.2, "loss_coefficient": 0.2,
-                             "opening": opening}  # fmt: skip
+    case = gated(lift())
     found, run = use(case)
     power = RHO * GRAVITY * run["p.flow"][0] * run["p.head"][0] / 0.75
     assert found["pumps"]["p"]["running_share"] == pytest.approx(0.5, abs=1e-12)
@@ -123,9 +128,11 @@ def test_a_price_without_the_table_energy_is_a_fault():
 
 
 def test_the_study_of_energy_has_the_table_of_the_run():
-    case = lift(charges={"price": {"time": [0.0, 3000.0], "value": [0.1, 0.25], "kind": "step"}}, end=86400.0)
+    """The pump stops when its valve shuts: a stop by a rising level is ill-conditioned, so its time has few digits."""
+    case = gated(lift(charges={"price": {"time": [0.0, 3000.0], "value": [0.1, 0.25], "kind": "step"}}))
     case["nodes"]["hill"] = tank(30.0, 2.0, elevation=38.0)
     found, _ = use(case)
+    assert found["pumps"]["p"]["running_share"] == pytest.approx(0.5, abs=1e-12)
     assert energy(fvsolve.load(case)).energy_use["pumps"]["p"] == pytest.approx(found["pumps"]["p"], rel=1e-6)
 
 
