@@ -41,7 +41,7 @@ from fvsolve.steppers.step_operations import (
 )
 
 EVENT_TOLERANCE = 1e-13
-SLOW_EVENT_TIME = 1e-9  # of a step that nothing fast limits: the rounding of large networks hides a nearer event
+SLOW_EVENT_TIME = 1e-11  # of a step that nothing fast limits: the rounding of large networks hides a nearer event
 MOST_SEARCHES = 8  # for events before an event within the same step
 SECANT_TURNS = 40  # turns of the Illinois rule, which is slow where an event function is nearly zero at the start
 # attempts of an implicit step by Newton alone at tolerances above LOOSE: shorter steps cost less than sweeps
@@ -105,13 +105,13 @@ def locate(handle, run, r, h, now, new, e):
     guess, at_high, side = h, past, 0
     r.progress[0]["no_sweeps"] = 0
     narrow = SLOW_EVENT_TIME * h if r.control[0]["keeps_step"] == 1 else 0.0
+    beyond = max(1e-3 * EVENT_TOLERANCE * h, 0.1 * narrow)
     for turn in range(101):
-        narrow = max(narrow, 4e-16 * max(abs(t), high))
-        done = turn == 100 or past >= -EVENT_TOLERANCE or high - low <= narrow
+        done = turn == 100 or past >= -EVENT_TOLERANCE or high - low <= max(narrow, 4e-16 * max(abs(t), high))
         if done and guess == high:
             break
         guess = high - at_high * (high - low) / (at_high - at_low)
-        guess += 1e-3 * EVENT_TOLERANCE * h
+        guess += beyond
         if not low < guess < high or turn > SECANT_TURNS:
             guess = 0.5 * (low + high)
         if done:
