@@ -18,6 +18,7 @@ from fvsolve.errors import CaseError, Fault, Notice
 from fvsolve.fluid.oils import walther_viscosity
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tanks
+from fvsolve.kernels.steady_friction import signed_roughness
 
 HAZEN_WILLIAMS = 4.727 * 0.3048**-0.685  # h / L = 10.667 q^1.852 / (C^1.852 D^4.871), EPANET's 4.727 in feet, as SI
 MANNING = 4.0 ** (10.0 / 3.0) / math.pi**2  # h / L = 10.294 n^2 q^2 / D^(16/3), SI
@@ -77,7 +78,7 @@ class Hydraulics:
             fault(f"links.{name}.friction", text)
         else:
             row["friction"], row["rough"] = rec.FRICTION_ROUGH, per_factor
-            row["roughness"] = law.roughness / link.diameter
+            row["roughness"] = signed_roughness(law.roughness / link.diameter, law.model)
             row["reynolds"] = link.diameter / (area * self.viscosity_at_start(link, row))
 
     def viscosity_at_start(self, link, row) -> float:

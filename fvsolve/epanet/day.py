@@ -204,7 +204,15 @@ class DayTranslation(Translation):
         return self.set_valve(link, ends, begins)
 
     def regulating(self, link: EpanetLink, ends: tuple[str, str], diameter: float, setting: float) -> part_tables.Part:
-        """Table of a regulating valve that acts at once, as in EPANET, unless another one is next to it."""
+        """Table of a regulating valve that acts at once, as in EPANET, unless another one is next to it.
+
+        A PSV or FCV that alone supplies the nodes behind it would leave their demands without supply. EPANET opens it.
+        """
+        if link.kind in ("PSV", "FCV") and link.end not in self.network.supplied(lambda other: other is not link):
+            text = f"{link.kind} alone supplies the nodes behind it, so EPANET opens it where it would act"
+            self.note(f"{text}: imported as open", link.name)
+            table = part_tables.check_valve if link.kind == "PSV" else part_tables.valve
+            return table(ends, diameter, link.minor_loss)
         near = (other for end in (link.start, link.end) for other in self.network.links_at[end])
         if any(other.kind in part_tables.REGULATING and other.name != link.name for other in near):
             return super().regulating(link, ends, diameter, setting)
@@ -228,8 +236,8 @@ class DayTranslation(Translation):
 
             first = begins if begins[0] != "closed" else self.open_state(link)
             part = self.valve_table(link, ends, ("setting", link.setting))
-            if part["type"] == "valve":  # its setting is above every source
-                self.leave_out(self.statements[link.name], "sets a valve whose set head is above every source")
+            if part["type"] in ("valve", "check-valve"):
+                self.leave_out(self.statements[link.name], "sets a valve that does not regulate here")
                 return part
             key = "set_flow" if kind == "FCV" else "set_pressure"
             return part | {key: self.switched(link.name, key, UNITS[kind], value_of, value_of(first))}
@@ -423,7 +431,7 @@ def limits(values: list[float], text: Callable[[float], Any]) -> part_tables.Par
 def in_si(value: float, text: Callable[[float], Any]) -> float:
     """Number of a value in a formula, in SI: an absolute pressure for a head of water in "barg"."""
     if text is part_tables.gauge_pressure:
-        return part_tables.AMBIENT + part_tables.DENSITY * part_tables.GRAVITY * value
+        return part_tables.AMBIENT + part_tables.WEIGHT * value
     return value
 
 

@@ -7,15 +7,20 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case import Case
-from fvsolve.epanet.part_tables import DENSITY, GRAVITY, rounded_number
+from fvsolve.epanet.part_tables import GRAVITY, WATER_VISCOSITY, WEIGHT, rounded_number
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.pipe.part import Pipe
 
 LONGEST_NAME = 31  # of EPANET, in characters
 SHORT_PIPE = 0.01  # length of the pipe that stands for a check valve [m]
 SMOOTH = {"H-W": 150.0, "C-M": 0.009, "D-W": 0.0}  # roughness of that pipe
-WATER_VISCOSITY = 1.022e-6  # of EPANET, relative to which a file states a viscosity [m2/s]
-FORMULAS = {"hazen-williams": "H-W", "chezy-manning": "C-M", "quasi-steady": "D-W", "steady": "D-W"}
+FORMULAS = {
+    "hazen-williams": "H-W",
+    "chezy-manning": "C-M",
+    "quasi-steady": "D-W",
+    "steady": "D-W",
+    "swamee-jain": "D-W",
+}
 REGULATING = {"pressure-reducing": "PRV", "pressure-sustaining": "PSV", "flow-control": "FCV"}
 NEGATION = "1 - other"  # formula of a block that does the opposite of a relay, as the import writes it
 HIGH_LEVEL = 1000.0  # greatest level of a tank that has none [m]
@@ -49,7 +54,8 @@ class _Export:
         self.curves: dict[tuple[tuple[float, float], ...], str] = {}
         self.step = self.pattern_step()
         self.formula = self.loss_formula()
-        self.gravity = case.properties.density / DENSITY
+        self.gravity = case.properties.density * case.gravity / WEIGHT
+        self.minor = GRAVITY / case.gravity  # EPANET divides minor losses by its own gravity
         self.exponents: set[float] = set()
         self.pressures: set[tuple[float, float, float]] = set()
         for name, node in case.nodes.items():
@@ -141,7 +147,7 @@ class _Export:
         self.add("JUNCTIONS", name, self.elevation(name), base, pattern)
         self.position(name, node)
         if node.required_pressure is not None:
-            weight, ambient = DENSITY * GRAVITY, self.case.ambient_pressure
+            weight, ambient = WEIGHT, self.case.ambient_pressure
             least = 0.0 if node.minimum_pressure is None else (node.minimum_pressure - ambient) / weight
             self.pressures.add((least, (node.required_pressure - ambient) / weight, node.demand_exponent))
 
@@ -207,15 +213,15 @@ class _Export:
             self.faults.append(f"links.{name}.friction: {text}; expected one of these models")
             return
         rough = 1e3 * friction.roughness if self.formula == "D-W" else friction.coefficient
-        ends = (link.from_, link.to)
-        self.add("PIPES", name, *ends, link.length, 1e3 * link.diameter, rough, link.minor_loss or 0.0, "Open")
+        ends, minor = (link.from_, link.to), self.minor * (link.minor_loss or 0.0)
+        self.add("PIPES", name, *ends, link.length, 1e3 * link.diameter, rough, minor, "Open")
 
     def size(self, link: Any) -> tuple[float, float]:
-        """(diameter [mm], loss coefficient at full opening) of a restriction."""
+        """(diameter [mm], loss coefficient at full opening by EPANET's gravity) of a restriction."""
         area = link.flow_area(self.case.properties.density)
         if link.diameter is not None and link.loss_coefficient is not None:
-            return 1e3 * link.diameter, link.loss_coefficient
-        return 1e3 * math.sqrt(4.0 / math.pi * area), 1.0
+            return 1e3 * link.diameter, self.minor * link.loss_coefficient
+        return 1e3 * math.sqrt(4.0 / math.pi * area), self.minor
 
     def valve(self, name: str, link: Any) -> None:
         diameter, loss = self.size(link)
@@ -260,7 +266,7 @@ class _Export:
         schedule = getattr(link, key)
         if schedule.kind != "constant":
             self.notes.append(f"links.{name}.{key}: a schedule is left out: its first value counts")
-        weight = DENSITY * GRAVITY
+        weight = WEIGHT
         setting = 1e3 * schedule.first if kind == "FCV" else (schedule.first - self.case.ambient_pressure) / weight
         self.add("VALVES", name, link.from_, link.to, diameter, kind, setting, loss)
 
@@ -293,7 +299,7 @@ class _Export:
 
     def leak(self, name: str, link: Any) -> None:
         self.exponents.add(link.exponent)
-        per_metre = link.coefficient * (DENSITY * GRAVITY) ** link.exponent
+        per_metre = link.coefficient * (WEIGHT) ** link.exponent
         self.add("EMITTERS", link.from_, 1e3 * per_metre)
 
     # controls -------------------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from pathlib import Path
 from fvsolve.case import text
 from fvsolve.epanet.day import DayTranslation
 from fvsolve.epanet.network_file import EpanetNetwork, EpanetSolution, read_network, solution_at
-from fvsolve.epanet.part_tables import DENSITY
+from fvsolve.epanet.part_tables import DENSITY, GRAVITY, WATER_VISCOSITY
 from fvsolve.epanet.switching import DAY
 from fvsolve.epanet.translating import Translation
 from fvsolve.errors import FvsolveError, listing
@@ -99,10 +99,11 @@ def _text(path: Path, network: EpanetNetwork, translation: Translation, title: s
     lines += ["", "# Differences from EPANET:"] if translation.notes else []
     lines += [f"# - {note}: {listing(names, 60)}" for note, names in translation.notes]
     density = DENSITY * network.options["gravity"]
+    lines.append(f'gravity = "{GRAVITY:.10g} m/s2"  # of EPANET: 32.2 ft/s2')
     lines += ["", "[fluid]", 'name = "Water"', 'temperature = "20 degC"', 'law = "linear"']
     lines.append(f'density = "{density:.10g} kg/m3"  # EPANET\'s weight of water')
     if translation.formula == "D-W":
-        lines.append(f'viscosity = "{1.022 * network.options["viscosity"]:.6g} cSt"')
+        lines.append(f'viscosity = "{1e6 * WATER_VISCOSITY * network.options["viscosity"]:.7g} cSt"')
     for group in ("nodes", "links"):
         lines += ["", f"[{group}]"]
         lines += [f"{name} = {text.inline(part)}" for name, part in getattr(translation, group).items()]

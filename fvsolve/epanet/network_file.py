@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -148,6 +149,24 @@ class EpanetNetwork:
             for end in (link.start, link.end):
                 found[end].append(link)
         return found
+
+    def supplied(self, is_way: Callable[[EpanetLink], bool]) -> set[str]:
+        """Names of the nodes that water can reach from reservoirs and tanks through the links that are ways.
+
+        Water passes pumps, check valves, PRVs and PSVs in one direction only.
+        """
+        reached = {name for name, node in self.nodes.items() if node.kind != "junction"}
+        waiting = list(reached)
+        while waiting:
+            place = waiting.pop()
+            for link in self.links_at[place]:
+                is_directed = link.kind in ("pump", "PRV", "PSV") or link.check_valve
+                if not is_way(link) or (is_directed and link.start != place):
+                    continue
+                new = {link.start, link.end} - reached
+                reached |= new
+                waiting += new
+        return reached
 
     def pattern_at(self, index: int, seconds: float) -> float:
         """Value of a pattern at a time of the run [s]; 1 for the index 0."""

@@ -8,8 +8,12 @@ Part = dict[str, Any]
 NO_LOSS = 1e-4  # loss coefficient of an open valve without loss in EPANET: a case needs a positive one
 TIME_CONSTANT = "5 s"  # of regulating valves in a run with waves: EPANET has none
 REGULATING = {"PRV": "pressure-reducing", "PSV": "pressure-sustaining", "FCV": "flow-control"}
-DENSITY = 999.563  # EPANET's density of water: 550 ft lbf/s / 8.814 per hp / gravity [kg/m3]
-GRAVITY, AMBIENT = 9.80665, 101325.0  # standard gravity [m/s2], ambient pressure of a case [Pa]
+POUND_FORCE, FOOT = 4.4482216152605, 0.3048  # [N], [m]
+WEIGHT = 550.0 / 8.814 * POUND_FORCE / FOOT**3  # EPANET's weight of water, by its power of a pump [N/m3]
+GRAVITY = 32.2 * FOOT  # of EPANET, in minor losses and Darcy-Weisbach [m/s2]
+DENSITY = WEIGHT / GRAVITY  # of water [kg/m3]
+WATER_VISCOSITY = 1.1e-5 * FOOT**2  # of EPANET, relative to which a file states a viscosity [m2/s]
+AMBIENT = 101325.0  # ambient pressure of a case [Pa]
 
 
 def quantity_text(value: float, unit: str) -> str:
@@ -46,7 +50,7 @@ def pressure_demand(minimum: float, required: float, exponent: float) -> Part:
 
 def gauge_pressure(head: float) -> str:
     """Text of the gauge pressure under a head of water [m]."""
-    return f"{DENSITY * GRAVITY * head * 1e-5:.10g} barg"
+    return f"{WEIGHT * head * 1e-5:.10g} barg"
 
 
 def reservoir(head: float, position: Any) -> Part:
@@ -85,7 +89,7 @@ def friction(formula: str, roughness: float) -> Part:
         return {"model": "hazen-williams", "coefficient": rounded_number(roughness)}
     if formula == "C-M":
         return {"model": "chezy-manning", "coefficient": rounded_number(roughness)}
-    return {"model": "quasi-steady", "roughness": quantity_text(roughness, "mm")}
+    return {"model": "swamee-jain", "roughness": quantity_text(roughness, "mm")}
 
 
 def darcy(factor: float) -> Part:
@@ -157,7 +161,7 @@ def leak(place: str, coefficient: float, exponent: float) -> Part:
 
     In the table the coefficient refers to a pressure in Pa. place : name of the node
     """
-    per_pascal = coefficient / (DENSITY * GRAVITY) ** exponent
+    per_pascal = coefficient / (WEIGHT) ** exponent
     return {
         "type": "leak", "from": place, "coefficient": rounded_number(per_pascal), "exponent": rounded_number(exponent),
     }  # fmt: skip

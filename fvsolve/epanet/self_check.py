@@ -129,21 +129,8 @@ def _compared(
 
 
 def left_out(network: EpanetNetwork, solution: EpanetSolution) -> dict[str, list[str]]:
-    """Reason -> junctions whose head has no meaning in EPANET: cut off from every source.
-
-    Water passes pumps, check valves, PRVs and PSVs in one direction only.
-    """
-    reached = {name for name, node in network.nodes.items() if node.kind != "junction"}
-    waiting = list(reached)
-    while waiting:
-        place = waiting.pop()
-        for link in network.links_at[place]:
-            directed = link.kind in ("pump", "PRV", "PSV") or link.check_valve
-            if not solution.open[link.name] or _is_stalled(link, solution) or (directed and link.start != place):
-                continue
-            new = {link.start, link.end} - reached
-            reached |= new
-            waiting += new
+    """Reason -> junctions whose head has no meaning in EPANET: cut off from every source."""
+    reached = network.supplied(lambda link: solution.open[link.name] and not _is_stalled(link, solution))
     dead = [name for name in network.nodes if name not in reached]
     return {"since closed links cut them off from every source": dead} if dead else {}
 

@@ -18,7 +18,6 @@ RISE_TOLERANCE = 1e-9  # of the rise over the length of a pipe
 SUSTAIN_TOLERANCE = 1e-2  # of the head before a PSV [m]
 SET_TOLERANCE = 1e-6  # of set heads and heads of sources [m]
 LOWEST_HEAD = -9.0  # least set pressure of a case: a head of water near vacuum [m]
-GRAVITY_SHARE, SMALL_HEAD = 8e-4, 5e-4  # by which EPANET's gravity is greater; differences below [m] need no note
 NARROW = 1e-3  # diameter below which a closed pipe is a shut valve [m]
 STILL = 1e-6  # velocity below which a pipe counts as still [m/s]
 GRAVITY = part_tables.GRAVITY
@@ -451,13 +450,6 @@ class Translation:
     def note_omissions(self) -> None:
         """Note what the file has and the case does not."""
         for link in self.network.links.values():
-            if link.minor_loss and link.kind != "pump" and self.minor_head(link) * GRAVITY_SHARE > SMALL_HEAD:
-                self.note("minor losses by standard gravity, in EPANET by 32.2 ft/s2: 0.08 % more", link.name, True)
-        if self.formula == "D-W":
-            self.note(
-                "Darcy factor by Colebrook, in EPANET by Swamee and Jain: both factors agree within 3 %", "D-W", True
-            )
-        for link in self.network.links.values():
             if link.leak_area:
                 self.note("leakage of the pipe ([LEAKAGE]) is not imported", link.name, True)
         study = {"age": "`fvsolve quality`", "trace": "`fvsolve quality --trace NODE`"}.get(self.option["quality"])
@@ -467,11 +459,6 @@ class Translation:
             self.note("the chemical and its reactions are not imported", "[QUALITY]")
         if self.network.rewritten:
             self.note("pumps in the form of EPANET 1 are read as EPANET 2.2 reads them", "[PUMPS]")
-
-    def minor_head(self, link: EpanetLink) -> float:
-        """Minor loss of a link at this hour [m]."""
-        velocity = self.solution.flow[link.name] / (math.pi / 4.0 * link.diameter**2)
-        return link.minor_loss * velocity**2 / (2.0 * GRAVITY)
 
 
 def initial_action(link: EpanetLink) -> tuple[Any, ...]:

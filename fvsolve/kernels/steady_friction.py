@@ -18,6 +18,7 @@ C0, C1, C2, C3 = 1.1885429391841094, 0.33754619472829295, -0.06458383859594458, 
 C4, C5, C6, C7 = -0.009691106002097438, 0.004618135156910341, -0.002347050217323954, 0.0012459456986562145
 C8, C9, C10, C11 = -0.0006824009481078974, 0.0003828835870081093, -0.00022023842211638112, 0.00012760184472426772
 C12, C13, C14, C15 = -6.871804362162948e-05, 4.135631024837494e-05, -3.944523632526398e-05, 2.3126602172851562e-05
+SMOOTHEST = 1e-12  # relative roughness of a smooth wall with a sign
 LAMINAR, TURBULENT = 2000.0, 4000.0  # Reynolds numbers; both laws are blended between them
 
 
@@ -38,14 +39,41 @@ def factor_turbulent(reynolds, roughness):
     return 1.0 / (x * x)
 
 
+def signed_roughness(roughness: float, model: str) -> float:
+    """Relative roughness [-] as the tables of pipes store it: below zero for the friction model swamee-jain."""
+    return -max(roughness, SMOOTHEST) if model == "swamee-jain" else roughness
+
+
+@njit
+def factor_swamee_jain(reynolds, roughness):
+    """Darcy factor of Swamee and Jain (1976) above Re 4000, by the cubic of Dunlop (1991) from Re 2000 to 4000.
+
+    EPANET computes it so (Rossman et al. 2020, EPANET 2.2 User Manual, chapter 12).
+    reynolds : Reynolds number above 2000 [-]; roughness : relative to the diameter [-]
+    """
+    inner = roughness / 3.7 + 5.74 / max(reynolds, TURBULENT) ** 0.9
+    root = -TWO_OVER_LN10 * log(inner)
+    factor = 1.0 / (root * root)
+    if reynolds >= TURBULENT:
+        return factor
+    slope = factor * (2.0 - 1.8 * TWO_OVER_LN10 * 5.74 / TURBULENT**0.9 / (inner * root))
+    x = reynolds / LAMINAR
+    second, third = 0.128 - 17.0 * factor + 2.5 * slope, -0.128 + 13.0 * factor - 2.0 * slope
+    fourth = 0.032 - 3.0 * factor + 0.5 * slope
+    return 7.0 * factor - slope + x * (second + x * (third + x * fourth))
+
+
 @njit
 def factor_times_reynolds(reynolds, roughness):
     """Darcy factor times Reynolds number: 64 below Re 2000, Colebrook above 4000, a smooth blend between.
 
-    This makes the drop a monotone function of the flow. roughness : relative to the diameter [-]
+    This makes the drop a monotone function of the flow. A roughness below zero stands for the factor of Swamee and
+    Jain, see `signed_roughness`. roughness : relative to the diameter [-]
     """
     if reynolds <= LAMINAR:
         return 64.0
+    if roughness < 0.0:
+        return factor_swamee_jain(reynolds, -roughness) * reynolds
     turbulent = factor_turbulent(reynolds, roughness) * reynolds
     if reynolds >= TURBULENT:
         return turbulent

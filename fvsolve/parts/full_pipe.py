@@ -100,12 +100,12 @@ def fittings_loss(names: list[str], diameter: float) -> float:
     return sum(FITTINGS[name](fittings, diameter, ft_Crane(diameter)) for name in names)
 
 
-MODELS = ("none", "steady", "quasi-steady", "unsteady", "hazen-williams", "chezy-manning")
+MODELS = ("none", "steady", "quasi-steady", "unsteady", "swamee-jain", "hazen-williams", "chezy-manning")
 WEIGHTINGS = ("zielke", "vardy-brown")
 DARCY = ("roughness", "factor")
 DARCY_WEISBACH = '"quasi-steady" or "steady" with a roughness, whose factor is Colebrook\'s'
 SYNONYMS = dict.fromkeys(
-    ("colebrook", "colebrook-white", "swamee-jain", "moody", "haaland", "darcy", "darcy-weisbach", "d-w", "dw"),
+    ("colebrook", "colebrook-white", "moody", "haaland", "darcy", "darcy-weisbach", "d-w", "dw"),
     DARCY_WEISBACH,
 ) | {"h-w": '"hazen-williams"', "hw": '"hazen-williams"', "manning": '"chezy-manning"', "c-m": '"chezy-manning"'}
 KEYS_OF_MODEL = {  # keys of each model; at least one of the Darcy pair, or the coefficient, is needed
@@ -113,6 +113,7 @@ KEYS_OF_MODEL = {  # keys of each model; at least one of the Darcy pair, or the 
     "steady": DARCY,
     "quasi-steady": DARCY,
     "unsteady": (*DARCY, "weighting", "accuracy"),
+    "swamee-jain": ("roughness",),
     "hazen-williams": ("coefficient",),
     "chezy-manning": ("coefficient",),
 }
@@ -132,6 +133,8 @@ class Friction(Table):
     steady : Darcy factor of the initial flow; quasi-steady : Darcy factor of the present flow
     unsteady : quasi-steady, plus the effect of past flow changes by a weighting function, a sum of exponentials; each
     term of the sum is a state of every cell and stores energy
+    swamee-jain : Darcy factor of the present flow by the formula of Swamee and Jain, as in EPANET; the others take that
+    of Colebrook, from which it differs by up to 3 %
     hazen-williams, chezy-manning : empirical formulas with a `coefficient`. Dissipated power: pressure drop times flow
     [W].
     """
@@ -141,7 +144,11 @@ class Friction(Table):
     model: Annotated[str, Choice("friction model", MODELS, "model of the wall friction", SYNONYMS)]
     roughness: Annotated[
         float | None,
-        Quantity("length", nonnegative, "roughness of the wall for the models steady, quasi-steady and unsteady [m]"),
+        Quantity(
+            "length",
+            nonnegative,
+            "roughness of the wall for the models steady, quasi-steady, unsteady, swamee-jain [m]",
+        ),
     ] = None
     factor: Annotated[
         float | None,

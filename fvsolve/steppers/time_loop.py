@@ -8,7 +8,7 @@ due : time of an output row at which it has to end [s], see `step_control.row_st
 tolerance.
 """
 
-from math import isfinite, nan
+from math import inf, isfinite, nan
 
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.calls import compile_as
@@ -41,9 +41,9 @@ from fvsolve.steppers.step_operations import (
 )
 
 EVENT_TOLERANCE = 1e-13
-SLOW_EVENT_TIME = 1e-11  # of a step that nothing fast limits: the rounding of large networks hides a nearer event
+# Of long steps: event functions have the rounding of large networks and of Newton, which hides a nearer event.
+SLOW_EVENT_TOLERANCE, SLOW_EVENT_TIME = 1e-9, 1e-11
 MOST_SEARCHES = 8  # for events before an event within the same step
-SECANT_TURNS = 40  # turns of the Illinois rule, which is slow where an event function is nearly zero at the start
 # attempts of an implicit step by Newton alone at tolerances above LOOSE: shorter steps cost less than sweeps
 UNSWEPT, LOOSE = 5, 3e-6
 # time for which a step goes on after an event function has jumped, as fraction of the step and of the time
@@ -95,6 +95,8 @@ def event_ratio(g, g_new):
 def locate(handle, run, r, h, now, new, e):
     """Shorten a step so that it ends just past the first event, by the Illinois rule; returns its length and error.
 
+    Where that rule is slow, because an event function jumps beyond its zero, the event functions are extrapolated from
+    their last two values before the zero, in turn with bisection.
     handle, run, r : handles of the model and of the run, and the open handle of the run; now, new : rows of y
     h, e : length and error of the full step; y[new] and g_new receive the values at the end of the shortened step
     The error is NEWTON_FAILED if a stage could not be solved, or if an event function jumps over zero in an implicit
@@ -103,17 +105,28 @@ def locate(handle, run, r, h, now, new, e):
     g, g_new = r.g, r.g_new
     t, low, high, at_low, past = r.state[0]["t"], 0.0, h, 1.0, event_ratio(g, g_new)
     guess, at_high, side = h, past, 0
+    earlier, at_earlier, at_last = 0.0, 1.0, 1.0  # length before `low`; ratios there and at `low`
+    width, wider = inf, inf  # of the bracket in the last turn, and in the one before
+    is_slow, is_extrapolated = False, False
     r.progress[0]["no_sweeps"] = 0
-    narrow = SLOW_EVENT_TIME * h if r.control[0]["keeps_step"] == 1 else 0.0
-    beyond = max(1e-3 * EVENT_TOLERANCE * h, 0.1 * narrow)
+    is_long = r.control[0]["keeps_step"] == 1
+    tolerance, narrow = (SLOW_EVENT_TOLERANCE, SLOW_EVENT_TIME * h) if is_long else (EVENT_TOLERANCE, 0.0)
+    beyond = 1e-3 * tolerance * h
     for turn in range(101):
-        done = turn == 100 or past >= -EVENT_TOLERANCE or high - low <= max(narrow, 4e-16 * max(abs(t), high))
+        done = turn == 100 or past >= -tolerance or high - low <= max(narrow, 4e-16 * max(abs(t), high))
         if done and guess == high:
             break
-        guess = high - at_high * (high - low) / (at_high - at_low)
-        guess += beyond
-        if not low < guess < high or turn > SECANT_TURNS:
-            guess = 0.5 * (low + high)
+        is_slow = is_slow or high - low > 0.5 * wider
+        guess = -inf
+        if not is_slow:
+            guess = high - at_high * (high - low) / (at_high - at_low)
+        elif at_earlier > at_last and (not is_extrapolated or high - low <= 0.5 * width):
+            guess = low + at_last * (low - earlier) / (at_earlier - at_last)
+        is_extrapolated = is_slow and guess > low
+        guess += -beyond if side > 0 else beyond  # to the other side of the event
+        if not low < guess < high:
+            guess, is_extrapolated = 0.5 * (low + high), False
+        wider, width = width, high - low
         if done:
             guess = high
         r.progress[0]["stage_status"] = 0
@@ -129,6 +142,7 @@ def locate(handle, run, r, h, now, new, e):
             high, at_high, past = guess, here, here
             at_low, side = 0.5 * at_low if side > 0 else at_low, 1
         else:
+            earlier, at_earlier, at_last = low, at_last, here
             low, at_low = guess, here
             at_high, side = 0.5 * at_high if side < 0 else at_high, -1
     control = r.control[0]
