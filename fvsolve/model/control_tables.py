@@ -249,7 +249,8 @@ class Balance:
     def sought(self) -> list[int]:
         """Numbers of the blocks without `initial` whose outputs affect the scene and depend on it.
 
-        A block that integrates counts as affecting it. The levels of tanks at the start do not depend on blocks.
+        A block that integrates counts as affecting it, and so do all blocks before it: its output is found by the rate
+        of its input, which blocks with `initial` pass on. The levels of tanks at the start do not depend on blocks.
         """
         blocks, numbers = list(self.blocks.values()), {name: k for k, name in enumerate(self.blocks)}
         static = [isinstance(control_rows_of(type(block.control)), StaticRows) for block in blocks]
@@ -262,6 +263,11 @@ class Balance:
         while ahead:
             acting |= ahead
             ahead = {numbers[name] for k in ahead for name in blocks[k].blocks_read} & {*self.unstated} - acting
+        before = {k for k in self.unstated if blocks[k].control.integrates}
+        while before:
+            acting |= before
+            before = {numbers[name] for k in before for name in blocks[k].blocks_read} - acting
+        acting &= {*self.unstated}
         known = {*range(len(blocks))} - {*self.unstated}
         for k in self.unstated * static.count(True):
             own = (item in numbers and numbers[item] in known if isinstance(item, str) else
