@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case import Case
-from fvsolve.epanet.part_tables import GRAVITY, WATER_VISCOSITY, WEIGHT, rounded_number
+from fvsolve.epanet.part_tables import GRAVITY, WATER_VISCOSITY, WEIGHT, manning_share, rounded_number
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.pipe.part import Pipe
 
 LONGEST_NAME = 31  # of EPANET, in characters
 SHORT_PIPE = 0.01  # length of the pipe that stands for a check valve [m]
-SMOOTH = {"H-W": 150.0, "C-M": 0.009, "D-W": 0.0}  # roughness of that pipe
+SMOOTH = {"H-W": 150.0, "C-M": 0.009, "D-W": 1e-6}  # roughness of that pipe; EPANET refuses 0
 FORMULAS = {
     "hazen-williams": "H-W",
     "chezy-manning": "C-M",
@@ -200,6 +200,9 @@ class _Export:
         if len(found) > 1:
             text = f"pipes have the formulas {', '.join(sorted(found))}; EPANET has one formula for all pipes"
             self.faults.append(f"links: {text}")
+        if any(item.roughness is not None and item.model != "swamee-jain" for item in models):
+            text = "EPANET has the Darcy factor of Swamee and Jain, within about 3 % of Colebrook's"
+            self.notes.append(f'links: {text}; friction model = "swamee-jain" has the same')
         return next(iter(sorted(found)), "H-W")
 
     def pipes(self) -> list[Any]:
@@ -212,7 +215,10 @@ class _Export:
             text = "EPANET needs hazen-williams, chezy-manning, or a roughness"
             self.faults.append(f"links.{name}.friction: {text}; expected one of these models")
             return
-        rough = 1e3 * friction.roughness if self.formula == "D-W" else friction.coefficient
+        is_darcy = self.formula == "D-W"
+        rough = max(1e3 * friction.roughness, SMOOTH["D-W"]) if is_darcy else friction.coefficient
+        if self.formula == "C-M":
+            rough /= manning_share(link.diameter)
         ends, minor = (link.from_, link.to), self.minor * (link.minor_loss or 0.0)
         self.add("PIPES", name, *ends, link.length, 1e3 * link.diameter, rough, minor, "Open")
 

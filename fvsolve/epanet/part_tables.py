@@ -80,15 +80,24 @@ def pipe(ends: tuple[str, str], length: float, diameter: float, friction: Part, 
     return part | {"wave_speed": quantity_text(speed, "m/s")}
 
 
-def friction(formula: str, roughness: float) -> Part:
-    """Table of friction by a formula of EPANET: "H-W", "C-M" or "D-W".
+def manning_share(diameter: float) -> float:
+    """Coefficient n of a case over that of EPANET for the same loss.
+
+    The loss is L (4 n Q / (1.49 pi D^2))^2 / (D / 4)^1.333 in feet and cfs (EPANET 2.2, `hydcoeffs.c`); a case has
+    1 for 1.49, 4/3 for 1.333, and SI. diameter : [m]
+    """
+    return FOOT ** (0.5 * 1.333 - 1.0) / 1.49 * (0.25 * diameter) ** (2.0 / 3.0 - 0.5 * 1.333)
+
+
+def friction(formula: str, roughness: float, diameter: float) -> Part:
+    """Table of friction of a pipe with a diameter [m] by a formula of EPANET: "H-W", "C-M" or "D-W".
 
     roughness : coefficient C [-] for "H-W", coefficient n [s/m^(1/3)] for "C-M", or roughness height [m] for "D-W"
     """
     if formula == "H-W":
         return {"model": "hazen-williams", "coefficient": rounded_number(roughness)}
     if formula == "C-M":
-        return {"model": "chezy-manning", "coefficient": rounded_number(roughness)}
+        return {"model": "chezy-manning", "coefficient": rounded_number(roughness * manning_share(diameter))}
     return {"model": "swamee-jain", "roughness": quantity_text(roughness, "mm")}
 
 

@@ -242,7 +242,7 @@ class Translation:
 
     def pipe_table(self, link: EpanetLink, ends: tuple[str, str]) -> part_tables.Part:
         """Table of a pipe between two nodes of the case, lengthened if it is too short."""
-        law = part_tables.friction(self.formula, link.roughness)
+        law = part_tables.friction(self.formula, link.roughness, link.diameter)
         length = self.lengths[link.name] = self.length(link)
         if length > link.length:
             law = self.spread(link, length)
@@ -267,9 +267,9 @@ class Translation:
         """
         ratio = link.length / length
         if self.formula == "H-W":
-            return part_tables.friction("H-W", link.roughness * ratio ** (-1.0 / 1.852))
+            return part_tables.friction("H-W", link.roughness * ratio ** (-1.0 / 1.852), link.diameter)
         if self.formula == "C-M":
-            return part_tables.friction("C-M", link.roughness * math.sqrt(ratio))
+            return part_tables.friction("C-M", link.roughness * math.sqrt(ratio), link.diameter)
         return part_tables.darcy(ratio * self.darcy_factor(link))
 
     def darcy_factor(self, link: EpanetLink) -> float:
@@ -452,6 +452,9 @@ class Translation:
         for link in self.network.links.values():
             if link.leak_area:
                 self.note("leakage of the pipe ([LEAKAGE]) is not imported", link.name, True)
+        if self.formula == "C-M":
+            text = "EPANET rounds the constants of Manning's formula: each coefficient is changed to the same loss"
+            self.note(text, "C-M")
         study = {"age": "`fvsolve quality`", "trace": "`fvsolve quality --trace NODE`"}.get(self.option["quality"])
         if study:
             self.note(f"water {self.option['quality']} is computed from a run over a day by {study}", "[QUALITY]")

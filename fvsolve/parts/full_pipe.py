@@ -134,7 +134,7 @@ class Friction(Table):
     unsteady : quasi-steady, plus the effect of past flow changes by a weighting function, a sum of exponentials; each
     term of the sum is a state of every cell and stores energy
     swamee-jain : Darcy factor of the present flow by the formula of Swamee and Jain, as in EPANET; the others take that
-    of Colebrook, from which it differs by up to 3 %
+    of Colebrook, from which it differs by about 3 % at most
     hazen-williams, chezy-manning : empirical formulas with a `coefficient`. Dissipated power: pressure drop times flow
     [W].
     """

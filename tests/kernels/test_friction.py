@@ -1,14 +1,16 @@
-"""Hazen-Williams friction: power compared with Decimal, mean over a cell with quadrature, and signs to the bit."""
+"""Friction: Hazen-Williams by Decimal and quadrature, signs to the bit; Swamee and Jain by fluids."""
 
+import math
 from decimal import Decimal, localcontext
 
 import numpy as np
 import pytest
+from fluids.friction import Swamee_Jain_1976
 from scipy.integrate import quad
 
 from fvsolve.kernels.dtypes import FRICTION_HAZEN
 from fvsolve.kernels.pipes import subtract_friction_hazen
-from fvsolve.kernels.steady_friction import drag, power_of_square
+from fvsolve.kernels.steady_friction import drag, factor_times_reynolds, power_of_square, signed_roughness
 
 FLOWS = [*2.0 ** np.random.default_rng(5).uniform(-490.0, 490.0, 300), *np.linspace(0.99, 2.01, 103), 1e-150, 1e150]
 
@@ -80,3 +82,38 @@ def test_a_mirrored_pipe_rubs_the_same_to_the_bit():
     subtract_friction_hazen(0.7, 0.2, 0.3, 1.7, 0.1, *ahead)
     subtract_friction_hazen(0.7, -0.2, 0.3, 1.7, -0.1, *mirrored)
     assert np.array_equal(ahead[2], mirrored[3][::-1]) and np.array_equal(ahead[3], mirrored[2][::-1])
+
+
+def swamee_jain(reynolds, roughness):
+    """Darcy factor of the friction model swamee-jain."""
+    return factor_times_reynolds(reynolds, signed_roughness(roughness, "swamee-jain")) / reynolds
+
+
+ROUGH = (0.0, 1e-6, 1e-4, 1e-2)
+
+
+@pytest.mark.parametrize("roughness", ROUGH)
+def test_the_factor_above_reynolds_4000_is_that_of_swamee_and_jain_by_fluids(roughness):
+    for reynolds in (4000.0, 1e4, 1e5, 1e8):
+        # fluids has the rounded constants -4 log10(e / 3.7 + (6.97 / Re)^0.9) of 1976
+        assert swamee_jain(reynolds, roughness) == pytest.approx(Swamee_Jain_1976(reynolds, roughness), rel=2e-4)
+        exact = 0.25 / math.log10(max(roughness, 1e-12) / 3.7 + 5.74 / reynolds**0.9) ** 2
+        assert swamee_jain(reynolds, roughness) == pytest.approx(exact, rel=1e-12)
+
+
+@pytest.mark.parametrize("roughness", ROUGH)
+def test_between_laminar_and_turbulent_flow_the_factor_has_the_values_and_slopes_of_both(roughness):
+    assert swamee_jain(2000.0, roughness) == 0.032
+    for place in (2000.0, 4000.0):
+        slopes = [(swamee_jain(place + d, roughness) - swamee_jain(place, roughness)) / d for d in (0.01, -0.01)]
+        assert slopes[0] == pytest.approx(slopes[1], rel=2e-3)
+        assert swamee_jain(place + 1e-9, roughness) == pytest.approx(swamee_jain(place - 1e-9, roughness), rel=1e-6)
+
+
+def test_the_factor_is_within_about_3_percent_of_colebrook_and_the_drop_grows_with_the_flow():
+    for roughness in ROUGH:
+        reynolds = np.geomspace(4000.0, 1e8, 200)
+        ratio = [swamee_jain(re, roughness) * re / factor_times_reynolds(re, roughness) for re in reynolds]
+        assert 0.97 < min(ratio) and max(ratio) < 1.032
+        drops = [swamee_jain(re, roughness) * re * re for re in np.linspace(1000.0, 6000.0, 500)]
+        assert np.all(np.diff(drops) > 0.0)
