@@ -122,8 +122,9 @@ def import_(
     pressure_dependent: Annotated[str | None, Option(metavar="P", help="pressure from which demands are full, in Pa "
         'or with a unit, for example "2 bar"; below it they depend on pressure, as with PDA in EPANET (default '
         "demands as in FILE)")] = None,
-    check: Annotated[bool, Option("--check/--no-check", help="comparison of heads and flows, with --day also of levels "
-        "over a day, with EPANET on FILE")] = True,
+    check: Annotated[bool | None, Option("--check/--no-check", help="comparison of heads and flows, with --day also of "
+        "levels over a day, with EPANET on FILE (default yes; the day of more than 2000 nodes with --check only)",
+    )] = None,
 ) -> None:  # fmt: skip
     """Import an EPANET network: write its case file, print all differences from EPANET and compare both."""
     from fvsolve.epanet import import_network
@@ -154,8 +155,12 @@ def import_(
         print(path)
     for text, names in [*network.notes, *([(SHORT, network.short_pipes)] if network.short_pipes else [])]:
         print(f"{text}: {listing(names)}", file=sys.stderr)
-    if check:
-        _compare(network, to, day)
+    if check is not False:
+        is_long = len(network.network.nodes) > MOST_NODES and not check
+        _compare(network, to, day and not is_long)
+        if day and is_long:
+            nodes = len(network.network.nodes)
+            print(f"self-check: the day of {nodes} nodes is not compared; --check compares it", file=sys.stderr)
 
 
 @app.command()
@@ -177,6 +182,9 @@ def export(
     print(epanet)
     for note in notes:
         print(note, file=sys.stderr)
+
+
+MOST_NODES = 2000  # of a network whose day is compared with EPANET without --check: a minute or so
 
 
 def _compare(network: "Imported", case: Path, day: bool) -> None:

@@ -11,6 +11,7 @@ from fvsolve.epanet.translating import NARROW, STALL_FLOW, Translation, initial_
 
 STEP_WIDTH = 1e-3  # difference of levels over which the area of a tank changes at a point of its volume curve [m]
 OPEN, CLOSED = 1.0, 0.0
+MOST_SPEED = 3.0  # relative speed above which a setting is probably a power or a percentage
 FILTER = "10 s"  # time constant with which a block reads a head or a flow, which would follow its own action at once
 # Set points of a regulating valve that a control holds open: heads of water [m], and a flow [m3/s]
 HELD_OPEN = {"PRV": 1e4, "PSV": -9.0, "FCV": 1e3}
@@ -156,6 +157,10 @@ class DayTranslation(Translation):
         if link.pattern > 0:
             return part | {"speed": self.scheduled(1.0, link.pattern, "")}
         begins = initial_action(link)
+        speeds = [speed for item in self.statements.get(link.name, []) if (speed := speed_of(item.action)) is not None]
+        if max(speeds, default=1.0) > MOST_SPEED:
+            text = f"a control sets a relative speed above {MOST_SPEED:g}, and EPANET takes it: heads have no meaning"
+            self.note(text, link.name, True)
         return part | {"speed": self.switched(link.name, "speed", "", speed_of, speed_of(begins) or 1.0)}
 
     def energy_table(self) -> part_tables.Part:
@@ -206,13 +211,12 @@ class DayTranslation(Translation):
     def regulating(self, link: EpanetLink, ends: tuple[str, str], diameter: float, setting: float) -> part_tables.Part:
         """Table of a regulating valve that acts at once, as in EPANET, unless another one is next to it.
 
-        A PSV or FCV that alone supplies the nodes behind it would leave their demands without supply. EPANET opens it.
+        A PSV that alone supplies the nodes behind it would leave their demands without supply. EPANET opens it instead.
         """
-        if link.kind in ("PSV", "FCV") and link.end not in self.network.supplied(lambda other: other is not link):
-            text = f"{link.kind} alone supplies the nodes behind it, so EPANET opens it where it would act"
-            self.note(f"{text}: imported as open", link.name)
-            table = part_tables.check_valve if link.kind == "PSV" else part_tables.valve
-            return table(ends, diameter, link.minor_loss)
+        if link.kind == "PSV" and link.end not in self.network.supplied(lambda other: other is not link):
+            text = "PSV alone supplies the nodes behind it, so EPANET opens it where it would act"
+            self.note(f"{text}: imported as a check valve", link.name)
+            return part_tables.check_valve(ends, diameter, link.minor_loss)
         near = (other for end in (link.start, link.end) for other in self.network.links_at[end])
         if any(other.kind in part_tables.REGULATING and other.name != link.name for other in near):
             return super().regulating(link, ends, diameter, setting)

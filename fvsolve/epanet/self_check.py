@@ -1,5 +1,6 @@
 """Comparison of an imported case with EPANET's solution of the original file: heads, flows and levels of tanks."""
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +16,9 @@ from fvsolve.errors import FvsolveError, listing
 from fvsolve.model.build import build
 
 MOST_HEAD, MOST_FLOW = 0.01, 0.01  # differences of heads [m], and of flows over the largest flow [-], that are named
+LEAST_FLOW = 1e-7  # smaller differences of flows are rounding of EPANET's shut links [m3/s]
+NO_MEANING = 1000.0  # height of heads above all sources which no pump has: constant power with hardly any flow [m]
+CYCLES = 10  # openings of a valve at a full or empty tank over a day that are a cycle
 STEP = 10  # hydraulic step of EPANET over a day [s]
 ROWS = 150  # time between rows of the day that are compared [s]; not a time at which patterns change
 
@@ -95,14 +99,14 @@ def check_start(imported: Imported, case: Case) -> SelfCheck:
     compared = [_compared("heads", "m", heads, solution.head, MOST_HEAD, left_out(imported.network, solution))]
     if flows:
         compared.append(_flows(flows, solution.flow))
-    return SelfCheck(compared, imported.causes)
+    return SelfCheck(compared, imported.causes + extreme_heads(imported.network, [solution]))
 
 
 def _flows(flows: dict[str, float], known: dict[str, float], time: float | None = None) -> Compared:
     """Comparison of flows [m3/s], in l/s."""
     largest = max((abs(value) for value in known.values()), default=0.0)
     ours, theirs = ({name: 1e3 * value for name, value in table.items()} for table in (flows, known))
-    return _compared("flows", "l/s", ours, theirs, 1e3 * MOST_FLOW * largest, {}, time)
+    return _compared("flows", "l/s", ours, theirs, 1e3 * max(MOST_FLOW * largest, LEAST_FLOW), {}, time)
 
 
 def _unsolved(imported: Imported, text: str) -> str:
@@ -143,6 +147,25 @@ def _is_stalled(link: Any, solution: EpanetSolution) -> bool:
 STALLED = 1e-7  # [m3/s]
 
 
+def extreme_heads(network: EpanetNetwork, solutions: list[EpanetSolution]) -> list[str]:
+    """Cause of differences if a pump of constant power drives heads of EPANET far above all sources; as a list."""
+    pumps = [name for name, link in network.links.items() if link.power is not None]
+    sources = [name for name, node in network.nodes.items() if node.kind != "junction"]
+    above = [max(solution.head.values()) - max(solution.head[name] for name in sources) for solution in solutions]
+    if not pumps or max(above) < NO_MEANING:
+        return []
+    return [f"pumps of constant power ({listing(pumps)}) with hardly any flow: EPANET states heads {max(above):.3g} m "
+            "above every source, which have no meaning"]  # fmt: skip
+
+
+def cycling_tanks(events: list[dict[str, Any]]) -> list[str]:
+    """Cause of differences if valves at full or empty tanks open again and again over a day; as a list."""
+    opened = Counter(event["name"] for event in events if "-altitude" in event["name"] and event["what"] == "opens")
+    names = sorted({name.split("-altitude")[0] for name, count in opened.items() if count >= CYCLES})
+    text = "tanks at their greatest or least level, whose links open and shut in turn, in EPANET at each step"
+    return [f"{text}: {listing(names)}"] if names else []
+
+
 def check_day(imported: Imported, case: Any) -> SelfCheck:
     """Compare levels, heads and flows of a case over a day with EPANET at steps of `STEP` seconds.
 
@@ -180,7 +203,7 @@ def check_day(imported: Imported, case: Any) -> SelfCheck:
         key: np.asarray(result[probe])[rows] * (1e3 if key[0] == "flows" else 1.0) for key, probe in probes.items()
     }
     largest = max(abs(value) for solution in days for value in solution.flow.values()) * 1e3
-    limits = {"levels": MOST_HEAD, "heads": MOST_HEAD, "flows": MOST_FLOW * largest}
+    limits = {"levels": MOST_HEAD, "heads": MOST_HEAD, "flows": max(MOST_FLOW * largest, 1e3 * LEAST_FLOW)}
     hidden = [left_out(network, solution) for solution in days]
     dead = {name for table in hidden for names in table.values() for name in names}
     for quantity, names in (("levels", tanks), ("heads", list(network.nodes)), ("flows", pipes)):
@@ -199,4 +222,5 @@ def check_day(imported: Imported, case: Any) -> SelfCheck:
             quantity, "l/s" if quantity == "flows" else "m", len(shown), shown[worst], float(ours[worst, at]),
             float(theirs[worst, at]), limit, [shown[k] for k in order if greatest[k] > limit], {}, float(times[at]),
         ))  # fmt: skip
-    return SelfCheck(compared, imported.causes)
+    causes = imported.causes + extreme_heads(network, days) + cycling_tanks(result.summary["events"])
+    return SelfCheck(compared, causes)

@@ -339,6 +339,74 @@ HYDRAULIC TIMESTEP 0:05
         assert run["nodes.j.head"][-1] == pytest.approx(54.50, abs=0.01)
 
 
+ALONE = """[JUNCTIONS]
+a 10 5
+b 10 4
+c 12 3
+[RESERVOIRS]
+R 40
+[TANKS]
+T 30 3 0 6 8 0
+[PIPES]
+p1 R a 1000 200 110 0 Open
+p2 a T 300 150 110 0 Open
+p3 b c 200 150 110 0 Open
+[VALVES]
+v {ends} 150 {kind} {setting} 0
+[PATTERNS]
+1 0.3 2.0 1.0 0.3
+"""
+
+
+@pytest.mark.parametrize("ends", ["a b", "a c"])
+def test_a_psv_that_alone_supplies_nodes_is_open_over_a_day_as_in_epanet(ends, tmp_path):
+    """The head before it falls below its set head in the second hour."""
+    text = ALONE.format(kind="PSV", setting=26, ends=ends)
+    imported, found = day_of(text + OPTIONS, tmp_path)
+    assert found.agrees and not imported.causes and max(item.difference for item in found.compared) < 5e-3
+    assert any("alone supplies" in text and names == ["v"] for text, names in imported.notes)
+    beside = text.replace("p3 b c", "p4 T c 900 100 110 0 Open\np3 b c")
+    notes = import_network(written(tmp_path, beside + OPTIONS), day=True).notes
+    assert not any("alone supplies" in text for text, _ in notes)
+
+
+def test_a_tank_that_stays_full_is_named_where_its_links_cycle(tmp_path):
+    """EPANET lets a full tank give and take in turn at each step; an altitude valve has a differential of 5 mm."""
+    text = ALONE.format(kind="PRV", setting=20, ends="a b").replace("T 30 3 0 6 8 0", "T 30 2.9 0 3 2 0")
+    text = text.replace("p3 b c", "p5 T b 300 50 110 0 Open\np3 b c")
+    _, found = day_of(text + OPTIONS, tmp_path)
+    assert found.agrees and any(
+        "whose links open and shut in turn" in cause and cause.endswith(": T") for cause in found.causes
+    )
+
+
+def test_heads_far_above_every_source_are_named(tmp_path):
+    """A pump of constant power with hardly any flow: EPANET states heads of kilometres."""
+    imported = import_network(written(tmp_path, pumped()))
+    network, solution = imported.network, imported.solution
+    powered = replace(network, links={"lift": replace(network.links["lift"], power=3000.0)})
+    low, high = (replace(solution, head={**solution.head, "b": head}) for head in (900.0, 6700.0))
+    (cause,) = self_check.extreme_heads(powered, [solution, high])
+    assert "(lift)" in cause and "6.66e+03 m above every source" in cause
+    assert not self_check.extreme_heads(powered, [solution, low]) and not self_check.extreme_heads(network, [high])
+
+
+@pytest.mark.parametrize("speed, is_named", [(75, True), (1.2, False)])
+def test_a_speed_that_is_no_relative_speed_is_named(speed, is_named, tmp_path):
+    text = pumped(controls=f"LINK lift {speed} IF NODE tower BELOW 1\nLINK lift CLOSED IF NODE tower ABOVE 5.5")
+    imported = import_network(written(tmp_path, text), day=True)
+    assert any("relative speed above 3" in cause and "lift" in cause for cause in imported.causes) == is_named
+
+
+def test_the_day_of_a_large_network_is_compared_on_request(tmp_path, fvs, monkeypatch):
+    monkeypatch.setattr("fvsolve.cli.file_commands.MOST_NODES", 1)
+    path = written(tmp_path, pumped())
+    for options, is_compared in (((), False), (("--check",), True), (("--no-check",), False)):
+        code, _, err = fvs("import", path, tmp_path / f"day{len(options)}{is_compared}.toml", "--day", *options)
+        assert code == 0 and ("levels, greatest difference" in err) == is_compared
+        assert ("is not compared; --check compares it" in err) == (options == ())
+
+
 def test_rules_read_states_of_links_and_pressures_of_junctions(tmp_path):
     rules = """RULE 1
 IF JUNCTION b PRESSURE ABOVE 36.6
