@@ -177,6 +177,37 @@ def test_at_the_start_nothing_moves_by_one_bit(kind, given, law):
         assert model.checks["nodes"][sensed]["pressure"] == pytest.approx(given, rel=1e-12)
 
 
+@pytest.mark.in_turn
+@pytest.mark.parametrize("law", ["linear", "log"])
+@pytest.mark.parametrize(
+    "kind, given", [("pressure-reducing", 6.5e5), ("pressure-reducing", 8e5), ("pressure-sustaining", 2e5)]
+)
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_pipe_that_shut_valves_cut_off_rests_at_the_head_behind_an_open_valve(turned, kind, given, law):
+    """A pocket between a shut valve below a higher reservoir and a regulating valve that its pressures open."""
+    nodes = {
+        "high": reservoir(9e5),
+        "far": junction(),
+        "pocket": junction(),
+        "town": junction(0.05),
+        "low": reservoir(6e5),
+    }
+    links = {"shut": valve("high", "far", 0.05, 0.0),
+             "dead": pipe("far", "pocket", 200.0, 0.3, 1000.0, 10, friction=FRICTION),
+             "v": regulating(kind, "pocket", "town", given, diameter=0.3, loss_coefficient=2.0),
+             "p2": pipe("low", "town", 100.0, 0.3, 1000.0, 10, friction=FRICTION)}  # fmt: skip
+    if turned:
+        links = dict(reversed(links.items()))
+    case = scene(nodes, links, 0.5, SMOOTH, ["v.flow", "pocket.pressure", "town.pressure"])
+    case["fluid"] = {**WATER, "law": law}
+    model = fvsolve.build(fvsolve.load(case))
+    checks = model.checks["nodes"]
+    assert checks["pocket"]["pressure"] == pytest.approx(checks["town"]["pressure"], rel=1e-12)
+    run = fvsolve.run(fvsolve.load(case))
+    assert run.ok and np.abs(run["v.flow"]).max() < 1e-9
+    assert run["pocket.pressure"] == pytest.approx(checks["town"]["pressure"], rel=1e-9)
+
+
 def test_one_that_throttles_dissipates():
     found = energy(filled(0.05, {"method": "dormand-prince", "rtol": 1e-10}))
     assert found.relative < 1e-8 and np.all(np.diff(found.dissipated["prv pressure reducing"]) > -1e-6)

@@ -442,11 +442,8 @@ class Regulator(Device, kind=""):
         return start.valve_modes.setdefault(k, ACTIVE if self.is_controllable(start, k) else OPEN)
 
     def release(self, start, k: int) -> None:
-        """Open valve k in the present iteration of the steady start, or shut it if it holds the pressure behind it."""
-        if self.end == "to":
-            start.shut = start.shut | {k}
-        else:
-            start.valve_modes[k] = OPEN
+        """Open valve k in the present iteration of the steady start; a reversed flow shuts it in the next one."""
+        start.valve_modes[k] = OPEN
 
     def edge(self, start, k):
         if k in start.shut or self.steady_mode(start, k) == OPEN:
