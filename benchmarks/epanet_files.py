@@ -300,6 +300,7 @@ def closure(case: dict, limit: float) -> str:
 def examine_day(path: Path, options: Any, record: Record) -> None:
     """Run a day by EPANET and by fvsolve, and compare levels and heads."""
     import fvsolve
+    from fvsolve.epanet.self_check import cycling_tanks
     from fvsolve.errors import FvsolveError
 
     day = record.row["day"] = {"ok": False}
@@ -328,6 +329,7 @@ def examine_day(path: Path, options: Any, record: Record) -> None:
     steps = {key: summary[key] for key in ("steps", "seconds", "seconds_setup") if key in summary}
     day |= {"ok": run.ok, "reason": run.reason, "end": float(run.seconds[-1]), **steps}
     day["marks"] = [f"{mark['text']} at {mark['time'] / 3600.0:.2f} h" for mark in summary["marks"]]
+    day["causes"] = day["causes"] + cycling_tanks(summary["events"])
     day["causes"] += [text for mark, text in zip(summary["marks"], day["marks"], strict=True) if mark["what"] in DRY]
     day |= {"step": STEPS[0], **compare_day(run, imported.nodes, theirs)}
     if run.ok and not is_near(day) and not day_unsolved(day):

@@ -22,7 +22,7 @@ BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")  # fields of state
 FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve": (2056, 13),
     "tests": (1066, 8),
-    "benchmarks": (9532, 64),
+    "benchmarks": (9534, 64),
     "fvsolve/assembly": (1990, 10),
     "fvsolve/basins": (12998, 61),
     "fvsolve/case": (8331, 30),
