@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from fvsolve.epanet import Imported
 
 DAY = 86400.0  # [s]
-WEIGHT = 999.563 * 9.80665  # weight of EPANET's water [N/m3]
 SHORT = (
     'pipes shorter than a cell, which make steps small with pipe_model = "finite-volume" '
     "(--min-pipe-length lengthens them)"
@@ -128,6 +127,7 @@ def import_(
 ) -> None:  # fmt: skip
     """Import an EPANET network: write its case file, print all differences from EPANET and compare both."""
     from fvsolve.epanet import import_network
+    from fvsolve.epanet.part_tables import WEIGHT
 
     to = case or Path(f"{source.stem}.toml")
     if to.is_dir():
