@@ -329,13 +329,14 @@ def examine_day(path: Path, options: Any, record: Record) -> None:
     steps = {key: summary[key] for key in ("steps", "seconds", "seconds_setup") if key in summary}
     day |= {"ok": run.ok, "reason": run.reason, "end": float(run.seconds[-1]), **steps}
     day["marks"] = [f"{mark['text']} at {mark['time'] / 3600.0:.2f} h" for mark in summary["marks"]]
-    day["causes"] = day["causes"] + cycling_tanks(summary["events"])
     day["causes"] += [text for mark, text in zip(summary["marks"], day["marks"], strict=True) if mark["what"] in DRY]
     day |= {"step": STEPS[0], **compare_day(run, imported.nodes, theirs)}
     if run.ok and not is_near(day) and not day_unsolved(day):
         record.stage("EPANET day")
         day |= {"step": STEPS[1], "at_first_step": [day["level"], day["head"]]}
         day |= compare_day(run, imported.nodes, epanet_engine.day(path, options.version, STEPS[1], ROWS))
+    if day["level"]["difference"] <= NEAR:  # a cycle at a limit keeps the levels
+        day["causes"] = day["causes"] + cycling_tanks(summary["events"])
 
 
 def compare_day(run: Any, nodes: dict[str, str], theirs: epanet_engine.Day) -> Row:

@@ -222,5 +222,7 @@ def check_day(imported: Imported, case: Any) -> SelfCheck:
             quantity, "l/s" if quantity == "flows" else "m", len(shown), shown[worst], float(ours[worst, at]),
             float(theirs[worst, at]), limit, [shown[k] for k in order if greatest[k] > limit], {}, float(times[at]),
         ))  # fmt: skip
-    causes = imported.causes + extreme_heads(network, days) + cycling_tanks(result.summary["events"])
+    causes = imported.causes + extreme_heads(network, days)
+    if not any(item.above for item in compared if item.quantity == "levels"):  # a cycle at a limit keeps the levels
+        causes = causes + cycling_tanks(result.summary["events"])
     return SelfCheck(compared, causes)
