@@ -27,6 +27,7 @@ FRICTIONS = [
     {"model": "none"},
     {"model": "steady", "factor": 0.02},
     {"model": "quasi-steady", "roughness": 1e-4},
+    {"model": "swamee-jain", "roughness": 1e-4},
     {"model": "hazen-williams", "coefficient": 110.0},
     {"model": "chezy-manning", "coefficient": 0.012},
 ]

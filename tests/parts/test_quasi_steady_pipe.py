@@ -54,6 +54,10 @@ def colebrook(reynolds, roughness):
     return brentq(residual, 1.0, 50.0, xtol=1e-14, rtol=1e-14) ** -2
 
 
+def swamee_jain(reynolds, roughness):
+    return 0.25 / math.log10(roughness / 3.7 + 5.74 / reynolds**0.9) ** 2
+
+
 def loss_of(friction, flow, length=100.0, diameter=0.05, minor=2.0):
     """Head loss [m] of a flow [m3/s], by the formulas of the handbooks."""
     velocity = flow / area(diameter)
@@ -62,12 +66,13 @@ def loss_of(friction, flow, length=100.0, diameter=0.05, minor=2.0):
         return other + 4.727 * 0.3048**-0.685 * length * (flow / friction["coefficient"]) ** 1.852 / diameter**4.871
     if friction["model"] == "chezy-manning":
         return other + length * (velocity * friction["coefficient"] / (diameter / 4.0) ** (2.0 / 3.0)) ** 2
-    factor = friction.get("factor") or colebrook(velocity * diameter * RHO / 1e-3, friction["roughness"] / diameter)
+    law = swamee_jain if friction["model"] == "swamee-jain" else colebrook
+    factor = friction.get("factor") or law(velocity * diameter * RHO / 1e-3, friction["roughness"] / diameter)
     return other + factor * length / diameter * velocity**2 / (2.0 * GRAVITY)
 
 
 FRICTIONS = [FACTOR, HAZEN, {"model": "chezy-manning", "coefficient": 0.011},
-             {"model": "quasi-steady", "roughness": 2e-4}]  # fmt: skip
+             {"model": "quasi-steady", "roughness": 2e-4}, {"model": "swamee-jain", "roughness": 2e-4}]  # fmt: skip
 
 
 @pytest.mark.parametrize("friction", FRICTIONS, ids=lambda one: one["model"])
