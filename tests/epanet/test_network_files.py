@@ -374,10 +374,12 @@ def test_a_tank_that_stays_full_is_named_where_its_links_cycle(tmp_path):
     """EPANET lets a full tank give and take in turn at each step; an altitude valve has a differential of 5 mm."""
     text = ALONE.format(kind="PRV", setting=20, ends="a b").replace("T 30 3 0 6 8 0", "T 30 2.9 0 3 2 0")
     text = text.replace("p3 b c", "p5 T b 300 50 110 0 Open\np3 b c")
-    _, found = day_of(text + OPTIONS, tmp_path)
-    assert found.agrees and any(
-        "whose links open and shut in turn" in cause and cause.endswith(": T") for cause in found.causes
-    )
+    imported, found = day_of(text + OPTIONS, tmp_path)
+    assert found.agrees and any(cause.endswith("in EPANET at each step: T") for cause in found.causes)
+    planted = replace(imported, text=imported.text.replace('full_level = "3 m"', 'full_level = "2.95 m"'))
+    assert planted.text != imported.text
+    wrong = self_check.check_day(planted, _case(planted, tmp_path))
+    assert not wrong.agrees and not wrong.causes  # levels differ by 5 cm, which no cycle explains
 
 
 def test_heads_far_above_every_source_are_named(tmp_path):
