@@ -6,6 +6,7 @@ solved together by Newton's method (Todini and Pilati 1988). In a loop without f
 norm.
 """
 
+from collections import Counter, defaultdict
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -257,14 +258,16 @@ def _references(held, demand, edges, parts, free_sets):
     """
     dropped: set[int] = set()
     entries: dict[int, frozenset[int]] = {}
-    known = {i for group in parts if group not in free_sets for i in group}
+    known = {i for group in set(parts) - set(free_sets) for i in group}
+    links_at, given_at = _edges_at_nodes(edges)
     waiting = list(free_sets)
     while waiting:
         for group in waiting:
-            entry = next((e for e, edge in enumerate(edges) if _enters(edge, group, known)), None)
+            near = sorted({e for i in group for e in given_at[i]})
+            entry = next((e for e in near if _enters(edges[e], group, known)), None)
             if entry is not None:
                 entries[entry] = group
-                dropped.add(_dead_end(group, demand, edges))
+                dropped.add(_dead_end(group, demand, links_at))
                 known |= group
                 waiting.remove(group)
                 break
@@ -274,16 +277,25 @@ def _references(held, demand, edges, parts, free_sets):
 
 
 def _enters(edge, group, known) -> bool:
-    """True if an edge with a fixed flow and a known drop joins the sets of nodes `group` and `known`."""
-    if edge.row is not None or edge.drop is None:
-        return False
+    """True if an edge joins the sets of nodes `group` and `known`."""
     return (edge.i in group and edge.j in known) or (edge.j in group and edge.i in known)
 
 
-def _dead_end(group, demand, edges):
+def _edges_at_nodes(edges):
+    """Edges of each node : (number of all edges, indices of those with a fixed flow and a known drop)."""
+    counts: dict[int, int] = Counter()
+    given: dict[int, list[int]] = defaultdict(list)
+    for e, edge in enumerate(edges):
+        for i in {edge.i, edge.j}:
+            counts[i] += 1
+            if edge.row is None and edge.drop is not None:
+                given[i].append(e)
+    return counts, given
+
+
+def _dead_end(group, demand, counts):
     """Node of the set `group` that is most similar to a dead end: without demand, with the fewest links."""
-    count = {i: sum(i in (edge.i, edge.j) for edge in edges) for i in group}
-    return min(sorted(group), key=lambda i: (demand[i] != 0.0, count[i]))
+    return min(sorted(group), key=lambda i: (demand[i] != 0.0, counts[i]))
 
 
 def _newton(problems: list[_Problem]) -> None:

@@ -136,6 +136,17 @@ def aligned_zeros(size: int) -> np.ndarray:
     return buffer[first : first + size]
 
 
+class RowNames(list):
+    """Names of the links of a table, one for each row; complete from the start, so that a search needs no loop."""
+
+    def __init__(self, names) -> None:
+        super().__init__(names)
+        self._first_rows = {name: row for row, name in reversed(list(enumerate(self)))}
+
+    def index(self, name: str, *_) -> int:
+        return self._first_rows[name]
+
+
 @dataclass(frozen=True)
 class PipeMesh:
     """Cells of a pipe, counted from its `from` end; for a delay line the places at which fields are computed.
@@ -379,7 +390,7 @@ class ModelDraft:
     def fill(self, table: str, record: np.dtype) -> tuple[list[str], np.ndarray]:
         """Fill the rows of a table from the links of the case : (name of the link of each row, rows)."""
         parts = self.links.get(table, [])
-        names = [name for name, _, lowering in parts for _ in range(lowering.rows)]
+        names = RowNames(name for name, _, lowering in parts for _ in range(lowering.rows))
         table_rows, at = np.zeros(len(names), record), 0
         if table == "valve":
             table_rows["device"] = table_rows["hooks"] = table_rows["data"] = table_rows["event"] = -1

@@ -97,7 +97,7 @@ class Case(Displayable):
         """Paths of the files that the case used, such as schedules, measurements, meshes and tableaus."""
         return list(self.copies.values())
 
-    @property
+    @cached_property
     def probes(self) -> list[Probe]:
         """Probes to record: the probes of `[output]`, then further probes that `[expect]` and `[compare]` name."""
         named = [*self.output.probes]
@@ -118,6 +118,12 @@ class Case(Displayable):
         powers = watched_powers(self.links) if self.energy is not None else {}
         named += [Probe(text, "links", *place, None, "power") for text, place in powers.items()]
         return list({probe.text: probe for probe in named}.values())
+
+    @cached_property
+    def links_with_force_probe(self) -> set[str]:
+        """Names of links whose force a probe reads."""
+        probes = [*self.probes, *self.extreme_probes]
+        return {probe.name for probe in probes if (probe.part, probe.quantity) == ("links", "force")}
 
     @property
     def schemes(self) -> tuple[str, ...]:

@@ -330,19 +330,29 @@ def store_gates(draft) -> None:
     nodes, valves, columns = draft.node_table, draft.valve_table, draft.column_table
     nodes["gates"], places = -1, list(draft.case.places.values())
     bare = (nodes["kind"] == rec.JUNCTION) & (nodes["admittance"] == 0.0)
-    for i in np.flatnonzero(bare):
-        joined = [k for k, v in enumerate(valves) if i in (v["from_node"], v["to_node"])]
+    valves_at, columns_at = rows_at_nodes(valves), rows_at_nodes(columns)
+    for i in np.flatnonzero(bare).tolist():
+        joined = valves_at.get(i, [])
         devices = [k for k in valves["device"][joined] if k >= 0 and not draft.devices[k][2].vessel]
         own = [k for k in devices if not draft.devices[k][2].sensed(draft.devices[k][1])]
         if any(draft.device_table["node"][own] >= 0):
             continue
-        column_count, place = sum(i in (c["from_node"], c["to_node"]) for c in columns), places[i]
+        column_count, place = len(columns_at.get(i, [])), places[i]
         if column_count == 0 or not joined:
             continue
         if not np.any((place.demand if place.kind == "junction" else place.flow).value):
             nodes["gates"][i], nodes["gate_count"][i] = len(draft.integers), len(joined)
             nodes["columns"][i] = column_count
             draft.integers += joined
+
+
+def rows_at_nodes(table) -> dict[int, list[int]]:
+    """Rows of links that end at each node, in ascending order : node -> rows; table : links"""
+    found: dict[int, list[int]] = {}
+    for k, ends in enumerate(zip(table["from_node"].tolist(), table["to_node"].tolist(), strict=True)):
+        for i in set(ends):
+            found.setdefault(i, []).append(k)
+    return found
 
 
 def refuse_isolated_groups(draft, members) -> None:
@@ -352,8 +362,9 @@ def refuse_isolated_groups(draft, members) -> None:
     members : label of a group -> indices of its nodes
     """
     nodes, valves, names = draft.node_table, draft.valve_table, list(draft.case.places)
+    valves_at = rows_at_nodes(valves)
     for group in members.values():
-        links = [v for v in valves if {int(v["from_node"]), int(v["to_node"])} & set(group)]
+        links = [valves[k] for k in sorted({k for i in group for k in valves_at.get(i, [])})]
         air = [v for v in links if v["device"] >= 0 and draft.devices[v["device"]][2].vessel]
         to_fixed = [v for v in links if not {int(v["from_node"]), int(v["to_node"])} <= set(group)]
         if len(group) < 2 or len(to_fixed) > len(air) or np.any(nodes["admittance"][group] > 0.0):

@@ -248,8 +248,7 @@ def reason_for_cells(case, name: str, link) -> str:
         return "its wall creeps in every cell"
     if any(getattr(case.places[end], "on", None) for end in link.ports.values()):
         return "the acceleration of its body acts on its cells"
-    probes = [*case.probes, *case.extreme_probes]
-    if any(probe.quantity == "force" and (probe.part, probe.name) == ("links", name) for probe in probes):
+    if name in case.links_with_force_probe:
         return "a probe reads its force, which is computed from cells"
     return ""
 
