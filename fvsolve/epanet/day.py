@@ -194,9 +194,8 @@ class DayTranslation(Translation):
     def valve(self, link: EpanetLink) -> part_tables.Part:
         kind, begins, own = link.kind, initial_action(link), self.statements.get(link.name, [])
         settings = {action for item in own if (action := item.action)[0] != "closed"} - {begins}
+        settings -= {("open",)} if kind == "GPV" else set()  # it keeps its curve
         opening, ends = self.opening(link.name), self.ends(link)
-        if kind in ("PBV", "GPV"):
-            self.note(f"{kind}: its loss coefficient is that of hour 0 all day", link.name, True)
         if not settings or kind in ("PBV", "GPV"):
             self.leave_out([item for item in own if item.action in settings], "sets a valve of this kind")
             if opening == CLOSED or begins[0] == "closed":
@@ -226,6 +225,7 @@ class DayTranslation(Translation):
     def open_state(self, link: EpanetLink) -> Action:
         """State of a valve that begins closed, after an action opens it: active with its setting, or fixed open."""
         opens = {item.action for item in self.statements.get(link.name, []) if item.action[0] != "closed"}
+        opens -= {("open",)} if link.kind == "GPV" else set()
         return ("open",) if ("open",) in opens else ("setting", link.setting)
 
     def set_valve(self, link: EpanetLink, ends: tuple[str, str], begins: Action) -> part_tables.Part:

@@ -23,6 +23,7 @@ FORMULAS = {
 }
 REGULATING = {"pressure-reducing": "PRV", "pressure-sustaining": "PSV", "flow-control": "FCV"}
 NEGATION = "1 - other"  # formula of a block that does the opposite of a relay, as the import writes it
+GENERAL_DIAMETER = 100.0  # of a valve whose loss follows a curve [mm]
 HIGH_LEVEL = 1000.0  # greatest level of a tank that has none [m]
 
 
@@ -81,7 +82,8 @@ class _Export:
     def link_writers(self) -> dict[str, Callable]:
         regulating = dict.fromkeys(REGULATING, self.regulating)
         own = {"pipe": self.pipe, "valve": self.valve, "orifice": self.valve, "altitude-valve": self.altitude_valve}
-        return own | regulating | {"check-valve": self.check_valve, "pump": self.pump, "leak": self.leak}
+        own |= {"check-valve": self.check_valve, "loss-curve": self.loss_curve}
+        return own | regulating | {"pump": self.pump, "leak": self.leak}
 
     def part(self, name: str, group: str, part: Any, writers: dict[str, Callable]) -> None:
         """Write a part, or report that EPANET has none of its kind."""
@@ -264,6 +266,14 @@ class _Export:
         diameter, loss = self.size(link)
         ends = (link.from_, link.to)
         self.add("PIPES", name, *ends, SHORT_PIPE, diameter, SMOOTH[self.formula], loss, "CV")
+
+    def loss_curve(self, name: str, link: Any) -> None:
+        """Write a general purpose valve by its curve; its diameter has no effect."""
+        weight = self.case.properties.density * self.case.gravity
+        per_metre = 1.0 if link.loss.quantity == "head" else weight
+        points = [(1e3 * q, loss / per_metre) for q, loss in zip(link.loss.flow, link.loss.value, strict=True)]
+        points = [(0.0, 0.0), *points] if points[0][0] > 0.0 else points
+        self.add("VALVES", name, link.from_, link.to, GENERAL_DIAMETER, "GPV", self.curve(points), 0.0)
 
     def regulating(self, name: str, link: Any) -> None:
         kind = REGULATING[link.kind]

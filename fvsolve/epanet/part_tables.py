@@ -14,6 +14,9 @@ GRAVITY = 32.2 * FOOT  # of EPANET, in minor losses and Darcy-Weisbach [m/s2]
 DENSITY = WEIGHT / GRAVITY  # of water [kg/m3]
 WATER_VISCOSITY = 1.1e-5 * FOOT**2  # of EPANET, relative to which a file states a viscosity [m2/s]
 AMBIENT = 101325.0  # ambient pressure of a case [Pa]
+ROUNDING = 1e-9  # loss of a curve at no flow that counts as none, over its last loss
+FAST = 5.0  # velocity in a PBV at the second point of its constant loss [m/s]
+SPACING, MOST_TURNED = 1.04, 4.0  # ratio of flows at points of a square law; greatest flow over the first
 
 
 def quantity_text(value: float, unit: str) -> str:
@@ -116,6 +119,13 @@ def valve(ends: tuple[str, str], diameter: float, loss: float, opening: float = 
     return part if opening == 1.0 else part | {"opening": opening}
 
 
+def loss_curve(ends: tuple[str, str], points: list[tuple[float, float]]) -> Part:
+    """Table of a link whose head loss follows points of flow [m3/s] and loss [m]."""
+    flow, loss = zip(*points, strict=True)
+    keys = {"flow": [quantity_text(q, "l/s") for q in flow], "head": [quantity_text(h, "m") for h in loss]}
+    return _link("loss-curve", ends) | {"loss": keys}
+
+
 def pump(ends: tuple[str, str], law: Part, speed: float) -> Part:
     """Table of a pump with a check valve, because EPANET's pumps have no reverse flow.
 
@@ -174,6 +184,42 @@ def leak(place: str, coefficient: float, exponent: float) -> Part:
     return {
         "type": "leak", "from": place, "coefficient": rounded_number(per_pascal), "exponent": rounded_number(exponent),
     }  # fmt: skip
+
+
+def general_losses(curve: list[list[float]]) -> tuple[list[tuple[float, float]], bool]:
+    """(points of flow [m3/s] and loss [m], True if EPANET's loss is negative at small flows) of the curve of a GPV.
+
+    EPANET continues the first section down to no flow, and the last section beyond the last point. No points if the
+    loss falls anywhere, or is never above 0.
+    """
+    if len(curve) < 2 or curve[-1][1] <= 0.0 or any(b[1] < a[1] for a, b in zip(curve, curve[1:], strict=False)):
+        return [], False
+    first = max(k for k, (flow, _) in enumerate(curve[:-1]) if k == 0 or flow <= 0.0)
+    (q0, h0), (q1, h1) = curve[first : first + 2]
+    at_rest = h0 - (h1 - h0) / (q1 - q0) * q0
+    points = [(0.0, at_rest), *((q, h) for q, h in curve if q > 0.0)]
+    if abs(at_rest) <= ROUNDING * curve[-1][1]:
+        return [(0.0, 0.0), *points[1:]], False
+    if at_rest > 0.0:
+        return points, False
+    k = next(k for k, (_, loss) in enumerate(points) if loss > 0.0)
+    (q0, h0), (q1, h1) = points[k - 1 : k + 1]
+    return [(0.0, 0.0), (q0 - h0 * (q1 - q0) / (h1 - h0), 0.0), *points[k:]], True
+
+
+def breaker_losses(setting: float, loss: float, diameter: float) -> list[tuple[float, float]]:
+    """Points of flow [m3/s] and loss [m] of a PBV: its setting [m], or the loss of the open valve if greater.
+
+    loss : loss coefficient of the open valve for the velocity in the diameter [m]; 0 for none
+    The points follow the square of the flow within `(SPACING - 1)^2 / 4` of the loss, up to `MOST_TURNED` times the
+    flow at which both are equal.
+    """
+    area = math.pi / 4.0 * diameter**2
+    if not loss:
+        return [(0.0, setting), (FAST * area, setting)]
+    equal = area * math.sqrt(2.0 * GRAVITY * setting / loss)
+    count = math.ceil(math.log(MOST_TURNED) / math.log(SPACING))
+    return [(0.0, setting), *((equal * SPACING**k, setting * SPACING ** (2 * k)) for k in range(count + 1))]
 
 
 def loss_coefficient(drop: float, flow: float, diameter: float) -> float:

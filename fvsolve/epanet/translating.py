@@ -309,7 +309,7 @@ class Translation:
         if self.solution.seconds == 0.0 and not self.is_controlled(link):
             return begins
         if link.kind == "GPV":
-            return ("closed",) if self.is_shut(link) else begins
+            return ("closed",) if self.is_shut(link) else ("setting", link.setting)
         if setting == 0.0 and (begins[0] != "setting" or link.setting != 0.0):  # EPANET states 0 for a fixed valve
             return ("closed",) if self.is_shut(link) else ("open",)
         return ("setting", setting)
@@ -323,7 +323,12 @@ class Translation:
 
     def valve_table(self, link: EpanetLink, ends: tuple[str, str], state: tuple[Any, ...]) -> part_tables.Part:
         """Table of a valve between two nodes of the case; state : as from `valve_state`"""
-        kind, diameter = link.kind, self.valve_diameter(link)
+        kind = link.kind
+        if kind == "GPV" and state[0] == "setting":
+            return self.general_valve(link, ends)
+        if kind == "PBV" and state[0] == "setting":
+            return self.breaker(link, ends, state[1])
+        diameter = self.valve_diameter(link)
         if state[0] == "closed":
             self.note(f"{kind} is shut: imported as a shut valve", link.name)
             return part_tables.valve(ends, diameter, 0.0, opening=0.0)
@@ -344,27 +349,41 @@ class Translation:
             return self.regulating(link, ends, diameter, setting)
         if kind == "TCV":
             return part_tables.valve(ends, link.diameter, max(setting, link.minor_loss))
-        if kind == "PCV":
-            share = curve_value(link.curve or [[0.0, 0.0], [1.0, 1.0]], 0.01 * setting)
-            return part_tables.valve(ends, diameter, link.minor_loss, opening=share)
-        return self.fixed_loss(link, ends, diameter)
+        share = curve_value(link.curve or [[0.0, 0.0], [1.0, 1.0]], 0.01 * setting)  # of a PCV
+        return part_tables.valve(ends, diameter, link.minor_loss, opening=share)
 
     def regulating(self, link: EpanetLink, ends: tuple[str, str], diameter: float, setting: float) -> part_tables.Part:
         """Table of a regulating valve that moves with a time constant."""
         self.note(f"{link.kind}: EPANET states no time constant, {part_tables.TIME_CONSTANT} is used", link.name)
         return part_tables.regulating(link.kind, ends, diameter, self.set_point(link, setting), link.minor_loss)
 
-    def fixed_loss(self, link: EpanetLink, ends: tuple[str, str], diameter: float) -> part_tables.Part:
-        """Table of a PBV or GPV: a valve with the constant loss coefficient of this hour."""
-        flow, kind = self.solution.flow[link.name], link.kind
-        drop = self.solution.head[link.start] - self.solution.head[link.end]
-        if flow * drop < 0.0:
-            text = f"{kind} raises the head along its flow, which a valve cannot do"
+    def general_valve(self, link: EpanetLink, ends: tuple[str, str]) -> part_tables.Part:
+        """Table of a GPV: a link by its curve; a valve if its curve falls."""
+        points, negative = part_tables.general_losses(link.curve or [])
+        if negative:
+            text = "GPV: its curve states a negative loss at small flows, which a loss cannot be"
+            self.note(f"{text}: imported without loss there", link.name, True)
+        if points:
+            return part_tables.loss_curve(ends, points)
+        text = "GPV: the loss of its curve falls as the flow rises"
+        self.note(f"{text}: imported as a valve with the constant loss coefficient of this hour", link.name, True)
+        flow, drop = self.solution.flow[link.name], self.solution.head[link.start] - self.solution.head[link.end]
+        loss = part_tables.loss_coefficient(drop, flow, link.diameter) if flow * drop > 0.0 else link.minor_loss
+        return part_tables.valve(ends, link.diameter, abs(loss))
+
+    def breaker(self, link: EpanetLink, ends: tuple[str, str], setting: float) -> part_tables.Part:
+        """Table of a PBV with a setting: a link with constant loss, or with that of the open valve where it is greater.
+
+        In EPANET it keeps its drop against its flow too.
+        """
+        uphill = setting > 0.0 and self.solution.flow[link.name] < -STALL_FLOW
+        if uphill:
+            text = "PBV raises the head along its flow, which a valve cannot do"
             self.note(f"{text}: imported as an open valve, so heads differ", link.name, True)
-        elif flow and drop:
-            self.note(f"{kind}: imported as a valve with the constant loss coefficient of this hour", link.name)
-            return part_tables.valve(ends, link.diameter, part_tables.loss_coefficient(abs(drop), flow, link.diameter))
-        return part_tables.valve(ends, diameter, link.minor_loss)
+        if uphill or setting <= 0.0:
+            return part_tables.valve(ends, self.valve_diameter(link), link.minor_loss)
+        points = part_tables.breaker_losses(setting / self.gravity, link.minor_loss, link.diameter)
+        return part_tables.loss_curve(ends, points)
 
     def bore(self, link: EpanetLink) -> float:
         """Diameter [m] of the widest pipe at the ends of a link; of the network if there is no pipe."""
