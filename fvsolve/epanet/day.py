@@ -360,7 +360,7 @@ class DayTranslation(Translation):
         names = {source: f"{source[0]}_{k + 1}" for k, source in enumerate(sources)}
         formulas = switching.prevailing(actions, names)
         others = [formula for item, formula in formulas.items() if item != value]
-        off = others[0] if len(others) == 1 else f"1 - {'*'.join(f'(1 - ({item}))' for item in others)}"
+        off = others[0] if len(others) == 1 else f"1 - {'*'.join(f'(1 - ({item}))' for item in others) or '1'}"
         block: part_tables.Part = {"type": "latch"}
         for word, formula in (("set", formulas.get(value, "0")), ("reset", off)):
             block[word] = f"controls.{ours}-{word}"

@@ -16,7 +16,8 @@ WATER_VISCOSITY = 1.1e-5 * FOOT**2  # of EPANET, relative to which a file states
 AMBIENT = 101325.0  # ambient pressure of a case [Pa]
 ROUNDING = 1e-9  # loss of a curve at no flow that counts as none, over its last loss
 FAST = 5.0  # velocity in a PBV at the second point of its constant loss [m/s]
-SPACING, MOST_TURNED = 1.04, 4.0  # ratio of flows at points of a square law; greatest flow over the first
+MINOR_LOSS = 0.02517 / FOOT  # head loss over K Q^2 / d^4, of EPANET [s2/m]
+LINE_ERROR, MOST_POINTS = 5e-4, 200  # error of lines between points of a square law [m]; number of points at most
 
 
 def quantity_text(value: float, unit: str) -> str:
@@ -207,19 +208,20 @@ def general_losses(curve: list[list[float]]) -> tuple[list[tuple[float, float]],
     return [(0.0, 0.0), (q0 - h0 * (q1 - q0) / (h1 - h0), 0.0), *points[k:]], True
 
 
-def breaker_losses(setting: float, loss: float, diameter: float) -> list[tuple[float, float]]:
+def breaker_losses(setting: float, loss: float, diameter: float, most: float) -> list[tuple[float, float]]:
     """Points of flow [m3/s] and loss [m] of a PBV: its setting [m], or the loss of the open valve if greater.
 
-    loss : loss coefficient of the open valve for the velocity in the diameter [m]; 0 for none
-    The points follow the square of the flow within `(SPACING - 1)^2 / 4` of the loss, up to `MOST_TURNED` times the
-    flow at which both are equal.
+    loss : loss coefficient of the open valve for the velocity in the diameter [m], 0 for none; most : greatest loss [m]
+    The lines between the points differ from the square of the flow by at most `LINE_ERROR`, see `MOST_POINTS`.
     """
-    area = math.pi / 4.0 * diameter**2
     if not loss:
-        return [(0.0, setting), (FAST * area, setting)]
-    equal = area * math.sqrt(2.0 * GRAVITY * setting / loss)
-    count = math.ceil(math.log(MOST_TURNED) / math.log(SPACING))
-    return [(0.0, setting), *((equal * SPACING**k, setting * SPACING ** (2 * k)) for k in range(count + 1))]
+        return [(0.0, setting), (FAST * math.pi / 4.0 * diameter**2, setting)]
+    square = MINOR_LOSS * loss / diameter**4
+    equal, last = math.sqrt(setting / square), math.sqrt(max(most, setting) / square)
+    count = min(math.ceil(0.5 * (last - equal) * math.sqrt(square / LINE_ERROR)) or 1, MOST_POINTS)
+    width = max(last - equal, equal) / count
+    flows = [equal + k * width for k in range(count + 1)]
+    return [(0.0, setting), *((q, square * q * q) for q in flows)]
 
 
 def loss_coefficient(drop: float, flow: float, diameter: float) -> float:

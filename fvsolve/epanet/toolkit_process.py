@@ -238,6 +238,26 @@ def _control(tk: Any, project: Any, index: int, unit: Units) -> dict[str, Any]:
     return control
 
 
+def set_general_actions(found: dict[str, Any], text: str) -> None:
+    """Set the actions of controls on GPVs from the lines of the file: the toolkit states the index of their curves.
+
+    found : result of `contents`; text : of the file
+    """
+    general = {link["name"] for link in found["links"] if link["kind"] == "GPV"}
+    lines: dict[str, list[str]] = {name: [] for name in general}
+    section = ""
+    for line in text.splitlines():
+        words = line.partition(";")[0].split()
+        if words and words[0].startswith("["):
+            section = words[0].upper()
+        elif section.startswith("[CONT") and len(words) > 2 and words[1] in general:
+            lines[words[1]].append(words[2].lower())
+    for control in found["controls"]:
+        if control["link"] in general and lines[control["link"]]:
+            word = lines[control["link"]].pop(0)
+            control["action"] = [word] if word in ("open", "closed") else control["action"]
+
+
 def _action(tk: Any, code: int, setting: float, factor: float) -> list[Any]:
     """Action as ["open"], ["closed"] or ["setting", value in SI]; code : kind of link"""
     pipe = code in (tk.PIPE, tk.CVPIPE)
@@ -481,6 +501,7 @@ def answer(path: str, request: dict[str, Any]) -> dict[str, Any]:
             tk.setdemandmodel(project, tk.PDA, 0.0, pressure, 0.5)
         if request.get("contents"):
             result["contents"] = contents(tk, project)
+            set_general_actions(result["contents"], _read(Path(path)))
         result["solutions"] = []
         for requested in request.get("solutions", ()):
             begun = time.process_time()

@@ -382,7 +382,9 @@ class Translation:
             self.note(f"{text}: imported as an open valve, so heads differ", link.name, True)
         if uphill or setting <= 0.0:
             return part_tables.valve(ends, self.valve_diameter(link), link.minor_loss)
-        points = part_tables.breaker_losses(setting / self.gravity, link.minor_loss, link.diameter)
+        heads = self.solution.head.values()
+        most = max(heads) - min(heads)
+        points = part_tables.breaker_losses(setting / self.gravity, link.minor_loss, link.diameter, most)
         return part_tables.loss_curve(ends, points)
 
     def bore(self, link: EpanetLink) -> float:

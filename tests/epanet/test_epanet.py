@@ -299,8 +299,8 @@ VALVES = {
     "FCV": ("v1 a c 150 FCV 5 0", "flow-control"),
     "PRV": ("v1 a c 150 PRV 32 0", "pressure-reducing"),
     "PSV": ("v1 a c 150 PSV 45 0", "pressure-sustaining"),
-    "PBV": ("v1 a c 150 PBV 3 0", "valve"),
-    "GPV": ("v1 a c 150 GPV g 0\n[CURVES]\ng 0 0\ng 10 2\ng 40 20", "valve"),
+    "PBV": ("v1 a c 150 PBV 3 0", "loss-curve"),
+    "GPV": ("v1 a c 150 GPV g 0\n[CURVES]\ng 0 0\ng 10 2\ng 40 20", "loss-curve"),
 }
 
 
