@@ -17,6 +17,7 @@ AMBIENT = 101325.0  # ambient pressure of a case [Pa]
 ROUNDING = 1e-9  # loss of a curve at no flow that counts as none, over its last loss
 FAST = 5.0  # velocity in a PBV at the second point of its constant loss [m/s]
 MINOR_LOSS = 0.02517 / FOOT  # head loss over K Q^2 / d^4, of EPANET [s2/m]
+LEAST_SPAN = 0.01  # range of flows of points of a square law that no flow reaches, over the least
 LINE_ERROR, MOST_POINTS = 5e-4, 200  # error of lines between points of a square law [m]; number of points at most
 
 
@@ -217,10 +218,10 @@ def breaker_losses(setting: float, loss: float, diameter: float, most: float) ->
     if not loss:
         return [(0.0, setting), (FAST * math.pi / 4.0 * diameter**2, setting)]
     square = MINOR_LOSS * loss / diameter**4
-    equal, last = math.sqrt(setting / square), math.sqrt(max(most, setting) / square)
-    count = min(math.ceil(0.5 * (last - equal) * math.sqrt(square / LINE_ERROR)) or 1, MOST_POINTS)
-    width = max(last - equal, equal) / count
-    flows = [equal + k * width for k in range(count + 1)]
+    equal = math.sqrt(setting / square)
+    span = math.sqrt(most / square) - equal if most > setting else LEAST_SPAN * equal
+    count = min(math.ceil(0.5 * span * math.sqrt(square / LINE_ERROR)), MOST_POINTS)
+    flows = [equal + k * span / count for k in range(count + 1)]
     return [(0.0, setting), *((q, square * q * q) for q in flows)]
 
 

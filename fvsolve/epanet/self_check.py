@@ -158,6 +158,13 @@ def extreme_heads(network: EpanetNetwork, solutions: list[EpanetSolution]) -> li
             "above every source, which have no meaning"]  # fmt: skip
 
 
+def uphill_breakers(network: EpanetNetwork, solutions: list[EpanetSolution]) -> list[str]:
+    """Cause of differences if the flow through a PBV is negative at some time, against its drop; as a list."""
+    breakers = [name for name, link in network.links.items() if link.kind == "PBV"]
+    found = [name for name in breakers if min(solution.flow[name] for solution in solutions) < -LEAST_FLOW]
+    return [f"PBV raises the head along a negative flow, which a loss cannot do ({listing(found)})"] if found else []
+
+
 def cycling_tanks(events: list[dict[str, Any]]) -> list[str]:
     """Cause of differences if valves at full or empty tanks open again and again over a day; as a list."""
     opened = Counter(event["name"] for event in events if "-altitude" in event["name"] and event["what"] == "opens")
@@ -222,7 +229,7 @@ def check_day(imported: Imported, case: Any) -> SelfCheck:
             quantity, "l/s" if quantity == "flows" else "m", len(shown), shown[worst], float(ours[worst, at]),
             float(theirs[worst, at]), limit, [shown[k] for k in order if greatest[k] > limit], {}, float(times[at]),
         ))  # fmt: skip
-    causes = imported.causes + extreme_heads(network, days)
+    causes = imported.causes + extreme_heads(network, days) + uphill_breakers(network, days)
     if not any(item.above for item in compared if item.quantity == "levels"):  # a cycle at a limit keeps the levels
         causes = causes + cycling_tanks(result.summary["events"])
     return SelfCheck(compared, causes)
