@@ -73,6 +73,10 @@ LINKS = {
     "pressure-compensator": of(
         "pressure-compensator", {"set_drop": between(2e4, 2e5), "senses": SENSES}, a=SIZE, b=st.just({}) | MOVING
     ),
+    "loss-curve": of("loss-curve", {"loss": st.sampled_from([
+        {"flow": [0.0, 0.005, 0.01], "head": [0.0, 1.0, 4.0]}, {"flow": [0.0, 0.01], "head": [3.0, 3.0]},
+        {"flow": [0.01], "drop": [2e4]}, {"flow": [0.0, 0.004, 0.01], "head": [0.0, 0.0, 2.0]},
+    ])}),
     "rupture-disc": of("rupture-disc", {"burst_pressure": between(1.1e5, 1.6e5)}, a=SIZE),
     "surge-anticipating": of(
         "surge-anticipating",

@@ -289,6 +289,6 @@ def test_a_fault_names_its_key_and_its_remedy(name):
 
 def test_a_head_without_gravity_is_refused():
     case = scene({"a": reservoir(2e5), "b": reservoir(1e5)}, {"part": curve("a", "b")}, 1.0, {}, gravity=0.0)
-    refused(case, "without gravity")
+    refused(case, "no pressure without gravity; expected `drop`")
     case["links"]["part"]["loss"] = {"flow": [0.01], "drop": ["1 bar"]}
     assert fvsolve.run(case, {"output.probes": ["part.flow"]})["part.flow"][0] == pytest.approx(0.01, rel=1e-12)

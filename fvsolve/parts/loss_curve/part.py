@@ -60,4 +60,4 @@ class LossCurve(TwoPort, kind="loss-curve"):
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if self.loss.quantity == "head" and around.gravity == 0.0:
-            yield ("loss", "head"), "without gravity a head is no pressure; expected `drop`, a pressure drop"
+            yield ("loss", "head"), "a head has no pressure without gravity; expected `drop`, a pressure drop"
