@@ -64,7 +64,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/parts": (19543, 52),
     "tests/reference": (3830, 36),
     "tests/report": (863, 4),
-    "tests/repository": (4813, 26),
+    "tests/repository": (4814, 26),
     "tests/schemes": (569, 2),
     "tests/solve": (2850, 14),
     "tests/step_limits": (1100, 5),
