@@ -214,3 +214,12 @@ def test_drops_are_exported_as_heads(tmp_path):
     back = tmp_path / "back.inp"
     back.write_text(network_text(load(table))[0])
     assert [loss for _, loss in read_network(back).links["v"].curve] == pytest.approx(head)
+
+
+def test_a_setting_that_no_control_changes_back_is_kept(tmp_path):
+    path = town(tmp_path, "PRV 12 0", controls="LINK v 35 IF NODE tower BELOW 2.5")
+    imported, found = day_of(path, tmp_path)
+    assert not found.fault and not imported.causes
+    blocks = tomllib.loads(imported.text)["controls"]
+    assert [block["type"] for block in blocks.values()].count("latch") == 1
+    assert found.agrees and differences(found)["levels"] < SAME, list(found.lines())

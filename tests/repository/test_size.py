@@ -52,7 +52,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/case": (4586, 16),
     "tests/cli": (1241, 9),
     "tests/draw": (232, 2),
-    "tests/epanet": (1586, 5),
+    "tests/epanet": (1595, 5),
     "tests/exact": (475, 2),
     "tests/fluid": (1063, 4),
     "tests/fmi": (396, 2),
