@@ -13,6 +13,8 @@ from collections.abc import Mapping
 from decimal import Decimal, DecimalException
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from fvsolve.data import read_table
 
 
@@ -167,16 +169,27 @@ def parse(given: Any, dimension: str) -> Any:
         value, unit = _parse_number(given, dimension), None
     if not is_possible(value):
         raise ValueError(magnitude_fault(value, given, expected(dimension)))
-    if (DIMENSIONS[dimension].base or dimension) == "pressure" and DIMENSIONS[dimension].gauge:
+    if may_be_gauge(dimension):
         return value, unit is not None and unit.gauge
     if unit is not None and unit.dimension == "kinematic viscosity" and dimension == "viscosity":
         return Kinematic(value)
     return value
 
 
+def may_be_gauge(dimension: str) -> bool:
+    """True if values of a dimension may be absolute or gauge pressures."""
+    return (DIMENSIONS[dimension].base or dimension) == "pressure" and DIMENSIONS[dimension].gauge
+
+
 def is_possible(value: float) -> bool:
     """True if a number is 0, or neither so large nor so small that products or quotients overflow."""
     return value == 0.0 or MIN_NUMBER <= abs(value) <= MAX_NUMBER
+
+
+def are_possible(values: np.ndarray) -> np.ndarray:
+    """`is_possible` for each number of an array."""
+    size = np.abs(values)
+    return (size == 0.0) | ((size >= MIN_NUMBER) & (size <= MAX_NUMBER))
 
 
 def magnitude_fault(value: float, given: Any, remedy: str) -> str:
@@ -292,6 +305,19 @@ class Kinematic(float):
     """A kinematic viscosity [m2/s], not yet multiplied by a density."""
 
 
+@functools.lru_cache(maxsize=1024)
+def _known_unit(spelling: str, dimension: str) -> Unit | None:
+    """Unit of the table with a given spelling that measures `dimension` and may be written there; else None.
+
+    Schedules repeat few units in many values.
+    """
+    unit, base = _table_unit(spelling) if len(spelling) <= LONGEST else None, DIMENSIONS[dimension]
+    if unit is None or unit.dimension not in (base.base or dimension, dimension):
+        return None
+    refused = (dimension == "gauge_pressure" and unit.absolute) or (unit.gauge and not base.gauge)
+    return None if refused else unit
+
+
 def find(spelling: str, dimension: str, number: str = "") -> Unit:
     """Unit with a given spelling that measures `dimension`; for "viscosity" also a unit of kinematic viscosity.
 
@@ -299,6 +325,8 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
     gauge or absolute unit where the dimension does not allow it.
     number : text of the number before the unit, for the message
     """
+    if (known := _known_unit(spelling, dimension)) is not None:
+        return known
     if len(spelling) > LONGEST:  # pint would take minutes to read it
         text = f"{show(f'{number} {spelling}'.strip())}: unknown unit of {len(spelling)} letters; {expected(dimension)}"
         raise ValueError(text)

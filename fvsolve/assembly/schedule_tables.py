@@ -193,11 +193,12 @@ def schedule_pieces(schedule) -> np.ndarray:
         span = t[1] - t[0]
         return np.array([*hold, [t[0], 1, t[0], v[0], v[1], span, schedule.exponent], *last])
     if schedule.kind == "step":
-        return np.array([*hold, *[[t[k], 0, t[k], v[k], 0, 0, 0] for k in range(1, len(t))]])
+        none = np.zeros(len(t) - 1)
+        return np.concatenate([hold, np.column_stack([t[1:], none, t[1:], v[1:], none, none, none])])
     if schedule.kind == "linear":
-        slope = np.diff(v) / np.diff(t)
-        inner = [[t[k], 0, t[k], v[k], slope[k], 0, 0] for k in range(len(t) - 1)]
-        return np.array([*hold, *inner, *last])
+        slope, none = np.diff(v) / np.diff(t), np.zeros(len(t) - 1)
+        inner = np.column_stack([t[:-1], none, t[:-1], v[:-1], slope, none, none])
+        return np.concatenate([hold, inner, last])
     from scipy.interpolate import PchipInterpolator
 
     c = PchipInterpolator(t, v).c

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
@@ -22,6 +23,7 @@ NEEDED = object()  # instead of a default: the key is required
 OF_TIME = re.compile(r"[*/+(-] ?t\b(?![\w.])|(?<![\w.])t ?[*/+)<>^-]")  # formula with the name t
 CHANGING = ("control", "formula", "signal", "time")  # keys of schedules
 
+PLAIN = re.compile(r"[+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)? ")  # a number before its unit
 GREATEST_WHOLE = 10**15  # of a whole number; floats contain it exactly
 
 # Effect of a changed value on an existing model
@@ -102,6 +104,7 @@ class ReadContext:
     signals: dict[str, Any] = field(default_factory=dict)
     files: dict[str, Path] = field(default_factory=dict)
     used: dict[str, Any] = field(default_factory=dict)  # signals that parts refer to, in SI
+    scaled: dict[str, Any] = field(default_factory=dict)  # schedules of signals that parts scale by a factor
     lookups: int = 0  # number of uses of files, signals and controls
     controls: dict[str, Any] = field(default_factory=dict)
     driven: dict[str, list[tuple[str, Range]]] = field(default_factory=dict)
@@ -133,6 +136,11 @@ class Range:
         excluded = (self.open and value == self.least) or (self.nonzero and value == 0.0)
         if value < self.least or value > self.greatest or excluded:
             raise ValueError(f"{show(given)} is out of range; expected a value {self}")
+
+    def holds(self, values: np.ndarray) -> np.ndarray:
+        """True for each number within the range : bool[n]"""
+        inside = (values >= self.least) & (values <= self.greatest)
+        return inside & ~((self.open & (values == self.least)) | (self.nonzero & (values == 0.0)))
 
     @property
     def bounds(self) -> str:
@@ -242,6 +250,34 @@ class Quantity(Value):
                 raise
             raise ValueError(f'{fault}, in m; did you mean "{given:g} mm"?') from None
         return value
+
+    def read_all(self, given: list[Any] | tuple[Any, ...]) -> tuple[float, ...] | None:
+        """Values of a list of bare numbers, or of numbers with the same unit, all at once.
+
+        None if an entry needs `read`, because it has another form or a fault.
+        """
+        kinds = set(map(type, given))
+        if units.may_be_gauge(self.dimension) or self.dimension == "viscosity":
+            return None
+        if kinds == {str}:
+            given = self.numbers_of(given)
+        elif not kinds <= {int, float}:
+            return None
+        try:
+            values = np.array(given, dtype=float)
+        except OverflowError:
+            return None
+        return tuple(values.tolist()) if np.all(units.are_possible(values) & self.range.holds(values)) else None
+
+    def numbers_of(self, texts: list[str] | tuple[str, ...]) -> list[float]:
+        """SI values of texts that all end with the same unit; not a number for texts of another form."""
+        spelling = texts[0].rpartition(" ")[2]
+        try:
+            unit = units.find(spelling, self.dimension)
+        except ValueError:
+            return [math.nan]
+        numbers = [text.removesuffix(spelling) for text in texts]
+        return [unit.read(number) if PLAIN.fullmatch(number) else math.nan for number in numbers]
 
     @property
     def takes(self) -> str:
@@ -369,7 +405,9 @@ class Rows(Value):
         if self.length is not None and len(given) != self.length:
             raise ValueError(f"{show(given)} has {len(given)} values; expected {self.length}")
         item = Quantity(self.dimension, self.range)
-        values = tuple(read_each(enumerate(given), lambda entry: item.read(entry, setting)).values())
+        values = item.read_all(given)
+        if values is None:
+            values = tuple(read_each(enumerate(given), lambda entry: item.read(entry, setting)).values())
         if self.rising:
             check_increasing(values, given)
         return values

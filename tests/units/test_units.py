@@ -9,6 +9,7 @@ import pytest
 from pytest import approx
 
 from fvsolve import units
+from fvsolve.parts import value
 from fvsolve.units import DIMENSIONS, UNITS, Kinematic, convert, parse
 
 # Spelling -> unit in pint's words. A test checks that each spelling of the table has a row.
@@ -324,3 +325,35 @@ def test_the_table_needs_no_pint():
     code += "; parse('3 mm hr-1', 'rainfall'); parse('3 kg m-2 s-1', 'rainfall'); parse('3 metres', 'length')"
     code += "; sys.exit('pint' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+# lists ----------------------------------------------------------------------------------------------------------------
+
+LISTS = [
+    [0.0, 300, 600.5], [1, True], [1.0, "2 m"], [1e200, 1.0], [1e-200], [10**400, 1], [float("nan")], [-1.0, 2.0],
+    [0.0], [1.0, [2.0]], [5.0, 1e7], ["1 m", "2.5 m", "0.26 m"], ["1 mm", "260 mm"], ["1 m", "2 mm"], ["1 m", "x m"],
+    ["1", "2"], ["1 m", "-1 m"], ["1 s", "90 min"], ["0.1 min", "0.2 min"], ["1e400 m", "1 m"], ["5 barg", "1 barg"],
+    ["1,5 m"], ["\u0661 m"], [""], ["m"],
+]  # fmt: skip
+DECLARED = [
+    ("length", value.positive), ("length", value.nonnegative), ("number", value.between(0, 1)),
+    ("time", value.anything), ("pressure", value.positive), ("gauge_pressure", value.anything),
+    ("number", value.Range(nonzero=True)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("given", LISTS, ids=str)
+@pytest.mark.parametrize("dimension, bounds", DECLARED, ids=[f"{name}-{bounds}" for name, bounds in DECLARED])
+def test_a_list_is_read_as_each_of_its_entries(given, dimension, bounds):
+    """Bare numbers are read all at once; values and faults are those of single numbers."""
+    context, item = value.ReadContext(), value.Quantity(dimension, bounds)
+
+    def outcome(read):
+        try:
+            return read()
+        except ValueError as error:
+            return value.faults_of(error)
+
+    whole = outcome(lambda: value.Rows(dimension, bounds).read(given, context))
+    single = outcome(lambda: tuple(value.read_each(enumerate(given), lambda one: item.read(one, context)).values()))
+    assert whole == single
