@@ -155,6 +155,11 @@ class Couplings:
         """Indices of the states of a device."""
         return device["y"] + np.arange(device["states"] if device["y"] >= 0 else 0)
 
+    def acting_states(self, k: int) -> np.ndarray:
+        """Indices of the states of device k on which its flow and rates depend: all but its integrals over time."""
+        states, (_, _, rows) = self.device_states(self.devices[k]), self.parts[k]
+        return states[: states.size - rows.integrals(self.devices[k])]
+
     def opening_states(self, link) -> np.ndarray:
         """Indices of the states of the device and of the blocks that open and close a link; empty if it has none."""
         if "device" not in link.dtype.names:
@@ -168,7 +173,7 @@ class Couplings:
             turned = self.network_states(network.columns_of_rows[network.node_row(shaft)])
         lifting = [self.sets[i] if self.sets else self.pressure_states(i) for i in self.lifting_nodes(link)]
         schedules = self.blocks.schedule(*rows.schedules_at_once(device, self.valves, self.floats))
-        return unique_states(self.device_states(device), schedules, turned, *lifting)
+        return unique_states(self.acting_states(link["device"]), schedules, turned, *lifting)
 
     def lifting_nodes(self, link) -> list[int]:
         """Nodes whose pressures open a link at once, besides its ends; empty for links without such a device."""
@@ -302,11 +307,11 @@ class Couplings:
 
         The pressures are those at its ends and at the nodes that it senses.
         """
-        for row, (_, _, rows) in zip(self.devices, self.parts, strict=True):
+        for k, (row, (_, _, rows)) in enumerate(zip(self.devices, self.parts, strict=True)):
             ends = ends_of(self.valves[row["valve"]]) if row["valve"] >= 0 else ()
             read = [self.sets[i] for i in (*ends, row["node"], row["second"]) if i >= 0]
             read.append(self.blocks.schedule(row["schedule"], *rows.schedules_of_rates(row, self.valves, self.floats)))
-            yield pairs_of(self.device_states(row), unique_states(self.device_states(row), *read))
+            yield pairs_of(self.device_states(row), unique_states(self.acting_states(k), *read))
 
     def network_pairs(self) -> Iterator[Pairs]:
         """Yield couplings of the stores of networks with each other, and with what their sources follow."""
@@ -557,7 +562,7 @@ class ScalarCouplings:
     def heat_states(self, source) -> list[np.ndarray]:
         """States that set the heat of a restriction."""
         valve = self.of.valves[source["valve"]]
-        device = [self.of.device_states(self.tables.devices[source["device"]])] if source["device"] >= 0 else []
+        device = [self.of.acting_states(source["device"])] if source["device"] >= 0 else []
         return [*(self.of.sets[i] for i in ends_of(valve)), self.of.opening_states(valve), *device]
 
     def heat_pairs(self) -> Iterator[Pairs]:

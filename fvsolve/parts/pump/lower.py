@@ -175,6 +175,9 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
     def states_of(self, draft, name, part):
         return super().states_of(draft, name, part) + (STATES if draft.case.energy is not None else ())
 
+    def integrals(self, row) -> int:
+        return len(STATES) if row["states"] >= len(STATES) else 0
+
     def scales(self, draft, name, part):
         shaft = [self.small for _ in super().states_of(draft, name, part)]
         if draft.case.energy is None:
