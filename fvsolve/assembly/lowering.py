@@ -195,6 +195,11 @@ class Restriction(Lowering):
     def probe(self, draft, name: str, probe: Any, row) -> None:
         row["kind"], row["index"] = rec.VALVE_FLOW, draft.valve_names.index(name)
 
+    smooths: ClassVar[bool] = False  # True if the part has a method `smooth`
+
+    def smooth(self, draft, row, drop: float) -> None:
+        """Make the law of a VALVE row smooth below a drop [Pa] which no error tolerance shows."""
+
     @property
     def steps(self) -> bool:
         """True if the part has a flow law of its own."""
@@ -360,6 +365,10 @@ class Device(Restriction):
     def states_of(self, draft, name: str, part: Any) -> tuple[str, ...]:
         """Names of the states of this part."""
         return self.states
+
+    def integrals(self, row) -> int:
+        """Number of its last states that only add up rates, on which nothing else depends; row : of the device"""
+        return 0
 
     def scales(self, draft, name: str, part: Any) -> list[float]:
         """Size of a small deviation of each state of this part."""

@@ -55,6 +55,7 @@ def classify_nodes(draft) -> None:
     refuse_isolated_groups(draft, members)
     for k in np.flatnonzero(fixed):
         regularise(draft, [k])
+    smooth_near_stores(draft)
     draft.cluster_table = np.array(clusters, dtype=rec.CLUSTER_RECORD)
     for i in np.flatnonzero(inner & (nodes["admittance"] == 0.0)):
         if nodes["solve"][i] == rec.ALONE:
@@ -388,6 +389,31 @@ def follows_column(draft, members, ks) -> bool:
     ends = np.concatenate((draft.column_table["from_node"], draft.column_table["to_node"]))
     plain = has_closed_root(draft.valve_table)[ks[0]]
     return len(ks) == 1 and len(members) == 1 and members[0] in ends and bool(plain)
+
+
+def smooth_near_stores(draft) -> None:
+    """Make laws with a steep slope at zero drop smooth below the drop of `tolerated_drop`, in links next to a store.
+
+    Between them and the store there may be further restrictions, such as an altitude valve. Two tanks at one level,
+    joined by a short pipe, would otherwise move in steps of seconds: linearly implicit steps alternate in sign there.
+    """
+    nodes, valves = draft.node_table, draft.valve_table
+    lowerings = [lowering for _, _, lowering in draft.links.get("valve", []) for _ in range(lowering.rows)]
+    steep = [k for k, lowering in enumerate(lowerings) if lowering.smooths]
+    if not steep or draft.case.numerics.rtol is None:
+        return
+    others = [k for k, lowering in enumerate(lowerings) if not lowering.smooths]
+    ends = np.column_stack([valves["from_node"], valves["to_node"]]).tolist()
+    free = (nodes["kind"] != rec.FIXED).tolist()
+    label = union(len(nodes), [ends[k] for k in others if free[ends[k][0]] and free[ends[k][1]]])
+    groups: dict[int, list[int]] = {}
+    for k in others:
+        groups.setdefault(label[ends[k][0]], []).append(k)
+    stores = {label[i] for i in np.flatnonzero((nodes["y"] >= 0) & (nodes["stiffness"] > 0.0))}
+    for k in steep:
+        near = {label[i] for i in ends[k]} & stores
+        if near and (drop := tolerated_drop(draft, [k, *(other for at in near for other in groups.get(at, []))])):
+            lowerings[k].smooth(draft, valves[k], drop)
 
 
 TOLERANCES = 10.0  # tolerances of a vessel: its tolerance grows with its deviation, here up to nine times its scale

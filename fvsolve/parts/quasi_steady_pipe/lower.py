@@ -2,12 +2,15 @@
 
 import math
 
+from scipy.optimize import brentq
+
 from fvsolve.assembly.lowering import LAMINAR_REYNOLDS, Restriction
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.steady_friction import drag
 
 from . import law
 
+MOST_FLOW = 1e6  # beyond any flow of a pipe: one without losses has no flow at a drop [kg/s]
 TINY_DROP = 1e-3  # of a pipe with hardly any loss [Pa]
 
 
@@ -33,6 +36,25 @@ class QuasiSteadyPipeRows(Restriction, kind="quasi-steady-pipe"):
         viscosity = draft.fluid.viscosity or 1e-6 * draft.fluid.density  # water's: it only bounds the slope at no flow
         least = LAMINAR_REYNOLDS * math.pi / 4.0 * link.diameter * viscosity
         return [*(float(friction[key]) for key in law.DRAG), link.length / area, least]
+
+    smooths = True
+
+    def smooth(self, draft, row, drop: float) -> None:
+        """Raise the flow below which the losses are an odd cubic to the flow at this drop [Pa]."""
+        at = int(row["data"])
+        *friction, per, least = draft.floats[at : at + law.LEAST + 1]
+        kind = int(friction[law.KIND])
+        if kind == rec.FRICTION_ROUGH:  # linear where it is laminar
+            return
+
+        def rest(flow):
+            return per * drag(kind, *friction[1:], flow) - drop
+
+        most = least
+        while rest(most) < 0.0 and most < MOST_FLOW:
+            most *= 2.0
+        if most > least and most < MOST_FLOW:
+            draft.floats[at + law.LEAST] = brentq(rest, least, most)
 
     def probe(self, draft, name, probe, row) -> None:
         super().probe(draft, name, probe, row)
