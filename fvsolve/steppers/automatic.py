@@ -1,5 +1,7 @@
 """Method `auto`: explicit steps while stability allows them, implicit steps where stiffness makes those cheaper."""
 
+import numpy as np
+
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import AUTO, method_named
@@ -23,16 +25,24 @@ def implicit_method(rtol: float) -> str:
     return IMPLICIT if rtol >= TIGHT_BELOW else TIGHT_IMPLICIT
 
 
-def step_cost_ratio(structure: Structure) -> float:
-    """Cost of an implicit step as a multiple of an explicit step, both counted in calls of the right-hand side."""
+def step_cost_ratio(structure: Structure, work: float = 1.0) -> float:
+    """Cost of an implicit step as a multiple of an explicit step, both counted in calls of the right-hand side.
+
+    work : cost of a call relative to that of a right-hand side that computes each rate from few states
+    """
     implicit, explicit = method_named(IMPLICIT), method_named(EXPLICIT)
     algebra = DENSE_COST * structure.n**2 if structure.kind == "dense" else SPARSE_COST
-    return (structure.color_count + implicit.stages + 1 + algebra) / (explicit.stages - 1)
+    return (structure.color_count + implicit.stages + 1 + algebra / work) / (explicit.stages - 1)
 
 
-def watch(stepper: Integrator, structure: Structure) -> None:
-    """Switch on the stiffness test of the time loop, by which the method `auto` chooses between its two methods."""
-    stepper.set_control(watch=1, price=step_cost_ratio(structure))
+def watch(stepper: Integrator, structure: Structure, work: float = 1.0) -> None:
+    """Switch on the stiffness test of the time loop, by which the method `auto` chooses between its two methods.
+
+    work : as for `step_cost_ratio`
+    """
+    stepper.set_control(watch=1, price=step_cost_ratio(structure, work))
+    if stepper.control[0]["keeps_step"]:  # without waves: the rates may bend at levels of tanks, see `hidden_stiffness`
+        stepper.returns = np.zeros((2, structure.n))
 
 
 def is_change_due(stepper: Integrator) -> bool:

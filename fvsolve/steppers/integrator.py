@@ -60,6 +60,7 @@ class Integrator:
         self.out[rec.JUMP_TIME] = rec.NO_JUMP
         self.armed = self.no_floats
         self.prepare_events(0)
+        self.returns = np.zeros((2, 0))
         self.y_out, self.rows = np.zeros(n), np.zeros((1, 1))
         self.bounded_states, self.bounds = self.no_integers, np.zeros((0, 4))
         self.watcher, self.watch = no_watch(), self.no_integers
@@ -179,8 +180,9 @@ class Integrator:
     def discard_history(self) -> None:
         """Discard the step size, the last error, the stiffness count and the Jacobian, for a start after a kink."""
         kept = ("step",) if self.control["keeps_step"][0] else ()
-        for name in {"step", "error_old", "switch_count", "split_remainder"}.difference(kept):
+        for name in {"step", "error_old", "switch_count", "split_remainder", "window"}.difference(kept):
             self.state[name] = 0.0
+        self.returns[:] = 0.0
         if self.control["kind"] != rec.EXPLICIT:
             from fvsolve.steppers.newton import reset
 
@@ -188,7 +190,7 @@ class Integrator:
 
     def restart_arrays(self) -> dict[str, np.ndarray]:
         """All arrays of this object on which the next step depends, by name, except the states y."""
-        names = ["state", "ledger", "carry", "pace"]
+        names = ["state", "ledger", "carry", "pace", "returns"]
         if self.control["kind"] != rec.EXPLICIT:  # f at the start of the last step, and its stages
             names += ["newton", "jacobian", "first", "k"]
         return {name: getattr(self, name) for name in names}

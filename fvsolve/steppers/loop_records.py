@@ -16,11 +16,13 @@ def _record(integers: str, floats: str) -> np.dtype:
 # Stored for a restart: time; given or next step; start of the present given steps and their number; error of the last
 # step; numbers of output rows and fields; counts of work; length of the last step; step that is not yet in the ledger;
 # state in which Newton iterations failed; spectral radius [1/s]; steps in favour of the other kind of method, and the
-# number of changes of the method; rest of a given step that is taken in parts [s], and the number of such steps.
+# number of changes of the method; rest of a given step that is taken in parts [s], and the number of such steps; steps
+# since both sums of `hidden_stiffness` were compared.
 STATE = _record(
     "",
     "t step t_mark n_mark error_old next_output next_field steps rejections calls last unbooked jacobians "
-    "factorisations newton newton_failures worst radius switch_count switches split_remainder split_steps",
+    "factorisations newton newton_failures worst radius switch_count switches split_remainder split_steps "
+    "window",
 )
 COUNTS = {
     "steps": "steps", "rejections": "rejections", "rhs": "calls", "jacobians": "jacobians",

@@ -41,6 +41,7 @@ ARRAY_KINDS = {
     "out": "v", "out_row": "v",  # results of rhs besides the rates, at the present state and at an output row
     "values": "v",  # probe values of the present state
     "g": "v", "g_new": "v", "armed": "v",  # event functions at the start and the end of a step, and event flags
+    "returns": "w",  # [2, n]  sums over the last steps, see `hidden_stiffness`; [2, 0] without this test
     "pace": "v", "inner": "w",  # data of the search for events within a step, see `event_search`: [events], [6, events]
     "stored": "h", "carry": "v",  # states with compensated sums, and the rounding errors of these sums
     "times": "v",  # times of the output rows if given as a list

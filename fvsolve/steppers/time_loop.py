@@ -17,6 +17,7 @@ from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers import run_handle, step_control
 from fvsolve.steppers.coefficients import error_of, weights_of
 from fvsolve.steppers.event_search import NOWHERE, forget_pace, is_near, update_pace, zero_within
+from fvsolve.steppers.hidden_stiffness import WINDOW, has_returned
 from fvsolve.steppers.ledger import book, book_error
 from fvsolve.steppers.output_rows import emit, next_due, row_due
 from fvsolve.steppers.row_substeps import store_start_slopes
@@ -91,12 +92,19 @@ def event_ratio(g, g_new):
     return share
 
 
+@njit(forceinline=True)
+def is_on_line(value, line):
+    """True if a negative value of event functions differs from that of a line by a factor of two at most."""
+    return 2.0 * line <= value <= 0.5 * line
+
+
 @njit
 def locate(handle, run, r, h, now, new, e):
     """Shorten a step so that it ends just past the first event, by the Illinois rule; returns its length and error.
 
     Where that rule is slow, because an event function jumps beyond its zero, the event functions are extrapolated from
-    their last two values before the zero, in turn with bisection.
+    their last two values before the zero, then twice as far, in turn with bisection. The Illinois rule goes on where
+    the line through these two values is near the value beyond the zero, because they do not jump there.
     handle, run, r : handles of the model and of the run, and the open handle of the run; now, new : rows of y
     h, e : length and error of the full step; y[new] and g_new receive the values at the end of the shortened step
     The error is NEWTON_FAILED if a stage could not be solved, or if an event function jumps over zero in an implicit
@@ -107,7 +115,7 @@ def locate(handle, run, r, h, now, new, e):
     guess, at_high, side = h, past, 0
     earlier, at_earlier, at_last = 0.0, 1.0, 1.0  # length before `low`; ratios there and at `low`
     width, wider = inf, inf  # of the bracket in the last turn, and in the one before
-    is_slow, is_extrapolated = False, False
+    is_slow, extrapolations = False, 0
     r.progress[0]["no_sweeps"] = 0
     is_long = r.control[0]["keeps_step"] == 1
     tolerance, narrow = (SLOW_EVENT_TOLERANCE, SLOW_EVENT_TIME * h) if is_long else (EVENT_TOLERANCE, 0.0)
@@ -117,15 +125,15 @@ def locate(handle, run, r, h, now, new, e):
         if done and guess == high:
             break
         is_slow = is_slow or high - low > 0.5 * wider
-        guess = -inf
-        if not is_slow:
-            guess = high - at_high * (high - low) / (at_high - at_low)
-        elif at_earlier > at_last and (not is_extrapolated or high - low <= 0.5 * width):
-            guess = low + at_last * (low - earlier) / (at_earlier - at_last)
-        is_extrapolated = is_slow and guess > low
+        guess, fall = -inf, (at_earlier - at_last) / (low - earlier) if low > earlier else 0.0
+        if not is_slow or is_on_line(past, at_last - fall * (high - low)):
+            guess, extrapolations = high - at_high * (high - low) / (at_high - at_low), 0
+        elif fall > 0.0 and (extrapolations < 2 or high - low <= 0.5 * width):
+            farther = 2.0 if extrapolations == 1 and side < 0 else 1.0
+            guess, extrapolations = low + farther * at_last / fall, extrapolations % 2 + 1
         guess += -beyond if side > 0 else beyond  # to the other side of the event
         if not low < guess < high:
-            guess, is_extrapolated = 0.5 * (low + high), False
+            guess, extrapolations = 0.5 * (low + high), 0
         wider, width = width, high - low
         if done:
             guess = high
@@ -140,11 +148,11 @@ def locate(handle, run, r, h, now, new, e):
         here = event_ratio(g, g_new)
         if here <= 0.0:
             high, at_high, past = guess, here, here
-            at_low, side = 0.5 * at_low if side > 0 else at_low, 1
+            at_low, side = 0.5 * at_low if side > 0 else at_last, 1
         else:
             earlier, at_earlier, at_last = low, at_last, here
             low, at_low = guess, here
-            at_high, side = 0.5 * at_high if side < 0 else at_high, -1
+            at_high, side = 0.5 * at_high if side < 0 else past, -1
     control = r.control[0]
     fixed = control["kind"] == rec.NEWTON_SOLVED and control["mode"] != rec.TOLERANCE
     if fixed and past < -JUMP and high > JUMP * r.state[0]["step"]:
@@ -458,6 +466,9 @@ def find_step(handle, run, r, h, full, due, new):
         elif acceptable(e, near_kink):
             if control["mode"] == rec.TOLERANCE:
                 shortened = last or length == due - state["t"] or length < full
+                is_tested = control["watch"] != 0 and control["keeps_step"] == 1 and control["kind"] == rec.EXPLICIT
+                if is_tested and has_returned(r, length, now, new):
+                    state["switch_count"] += WINDOW
                 step_control.store_next(control, state, length, e, shortened, failures > 0, rate)
             return rec.DONE, length, last
         else:
