@@ -26,7 +26,16 @@ FLOW_UNITS = (  # [m3/s], by EPANET's codes: CFS, GPM, MGD, IMGD, AFD, LPS, LPM,
 )  # fmt: skip
 US_UNITS = range(5)  # codes with lengths in feet
 NODES, LINKS = 0, 2  # of EN_getcount
-DEMAND, HEAD, FLOW, STATUS = 9, 10, 8, 11  # of EN_getnodevalue, EN_getlinkvalue
+DEMAND, HEAD, MOST_LEVEL, LEAST_LEVEL, OVERFLOWS, ELEVATION, FLOW, STATUS = (
+    9,
+    10,
+    21,
+    20,
+    26,
+    0,
+    8,
+    11,
+)  # of EN_getnodevalue, EN_getlinkvalue
 JUNCTION, TANK, PUMP, CONSTANT_POWER = 0, 2, 2, 0  # kinds of nodes, links, pumps
 DIRECTED = (0, PUMP, 3, 4)  # links that water passes from their first node alone: check valves, pumps, PRV, PSV
 TRIALS, ACCURACY = 0, 1  # of EN_setoption
@@ -41,6 +50,7 @@ CUT_OFF, FAR = "demand cut off", "heads beyond 100 km"  # warnings of our own
 UNSOLVED = ("unbalanced", "unstable", CUT_OFF, FAR)  # warnings without a solution that a network could have
 FARTHEST = 1e5  # greatest head of a network [m]
 STALLED = 1e-6  # flow below which a pump of constant power gives no head to the nodes behind it [m3/s]
+AT_LIMIT = 1e-3  # distance of a tank's level from its limit that EPANET takes for none [m]
 NO_DEMAND = 1e-9  # smaller outflows are rounding [m3/s]
 
 
@@ -69,6 +79,7 @@ class Day:
     """EPANET's heads over a day: times float64[n] [s], heads float64[n, nodes] [m], dead bool[n, nodes], CPU time [s].
 
     dead : as in `Start`; all nodes where EPANET supplies demands without a source, or has heads beyond 100 km
+    crossed : tanks that give water at their least level, or take it at their greatest
     end : last time that EPANET reached [s]; steps : number of its solutions; warnings : EPANET's, with their first time
     """
 
@@ -77,6 +88,7 @@ class Day:
     dead: np.ndarray
     names: list[str]
     tanks: list[str]
+    crossed: list[str]
     cpu: float
     end: float
     steps: int
@@ -178,6 +190,15 @@ class Project:
         reached[breadth_first_order(graph.tocsr(), count, return_predecessors=False)] = True
         return ~reached[:count]
 
+    def limits(self) -> np.ndarray:
+        """Heads between which tanks exchange water : float64[2, nodes] [m]; without limit at other nodes."""
+        bottoms = self.values("EN_getnodevalue", len(self.nodes), ELEVATION)
+        levels = [self.values("EN_getnodevalue", len(self.nodes), code) for code in (LEAST_LEVEL, MOST_LEVEL)]
+        limits = self.foot * (bottoms + levels) + [[AT_LIMIT], [-AT_LIMIT]]
+        overflows = self.values("EN_getnodevalue", len(self.nodes), OVERFLOWS) > 0.0
+        limits[0, self.kinds != TANK], limits[1, (self.kinds != TANK) | overflows] = -np.inf, np.inf
+        return limits
+
     def absurdities(self, heads: np.ndarray, dead: np.ndarray) -> list[str]:
         """Reasons why heads [m] are not those of a network, from `UNSOLVED`; dead : as from `dead`"""
         cut_off = (np.abs(self.demands()[dead]) > NO_DEMAND).any()
@@ -257,6 +278,7 @@ def day(path: Path, version: str, step: int = 10, rows: int = 150, end: int = 86
         project.call("EN_openH")
         project.call("EN_initH", NEW_FLOWS)
         cpu, kept, warnings, steps, now, left = process_time() - began, [], {}, 0, 0, 1
+        (least, most), crossed = project.limits(), set()
         while left > 0:
             began = process_time()
             now, code = project.seconds("EN_runH")
@@ -268,6 +290,9 @@ def day(path: Path, version: str, step: int = 10, rows: int = 150, end: int = 86
                 absurd = project.absurdities(values, alone)
                 for text in absurd:
                     warnings.setdefault(text, float(now))
+                inflow = project.demands()
+                crosses = ((values <= least) & (inflow < -STALLED)) | ((values >= most) & (inflow > STALLED))
+                crossed |= set(np.flatnonzero(crosses).tolist())
                 kept.append((now, values, alone | bool(absurd)))
             began = process_time()
             left, _ = project.seconds("EN_nextH")
@@ -275,4 +300,5 @@ def day(path: Path, version: str, step: int = 10, rows: int = 150, end: int = 86
         if not kept:  # EPANET stops where it does not converge, unless the file has `UNBALANCED CONTINUE`
             raise EpanetError(f"EPANET stops at {now} s, before the first row of the day: {', '.join(warnings)}")
         columns = [np.array(column) for column in zip(*kept, strict=True)]
-        return Day(*columns, project.nodes, project.tanks, cpu, float(now), steps, warnings)
+        names = [project.nodes[i] for i in sorted(crossed)]
+        return Day(*columns, project.nodes, project.tanks, names, cpu, float(now), steps, warnings)

@@ -337,6 +337,8 @@ def examine_day(path: Path, options: Any, record: Record) -> None:
         day |= compare_day(run, imported.nodes, epanet_engine.day(path, options.version, STEPS[1], ROWS))
     if day["level"]["difference"] <= NEAR:  # a cycle at a limit keeps the levels
         day["causes"] = day["causes"] + cycling_tanks(summary["events"])
+        text = "EPANET lets tanks give water at their least level, or take it at their greatest"
+        day["causes"] += [f"{text}: {', '.join(theirs.crossed)}"] * bool(theirs.crossed)
 
 
 def compare_day(run: Any, nodes: dict[str, str], theirs: epanet_engine.Day) -> Row:

@@ -222,6 +222,10 @@ class DayTranslation(Translation):
         set_point = self.set_point(link, setting)
         return part_tables.regulating(link.kind, ends, diameter, set_point, link.minor_loss, "0 s")
 
+    def full_open_loss(self, link: EpanetLink, diameter: float) -> float:
+        """Loss coefficient of a regulating valve at full opening: EPANET's, since it may open fully over the day."""
+        return link.minor_loss
+
     def open_state(self, link: EpanetLink) -> Action:
         """State of a valve that begins closed, after an action opens it: active with its setting, or fixed open."""
         opens = {item.action for item in self.statements.get(link.name, []) if item.action[0] != "closed"}
@@ -252,11 +256,15 @@ class DayTranslation(Translation):
                 return None
             if kind == "PCV":
                 return 1.0 if action[0] == "open" else self.position_share(link, action[1])
-            return math.sqrt(least / max(action[1] if action[0] == "setting" else link.minor_loss, least))
+            return math.sqrt(least / max(loss_of(action), least))
 
-        losses = [item.action[1] for item in self.statements[link.name] if item.action[0] == "setting"]
-        least = max(min([*losses, link.setting]), link.minor_loss, part_tables.NO_LOSS)
+        def loss_of(action: Action) -> float:
+            """Loss coefficient of a TCV: its setting, which replaces the minor loss, and may be below it."""
+            return action[1] if action[0] == "setting" else link.minor_loss
+
         first = begins if begins[0] != "closed" else self.open_state(link)
+        actions = [first, *(item.action for item in self.statements[link.name] if item.action[0] != "closed")]
+        least = max(min(map(loss_of, actions)), part_tables.NO_LOSS)
         part = part_tables.valve(ends, link.diameter, least if kind == "TCV" else link.minor_loss)
         return part | {"opening": self.switched(link.name, "setting", "", opening_of, opening_of(first))}
 

@@ -16,7 +16,7 @@ from fvsolve.parts.pipe.part import QUASI_STEADY
 CELL_TIME = 0.01  # travel time of a cell in small networks [s]
 MOST_CELLS = 40_000  # largest number of cells; larger networks get longer cells
 END = "20 s"
-DAY_RTOL, DAY_ROWS = 1e-7, "5 min"  # tolerance of a run over a day, and its interval of rows
+DAY_RTOL, DAY_ROWS = 1e-6, "5 min"  # tolerance of a run over a day, and its interval of rows
 PROBES = 5  # number of recorded junctions: those with the largest demands
 
 

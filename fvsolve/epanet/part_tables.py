@@ -6,6 +6,8 @@ from typing import Any
 Part = dict[str, Any]
 
 NO_LOSS = 1e-4  # loss coefficient of an open valve without loss in EPANET: a case needs a positive one
+OPENING = 0.3  # of a regulating valve that acts, at the start of a run with waves
+CONTROL_VALVE_LOSS = 10.0  # loss coefficient of an open control valve (globe), for valves that are shut at the start
 TIME_CONSTANT = "5 s"  # of regulating valves in a run with waves: EPANET has none
 REGULATING = {"PRV": "pressure-reducing", "PSV": "pressure-sustaining", "FCV": "flow-control"}
 POUND_FORCE, FOOT = 4.4482216152605, 0.3048  # [N], [m]

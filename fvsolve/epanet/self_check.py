@@ -19,6 +19,7 @@ MOST_HEAD, MOST_FLOW = 0.01, 0.01  # differences of heads [m], and of flows over
 LEAST_FLOW = 1e-7  # smaller differences of flows are rounding of EPANET's shut links [m3/s]
 NO_MEANING = 1000.0  # height of heads above all sources which no pump has: constant power with hardly any flow [m]
 CYCLES = 10  # openings of a valve at a full or empty tank over a day that are a cycle
+AT_LIMIT = 1e-3  # distance of a level from its limit that EPANET takes for none [m]
 STEP = 10  # hydraulic step of EPANET over a day [s]
 ROWS = 150  # time between rows of the day that are compared [s]; not a time at which patterns change
 
@@ -173,6 +174,20 @@ def cycling_tanks(events: list[dict[str, Any]]) -> list[str]:
     return [f"{text}: {listing(names)}"] if names else []
 
 
+def crossed_limits(network: EpanetNetwork, solutions: list[EpanetSolution]) -> list[str]:
+    """Cause of differences if an empty tank gives water in EPANET, or a full one takes it; as a list."""
+    found = set()
+    for solution in solutions:
+        for tank in network.tanks():
+            level, inflow = solution.head[tank.name] - tank.elevation, solution.demand[tank.name]
+            gives = level <= tank.minimum + AT_LIMIT and inflow < -STALLED
+            takes = level >= tank.maximum - AT_LIMIT and inflow > STALLED and not tank.overflow
+            if gives or takes:
+                found.add(tank.name)
+    text = "EPANET lets a tank at its least level give water, or one at its greatest level take it"
+    return [f"{text}: {listing(sorted(found))}"] if found else []
+
+
 def check_day(imported: Imported, case: Any) -> SelfCheck:
     """Compare levels, heads and flows of a case over a day with EPANET at steps of `STEP` seconds.
 
@@ -231,5 +246,5 @@ def check_day(imported: Imported, case: Any) -> SelfCheck:
         ))  # fmt: skip
     causes = imported.causes + extreme_heads(network, days) + uphill_breakers(network, days)
     if not any(item.above for item in compared if item.quantity == "levels"):  # a cycle at a limit keeps the levels
-        causes = causes + cycling_tanks(result.summary["events"])
+        causes = causes + cycling_tanks(result.summary["events"]) + crossed_limits(network, days)
     return SelfCheck(compared, causes)

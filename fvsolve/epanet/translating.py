@@ -7,6 +7,7 @@ from typing import Any
 from fvsolve.epanet import part_tables
 from fvsolve.epanet.network_file import EpanetLink, EpanetNetwork, EpanetNode, EpanetSolution
 from fvsolve.errors import listing
+from fvsolve.parts.pipe.part import QUASI_STEADY
 from fvsolve.parts.tolerances import is_head_above, is_shorter_than_rise
 
 STALL_FLOW = 1e-7  # flow below which EPANET's pumps of constant power have stalled [m3/s]
@@ -18,7 +19,7 @@ RISE_TOLERANCE = 1e-9  # of the rise over the length of a pipe
 SUSTAIN_TOLERANCE = 1e-2  # of the head before a PSV [m]
 SET_TOLERANCE = 1e-6  # of set heads and heads of sources [m]
 LOWEST_HEAD = -9.0  # least set pressure of a case: a head of water near vacuum [m]
-NARROW = 1e-3  # diameter below which a closed pipe is a shut valve [m]
+NARROW = 1e-3  # diameter below which a pipe stands for one to be designed: it carries hardly any water [m]
 STILL = 1e-6  # velocity below which a pipe counts as still [m/s]
 GRAVITY = part_tables.GRAVITY
 
@@ -247,7 +248,12 @@ class Translation:
         if length > link.length:
             law = self.spread(link, length)
             self.note(f"lengthened to {length:.4g} m; the friction loss is that of the original length", link.name)
-        return part_tables.pipe(ends, length, link.diameter, law, link.minor_loss, self.speed)
+        part = part_tables.pipe(ends, length, link.diameter, law, link.minor_loss, self.speed)
+        if link.diameter < NARROW:
+            text = f"narrower than {1e3 * NARROW:g} mm, it stands for a pipe to be designed"
+            self.note(f"{text}: imported without waves, which its friction would damp at once", link.name)
+            part["pipe_model"] = QUASI_STEADY
+        return part
 
     def length(self, link: EpanetLink) -> float:
         """Length of a pipe in the case [m], at least `shortest`.
@@ -347,15 +353,31 @@ class Translation:
             return part_tables.check_valve(ends, diameter, link.minor_loss)
         if kind in part_tables.REGULATING:
             return self.regulating(link, ends, diameter, setting)
-        if kind == "TCV":
-            return part_tables.valve(ends, link.diameter, max(setting, link.minor_loss))
+        if kind == "TCV":  # its setting replaces the minor loss, and may be below it
+            return part_tables.valve(ends, link.diameter if setting else self.bore(link), setting)
         share = curve_value(link.curve or [[0.0, 0.0], [1.0, 1.0]], 0.01 * setting)  # of a PCV
         return part_tables.valve(ends, diameter, link.minor_loss, opening=share)
 
     def regulating(self, link: EpanetLink, ends: tuple[str, str], diameter: float, setting: float) -> part_tables.Part:
         """Table of a regulating valve that moves with a time constant."""
-        self.note(f"{link.kind}: EPANET states no time constant, {part_tables.TIME_CONSTANT} is used", link.name)
-        return part_tables.regulating(link.kind, ends, diameter, self.set_point(link, setting), link.minor_loss)
+        loss = self.full_open_loss(link, diameter)
+        text = f"{link.kind}: EPANET states neither a time constant nor a stroke, {part_tables.TIME_CONSTANT} is used"
+        if loss > link.minor_loss:
+            text += f", and the loss coefficient by which it is {part_tables.OPENING:.0%} open at this hour"
+        self.note(text, link.name)
+        return part_tables.regulating(link.kind, ends, diameter, self.set_point(link, setting), loss)
+
+    def full_open_loss(self, link: EpanetLink, diameter: float) -> float:
+        """Loss coefficient of a regulating valve at full opening, by which it is partly open at this hour if it acts.
+
+        EPANET's valve has no loss when it is open. It would regulate within a thousandth of its stroke, so it would
+        act within microseconds, whatever its time constant.
+        """
+        flow, drop = self.solution.flow[link.name], self.solution.head[link.start] - self.solution.head[link.end]
+        if self.solution.open[link.name] and flow > STALL_FLOW:
+            least = part_tables.OPENING**2 * part_tables.loss_coefficient(max(drop, 0.0), flow, diameter)
+            return max(link.minor_loss, least)
+        return max(link.minor_loss, part_tables.CONTROL_VALVE_LOSS)
 
     def general_valve(self, link: EpanetLink, ends: tuple[str, str]) -> part_tables.Part:
         """Table of a GPV: a link by its curve; a valve if its curve falls."""

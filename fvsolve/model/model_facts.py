@@ -244,6 +244,8 @@ def fastest_parts(model) -> str:
     """Names of all parts other than pipes that can limit the step, as text."""
     stores = [name for name, row in zip(model.node_names, model.tables.nodes, strict=True)
               if row["kind"] not in (rec.FIXED, rec.JUNCTION, rec.PATCH)]  # fmt: skip
-    names = [*(basin.name for basin in model.basins), *stores]
+    moving = [name for name, row in zip(model.valve_names, model.tables.valves, strict=True)
+              if row["device"] >= 0 and model.tables.devices[row["device"]]["y"] >= 0]  # fmt: skip
+    names = [*(basin.name for basin in model.basins), *stores, *moving]
     names += [*model.column_names, *model.mass_names, *model.body_names]
     return names[0] if len(names) == 1 else f"one of {listing(names)}"

@@ -296,6 +296,8 @@ def test_where_a_flow_follows_the_pressure_a_steep_pipe_grows_and_no_junction_mo
 
 VALVES = {
     "TCV": ("v1 a c 150 TCV 40 0", "valve"),
+    "TCV below its minor loss": ("v1 a c 150 TCV 4 40", "valve"),
+    "TCV without loss": ("v1 a c 150 TCV 0 40", "valve"),
     "FCV": ("v1 a c 150 FCV 5 0", "flow-control"),
     "PRV": ("v1 a c 150 PRV 32 0", "pressure-reducing"),
     "PSV": ("v1 a c 150 PSV 45 0", "pressure-sustaining"),

@@ -393,6 +393,61 @@ def test_heads_far_above_every_source_are_named(tmp_path):
     assert not self_check.extreme_heads(powered, [solution, low]) and not self_check.extreme_heads(network, [high])
 
 
+def test_a_tank_that_gives_water_at_its_least_level_is_named(tmp_path):
+    """EPANET lets it do so within a step; limits with an overflow, or within the range of levels, are no cause."""
+    imported = import_network(written(tmp_path, pumped()))
+    network, solution = imported.network, imported.solution
+
+    def causes(level, inflow, **keys):
+        tower = replace(network.nodes["tower"], **keys)
+        head = {**solution.head, "tower": tower.elevation + level}
+        changed = replace(solution, head=head, demand={**solution.demand, "tower": inflow})
+        return self_check.crossed_limits(replace(network, nodes=network.nodes | {"tower": tower}), [solution, changed])
+
+    for level, inflow in ((1.0, -1e-4), (6.0, 1e-4)):
+        (cause,) = causes(level, inflow)
+        assert cause.endswith("greatest level take it: tower")
+    assert not causes(1.0, 1e-4) and not causes(6.0, -1e-4) and not causes(3.0, -1e-4) and not causes(1.0, -1e-9)
+    assert not causes(6.0, 1e-4, overflow=True)
+
+
+ACTING = """[JUNCTIONS]
+a 10 5
+b 10 4
+c 10 0
+[RESERVOIRS]
+R 60
+[PIPES]
+p1 R a 1000 200 110 0 Open
+p2 c b 300 150 110 0 Open
+[VALVES]
+v a c 150 {kind} {setting} 0
+"""
+
+
+@pytest.mark.parametrize("kind, setting", [("PRV", 30), ("PSV", 45), ("FCV", 3)])
+def test_a_valve_that_regulates_is_partly_open_and_sets_no_step(kind, setting, tmp_path):
+    """EPANET's open valve has no loss. With it the valve would act within microseconds."""
+    text = ACTING.format(kind=kind, setting=setting) + OPTIONS
+    if kind != "PRV":
+        text = text.replace("R 60", "R 60\nlow 12").replace("p2 c b", "p3 low b 500 100 110 0 Open\np2 c b")
+    imported = import_network(written(tmp_path, text))
+    assert not compared(imported, tmp_path).compared[0].above
+    assert build(load(_case(imported, tmp_path))).checks["step"] > 1e-3
+    assert any("30% open at this hour" in note for note, _ in imported.notes)
+
+
+def test_a_pipe_to_be_designed_has_no_waves(tmp_path):
+    """Its friction would make each explicit step unstable: the pipe of 2.5 micrometres stands beside a main."""
+    text = MAIN.replace("p1 R a", "none R a 500 0.00254 110 0 Open\np1 R a") + OPTIONS
+    imported = import_network(written(tmp_path, text))
+    assert any(text.startswith("narrower than 1 mm") and names == ["none"] for text, names in imported.notes)
+    case = load(_case(imported, tmp_path))
+    stops = {"time": [0.0, 1.0, 5.0], "value": ["20 l/s", "20 l/s", "0 l/s"]}
+    run = fvsolve.run(case, {"nodes.a.demand": stops, "numerics.end": 8.0})
+    assert run.ok and case.links["none"].pipe_model == "quasi-steady"
+
+
 @pytest.mark.parametrize("speed, is_named", [(75, True), (1.2, False)])
 def test_a_speed_that_is_no_relative_speed_is_named(speed, is_named, tmp_path):
     text = pumped(controls=f"LINK lift {speed} IF NODE tower BELOW 1\nLINK lift CLOSED IF NODE tower ABOVE 5.5")
@@ -495,6 +550,7 @@ SET = {
     "PSV 60": "LINK v 64 AT TIME 4\nLINK v 58 AT TIME 12",
     "FCV 12": "LINK v 8 AT TIME 4\nLINK v 14 AT TIME 12\nLINK v CLOSED AT TIME 20",
     "TCV 40": "LINK v 100 AT TIME 4\nLINK v 10 AT TIME 12\nLINK v CLOSED AT TIME 20",
+    "TCV 40 20 ;": "LINK v 100 AT TIME 4\nLINK v 10 AT TIME 8\nLINK v OPEN AT TIME 15",  # minor loss 20
     "PRV 41": "LINK v 35 IF NODE tower ABOVE 8\nLINK v 42 IF NODE tower BELOW 6",
 }
 
