@@ -4,12 +4,14 @@ import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from parts.test_controls import METHODS
 from reference.scenes import GRAVITY, RHO, junction, lake, scene, tank
 
 import fvsolve
 from fvsolve.errors import CaseError
+from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.studies import energy
 
 KWH = 3.6e6
@@ -270,3 +272,16 @@ def test_the_energy_of_the_networks_of_epanet_is_that_of_its_report(name, tmp_pa
     gallons = 3785.411784  # the report is per million gallons, in m3
     for pump, row in known.items():
         assert in_report(found["pumps"][pump], gallons) == pytest.approx(row, rel=5e-4, abs=0.006), pump
+
+
+def test_sums_of_energy_act_on_nothing():
+    """Neither a rate nor the sparsity pattern of the Jacobian depends on them, so they cost no evaluations."""
+    case = lift(charges={"price": 0.2})
+    case["nodes"]["hill"] = tank(50.0, 3.0, elevation=35.0)
+    model = fvsolve.build(fvsolve.load(case))
+    sums = np.array([name.startswith("p.") for name in model.state_names])
+    assert sums.sum() == 5 and len(sums) == 6
+    pattern = jacobian_pattern(model).toarray()
+    assert np.array_equal(pattern[:, sums].sum(axis=0), np.ones(5)) and pattern[:, ~sums].sum() > 5
+    jacobian = model.jacobian(0.0, model.start)
+    assert not jacobian[:, sums].any() and np.count_nonzero(jacobian[:, ~sums]) > 3
