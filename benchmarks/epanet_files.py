@@ -300,7 +300,7 @@ def closure(case: dict, limit: float) -> str:
 def examine_day(path: Path, options: Any, record: Record) -> None:
     """Run a day by EPANET and by fvsolve, and compare levels and heads."""
     import fvsolve
-    from fvsolve.epanet.self_check import cycling_tanks
+    from fvsolve.epanet.self_check import cycling_tanks, late_switches, switches_at_limits
     from fvsolve.errors import FvsolveError
 
     day = record.row["day"] = {"ok": False}
@@ -335,6 +335,8 @@ def examine_day(path: Path, options: Any, record: Record) -> None:
         record.stage("EPANET day")
         day |= {"step": STEPS[1], "at_first_step": [day["level"], day["head"]]}
         day |= compare_day(run, imported.nodes, epanet_engine.day(path, options.version, STEPS[1], ROWS))
+        day["causes"] = day["causes"] + late_switches(day["at_first_step"][0]["difference"], day["level"]["difference"])
+    day["causes"] = day["causes"] + switches_at_limits(summary["events"])
     if day["level"]["difference"] <= NEAR:  # a cycle at a limit keeps the levels
         day["causes"] = day["causes"] + cycling_tanks(summary["events"])
         text = "EPANET lets tanks give water at their least level, or take it at their greatest"

@@ -182,8 +182,10 @@ class DayTranslation(Translation):
     def energy_keys(self, link: EpanetLink) -> part_tables.Part:
         """Keys of a pump with its own efficiency curve and price; the global values replace what is missing."""
         keys: part_tables.Part = {}
-        if link.efficiency_curve:
-            flow, share = zip(*link.efficiency_curve, strict=True)
+        flow, share = zip(*(link.efficiency_curve or [(0.0, 0.0)]), strict=True)
+        if link.efficiency_curve and max(flow) <= 0.0:  # EPANET holds the last value
+            keys["overall_efficiency"] = part_tables.rounded_number(max(share[-1], part_tables.LEAST_EFFICIENCY))
+        elif link.efficiency_curve:
             keys["overall_efficiency"] = {"flow": [part_tables.quantity_text(q, "l/s") for q in flow],
                                           "efficiency": [part_tables.rounded_number(e) for e in share]}  # fmt: skip
         price = link.price or self.option["price"]
@@ -221,6 +223,10 @@ class DayTranslation(Translation):
             return super().regulating(link, ends, diameter, setting)
         set_point = self.set_point(link, setting)
         return part_tables.regulating(link.kind, ends, diameter, set_point, link.minor_loss, "0 s")
+
+    def may_run(self, link: EpanetLink) -> bool:
+        """True unless a pump is off all day."""
+        return self.opening(link.name) != CLOSED
 
     def full_open_loss(self, link: EpanetLink, diameter: float) -> float:
         """Loss coefficient of a regulating valve at full opening: EPANET's, since it may open fully over the day."""

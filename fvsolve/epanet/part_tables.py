@@ -12,6 +12,7 @@ TIME_CONSTANT = "5 s"  # of regulating valves in a run with waves: EPANET has no
 REGULATING = {"PRV": "pressure-reducing", "PSV": "pressure-sustaining", "FCV": "flow-control"}
 POUND_FORCE, FOOT = 4.4482216152605, 0.3048  # [N], [m]
 WEIGHT = 550.0 / 8.814 * POUND_FORCE / FOOT**3  # EPANET's weight of water, by its power of a pump [N/m3]
+LEAST_EFFICIENCY = 0.01  # of pumps, as in EPANET
 GRAVITY = 32.2 * FOOT  # of EPANET, in minor losses and Darcy-Weisbach [m/s2]
 DENSITY = WEIGHT / GRAVITY  # of water [kg/m3]
 WATER_VISCOSITY = 1.1e-5 * FOOT**2  # of EPANET, relative to which a file states a viscosity [m2/s]

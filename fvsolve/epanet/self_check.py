@@ -19,8 +19,10 @@ MOST_HEAD, MOST_FLOW = 0.01, 0.01  # differences of heads [m], and of flows over
 LEAST_FLOW = 1e-7  # smaller differences of flows are rounding of EPANET's shut links [m3/s]
 NO_MEANING = 1000.0  # height of heads above all sources which no pump has: constant power with hardly any flow [m]
 CYCLES = 10  # openings of a valve at a full or empty tank over a day that are a cycle
+BLOCK_PREFIX = "controls."  # of the names of events of controls
 AT_LIMIT = 1e-3  # distance of a level from its limit that EPANET takes for none [m]
-STEP = 10  # hydraulic step of EPANET over a day [s]
+STEP, FINE_STEP = 10, 2  # hydraulic steps of EPANET over a day [s]; the second where differences have no other cause
+FALLS = 2.5  # ratio of differences at both steps that shows their cause
 ROWS = 150  # time between rows of the day that are compared [s]; not a time at which patterns change
 
 
@@ -174,6 +176,18 @@ def cycling_tanks(events: list[dict[str, Any]]) -> list[str]:
     return [f"{text}: {listing(names)}"] if names else []
 
 
+def switches_at_limits(events: list[dict[str, Any]]) -> list[str]:
+    """Cause of differences if a control switches as its tank becomes full or empty; as a list.
+
+    EPANET steps to whole seconds, so by rounding the tank has reached the level of the control or not.
+    """
+    full = {event["time"] for event in events if event["name"].endswith("-altitude") and "tank is" in event["what"]}
+    found = {event["name"] for event in events if event["name"].startswith(BLOCK_PREFIX) and event["time"] in full}
+    names = sorted(name.removeprefix(BLOCK_PREFIX) for name in found)
+    text = "controls at the greatest or least level of a tank, which EPANET reaches or misses by rounding"
+    return [f"{text}: {listing(names)}"] if names else []
+
+
 def crossed_limits(network: EpanetNetwork, solutions: list[EpanetSolution]) -> list[str]:
     """Cause of differences if an empty tank gives water in EPANET, or a full one takes it; as a list."""
     found = set()
@@ -213,23 +227,51 @@ def check_day(imported: Imported, case: Any) -> SelfCheck:
     every = list(range(0, int(end) + 1, ROWS))
     times = every[1::2]
     rows = np.searchsorted(result.t, np.array(times) - 1e-6)
+    series = {
+        key: np.asarray(result[probe])[rows] * (1e3 if key[0] == "flows" else 1.0) for key, probe in probes.items()
+    }
     days = run_epanet(network, int(end), STEP, every).solutions[1::2]
-    compared = []
+    compared = _compared_days(network, series, days, times)
+    events = result.summary["events"]
+    causes = imported.causes + extreme_heads(network, days) + uphill_breakers(network, days)
+    if not any(item.above for item in compared if item.quantity == "levels"):  # a cycle at a limit keeps the levels
+        causes = causes + cycling_tanks(events) + crossed_limits(network, days)
+    causes = causes + switches_at_limits(events)
+    if not causes and any(item.above for item in compared):
+        finer = _compared_days(network, series, run_epanet(network, int(end), FINE_STEP, every).solutions[1::2], times)
+        if late := late_switches(compared[0].difference, finer[0].difference):  # the first are levels
+            causes, compared = late, finer
+    return SelfCheck(compared, causes)
+
+
+def late_switches(coarse: float, fine: float) -> list[str]:
+    """Cause of differences that fall with EPANET's step; as a list.
+
+    coarse, fine : greatest difference of levels [m] from EPANET with steps of `STEP` and of `FINE_STEP`
+    """
+    if coarse < FALLS * fine:
+        return []
+    text = f"EPANET's controls and rules act up to a step late: with steps of {STEP} s the levels differ by"
+    return [f"{text} {coarse:.2g} m, with {FINE_STEP} s by {fine:.2g} m"]
+
+
+def _compared_days(
+    network: EpanetNetwork, series: dict[tuple[str, str], np.ndarray], days: list[EpanetSolution], times: list[int]
+) -> list[Compared]:
+    """Comparisons of levels, heads and flows; series : (quantity, EPANET's name) -> values at the times [s]"""
     bottoms = {tank.name: tank.elevation for tank in network.tanks()}
     known = {
         "levels": lambda solution, name: solution.head[name] - bottoms[name],
         "heads": lambda solution, name: solution.head[name],
         "flows": lambda solution, name: 1e3 * solution.flow[name],
     }
-    series = {
-        key: np.asarray(result[probe])[rows] * (1e3 if key[0] == "flows" else 1.0) for key, probe in probes.items()
-    }
     largest = max(abs(value) for solution in days for value in solution.flow.values()) * 1e3
     limits = {"levels": MOST_HEAD, "heads": MOST_HEAD, "flows": max(MOST_FLOW * largest, 1e3 * LEAST_FLOW)}
     hidden = [left_out(network, solution) for solution in days]
     dead = {name for table in hidden for names in table.values() for name in names}
-    for quantity, names in (("levels", tanks), ("heads", list(network.nodes)), ("flows", pipes)):
-        shown = [name for name in names if quantity != "heads" or name not in dead]
+    compared = []
+    for quantity in known:
+        shown = [name for of, name in series if of == quantity and (quantity != "heads" or name not in dead)]
         if not shown:
             continue
         ours = np.array([series[quantity, name] for name in shown])
@@ -244,7 +286,4 @@ def check_day(imported: Imported, case: Any) -> SelfCheck:
             quantity, "l/s" if quantity == "flows" else "m", len(shown), shown[worst], float(ours[worst, at]),
             float(theirs[worst, at]), limit, [shown[k] for k in order if greatest[k] > limit], {}, float(times[at]),
         ))  # fmt: skip
-    causes = imported.causes + extreme_heads(network, days) + uphill_breakers(network, days)
-    if not any(item.above for item in compared if item.quantity == "levels"):  # a cycle at a limit keeps the levels
-        causes = causes + cycling_tanks(result.summary["events"]) + crossed_limits(network, days)
-    return SelfCheck(compared, causes)
+    return compared

@@ -434,8 +434,12 @@ class Translation:
         sources = [name for name, node in network.nodes.items() if node.kind != "junction"]
         greatest = max(self.solution.head[source] for source in sources)
         head = setting / self.gravity + network.nodes[controlled].elevation
-        pumps = any(other.kind == "pump" for other in network.links.values())
+        pumps = any(other.kind == "pump" and self.may_run(other) for other in network.links.values())
         return not pumps and is_head_above(head, greatest)
+
+    def may_run(self, link: EpanetLink) -> bool:
+        """True if a pump runs in the case; others become shut valves."""
+        return not self.is_shut(link)
 
     def cannot_sustain(self, link: EpanetLink, setting: float) -> bool:
         """True if a PSV passes flow in EPANET although the head before it is below its set head."""

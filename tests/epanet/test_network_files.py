@@ -411,6 +411,35 @@ def test_a_tank_that_gives_water_at_its_least_level_is_named(tmp_path):
     assert not causes(6.0, 1e-4, overflow=True)
 
 
+def test_controls_at_the_limit_of_a_tank_and_late_switches_are_named():
+    def event(time, name, what):
+        return {"time": time, "name": name, "what": what}
+
+    full = [event(60.0, "T-altitude", "shuts: the tank is full"), event(60.0, "controls.P", "turns off")]
+    (cause,) = self_check.switches_at_limits([*full, event(70.0, "controls.Q", "turns on")])
+    assert cause.endswith("misses by rounding: P")
+    assert not self_check.switches_at_limits([full[0], event(61.0, "controls.P", "turns off")])
+    assert not self_check.switches_at_limits([event(60.0, "T-altitude", "opens"), full[1]])
+    (late,) = self_check.late_switches(0.11, 0.014)
+    assert "with steps of 10 s the levels differ by 0.11 m, with 2 s by 0.014 m" in late
+    assert not self_check.late_switches(0.11, 0.09)
+
+
+def test_an_efficiency_at_no_flow_alone_holds_at_every_flow(tmp_path):
+    energy = "[ENERGY]\nGlobal Price 0.1\nPump lift Efficiency e\n[CURVES]\ne 0 65\n"
+    imported = import_network(written(tmp_path, pumped().replace("[OPTIONS]", energy + "[OPTIONS]")), day=True)
+    assert load(_case(imported, tmp_path)).links["lift"].overall_efficiency is not None
+    assert "overall_efficiency = 0.65" in imported.text
+
+
+def test_a_pump_that_is_off_all_day_does_not_lift_a_set_pressure(tmp_path):
+    """Without it no source reaches the set head, and the case reader refused the case of the importer."""
+    text = ALONE.format(kind="PRV", setting=60, ends="a b") + "[PUMPS]\nboost R a HEAD h\n[CURVES]\nh 10 50\n"
+    text += "[STATUS]\nboost Closed\n"
+    imported, found = day_of(text + OPTIONS, tmp_path)
+    assert found.agrees and any("set head above every source" in note for note, _ in imported.notes)
+
+
 ACTING = """[JUNCTIONS]
 a 10 5
 b 10 4
