@@ -102,9 +102,8 @@ def is_on_line(value, line):
 def locate(handle, run, r, h, now, new, e):
     """Shorten a step so that it ends just past the first event, by the Illinois rule; returns its length and error.
 
-    Where that rule is slow, because an event function jumps beyond its zero, the event functions are extrapolated from
-    their last two values before the zero, then twice as far, in turn with bisection. The Illinois rule goes on where
-    the line through these two values is near the value beyond the zero, because they do not jump there.
+    Where that rule is slow, because an event function jumps beyond its zero, a line through the last two values before
+    the zero is extrapolated, then twice as far, in turn with bisection; not where it is near the value beyond the zero.
     handle, run, r : handles of the model and of the run, and the open handle of the run; now, new : rows of y
     h, e : length and error of the full step; y[new] and g_new receive the values at the end of the shortened step
     The error is NEWTON_FAILED if a stage could not be solved, or if an event function jumps over zero in an implicit

@@ -44,7 +44,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/run": (1619, 7),
     "fvsolve/solve": (3151, 12),
     "fvsolve/step_limits": (1720, 7),
-    "fvsolve/steppers": (7938, 35),
+    "fvsolve/steppers": (7937, 35),
     "fvsolve/studies": (16170, 57),
     "fvsolve/validation": (1462, 11),
     "tests/attitude": (447, 2),
