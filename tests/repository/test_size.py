@@ -66,7 +66,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/report": (863, 4),
     "tests/repository": (4814, 26),
     "tests/schemes": (569, 2),
-    "tests/solve": (2918, 14),
+    "tests/solve": (2919, 14),
     "tests/step_limits": (1100, 5),
     "tests/steppers": (2858, 16),
     "tests/studies": (9018, 26),
