@@ -28,6 +28,7 @@ class DayTranslation(Translation):
     """
 
     def __init__(self, network: EpanetNetwork, solution: EpanetSolution, end: float = DAY) -> None:
+        self.network = network
         self.signals: dict[str, part_tables.Part] = {}
         self.controls: dict[str, part_tables.Part] = {}
         self.energy: part_tables.Part = {}
@@ -43,6 +44,8 @@ class DayTranslation(Translation):
             self.statements.setdefault(item.link, []).append(item)
         self.start_values = switching.values_at_start(network, solution)
         for name, link in network.links.items():
+            if link.kind == "pump" and link.pattern > 0:
+                self.statements[name] = self.pattern_statements(link)
             self.start_values["open", name] = float(initial_action(link)[0] != "closed")
         super().__init__(network, solution, 0.0, 0.0)
         self.energy = self.energy_table()
@@ -76,6 +79,21 @@ class DayTranslation(Translation):
             times = self.times()
             self.signals[name] = step_table(times, values or [self.network.pattern_at(pattern, at) for at in times])
         return name
+
+    def pattern_statements(self, pump: EpanetLink) -> list[Statement]:
+        """Actions on a pump whose speed has a pattern: EPANET sets status and speed by it again at each step.
+
+        So the status at the start of the file does not count, and a control or rule lasts for one step only.
+        """
+        replaced = "lasts for one step: EPANET sets a pump by the pattern of its speed again at the next"
+        self.refused += [(replaced, item.label) for item in self.statements.get(pump.name, [])
+                         if item.clause.intervals != ()]  # fmt: skip
+        times, found = self.times(), []
+        for begin, stop in zip(times, [*times[1:], math.inf], strict=True):
+            speed = self.network.pattern_at(pump.pattern, begin)
+            clause = switching.interval_clause([(begin, stop)])
+            found.append(Statement("pattern", clause, pump.name, ("setting", speed) if speed else ("closed",)))
+        return found
 
     # nodes --------------------------------------------------------------------------------------------------
 
@@ -151,7 +169,7 @@ class DayTranslation(Translation):
             return part_tables.valve(ends, self.bore(link), 0.0, opening=0.0)
         if opening == OPEN and link.power is not None and abs(self.solution.flow[link.name]) < STALL_FLOW:
             return self.stalled(link, ends)
-        if opening != OPEN:
+        if opening != OPEN and not link.pattern:
             ends = (ends[0], self.shut_off(link, self.bore(link), opening))
         part = part_tables.pump(ends, self.head_law(link), 1.0) | self.energy_keys(link)
         if link.pattern > 0:

@@ -105,10 +105,12 @@ lift lake a HEAD 1 {speed}
 day 0.6 0.8 1.4 1.2
 night 1.5 0.2 0.5
 slow 1.0 0.95 1.05
+pauses 1.0 0.0 0.9
 [CONTROLS]
 {controls}
 [RULES]
 {rules}
+{stated}
 [TIMES]
 DURATION 24:00
 HYDRAULIC TIMESTEP 1:00
@@ -132,6 +134,7 @@ def town(tmp_path, **keys):
         "speed": "",
         "controls": "",
         "rules": "",
+        "stated": "",
         "width": 12,
         "drawn": 4,
     }
@@ -165,6 +168,9 @@ CASES = {
     "shut": ({"status": "Closed", "controls": LEVELS}, ["lift"], ["relay"]),
     "check valve": ({"valve": "CV", "controls": LEVELS}, ["lift"], ["relay"]),
     "pattern of speed": ({"speed": "PATTERN slow"}, [], []),
+    "pattern with pauses": ({"speed": "PATTERN pauses"}, [], []),
+    "pattern and status": ({"speed": "PATTERN pauses", "stated": "[STATUS]\nlift Closed"}, [], []),
+    "pattern and a rule": ({"speed": "PATTERN slow", "rules": RULES}, ["p3"], []),
     "volume curve": ({"curve": "v", "controls": LEVELS}, ["lift"], ["relay"]),
     "full and empty": ({"width": 4, "drawn": 30}, [], []),
 }  # fmt: skip
