@@ -88,13 +88,13 @@ class DayTranslation(Translation):
         amounts = [(base, network.demand_pattern(index)) for base, index in node.demands if base]
         if not amounts:
             return part
-        if len({index for _, index in amounts}) == 1:
-            base = sum(base for base, _ in amounts)
-            part["demand"] = self.scheduled(base * self.option["multiplier"], amounts[0][1], "l/s")
-        else:
-            values = [network.demand_at(node, at) for at in self.times()]
-            texts = [part_tables.quantity_text(value, "l/s") for value in values]
-            part["demand"] = step_table(self.times(), texts) if len(set(texts)) > 1 else texts[0]
+        bases: dict[int, float] = {}
+        for base, index in amounts:
+            bases[index] = bases.get(index, 0.0) + base * self.option["multiplier"]
+        parts = [self.scheduled(base, index, "l/s") for index, base in bases.items()]
+        changing = any(isinstance(item, dict) for item in parts)
+        constant = part_tables.quantity_text(network.demand_at(node, 0.0), "l/s")
+        part["demand"] = constant if not changing else parts[0] if len(parts) == 1 else {"sum": parts}
         self.demands[self.node_names.given[node.name]] = sum(base for base, _ in amounts)
         return part | self.pressure_keys(node, max(base for base, _ in amounts) > 0.0)
 

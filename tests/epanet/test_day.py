@@ -233,3 +233,13 @@ def test_a_rule_that_holds_at_the_start_explains_the_start_alone(tmp_path):
     assert "a rule that holds at the start" in start.causes[0] and "lift" in start.causes[0]
     assert imported.causes == []  # the day must agree
     agree(path, imported, ours(imported, tmp_path, **{"numerics.end": "3 h"}), [])
+
+
+def test_demands_of_several_patterns_are_sums_of_signals(tmp_path):
+    path, _ = town(tmp_path)
+    text = path.read_text().replace("[RESERVOIRS]", "[DEMANDS]\nb 4 day\nb 2 night\nb 1 night\nc 3 night\n[RESERVOIRS]")
+    path.write_text(text)
+    imported = import_network(path, day=True)
+    factors = [{"signal": "pattern-day", "factor": "4 l/s"}, {"signal": "pattern-night", "factor": "3 l/s"}]
+    assert tomllib.loads(imported.text)["nodes"]["b"]["demand"] == {"sum": factors}
+    agree(path, imported, ours(imported, tmp_path), [])
