@@ -49,6 +49,10 @@ class ControlRows:
         """Names of the states of a block, without those of filters."""
         return ()
 
+    def is_static(self, control: Any) -> bool:
+        """True for a block without states, whose output at the start follows from its inputs and its setpoint."""
+        return False
+
     def scales(self, control: Any, change: tuple[float, float]) -> list[float]:
         """Sizes of a small deviation of each state; change : those of the first input and of the output."""
         return []
@@ -95,6 +99,9 @@ class ControlRows:
 
 class StaticRows(ControlRows):
     """Conversion of blocks without states, whose output is a function of their inputs."""
+
+    def is_static(self, control):
+        return True
 
     def value(self, control: Any, start: BlockStart) -> float:
         """Output for the inputs at the start, before its limits."""

@@ -308,7 +308,7 @@ def fill_specific_heats(reading: Reading, scalars: dict[str, Any], links: dict[s
 def check_unused_signals(reading: Reading) -> None:
     """Add a fault for each signal that no part uses and that is not a schedule of any usual dimension."""
     for name, given in reading.setting.signals.items():
-        if name in reading.setting.used or (isinstance(given, dict) and "signal" in given):
+        if name in reading.setting.used or (isinstance(given, dict) and ("signal" in given or "sum" in given)):
             continue
         if text := signal_fault(given):
             reading.fault(("signals", name), text)

@@ -8,6 +8,7 @@ from fvsolve.epanet import part_tables, switching
 from fvsolve.epanet.network_file import EpanetLink, EpanetNetwork, EpanetNode, EpanetSolution
 from fvsolve.epanet.switching import DAY, Clause, Source, Statement
 from fvsolve.epanet.translating import NARROW, STALL_FLOW, Translation, initial_action
+from fvsolve.errors import listing
 
 STEP_WIDTH = 1e-3  # difference of levels over which the area of a tank changes at a point of its volume curve [m]
 OPEN, CLOSED = 1.0, 0.0
@@ -15,6 +16,7 @@ MOST_SPEED = 3.0  # relative speed above which a setting is probably a power or 
 FILTER = "10 s"  # time constant with which a block reads a head or a flow, which would follow its own action at once
 # Set points of a regulating valve that a control holds open: heads of water [m], and a flow [m3/s]
 HELD_OPEN = {"PRV": 1e4, "PSV": -9.0, "FCV": 1e3}
+RULES_AT_START = "a rule that holds at the start acts at once, in EPANET after its first rule time step"
 UNITS = {"PRV": "barg", "PSV": "barg", "FCV": "l/s"}
 
 Action = tuple[Any, ...]
@@ -35,6 +37,7 @@ class DayTranslation(Translation):
         self.end = end
         # relays with outputs 0 and 1: (tank, level at which it turns on, and off, state at the start) -> name
         self.relays: dict[tuple[str, float, float, bool], str] = {}
+        self.margins: dict[switching.ThresholdSteps, str] = {}  # -> name of the block that subtracts the source from it
         self.inlets: dict[tuple[str, str], str] = {}  # (tank, link) -> junction before its altitude valve
         self.openings: dict[str, Any] = {}  # EPANET's name of a link -> value of its key `opening`
         self.step = float(network.times["pattern_step"])
@@ -103,13 +106,13 @@ class DayTranslation(Translation):
         amounts = [(base, network.demand_pattern(index)) for base, index in node.demands if base]
         if not amounts:
             return part
-        if len({index for _, index in amounts}) == 1:
-            base = sum(base for base, _ in amounts)
-            part["demand"] = self.scheduled(base * self.option["multiplier"], amounts[0][1], "l/s")
-        else:
-            values = [network.demand_at(node, at) for at in self.times()]
-            texts = [part_tables.quantity_text(value, "l/s") for value in values]
-            part["demand"] = step_table(self.times(), texts) if len(set(texts)) > 1 else texts[0]
+        bases: dict[int, float] = {}
+        for base, index in amounts:
+            bases[index] = bases.get(index, 0.0) + base * self.option["multiplier"]
+        parts = [self.scheduled(base, index, "l/s") for index, base in bases.items()]
+        changing = any(isinstance(item, dict) for item in parts)
+        constant = part_tables.quantity_text(network.demand_at(node, 0.0), "l/s")
+        part["demand"] = constant if not changing else parts[0] if len(parts) == 1 else {"sum": parts}
         self.demands[self.node_names.given[node.name]] = sum(base for base, _ in amounts)
         return part | self.pressure_keys(node, max(base for base, _ in amounts) > 0.0)
 
@@ -327,23 +330,38 @@ class DayTranslation(Translation):
 
         value_of : action -> value in SI, None if the action leaves the key as it is; begins : value before hour 0 [SI]
         """
-        actions = [(item.clause, value) for item in self.statements.get(name, ())
-                   if (value := value_of(item.action)) is not None]  # fmt: skip
+        actions = switching.simplified([
+            (item.clause, value) for item in self.statements.get(name, ())
+            if (value := value_of(item.action)) is not None
+        ])  # fmt: skip
         text, value = quantity(unit), begins
         values = {value for _, value in actions} | {begins}
         if len(values) == 1:
             return text(begins)
-        if all(clause.intervals is not None for clause, _ in actions):
-            times, found = switching.schedule_keys(actions, begins, self.end)
-            return step_table(times, [text(item) for item in found]) if len(times) > 1 else text(found[0])
         for clause, result in actions:
             value = result if clause.holds(self.start_values) else value
+        self.note_rules_at_start(name, value_of, begins, value)
+        if not any(clause.sources for clause, _ in actions):
+            times, found = switching.schedule_keys(actions, begins, self.end)
+            return step_table(times, [text(item) for item in found]) if len(times) > 1 else text(found[0])
         ours = self.link_names.given[name] + ("" if key == "opening" else f"-{key}")
         if key == "opening":
             self.start_values["open", name] = value
         if len(values) == 2:
             return self.two_states(ours, actions, value, sorted(values), text)
         return self.several_states(ours, actions, value, sorted(values), text)
+
+    def note_rules_at_start(
+        self, name: str, value_of: Callable[[Action], float | None], begins: float, value: float
+    ) -> None:
+        """Note a link that has another state at the start because of rules; value : that at the start, as `begins`"""
+        before = begins
+        for item in self.statements.get(name, ()):
+            result = value_of(item.action)
+            if not item.of_rule and result is not None and item.clause.holds(self.start_values):
+                before = result
+        if before != value:
+            self.note(RULES_AT_START, name)
 
     def two_states(
         self, ours: str, actions: list[tuple[Clause, float]], value: float, values: list[float],
@@ -412,11 +430,23 @@ class DayTranslation(Translation):
     def probe(self, source: Source) -> str:
         """Probe of a source of a condition."""
         kind, name = source
+        if kind == "margin":
+            return f"controls.{self.margin(name)}"
         if kind == "open":
             return self.opening_probe(name)
         if kind == "flow":
             return f"links.{self.link_names.given[name]}.flow"
         return f"nodes.{self.node_names.given[name]}.{kind}"
+
+    def margin(self, steps: switching.ThresholdSteps) -> str:
+        """Name of the block with a threshold that changes with the time minus its source, which is added if new."""
+        if steps not in self.margins:
+            name = self.margins[steps] = self.link_names.new(f"{self.node_names.given[steps.source[1]]}-margin")
+            texts = [part_tables.quantity_text(value, "m") for value in steps.value]
+            block = {"type": "pi", "input": self.probe(steps.source), "setpoint": step_table([*steps.time], texts)}
+            filtered = {"filter": FILTER} if steps.source[0] == "head" else {}
+            self.controls[name] = block | {"gain": 1} | filtered
+        return self.margins[steps]
 
     def opening_probe(self, name: str) -> str:
         """Name of a block whose output is the opening of a link, which is added for a constant or a schedule."""
@@ -427,11 +457,16 @@ class DayTranslation(Translation):
         if isinstance(opening, dict):
             times, values = [*opening["time"], 2.0 * self.end + 1.0], opening["value"]
             spans = [(times[k], times[k + 1]) for k, value in enumerate(values) if value]
-            formula = switching.interval_clause(spans).text({})
+            formula = switching.interval_text(switching.clipped(spans, self.end))
         else:
             formula = f"{opening:g} + 0*t"
         self.controls[block] = {"type": "function", "formula": formula}
         return f"controls.{block}"
+
+    @property
+    def start_causes(self) -> list[str]:
+        """Notes on what makes heads or flows differ from EPANET at the start alone."""
+        return [f"{text} ({listing(names)})" for text, names in self.notes if text == RULES_AT_START]
 
     @property
     def notes(self) -> list[tuple[str, list[str]]]:

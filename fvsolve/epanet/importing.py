@@ -28,7 +28,7 @@ class Imported:
     notes : differences from EPANET, as a list of (text, EPANET's names)
     short_pipes : EPANET's names of pipes shorter than a cell, the shortest first
     network : contents of the file; solution : EPANET's solution at the imported hour
-    causes : notes on what makes heads or flows differ from EPANET
+    causes : notes on what makes heads or flows differ from EPANET; start_causes : at the start alone
     """
 
     text: str
@@ -39,6 +39,7 @@ class Imported:
     network: EpanetNetwork
     solution: EpanetSolution
     causes: list[str]
+    start_causes: list[str]
 
 
 def import_network(
@@ -78,7 +79,9 @@ def import_network(
         lines = _hour_lines(translation, time, short)
     case_text = _text(Path(path), network, translation, title, lines)
     names = translation.node_names.given, translation.link_names.given
-    return Imported(case_text, *names, translation.notes, short, network, solution, translation.causes)
+    return Imported(
+        case_text, *names, translation.notes, short, network, solution, translation.causes, translation.start_causes
+    )
 
 
 def cell_time(lengths: list[float], wave_speed: float) -> float:

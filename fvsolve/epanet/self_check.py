@@ -102,7 +102,8 @@ def check_start(imported: Imported, case: Case) -> SelfCheck:
     compared = [_compared("heads", "m", heads, solution.head, MOST_HEAD, left_out(imported.network, solution))]
     if flows:
         compared.append(_flows(flows, solution.flow))
-    return SelfCheck(compared, imported.causes + extreme_heads(imported.network, [solution]))
+    causes = imported.causes + imported.start_causes
+    return SelfCheck(compared, causes + extreme_heads(imported.network, [solution]))
 
 
 def _flows(flows: dict[str, float], known: dict[str, float], time: float | None = None) -> Compared:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 from fvsolve.epanet.network_file import FOOT, EpanetNetwork, EpanetSolution
@@ -14,8 +15,10 @@ PULSE = 1.0  # time for which a condition holds that EPANET states for a moment 
 RULE_TOLERANCE = 1e-3  # of values in EPANET's rules, in the unit of the file
 
 Interval = tuple[float, float]
-# Input of a condition: ("level", tank), ("head", junction), ("flow", link) or ("open", link), by EPANET's names
-Source = tuple[str, str]
+ALWAYS: tuple[Interval, ...] = ((-inf, inf),)
+# Input of a condition: ("level", tank), ("head", junction), ("flow", link) or ("open", link), by EPANET's names,
+# or ("margin", steps of a threshold): the threshold at a time minus its source
+Source = tuple[str, Any]
 Values = dict[Source, float]
 
 
@@ -24,28 +27,45 @@ class Untranslatable(Exception):
 
 
 @dataclass(frozen=True)
-class Clause:
-    """Condition of a control or rule.
+class ThresholdSteps:
+    """Threshold of a source that changes with the time.
 
-    text : function (source -> its name in the formula) -> formula that is 1 while it holds, else 0
-    holds : function (values of sources) -> True if it holds at the start
-    sources : what it reads
-    intervals : times [s] between which it holds, for a condition of the time alone; else None
-    level : (tank, True if it holds above, level [m]) of a condition on the level of one tank; else None
+    time, value : it has each value [m] from a time [s] on, and its first value before
     """
 
-    text: Callable[[dict[Source, str]], str]
+    source: Source
+    time: tuple[float, ...]
+    value: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Clause:
+    """Condition of a control or rule, which holds in intervals of time, while its sources satisfy a formula.
+
+    formula : function (source -> its name in the formula) -> formula that is 1 while the sources satisfy it, else 0
+    holds : function (values of sources) -> True if the clause holds at the start
+    sources : inputs of the formula; none for a condition on the time alone
+    intervals : times [s]; an interval is infinite on a side where it extends beyond the run
+    compared : (source, relation, threshold) of a comparison of one level or head with a number [m]; else None
+    """
+
+    formula: Callable[[dict[Source, str]], str]
     holds: Callable[[Values], bool]
     sources: tuple[Source, ...] = ()
-    intervals: tuple[Interval, ...] | None = None
-    level: tuple[str, bool, float] | None = None
+    intervals: tuple[Interval, ...] = ALWAYS
+    compared: tuple[Source, str, float] | None = None
+
+    def text(self, names: dict[Source, str]) -> str:
+        """Formula that is 1 while the clause holds, else 0; names : source -> its name in the formula"""
+        factors = [interval_text(self.intervals)] if self.intervals != ALWAYS or not self.sources else []
+        return "*".join([*factors, self.formula(names)] if self.sources else factors)
 
 
 @dataclass(frozen=True)
 class Statement:
     """Action of a control or rule on a link.
 
-    label : name of the control or rule; link : EPANET's name
+    label : name of the control or rule; of_rule : True for a rule; link : EPANET's name
     action : ("closed",), ("open",), ("active",) or ("setting", value in SI)
     """
 
@@ -53,6 +73,7 @@ class Statement:
     clause: Clause
     link: str
     action: tuple[Any, ...]
+    of_rule: bool = False
 
 
 def statements(network: EpanetNetwork, end: float) -> tuple[list[Statement], list[tuple[str, str]]]:
@@ -77,7 +98,7 @@ def statements(network: EpanetNetwork, end: float) -> tuple[list[Statement], lis
             refused.append((str(reason), label))
             continue
         for side, when in (("else", opposite(clause)), ("then", clause)):
-            found += [Statement(label, when, link, tuple(action)) for link, action in reversed(rule[side])]
+            found += [Statement(label, when, link, tuple(action), True) for link, action in reversed(rule[side])]
     return found, refused
 
 
@@ -120,6 +141,8 @@ def premise_clause(network: EpanetNetwork, premise: dict[str, Any], end: float) 
         if variable == "time":
             return time_clause(relation, [float(value)], (float(value) + PULSE, 2.0 * end + PULSE), end)
         if variable == "clocktime":
+            if float(value) >= DAY and relation not in ("=", "<>"):  # 24:00 is after all times of EPANET's clock
+                return interval_clause(ALWAYS if relation in ("<", "<=") else ())
             since = float(value) % DAY  # midnight
             return time_clause(relation, daily_moments(network, since, end), (since, DAY - since), end)
         raise Untranslatable(f"acts by the {variable} of the whole system")
@@ -173,14 +196,14 @@ def value_clause(source: Source, relation: str, threshold: float, tolerance: flo
 
 def _comparison(source: Source, relation: str, threshold: float) -> Clause:
     shown = "abs({})" if source[0] == "flow" else "{}"
-    level = (source[1], relation in (">", ">="), threshold) if source[0] == "level" else None
+    compared = None if source[0] == "flow" else (source, relation, threshold)
 
     def holds(values: Values) -> bool:
         value = values[source]
         return COMPARE[relation](abs(value) if source[0] == "flow" else value, threshold)
 
     return Clause(
-        lambda names: f"({shown.format(names[source])} {relation} {threshold:.10g})", holds, (source,), None, level
+        lambda names: f"({shown.format(names[source])} {relation} {threshold:.10g})", holds, (source,), ALWAYS, compared
     )
 
 
@@ -202,56 +225,82 @@ def time_clause(relation: str, moments: list[float], reach: tuple[float, float],
         spans = [(at, at + reach[1]) for at in moments if at <= end]
     else:
         spans = [(at - reach[0], min(at, 2.0 * end + PULSE)) for at in moments]
-    clause = interval_clause([(begin, stop) for begin, stop in spans if stop > 0.0 and begin <= end])
+    clause = interval_clause(clipped(spans, end))
     return opposite(clause) if relation == "<>" else clause
+
+
+def clipped(spans: Iterable[Interval], end: float) -> list[Interval]:
+    """Intervals [s] that reach into a run, infinite on the sides where they extend beyond it; end : of the run [s]"""
+    return [(begin if begin > 0.0 else -inf, stop if stop <= end else inf)
+            for begin, stop in spans if stop > 0.0 and begin <= end]  # fmt: skip
 
 
 def interval_clause(spans: Iterable[Interval]) -> Clause:
     """Clause that holds between times [s]."""
     kept = tuple(spans)
+    return Clause(lambda names: "1", lambda values: within(0.0, kept), (), kept)
 
-    def text(names: dict[Source, str]) -> str:
-        terms = [f"(t >= {begin:.10g})*(t < {stop:.10g})" for begin, stop in kept]
-        return "(" + (" + ".join(terms) or "0*t") + ")"
 
-    return Clause(text, lambda values: within(0.0, kept), (), kept)
+def interval_text(spans: Iterable[Interval]) -> str:
+    """Formula of the time that is 1 in intervals, else 0."""
+    terms = []
+    for begin, stop in spans:
+        sides = [f"(t >= {begin:.10g})"] * (begin > -inf) + [f"(t < {stop:.10g})"] * (stop < inf)
+        terms.append("*".join(sides) or "1")
+    return terms[0] if len(terms) == 1 else f"({' + '.join(terms)})" if terms else "0"
+
+
+def spans_where(parts: list[tuple[Interval, ...]], test: Callable[[float], bool]) -> tuple[Interval, ...]:
+    """Intervals in which a test of the time [s] is true; it changes only at the ends of intervals in `parts`."""
+    ends = sorted({-inf, inf, *(at for spans in parts for span in spans for at in span)})
+    found: list[Interval] = []
+    for begin, stop in zip(ends[:-1], ends[1:], strict=True):
+        if test(begin):
+            joins = bool(found) and found[-1][1] == begin
+            found[-1:] = [(found[-1][0], stop)] if joins else [*found[-1:], (begin, stop)]
+    return tuple(found)
 
 
 def combined(every: bool, clauses: list[Clause]) -> Clause:
     """Clause that holds where all clauses hold (every), or where one of them holds."""
+    if not every:
+        clauses = [clause for clause in clauses if clause.intervals] or clauses[:1]
     if len(clauses) == 1:
         return clauses[0]
-    spans = None
-    if all(clause.intervals is not None for clause in clauses):
-        ends = sorted({at for clause in clauses for span in clause.intervals for at in span})
-        pieces = zip(ends[:-1], ends[1:], strict=True)
-        test = all if every else any
-        spans = tuple(piece for piece in pieces if test(within(0.5 * sum(piece), part.intervals) for part in clauses))
+    test = all if every else any
+    parts = [clause.intervals for clause in clauses]
+    spans = spans_where(parts, lambda time: test(within(time, part) for part in parts))
+    reading = [clause for clause in clauses if clause.sources]
 
-    def text(names: dict[Source, str]) -> str:
+    def formula(names: dict[Source, str]) -> str:
         if every:
-            return "*".join(clause.text(names) for clause in clauses)
+            return "*".join(clause.formula(names) for clause in reading)
         return f"(1 - {'*'.join(f'(1 - {clause.text(names)})' for clause in clauses)})"
 
     return Clause(
-        text,
-        lambda values: (all if every else any)(clause.holds(values) for clause in clauses),
+        formula,
+        lambda values: test(clause.holds(values) for clause in clauses),
         tuple(dict.fromkeys(source for clause in clauses for source in clause.sources)),
-        spans,
+        spans if every or not reading else ALWAYS,
+        reading[0].compared if every and len(reading) == 1 else None,
     )
+
+
+OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
 
 
 def opposite(clause: Clause) -> Clause:
     """Clause that holds where another clause does not."""
-    spans = None
-    if clause.intervals is not None:
-        ends = sorted({-DAY, 1e4 * DAY, *(at for span in clause.intervals for at in span)})
-        pieces = zip(ends[:-1], ends[1:], strict=True)
-        spans = tuple(piece for piece in pieces if not within(0.5 * sum(piece), clause.intervals))
-    level = clause.level and (clause.level[0], not clause.level[1], clause.level[2])
+    if not clause.sources:
+        outside = spans_where([clause.intervals], lambda time: not within(time, clause.intervals))
+        return interval_clause(outside)
+    compared = None
+    if clause.compared is not None and clause.intervals == ALWAYS:
+        source, relation, threshold = clause.compared
+        compared = source, OPPOSITE[relation], threshold
     return Clause(
-        lambda names: f"(1 - {clause.text(names)})", lambda values: not clause.holds(values), clause.sources, spans,
-        level,
+        lambda names: f"(1 - {clause.text(names)})", lambda values: not clause.holds(values), clause.sources, ALWAYS,
+        compared,
     )  # fmt: skip
 
 
@@ -274,13 +323,17 @@ def relay_keys(actions: list[tuple[Clause, Any]], on: Any) -> tuple[str, float, 
     """
     if len(actions) != 2 or {value == on for _, value in actions} != {True, False}:
         return None
-    turns_on, turns_off = (next(clause.level for clause, value in actions if (value == on) is side)
+    turns_on, turns_off = (next(clause for clause, value in actions if (value == on) is side)
                            for side in (True, False))  # fmt: skip
-    if turns_on is None or turns_off is None or turns_on[0] != turns_off[0] or turns_on[1] == turns_off[1]:
+    if turns_on.compared is None or turns_off.compared is None or {turns_on.intervals, turns_off.intervals} != {ALWAYS}:
         return None
-    if (turns_on[2] <= turns_off[2]) if turns_on[1] else (turns_on[2] >= turns_off[2]):
+    (source, relation, upper), (other, against, lower) = turns_on.compared, turns_off.compared
+    rises = relation in (">", ">=")
+    if source[0] != "level" or source != other or rises == (against in (">", ">=")):
         return None
-    return turns_on[0], turns_on[2], turns_off[2]
+    if (upper <= lower) if rises else (upper >= lower):
+        return None
+    return source[1], upper, lower
 
 
 def schedule_keys(actions: list[tuple[Clause, Any]], begins: Any, end: float) -> tuple[list[float], list[Any]]:
@@ -299,15 +352,83 @@ def schedule_keys(actions: list[tuple[Clause, Any]], begins: Any, end: float) ->
     return times, values
 
 
+def simplified(actions: list[tuple[Clause, Any]]) -> list[tuple[Clause, Any]]:
+    """Actions with the same effect, fewer where several actions set the same value.
+
+    actions : pairs (clause, value) in the order of precedence, the last prevails
+    """
+    runs: list[tuple[list[Clause], Any]] = []
+    for clause, value in actions:
+        if not clause.intervals:
+            continue
+        for clauses, result in reversed(runs):
+            if result == value:
+                clauses.append(clause)
+                break
+            if not all(exclude(clause, other) for other in clauses):  # so that it prevails over an action between
+                runs.append(([clause], value))
+                break
+        else:
+            runs.append(([clause], value))
+    return [(combined(False, joined(clauses)), value) for clauses, value in runs]
+
+
+def exclude(first: Clause, second: Clause) -> bool:
+    """True if two clauses never hold at one time, as far as their intervals and thresholds show."""
+    if not any(a < d and c < b for a, b in first.intervals for c, d in second.intervals):
+        return True
+    if first.compared is None or second.compared is None or first.compared[0] != second.compared[0]:
+        return False
+    sides = {relation[0]: threshold for _, relation, threshold in (first.compared, second.compared)}
+    return len(sides) == 2 and sides["<"] < sides[">"]
+
+
+def joined(clauses: list[Clause]) -> list[Clause]:
+    """Clauses of which one holds where one of the given clauses holds, one for all thresholds of a source."""
+    groups: dict[Any, list[Clause]] = {}
+    for clause in clauses:
+        groups.setdefault(clause.compared[:2] if clause.compared is not None else id(clause), []).append(clause)
+    return [group[0] if len(group) == 1 else varying(group) for group in groups.values()]
+
+
+def varying(clauses: list[Clause]) -> Clause:
+    """Clause that holds where one of several comparisons of a source with the same relation holds, each in its times.
+
+    Its threshold is a table over the time, so that its formula does not grow with the number of intervals.
+    """
+    source, relation, _ = clauses[0].compared
+    farthest = max if relation in ("<", "<=") else min
+    parts = [clause.intervals for clause in clauses]
+    spans = spans_where(parts, lambda time: any(within(time, part) for part in parts))
+    times, values = [], []
+    for begin in sorted({span[0] for part in parts for span in part} | {span[1] for part in parts for span in part}):
+        active = [clause.compared[2] for clause in clauses if within(begin, clause.intervals)]
+        if active and (not values or farthest(active) != values[-1]):  # without a threshold, the last one remains
+            times.append(max(begin, 0.0))
+            values.append(farthest(active))
+    if len(values) == 1:
+        clause = _comparison(source, relation, values[0])
+        return Clause(clause.formula, lambda found: any(item.holds(found) for item in clauses), (source,), spans,
+                      clause.compared)  # fmt: skip
+    margin = "margin", ThresholdSteps(source, tuple(times), tuple(values))
+    sign = ">" if farthest is max else "<"
+    return Clause(lambda names: f"({names[margin]} {sign} 0)",
+                  lambda found: any(item.holds(found) for item in clauses), (margin,), spans)  # fmt: skip
+
+
 def prevailing(actions: list[tuple[Clause, Any]], names: dict[Source, str]) -> dict[Any, str]:
     """Value -> formula that is 1 where an action sets the value and no later action sets another value.
 
     actions : pairs (clause, value) in the order of precedence, the last prevails
     """
-    formulas: dict[Any, list[str]] = {}
-    for k, (clause, value) in enumerate(actions):
-        later = [other for other, result in actions[k + 1 :] if result != value]
-        factors = [clause.text(names), *(f"(1 - {other.text(names)})" for other in later)]
-        formulas.setdefault(value, []).append("*".join(factors))
-    return {value: terms[0] if len(terms) == 1 else f"1 - {'*'.join(f'(1 - {term})' for term in terms)}"
-            for value, terms in formulas.items()}  # fmt: skip
+    formulas: dict[Any, str] = {}
+    for value in dict.fromkeys(value for _, value in actions):
+        formula = ""
+        for clause, result in actions:
+            text = clause.text(names)
+            if result != value:
+                formula = formula and f"{formula}*(1 - {text})"
+            else:
+                formula = f"(1 - (1 - {formula})*(1 - {text}))" if formula else text
+        formulas[value] = formula
+    return formulas

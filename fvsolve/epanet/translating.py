@@ -107,6 +107,11 @@ class Translation:
         return [f"{text} ({listing(names)})" for text, names in self.notes if text in self.reasons]
 
     @property
+    def start_causes(self) -> list[str]:
+        """Notes on what makes heads or flows differ from EPANET at the start alone."""
+        return []
+
+    @property
     def notes(self) -> list[tuple[str, list[str]]]:
         """Differences from EPANET : list of (text, EPANET's names)."""
         return list(self.notes_by_text.items())

@@ -253,7 +253,7 @@ class Balance:
         of its input, which blocks with `initial` pass on. The levels of tanks at the start do not depend on blocks.
         """
         blocks, numbers = list(self.blocks.values()), {name: k for k, name in enumerate(self.blocks)}
-        static = [isinstance(control_rows_of(type(block.control)), StaticRows) for block in blocks]
+        static = [control_rows_of(type(block.control)).is_static(block.control) for block in blocks]
         rows = dict(zip([probe.text for probe in self.packed.sensors], self.packed.sensor_table, strict=True))
         tables = self.packed.tables
         ahead = {int(tables.pieces[first, 2]) for first, count in tables.schedules.tolist() if count == 0}

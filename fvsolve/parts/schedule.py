@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -115,6 +115,8 @@ class Scheduled(Value):
             return constant(self._read_number(given, setting))
         if "signal" in given:
             return self._read_signal(given, setting)
+        if "sum" in given:
+            return self._read_sum(given, setting)
         if "formula" in given:
             return self._read_formula(given, setting, given)
         if "control" in given:
@@ -151,6 +153,7 @@ class Scheduled(Value):
                 "kind": kind,
             },
             "signal": {"signal": (Text(), NEEDED), "factor": (Quantity(self.dimension), None)},
+            "sum": {"sum": (Summands(replace(self, range=val.anything)), NEEDED)},
             "control": {"control": (Text(), NEEDED)},
             "formula": {"formula": (Text(), NEEDED), "unit": (Text(), "")},
         }  # fmt: skip
@@ -236,7 +239,7 @@ class Scheduled(Value):
         shared = setting.signals[name]
         if text := signal_fault(shared):
             raise ValueFault([((val.ROOT, "signals", name), text)])
-        if isinstance(shared, dict) and "signal" in shared:
+        if isinstance(shared, dict) and ("signal" in shared or "sum" in shared):
             raise ValueFault(
                 [(("signal",), f"signal {show(name)} refers to another signal; expected a signal with values")]
             )
@@ -273,6 +276,18 @@ class Scheduled(Value):
             schedule = replace(schedule, wave=(factor * mean, factor * amplitude, *rest))
             value = np.sort(value)
         return replace(schedule, value=value, origin={"signal": name, "factor": factor})
+
+    def _read_sum(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
+        setting.lookups += 1
+        try:
+            schedule = total(read_keys(given, self.forms["sum"], setting)["sum"])
+            for bound in (schedule.value.min(), schedule.value.max()):
+                self.range.check(float(bound), float(bound))
+        except ValueFault:
+            raise
+        except ValueError as error:
+            raise ValueFault([(("sum",), str(error))]) from None
+        return schedule
 
     def _read_formula(self, given: dict[str, Any], setting: ReadContext, origin: Any) -> Schedule:
         setting.lookups += 1  # its range depends on the times of the run
@@ -334,3 +349,44 @@ class Scheduled(Value):
             if needed:
                 raise ValueFault([]) from None  # the block has the fault
         return Schedule("control", (-np.inf, np.inf), reach, origin={"control": name})
+
+
+@dataclass(frozen=True)
+class Summands(Value):
+    """List of schedules whose values are added: constants, and tables or signals of steps or of straight lines."""
+
+    item: Scheduled
+    schema: ClassVar[dict[str, Any]] = {
+        "type": "array", "items": {"type": ["number", "string", "object"]}, "minItems": 1
+    }  # fmt: skip
+
+    def read(self, given: Any, setting: ReadContext) -> list[Schedule]:
+        if not isinstance(given, (list, tuple)) or not given:
+            raise ValueError(f"{show(given)} is not a list of schedules; expected for example two signals with factors")
+
+        def read(entry: Any) -> Schedule:
+            schedule = self.item.read(entry, setting)
+            if schedule.kind not in ("constant", "step", "linear"):
+                text = f"is a schedule of the kind {schedule.kind}, which takes no sum"
+                raise ValueError(f"{text}; expected constants, and tables of steps or of straight lines")
+            return schedule
+
+        return list(val.read_each(enumerate(given), read).values())
+
+
+def total(parts: list[Schedule]) -> Schedule:
+    """Sum of constants and of tables, all of steps or all of straight lines. Raises ValueError if there are both."""
+    kinds = sorted({part.kind for part in parts} - {"constant"})
+    origin = {"sum": [part.table() for part in parts]}
+    if len(kinds) > 1:
+        raise ValueError("has tables of steps and of straight lines; expected tables of one kind")
+    if not kinds:
+        return Schedule("constant", (0.0,), (sum(part.first for part in parts),), origin=origin)
+    times = np.unique(np.concatenate([part.time for part in parts if not part.constant]))
+    value = np.zeros(times.size)
+    for part in parts:
+        if part.kind == "linear":
+            value += np.interp(times, part.time, part.value)
+        else:
+            value += part.value[np.maximum(np.searchsorted(part.time, times, side="right") - 1, 0)]
+    return Schedule(kinds[0], times, value, origin=origin)

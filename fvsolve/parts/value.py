@@ -21,7 +21,7 @@ ROOT = object()  # in the key path of a fault: the following keys start at the t
 NEEDED = object()  # instead of a default: the key is required
 
 OF_TIME = re.compile(r"[*/+(-] ?t\b(?![\w.])|(?<![\w.])t ?[*/+)<>^-]")  # formula with the name t
-CHANGING = ("control", "formula", "signal", "time")  # keys of schedules
+CHANGING = ("control", "formula", "signal", "sum", "time")  # keys of schedules
 
 PLAIN = re.compile(r"[+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)? ")  # a number before its unit
 GREATEST_WHOLE = 10**15  # of a whole number; floats contain it exactly

@@ -1,4 +1,6 @@
-"""Signals with a factor: the numbers of a pattern times a quantity of the key."""
+"""Signals with a factor: the numbers of a pattern times a quantity of the key; sums of such signals."""
+
+import tomllib
 
 import numpy as np
 import pytest
@@ -60,4 +62,47 @@ def test_a_wrong_factor_is_told_at_its_place():
     case = filling(0.01, signals={"day": PATTERN})
     case["links"]["gate"]["opening"] = {"signal": "day", "factor": 1.0}
     with pytest.raises(CaseError, match=r"gives values from 0.5 to 1.5"):
+        fvsolve.load(case)
+
+
+@pytest.mark.parametrize("kind", ["step", "linear"])
+def test_a_sum_is_the_table_of_the_added_values(kind):
+    night = {"time": [5.0, 10.0, 25.0], "value": [2.0, 4.0, 1.0], "kind": kind}
+    day = PATTERN | {"kind": kind}
+    parts = [{"signal": "day", "factor": "20 l/s"}, {"signal": "night", "factor": "5 l/s"}, "1 l/s"]
+    times = [0.0, 5.0, 10.0, 20.0, 25.0]
+    if kind == "step":
+        values = [0.031, 0.031, 0.051, 0.031, 0.016]
+    else:
+        values = [0.02 * np.interp(t, day["time"], day["value"]) + 0.005 * np.interp(t, night["time"], night["value"])
+                  + 0.001 for t in times]  # fmt: skip
+    case = filling({"sum": parts}, signals={"day": day, "night": night})
+    found, exact = fvsolve.run(case), fvsolve.run(filling({"time": times, "value": values, "kind": kind}))
+    assert found["gate.flow"] == pytest.approx(exact["gate.flow"], rel=1e-13)
+    again = fvsolve.load(tomllib.loads(fvsolve.load(case).resolved()))
+    assert again.nodes["spring"].flow == fvsolve.load(case).nodes["spring"].flow
+
+
+@pytest.mark.parametrize(
+    ("given", "place", "message"),
+    [
+        ({"sum": 3.0}, "sum", "is not a list of schedules"),
+        ({"sum": []}, "sum", "is not a list of schedules"),
+        ({"sum": [0.01, "3 m"]}, "sum[1]", "expected a flow"),
+        ({"sum": [0.01, FORMS["ramp"]]}, "sum[1]", "takes no sum"),
+        ({"sum": [PATTERN, FORMS["linear"]]}, "sum", "tables of steps and of straight lines"),
+        ({"sum": [{"signal": "loop"}]}, "sum[0].signal", "refers to another signal"),
+    ],
+)
+def test_a_wrong_sum_is_told_at_its_place(given, place, message):
+    with pytest.raises(CaseError) as caught:
+        fvsolve.load(filling(given, signals={"loop": {"sum": [{"signal": "loop"}]}} if "loop" in str(given) else {}))
+    (fault,) = caught.value.faults
+    assert fault.place == f"nodes.spring.flow.{place}" and message in fault.message
+
+
+def test_a_sum_out_of_range_is_told():
+    case = filling(0.01, signals={"day": PATTERN})
+    case["links"]["gate"]["opening"] = {"sum": [{"signal": "day", "factor": 0.6}, 0.3]}
+    with pytest.raises(CaseError, match=r"links.gate.opening.sum"):
         fvsolve.load(case)

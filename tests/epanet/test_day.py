@@ -1,5 +1,6 @@
 """EPANET over a day: levels of tanks and switches agree with EPANET 2.2 at a hydraulic step of 2 s."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import fvsolve
 wntr = pytest.importorskip("wntr", reason="WNTR, the extra `epanet`, is not installed")
 
 from fvsolve.epanet import import_network, toolkit_run  # noqa: E402
+from fvsolve.epanet.self_check import check_start  # noqa: E402
 
 SHIPPED = Path(wntr.__file__).parent / "library" / "networks"
 SAME, SOON = 1e-3, 2.0  # levels [m] and times of switches [s] agree to within these
@@ -156,6 +158,14 @@ IF SYSTEM TIME > 12
 AND SYSTEM TIME < 15
 THEN PIPE p3 STATUS IS CLOSED
 ELSE PIPE p3 STATUS IS OPEN"""
+# Levels in windows of two hours of the clock; the last is until 24:00, which EPANET's clock never reaches
+WINDOWS = "".join(
+    f"RULE {name}-{hour}\nIF SYSTEM CLOCKTIME >= {hour}\nAND SYSTEM CLOCKTIME < {hour + 2}\n"
+    f"AND TANK tower LEVEL {relation} {level + 0.05 * (hour % 6):.2f}\nTHEN PUMP lift STATUS IS {action}\n"
+    f"PRIORITY {priority}\n"
+    for hour in range(0, 24, 2)
+    for name, relation, level, action, priority in (("on", "BELOW", 2.6, "OPEN", 1), ("off", "ABOVE", 3.4, "CLOSED", 5))
+)
 CASES = {
     "levels": ({"controls": LEVELS}, ["lift"], ["relay"]),
     "times": ({"controls": "LINK p3 CLOSED AT TIME 2:15\nLINK p3 OPEN AT TIME 7.5\n"
@@ -163,6 +173,11 @@ CASES = {
     "mixed": ({"controls": "LINK lift CLOSED IF NODE tower ABOVE 4.2\nLINK lift OPEN AT TIME 9"},
               ["lift"], ["latch", "function", "function"]),
     "rules": ({"rules": RULES}, ["lift", "p3"], ["latch", "function", "function"]),
+    "windows": ({"rules": WINDOWS, "drawn": 10}, ["lift"], ["latch", "function", "function", "pi", "pi"]),
+    "alternating windows": ({"rules": re.sub("PRIORITY.*\n", "", WINDOWS), "drawn": 10},
+                            ["lift"], ["latch", "function", "function", "pi", "pi"]),
+    "until 24:00": ({"rules": "RULE 1\nIF SYSTEM CLOCKTIME >= 22\nAND SYSTEM CLOCKTIME < 24\n"
+                              "THEN PUMP lift STATUS IS CLOSED\nELSE PUMP lift STATUS IS OPEN"}, ["lift"], []),
     "speed": ({"controls": LEVELS.replace("CLOSED", "0.8").replace("OPEN", "1.05"), "speed": "SPEED 1.05"},
               [], ["relay"]),
     "shut": ({"status": "Closed", "controls": LEVELS}, ["lift"], ["relay"]),
@@ -214,3 +229,23 @@ def test_patterns_are_signals_and_the_command_writes_the_case(tmp_path, fvs):
     assert all("wave_speed" not in link for link in case["links"].values())
     code, *_ = fvs("import", path, tmp_path / "town.toml", "--day")
     assert code == 0 and (tmp_path / "town.toml").read_text() == imported.text
+
+
+def test_a_rule_that_holds_at_the_start_explains_the_start_alone(tmp_path):
+    rules = "RULE 1\nIF TANK tower LEVEL BELOW 4\nTHEN PUMP lift STATUS IS CLOSED"
+    path, imported = town(tmp_path, rules=rules)
+    start = check_start(imported, fvsolve.load(tomllib.loads(imported.text)))
+    assert start.agrees and any(item.above for item in start.compared)
+    assert "a rule that holds at the start" in start.causes[0] and "lift" in start.causes[0]
+    assert imported.causes == []  # the day must agree
+    agree(path, imported, ours(imported, tmp_path, **{"numerics.end": "3 h"}), [])
+
+
+def test_demands_of_several_patterns_are_sums_of_signals(tmp_path):
+    path, _ = town(tmp_path)
+    text = path.read_text().replace("[RESERVOIRS]", "[DEMANDS]\nb 4 day\nb 2 night\nb 1 night\nc 3 night\n[RESERVOIRS]")
+    path.write_text(text)
+    imported = import_network(path, day=True)
+    factors = [{"signal": "pattern-day", "factor": "4 l/s"}, {"signal": "pattern-night", "factor": "3 l/s"}]
+    assert tomllib.loads(imported.text)["nodes"]["b"]["demand"] == {"sum": factors}
+    agree(path, imported, ours(imported, tmp_path), [])

@@ -20,6 +20,9 @@ class PiRows(ControlRows, kind="pi"):
     def states(self, control):
         return ("integral",) * control.integrates + ("derivative",) * (derivative(control)[0] != 0.0)
 
+    def is_static(self, control):
+        return not self.states(control)
+
     def scales(self, control, change):
         return [change[1]] * control.integrates + [change[0]] * (derivative(control)[0] != 0.0)
 
