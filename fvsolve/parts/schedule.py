@@ -13,7 +13,7 @@ from fvsolve.parts.formula_intervals import find_outside
 from fvsolve.parts.formula_program import Program, is_formula, program_in
 from fvsolve.parts.table_model import keys_json, read_keys
 from fvsolve.parts.value import NEEDED, Choice, Number, Quantity, Range, ReadContext, Rows, Text, Value, ValueFault
-from fvsolve.units import DIMENSIONS, begins_as_quantity, expected, show
+from fvsolve.units import DIMENSIONS, UNITS, begins_as_quantity, expected, may_be_gauge, show
 
 KINDS = ("linear", "step", "smooth")
 AMPLITUDE_DIMENSIONS = {
@@ -279,6 +279,11 @@ class Scheduled(Value):
 
     def _read_sum(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
         setting.lookups += 1
+        base = DIMENSIONS[self.dimension].base or self.dimension
+        offsets = any(unit.offset for unit in UNITS.values() if unit.dimension == base)
+        if offsets or may_be_gauge(self.dimension):
+            text = f"a {self.dimension} takes no sum, because its units count from different zeros"
+            raise ValueFault([(("sum",), f"{text}; expected one table of values")])
         try:
             schedule = total(read_keys(given, self.forms["sum"], setting)["sum"])
             for bound in (schedule.value.min(), schedule.value.max()):

@@ -8,6 +8,8 @@ from reference.scenes import inflow, scene, tank, valve
 
 import fvsolve
 from fvsolve.errors import CaseError
+from fvsolve.parts.schedule import Scheduled
+from fvsolve.parts.value import ReadContext, ValueFault
 
 PATTERN = {"time": [0.0, 10.0, 20.0], "value": [1.0, 1.5, 0.5], "kind": "step"}
 FORMS = {
@@ -99,6 +101,14 @@ def test_a_wrong_sum_is_told_at_its_place(given, place, message):
         fvsolve.load(filling(given, signals={"loop": {"sum": [{"signal": "loop"}]}} if "loop" in str(given) else {}))
     (fault,) = caught.value.faults
     assert fault.place == f"nodes.spring.flow.{place}" and message in fault.message
+
+
+@pytest.mark.parametrize(("dimension", "one"), [("pressure", "1 barg"), ("temperature", "15 degC")])
+def test_values_whose_units_have_different_zeros_take_no_sum(dimension, one):
+    with pytest.raises(ValueFault) as caught:
+        Scheduled(dimension).read({"sum": [one, one]}, ReadContext())
+    ((place, message),) = caught.value.faults
+    assert place == ("sum",) and "takes no sum" in message
 
 
 def test_a_sum_out_of_range_is_told():
