@@ -7,6 +7,7 @@ norm.
 """
 
 from collections import Counter, defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -110,8 +111,8 @@ def solve_steady(held: np.ndarray, demand: np.ndarray, edges: list[Edge], scale:
             result.potential[problem.nodes], result.flow[problem.own] = problem.potential, problem.flow
             result.converged &= problem.converged
             result.split |= problem.split
-            if problem.split and problem.weakest >= len(problem.active):
-                result.undetermined.append(int(problem.nodes[problem.unknown[problem.weakest - len(problem.active)]]))
+            if problem.split and (weakest := int(np.abs(problem.open_part()).argmax())) >= len(problem.active):
+                result.undetermined.append(int(problem.nodes[problem.unknown[weakest - len(problem.active)]]))
     return result
 
 
@@ -149,11 +150,8 @@ class _Problem:
 
     def __init__(self, held, demand, edges, scale, potential) -> None:
         self.held, self.demand, self.scale, self.potential = held, demand, scale, potential
-        self.converged, self.split, self.weakest = (
-            True,
-            False,
-            -1,
-        )  # weakest : unknown that a singular system leaves open
+        self.converged, self.split = True, False
+        self.open_part: Callable[[], np.ndarray] = lambda: np.zeros(1)  # of the last singular system
         quiet = _quiet(held, demand, edges)
         self.edges = [
             replace(edge, row=None, flow=0.0, drop=lambda flow: 0.0) if e in quiet else edge
@@ -410,7 +408,7 @@ def _solve(places, values, right, matrices, size, problems) -> np.ndarray:
     """Solutions of the Newton systems of n problems; the least-squares solution of least norm where one is singular.
 
     `split` of a problem is set to True for a singular system, and for a large system also if it is not square, and
-    `weakest` to the unknown that such a system determines least.
+    `open_part` to a function that gives the vector of unknowns that such a system leaves open.
     places : index of each of the `values` in a matrix, row * size + column; values : float64[n, entries]
     right : float64[n, rows]  right-hand sides; matrices : float64[n, rows, size], None for large systems
     size : number of unknowns. A solution is NaN if a number in its values or right-hand side is not finite.
@@ -426,29 +424,30 @@ def _solve(places, values, right, matrices, size, problems) -> np.ndarray:
     solutions = np.full((len(problems), size), np.nan)
     for k in np.flatnonzero(finite):
         if matrices is not None:
-            solutions[k], weakest = _solve_dense(matrices[k], right[k])
+            solutions[k], open_part = _solve_dense(matrices[k], right[k])
         else:
-            solutions[k], weakest = _solve_sparse(values[k], places // size, places % size, right[k], size)
-        if weakest >= 0:
-            problems[k].split, problems[k].weakest = True, weakest
+            solutions[k], open_part = _solve_sparse(values[k], places // size, places % size, right[k], size)
+        if open_part is not None:
+            problems[k].split, problems[k].open_part = True, open_part
     return solutions
 
 
 def _solve_dense(matrix, right):
-    """Solution of least norm of a small system A x = b : (x, unknown that a singular system leaves open, else -1)."""
+    """Solution of least norm of a small system A x = b : (x, function that gives `open_part` of a singular one)."""
     if len(right) == matrix.shape[1]:
         try:
             solution = np.linalg.solve(matrix, right)
             if np.isfinite(solution).all() and np.abs(matrix @ solution - right).max() < 1e-6:
-                return solution, -1
+                return solution, None
         except np.linalg.LinAlgError:
             pass
     solution, _, rank, _ = np.linalg.lstsq(matrix, right, rcond=1e-12)
-    return solution, int(np.abs(np.linalg.svd(matrix)[2][-1]).argmax()) if rank < matrix.shape[1] else -1
+    regular = rank == matrix.shape[1]
+    return solution, None if regular else lambda: np.linalg.svd(matrix)[2][-1]  # which costs more than the solution
 
 
 def _solve_sparse(values, i, j, right, size):
-    """Solution of a large sparse system A x = b : (x, unknown that the system leaves open, -1 for none).
+    """Solution of a large sparse system A x = b : (x, function that gives `open_part`, None if it is regular).
 
     values, i, j : entries of A with their rows and columns, entries at the same place are added; right : b
     size : number of unknowns
@@ -463,15 +462,19 @@ def _solve_sparse(values, i, j, right, size):
         try:
             solution = splu(matrix).solve(right)
             if np.all(np.isfinite(solution)) and np.max(np.abs(matrix @ solution - right)) < 1e-6:
-                return solution, -1
+                return solution, None
         except RuntimeError:  # singular
             pass
     system = bmat([[identity(len(right)), matrix], [matrix.T, -DAMPING * identity(size)]], format="csc")
     factors = splu(system)
-    # any right-hand side without symmetry: what the equations leave open dominates its solution
-    open_part = factors.solve(np.concatenate((np.zeros(len(right)), np.sin(np.arange(1.0, size + 1.0)))))[len(right) :]
+
+    def open_part() -> np.ndarray:
+        # any right-hand side without symmetry: what the equations leave open dominates its solution
+        mixed = np.sin(np.arange(1.0, size + 1.0))
+        return factors.solve(np.concatenate((np.zeros(len(right)), mixed)))[len(right) :]
+
     solution = factors.solve(np.concatenate((right, np.zeros(size))))[len(right) :]
-    return solution, int(np.abs(open_part).argmax())
+    return solution, open_part
 
 
 def _through_shut(problem) -> None:
