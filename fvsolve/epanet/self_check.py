@@ -169,6 +169,18 @@ def uphill_breakers(network: EpanetNetwork, solutions: list[EpanetSolution]) -> 
     return [f"PBV raises the head along a negative flow, which a loss cannot do ({listing(found)})"] if found else []
 
 
+def feeding_emitters(network: EpanetNetwork, solutions: list[EpanetSolution]) -> list[str]:
+    """Cause of differences if emitters above their pressure feed the network in EPANET at some time; as a list."""
+    if not network.options["emitter_backflow"]:
+        return []
+    found = [
+        name
+        for name, node in network.nodes.items()
+        if node.emitter and min(solution.head[name] for solution in solutions) < node.elevation - MOST_HEAD
+    ]
+    return [f"EPANET lets emitters above their pressure feed the network ({listing(found)})"] if found else []
+
+
 def cycling_tanks(events: list[dict[str, Any]]) -> list[str]:
     """Cause of differences if valves at full or empty tanks open again and again over a day; as a list."""
     opened = Counter(event["name"] for event in events if "-altitude" in event["name"] and event["what"] == "opens")
@@ -235,6 +247,7 @@ def check_day(imported: Imported, case: Any) -> SelfCheck:
     compared = _compared_days(network, series, days, times)
     events = result.summary["events"]
     causes = imported.causes + extreme_heads(network, days) + uphill_breakers(network, days)
+    causes = causes + feeding_emitters(network, days)
     if not any(item.above for item in compared if item.quantity == "levels"):  # a cycle at a limit keeps the levels
         causes = causes + cycling_tanks(events) + crossed_limits(network, days)
     causes = causes + switches_at_limits(events)

@@ -179,6 +179,8 @@ VALVE = record(
     chained=i8,  # 1: in a cluster with quasi-steady pipes; the other links at its junctions limit its rate
     level_start=i8,  # 1: Newton starts from equal potentials at both ends, those of the end outside the cluster
     flow_given=i8,  # 1: nothing else joins a junction at its end, so its flow is given there and has no rate
+    one_way=i8,  # BOTH_WAYS, or OUTWARD: only to its end `to`, a known pressure; OUTWARD_DEMAND: a demand flows so
+    begins=f8,  # drop below which an outward link has no flow [Pa]
     conductance=f8,  # 2 rho (Cd A)^2 at full opening: M |M| = conductance * dp
     transition=f8,  # flow below which the law is laminar [kg/s]; 0 if pipes bound the slope of the root
     rounding_drop=f8,  # drop below which the law is laminar at any opening [Pa]: too small for error control
@@ -194,6 +196,7 @@ VALVE = record(
     flow=f8,  # of the profile [kg/s]
     drop=f8,  # of the profile [Pa]
 )
+BOTH_WAYS, OUTWARD, OUTWARD_DEMAND = range(3)
 TO_HELD, FROM_HELD, FLOW_HELD = range(3)  # held by a valve: pressure at its end `to`, or at `from`, or its flow
 NOT_HELD = 1e300  # in out[drive] of such a valve: it holds nothing at present
 

@@ -1,10 +1,12 @@
-"""Detection and pressure of isolated nodes, which only closed valves join to the rest of the network.
+"""Detection and pressure of isolated nodes, which only closed or outward valves join to the rest of the network.
 
 No flow passes there, so any pressure would satisfy the balance. The pressure chosen is that at which equal small leaks
 would balance: sum of sqrt|dP| over the closed valves, each with the sign of its drop dP, is zero. P = p + rho g z.
 A demand there is not supplied: it becomes zero, and its nodes drain to ambient pressure at the lowest demand. If a node
 beyond a closed valve has a lower potential, they drain to `OPENING` below it, so that a self-acting valve from there
 opens. An inflow drives them above the nodes beyond the closed valves; if no valve opens, it finds no way out.
+Outward valves only let fluid out (leaks, demands that depend on pressure), so they supply nothing. Nodes without an
+inflow drain through open outward valves to the lowest potential at which the flow of one begins.
 
 Arguments common to these functions: `cluster`, row of a cluster (nodes that are solved together); g : conductances of
 its valves [kg2/s2/Pa], 0 if closed, -1 if open at isolated nodes; connected : 0 for its isolated nodes; group : group
@@ -14,7 +16,15 @@ number of each of its nodes.
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import JUNCTION, LAW_LINEAR, NO_SOLUTION, STATUS, WHERE
+from fvsolve.kernels.dtypes import (
+    BOTH_WAYS,
+    JUNCTION,
+    LAW_LINEAR,
+    NO_SOLUTION,
+    OUTWARD_DEMAND,
+    STATUS,
+    WHERE,
+)
 
 DEMAND_ROUNDING = 1e-9  # relative demand that an isolated node may have: rounding
 OPENING = 100.0  # potential below a neighbour at which self-acting valves open, above their margins [Pa]
@@ -22,6 +32,8 @@ RISE = 1e6  # potential of an inflow without a way out above the nodes beyond cl
 # Codes of nodes in `out`: joined to a pipe or to a known pressure; isolated without demand, so that nothing determines
 # the pressure; isolated beside nodes with demand or inflow; isolated with a demand, which is not supplied.
 JOINED, UNDETERMINED, DRAINED, UNSUPPLIED = 0.0, 1.0, 2.0, 3.0
+NO_LEVEL = 1e299  # in place of a potential: no node lies beyond the closed valves, and no outward valve is open [Pa]
+FED = -1.0  # in place of `connected`: fluid flows into a group, so outward valves join it to ambient
 
 
 @njit(forceinline=True)
@@ -56,10 +68,11 @@ def join(group, i, j):
 
 
 @njit
-def find_connected(cluster, tables, g, connected, group):
+def find_connected(cluster, tables, c, g, connected, group):
     """Set connected[i] to 1 if open valves join node i of a cluster to a pipe or to a known pressure, else to 0.
 
-    group : float64[nodes]  work array
+    An outward valve joins nodes to a known pressure only where fluid flows in: it cannot supply them.
+    c : given inflow of the nodes [kg/s]; group : float64[nodes]  work array
     """
     nodes, valves, integers = tables.nodes, tables.valves, tables.integers
     for i in range(group.size):
@@ -75,14 +88,40 @@ def find_connected(cluster, tables, g, connected, group):
     for i in range(connected.size):
         if nodes[integers[cluster["first_node"] + i]]["admittance"] > 0.0:
             connected[root_of(group, i)] = 1.0
+    outward = False
     for e in range(g.size):
         if g[e] > 0.0:
             valve = valves[integers[cluster["first_valve"] + e]]
             i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
-            if (i < 0) != (j < 0):
+            if (i < 0) != (j < 0) and valve["one_way"] == BOTH_WAYS:
                 connected[root_of(group, max(i, j))] = 1.0
+            outward = outward or valve["one_way"] != BOTH_WAYS
+    if outward:
+        connect_outward(cluster, tables, c, g, connected, group)
     for i in range(connected.size):
         connected[i] = connected[root_of(group, i)]
+
+
+@njit
+def connect_outward(cluster, tables, c, g, connected, group):
+    """Set connected[i] to 1 for the first node i of each group from which a given inflow leaves by outward valves.
+
+    The flow of a rigid column is such an inflow: it may change its sign. Arguments as for `find_connected`.
+    """
+    nodes, valves, integers = tables.nodes, tables.valves, tables.integers
+    for i in range(connected.size):
+        first = root_of(group, i)
+        fed = c[i] > 0.0 or nodes[integers[cluster["first_node"] + i]]["gates"] >= 0
+        if fed and connected[first] == 0.0:
+            connected[first] = FED
+    for e in range(g.size):
+        valve = valves[integers[cluster["first_valve"] + e]]
+        if g[e] > 0.0 and valve["one_way"] != BOTH_WAYS:
+            i = inner_row(nodes, valve["from_node"])
+            if i >= 0 and connected[root_of(group, i)] == FED:
+                connected[root_of(group, i)] = 1.0
+    for i in range(connected.size):
+        connected[i] = 1.0 if connected[i] == 1.0 else 0.0
 
 
 @njit
@@ -204,19 +243,41 @@ def mark_isolated(cluster, tables, out, g, c, connected, group, scale, work):
         if not (c[i] <= 0.0 and c[i] == out[layout["supply"] + node]):
             drawn[number] = 0.0
     for number in range(n):
-        if connected[number] > 0.0 or group[number] != number or abs(totals[number]) <= DEMAND_ROUNDING * scale:
+        if connected[number] > 0.0 or group[number] != number:
             continue
-        low, high = potentials_beyond(cluster, tables, out, leaks, connected, group, number)
-        level = low - OPENING if totals[number] < 0.0 else high + RISE
-        if drawn[number] == 0.0:
+        level = outlet_level(cluster, tables, out, g, group, number)
+        given = abs(totals[number]) > DEMAND_ROUNDING * scale
+        if given and drawn[number] == 0.0:
+            low, high = potentials_beyond(cluster, tables, out, leaks, connected, group, number)
+            level = low - OPENING if totals[number] < 0.0 else high + RISE
             out[STATUS], out[WHERE] = NO_SOLUTION, integers[cluster["first_node"] + number]
-        else:
-            level = drain(cluster, tables, out, group, number, level)
+        elif given:
+            low, _ = potentials_beyond(cluster, tables, out, leaks, connected, group, number)
+            level = drain(cluster, tables, out, group, number, min(level, low - OPENING))
         for i in range(n):
             node = integers[cluster["first_node"] + i]
-            if group[i] == number and abs(level) < 1e299:  # there are nodes beyond closed valves
+            if group[i] == number and abs(level) < NO_LEVEL:
                 out[layout["pressure"] + node] += level - total_pressure(tables, out, node)
                 out[layout["isolated"] + node] = max(out[layout["isolated"] + node], DRAINED)
+
+
+@njit
+def outlet_level(cluster, tables, out, g, group, number):
+    """Potential [Pa] to which the open outward valves of a group of isolated nodes drain it; NO_LEVEL without any.
+
+    The codes of nodes with an outward demand become UNSUPPLIED.
+    """
+    valves, integers, level = tables.valves, tables.integers, NO_LEVEL
+    for e in range(g.size):
+        valve = valves[integers[cluster["first_valve"] + e]]
+        if valve["one_way"] == BOTH_WAYS or g[e] >= 0.0:
+            continue
+        i = inner_row(tables.nodes, valve["from_node"])
+        if i >= 0 and group[i] == number:
+            level = min(level, total_pressure(tables, out, valve["to_node"]) + valve["begins"])
+            if valve["one_way"] == OUTWARD_DEMAND:
+                out[tables.layout[0]["isolated"] + valve["from_node"]] = UNSUPPLIED
+    return level
 
 
 @njit

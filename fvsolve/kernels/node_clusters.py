@@ -749,7 +749,7 @@ def begin_clusters(out, tables, space):
         change[k], wide[k] = 1e300, 1.0
         if done[k] == 0.0:
             begin_level(cluster, tables, out)
-        find_connected(cluster, tables, g[b:j], connected[a:i], group[a:i])
+        find_connected(cluster, tables, c[a:i], g[b:j], connected[a:i], group[a:i])
         zero_isolated(cluster, tables, g[b:j], m[b:j], connected[a:i])
         a, b = i, j
 
@@ -892,7 +892,7 @@ def solve_cluster(out, tables, index):
     from_accepted = tables.accepted.size > 0 and cluster["order"] >= 0
     if from_accepted and not undisturbed:
         begin_accepted(cluster, tables, out, g, m)
-    find_connected(cluster, tables, g, connected, group)
+    find_connected(cluster, tables, c, g, connected, group)
     zero_isolated(cluster, tables, g, m, connected)
     change, flows, wide, limits, out[FIRM] = 1e300, 0.0, True, group[:0], 0.0
     for sweep in range(MAX_SWEEPS + LIMITED_SWEEPS):

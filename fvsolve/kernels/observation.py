@@ -195,7 +195,7 @@ def record_unsupplied(t, out, tables, i):
         valve = tables.valves[k]
         a = out[layout["isolated"] + valve["from_node"]] >= DRAINED
         b = out[layout["isolated"] + valve["to_node"]] >= DRAINED
-        if a != b and marks[first + k] != marks[first + k]:
+        if a != b and valve["one_way"] == rec.BOTH_WAYS and marks[first + k] != marks[first + k]:
             marks[first + k] = t
 
 

@@ -48,7 +48,7 @@ class Junction(PlaceOnBody, kind="junction"):
 
         full = float(self.demand.value.max())
         law = {"flow": full, "exponent": self.demand_exponent, "opening": self.demand, "full": full, "most": 1.0}
-        law |= {"least": self.minimum_pressure, "upper": self.required_pressure}
+        law |= {"least": self.minimum_pressure, "upper": self.required_pressure, "demand": True}
         places, links = outlet_to_ambient(f"{name}.demand", name, **law)
         return {name: self.model_copy(update={"demand": constant(0.0), "required_pressure": None}), **places}, links
 

@@ -421,10 +421,11 @@ def set_step_mode(control, model: Model) -> None:
     Without waves nothing is fast after a switch: steps then keep their length, which only their error limits.
     """
     numerics = model.case.numerics
-    control["keeps_step"] = model.shapes.accepted > 0
     for mode, key in enumerate(("courant", "step", "rtol")):  # COURANT, FIXED_STEP, TOLERANCE of `loop_records`
         if getattr(numerics, key) is not None:
             control["mode"], control["size"] = mode, getattr(numerics, key)
+    # given steps begin anew after a switch: full steps end at multiples of the step after its beginning
+    control["keeps_step"] = model.shapes.accepted > 0 and control["mode"] == loop_records.TOLERANCE
 
 
 def cost_of_rates(model: Model) -> float:

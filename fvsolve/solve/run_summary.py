@@ -220,8 +220,7 @@ def unsupplied_demands(
         own = np.flatnonzero(first == begin)
         names = [model.node_names[i] for i in own]
         losses += [Event(begin, name, "loses its supply") for name in names]
-        demanded = sum(scheduled_volume(model.case.places[name].demand, *span) for name in names)
-        lack = demanded + float(entered[own].sum()) / model.case.properties.density
+        lack = sum(lacking_volume(model, name, span, entered) for name in names)
         amounts = f"{amount(lack, 'volume', 4)} lack" if np.isfinite(lack) else "the demand is not met"
         causes = listing([_shut_by(valves[k], begin, events) for k in np.flatnonzero(shut == begin)], 6)
         text = (f"{listing(names, 6)}: no open path supplies the demand between {amount(begin, 'time', 6)} and "
@@ -229,6 +228,14 @@ def unsupplied_demands(
                 "the pressure there is that of drained pipes")  # fmt: skip
         notices.append(Notice("unsupplied", f"nodes.{names[0]}", text, "demand", lack if np.isfinite(lack) else None))
     return notices, losses
+
+
+def lacking_volume(model: Model, name: str, span: tuple[float, float], entered: np.ndarray) -> float:
+    """Demand of a node over a run less the volume drawn [m3]; arguments as for `unsupplied_demands`."""
+    outlet = model.case.conduits.get(f"{name}.demand")  # of a demand that depends on pressure
+    demand = model.case.places[name].demand if outlet is None else outlet.opening
+    place = model.node_names.index(name if outlet is None else outlet.to)
+    return scheduled_volume(demand, *span) + float(entered[place]) / model.case.properties.density
 
 
 def undetermined_notices(run_data: RunData) -> list[Notice]:

@@ -4,6 +4,7 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import fvsolve
@@ -314,6 +315,61 @@ def test_a_level_equal_to_its_switch_counts_at_hour_0(tmp_path):
     imported, found = day_of(text, tmp_path)
     assert found.agrees and imported.solution.flow["lift"] > 0.01
     assert compared(imported, tmp_path).agrees
+
+
+EMPTIED = """[JUNCTIONS]
+b 8 {b}
+c 12 {c}
+end 8 0
+[RESERVOIRS]
+lake 5
+[TANKS]
+tower 40 3 0 5 6 0
+[PIPES]
+p1 tower b 300 200 110 0 Open
+p2 b c 300 150 110 0 Open
+p3 end b 500 200 110 0 Open
+[PUMPS]
+lift lake end HEAD h
+[CURVES]
+h 0 75
+h 20 65
+h 40 35
+[EMITTERS]
+{emitters}
+[CONTROLS]
+LINK lift OPEN AT TIME 10
+LINK lift CLOSED AT TIME 16
+[STATUS]
+lift Closed
+[TIMES]
+DURATION 24:00
+"""
+
+
+def test_demands_by_pressure_behind_an_empty_tower_end_and_return_as_in_epanet(tmp_path):
+    """The pressure of a town that only demands without flow join to ambient is that at its lowest demand."""
+    softness = "DEMAND MODEL PDA\nREQUIRED PRESSURE 20\nPRESSURE EXPONENT 0.5\n[END]"
+    text = EMPTIED.format(b=6, c=2, emitters="") + OPTIONS.replace("[END]", softness)
+    imported, found = day_of(text, tmp_path)
+    assert not found.fault and found.agrees and not found.causes
+    assert max(item.difference for item in found.compared) < 2e-3
+    run = fvsolve.run(
+        load(_case(imported, tmp_path), {"output.probes": ["b.head"], "output.units": {}}), pictures=False
+    )
+    network = network_file.run_epanet(imported.network, 86400, 10, [21600, 82800])
+    for solution in network.solutions:
+        assert solution.head["b"] == pytest.approx(8.0, abs=1e-3)
+        assert run["b.head"][np.searchsorted(run.t, solution.seconds)] == pytest.approx(8.0, abs=1e-3)
+    (note,) = [note for note in run.warnings if note.kind == "unsupplied"]
+    assert "tower-altitude (the tank is empty)" in note.text
+
+
+def test_emitters_that_feed_a_drained_town_in_epanet_are_named(tmp_path):
+    """Behind the empty tower the emitter at b leaks 0.57 l/s, which EPANET takes from the emitter above it, at c."""
+    _, found = day_of(EMPTIED.format(b=0, c=0, emitters="b 1.0\nc 0.3") + OPTIONS, tmp_path)
+    assert found.agrees and found.causes == ["EPANET lets emitters above their pressure feed the network (c)"]
+    assert found.compared[0].quantity == "levels" and found.compared[0].difference < 2e-3
 
 
 def test_a_tank_with_inlet_and_outlet_shuts_only_what_fills_it(tmp_path):

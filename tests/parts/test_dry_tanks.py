@@ -1,4 +1,4 @@
-"""Days of networks whose tanks run dry or full behind check valves: heads as in EPANET, demands without supply."""
+"""Days of networks whose tanks run dry or full: heads as in EPANET, demands and leaks without supply."""
 
 import numpy as np
 import pytest
@@ -170,3 +170,106 @@ def test_an_inflow_that_finds_no_way_out_still_stops_the_run():
     links = {"p3": main("tower-inlet", "b", 300.0, 0.2), "gate": altitude("tower", full_level=3.5)}
     run = fvsolve.run(day(nodes, links))
     assert not run.ok and run.reason.startswith("stopped: the inflow at b finds no way out at t = 14137")
+
+
+LACKING = 3600.0 * (6e-3 * 6.736782 + 2e-3 * 8.673568)  # demand of the town while its tower is dry [m3]
+# (level of the tower, head at b) by EPANET 2.2 at steps of 10 s, at hours [m]
+BY_EPANET = {3.0: (0.3262, 40.2525), 6.5: (0.0, 8.0), 9.5: (0.0, 8.0), 10.5: (2.0706, 44.3713), 15.5: (5.0, 79.2521),
+             16.5: (4.7963, 44.7640), 20.5: (0.8365, 40.7628), 23.5: (0.0, 8.0)}  # fmt: skip
+
+
+def supplied_by_a_tower(numerics: dict | None = None, pumped: bool = False) -> dict:
+    """Town b, c of demands by pressure, and a tower that runs dry; pumped : a lake fills it from 10 h to 16 h"""
+    nodes = {"b": junction(demand(6e-3), elevation=8.0, required_pressure="2 barg"),
+             "c": junction(2e-3, elevation=12.0, required_pressure="2 barg"),
+             "tower-inlet": junction(elevation=30.0), "tower": tank(SECTION, 3.0, elevation=40.0)}  # fmt: skip
+    links = {"tower-main": main("tower-inlet", "b", 300.0, 0.2), "b-c": main("b", "c", 300.0, 0.15),
+             "gate": altitude("tower", empty_level=0.0, full_level=5.0)}  # fmt: skip
+    if pumped:
+        nodes |= {"lake": lake(5.0), "delivery": junction(elevation=8.0)}
+        links["rising"] = main("delivery", "b", 500.0, 0.2)
+        links["pump"] = {"type": "pump", "from": "lake", "to": "delivery", "check_valve": True,
+                         "curve": {"flow": [0.0, 0.02, 0.04], "head": [75.0, 65.0, 35.0]},
+                         "speed": {"time": ["0 h", "10 h", "16 h"], "value": [0.0, 1.0, 0.0], "kind": "step"},
+                         }  # fmt: skip
+    return day(nodes, links, numerics)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("method", METHODS)
+def test_demands_by_pressure_cease_with_the_water_of_their_tower_and_return_with_the_pump(method, turned):
+    """Outlets without flow do not determine a pressure: no Newton step was found, and the run stopped at 3.51 h."""
+    case = supplied_by_a_tower({"method": method}, pumped=True)
+    run = fvsolve.run(restated(case) if turned else case)
+    (note,) = [note for note in run.warnings if note.kind == "unsupplied"]
+    assert run.ok and run.reason == "finished" and len(run.summary["events"]) < 12
+    assert [what for _, what in events_of(run, "gate")] == ["shuts: the tank is empty", "opens",
+                                                           "shuts: the tank is full", "opens",
+                                                           "shuts: the tank is empty"]  # fmt: skip
+    for hour, (level, head) in BY_EPANET.items():
+        k = np.searchsorted(run.t, hour * HOUR)
+        assert (run["tower.level"][k], run["b.head"][k]) == pytest.approx((level, head), abs=1e-3)
+    assert "gate (the tank is empty)" in note.text and "b, c" in note.text and "demand" not in note.place
+    assert note.value == pytest.approx(LACKING, rel=1e-5)
+    assert abs(run.ledger["mass"]["relative"]) < 1e-11 and run.ledger["mass"]["made_up"] < 1e-6
+    ledger = energy(case)
+    assert abs(ledger.remainder[-1]) < 1e-6 * ledger.throughput
+
+
+def with_leaks(case: dict) -> dict:
+    """The same town with leaks in place of its demands."""
+    for name, elevation in (("b", 8.0), ("c", 12.0)):
+        case["nodes"][name] = junction(elevation=elevation)
+        case["links"][f"leak-{name}"] = {"type": "leak", "from": name, "coefficient": 1e-5}
+    return case
+
+
+def with_a_hydrant(case: dict) -> dict:
+    """The same town with a hydrant at b in place of its demands."""
+    case["nodes"] |= {"b": junction(elevation=8.0), "c": junction(elevation=12.0)}
+    case["links"]["hydrant"] = {"type": "hydrant", "from": "b", "flow": 5e-3, "residual_pressure": "1 barg"}
+    return case
+
+
+def beside_a_fixed_demand(case: dict) -> dict:
+    """The same town with a demand at c that does not depend on pressure, at a lower place than b."""
+    case["nodes"]["c"] = junction(2e-3, elevation=6.0)
+    return case
+
+
+def under_the_law_log(case: dict) -> dict:
+    return {**case, "fluid": {**case["fluid"], "law": "log"}}
+
+
+@pytest.mark.parametrize(
+    ("change", "head", "unsupplied"),
+    [(with_leaks, 8.0, []), (with_a_hydrant, 8.0 + 1e5 / 9806.65, []), (beside_a_fixed_demand, 6.0, ["b, c"]),
+     (under_the_law_log, 8.0, ["b, c"])],
+)  # fmt: skip
+def test_what_draws_from_a_dry_tower_drains_the_town_to_the_lowest_level_of_outflow(change, head, unsupplied):
+    case = change(supplied_by_a_tower())
+    for told in (case, restated(case)):
+        run = fvsolve.run(told)
+        dry, _ = events_of(run, "gate")[0]
+        late = run.t > dry * HOUR
+        assert run.ok and len(run.summary["events"]) < 5
+        assert run["tower.level"][late] == pytest.approx(0.0, abs=1e-7)
+        assert run["b.head"][late] == pytest.approx(head, abs=1e-3)
+        texts = [note.text for note in run.warnings if note.kind == "unsupplied"]
+        assert [text.partition(":")[0] for text in texts] == unsupplied
+
+
+def test_a_spring_behind_a_dry_tower_leaves_through_the_demands():
+    """From 10 to 12 h a spring brings 1 l/s, which the demands take; before and after, nothing supplies them."""
+    case = supplied_by_a_tower()
+    spring = {"time": ["0 h", "10 h", "12 h"], "value": [0.0, 1e-3, 0.0], "kind": "step"}
+    case["nodes"]["spring"] = {"type": "inflow", "flow": spring, "elevation": 8.0}
+    case["links"]["spring-main"] = main("spring", "c", 50.0, 0.1)
+    run = fvsolve.run(case)
+    supplied = (run.t > 10.0 * HOUR) & (run.t < 12.0 * HOUR)
+    dry = (run.t > 4.0 * HOUR) & ~supplied & (run.t != 10.0 * HOUR) & (run.t != 12.0 * HOUR)
+    (note,) = [note for note in run.warnings if note.kind == "unsupplied"]
+    assert run.ok and np.all(run["b.head"][supplied] > 8.1)
+    assert run["b.head"][dry] == pytest.approx(8.0, abs=1e-9)
+    asked = HOUR * (6e-3 * 4.0 * sum(PATTERN) + 2e-3 * 24.0)
+    assert note.value == pytest.approx(asked - 3.0 * SECTION - 7.2, rel=1e-7)

@@ -334,3 +334,21 @@ def test_an_event_is_found_in_few_attempts_where_another_jumps_beyond_it():
     events = {event["name"]: event["time"] for event in found.summary["events"]}
     assert events["controls.stop"] < events["v"]
     assert found.summary["rhs"] < 7 * found.summary["steps"] + 7 * 12 * len(found.summary["events"])
+
+
+@pytest.mark.parametrize("method", ["euler", "rk4", "implicit-midpoint"])
+@pytest.mark.parametrize("step", [60.0, 300.0])
+def test_given_steps_miss_no_time_after_a_kink_or_an_event(method, step):
+    """After a kink between steps, or an event, the time went on to the next multiple of the step without flow."""
+    demand = {"time": [0.0, 1234.5], "value": [0.01, 0.015], "kind": "step"}
+    check = {"type": "check-valve", **SIZE}
+    case = town(check, demand=demand, source=32.0, method=method, step=step, end=20030.0)
+    del case["numerics"]["rtol"]
+    found = run(case)
+    (event,) = [event for event in found.summary["events"] if event["name"] == "v"]
+    assert event["what"] == "opens" and event["time"] % 60.0 > 1.0
+    drawn = 1234.5 * 0.01 + (20030.0 - 1234.5) * 0.015
+    by_node = found.ledger["mass"]["by_node"]
+    assert by_node["town"] == pytest.approx(-RHO * drawn, rel=1e-12)
+    fallen = 50.0 * (3.0 - found["tower.level"][-1])
+    assert fallen == pytest.approx(drawn - by_node["lake"] / RHO, rel=1e-9)

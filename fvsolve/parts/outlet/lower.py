@@ -39,6 +39,8 @@ class OutletRows(Restriction, kind="outlet"):
     def restriction(self, draft, name, link, row) -> None:
         row["schedule"] = draft.schedules.add(link.opening, 1.0 / link.full)
         row["conductance"] = (draft.fluid.density * link.flow) ** 2 / self.span(draft, link)
+        row["one_way"] = rec.OUTWARD_DEMAND if link.demand else rec.OUTWARD
+        row["begins"] = self.least(draft, link)
 
     def numbers(self, draft, name, link) -> list[float]:
         return [link.exponent, self.least(draft, link), self.span(draft, link), link.most]
@@ -75,6 +77,10 @@ class RelievingRows(Device, kind=""):
     def own_numbers(self, draft, name, part) -> list[float]:
         """Parameters of the law of the valve; for a valve to ambient, `numbers` puts those of an outlet before them."""
         raise NotImplementedError
+
+    def restriction(self, draft, name, link, row) -> None:
+        super().restriction(draft, name, link, row)
+        row["one_way"] = rec.OUTWARD if self.mode > 0 else rec.BOTH_WAYS
 
     def numbers(self, draft, name, part) -> list[float]:
         return [0.5, 0.0, SPAN, law_outlet.NO_LIMIT][: self.mode] + self.own_numbers(draft, name, part)

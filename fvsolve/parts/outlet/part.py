@@ -30,7 +30,7 @@ class Outlet(TwoPort):
     flow : flow at p = upper and opening = full [m3/s]; opening : schedule
     least : pressure from which flow begins [Pa], ambient pressure if None
     upper : pressure of the nominal flow [Pa], `span` above least if None, by default 1 bar; most : greatest value of
-    the power [-]
+    the power [-]; demand : True for the demand of a junction
     """
 
     kind: ClassVar[str] = "outlet"
@@ -43,6 +43,7 @@ class Outlet(TwoPort):
     most: float = float("inf")
     opening: Any = None
     full: float = 1.0
+    demand: bool = False
 
 
 def outlet_to_ambient(name: str, place: str, **law: Any) -> tuple[dict[str, Node], dict[str, Outlet]]:
