@@ -13,6 +13,8 @@ STEP_WIDTH = 1e-3  # difference of levels over which the area of a tank changes 
 OPEN, CLOSED = 1.0, 0.0
 MOST_SPEED = 3.0  # relative speed above which a setting is probably a power or a percentage
 FILTER = "10 s"  # time constant with which a block reads a head or a flow, which would follow its own action at once
+# Least time between two switches of a link by actions that hold on both sides of one level; in EPANET the time of rules
+REST = "1 min"
 # Set points of a regulating valve that a control holds open: heads of water [m], and a flow [m3/s]
 HELD_OPEN = {"PRV": 1e4, "PSV": -9.0, "FCV": 1e3}
 UNITS = {"PRV": "barg", "PSV": "barg", "FCV": "l/s"}
@@ -365,7 +367,7 @@ class DayTranslation(Translation):
             block = {"type": "relay", "input": self.probe(("level", tank)), "on": part_tables.quantity_text(on, "m"),
                      "off": part_tables.quantity_text(off, "m")}  # fmt: skip
         else:
-            block = self.latch(ours, actions, values[1])
+            block = self.latch(ours, actions, values[1], plain and switching.lacks_dead_band(actions))
         block["initial"] = int(state)
         if not plain:
             block["output"] = [text(item) for item in values]
@@ -386,8 +388,13 @@ class DayTranslation(Translation):
         self.controls[ours] = table | limits(values, text)
         return {"control": ours}
 
-    def latch(self, ours: str, actions: list[tuple[Clause, float]], value: float) -> part_tables.Part:
-        """Table of a latch that is on from an action that sets a value until one that sets another value."""
+    def latch(
+        self, ours: str, actions: list[tuple[Clause, float]], value: float, rests: bool = False
+    ) -> part_tables.Part:
+        """Table of a latch that is on from an action that sets a value until one that sets another value.
+
+        rests : True if it may switch back only after the time REST; a timer has then followed it
+        """
         sources = list(dict.fromkeys(source for clause, _ in actions for source in clause.sources))
         names = {source: f"{source[0]}_{k + 1}" for k, source in enumerate(sources)}
         formulas = switching.prevailing(actions, names)
@@ -396,7 +403,13 @@ class DayTranslation(Translation):
         block: part_tables.Part = {"type": "latch"}
         for word, formula in (("set", formulas.get(value, "0")), ("reset", off)):
             block[word] = f"controls.{ours}-{word}"
-            self.controls[f"{ours}-{word}"] = self.function(formula, names)
+            timed = f"({formula})*{'(1 - rested)' if word == 'set' else 'rested'}" if rests else formula
+            self.controls[f"{ours}-{word}"] = table = self.function(timed, names)
+            if rests:
+                table["inputs"] = table.get("inputs", {}) | {"rested": f"controls.{ours}-rest"}
+        if rests:
+            timer = {"type": "timer", "input": f"controls.{ours}", "on_delay": REST, "off_delay": REST}
+            self.controls[f"{ours}-rest"] = timer
         return block
 
     def function(self, formula: str, names: dict[Source, str]) -> part_tables.Part:

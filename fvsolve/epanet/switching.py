@@ -17,6 +17,7 @@ Interval = tuple[float, float]
 # Input of a condition: ("level", tank), ("head", junction), ("flow", link) or ("open", link), by EPANET's names
 Source = tuple[str, str]
 Values = dict[Source, float]
+Level = tuple[str, bool, float]  # tank, True if a condition holds above, level [m]
 
 
 class Untranslatable(Exception):
@@ -31,14 +32,16 @@ class Clause:
     holds : function (values of sources) -> True if it holds at the start
     sources : what it reads
     intervals : times [s] between which it holds, for a condition of the time alone; else None
-    level : (tank, True if it holds above, level [m]) of a condition on the level of one tank; else None
+    level : of a condition on the level of one tank; else None
+    levels : all comparisons with levels of tanks in it
     """
 
     text: Callable[[dict[Source, str]], str]
     holds: Callable[[Values], bool]
     sources: tuple[Source, ...] = ()
     intervals: tuple[Interval, ...] | None = None
-    level: tuple[str, bool, float] | None = None
+    level: Level | None = None
+    levels: tuple[Level, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -180,8 +183,9 @@ def _comparison(source: Source, relation: str, threshold: float) -> Clause:
         return COMPARE[relation](abs(value) if source[0] == "flow" else value, threshold)
 
     return Clause(
-        lambda names: f"({shown.format(names[source])} {relation} {threshold:.10g})", holds, (source,), None, level
-    )
+        lambda names: f"({shown.format(names[source])} {relation} {threshold:.10g})", holds, (source,), None, level,
+        (level,) if level else (),
+    )  # fmt: skip
 
 
 def daily_moments(network: EpanetNetwork, clock: float, end: float) -> list[float]:
@@ -238,6 +242,7 @@ def combined(every: bool, clauses: list[Clause]) -> Clause:
         lambda values: (all if every else any)(clause.holds(values) for clause in clauses),
         tuple(dict.fromkeys(source for clause in clauses for source in clause.sources)),
         spans,
+        levels=tuple(level for clause in clauses for level in clause.levels),
     )
 
 
@@ -248,11 +253,16 @@ def opposite(clause: Clause) -> Clause:
         ends = sorted({-DAY, 1e4 * DAY, *(at for span in clause.intervals for at in span)})
         pieces = zip(ends[:-1], ends[1:], strict=True)
         spans = tuple(piece for piece in pieces if not within(0.5 * sum(piece), clause.intervals))
-    level = clause.level and (clause.level[0], not clause.level[1], clause.level[2])
+    level = clause.level and beyond(clause.level)
     return Clause(
         lambda names: f"(1 - {clause.text(names)})", lambda values: not clause.holds(values), clause.sources, spans,
-        level,
+        level, tuple(map(beyond, clause.levels)),
     )  # fmt: skip
+
+
+def beyond(level: Level) -> Level:
+    """Comparison that holds where another one does not."""
+    return level[0], not level[1], level[2]
 
 
 def within(time: float, intervals: tuple[Interval, ...]) -> bool:
@@ -281,6 +291,19 @@ def relay_keys(actions: list[tuple[Clause, Any]], on: Any) -> tuple[str, float, 
     if (turns_on[2] <= turns_off[2]) if turns_on[1] else (turns_on[2] >= turns_off[2]):
         return None
     return turns_on[0], turns_on[2], turns_off[2]
+
+
+def lacks_dead_band(actions: list[tuple[Clause, Any]]) -> bool:
+    """True if actions with different values hold above and below levels of a tank without levels between them.
+
+    Then each action may move the level to where the other one holds, without end. actions : pairs (clause, value)
+    """
+    reads = [(level, value) for clause, value in actions for level in clause.levels]
+    return any(
+        above and not below and tank == other and value != result and high >= low
+        for (tank, above, low), value in reads
+        for (other, below, high), result in reads
+    )
 
 
 def schedule_keys(actions: list[tuple[Clause, Any]], begins: Any, end: float) -> tuple[list[float], list[Any]]:
