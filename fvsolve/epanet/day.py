@@ -14,6 +14,8 @@ STEP_WIDTH = 1e-3  # difference of levels over which the area of a tank changes 
 OPEN, CLOSED = 1.0, 0.0
 MOST_SPEED = 3.0  # relative speed above which a setting is probably a power or a percentage
 FILTER = "10 s"  # time constant with which a block reads a head or a flow, which would follow its own action at once
+# Least time between two switches of a link by actions that hold on both sides of one level; in EPANET the time of rules
+REST = "1 min"
 # Set points of a regulating valve that a control holds open: heads of water [m], and a flow [m3/s]
 HELD_OPEN = {"PRV": 1e4, "PSV": -9.0, "FCV": 1e3}
 RULES_AT_START = "a rule that holds at the start acts at once, in EPANET after its first rule time step"
@@ -330,10 +332,9 @@ class DayTranslation(Translation):
 
         value_of : action -> value in SI, None if the action leaves the key as it is; begins : value before hour 0 [SI]
         """
-        actions = switching.simplified([
-            (item.clause, value) for item in self.statements.get(name, ())
-            if (value := value_of(item.action)) is not None
-        ])  # fmt: skip
+        stated = [(item.clause, value) for item in self.statements.get(name, ())
+                  if (value := value_of(item.action)) is not None]  # fmt: skip
+        actions = switching.simplified(stated)
         text, value = quantity(unit), begins
         values = {value for _, value in actions} | {begins}
         if len(values) == 1:
@@ -348,7 +349,8 @@ class DayTranslation(Translation):
         if key == "opening":
             self.start_values["open", name] = value
         if len(values) == 2:
-            return self.two_states(ours, actions, value, sorted(values), text)
+            rests = key == "opening" and switching.lacks_dead_band(stated)
+            return self.two_states(ours, actions, value, sorted(values), text, rests)
         return self.several_states(ours, actions, value, sorted(values), text)
 
     def note_rules_at_start(
@@ -365,9 +367,12 @@ class DayTranslation(Translation):
 
     def two_states(
         self, ours: str, actions: list[tuple[Clause, float]], value: float, values: list[float],
-        text: Callable[[float], Any],
+        text: Callable[[float], Any], rests: bool,
     ) -> part_tables.Part:  # fmt: skip
-        """Table that names a relay or latch between two values; ours : name of the block, value : that at the start"""
+        """Table that names a relay or latch between two values.
+
+        ours : name of the block; value : that at the start; rests : as for `latch`
+        """
         state, plain = value == values[1], values == [0.0, 1.0]
         keys = switching.relay_keys(actions, values[1])
         if keys is not None:
@@ -383,7 +388,7 @@ class DayTranslation(Translation):
             block = {"type": "relay", "input": self.probe(("level", tank)), "on": part_tables.quantity_text(on, "m"),
                      "off": part_tables.quantity_text(off, "m")}  # fmt: skip
         else:
-            block = self.latch(ours, actions, values[1])
+            block = self.latch(ours, actions, values[1], rests)
         block["initial"] = int(state)
         if not plain:
             block["output"] = [text(item) for item in values]
@@ -404,8 +409,13 @@ class DayTranslation(Translation):
         self.controls[ours] = table | limits(values, text)
         return {"control": ours}
 
-    def latch(self, ours: str, actions: list[tuple[Clause, float]], value: float) -> part_tables.Part:
-        """Table of a latch that is on from an action that sets a value until one that sets another value."""
+    def latch(
+        self, ours: str, actions: list[tuple[Clause, float]], value: float, rests: bool = False
+    ) -> part_tables.Part:
+        """Table of a latch that is on from an action that sets a value until one that sets another value.
+
+        rests : True if it may switch back only after the time REST; a timer has then followed it
+        """
         sources = list(dict.fromkeys(source for clause, _ in actions for source in clause.sources))
         names = {source: f"{source[0]}_{k + 1}" for k, source in enumerate(sources)}
         formulas = switching.prevailing(actions, names)
@@ -414,7 +424,13 @@ class DayTranslation(Translation):
         block: part_tables.Part = {"type": "latch"}
         for word, formula in (("set", formulas.get(value, "0")), ("reset", off)):
             block[word] = f"controls.{ours}-{word}"
-            self.controls[f"{ours}-{word}"] = self.function(formula, names)
+            timed = f"({formula})*{'(1 - rested)' if word == 'set' else 'rested'}" if rests else formula
+            self.controls[f"{ours}-{word}"] = table = self.function(timed, names)
+            if rests:
+                table["inputs"] = table.get("inputs", {}) | {"rested": f"controls.{ours}-rest"}
+        if rests:
+            timer = {"type": "timer", "input": f"controls.{ours}", "on_delay": REST, "off_delay": REST}
+            self.controls[f"{ours}-rest"] = timer
         return block
 
     def function(self, formula: str, names: dict[Source, str]) -> part_tables.Part:

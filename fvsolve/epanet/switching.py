@@ -20,6 +20,7 @@ ALWAYS: tuple[Interval, ...] = ((-inf, inf),)
 # or ("margin", steps of a threshold): the threshold at a time minus its source
 Source = tuple[str, Any]
 Values = dict[Source, float]
+Level = tuple[str, bool, float]  # tank, True if a condition holds above, level [m]
 
 
 class Untranslatable(Exception):
@@ -47,6 +48,7 @@ class Clause:
     sources : inputs of the formula; none for a condition on the time alone
     intervals : times [s]; an interval is infinite on a side where it extends beyond the run
     compared : (source, relation, threshold) of a comparison of one level or head with a number [m]; else None
+    levels : all comparisons with levels of tanks in it
     """
 
     formula: Callable[[dict[Source, str]], str]
@@ -54,6 +56,7 @@ class Clause:
     sources: tuple[Source, ...] = ()
     intervals: tuple[Interval, ...] = ALWAYS
     compared: tuple[Source, str, float] | None = None
+    levels: tuple[Level, ...] = ()
 
     def text(self, names: dict[Source, str]) -> str:
         """Formula that is 1 while the clause holds, else 0; names : source -> its name in the formula"""
@@ -202,9 +205,11 @@ def _comparison(source: Source, relation: str, threshold: float) -> Clause:
         value = values[source]
         return COMPARE[relation](abs(value) if source[0] == "flow" else value, threshold)
 
+    levels = ((source[1], relation in (">", ">="), threshold),) if source[0] == "level" else ()
     return Clause(
-        lambda names: f"({shown.format(names[source])} {relation} {threshold:.10g})", holds, (source,), ALWAYS, compared
-    )
+        lambda names: f"({shown.format(names[source])} {relation} {threshold:.10g})", holds, (source,), ALWAYS,
+        compared, levels,
+    )  # fmt: skip
 
 
 def daily_moments(network: EpanetNetwork, clock: float, end: float) -> list[float]:
@@ -283,6 +288,7 @@ def combined(every: bool, clauses: list[Clause]) -> Clause:
         tuple(dict.fromkeys(source for clause in clauses for source in clause.sources)),
         spans if every or not reading else ALWAYS,
         reading[0].compared if every and len(reading) == 1 else None,
+        tuple(level for clause in clauses for level in clause.levels),
     )
 
 
@@ -300,8 +306,13 @@ def opposite(clause: Clause) -> Clause:
         compared = source, OPPOSITE[relation], threshold
     return Clause(
         lambda names: f"(1 - {clause.text(names)})", lambda values: not clause.holds(values), clause.sources, ALWAYS,
-        compared,
+        compared, tuple(map(beyond, clause.levels)),
     )  # fmt: skip
+
+
+def beyond(level: Level) -> Level:
+    """Comparison that holds where another one does not."""
+    return level[0], not level[1], level[2]
 
 
 def within(time: float, intervals: tuple[Interval, ...]) -> bool:
@@ -334,6 +345,19 @@ def relay_keys(actions: list[tuple[Clause, Any]], on: Any) -> tuple[str, float, 
     if (upper <= lower) if rises else (upper >= lower):
         return None
     return source[1], upper, lower
+
+
+def lacks_dead_band(actions: list[tuple[Clause, Any]]) -> bool:
+    """True if actions with different values hold at one time above and below levels of a tank without a band between.
+
+    Then each action may move the level to where the other one holds, without end. actions : pairs (clause, value)
+    """
+    reads = [(level, clause, value) for clause, value in actions for level in clause.levels]
+    return any(
+        above and not below and tank == other and value != result and high >= low and meet(first, second)
+        for (tank, above, low), first, value in reads
+        for (other, below, high), second, result in reads
+    )
 
 
 def schedule_keys(actions: list[tuple[Clause, Any]], begins: Any, end: float) -> tuple[list[float], list[Any]]:
@@ -373,9 +397,14 @@ def simplified(actions: list[tuple[Clause, Any]]) -> list[tuple[Clause, Any]]:
     return [(combined(False, joined(clauses)), value) for clauses, value in runs]
 
 
+def meet(first: Clause, second: Clause) -> bool:
+    """True if intervals of two clauses have a common time."""
+    return any(a < d and c < b for a, b in first.intervals for c, d in second.intervals)
+
+
 def exclude(first: Clause, second: Clause) -> bool:
     """True if two clauses never hold at one time, as far as their intervals and thresholds show."""
-    if not any(a < d and c < b for a, b in first.intervals for c, d in second.intervals):
+    if not meet(first, second):
         return True
     if first.compared is None or second.compared is None or first.compared[0] != second.compared[0]:
         return False

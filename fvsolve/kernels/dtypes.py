@@ -512,7 +512,9 @@ RATE, STATUS, WHERE, CLOSING, ARRIVES, LONGEST = 0, 1, 2, 3, 4, 5  # first entri
 # Least slope [m2/s] of laws between levels in Newton's method; 0: it follows the flow. FIRM_SLOPE is that of limited
 # steps, of the steady start, and of the density laws other than `linear`.
 FIRM, FIRM_SLOPE = 6, 1e-9
-OUT_HEAD = 7
+# 1 in NEARBY before a call at a state that differs from the last accepted one by an increment of a difference quotient.
+NEARBY = 7
+OUT_HEAD = 8
 # RATE before a call if the rate that limits the step is not needed, which holds at all stages of a step but the first.
 # Functions that spend time on this rate leave the value; others raise it as always.
 RATE_UNWANTED = -1.0

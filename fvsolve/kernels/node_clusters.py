@@ -34,6 +34,7 @@ from fvsolve.kernels.dtypes import (
     FIRM,
     FIRM_SLOPE,
     FLOW_HELD,
+    NEARBY,
     NO_SOLUTION,
     NOT_CONVERGED,
     NOT_HELD,
@@ -62,6 +63,7 @@ from fvsolve.kernels.table_handle import open_tables
 BAR = 1e5
 ROUNDING = 1e-15  # relative rounding of pressures; of a flow, relative to the flow at 1 Pa
 NEARLY_CONVERGED = 1e-9  # relative change of Newton below which it may be rounding
+SMALL_CHANGE = 1e-7  # relative change of Newton after which the second-order rest is 1e-6 of a difference of 1e-8
 QUADRATIC, STAGNANT = 1e-4, 1e-7  # ratio of quadratic steps; relative change below which a constant one is rounding
 FIRST_RISE = 1e4  # greatest change of a pressure in the first limited step of Newton [Pa]
 NOT_BALANCED = 1e300  # in place of a change of Newton: the step was limited
@@ -197,6 +199,15 @@ def has_settled(change, last_change):
     if change <= NEARLY_CONVERGED and change <= QUADRATIC * last_change:
         return True
     return has_converged(change, last_change) or (change <= STAGNANT and change >= 0.999 * last_change)
+
+
+@njit(forceinline=True)
+def has_followed(out, change):
+    """True if a change of Newton is the first-order change of a difference quotient, whose next change is negligible.
+
+    The increment of a difference quotient changes flows by about 1e-8, so Newton's first step has the derivative.
+    """
+    return out[NEARBY] == 1.0 and change <= SMALL_CHANGE
 
 
 @njit
@@ -912,7 +923,8 @@ def solve_cluster(out, tables, index):
         change, flows, _ = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, limits, rest)
         if bracketed and flows <= STEEP_CHANGE:  # at a drop of zero a flow changes with the last digits of a pressure
             change, flows = 0.0, 0.0
-        if has_settled(change, last_change) if from_accepted else has_converged(change, last_change):
+        settled = has_settled(change, last_change) or has_followed(out, change)
+        if settled if from_accepted else has_converged(change, last_change):
             if not (wide and has_backflow(cluster, tables, m)):
                 break
             change, flows, wide = 1e300, 1e300, False

@@ -16,6 +16,8 @@ from fvsolve.steppers.step_operations import BEGIN, STOP, copy, interpolate
 NEAR, NEAR_AFTER_BREAK = 2.0, 20.0  # distance to zero at which a step is searched, in changes at the pace
 FADING = 0.8  # of the pace per step, where an event function changes more slowly than before
 MARGIN, MOVED = 0.1, 0.25  # least bound, in changes within the step; least change within the step, in those at the pace
+# Greatest bend of a function that ends at zero, in its fall; a parabola with a bend above 0.25 has an earlier zero.
+STRAIGHT = 0.1
 MOST_TURNS = 10  # of the search in an interval
 # rows of the array `inner`: event functions at the start, the quarters and the end of the step, and at another time
 INNER_ROWS, MIDDLE, END, OTHER = 6, 2, 4, 5
@@ -125,14 +127,16 @@ def is_excluded(r, h, middle, far):
     """True if the values `middle` of event functions in the middle of the step, and those at its ends, exclude a zero.
 
     A convex function is above the line through two of its values, outside of the interval between them. The values must
-    also move as much as the pace predicts.
+    also move as much as the pace predicts. A function that is zero at the end of the step, which is the event found so
+    far, must be nearly straight.
     """
     g, g_new = r.g, r.g_new
     for i in range(g.size):
         if is_function_near(r, i, h, far):
             moved = abs(middle[i] - g[i]) + abs(g_new[i] - middle[i])
             least = min(middle[i], 2.0 * middle[i] - g[i], 2.0 * middle[i] - g_new[i])
-            if not least > MARGIN * moved:
+            ends_there = g_new[i] <= 0.0 and abs(middle[i] - 0.5 * (g[i] + g_new[i])) <= STRAIGHT * g[i]
+            if not (least > MARGIN * moved or ends_there):
                 return False
             if r.pace[i] < rec.UNKNOWN_PACE and moved < MOVED * h * r.pace[i]:
                 return False

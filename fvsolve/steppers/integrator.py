@@ -56,7 +56,7 @@ class Integrator:
         self.no_floats, self.no_integers = np.zeros(0), np.zeros(0, dtype=np.int64)
         self.stored, self.carry, self.times = self.no_integers, np.zeros(0), self.no_floats
         self.largest = self.no_floats  # largest allowed states, where growth is checked
-        self.out, self.out_row, self.values = np.zeros(6), np.zeros(6), np.zeros(0)
+        self.out, self.out_row, self.values = np.zeros(rec.OUT_HEAD), np.zeros(rec.OUT_HEAD), np.zeros(0)
         self.out[rec.JUMP_TIME] = rec.NO_JUMP
         self.armed = self.no_floats
         self.prepare_events(0)

@@ -83,7 +83,9 @@ UNKNOWN_PACE = 1e100  # in the array `pace`: no step with this event function ha
 LEAST_STEP = 4e-16  # least step, relative to the time
 
 # Entries of `out` that the loop reads; LONGEST_STEP limits the next step under error control [s], 0 for no limit.
-RATE, STATUS, PLACE, CLOSING_RATE, JUMP_TIME, LONGEST_STEP = 0, 1, 2, 3, 4, 5
+# NEARBY : 1 before a call at a state next to the last accepted one, see `newton.renew_at_start`
+RATE, STATUS, PLACE, CLOSING_RATE, JUMP_TIME, LONGEST_STEP, NEARBY = 0, 1, 2, 3, 4, 5, 7
+OUT_HEAD = 8
 NO_JUMP = -1e300  # in JUMP_TIME: no jump will arrive
 CORRECTED, ARRIVED = 7, 8  # in STATUS: the record has corrected the accepted state; the record lets a jump arrive now
 NOT_FINITE = 3  # a value of out[STATUS]

@@ -87,8 +87,14 @@ def renew(handle, r, t, y, f, ledger_rates, f_work):
 
 @inline
 def renew_at_start(handle, r, t, now):
-    """Compute the Jacobian at the start of the step, from row `now` of y and the first stage."""
+    """Compute the Jacobian at the start of the step, from row `now` of y and the first stage.
+
+    The states of its differences are next to an accepted one, from which iterations within f start: they may stop
+    sooner.
+    """
+    r.out[rec.NEARBY] = 1.0
     renew(handle, r, t, r.y[now], r.k[0], r.ledger_rates[0], r.rate)
+    r.out[rec.NEARBY] = 0.0
 
 
 @inline

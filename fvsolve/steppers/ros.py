@@ -25,7 +25,9 @@ def slope_in_time(handle, r, t, h, now):
     slope, first, out, ledger_slopes, offset = r.base, r.k[0], r.out, r.ledger_slopes, r.control[0]["ledger_offset"]
     step = min((2.2e-16 * max(1e-5, abs(t))) ** 0.5, 1e-3 * h)
     later = t + step
+    out[rec.NEARBY] = 1.0
     stage_rates(handle, r, later, r.y[now], slope)
+    out[rec.NEARBY] = 0.0
     per = 1.0 / (later - t) if later > t else 0.0  # the time difference is lost in rounding: df/dt is negligible
     for e in range(slope.size):
         slope[e] = (slope[e] - first[e]) * per

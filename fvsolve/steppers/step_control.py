@@ -175,17 +175,18 @@ def reduced(control, e):
 
 
 @njit(forceinline=True)
-def grown(control, state, h, e):
+def grown(control, state, h, e, shortened):
     """Factor on the step length h after an accepted step with the error e, in units of the tolerance.
 
-    Explicit methods use PI control (Gustafsson 1991), implicit methods predictive control (Gustafsson 1994).
+    Explicit methods use PI control (Gustafsson 1991), implicit methods predictive control (Gustafsson 1994). A step
+    shortened by an event or a due time may be shorter by orders of magnitude, so it shows no trend of the error.
     control, state : records of the time loop, see `loop_records`
     """
     e, old, order = max(e, 1e-10), max(state["error_old"], 1e-4), control["order"]
     if control["kind"] == rec.EXPLICIT:
         return min(5.0, max(0.2, 0.9 * e ** (-0.7 / order) * old ** (0.4 / order)))
     grow = 0.9 * e ** (-1.0 / order)
-    if state["error_old"] > 0.0 and state["steps"] > 0.0:
+    if state["error_old"] > 0.0 and state["steps"] > 0.0 and not shortened:
         grow = min(grow, 0.9 * (h / state["last"]) * (old / (e * e)) ** (1.0 / order))
     return min(8.0, max(0.2, grow))
 
@@ -212,7 +213,7 @@ def store_next(control, state, h, e, shortened, failed, out_rate):
     shortened : True if the step was shortened to a due time; failed : True if an attempt could not be solved
     out_rate : as for `watch`, which may end the call after this step, to change the method
     """
-    grow = grown(control, state, h, e)
+    grow = grown(control, state, h, e, shortened)
     if failed:
         grow = min(grow, 1.0)
     if (not shortened or grow < 1.0) and not retains_length(control, grow):

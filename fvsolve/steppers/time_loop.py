@@ -44,6 +44,8 @@ from fvsolve.steppers.step_operations import (
 EVENT_TOLERANCE = 1e-13
 # Of long steps: event functions have the rounding of large networks and of Newton, which hides a nearer event.
 SLOW_EVENT_TOLERANCE, SLOW_EVENT_TIME = 1e-9, 1e-11
+MOST_SECANTS = 3  # attempts by a line through two values beyond the event; an event function that jumps needs others
+LANDING = 0.25  # value beyond the event at which such a line aims, in tolerances: an event acts from zero on
 MOST_SEARCHES = 8  # for events before an event within the same step
 # attempts of an implicit step by Newton alone at tolerances above LOOSE: shorter steps cost less than sweeps
 UNSWEPT, LOOSE = 5, 3e-6
@@ -98,6 +100,16 @@ def is_on_line(value, line):
     return 2.0 * line <= value <= 0.5 * line
 
 
+@njit(forceinline=True)
+def secant(high, past, farther, at_farther, tolerance):
+    """Length at which the line through two values beyond the event is just beyond it; -inf if it does not fall.
+
+    high, farther : lengths beyond the event, the nearer first, infinite for none; past, at_farther : ratios there
+    """
+    fall = (past - at_farther) / (farther - high) if high < farther < inf else 0.0
+    return high + (past + LANDING * tolerance) / fall if fall > 0.0 else -inf
+
+
 @njit
 def locate(handle, run, r, h, now, new, e):
     """Shorten a step so that it ends just past the first event, by the Illinois rule; returns its length and error.
@@ -114,7 +126,7 @@ def locate(handle, run, r, h, now, new, e):
     guess, at_high, side = h, past, 0
     earlier, at_earlier, at_last = 0.0, 1.0, 1.0  # length before `low`; ratios there and at `low`
     width, wider = inf, inf  # of the bracket in the last turn, and in the one before
-    is_slow, extrapolations = False, 0
+    is_slow, extrapolations, farther, at_farther = False, 0, inf, past
     r.progress[0]["no_sweeps"] = 0
     is_long = r.control[0]["keeps_step"] == 1
     tolerance, narrow = (SLOW_EVENT_TOLERANCE, SLOW_EVENT_TIME * h) if is_long else (EVENT_TOLERANCE, 0.0)
@@ -133,6 +145,9 @@ def locate(handle, run, r, h, now, new, e):
         guess += -beyond if side > 0 else beyond  # to the other side of the event
         if not low < guess < high:
             guess, extrapolations = 0.5 * (low + high), 0
+        line = secant(high, past, farther, at_farther, tolerance) if is_long and turn <= MOST_SECANTS else -inf
+        if side > 0 and low < line < high:
+            guess = line
         wider, width = width, high - low
         if done:
             guess = high
@@ -146,29 +161,32 @@ def locate(handle, run, r, h, now, new, e):
             break
         here = event_ratio(g, g_new)
         if here <= 0.0:
+            farther, at_farther = high, past
             high, at_high, past = guess, here, here
             at_low, side = 0.5 * at_low if side > 0 else at_last, 1
         else:
             earlier, at_earlier, at_last = low, at_last, here
             low, at_low = guess, here
             at_high, side = 0.5 * at_high if side < 0 else past, -1
-    control = r.control[0]
-    fixed = control["kind"] == rec.NEWTON_SOLVED and control["mode"] != rec.TOLERANCE
-    if fixed and past < -JUMP and high > JUMP * r.state[0]["step"]:
-        e = rec.NEWTON_FAILED
-    if e != rec.NEWTON_FAILED and past < -JUMP and control["has_jumps"]:
-        return after_jump(handle, run, r, h, high, now, new)
+    if past < -JUMP and e != rec.NEWTON_FAILED:
+        return after_jump(handle, run, r, h, high, now, new, e)
     return high, e
 
 
 @njit
-def after_jump(handle, run, r, h, length, now, new):
-    """Extend a step that ends where an event function jumps over zero; returns its length and error.
+def after_jump(handle, run, r, h, length, now, new, e):
+    """Length and error of a step that ends where an event function jumps over zero: failed, or extended, or as it was.
 
     Waves that arrive together make it jump at times that differ by rounding, within which the step has ended. Which of
     them have arrived must not depend on rounding, so it ends after all of them.
-    h : length of the full step; length : of the step up to the event
+    h, e : length of the full step, and error of the step up to the event; length : of the step up to the event
     """
+    control = r.control[0]
+    fixed = control["kind"] == rec.NEWTON_SOLVED and control["mode"] != rec.TOLERANCE
+    if fixed and length > JUMP * r.state[0]["step"]:
+        return length, rec.NEWTON_FAILED
+    if not control["has_jumps"]:
+        return length, e
     t, later = r.state[0]["t"], 0.0
     for extension in (SAME_TIMES * h + SAME_ROUNDING * abs(r.state[0]["t"]), 0.0):
         later = min(h, length + extension)

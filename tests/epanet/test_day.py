@@ -206,6 +206,29 @@ def test_controls_rules_and_tanks_act_as_in_epanet(name, tmp_path):
         assert "shuts: the tank is full" in shut and "opens" in shut
 
 
+BOTH_SIDES = """RULE 1
+IF TANK tower LEVEL ABOVE 3.5
+THEN PUMP lift STATUS IS CLOSED
+RULE 2
+IF TANK tower LEVEL BELOW 3.5
+THEN PUMP lift STATUS IS OPEN"""
+
+
+@pytest.mark.parametrize("rules", [BOTH_SIDES, BOTH_SIDES.partition("\nRULE 2")[0] + "\nELSE PUMP lift STATUS IS OPEN"])
+def test_a_link_rests_between_actions_that_hold_on_both_sides_of_one_level(rules, tmp_path):
+    """The pump would switch without end at 3.5 m; in EPANET at a step of 10 s it switches at almost each step."""
+    path, imported = town(tmp_path, rules=rules)
+    blocks = tomllib.loads(imported.text)["controls"]
+    assert sorted(block["type"] for block in blocks.values()) == ["function", "function", "latch", "timer"]
+    run = ours(imported, tmp_path, **{"numerics.end": "6 h"})
+    switches = [time for time, name, _ in blocks_of(run) if name == imported.links["lift"]]
+    assert len(switches) > 20 and np.diff(switches).min() >= 60.0 - 1e-6
+    day = toolkit_run.run(path, ["tower"], ["lift"], 10, 21600)
+    level = run[f"nodes.{imported.nodes['tower']}.level"]
+    assert level == pytest.approx(day.level("tower", run.t), abs=0.01)
+    assert level[0] < 3.4 and level[-1] == pytest.approx(3.5, abs=0.01)
+
+
 def test_what_has_no_key_is_listed_with_its_number(tmp_path):
     rules = ("RULE 7\nIF SYSTEM DEMAND ABOVE 20\nTHEN PUMP lift STATUS IS OPEN\n"
              "RULE 8\nIF TANK tower FILLTIME ABOVE 5\nTHEN PIPE p5 STATUS IS CLOSED")  # fmt: skip

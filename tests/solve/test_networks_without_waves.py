@@ -10,10 +10,15 @@ from reference.scenes import AMBIENT, RHO, WATER
 from reference.scenes import GRAVITY as G
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from scipy.sparse import csc_array
 
 import fvsolve
 from fvsolve.kernels.node_clusters import solve_in_order
 from fvsolve.model.cluster_tables import SparseMatrix
+from fvsolve.output.memory_sink import MemorySink
+from fvsolve.solve.solve import Run, initial_state
+from fvsolve.steppers import loop_records
+from fvsolve.steppers.step_control import store_next
 
 FACTOR, DIAMETER, LENGTH = 0.02, 0.2, 500.0
 LOSS = 8.0 * FACTOR * LENGTH / (math.pi**2 * G * DIAMETER**5)  # head per flow squared [s2/m5]
@@ -352,3 +357,56 @@ def test_given_steps_miss_no_time_after_a_kink_or_an_event(method, step):
     assert by_node["town"] == pytest.approx(-RHO * drawn, rel=1e-12)
     fallen = 50.0 * (3.0 - found["tower.level"][-1])
     assert fallen == pytest.approx(drawn - by_node["lake"] / RHO, rel=1e-9)
+
+
+def filled_by_a_relay(method):
+    """Case of a tank that a relay fills between two levels, with a demand on the way."""
+    case = side_by_side(method, 1e-6, [0.0])
+    case["nodes"] = {"lake": {"type": "reservoir", "head": 30.0},
+                     "town": {"type": "junction", "elevation": 0.0, "demand": 0.004},
+                     "tower": {"type": "tank", "elevation": 15.0, "area": 150.0, "level": 2.0}}  # fmt: skip
+    gate = {"type": "valve", "from": "lake", "to": "a", **SIZE, "opening": {"control": "fill"}}
+    case["nodes"]["a"] = {"type": "junction", "elevation": 0.0}
+    case["links"] = {"gate": gate, "main": pipe("a", "town"), "p": pipe("town", "tower")}
+    relay = {"type": "relay", "input": "nodes.tower.level", "on": 1.5, "off": 2.5, "initial": 0}
+    case["controls"], case["output"]["probes"] = {"fill": relay}, ["tower.level", "main.flow"]
+    case["numerics"]["end"] = 172800.0
+    return case
+
+
+def test_a_step_that_ends_at_an_event_is_not_searched_for_earlier_ones():
+    """The level is nearly straight between two switches, so it cannot have reached the threshold earlier."""
+    found = run(filled_by_a_relay("rodas-5p"))
+    events, tries, stages = len(found.summary["events"]), found.summary["steps"] + found.summary["rejections"], 9
+    assert events == 8 and found["tower.level"].min() == pytest.approx(1.5, abs=0.05)
+    assert found.summary["rhs"] < stages * (tries + 4 * events)
+
+
+def test_a_step_that_an_event_shortens_does_not_shorten_the_next():
+    """An event 1e-8 s after another one left a step of 2e-9 s, from which steps grew again by a factor of 8."""
+    control, state = np.zeros(1, loop_records.CONTROL)[0], np.zeros(1, loop_records.STATE)[0]
+    control["kind"], control["mode"], control["order"] = loop_records.LINEARLY_IMPLICIT, loop_records.TOLERANCE, 5.0
+    for error, expected in ((1e-20, 600.0), (0.99, 0.9 * 1e-8)):  # unless its own error is near the tolerance
+        state["step"], state["last"], state["error_old"], state["steps"] = 600.0, 500.0, 1e-3, 7.0
+        getattr(store_next, "py_func", store_next)(control, state, 1e-8, error, True, False, 0.0)
+        assert state["step"] == pytest.approx(expected, rel=0.01)
+
+
+def test_the_jacobian_of_a_run_has_the_derivatives_of_the_converged_network():
+    """Its differences take a single step of Newton in the network; central differences of converged flows have errors
+    of 1e-7."""
+    case = side_by_side("rodas-5p", 1e-6, [0.01])
+    case["nodes"]["town"] = {"type": "junction", "elevation": 0.0, "demand": 0.02}
+    case["nodes"]["tower"] = {"type": "tank", "elevation": 0.0, "level": 8.0, "area": 30.0, "height": 40.0}
+    case["links"] |= {"a": pipe("left", "town"), "b": pipe("right", "town"), "c": pipe("town", "tower")}
+    case["numerics"]["end"] = 3000.0
+    model = fvsolve.build(fvsolve.load(case))
+    sink, state = MemorySink(model), initial_state(model)
+    sink.begin(model, state)
+    course = Run(model, state, sink, None, 1)
+    assert course.go().reason == "finished"
+    stepper = course.loop.stepper
+    first = stepper.y[int(stepper.progress["old"][0])]
+    matrix = csc_array((stepper.jacobian, *(getattr(model.structure.pattern, key) for key in ("indices", "indptr"))))
+    exact = model.jacobian(float(stepper.progress["t_old"][0]), first)
+    assert matrix.toarray()[: model.y_size] == pytest.approx(exact, rel=1e-5, abs=1e-9)
