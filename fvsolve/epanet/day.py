@@ -350,6 +350,9 @@ class DayTranslation(Translation):
             self.start_values["open", name] = value
         if len(values) == 2:
             rests = key == "opening" and switching.lacks_dead_band(stated)
+            if rests:
+                text = "actions on both sides of one level would switch without end: the link rests after each switch"
+                self.note(f"{text} for {REST}, in EPANET for its rule time step", name, True)
             return self.two_states(ours, actions, value, sorted(values), text, rests)
         return self.several_states(ours, actions, value, sorted(values), text)
 

@@ -354,7 +354,7 @@ def lacks_dead_band(actions: list[tuple[Clause, Any]]) -> bool:
     """
     reads = [(level, clause, value) for clause, value in actions for level in clause.levels]
     return any(
-        above and not below and tank == other and value != result and high >= low and meet(first, second)
+        above and not below and tank == other and value != result and high >= low and overlap(first, second)
         for (tank, above, low), first, value in reads
         for (other, below, high), second, result in reads
     )
@@ -397,14 +397,14 @@ def simplified(actions: list[tuple[Clause, Any]]) -> list[tuple[Clause, Any]]:
     return [(combined(False, joined(clauses)), value) for clauses, value in runs]
 
 
-def meet(first: Clause, second: Clause) -> bool:
+def overlap(first: Clause, second: Clause) -> bool:
     """True if intervals of two clauses have a common time."""
     return any(a < d and c < b for a, b in first.intervals for c, d in second.intervals)
 
 
 def exclude(first: Clause, second: Clause) -> bool:
     """True if two clauses never hold at one time, as far as their intervals and thresholds show."""
-    if not meet(first, second):
+    if not overlap(first, second):
         return True
     if first.compared is None or second.compared is None or first.compared[0] != second.compared[0]:
         return False

@@ -220,6 +220,7 @@ def test_a_link_rests_between_actions_that_hold_on_both_sides_of_one_level(rules
     path, imported = town(tmp_path, rules=rules)
     blocks = tomllib.loads(imported.text)["controls"]
     assert sorted(block["type"] for block in blocks.values()) == ["function", "function", "latch", "timer"]
+    assert any("the link rests after each switch" in cause and "lift" in cause for cause in imported.causes)
     run = ours(imported, tmp_path, **{"numerics.end": "6 h"})
     switches = [time for time, name, _ in blocks_of(run) if name == imported.links["lift"]]
     assert len(switches) > 20 and np.diff(switches).min() >= 60.0 - 1e-6
