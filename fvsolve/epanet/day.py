@@ -349,7 +349,7 @@ class DayTranslation(Translation):
         if key == "opening":
             self.start_values["open", name] = value
         if len(values) == 2:
-            rests = key == "opening" and switching.lacks_dead_band(stated)
+            rests = switching.lacks_dead_band(stated)
             if rests:
                 text = "actions on both sides of one level would switch without end: the link rests after each switch"
                 self.note(f"{text} for {REST}, in EPANET for its rule time step", name, True)
@@ -390,6 +390,14 @@ class DayTranslation(Translation):
                     return {"control": other}
             block = {"type": "relay", "input": self.probe(("level", tank)), "on": part_tables.quantity_text(on, "m"),
                      "off": part_tables.quantity_text(off, "m")}  # fmt: skip
+        elif rests and not plain:  # a timer reads 0 and 1, so the latch has these outputs
+            state_name = f"{ours}-state"
+            self.controls[state_name] = self.latch(state_name, actions, values[1], True) | {"initial": int(state)}
+            low, high = (in_si(item, text) for item in values)
+            table = {"type": "function", "inputs": {"state": f"controls.{state_name}"},
+                     "formula": f"{low!r} + {high - low!r}*state"}  # fmt: skip
+            self.controls[ours] = table | limits(values, text)
+            return {"control": ours}
         else:
             block = self.latch(ours, actions, values[1], rests)
         block["initial"] = int(state)

@@ -306,11 +306,11 @@ def opposite(clause: Clause) -> Clause:
         compared = source, OPPOSITE[relation], threshold
     return Clause(
         lambda names: f"(1 - {clause.text(names)})", lambda values: not clause.holds(values), clause.sources, ALWAYS,
-        compared, tuple(map(beyond, clause.levels)),
+        compared, tuple(map(other_side, clause.levels)),
     )  # fmt: skip
 
 
-def beyond(level: Level) -> Level:
+def other_side(level: Level) -> Level:
     """Comparison that holds where another one does not."""
     return level[0], not level[1], level[2]
 

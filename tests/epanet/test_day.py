@@ -230,6 +230,18 @@ def test_a_link_rests_between_actions_that_hold_on_both_sides_of_one_level(rules
     assert level[0] < 3.4 and level[-1] == pytest.approx(3.5, abs=0.01)
 
 
+def test_a_pump_rests_between_speeds_on_both_sides_of_one_level(tmp_path):
+    """The level stays where the two speeds alternate, as in EPANET at a step of 10 s."""
+    controls = "LINK lift 0.7 IF NODE tower ABOVE 3.5\nLINK lift 1.05 IF NODE tower BELOW 3.5"
+    path, imported = town(tmp_path, controls=controls, speed="SPEED 1.05")
+    assert any("the link rests after each switch" in cause and "lift" in cause for cause in imported.causes)
+    run = ours(imported, tmp_path, **{"numerics.end": "6 h"})
+    times = [time for time, name, _ in blocks_of(run) if name.endswith("-state")]
+    assert len(times) > 20 and np.diff(times).min() >= 60.0 - 1e-6
+    day = toolkit_run.run(path, ["tower"], [], 10, 21600)
+    assert run[f"nodes.{imported.nodes['tower']}.level"] == pytest.approx(day.level("tower", run.t), abs=0.01)
+
+
 def test_what_has_no_key_is_listed_with_its_number(tmp_path):
     rules = ("RULE 7\nIF SYSTEM DEMAND ABOVE 20\nTHEN PUMP lift STATUS IS OPEN\n"
              "RULE 8\nIF TANK tower FILLTIME ABOVE 5\nTHEN PIPE p5 STATUS IS CLOSED")  # fmt: skip
