@@ -66,7 +66,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/parts": (19675, 52),
     "tests/reference": (3830, 36),
     "tests/report": (863, 4),
-    "tests/repository": (4815, 26),
+    "tests/repository": (4816, 26),
     "tests/schemes": (569, 2),
     "tests/solve": (2995, 14),
     "tests/step_limits": (1100, 5),
