@@ -11,6 +11,8 @@ separate process, without `--quick` with an empty cache of compiled code. dump_c
 - the files of the run: history, envelope, routes, fields and lines of all frames, the summary, the resolved case;
   cases in `dump_cases.ENDS` end earlier than shipped.
 
+A case is also run in its VARIANTS, in which keys have other values, so that features work together.
+
 Wall times, costs, versions and hashes in the summary, the checkpoint and pictures are not compared. Texts for people
 (titles, notices, reasons after the colon) are compared by number and kind, not by their words.
 
@@ -24,6 +26,7 @@ Prints a line for each case. Exit status: 0 if all are equal, 1 if any differs, 
 from __future__ import annotations
 
 import io
+import json
 import os
 import pickle
 import subprocess
@@ -37,6 +40,23 @@ import measure
 from compare_dumps import Dump, Names, compare, count
 
 HERE = Path(__file__).resolve().parent
+# Variants that wake features which no shipped case has, or which meet others there : case -> new values of keys
+VARIANTS: dict[str, list[dict]] = {
+    "valve-closure": [{"numerics.pipe_model": "delay-line"}, {"numerics.method": "rk4"}],
+    "streeter-nine-pipes": [{"numerics.pipe_model": "auto"}],
+    "pump-trip": [{"numerics.pipe_model": "auto"}, {"numerics.pipe_model": "auto", "numerics.method": "trapezoid"}],
+    "check-valve-slam": [{"numerics.pipe_model": "delay-line"}],
+    "digital-pressure": [{"numerics.pipe_model": "delay-line"}],
+    "three-way-junction": [{"numerics.pipe_model": "delay-line"}],
+    "net3-pump-trip": [{"numerics.pipe_model": "auto"}],
+    "relief-on-closed-main": [{"numerics.pipe_model": "delay-line"}],
+    "surge-tank": [{"numerics.pipe_model": "auto"}],
+    "pump-trip-air-vessel": [{"numerics.pipe_model": "delay-line"}],
+    "tank-relay": [{"numerics.method": "rodas-5p"}],
+    "chlorine": [{"numerics.scheme": "upwind"}],
+    "cylinder-servo": [{"numerics.method": "tr-bdf2"}],
+    "clutch": [{"numerics.method": "rodas-5p"}],
+}
 PARTS = ("fvsolve", "cases")  # folders of a commit that are extracted
 TINY = "accumulator"  # the case of --quick
 SHOWN = 3  # number of printed differences of a case
@@ -60,8 +80,8 @@ class Side:
         """Shipped cases of the commit : name -> path."""
         return {path.stem: path for path in sorted((self.tree / "cases").glob("*.toml"))}
 
-    def dump(self, name: str) -> Dump | str:
-        """Dump of a case, or a text with the exit status if the process ended."""
+    def dump(self, name: str, changed: dict) -> Dump | str:
+        """Dump of a case with new values of keys, or a text with the exit status if the process ended."""
         begun, out = time.perf_counter(), self.folder / "dump"
         if self.process is None:
             self.process = subprocess.Popen(
@@ -69,7 +89,7 @@ class Side:
                 stderr=open(self.folder / "errors", "w", encoding="utf-8"),
             )  # fmt: skip
         try:
-            print(self.cases[name], out, sep="\t", file=self.process.stdin, flush=True)
+            print(self.cases[name], out, json.dumps(changed), sep="\t", file=self.process.stdin, flush=True)
             answer = self.process.stdout.readline()
         except BrokenPipeError:
             answer = ""
@@ -118,13 +138,18 @@ def pairs(old: Side, new: Side, names: Names, asked: list[str]) -> list[tuple[st
     return found + ([] if asked else [(None, name) for name in sorted(left)])
 
 
-def compared(old: Side, new: Side, names: Names, name: str | None, other: str | None) -> tuple[bool, str]:
-    """True if a case is equal in both commits, and the line that reports the result."""
+def compared(old: Side, new: Side, names: Names, run: tuple) -> tuple[bool, str]:
+    """True if a run is equal in both commits, and the line that reports the result.
+
+    run : names of the case in both commits, None for a missing case, and new values of keys
+    """
+    name, other, changed = run
     for side, missing in ((old, name is None), (new, other is None)):
         if missing:
             return False, f"{name or other}: differs: {side.commit} has no such case"
-    dumps = [old.dump(name), new.dump(other)]
+    dumps = [old.dump(name, changed), new.dump(other, changed)]
     said = f"{name}" if name == other else f"{name} ({other})"
+    said += "".join(f" {key} = {value}" for key, value in changed.items())
     ended = [one for one in dumps if isinstance(one, str)]
     if ended:
         return False, f"{said}: differs: {'; '.join(ended)}"
@@ -160,11 +185,12 @@ def main() -> int:
         except (ValueError, OSError) as error:
             print(error, file=sys.stderr)
             return 2
-        print(f"{sides[0].commit} and {sides[1].commit}, {len(cases)} cases", flush=True)
+        runs = [(*pair, changed) for pair in cases for changed in ({}, *VARIANTS.get(pair[0] or "", []))]
+        print(f"{sides[0].commit} and {sides[1].commit}, {len(cases)} cases, {len(runs)} runs", flush=True)
         equal = 0
         try:
-            for name, other in cases:
-                same, line = compared(*sides, names, name, other)
+            for run in runs:
+                same, line = compared(*sides, names, run)
                 equal += same
                 print(line, flush=True)
         finally:
@@ -172,8 +198,8 @@ def main() -> int:
                 side.close()
     if unused := names.unused():
         print(f"public names of the map that no case has: {', '.join(unused)}")
-    print(f"{equal} of {len(cases)} cases are equal; {time.perf_counter() - begun:.0f} s")
-    return 0 if equal == len(cases) else 1
+    print(f"{equal} of {len(runs)} runs are equal; {time.perf_counter() - begun:.0f} s")
+    return 0 if equal == len(runs) else 1
 
 
 if __name__ == "__main__":

@@ -2,9 +2,9 @@
 
     python -P dump_cases.py CHECKOUT MAP
 
-Each line of standard input is a case file and the file of its dump, separated by a tab. The program writes the dump,
-then a line on standard output. It finds names of fvsolve through the map, because two commits may spell them
-differently.
+Each line of standard input is a case file, the file of its dump, and a JSON object of keys with new values, separated
+by tabs. The program writes the dump, then a line on standard output. It finds names of fvsolve through the map, because
+two commits may spell them differently.
 """
 
 from __future__ import annotations
@@ -49,11 +49,14 @@ class Named:
                              f"(spellings: {', '.join(spellings)}); state its new name in the map")  # fmt: skip
 
 
-def dump(path: Path, names: Names, fvsolve) -> Dump:
-    """Values of a case: its model at some states, then its run; for an invalid case the kind and number of faults."""
+def dump(path: Path, changed: dict, names: Names, fvsolve) -> Dump:
+    """Values of a case: its model at some states, then its run; for an invalid case the kind and number of faults.
+
+    changed : new values of keys
+    """
     api, found = Named(fvsolve, names), {}
     try:
-        model = api.build(api.load(path, shorter(path, names)))
+        model = api.build(api.load(path, shorter(path, names) | changed))
     except api.FvsolveError as error:
         return {("fault",): type(error).__name__, ("faults",): len(getattr(error, "faults", "1"))}
     start = api.initial_state(model)
@@ -78,11 +81,11 @@ def dump(path: Path, names: Names, fvsolve) -> Dump:
     return found
 
 
-def shorter(path: Path, names: Names) -> dict | None:
-    """Override with the earlier end of a case in ENDS; None for other cases."""
+def shorter(path: Path, names: Names) -> dict:
+    """Key with the earlier end of a case in ENDS; empty for other cases."""
     end = next((ENDS[one] for one in names.spellings(path.stem) if one in ENDS), None)
     if end is None:
-        return None
+        return {}
     table = tomllib.loads(path.read_text(encoding="utf-8"))
     section = next(one for one in names.spellings("numerics") if one in table)
     return {f"{section}.{next(one for one in names.spellings('end') if one in table[section])}": end}
@@ -194,6 +197,6 @@ def main() -> None:
         raise SystemExit(f"fvsolve was imported from {home}; expected a place below {checkout}")
     names = Names(written.read_text(encoding="utf-8").splitlines())
     for line in sys.stdin:
-        file, out = line.rstrip("\n").split("\t")
-        Path(out).write_bytes(pickle.dumps(dump(Path(file), names, fvsolve)))
+        file, out, changed = line.rstrip("\n").split("\t")
+        Path(out).write_bytes(pickle.dumps(dump(Path(file), json.loads(changed), names, fvsolve)))
         print("written", file=answers, flush=True)

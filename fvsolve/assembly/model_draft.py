@@ -233,8 +233,7 @@ class ModelDraft:
     basins: list[Any] = field(default_factory=list)
     # table -> links with rows in it, see `assembly.lowering.links_by_table`
     links: dict[str, list[tuple]] = field(default_factory=dict)
-    # pipe -> by cells or as a delay line, see `model.delay_lines`
-    followed: dict[str, Any] = field(default_factory=dict)
+    features: list[Any] = field(default_factory=list)  # see `assembly.features`
 
     # rows
     node_table: np.ndarray = no_rows(rec.NODE)
@@ -262,7 +261,7 @@ class ModelDraft:
     sources: int = 0  # number of rows in the ledger of rain and infiltration
     heat_rows: int = 0  # rows in the ledger of the heat of restrictions and pipes
     wall_table: np.ndarray = no_rows(rec.WALL)
-    delay_table: np.ndarray = no_rows(rec.DELAY)
+    coupling_table: np.ndarray = no_rows(rec.COUPLING)
     probe_table: np.ndarray = no_rows(rec.PROBE)
     control_table: np.ndarray = no_rows(rec.CONTROL)
     sensor_table: np.ndarray = no_rows(rec.PROBE)
@@ -317,6 +316,7 @@ class ModelDraft:
                 value = shallow_copy(value)
             setattr(copy, name, value)
         copy.case, copy.hydraulics = case, Hydraulics(case)
+        copy.features = [feature.copy_for(case) for feature in self.features]
         copy.tables = rec.Tables(*(tables.get(id(table), table) for table in self.tables))
         copy.warnings = [*case.notices, *self.warnings[len(self.case.notices) :]]
         for table, entries in self.links.items():
@@ -396,8 +396,8 @@ class ModelDraft:
             table_rows["device"] = table_rows["hooks"] = table_rows["data"] = table_rows["event"] = -1
             table_rows["command"] = table_rows["hold"] = -1
             table_rows["back"] = 1.0
-        for key in {"moving_segment", "delay"}.intersection(record.names):
-            table_rows[key] = -1
+        if "moving_segment" in record.names:
+            table_rows["moving_segment"] = -1
         for name, link, lowering in parts:
             lowering.fill(self, name, link, table_rows[at : at + lowering.rows])
             at += lowering.rows

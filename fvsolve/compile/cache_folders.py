@@ -83,7 +83,10 @@ def source_hash() -> str:
 
 
 def add_sources(folder: Path) -> None:
-    """Allow caching of functions defined in a folder outside the package, under the hash of all sources in it."""
+    """Allow caching of functions defined in a folder under the hash of all sources in it, beside those of the core.
+
+    An edit there compiles only these functions again. folder : of another package, or of the kernels of a feature
+    """
     folder = Path(folder).resolve()
     EXTRA_FOLDERS[folder] = f"outside/{_digest(folder, sorted(folder.rglob('*.py')))}"
 

@@ -23,11 +23,12 @@ class Tables(types.Opaque):
 
     name : name of the kind of handle
     members : function without arguments that returns the numba types of its tables, a named tuple
+    own : as `members`, for further tables of a feature, whose handle is entry `slot` of the table `features`
     """
 
-    def __init__(self, name: str, members: Callable[[], tuple]) -> None:
+    def __init__(self, name: str, members: Callable[[], tuple], own: Callable[[], tuple] | None = None, slot=0) -> None:
         super().__init__(name)
-        self.members = members
+        self.members, self.own, self.slot = members, own, slot
 
 
 register_model(Tables)(models.OpaqueModel)
@@ -46,7 +47,8 @@ class TableOf(AttributeTemplate):
     key = Tables
 
     def generic_resolve(self, kind, name):
-        return getattr(kind.members(), name, None)
+        member = getattr(kind.members(), name, None)
+        return getattr(kind.own(), name, None) if member is None and kind.own is not None else member
 
 
 @lower_getattr_generic(Tables)
@@ -56,13 +58,20 @@ def load_table(context, builder, kind, value, name):
     Address, rows and columns of the table are three words of the handle, which never change.
     """
     members, word = kind.members(), context.get_value_type(types.intp)
-    member, first = getattr(members, name), 3 * members._fields.index(name)
     base = builder.bitcast(value, word.as_pointer())
 
-    def entry(i):
-        loaded = builder.load(cgutils.gep_inbounds(builder, base, first + i))
+    def load(base, i):
+        loaded = builder.load(cgutils.gep_inbounds(builder, base, i))
         loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
         return loaded
+
+    if not hasattr(members, name):  # a table of a feature
+        slots = builder.inttoptr(load(base, 3 * members._fields.index("features")), word.as_pointer())
+        base, members = builder.inttoptr(load(slots, kind.slot), word.as_pointer()), kind.own()
+    member, first = getattr(members, name), 3 * members._fields.index(name)
+
+    def entry(i):
+        return load(base, first + i)
 
     array = make_array(member)(context, builder)
     size = word(context.get_abi_sizeof(context.get_data_type(member.dtype)))

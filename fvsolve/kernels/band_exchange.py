@@ -11,7 +11,7 @@ import numpy as np
 
 from fvsolve.jit import COMPILING, Intrinsic, njit
 from fvsolve.kernels.dtypes import RATE
-from fvsolve.kernels.table_handle import open_tables
+from fvsolve.kernels.table_handle import floats_at, open_tables
 
 # Entries of `joint`, int64: number of this band; number of bands; addresses of the board shared by all, of the buffer
 # for sums, and of the system function that yields the processor; number of barriers passed; number of spans common to
@@ -25,13 +25,6 @@ SHARED_ADDRESS, SHARED_RATES = 1, 2
 SPIN_LIMIT = 2000  # polls at a barrier before the thread yields
 
 if COMPILING:
-
-    @Intrinsic
-    def floats_at(typingctx, address, size):
-        """View of the memory at an address as an array float64[size], without a copy."""
-        from fvsolve.compile.code_generation import floats_at_address
-
-        return floats_at_address()
 
     @Intrinsic
     def address_of(typingctx, array):
@@ -74,10 +67,6 @@ if COMPILING:
 else:
     import ctypes
     import time
-
-    def floats_at(address, size):
-        """View of the memory at an address as an array float64[size], without a copy."""
-        return np.ctypeslib.as_array((ctypes.c_double * int(size)).from_address(int(address)))
 
     def address_of(array):
         """Address of the first entry of an array."""

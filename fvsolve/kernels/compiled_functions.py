@@ -71,7 +71,7 @@ class Functions:
         Their arguments are (t, y, dydt, out, handle, rows).
         """
         self.store_hooks(*ENERGY_HOOKS)
-        power, stored = self.cast.functions("power"), self.cast.functions("stored")
+        power, stored = self.cast.functions("network_power", "power"), self.cast.functions("stored")
         return self.compile_job(calls.POWER, power, calls.power_in_turn), self.compile_job(
             calls.STORED, stored, calls.stored_in_turn
         )

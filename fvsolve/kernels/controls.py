@@ -274,7 +274,7 @@ def record_controls(t, y, out, handle, values):
     """
     tables = open_tables(handle)
     record_inputs(t, out, tables)
-    arrives, ends = out[ARRIVES] if tables.delays.size > 0 else NEVER, t >= tables.clock[0]["limit"]
+    arrives, ends = out[ARRIVES] if tables.settings[0]["arrivals"] == 1 else NEVER, t >= tables.clock[0]["limit"]
     for k in range(tables.controls.size):
         control = tables.controls[k]
         if control["period"] > 0.0 and not (ends and is_due(t, tables, control)):

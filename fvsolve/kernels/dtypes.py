@@ -75,25 +75,24 @@ SETTINGS = record(
     floor=f8,  # mixture: pressure below that of the gas, vapour pressure or 0 [Pa]
     gas=f8,  # gas volume over liquid volume, times pressure to the power gas_power [Pa^gas_power]
     gas_power=f8,  # 1 / (gas exponent)
-    weights=i8,  # offset in `floats` of the weights b of the method, followed by its c; number of stages
-    stages=i8,
-    jumps=f8,  # least jump in a delay line that is stored as a jump, as fraction of the greatest wave
     tolerance=f8,  # rtol of error control; 0 without it
+    arrivals=i8,  # 1 if a feature writes to out[ARRIVES]
     saturation=f8,  # gas pressure at which all gas is dissolved; infinite for no dissolution [Pa]
 )
 
-PIPE = record(  # columns read by delay lines come first, in as few cache lines as possible
+PIPE = record(  # columns read for waves come first, in as few cache lines as possible
     y=i8,  # offset of the forward wave in y; the backward wave follows it
     cell=i8,  # offset of its cells in per-cell arrays
     from_node=i8,
     to_node=i8,
     admittance=f8,  # area / speed [kg/s per Pa]
+    end_admittance=f8,  # that at its end nodes: less where a feature couples them at once
     flow=f8,  # mass flow of the profile [kg/s]
     drag=f8,  # balances the pressure gradient of the profile; its friction if steady [kg/s2]
     friction=i8,
     loss=f8,  # dM/dt = -loss |M| M, the part with a fixed factor [1/kg]
     rough=f8,  # dM/dt = -rough f(Re) |M| M  [1/kg]
-    cells=i8,
+    cells=i8,  # 0 if a feature computes its waves
     dx=f8,
     speed=f8,  # wave speed [m/s]
     rate_factor=f8,  # factor on speed / dx for the ends of a short pipe
@@ -119,24 +118,14 @@ PIPE = record(  # columns read by delay lines come first, in as few cache lines 
     from_mass=f8,  # mass per length at the end, computed for the profile [kg/m]
     to_mass=f8,
     moving_segment=i8,  # row of its first cell in `moving_segments`; -1 for a fixed pipe
-    delay=i8,  # row of `delays` for a delay line, which has no cells; else -1
     temperature=f8,  # of its fluid at the start, to which `reynolds` belongs; 0 if friction does not follow it [K]
     heat=i8,  # first row in the ledger of the heat of its friction; -1 if this does not heat the fluid
 )
 
-DELAY = record(  # delay line: stretches of equal travel time, friction in the middle of each
-    pipe=i8,
-    stretch=i8,  # first stretch
-    stretches=i8,
-    tau=f8,  # travel time of a stretch [s]
-    hold=f8,  # age of the waves that are read: tau, or the longest step for a shorter stretch [s]
-    now=f8,  # fraction that arrives instantly in a shorter stretch, 1 - tau / hold; else 0
-    ring=i8,  # number of entries of `past` before its own, see `kernels.delay_lines.wave_history`
-    ring_size=i8,  # number of entries of each stretch
-    transmission=f8,  # fraction of a small change of flow transmitted by the friction in the middle of a stretch
-    places=i8,  # number of places of fields and envelopes
-    couple=f8,  # instantaneous flow between the ends of a shorter stretch per pressure [kg/s per Pa]
-    acts=i8,  # ends whose nodes respond instantly: 1 `from`, 2 `to`, 3 both
+COUPLING = record(  # flow at once between two nodes, in addition to that of restrictions
+    from_node=i8,
+    to_node=i8,
+    conductance=f8,  # flow per pressure [kg/s per Pa]
 )
 
 NODE = record(
@@ -164,8 +153,6 @@ NODE = record(
     head_given=i8,  # laws log and table: 1 if the schedule is a head [m]
     density=f8,  # density in a tank [kg/m3]
     moving_segment=i8,  # row of `moving_segments`; -1 for a fixed node
-    lines=i8,  # offset in `integers` of the ends of delay lines at it, 2 line + side
-    line_count=i8,
 )
 
 VALVE = record(
@@ -774,7 +761,7 @@ RECORDS = {
     "heat_sources": HEAT_SOURCE,
     "exchangers": EXCHANGER,
     "walls": WALL,
-    "delays": DELAY,
+    "couplings": COUPLING,
     "controls": CONTROL,
     "sensors": PROBE,
     "driven": DRIVEN,
@@ -790,8 +777,8 @@ Tables = namedtuple("Tables", (*RECORDS, "integers", "floats", "profile", "plane
 RunArrays = namedtuple("RunArrays",
     (
         "clock", "work", "armed", "marks", "scratch", "spare", "seen", "bands", "joint", "sums", "envelope", "extremes",
-        "past", "sharp", "applied", "readings", "sensing", "stack", "discrete", "histories",
-        "network_places", "network_factors", "maxima", "accepted",
+        "applied", "readings", "sensing", "stack", "discrete", "histories",
+        "network_places", "network_factors", "maxima", "accepted", "features", "memory",
     ),
 )  # fmt: skip
 HandleTables = namedtuple("HandleTables", (*Tables._fields, *RunArrays._fields, "calls", "hooks"))
@@ -801,9 +788,10 @@ INTEGERS = (
     "bands",
     "joint",
     "sums",
-    "sharp",
     "sensing",
     "network_places",
+    "features",
+    "memory",
     "calls",
     "hooks",
 )  # these are int64

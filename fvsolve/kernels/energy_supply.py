@@ -13,7 +13,7 @@ import numpy as np
 from fvsolve.jit import COMPILING, Intrinsic, njit, plain_kinds
 from fvsolve.kernels.calls import power_in_turn, rhs_in_turn, stored_in_turn
 from fvsolve.kernels.network_energy import energy_head
-from fvsolve.kernels.table_handle import addresses_of, handle_of, open_tables
+from fvsolve.kernels.table_handle import addresses_of, boxed, floats_at, handle_of, open_tables
 
 # Header: count of steps at the next state; interval of states [steps], states with this interval, fraction of the next
 # interval; error bound of the supplied energy, greatest released and supplied energies [J]; greatest excess over the
@@ -45,13 +45,6 @@ def watch_types() -> WatchArrays:
 def handle_of_watch(arrays: WatchArrays) -> np.ndarray:
     """Handle of the arrays of a watch, which must be kept; without JIT an array that contains them."""
     return handle_of(addresses_of(arrays)) if COMPILING else boxed(arrays)
-
-
-def boxed(content) -> np.ndarray:
-    """Array that contains an object."""
-    box = np.empty(1, dtype=object)
-    box[0] = content
-    return box
 
 
 if COMPILING:
@@ -133,12 +126,14 @@ def copy_run(run, own):
 
     run, own : open handles of the model
     """
-    if run.past.size != own.past.size or run.histories.size != own.histories.size:
-        return False
+    for k in range(run.memory.size // 2):
+        if run.memory[2 * k + 1] != own.memory[2 * k + 1]:
+            return False
+    for k in range(run.memory.size // 2):
+        size = run.memory[2 * k + 1]
+        copy(floats_at(run.memory[2 * k], size), floats_at(own.memory[2 * k], size))
     copy(run.armed, own.armed)
     copy(run.discrete, own.discrete)
-    copy(run.past, own.past)
-    copy(run.histories, own.histories)
     copy(run.network_places, own.network_places)
     copy(run.network_factors, own.network_factors)
     own.clock[0]["limit"], own.clock[0]["step"] = run.clock[0]["limit"], run.clock[0]["step"]

@@ -239,16 +239,16 @@ def sensed_step(cluster, tables, k, right):
 
 @njit
 def add_couplings(cluster, tables, out, matrix, right, sparse):
-    """Add the instantaneous flow between the ends of short delay lines to the equations of a cluster.
+    """Add the flow at once between coupled nodes to the equations of a cluster.
 
     matrix, right : equations, as for `add_valve`; sparse : as for `places_of`
     """
     layout, nodes, integers = tables.layout[0], tables.nodes, tables.integers
     for k in range(cluster["couples"]):
-        line = tables.delays[integers[cluster["first_couple"] + k]]
-        pipe, g = tables.pipes[line["pipe"]], line["couple"]
-        i, j = inner_row(nodes, pipe["from_node"]), inner_row(nodes, pipe["to_node"])
-        p, q = out[layout["pressure"] + pipe["from_node"]], out[layout["pressure"] + pipe["to_node"]]
+        link = tables.couplings[integers[cluster["first_couple"] + k]]
+        g = link["conductance"]
+        i, j = inner_row(nodes, link["from_node"]), inner_row(nodes, link["to_node"])
+        p, q = out[layout["pressure"] + link["from_node"]], out[layout["pressure"] + link["to_node"]]
         places = places_of(cluster, tables, cluster["valves"] + k, i, j, sparse)
         add_valve(i, j, places, g * (p - q), 0.0, g, 0.0, matrix, right)
 
@@ -657,8 +657,8 @@ def prepare_cluster(cluster, tables, out, g, m):
             for i in (device["node"], device["second"]):
                 unchanged = unchanged and (i < 0 or out[layout["pressure"] + i] == 0.0)
     for k in range(cluster["couples"]):
-        pipe = tables.pipes[tables.delays[integers[cluster["first_couple"] + k]]["pipe"]]
-        for i in (pipe["from_node"], pipe["to_node"]):
+        link = tables.couplings[integers[cluster["first_couple"] + k]]
+        for i in (link["from_node"], link["to_node"]):
             unchanged = unchanged and out[layout["pressure"] + i] == 0.0
     return unchanged
 
@@ -938,9 +938,39 @@ def solve_cluster(out, tables, index):
 def solve_clusters(t, y, dydt, out, handle):
     """Solve the pressures of clusters and their valve flows under the density law `linear`.
 
-    Clusters with a stored inverse matrix are left to `delay_lines.line_rates`.
+    Clusters with a stored inverse matrix are left to `solve_coupled_clusters`.
     """
     tables = open_tables(handle)
     for k in range(tables.clusters.size):
         if tables.clusters[k]["inverse"] < 0:
             solve_cluster(out, tables, k)
+
+
+@njit
+def solve_coupled_clusters(t, y, dydt, out, handle):
+    """Solve for the pressures of nodes that are coupled and joined by no valve.
+
+    p' of each group of such nodes is the inverse of their admittance matrix times the arriving flows. These include the
+    flow of couplings from nodes of known pressure.
+    """
+    tables = open_tables(handle)
+    layout, integers, work = tables.layout[0], tables.integers, tables.scratch
+    for number in range(tables.clusters.size):
+        cluster = tables.clusters[number]
+        if cluster["inverse"] < 0:
+            continue
+        n, first = cluster["nodes"], cluster["first_node"]
+        for i in range(n):
+            work[i] = out[layout["net"] + integers[first + i]]
+        for c in range(cluster["couples"]):
+            link = tables.couplings[integers[cluster["first_couple"] + c]]
+            i, j = row_in_cluster(cluster, tables, link["from_node"]), row_in_cluster(cluster, tables, link["to_node"])
+            if i >= 0 and j < 0:
+                work[i] += link["conductance"] * out[layout["pressure"] + link["to_node"]]
+            if j >= 0 and i < 0:
+                work[j] += link["conductance"] * out[layout["pressure"] + link["from_node"]]
+        for i in range(n):
+            total, at = 0.0, cluster["inverse"] + i * n
+            for j in range(n):
+                total += tables.floats[at + j] * work[j]
+            out[layout["pressure"] + integers[first + i]] = total

@@ -290,7 +290,7 @@ def outgoing_waves_linear(t, y, dydt, out, handle):
     scratch = tables.scratch
     for i in range(pipes.size):
         pipe = pipes[i]
-        if pipe["delay"] >= 0:
+        if pipe["cells"] == 0:  # a feature computes its waves
             continue
         n, at = pipe["cells"], layout["ends"] + 4 * i
         r, l = y[pipe["y"] : pipe["y"] + n], y[pipe["y"] + n : pipe["y"] + 2 * n]
@@ -313,7 +313,7 @@ def incoming_waves_linear(t, y, dydt, out, handle):
     layout, pipes = tables.layout[0], tables.pipes
     for i in range(pipes.size):
         pipe = pipes[i]
-        if pipe["delay"] >= 0:
+        if pipe["cells"] == 0:  # a feature computes its waves
             continue
         at = layout["ends"] + 4 * i
         p_from = out[layout["pressure"] + pipe["from_node"]]
@@ -331,7 +331,7 @@ def wave_rates(t, y, dydt, out, handle):
         return
     for i in range(pipes.size):
         pipe = pipes[i]
-        if pipe["delay"] >= 0:
+        if pipe["cells"] == 0:  # a feature computes its waves
             continue
         n, o, at = pipe["cells"], pipe["y"], layout["ends"] + 4 * i
         pipe_rates(

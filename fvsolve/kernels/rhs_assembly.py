@@ -48,7 +48,8 @@ class RhsTerms(NamedTuple):
     observe: str = ""  # probe values
     record: str = ""  # records of an accepted state
     events: str = ""  # event functions
-    power: str = ""
+    network_power: str = ""  # powers of pipes, restrictions and columns
+    power: str = ""  # all other powers
     stored: str = ""
     derive_state: str = ""  # values that these jobs read instead of the state, written to dydt
     damp: str = ""  # divides rates dydt of a stage by 1 + h r; step h passed as t, h r written to out
@@ -96,12 +97,12 @@ PIPES = {
 READ = {
     "linear": RhsTerms(
         observe="observation: observe_linear",
-        power="network_energy: power_linear",
+        network_power="network_energy: power_linear",
         stored="network_energy: stored_linear",
     ),
     "barotropic": RhsTerms(
         observe="barotropic_pipes: observe_barotropic",
-        power="network_energy: power_barotropic",
+        network_power="network_energy: power_barotropic",
         stored="network_energy: stored_barotropic",
     ),
 }
@@ -237,13 +238,7 @@ COMPONENTS = {
         rates="relaxation: add_wall_creep", power="relaxation: add_creep_power", stored="relaxation: add_creep_stored"
     ),
 }
-DELAYS = RhsTerms(
-    outgoing_waves="delay_lines.line_rates: outgoing_line_waves",
-    incoming_waves="delay_lines.line_rates: incoming_line_waves",
-    observe="delay_lines.line_rates: observe_lines",
-    record="delay_lines.history_update: record_lines",
-)
-COUPLED = RhsTerms(solve_nodes="delay_lines.line_rates: solve_line_clusters")
+COUPLED = RhsTerms(solve_nodes="node_clusters: solve_coupled_clusters")
 BANDS = RhsTerms(exchange="band_exchange: exchange_states", reduce_rate="band_exchange: reduce_rate")
 BOUNDARY_EXCHANGE = RhsTerms(package="fvsolve.basins", boundary_exchange="basin_patches: put_boundary_flows")
 MIXED = RhsTerms(mix="scalar_transport: mix_scalars")
@@ -256,6 +251,7 @@ class ModelFeatures(NamedTuple):
     family : kernels of the density law, "linear", "barotropic" or "cavitating"
     laws : names of the modules of parts' laws, in the order of the rows of `hooks`
     lines : True if force elements join points of bodies
+    features : terms of other features, see `assembly.features`
     basins, carried : terms of basins, and of the scalars that they carry; see `basins.basin_terms`
     alone : True if there are only basins, and no link
     bands : True if threads or processes step bands of the state
@@ -284,7 +280,8 @@ class ModelFeatures(NamedTuple):
     carried: tuple[RhsTerms, ...] = ()
     scalars: bool = False
     valves: bool = False
-    delays: bool = False
+    features: tuple[RhsTerms, ...] = ()
+    couplings: bool = False
     alone: bool = False
     bands: bool = False
     boundary_exchange: bool = False
@@ -309,15 +306,14 @@ class ModelFeatures(NamedTuple):
         family = self.family if linear or self.pipes else "barotropic"
         if self.controls:
             yield COMPONENTS["controls, linear" if linear else "controls, barotropic"]
-        lumped = linear and not self.pipes and not self.delays
+        lumped = linear and not self.pipes and not any(terms.outgoing_waves for terms in self.features)
         yield from (ALONE,) if self.alone else (LUMPED,) if lumped else (NETWORK, NODES[family])
         yield READ["linear" if linear else "barotropic"]
         if self.masses:
             yield COMPONENTS["energy of masses" if linear else "energy of masses, barotropic"]
         if self.pipes:
             yield PIPES[family]
-        if self.delays:
-            yield DELAYS
+        yield from self.features
         if self.valves:
             yield COMPONENTS["valves"]
         bends = any(hook_of(law, "bends") is not None for law in self.modules())
@@ -337,7 +333,7 @@ class ModelFeatures(NamedTuple):
             yield COMPONENTS["formulas"]
         if self.clusters and linear:
             yield COMPONENTS["clusters"]
-            if self.delays:
+            if self.couplings:
                 yield COUPLED
         if self.columns:
             yield COMPONENTS["columns" if linear else "columns, barotropic"]

@@ -7,7 +7,8 @@ through memory once for each stage. `sums` of a handle describes the sums; steps
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.band_exchange import address_of, floats_at
+from fvsolve.kernels.band_exchange import address_of
+from fvsolve.kernels.table_handle import floats_at
 
 HUGE = 1e100  # greater values count as not finite
 # Entries of `sums`, int64, empty if no sums are formed in blocks: mode; number of values that are not finite; addresses

@@ -5,7 +5,8 @@ compilation. A handle costs nothing: compiled code loads a table where it uses i
 tables alive, at their addresses and with their sizes.
 """
 
-from ctypes import addressof, c_char
+from ctypes import addressof, c_char, c_double
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,6 +45,23 @@ if COMPILING:
         from fvsolve.compile.code_generation import Tables, handle_address
 
         return Tables("Tables", table_types)(handle), handle_address
+
+    def open_with(name: str, own, slot: int, handle):
+        """Signature and code of an intrinsic like `open_tables` that also loads the tables of a feature.
+
+        name : of the kind of tables; own : function that returns the numba types of the tables of the feature
+        slot : number of the feature, see `assembly.features`
+        """
+        from fvsolve.compile.code_generation import Tables, handle_address
+
+        return Tables(name, table_types, own, slot)(handle), handle_address
+
+    @Intrinsic
+    def floats_at(typingctx, address, size):
+        """View of the memory at an address as an array float64[size], without a copy."""
+        from fvsolve.compile.code_generation import floats_at_address
+
+        return floats_at_address()
 else:
 
     def addresses_of(tables: tuple) -> tuple:
@@ -62,25 +80,73 @@ else:
         """Tables of a handle, given as `HandleTables` or as an array that contains it."""
         return handle[0] if isinstance(handle, np.ndarray) else handle
 
+    def floats_at(address, size):
+        """View of the memory at an address as an array float64[size], without a copy."""
+        return np.ctypeslib.as_array((c_double * int(size)).from_address(int(address)))
+
+    class BothTables:
+        """Tables of the core and of a feature."""
+
+        def __init__(self, core, own) -> None:
+            self.core, self.own = core, own
+
+        def __getattr__(self, name: str):
+            return getattr(self.own if name in self.own._fields else self.core, name)
+
 
 def make_handle(tables: tuple):
     """Handle of a tuple of tables, in the order of `HandleTables`."""
     return handle_of(addresses_of(tables))
 
 
-def linked_handles(shared: tuple, replaced: dict[str, tuple], written: tuple, called: tuple):
-    """Handle of the tables of a model, the arrays of a run and the addresses of functions.
+class View(NamedTuple):
+    """Another handle of the same model, which compiled functions open: some tables of the model are replaced.
 
-    The arrays `sharp` and `sensing` of the run each receive another handle, in which some tables of the model are
-    replaced: for the time at which a jump of a delay line arrives, and to read sensors in place of probes.
-    shared : addresses of the tables of the model; replaced : "sharp" or "sensing" -> addresses with these replacements
-    written, called : arrays that the run writes, and tables of function addresses
+    array : array that receives the handle; tables : addresses of the tables of the model with the replacements
+    features : tables of each feature by slot, None for none
     """
-    own = addresses_of((*written, *called))
-    for name, tables in replaced.items():
-        within, array = handle_of((*tables, *own)), getattr(written, name)
-        if COMPILING:
-            array[:] = within
-        else:
-            array[0] = within
-    return handle_of((*shared, *own))
+
+    array: np.ndarray
+    tables: tuple
+    features: list
+
+
+def linked_handles(shared: tuple, views: list[View], written: tuple, called: tuple, features: list, kept: list):
+    """Handle of the tables of a model, the arrays of a run, the addresses of functions, and the handles of features.
+
+    shared : addresses of the tables of the model; written, called : arrays that the run writes, addresses of functions
+    features : tables of each feature by slot, None for none; kept : receives the arrays behind the handles
+    """
+    for view in views:
+        within = handle_of((*view.tables, *addresses_of((*with_features(written, view.features, kept), *called))))
+        view.array[:] = within if COMPILING else boxed(within)
+    return handle_of((*shared, *addresses_of((*with_features(written, features, kept), *called))))
+
+
+def boxed(content) -> np.ndarray:
+    """Array that contains an object."""
+    box = np.empty(1, dtype=object)
+    box[0] = content
+    return box
+
+
+def with_features(written: tuple, features: list, kept: list) -> tuple:
+    """Arrays of a run with the addresses of the handles of features; without compilation with their tables themselves.
+
+    features : tables of each feature by slot, None for none; kept : receives the arrays behind the handles
+    """
+    slots = np.zeros(len(features), dtype=np.int64 if COMPILING else object)
+    kept.append(slots)
+    for k, tables in enumerate(features):
+        if tables is not None and COMPILING:
+            handle = handle_of(addresses_of(tables))
+            slots[k] = handle.ctypes.data
+            kept += [handle, tables]
+        elif tables is not None:
+            slots[k] = tables
+    return written._replace(features=slots)
+
+
+def places_in_memory(arrays: list[np.ndarray]) -> np.ndarray:
+    """Address and size of each array of float64, one after another : int64[2 n]."""
+    return np.array([number for array in arrays for number in (array.ctypes.data, array.size)], dtype=np.int64)

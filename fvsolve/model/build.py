@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.argument_checks import TABLE, instance_of, validated
+from fvsolve.assembly.features import features_of
 from fvsolve.assembly.lowering import lower_devices, lowering_of
 from fvsolve.assembly.model_draft import ModelDraft
 from fvsolve.assembly.pipe_terms import MAX_TERMS, add_terms, limit_creep_step
@@ -28,15 +29,6 @@ from fvsolve.model.control_tables import (
     number_blocks,
     set_starts,
 )
-from fvsolve.model.delay_lines import (
-    divide_lines,
-    end_admittance_ratio,
-    history_size,
-    jump_capacity,
-    jump_tables,
-    line_methods,
-    lower_delays,
-)
 from fvsolve.model.input_histories import histories_size
 from fvsolve.model.mechanics_tables import (
     find_closed_chambers,
@@ -54,8 +46,6 @@ from fvsolve.model.reaction_tables import lower_reactions
 from fvsolve.model.scalar_tables import lower_scalars, scale_scalars, start_amounts
 from fvsolve.model.start_notices import start_notices
 from fvsolve.model.steady_start import SteadyStart
-from fvsolve.steppers import automatic
-from fvsolve.steppers.tableau import method_named
 
 
 def start_profile(draft) -> dict[str, Any]:
@@ -215,7 +205,7 @@ def tables_with_start(case: Case, draft: ModelDraft | None = None, unfit: Collec
         draft = with_balanced_blocks(draft)
     draft.steady = start_profile(draft)
     scale_scalars(draft)
-    worse = divide_lines(draft)
+    worse = settle(draft)
     draft.check()
     return tables_with_start(case, None, {*unfit, *worse}) if worse else draft
 
@@ -224,7 +214,7 @@ def tables_before_start(case: Case, unfit: Collection[str] = ()) -> ModelDraft:
     """Tables of a case before its initial steady state is known; unfit : names of pipes that cannot be delay lines."""
     draft = ModelDraft(case)
     number_blocks(draft)
-    draft.followed = line_methods(case, unfit)
+    draft.features = features_of(case, unfit)
     fill_nodes(draft)
     fill_links(draft)
     classify_nodes(draft)
@@ -246,7 +236,7 @@ def with_balanced_blocks(packed: ModelDraft) -> ModelDraft:
     def start(draft: ModelDraft) -> Model:
         draft.steady = start_profile(draft)
         scale_scalars(draft)
-        divide_lines(draft)
+        settle(draft)
         return model_of(draft, lambda _: [])
 
     balance = Balance(packed.case, packed, start)
@@ -271,13 +261,14 @@ def fill_nodes(draft: ModelDraft) -> None:
 def fill_links(draft: ModelDraft) -> None:
     """Fill the tables of links, devices, bodies and masses."""
     draft.pipe_names, draft.pipe_table = draft.fill("pipe", rec.PIPE)
-    lower_delays(draft)
+    for feature in draft.features:
+        feature.lower(draft)
     draft.column_names, draft.column_table = draft.fill("column", rec.COLUMN)
     draft.valve_names, draft.valve_table = draft.fill("valve", rec.VALVE)
     lower_devices(draft)
     for row in draft.pipe_table:
         for end in ("from_node", "to_node"):
-            draft.node_table["admittance"][row[end]] += row["admittance"] * end_admittance_ratio(draft, row)
+            draft.node_table["admittance"][row[end]] += row["end_admittance"]
     lower_bodies(draft)
     lower_moving_segments(draft)
     lower_masses(draft)
@@ -333,7 +324,7 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         draft.moving_segment_table, draft.mass_table, draft.brace_table, draft.stop_table, draft.piston_table,
         draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table,
         draft.heat_source_table, draft.exchanger_table, draft.wall_table,
-        draft.delay_table, draft.control_table, draft.sensor_table, draft.driven_table, draft.network_input_table,
+        draft.coupling_table, draft.control_table, draft.sensor_table, draft.driven_table, draft.network_input_table,
         draft.network_rate_table, draft.network_element_table, draft.network_switch_table, draft.reaction_table,
         np.array(draft.integers, dtype=np.int64), np.array(draft.floats, dtype=float), profile, draft.plane(), pieces,
     )  # fmt: skip
@@ -344,23 +335,21 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     # at which its pressure is not determined.
     marks = pipes * (4 if draft.case.law.cavitates else 1) + 3 * nodes + len(draft.column_table)
     marks += 2 * len(draft.device_table) + len(draft.piston_table) + len(draft.valve_table) + 3 * nodes
-    # `spare` has a copy of `out`; with delay lines two copies, three values for each probe and node, arrival times of
-    # jumps and the changes that they cause
-    spare = out
-    if lines := len(draft.delay_table):
-        spare = 2 * out + 3 * (len(draft.probe_table) + nodes) + 2 * (1 << (4 * lines - 1).bit_length()) + 8 * lines + 1
+    # `spare` has a copy of `out`
+    needed = [feature.sizes(draft, out) for feature in draft.features]
+    spare = max([out, *(sizes.get("spare", 0) for sizes in needed)])
     draft.shapes = rec.RunArrays(
         clock=1, work=draft.work_size, marks=marks,
         armed=tanks.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),
-        scratch=scratch_size(draft), spare=spare, seen=draft.size if len(draft.wall_table) else 0,
-        bands=2 * len(draft.basin_table), joint=0, sums=0, sharp=int(len(draft.delay_table) > 0),
-        envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)), past=history_size(draft.delay_table),
+        scratch=scratch_size(draft, needed), spare=spare, seen=draft.size if len(draft.wall_table) else 0,
+        bands=2 * len(draft.basin_table), joint=0, sums=0,
+        envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)),
         applied=2 * len(draft.control_table) + 2 * (len(draft.control_table) > 0), readings=len(draft.sensor_table),
         sensing=int(len(draft.sensor_table) > 0), stack=draft.schedules.stack, discrete=len(draft.discrete),
         histories=histories_size(draft.control_table),
         network_places=0 if draft.network is None else 3 * draft.network.rows.count + draft.network.capacity,
         network_factors=0 if draft.network is None else draft.network.rows.count + draft.network.capacity,
-        maxima=draft.maxima_size, accepted=accepted_size(draft),
+        maxima=draft.maxima_size, accepted=accepted_size(draft), features=0, memory=0,
     )  # fmt: skip
 
 
@@ -395,14 +384,10 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     s["stop_below"] = case.numerics.below_vapor == "stop"
     case.law.lower(draft.fluid, s, draft.floats)
     s["tolerance"] = case.numerics.rtol or 0.0
-    s["jumps"] = 0.25 * case.numerics.delay_tolerance
-    if len(draft.delay_table):
-        method = method_named(automatic.first_method(case.numerics.method))
-        s["weights"], s["stages"] = len(draft.floats), method.stages
-        draft.floats += [*map(float, method.b), *method.times]
+    s["arrivals"] = any(feature.sets_arrivals for feature in draft.features)
     waves = pipes["speed"] / pipes["dx"] * pipes["rate_factor"]
-    if case.numerics.step is not None:  # delay lines do not limit a given step
-        waves = waves[pipes["delay"] < 0]
+    if case.numerics.step is not None:  # pipes without cells do not limit a given step
+        waves = waves[pipes["cells"] > 0]
     rates = [*waves, *column_rates(draft)]
     s["rate"] = max([0.0, *rates, control_rate(draft), network_rate(draft)])
     return table
@@ -456,10 +441,13 @@ def most_states(draft: ModelDraft) -> int:
     return draft.size + MAX_TERMS * sum(unsteady)
 
 
-def scratch_size(draft: ModelDraft) -> int:
-    """Size of the work array `scratch`: the largest size that a function of the right-hand side needs."""
+def scratch_size(draft: ModelDraft, needed: list[dict[str, int]]) -> int:
+    """Size of the work array `scratch`: the largest size that a function of the right-hand side needs.
+
+    needed : sizes that features need
+    """
     scalars, nodes = len(draft.scalar_table), len(draft.node_table)
-    most = max([0, *draft.pipe_table["cells"], *draft.delay_table["places"]])
+    most = max([0, *draft.pipe_table["cells"], *(sizes.get("places", 0) for sizes in needed)])
     system = max((c["matrix"] + 4 * c["nodes"] + 5 * c["valves"] + c["held"] for c in draft.cluster_table), default=0)
     rigid = int(np.sum(draft.node_table["columns"] > 1))
     system = max(system, rigid * (rigid + 3))
@@ -468,8 +456,7 @@ def scratch_size(draft: ModelDraft) -> int:
     spatial = 8 * len(draft.freedom_table) + draft.factor_size + 16 * len(draft.body_table)
     spatial += constraints * (2 * len(draft.freedom_table) + constraints + 1)
     spatial = max(spatial, 18 if len(draft.body_table) else 0)
-    if stretches := sum(draft.delay_table["stretches"]):
-        system = max(system, 3 * most + jump_capacity(stretches))
+    system = max([system, *(sizes.get("scratch", 0) for sizes in needed)])
     return int(max(spatial, (5 if scalars else 4) * most + 64, system, 2 * len(draft.mass_table), 4 * scalars * nodes))
 
 
@@ -491,9 +478,26 @@ def model_of(draft: ModelDraft, notices: Callable[[ModelDraft], list[Notice]] = 
         draft.mass_names, draft.body_names, draft.bushing_names,
         dict(case.elevations), case.probes, draft.warnings,
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
-        draft.basins, case.extreme_probes, draft.watched_start, jump_tables(draft),
+        draft.basins, case.extreme_probes, draft.watched_start, closed(draft),
         flags_at_start(draft), np.array(draft.discrete, dtype=float), draft.timed, draft.network,
     )  # fmt: skip
+
+
+def settle(draft: ModelDraft) -> list[str]:
+    """Let features continue after the start, and write facts of pipes for `fvsolve check`; names of parts given up."""
+    facts = draft.steady["lines"] = {}
+    for name, link in draft.case.links.items():
+        if link.kind == "pipe":
+            model = link.pipe_model or draft.case.numerics.pipe_model
+            facts[name] = {"line": "finite-volume", "line_bound": None, "line_why": f'pipe_model = "{model}"'}
+    return [name for feature in draft.features for name in feature.settle(draft)]
+
+
+def closed(draft: ModelDraft) -> list:
+    """Features with complete tables."""
+    for feature in draft.features:
+        feature.close(draft)
+    return draft.features
 
 
 def flags_at_start(draft: ModelDraft) -> np.ndarray:

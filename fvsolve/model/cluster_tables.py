@@ -17,8 +17,7 @@ def classify_nodes(draft) -> None:
     Adds faults of nodes whose pressure nothing sets.
     """
     nodes, valves = draft.node_table, draft.valve_table
-    inner, short = nodes["kind"] == rec.JUNCTION, np.flatnonzero(draft.delay_table["now"] > 0.0)
-    joins = [draft.pipe_table[draft.delay_table["pipe"][k]] for k in short]
+    inner, joins = nodes["kind"] == rec.JUNCTION, draft.coupling_table
     pairs = [(v["from_node"], v["to_node"]) for v in (*valves, *joins) if inner[v["from_node"]] and inner[v["to_node"]]]
     group, sensed = union(len(nodes), pairs), sensed_junctions(draft, inner)
     if sensed:
@@ -27,9 +26,10 @@ def classify_nodes(draft) -> None:
             len(nodes), pairs + [pair for k, own in sensed.items() for pair in pairs_with(valves[k], own, inner)]
         )
     touched: dict[int, list[int]] = {}
-    couples = rows_by_group(group, inner, zip(short.tolist(), joins, strict=True), touched)
+    couples = rows_by_group(group, inner, enumerate(joins), touched)
     touched |= rows_by_group(group, inner, enumerate(valves), touched, sensed)
-    mark_event_ends(draft, group)
+    for feature in draft.features:
+        feature.grouped(draft, group)
     members: dict[int, list[int]] = {root: [] for root in touched}
     for i in np.flatnonzero(inner).tolist():
         if group[i] in members:
@@ -120,7 +120,7 @@ def rows_by_group(group, inner, rows, touched: dict[int, list[int]], further=Non
 def has_single_root(draft, members, ks, own) -> bool:
     """True if a group is a valve whose flow has a closed formula; sets the solution method of its nodes and valves.
 
-    Valves of a group without any pipe are made laminar near zero flow. members : nodes; ks : valves; own : delay lines
+    Valves of a group without any pipe are made laminar near zero flow. members : nodes; ks : valves; own : couplings
     """
     nodes, valves = draft.node_table, draft.valve_table
     regular, plain = np.all(nodes["admittance"][members] > 0.0), np.all(has_closed_root(valves[ks]))
@@ -135,7 +135,7 @@ FULL_MATRIX = 200  # nodes up to which a cluster with a sparse matrix also has s
 
 
 def add_cluster(draft, members, ks, own) -> tuple[int, ...]:
-    """Append a group to `integers`, its nodes, valves and delay lines, and return its `CLUSTER_RECORD`."""
+    """Append a group to `integers`, its nodes, valves and couplings, and return its `CLUSTER_RECORD`."""
     n, at = len(members), len(draft.integers)
     draft.node_table["row"][members] = np.arange(n)
     inverse = add_inverse(draft, members, own) if own and not ks else -1
@@ -208,14 +208,14 @@ def refuse_shared_nodes(draft, holds) -> None:
 class SparseMatrix:
     """Places of the entries of the matrix of a group of nodes, and its elimination, least degree first.
 
-    members : indices of the nodes; ks, own : rows of the valves and delay lines that join them
+    members : indices of the nodes; ks, own : rows of the valves and couplings that join them
     holds : row of a valve that may hold a pressure -> end at which it holds it, "" for a flow
     joined : nodes that links join to each node, by their rows; place : (row, column) -> place; size : number of places
     """
 
     def __init__(self, draft, members, ks, own, holds) -> None:
         self.draft, self.rows = draft, {i: k for k, i in enumerate(members)}
-        links = [draft.valve_table[k] for k in ks] + [draft.pipe_table[draft.delay_table["pipe"][k]] for k in own]
+        links = [draft.valve_table[k] for k in ks] + [draft.coupling_table[k] for k in own]
         self.links = [tuple(self.rows.get(int(row[end]), -1) for end in ("from_node", "to_node")) for row in links]
         self.joined: list[set[int]] = [set() for _ in members]
         for i, j in self.links:
@@ -276,41 +276,21 @@ class SparseMatrix:
         return [*starts, *links, *entries]
 
 
-def mark_event_ends(draft, group) -> None:
-    """Mark in column `acts` the ends of delay lines at junctions that respond instantly: 1 `from`, 2 `to`, 3 both.
-
-    Their group contains a device with events, or an end of a restriction with a flow law of its own.
-    group : label of the group of each node; valves or short delay lines join the junctions of a group
-    """
-    inner, valves, acting = draft.node_table["kind"] == rec.JUNCTION, draft.valve_table, set()
-    for v in valves:
-        if v["hooks"] >= 0 or (v["device"] >= 0 and draft.devices[v["device"]][2].events):
-            acting |= {int(v["from_node"]), int(v["to_node"])}
-    acting |= {int(row[column]) for row, (_, _, device) in zip(draft.device_table, draft.devices, strict=True)
-               for column in ("node", "second") if device.events}  # fmt: skip
-    roots = {group[i] for i in acting if i >= 0 and inner[i]}
-    for row in draft.delay_table:
-        pipe = draft.pipe_table[row["pipe"]]
-        ends = [int(pipe[end]) for end in ("from_node", "to_node")]
-        row["acts"] = sum(side for side, i in zip((1, 2), ends, strict=True) if inner[i] and group[i] in roots)
-
-
 def add_inverse(draft, members, couples) -> int:
-    """Append the inverse of the admittance matrix of nodes joined by short delay lines to `floats`; return its offset.
+    """Append the inverse of the admittance matrix of nodes that are coupled to `floats`; return its offset.
 
-    members : indices of the nodes; couples : rows of the delay lines. The inverse is stored row by row.
+    members : indices of the nodes; couples : rows of the couplings. The inverse is stored row by row.
     """
     rows, place = {i: k for k, i in enumerate(members)}, len(draft.floats)
     matrix = np.diag(draft.node_table["admittance"][members])
     for k in couples:
-        line = draft.delay_table[k]
-        pipe = draft.pipe_table[line["pipe"]]
-        ends = [rows[i] for i in (int(pipe["from_node"]), int(pipe["to_node"])) if i in rows]
+        link = draft.coupling_table[k]
+        ends = [rows[i] for i in (int(link["from_node"]), int(link["to_node"])) if i in rows]
         for i in ends:
-            matrix[i, i] += line["couple"]
+            matrix[i, i] += link["conductance"]
         if len(ends) == 2:
-            matrix[ends[0], ends[1]] -= line["couple"]
-            matrix[ends[1], ends[0]] -= line["couple"]
+            matrix[ends[0], ends[1]] -= link["conductance"]
+            matrix[ends[1], ends[0]] -= link["conductance"]
     draft.floats += np.linalg.inv(matrix).ravel().tolist()
     return place
 

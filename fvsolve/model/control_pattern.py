@@ -77,7 +77,7 @@ class BlockCouplings:
             if rows.quantities[row["side"]] in rows.states:
                 return model.device_states(model.devices[i])
             return model.device_reading(model.devices[i])
-        if kind in (rec.PIPE_PRESSURE, rec.PIPE_FLOW) and model.pipes[i]["delay"] < 0:
+        if kind in (rec.PIPE_PRESSURE, rec.PIPE_FLOW) and model.pipes[i]["cells"] > 0:
             pipe, right = model.pipes[i], int(row["side"] > 0)
             if row["side"] != 0:
                 node = pipe["to_node" if right else "from_node"]

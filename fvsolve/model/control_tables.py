@@ -166,7 +166,7 @@ def is_known_early(draft, row, probe) -> bool:
     if kind == rec.PRESSURE:
         return draft.node_table[row["index"]]["kind"] in STORED
     if kind in (rec.PIPE_PRESSURE, rec.PIPE_FLOW):
-        return row["side"] == 0 and draft.pipe_table[row["index"]]["delay"] < 0
+        return row["side"] == 0 and draft.pipe_table[row["index"]]["cells"] > 0
     if kind == rec.DEVICE_VALUE:
         name, part, device = draft.devices[row["index"]]
         return probe.quantity in device.states_of(draft, name, part)

@@ -45,7 +45,7 @@ class Couplings:
         self.size, self.model = model.y_size, model
         self.nodes, self.pipes = tables.nodes, tables.pipes
         self.valves, self.columns = tables.valves, tables.columns
-        self.short = self.pipes[tables.delays["pipe"][tables.delays["now"] > 0.0]]
+        self.couplings = tables.couplings
         settings = tables.settings[0]
         self.linear = model.case.law.linear
         self.own_friction = settings["scheme"] == rec.UPWIND and not settings["from_arriving"]
@@ -70,7 +70,7 @@ class Couplings:
     def pairs(self) -> Iterator[Pairs]:
         """Yield all couplings of the model, except some of a state with itself."""
         for pipe in self.pipes:
-            if pipe["delay"] >= 0:
+            if pipe["cells"] == 0:
                 yield pairs_of(unique_states(pipe["y"]), unique_states(*(self.sets[i] for i in ends_of(pipe))))
                 continue
             yield from self.inside(pipe)
@@ -112,7 +112,7 @@ class Couplings:
 
     def joints(self) -> list:
         """Links whose end nodes are solved together: valves, short delay lines, columns that valves can control."""
-        return [*self.valves, *self.short, *(column for column in self.columns if self.is_controlled(column))]
+        return [*self.valves, *self.couplings, *(column for column in self.columns if self.is_controlled(column))]
 
     def is_controlled(self, column) -> bool:
         """True if the flow of a rigid column follows the valves at its end at some openings."""
@@ -775,7 +775,7 @@ def lumped_states(model) -> np.ndarray:
     """
     if model.case.law.name not in ("linear", "log"):  # pressures come from iterations, rougher than rounding
         return np.zeros(0, dtype=np.int64)
-    pipes = model.tables.pipes[model.tables.pipes["delay"] < 0]
+    pipes = model.tables.pipes[model.tables.pipes["cells"] > 0]
     cells = [pipe["y"] + np.arange(2 * pipe["cells"]) for pipe in pipes] + [all_states(basin) for basin in model.basins]
     walls = [[at for at, _, _ in basin.stretches] for basin in model.basins]  # every cell's volume follows these
     return np.setdiff1d(np.arange(model.y_size), np.concatenate([[], *cells, *walls]))

@@ -163,7 +163,7 @@ class Model(Displayable):
     basins: list[BasinRows]  # in the order of their table
     watched: list[Probe]  # read in addition to the probes, for their extremes only
     watched_start: np.ndarray  # pressures of `watched` along pipes in the profile [Pa], nan for others
-    sharp: dict[str, np.ndarray]  # tables that replace these while a jump is solved, see `model.delay_lines`
+    features: list[Any]  # see `assembly.features`
     flags: np.ndarray  # event flags before a run
     discrete: np.ndarray  # numbers of blocks that change at events and samples only, at the start
     timed: list[tuple[int, int]]  # (event flag, place in `discrete` of the time of its last change)
@@ -177,7 +177,7 @@ class Model(Displayable):
     picture = "fvsolve.draw.object_pictures:model_figure"
 
     def __post_init__(self) -> None:
-        for array in (*self.tables, self.scale, self.start, *self.profiles.values(), *self.sharp.values()):
+        for array in (*self.tables, self.scale, self.start, *self.profiles.values()):
             array.flags.writeable = False
 
     def summary_line(self) -> str:
@@ -230,7 +230,7 @@ class Model(Displayable):
         For each delay line it is the value of the delay line with the longest travel time.
         """
         pipes = self.tables.pipes
-        rates = pipes["speed"] / pipes["dx"] * np.where(pipes["delay"] >= 0, pipes["rate_factor"], 1.0)
+        rates = pipes["speed"] / pipes["dx"] * np.where(pipes["cells"] == 0, pipes["rate_factor"], 1.0)
         rates.flags.writeable = False
         return rates
 
@@ -281,7 +281,8 @@ class Model(Displayable):
         alone = alone and bool((self.tables.nodes["kind"] == rec.PATCH).all())
         cells = bool((self.tables.pipes["cells"] > 0).any())
         cast = ModelFeatures(self.case.law.family, cells, *mechanics, self.unsteady, self.creeps, has.devices,
-                    tuple(self.laws), basins, carried, has.scalars, valves, has.delays, alone,
+                    tuple(self.laws), basins, carried, has.scalars, valves,
+                    tuple(terms for feature in self.features for terms in feature.terms), has.couplings, alone,
                     forces=bool(self.layout["forces"] >= 0), controls=has.controls,
                     formulas=bool((self.tables.schedules["pieces"] < 0).any()),
                     networks=self.network is not None, heat=bool((self.tables.scalars["specific_heat"] > 0.0).any()),
@@ -345,17 +346,17 @@ class Model(Displayable):
             with self.run_data() as run_data:
                 run_data.restore_history(t)
                 return run_data.evaluate(t.t, t.y, np.inf)[0]
-        self.refuse_delay_lines("rhs")
+        self.refuse_histories("rhs")
         return self.evaluate(t, y)[0]
 
-    def refuse_delay_lines(self, function: str) -> None:
+    def refuse_histories(self, function: str) -> None:
         """Raise FvsolveError if the model has delay lines or blocks with a delay: their history is not part of y."""
         if self.shapes.histories:
             text = f"{function}(t, y) is not defined for a case with a control of type delay: y has no earlier inputs"
             raise FvsolveError(f"{text}. Expected a case without it, or rhs(State) instead of rhs(t, y)")
-        if len(self.tables.delays):
-            text = f"{function}(t, y) is not defined for a model with delay lines: y does not contain their waves"
-            raise FvsolveError(f'{text}. Expected pipe_model = "finite-volume" (or rhs(State) instead of rhs(t, y))')
+        for feature in self.features:
+            if text := feature.refusal(function):
+                raise FvsolveError(text)
 
     def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
         """Right-hand side and further values at (t, y), see `rhs` : (dydt, out).
@@ -386,7 +387,7 @@ class Model(Displayable):
 
         Raises FvsolveError if the model has delay lines.
         """
-        self.refuse_delay_lines("jacobian")
+        self.refuse_histories("jacobian")
         return self.jacobian_without_delays(t, y)
 
     def jacobian_without_delays(self, t: float, y: np.ndarray) -> np.ndarray:
@@ -474,7 +475,7 @@ class Model(Displayable):
             row = self.tables.pipes[k]
             n, o = pipe.cells, row["y"]
             r, l = y[o : o + n], y[o + n : o + 2 * n]  # noqa: E741
-            if row["delay"] >= 0:
+            if row["cells"] == 0:
                 r, l = (lines or {}).get(k, (np.zeros(n), np.zeros(n)))  # noqa: E741
             pressure, mass_flow = self.cell_pressure(k, r + l), row["flow"] + (r - l)
             flow = mass_flow / law.density(pressure)
@@ -500,10 +501,9 @@ class Model(Displayable):
         y = self.checked_size(y)
         initial, change = self.initial_mass, 0.0
         pipes = self.tables.pipes
-        columns = (pipes[name].tolist() for name in ("y", "cells", "dx", "speed", "delay", "elements"))
-        for row, o, n, dx, speed, delay, elements in zip(pipes, *columns, strict=True):
-            change += float(np.sum(y[o : o + 2 * n])) * dx / speed if n else 0.0
-            change += float(y[o]) if delay >= 0 else 0.0
+        columns = (pipes[name].tolist() for name in ("y", "cells", "dx", "speed", "elements"))
+        for row, o, n, dx, speed, elements in zip(pipes, *columns, strict=True):
+            change += float(np.sum(y[o : o + 2 * n])) * dx / speed if n else float(y[o])
             change += mass_in_creep(self.tables.floats, row, y) if elements else 0.0
         for at in self.tables.nodes["y"].tolist():
             change += float(y[at]) if at >= 0 else 0.0

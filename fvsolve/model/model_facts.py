@@ -12,8 +12,8 @@ from fvsolve.case.basins import boundary_cells, patch_names
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.steady_friction import drag
-from fvsolve.model.delay_lines import step_at_start
 from fvsolve.model.reaction_tables import reaction_facts
+from fvsolve.model.step_division import step_at_start
 from fvsolve.parts.pipe.pipe_wall import HEAT_KEYS, Wall, materials, restraint_factor
 from fvsolve.steppers.automatic import first_method
 from fvsolve.steppers.tableau import AUTO, method_named

@@ -10,16 +10,7 @@ import numpy as np
 from fvsolve.assembly.model_draft import aligned_zeros
 from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.delay_lines.wave_history import COUNT, INFINITE, NEXT_ARRIVAL, SEGMENT_END, time_tolerance
 from fvsolve.model import input_histories
-from fvsolve.model.delay_lines import (
-    LEAST_STEPS,
-    begin_history,
-    reset_history,
-    steps_left,
-    stored_history,
-    with_doubled_rings,
-)
 from fvsolve.model.network_elimination import NetworkError
 
 if TYPE_CHECKING:
@@ -31,11 +22,10 @@ def zeros_for_run(shapes: rec.RunArrays) -> rec.RunArrays:
     arrays = {name: np.zeros(shape) for name, shape in shapes._asdict().items() if name not in rec.INTEGERS}
     arrays |= {name: np.zeros(getattr(shapes, name), dtype=np.int64) for name in shapes._fields if name in rec.INTEGERS}
     arrays |= {"clock": np.zeros(1, rec.CLOCK), "work": aligned_zeros(shapes.work)}
-    for name in ("sharp", "sensing"):
-        if getattr(shapes, name):
-            from fvsolve.kernels.table_handle import empty_handle
+    if shapes.sensing:
+        from fvsolve.kernels.table_handle import empty_handle
 
-            arrays[name] = empty_handle()
+        arrays["sensing"] = empty_handle()
     return rec.RunArrays(**arrays)
 
 
@@ -62,11 +52,12 @@ class RunData:
             self.tables.plane[:] = model.tables.plane
         if len(model.tables.moving_segments):  # `loads_body` is set where joint forces are read
             self.tables = self.tables._replace(moving_segments=model.tables.moving_segments.copy())
-        self.clock, self.full_at = self.written.clock[0], -np.inf  # number of history entries at which rings are full
+        self.clock = self.written.clock[0]
         self.armed, self.marks = self.written.armed, self.written.marks
         self.envelope, self.extremes = self.written.envelope, self.written.extremes
         self.maxima, self.accepted = self.written.maxima, self.written.accepted
-        begin_history(self.written.past, model.tables.delays)
+        self.features = [feature.run(self) for feature in model.features]
+        self.kept: list = []  # arrays behind handles
         input_histories.reset_histories(self.written.histories, model.tables.controls)
         self.clock["limit"], self.marks[:] = np.inf, np.nan
         self.armed[:], self.discrete[:] = model.flags, model.discrete
@@ -106,22 +97,35 @@ class RunData:
 
         callables : (calls, hooks) of `kernels.compiled_functions.Functions`
         """
-        from fvsolve.kernels.table_handle import addresses_of, linked_handles
+        from fvsolve.kernels.table_handle import View, addresses_of, linked_handles, places_in_memory
 
         model = self.model
         shared = model.places if self.tables is model.tables else addresses_of(self.tables)
-        replacements = {"sharp": model.sharp} if written.sharp.size else {}
+        views = []
         if len(model.tables.sensors):
-            replacements["sensing"] = {"probes": model.tables.sensors, "controls": model.tables.controls[:0]}
-        replaced = {name: addresses_of(self.tables._replace(**own)) for name, own in replacements.items()}
-        return linked_handles(shared, replaced, written, callables)
+            replaced = {"probes": model.tables.sensors, "controls": model.tables.controls[:0]}
+            views.append(View(written.sensing, addresses_of(self.tables._replace(**replaced)), self.feature_tables()))
+        for own in self.features:
+            for name, (array, replaced) in own.views().items():
+                views.append(View(array, addresses_of(self.tables._replace(**replaced)), self.feature_tables(name)))
+        written = written._replace(memory=places_in_memory(list(self.arrays().values())))
+        self.kept.append(written.memory)
+        return linked_handles(shared, views, written, callables, self.feature_tables(), self.kept)
+
+    def feature_tables(self, view: str = "") -> list:
+        """Tables of the features of the case, by slot; view : name of another view of the model."""
+        tables: list = [None] * (1 + max((own.feature.slot for own in self.features), default=-1))
+        for own in self.features:
+            tables[own.feature.slot] = own.tables(view)
+        return tables
 
     def reset(self, armed: np.ndarray | None = None) -> None:
         """Reset for another state: event flags as given or as at the start, and empty histories."""
         self.armed[:], self.clock["limit"] = self.model.flags if armed is None else armed, np.inf
         self.discrete[:], self.accepted[:] = self.model.discrete, 0.0
         self.update_network()
-        reset_history(self.past, self.model.tables.delays)
+        for own in self.features:
+            own.reset()
         if self.histories.size:
             input_histories.reset_histories(self.histories, self.model.tables.controls)
 
@@ -134,16 +138,6 @@ class RunData:
     def discrete(self) -> np.ndarray:
         """Numbers of blocks of `controls` that change at events and samples only."""
         return self.written.discrete
-
-    @property
-    def past(self) -> np.ndarray:
-        """History of waves in delay lines."""
-        return self.written.past
-
-    @past.setter
-    def past(self, past: np.ndarray) -> None:
-        self.full_at = -np.inf
-        self.store("past", past)
 
     @property
     def histories(self) -> np.ndarray:
@@ -163,8 +157,24 @@ class RunData:
         self.written = self.written._replace(**{name: values})
         self.__dict__.pop("handle", None)
 
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Arrays that a state needs in addition to y, by name; they may grow in a run."""
+        found = {}
+        for own in self.features:
+            found |= own.arrays()
+        return found | {"histories": self.histories}
+
+    def set_array(self, name: str, values: np.ndarray) -> None:
+        """Set one of `arrays`; the handle is made again only if the size is new."""
+        if name == "histories":
+            self.histories = values
+            return
+        own = next(one for one in self.features if name in one.arrays())
+        if own.store(name, values):
+            self.__dict__.pop("handle", None)
+
     def restore_history(self, state) -> None:
-        """Set histories of delay lines and of inputs of blocks, and numbers of blocks, from the memory of a state.
+        """Set histories of features and of inputs of blocks, and numbers of blocks, from the memory of a state.
 
         They are unchanged if state or memory are missing. Raises ValueError if the memory contains no history.
         """
@@ -172,71 +182,46 @@ class RunData:
             return
         if self.discrete.size:
             self.discrete[:] = state.memory.get("discrete", self.discrete)
-        if len(self.model.tables.delays):
-            self.past = stored_history(state.memory)
+        for own in self.features:
+            own.restore(state.memory)
         if self.histories.size:
             self.histories = input_histories.stored_histories(state.memory)
 
     def history_capacity(self) -> float:
         """Number of steps that fit before a history would lose an entry that is still needed.
 
-        Infinite without delay lines and blocks with a delay. Where there is little space left it is doubled; then the
-        arrays of the histories and `handle` are new.
+        Infinite without histories. Where there is little space left it is doubled; then the arrays of the histories
+        and `handle` are new.
         """
+        capacities = [own.capacity() for own in self.features]
         if self.histories.size:
             histories = input_histories.with_space(self.histories, self.model.tables.controls)
             if histories is not self.histories:
                 self.histories = histories
             delays = input_histories.delays_of(self.model.tables.controls)
-            return min(self.wave_history_capacity(), float(input_histories.steps_left(histories, delays)))
-        return self.wave_history_capacity()
-
-    def wave_history_capacity(self) -> float:
-        """Number of steps as `history_capacity`, for delay lines."""
-        delays = self.model.tables.delays
-        if not len(delays):
-            return np.inf
-        count = self.past[COUNT]
-        if self.full_at - count < LEAST_STEPS:  # a bound for any steps: checked again only near it
-            while (left := steps_left(self.past, delays)) < LEAST_STEPS:
-                self.past = with_doubled_rings(self.past, delays)
-            self.full_at = count + left
-        return float(self.full_at - count)
+            capacities.append(float(input_histories.steps_left(histories, delays)))
+        return min(capacities, default=np.inf)
 
     def along(self, t: float, out: np.ndarray, parts: int = 1) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-        """Waves along delay lines [kg/s] : number of the pipe -> (forward, backward), each float64[parts * cells].
+        """Waves along pipes without cells [kg/s] : number of the pipe -> (forward, backward), float64[parts * cells].
 
         They are the waves in the middle of each of `parts` equal parts of every cell.
         t, out : time and the result of `evaluate` there
         """
-        waves = {}
-        if len(self.model.tables.delays):
-            from fvsolve.kernels.delay_lines.line_rates import waves_along_line
-
-            for index, row in enumerate(self.model.tables.delays):
-                n = parts * int(row["places"])
-                waves[int(row["pipe"])] = r, l = np.zeros(n), np.zeros(n)  # noqa: E741
-                waves_along_line(t, out, self.handle, index, r, l)
-        return waves
+        return {pipe: both for own in self.features for pipe, both in own.waves(t, out, parts)}
 
     def begin_segment(self, t: float, y: np.ndarray, end: float) -> None:
-        """Let the jumps of waves arrive that arrive at the time t [s] of state y, together with jumps of schedules.
+        """Let features continue at the time t [s] of state y, together with jumps of schedules.
 
         A segment of the run begins at t. end : its end, where schedules may jump again; infinity for the last one [s]
         """
-        past = self.past
-        if not past.size:
-            return
-        past[SEGMENT_END] = min(end, INFINITE)
-        if past[COUNT] > 0.0 and past[NEXT_ARRIVAL] <= t + time_tolerance(past):
-            out, values = self.model.new_out(), np.zeros(len(self.model.tables.probes))
-            out[rec.STATUS] = rec.ARRIVED
-            self.model.functions.record(t, y, out, self.handle, values)
+        for own in self.features:
+            own.begin_segment(t, y, end)
 
     def evaluate(self, t: float, y: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:
         """Right-hand side and `out`, as `Model.evaluate`, with event flags set to the conditions at (t, y).
 
-        Waves arrive from delay lines as stored in `past`.
+        Waves arrive as stored in the histories of features.
         """
         return self.evaluate_checked(*self.model.checked(t, y), limit)
 

@@ -34,7 +34,7 @@ def too_few_cells(draft: Any) -> list[Notice]:
     table = draft.pipe_table
     if not len(table):
         return []
-    cells = np.where(table["delay"] < 0, table["cells"], np.inf)  # delay lines have no cells
+    cells = np.where(table["cells"] > 0, table["cells"], np.inf)
     return [*_behind_events(draft, cells), *(_near_answering(draft, cells) or _costly_piece(draft, cells))]
 
 

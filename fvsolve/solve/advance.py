@@ -57,10 +57,7 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     memory = {"step": np.array([loop.state["step"], loop.state["error_old"]]), "armed": loop.armed.copy()}
     if len(model.discrete):
         memory["discrete"] = loop.run_data.discrete.copy()
-    if len(model.tables.delays):
-        memory["past"] = loop.run_data.past.copy()
-    if loop.run_data.histories.size:
-        memory["histories"] = loop.run_data.histories.copy()
+    memory |= {name: array.copy() for name, array in loop.run_data.arrays().items() if array.size}
     end = State(loop.t, loop.now.copy(), memory)
     if reused.is_reusable:
         reused.state = end

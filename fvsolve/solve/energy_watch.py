@@ -17,9 +17,10 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.jit import COMPILING, compile_once
-from fvsolve.kernels import energy_supply, network_energy
+from fvsolve.kernels import energy_supply
 from fvsolve.kernels.calls import POWER, compile_as
 from fvsolve.kernels.energy_supply import EXCESS, HEADER, INTERVAL, NEXT, PLACE, RATIO, TIME, T, WatchArrays
+from fvsolve.kernels.table_handle import boxed
 from fvsolve.model import RunData
 from fvsolve.model.energy_accounts import Accounts, available_energy, compute_all_loads, terms_of
 from fvsolve.model.model import Model, once_per_model
@@ -32,7 +33,6 @@ MOST_JUMPS = 100  # jumps of schedules, at each of which two states are needed, 
 ALLOWED = 0.05
 TOLERANCES = 10.0
 ROUNDING = 1e-10  # rounding of states, relative to their scales, and of the available energy at the start
-GROWING = ("past", "histories")  # arrays whose size may change during a run
 
 
 class EnergyTerms(NamedTuple):
@@ -85,13 +85,12 @@ def energy_terms(model: Model) -> EnergyTerms | None:
 
 
 def calls_without_network(model: Model) -> np.ndarray:
-    """Addresses of the functions of a model, without the one that fills the powers of pipes, valves and columns."""
+    """Addresses of the functions of a model, without those that fill the powers of pipes, valves and columns."""
     table = model.functions.calls.copy()
-    others = [k for k, function in enumerate(model.functions.cast.functions("power"))
-              if function.__module__ != network_energy.__name__]  # fmt: skip
-    row = table[POWER].copy()
+    first = len(model.functions.cast.functions("network_power"))
+    row = table[POWER, first:].copy()
     table[POWER] = 0
-    table[POWER, : len(others)] = row[others]
+    table[POWER, : row.size] = row
     return table
 
 
@@ -160,7 +159,7 @@ class EnergyWatch:
     def link(self) -> None:
         """Make the handle of the watch from the present arrays of its run data."""
         own = self.run_data.linked_handle(self.run_data.written, (self.terms.calls, self.model.functions.hooks))
-        self.arrays = self.arrays._replace(own=own if COMPILING else energy_supply.boxed(own))
+        self.arrays = self.arrays._replace(own=own if COMPILING else boxed(own))
         self.handle = energy_supply.handle_of_watch(self.arrays)
 
     @property
@@ -190,10 +189,10 @@ class EnergyWatch:
 
     def follow(self, loop) -> None:
         """Give arrays that have grown in a `RunLoop` the same size here."""
-        own, run = self.run_data, loop.run_data
-        for name in GROWING:
-            if getattr(run, name).size != getattr(own, name).size:
-                setattr(own, name, getattr(run, name).copy())
+        own = self.run_data.arrays()
+        for name, array in loop.run_data.arrays().items():
+            if array.size != own[name].size:
+                self.run_data.set_array(name, array.copy())
                 self.link()
 
     def begin(self, loop) -> None:

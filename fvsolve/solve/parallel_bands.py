@@ -35,7 +35,7 @@ from fvsolve.steppers.run_handle import JOIN
 
 COPIED = ("state", "control", "progress", "ledger", "carry", "g", "g_new", "pace", "out", "out_row", "values",
           "ledger_rates")  # fmt: skip
-WRITTEN = ("clock", "armed", "marks", "scratch", "spare", "envelope", "extremes", "past", "accepted")
+WRITTEN = ("clock", "armed", "marks", "scratch", "spare", "envelope", "extremes", "accepted")
 ABORT_DELAY = 0.5  # seconds between a message and the end of all ranks: `mpiexec` loses what it has not yet forwarded
 
 
@@ -93,8 +93,6 @@ class BandWorker:
 
     def store(self, name: str, values: np.ndarray) -> None:
         """Copy values into the run's array `name`, which is in the list `WRITTEN`."""
-        if name == "past" and values.size != self.run_data.past.size:
-            self.run_data.past = values.copy()
         getattr(self.run_data.written, name)[...] = values
 
     def copy_from_loop(self, states: list[slice]) -> None:
@@ -105,6 +103,8 @@ class BandWorker:
             getattr(self.stepper, name)[...] = getattr(self.loop.stepper, name)
         for name in WRITTEN:
             self.store(name, getattr(self.loop.run_data.written, name))
+        for name, array in self.loop.run_data.arrays().items():
+            self.run_data.set_array(name, array.copy())
         self.stepper.times, self.stepper.largest = self.loop.stepper.times, self.loop.stepper.largest
         now = self.loop.progress["now"]
         for rows in states:
@@ -113,7 +113,7 @@ class BandWorker:
     def run_steps(self, functions: tuple, where: int) -> int:
         """Run the time loop on this band; returns a code of `steppers.loop_records`; arguments as `ThreadTeam.call`."""
         stepper = self.stepper
-        if self.run_data.past is not self.written.past:
+        if "handle" not in self.run_data.__dict__:
             self.open()
         return stepper.call(*functions, self.handle, where, self.run_data.armed)
 

@@ -11,9 +11,8 @@ from fvsolve.solve.run_loop import RunLoop
 from fvsolve.steppers.integrator import all_arrays
 from fvsolve.steppers.run_handle import RunArrays
 
-HISTORIES = ("past", "histories")  # arrays that may grow in a run
 # Handles, made anew where an array is replaced, and rows of output, which `advance` neither writes nor reads.
-HANDLES, UNUSED = ("sharp", "sensing"), ("calls", "spare", "rows", "coefficients", "dense")
+HANDLES, UNUSED = ("sensing", "features", "histories"), ("calls", "spare", "rows", "coefficients", "dense")
 
 
 class ReusedLoop:
@@ -32,7 +31,7 @@ class ReusedLoop:
         self.loop = loop = RunLoop(self.model, lambda: model.structure)
         loop.on_switch = lambda: loop.stop_columns(loop.control["end"])
         written, stepper = loop.run_data.written, dict(zip(RunArrays._fields, all_arrays(loop.stepper), strict=True))
-        arrays = [array for name, array in written._asdict().items() if name not in (*HANDLES, *HISTORIES)]
+        arrays = [array for name, array in written._asdict().items() if name not in HANDLES]
         arrays += [array for name, array in stepper.items() if name not in UNUSED]
         pairs = zip(loop.run_data.tables, self.model.tables, strict=True)
         arrays += [own for own, shared in pairs if own is not shared]  # a run changes its own copies
@@ -41,7 +40,7 @@ class ReusedLoop:
         uniform = [bool((word == word[0]).all()) for word in words]
         self.fills = [(word, int(word[0])) for word, alike in zip(words, uniform, strict=True) if alike]
         self.copies = [(word, word.copy()) for word, alike in zip(words, uniform, strict=True) if not alike]
-        self.histories = {name: getattr(loop.run_data, name).copy() for name in HISTORIES}
+        self.histories = {name: array.copy() for name, array in loop.run_data.arrays().items()}
         self.network_mode = loop.run_data.network_mode
         self.state: State | None = None  # state in which the loop is, as `advance` returned it
 
@@ -66,10 +65,10 @@ class ReusedLoop:
             words[:] = values
         loop.switched, loop.at_once, loop.last_switch, loop.network_fault = [], 0, np.nan, ""
         loop.recent_events.clear()
-        run_data.network_mode, run_data.full_at = self.network_mode, -np.inf
+        run_data.network_mode = self.network_mode
         for name, first in self.histories.items():
             if first.size and not state.memory:
-                setattr(run_data, name, first.copy())
+                run_data.set_array(name, first.copy())
         loop.now[:] = state.y
         loop.state["t"] = state.t
         loop.armed[:] = flags_of(state, self.model)

@@ -14,8 +14,6 @@ from fvsolve.case import sloshing
 from fvsolve.case.bodies import free_joints
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.delay_lines.wave_history import CORRECTED_TIME
-from fvsolve.model.delay_lines import friction_notices, jump_overflow_notices
 from fvsolve.solve.energy_watch import EnergyWatch
 from fvsolve.solve.run_loop import STATUS_FAILURES
 from fvsolve.step_limits.growing_modes import forcing_sizes, state_ranges, states_outside_cells
@@ -106,7 +104,7 @@ class RunChecks:
         notices += [] if step_error is None else [step_error]
         energy = self.energy.notice()
         notices += [] if energy is None else [energy]
-        notices += jump_overflow_notices(self.run_data.past) + friction_notices(self.model, self.run_data.extremes)
+        notices += [notice for own in self.run_data.features for notice in own.notices()]
         notices += self.sloshing.notices()
         notices += [] if self.grown is None else [self.grown]
         return notices + [notice for name, ledger in ledgers.items() for notice in ledger_notices(name, ledger)]
@@ -276,7 +274,7 @@ class StepDoubling:
         model, self.step = run_data.model, float(run_data.clock["step"])
         numerics = model.case.numerics
         method = method_named(automatic.first_method(numerics.method))
-        lines = model.tables.pipes["y"][model.tables.pipes["delay"] >= 0]  # their states do not affect other states
+        lines = model.tables.pipes["y"][model.tables.pipes["cells"] == 0]  # their states do not affect other states
         self.over_limit = exceeds_limit_of_cells(model)
         outside = states_outside_cells(model)
         all_states = self.over_limit or not method.explicit
@@ -325,8 +323,7 @@ class StepDoubling:
         # A step in which a jump in a delay line corrected masses of storing nodes or flows of columns is not checked,
         # because half steps have no such correction. The mark is removed when the corrected state is recorded again.
         # Neither is a step that ends at an event, because half steps would follow the equations after it.
-        past = loop.run_data.past
-        corrected = past.size > 0 and past[CORRECTED_TIME] == loop.t
+        corrected = any(own.corrected_at(loop.t) for own in loop.run_data.features)
         if h < FULL_STEP * full_step or corrected or loop.last_switch == loop.t:
             return
         before, now = loop.before[self.states], loop.now[self.states]

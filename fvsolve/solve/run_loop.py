@@ -14,9 +14,9 @@ from fvsolve.kernels.compiled_functions import fused_step_function
 from fvsolve.kernels.input_histories import BEGINS, MOST_POINTS
 from fvsolve.kernels.scalar_transport import GREATEST_RISE
 from fvsolve.model import Model, RunData
-from fvsolve.model.delay_lines import dividing_rate
 from fvsolve.model.input_histories import delays_of
 from fvsolve.model.scalar_tables import amount_indices, state_bounds
+from fvsolve.model.step_division import dividing_rate
 from fvsolve.parts.schedule import BLOCK_PREFIX
 from fvsolve.solve.partition import blocked_sums, make_partition
 from fvsolve.steppers import automatic, loop_records
@@ -107,7 +107,7 @@ class RunLoop:
         self.out, control = stepper.out, self.control
         control["step_max"] = longest_step(model)
         control["stop_at"], control["allow_fused"] = NO_LIMIT, fused_allowed
-        control["has_jumps"] = model.tables.delays.size > 0
+        control["has_jumps"] = model.tables.settings["arrivals"][0] == 1
         set_step_mode(control, model)
         if numerics.method == automatic.AUTO:
             automatic.watch(stepper, structure(), cost_of_rates(model))
@@ -454,8 +454,8 @@ def longest_step(model: Model) -> float:
         return min([NO_LIMIT, *(numerics.courant * basin.filling_step() for basin in model.basins)])
     if numerics.rtol is None:
         return NO_LIMIT
-    delay_lines = model.tables.pipes["delay"] >= 0
-    return min(model.step_max, 1.0 / model.wave_rates[delay_lines].max() if delay_lines.any() else NO_LIMIT)
+    others = model.tables.pipes["cells"] == 0
+    return min(model.step_max, 1.0 / model.wave_rates[others].max() if others.any() else NO_LIMIT)
 
 
 def step_within_delays(model: Model) -> float:

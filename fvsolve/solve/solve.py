@@ -28,7 +28,6 @@ FIRST_CHUNK = 1000.0  # steps before the first pause
 STALLED_ATTEMPTS, STALLED_ADVANCE = 2000, 1e-10
 FREQUENT_CHECK_STEPS = loop_records.GROWTH_CHECK_STEPS
 PERSISTENT = ("extremes", "envelope", "maxima", "marks", "armed", "discrete", "accepted")
-HISTORIES = ("past", "histories")  # arrays that may grow during a run
 
 
 class MemoryMismatch(RunError):
@@ -153,16 +152,16 @@ class Run:
             "rates": [rates.get(basin.name, 0.0) for basin in self.checks.moving],
         }  # fmt: skip
         memory = {name: np.array(values, dtype=np.float64) for name, values in own.items()}
-        memory |= {name: getattr(self.run_data, name).copy() for name in HISTORIES}
+        memory |= {name: array.copy() for name, array in self.run_data.arrays().items()}
         return memory | {name: view.copy() for name, view in self.views().items()}
 
     def restore(self, memory: dict[str, np.ndarray]) -> None:
         """Restore the result of `memory`; raises ValueError or KeyError if it does not match this run."""
         loop, t = self.loop, float(self.loop.state["t"])
-        for name in HISTORIES:
-            if (memory[name].size == 0) != (getattr(self.run_data, name).size == 0):
+        for name, array in self.run_data.arrays().items():
+            if (memory[name].size == 0) != (array.size == 0):
                 raise ValueError(f"array {name} does not match")
-            setattr(self.run_data, name, memory[name].copy())
+            self.run_data.set_array(name, memory[name].copy())
         segment, self.seconds, self.processor, loop.last_switch, at_once = memory["run"].tolist()
         self.segment, loop.at_once = int(segment), int(at_once)
         if not 0 <= self.segment < len(self.bounds):

@@ -50,7 +50,7 @@ def forcing_sizes(model) -> np.ndarray:
     if len(pipes):
         pressure = max(pressure, flow / float(pipes["admittance"].min()))
     for mesh, row in zip(model.pipes, pipes, strict=True):
-        if row["delay"] >= 0:  # amount in a delay line, less that of the profile
+        if row["cells"] == 0:  # mass in a pipe without cells, less that of the profile
             waves = pressure * float(row["admittance"]) * mesh.length / float(row["speed"])
             largest[row["y"]] = OTHER_STATES * max(largest[row["y"]], waves)
             continue
@@ -90,7 +90,7 @@ def pressure_and_flow_range(model) -> tuple[float, float]:
 def states_outside_cells(model) -> np.ndarray:
     """Numbers of the states outside cells and delay lines: storing nodes, columns, bodies, devices : int64[k]."""
     pipes = model.tables.pipes
-    lines = set(pipes["y"][pipes["delay"] >= 0].tolist())
+    lines = set(pipes["y"][pipes["cells"] == 0].tolist())
     names = model.state_names.single()
     return np.array([i for i, name in names if "[" not in name and i not in lines], dtype=np.int64)
 
@@ -240,11 +240,11 @@ def friction_modes(model) -> Modes:
     symbols = {n: pipe_symbol(tuple(weights), n) for n in {mesh.cells for mesh in model.pipes}}
     for mesh, row, q in zip(model.pipes, model.tables.pipes, model.wave_rates, strict=True):
         g = friction_slope(row)
-        if g > 0.0 and row["delay"] < 0 and from_arriving:
+        if g > 0.0 and row["cells"] > 0 and from_arriving:
             # Friction of the waves that enter a cell follows their transport, which amplifies nothing up to its own
             # limit; it multiplies the flow by 1 - h g.
             modes.append((mesh.name, np.array([-g + 0j])))
-        elif g > 0.0 and row["delay"] < 0:
+        elif g > 0.0 and row["cells"] > 0:
             z = symbols[mesh.cells]  # waves between two ends are longer than two cells
             root = np.sqrt(0.25 * g * g - (q * z.imag) ** 2 + 0j)
             modes.append((mesh.name, np.concatenate([q * z.real - 0.5 * g + root, q * z.real - 0.5 * g - root])))

@@ -13,11 +13,10 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.delay_lines import step_at_start
 from fvsolve.model.run_data import RunData
+from fvsolve.model.step_division import step_at_start
 from fvsolve.schemes import LEAST_CELLS, SCHEMES
 from fvsolve.step_limits.advection_limit import advection_limit, growth_of
-from fvsolve.step_limits.delay_line_growth import line_growth_notices
 from fvsolve.step_limits.grid_limits import GROWTH, LONG, is_stable_with_margin, pipe_growth, pipe_limit, plane_limit
 from fvsolve.step_limits.growing_modes import LEAST_GROWTH, Mode, growth_factor, lumped_modes, undamped_notices
 from fvsolve.step_limits.symbol import weights_of
@@ -105,7 +104,9 @@ def step_limits(
     method = method_named(automatic.first_method(numerics.method))
     if numerics.rtol is not None:
         return []
-    lines = line_growth_notices(model, method, given_step(model), span(model)) if len(model.tables.delays) else []
+    lines: list[Notice] = []
+    for feature in model.features:
+        lines += feature.step_notices(model, method, given_step(model), span(model))
     if not method.explicit:
         return lines
     try:
@@ -222,7 +223,7 @@ def pipe_checks(model, method: str, steps: Steps) -> list[CourantCheck]:
     pipes of few cells are checked by `short_pipe`, and of the longer pipes the one with the greatest Courant number by
     both `long_pipe` and, near the limit, `short_pipe`. The Courant number of the check may be below its limit.
     """
-    own = model.tables.pipes["delay"] < 0  # pipes divided into cells
+    own = model.tables.pipes["cells"] > 0  # pipes divided into cells
     if not own.any():
         return []
     numerics, waves = model.case.numerics, model.wave_rates

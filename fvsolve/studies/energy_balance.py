@@ -8,9 +8,10 @@ import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, TABLE, TEXT, validated
 from fvsolve.errors import CaseError, FvsolveError, did_you_mean
+from fvsolve.features.delay_lines.feature import history_of, lines_of
+from fvsolve.features.delay_lines.history import jump_times
+from fvsolve.features.delay_lines.kernels.wave_history import JUMPS_TRAVELLING, time_tolerance
 from fvsolve.file_replacement import write_file
-from fvsolve.kernels.delay_lines.wave_history import JUMPS_TRAVELLING, time_tolerance
-from fvsolve.model.delay_lines import jump_times
 from fvsolve.model.energy_accounts import Account, Accounts, available_energy, datum_of
 from fvsolve.schemes import SCHEMES
 from fvsolve.solve import initial_state
@@ -120,7 +121,7 @@ class EnergyLoop(RunLoop):
         The power at a stage is the power before or after a jump, so that the weights of the stages place the jump at a
         wrong time. Returns the correction for every energy account; the last entry is that for the Newton residual.
         """
-        past, total, h = self.run_data.past, np.zeros_like(self.total), self.t - t
+        past, total, h = history_of(self.run_data), np.zeros_like(self.total), self.t - t
         if not past.size or past[JUMPS_TRAVELLING] == 0.0:
             return total
         (_, b, c), separation = self.tableau(), time_tolerance(past)
@@ -128,7 +129,7 @@ class EnergyLoop(RunLoop):
             big_c, _, gamma = self.rosenbrock_coefficients()  # b: weights of the powers at the stages in the energy
             b = np.append(0.0, np.linalg.solve((np.eye(b.size - 1) - gamma * big_c[1:, 1:]).T, gamma * b[1:]))
         begin, end = t + min(0.0, float(c.min())) * h, t + max(1.0, float(c.max())) * h
-        for jump_time in jump_times(past, self.model.tables.delays, begin, end):
+        for jump_time in jump_times(past, lines_of(self.model), begin, end):
             sides = jump_time - 2.0 * separation, jump_time + 2.0 * separation
             before, after = (self.power(time, y + (time - t) / h * (self.now - y)) for time in sides)
             booked = h * float(b[t + c * h >= jump_time - separation].sum())

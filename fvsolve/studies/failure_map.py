@@ -13,7 +13,7 @@ from fvsolve.argument_checks import NAMES, NUMBER, NUMBERS, ROW, TEXT, Kind, is_
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.model.build import build
-from fvsolve.model.delay_lines import dividing_rate
+from fvsolve.model.step_division import dividing_rate
 from fvsolve.schemes import LIMITED
 from fvsolve.steppers.tableau import METHODS as KNOWN_METHODS
 from fvsolve.studies.distance import Deviation, column_ranges, time_weights

@@ -14,8 +14,8 @@ import numpy as np
 from fvsolve.case import load
 from fvsolve.case.sections import DEFAULT_CELLS
 from fvsolve.errors import FvsolveError
+from fvsolve.features.delay_lines.growth import storing_nodes, wave_growth
 from fvsolve.schemes import LIMITED, SCHEMES
-from fvsolve.step_limits.delay_line_growth import storing_nodes, wave_growth
 from fvsolve.steppers.tableau import method_named
 from fvsolve.studies.outcome import study_model
 from fvsolve.studies.resolution import cells_for_lines, delay_lines
@@ -207,7 +207,7 @@ def _fastest_and_wave_rate(case, set: dict) -> tuple[float, float | None]:
 def _wave_rate(case, set: dict) -> float | None:
     """Greatest number of cells that a wave crosses per second in pipes with cells [1/s]; None without such pipes."""
     model = study_model(case, set)
-    return float(max(model.wave_rates[model.tables.pipes["delay"] < 0], default=0.0)) or None
+    return float(max(model.wave_rates[model.tables.pipes["cells"] > 0], default=0.0)) or None
 
 
 def cells_for_delay_lines(case, set: dict) -> dict:

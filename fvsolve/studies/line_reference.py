@@ -14,7 +14,8 @@ import numpy as np
 
 from fvsolve.case import load
 from fvsolve.errors import CaseError, RunError
-from fvsolve.model.delay_lines import reason_for_cells
+from fvsolve.features.delay_lines.choice import reason_for_cells
+from fvsolve.features.delay_lines.feature import lines_of
 from fvsolve.run import Result, model_of, run
 from fvsolve.studies.resolution import pipe_model_keys, pipes
 
@@ -91,6 +92,6 @@ def cheap_tolerance(case: Any, step: float, steps: int, velocity: float) -> floa
         model = model_of(load(case, line_keys(case, step, tolerance, velocity)))
         if tolerance < LEAST_WITH_JUMPS and any(jump for t, jump in model.breaks if t > case.numerics.start):
             continue
-        if math.prod((steps, int(model.tables.delays["stretches"].sum()))) <= MOST_STRETCH_STEPS:
+        if math.prod((steps, int(lines_of(model)["stretches"].sum()))) <= MOST_STRETCH_STEPS:
             return tolerance
     return TOLERANCES[-1]

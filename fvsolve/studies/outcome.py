@@ -61,13 +61,11 @@ class Outcome:
 
     @property
     def cell_updates(self) -> int:
-        """Cost that is independent of the machine: evaluations of the rates, times cells plus stretches of delay lines.
+        """Cost that is independent of the machine: evaluations of the rates, times cells.
 
-        Without cells and stretches, the evaluations are multiplied by the number of states.
+        Without cells, the evaluations are multiplied by the number of states.
         """
-        delays, cells = self.model.tables.delays, self.model.all_cells
-        if len(delays):  # of delay lines only the stretches are stepped
-            cells += int((delays["stretches"] - delays["places"]).sum())
+        cells = self.model.all_cells + sum(feature.further_cells for feature in self.model.features)
         return self.counts.get("rhs", 0) * max(1, cells or self.model.y_size)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError, listing
-from fvsolve.model.delay_lines import line_methods, slowest_pipe
+from fvsolve.features.delay_lines.choice import line_methods, slowest_pipe
 from fvsolve.parts import Basin, Pipe
 from fvsolve.parts.formula import is_grid
 from fvsolve.schemes import SCHEMES
@@ -49,7 +49,7 @@ def fixed_choices(case) -> dict[str, str]:
     if not undecided:
         return {}
     model = model_of(case)
-    pairs = zip(model.pipes, model.tables.pipes["delay"] >= 0, strict=True)
+    pairs = zip(model.pipes, model.tables.pipes["cells"] == 0, strict=True)
     models = {pipe.name: "delay-line" if delayed else "finite-volume" for pipe, delayed in pairs}
     return pipe_model_keys({name: models[name] for name in models if name in undecided})
 

@@ -135,7 +135,10 @@ def digest_of(who: dict) -> str:
 
     The result of a point of a study depends on these alone.
     """
-    who = who | {"package": package_hash(), "outside": sorted(EXTRA_FOLDERS.values())}
+    who = who | {
+        "package": package_hash(),
+        "outside": sorted(name for folder, name in EXTRA_FOLDERS.items() if PACKAGE not in folder.parents),
+    }
     text = json.dumps(who, sort_keys=True, default=str)
     arrays = [method.text for name, method in METHODS.items() if name not in BUILT_IN and f'"{name}"' in text]
     arrays += [row.own.digest for name, row in LIMITERS.items() if row.own and f'"{name}"' in text]

@@ -5,6 +5,10 @@ Jumps that arrive within a step at a junction with a valve or a rigid column are
 
 import numpy as np
 import pytest
+from fvsolve.kernels.delay_lines import wave_bounds
+from fvsolve.kernels.delay_lines import wave_history as history
+from fvsolve.kernels.delay_lines.history_update import earliest_arrival, write_arrival
+from fvsolve.kernels.delay_lines.line_rates import smooth_wave_linear
 from reference.delays import turned
 from reference.scenes import (
     AMBIENT,
@@ -24,10 +28,6 @@ from reference.scenes import (
 from scipy.integrate import solve_ivp
 
 import fvsolve
-from fvsolve.kernels.delay_lines import wave_bounds
-from fvsolve.kernels.delay_lines import wave_history as history
-from fvsolve.kernels.delay_lines.history_update import earliest_arrival, write_arrival
-from fvsolve.kernels.delay_lines.line_rates import smooth_wave_linear
 from fvsolve.solve import initial_state
 from fvsolve.solve.solve import Run
 from fvsolve.studies.outcome import RowSink

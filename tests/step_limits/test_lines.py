@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from fvsolve.step_limits.delay_line_growth import ANGLES, interpolation_factor, reflection_factor
 from model.test_delay_lines import vessel
 
 import fvsolve
 from fvsolve.output.memory_sink import MemorySink
 from fvsolve.solve.solve import Run
-from fvsolve.step_limits.delay_line_growth import ANGLES, interpolation_factor, reflection_factor
 from fvsolve.steppers.tableau import method_named
 
 

@@ -23,10 +23,8 @@ class PipeRows(Lowering, kind="pipe"):
         draft.ends(link, row)
         row["cells"], row["dx"], row["speed"] = n, link.length / n, speed
         row["rate_factor"] = end_rate_factor(draft.case.numerics.scheme, n)
-        delayed = draft.followed[name].pipe_model == "delay-line"
-        if delayed:
-            row["cells"], row["rate_factor"] = 0, draft.followed[name].rate * link.length / n / speed
         row["area"], row["diameter"], row["admittance"] = area, link.diameter, area / speed
+        row["end_admittance"] = row["admittance"]
         row["cell"], draft.cells = draft.cells, draft.cells + n
         z = draft.node_table["elevation"][[row["from_node"], row["to_node"]]]
         row["rise"] = -1
@@ -37,9 +35,7 @@ class PipeRows(Lowering, kind="pipe"):
         draft.hydraulics.friction(name, link, row, draft.fault)
         if link.friction.model == "unsteady":
             reserve_terms(draft, row)
-        if delayed:
-            row["y"] = draft.states([f"{name}.mass"], 1e5 * row["admittance"] * link.length / speed)
-        else:
+        if not any(feature.fill_pipe(draft, name, link, row) for feature in draft.features):
             names = [f"{name}.{wave}[{i}]" for wave in ("forward", "backward") for i in range(n)]
             row["y"] = draft.states(names, 0.5e5 * row["admittance"])
             add_creep(draft, name, link, row)
@@ -56,7 +52,7 @@ class PipeRows(Lowering, kind="pipe"):
         """Fill the row of a probe for the force on a pipe; report a fault for a delay line or a pipe on a body."""
         row["kind"] = rec.PIPE_FORCE
         pipe = draft.pipe_table[row["index"]]
-        if pipe["delay"] >= 0:
+        if pipe["cells"] == 0:
             draft.fault(f"links.{name}", 'a delay line has no force probe; set pipe_model = "finite-volume"')
         elif pipe["moving_segment"] >= 0:
             draft.fault(
@@ -68,7 +64,7 @@ class PipeRows(Lowering, kind="pipe"):
         if probe.quantity == "force":
             return self.force(draft, name, row)
         row["kind"] = rec.PIPE_FLOW if probe.quantity in ("flow", "velocity") else rec.PIPE_PRESSURE
-        if draft.pipe_table[row["index"]]["delay"] >= 0 and probe.fraction not in (0.0, 1.0):
+        if draft.pipe_table[row["index"]]["cells"] == 0 and probe.fraction not in (0.0, 1.0):
             row["weights"] = len(draft.floats)
             draft.floats.append(probe.fraction)
         else:

@@ -18,7 +18,7 @@ from fvsolve.case.sections import (
     uses_error_control,
 )
 from fvsolve.errors import CaseError, FvsolveError, did_you_mean, listing
-from fvsolve.model.delay_lines import slowest_pipe
+from fvsolve.features.delay_lines.choice import slowest_pipe
 from fvsolve.model.model_facts import rhs_seconds
 from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.tableau import AUTO, METHODS

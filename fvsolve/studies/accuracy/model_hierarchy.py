@@ -19,10 +19,10 @@ from fvsolve.case.chainage import add_bends, placed
 from fvsolve.case.reading import raw_link
 from fvsolve.case.sloshing import slowest
 from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.features.delay_lines.choice import reason_for_cells
 from fvsolve.fluid import LAWS
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.steady_friction import drag
-from fvsolve.model.delay_lines import reason_for_cells
 from fvsolve.model.model_facts import velocities
 from fvsolve.studies.distance import Deviation, moving_probes
 from fvsolve.studies.outcome import GIVEN_UP, Outcome, capped, outcome, refuse_basins, study_model

@@ -11,6 +11,7 @@ import numpy as np
 
 from fvsolve.case.reading import raw_link
 from fvsolve.errors import FvsolveError, did_you_mean, listing
+from fvsolve.features.delay_lines.feature import lines_of
 from fvsolve.model.model_facts import rhs_seconds
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import AUTO, METHODS, method_named
@@ -156,7 +157,7 @@ def delay_line_plan(case, way: str, levels: int) -> Plan:
         what = "longest step" if by_error else "step"
         words = f"{STRETCH_WORDS}, and {'the longest step' if by_error else 'steps'} halved"
         return Plan(way, f"{what} [s]", tuple(refined), words)
-    tables = [study_model(case, row).tables.delays for row in rows]
+    tables = [lines_of(study_model(case, row)) for row in rows]
     line = int(np.argmax(tables[-1]["stretches"]))
     if tables[0]["stretches"][line] == tables[-1]["stretches"][line]:
         raise FvsolveError("a smaller numerics.delay_tolerance divides no delay line of this case into more stretches: "

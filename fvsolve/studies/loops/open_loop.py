@@ -12,7 +12,8 @@ import numpy as np
 
 from fvsolve.assembly.control_rows import small_change
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.kernels.delay_lines import wave_history as history
+from fvsolve.features.delay_lines.feature import history_of, lines_of, seen_by_jumps
+from fvsolve.features.delay_lines.kernels import wave_history as history
 from fvsolve.parts.schedule import BLOCK_PREFIX
 from fvsolve.solve.held_inputs import hold
 from fvsolve.studies.linearise import Linear, linearise_at
@@ -70,7 +71,7 @@ def delayed_system(case, set, input: str, output: str, at: float | None, before:
     inputs = list(dict.fromkeys([input, *(f"{BLOCK_PREFIX}{key}.output" for key in delays)]))
     linear = linear_with_names(point, inputs, len(probes))
     system = with_delays(linear, input, output, delay_blocks(point.model))
-    if len(point.model.tables.delays):
+    if len(lines_of(point.model)):
         waves = [f"{BLOCK_PREFIX}{key}" for key in delay_blocks(point.model)]
         rows = [output, *(f"{wave}.input" for wave in waves)]
         system = with_lines(linear, system, [input, *(f"{wave}.output" for wave in waves)], rows)
@@ -178,8 +179,8 @@ def with_lines(linear, system: DelaySystem, inputs: list[str], probes: list[str]
     A wave travels through a stretch in its time tau; friction in the middle reflects a part of it. The states of lines,
     their masses, are left out. inputs, probes : names of the columns of B and of the rows of C in `system`
     """
-    at, rows = linear.at, linear.at.model.tables.delays
-    model = replace(at.model, tables=at.model.tables._replace(**at.model.sharp))  # short lines need their travel time
+    at, rows = linear.at, lines_of(linear.at.model)
+    model = seen_by_jumps(at.model)  # short lines need their travel time
     keep = np.setdiff1d(np.arange(len(system.a)), model.tables.pipes["y"][rows["pipe"]])
     evaluate = line_function(replace(at, model=model), keep, [linear.outputs.index(probe) for probe in probes])
     y, none, n, p = at.y, np.zeros(2 * len(rows)), keep.size, len(probes)
@@ -211,7 +212,7 @@ def line_function(at: OperatingPoint, keep: np.ndarray, probes: list[int]):
 
     Its values are the rates of the states `keep`, the probes with these numbers, and the waves that nodes send.
     """
-    model, t, rows = at.model, float(at.t), at.model.tables.delays
+    model, t, rows = at.model, float(at.t), lines_of(at.model)
     ends = int(model.layout["ends"]) + 4 * rows["pipe"][:, None] + np.array([0, 3])
     first = np.cumsum(rows["stretches"]) - rows["stretches"]
     both = np.stack([first, first + rows["stretches"] - 1], axis=1)
@@ -219,7 +220,7 @@ def line_function(at: OperatingPoint, keep: np.ndarray, probes: list[int]):
     def evaluate(y: np.ndarray, waves: np.ndarray, held: dict[str, float]) -> np.ndarray:
         own = hold(model, held)
         with own.run_data(at.armed) as data:
-            past = data.past
+            past = history_of(data)
             places = history.offsets_of(past)[0] + history.ARRIVALS_SIZE * both + np.array([0, 1])
             past[places.ravel()] = waves
             past[history.COUNT] = past[history.ARRIVALS_COUNT] = history.PROFILE_ENTRIES + 1.0

@@ -17,12 +17,13 @@ from typing import NamedTuple
 import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.kernels.delay_lines import wave_history as at
-from fvsolve.kernels.delay_lines.line_rates import drag_and_slope
+from fvsolve.features.delay_lines.feature import history_of, lines_of
+from fvsolve.features.delay_lines.growth import REFLECTION_BOUND, lines_at, storing_nodes
+from fvsolve.features.delay_lines.kernels import wave_history as at
+from fvsolve.features.delay_lines.kernels.line_rates import drag_and_slope
 from fvsolve.model.energy_norm import energy_form
 from fvsolve.schemes import LIMITED
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
-from fvsolve.step_limits.delay_line_growth import REFLECTION_BOUND, lines_at, storing_nodes
 from fvsolve.steppers import loop_records
 from fvsolve.steppers.tableau import Method
 from fvsolve.studies.operating_point import with_held_schedules
@@ -74,7 +75,7 @@ class DelayLineSystem:
 
     def __init__(self, model, method: Method, h: float) -> None:
         self.model, self.method, self.h = model, method, h
-        rows, pipes = model.tables.delays, model.tables.pipes
+        rows, pipes = lines_of(model), model.tables.pipes
         line_of = np.repeat(np.arange(len(rows)), rows["stretches"])
         self.delays, self.now = (rows["hold"] / h)[line_of], rows["now"][line_of][:, None]
         self.last = np.cumsum(rows["stretches"]) - 1
@@ -212,7 +213,7 @@ class DelayLineSystem:
         The backward wave is the forward wave mirrored about the middle of a line, for opposite waves with the other
         sign. The direction in which a line is drawn changes at most the sign of opposite waves.
         """
-        rng, rows = np.random.default_rng(7), self.model.tables.delays
+        rng, rows = np.random.default_rng(7), lines_of(self.model)
         stored = rng.standard_normal((self.states.size, 1)) * self.model.scale[self.states][:, None]
         sent = rng.standard_normal((self.history_steps, self.delays.size)) * BAR_PRESSURE
         sent *= np.repeat(self.model.tables.pipes["admittance"][rows["pipe"]], rows["stretches"])
@@ -249,7 +250,7 @@ class DelayLineSystem:
         for part, root in zip(self.parts, self.energy_rows @ grown.end, strict=True):
             shares[part] += float(root**2)
         for k, (first, last) in enumerate(zip(self.first, self.last, strict=True)):
-            name = self.model.pipes[self.model.tables.delays[k]["pipe"]].name
+            name = self.model.pipes[lines_of(self.model)[k]["pipe"]].name
             shares[name] = shares.get(name, 0.0) + float(waves[first : last + 1].sum())
         part, total = max(shares, key=shares.get), sum(shares.values())
         return part, shares[part] / total if total > 0.0 else np.nan
@@ -270,13 +271,13 @@ def reflected_share(pipe, tau: float) -> float:
 
 def local_matrices(model, states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Matrices A, B, C, D of `DelayLineSystem` at the start, by central differences; states : indices of states x."""
-    t, y, rows = float(model.case.numerics.start), model.start, model.tables.delays
+    t, y, rows = float(model.case.numerics.start), model.start, lines_of(model)
     ends = int(model.layout["ends"]) + 4 * rows["pipe"][:, None] + np.array([0, 3])
     first = np.cumsum(rows["stretches"]) - rows["stretches"]
     admittance = np.repeat(model.tables.pipes["admittance"][rows["pipe"]], 2)
 
     with model.run_data() as data:
-        past, arrivals = data.past, at.offsets_of(data.past)[0]
+        past, arrivals = history_of(data), at.offsets_of(history_of(data))[0]
         ends_of_lines = np.stack([first, first + rows["stretches"] - 1], axis=1)
         inputs = arrivals + at.ARRIVALS_SIZE * ends_of_lines + np.array([0, 1])
 
@@ -322,7 +323,7 @@ class DelayLineRuns(RealRuns):
         loop = fixed_step_loop(model, lambda: model.structure, system.method.name, system.h, t)
         loop.now[:] = model.start
         loop.now[system.states] += x
-        write_history(loop.run_data.past, model.tables.delays, t, system.h, history)
+        write_history(history_of(loop.run_data), lines_of(model), t, system.h, history)
         loop.begin(t + 2.0 * self.steps * system.h, NO_LIMIT)
         return loop
 
@@ -349,14 +350,14 @@ class DelayLineRuns(RealRuns):
         """
         system = self.system(h)
         predicted, tables = system.growth(self.steps, self.threshold), system.model.tables
-        greatest_wave = BAR_PRESSURE * float(tables.pipes["admittance"][tables.delays["pipe"]].max())  # [kg/s]
+        greatest_wave = BAR_PRESSURE * float(tables.pipes["admittance"][lines_of(system.model)["pipe"]].max())  # [kg/s]
         small = SMALL_WAVE * float(system.weight.max()) * greatest_wave
         runs = [self.start_run(system, width * predicted.x, width * predicted.history) for width in (small, 0.0)]
 
         def growth(k: int) -> float:
             if any(run.run(self.strides[k]) != loop_records.BUDGET_SPENT for run in runs):
                 return np.inf
-            moved, base = ((run.now[system.states], read_history(run.run_data.past, system)) for run in runs)
+            moved, base = ((run.now[system.states], read_history(history_of(run.run_data), system)) for run in runs)
             return float(system.size((moved[0] - base[0])[:, None], (moved[1] - base[1])[..., None])[0]) / small
 
         return self.greatest(growth)
@@ -383,7 +384,7 @@ def read_history(past: np.ndarray, system: DelayLineSystem) -> np.ndarray:
     """Past waves of all stretches in a wave history, without the last entry : float64[history_steps, 2, stretches]."""
     values = np.zeros((system.history_steps, 2, system.delays.size))
     numbers = int(past[at.COUNT]) - 1 - system.history_steps + np.arange(system.history_steps)
-    for where, s, wave in ring_offsets(at.offsets_of(past), system.model.tables.delays, numbers):
+    for where, s, wave in ring_offsets(at.offsets_of(past), lines_of(system.model), numbers):
         values[:, wave, s] = past[where]
     return values
 
@@ -423,7 +424,7 @@ class DelayLineLimits:
         self.set = {"numerics.scheme": scheme, "numerics.method": method.name}
         self.refused: dict[float, str] = {}
         self.base_model = self.model(None)
-        rows = self.base_model.tables.delays
+        rows = lines_of(self.base_model)
         slowest = float((rows["tau"] * rows["stretches"]).max())
         self.far, self.first = TRAVEL_FACTOR * slowest, slowest / TRAVEL_PARTS
         self.work = prediction_limit(self.base_model.y_size, steps, REMEDY)
@@ -442,7 +443,7 @@ class DelayLineLimits:
         """
         step = {} if h is None else {"numerics.step": h}
         model = study_model(self.case, self.set | step)
-        if model.case.numerics.scheme in LIMITED and (model.tables.pipes["delay"] < 0).any():
+        if model.case.numerics.scheme in LIMITED and (model.tables.pipes["cells"] > 0).any():
             raise FvsolveError(f"numerics.scheme: {model.case.numerics.scheme} is not linear. Expected a linear scheme "
                                "for stability with delay lines, such as scheme = \"upwind5\"")  # fmt: skip
         if model.y_size > MAX_STATES:
@@ -454,7 +455,7 @@ class DelayLineLimits:
 
     def system(self, h: float) -> DelayLineSystem:
         """Linear system that describes the model with steps of h [s]; raises TooLarge if it has too many past waves."""
-        rows = self.base_model.tables.delays
+        rows = lines_of(self.base_model)
         longest = float((rows["tau"] * rows["stretches"]).max())
         self.work.check(propagation_time(self.method, int(longest / h), len(rows), self.steps))
         return DelayLineSystem(self.model(h), self.method, h)
@@ -511,7 +512,7 @@ def delayed_row(case, scheme: str, method, steps: int, threshold: float) -> Stab
     """
     limits, left_out, notes = DelayLineLimits(case, scheme, method, steps, threshold), {}, []
     predicted, model = limits.predicted(), limits.base_model
-    rate = float(max(model.wave_rates[model.tables.pipes["delay"] < 0], default=0.0))
+    rate = float(max(model.wave_rates[model.tables.pipes["cells"] > 0], default=0.0))
     row = {
         "scheme": scheme, "method": method.name, "when": "the start, with delay lines instead of cells",
         "states": model.y_size, "steps": steps, "threshold": threshold, "rate": rate, "predicted": predicted.step,

@@ -7,11 +7,11 @@ before, t : begin and end of a step [s]; span : (before, t); known : range of th
 changes; waves : bounds of both waves; other arguments are those of `wave_history`.
 """
 
+from fvsolve.features.delay_lines.kernels import wave_bounds
+from fvsolve.features.delay_lines.kernels import wave_history as history
+from fvsolve.features.delay_lines.kernels.line_rates import joint_at, smooth_wave_linear, waves_in_stretch
+from fvsolve.features.delay_lines.kernels.wave_bounds import BOUND_ROUNDING, GRID_ROUNDING, wave_at_jump
 from fvsolve.jit import njit
-from fvsolve.kernels.delay_lines import wave_bounds
-from fvsolve.kernels.delay_lines import wave_history as history
-from fvsolve.kernels.delay_lines.line_rates import joint_at, smooth_wave_linear, waves_in_stretch
-from fvsolve.kernels.delay_lines.wave_bounds import BOUND_ROUNDING, GRID_ROUNDING, wave_at_jump
 from fvsolve.kernels.dtypes import PIPE_FLOW, PIPE_PRESSURE
 from fvsolve.kernels.observation import update_envelope, update_extremes
 
@@ -262,9 +262,9 @@ def update_probe_extremes(past, places, clock, tables, before, t):
         if (probe["kind"] != PIPE_PRESSURE and probe["kind"] != PIPE_FLOW) or probe["side"] != 0:
             continue
         pipe = tables.pipes[probe["index"]]
-        if pipe["delay"] < 0:
+        if tables.line_of[probe["index"]] < 0:
             continue
-        line = tables.delays[pipe["delay"]]
+        line = tables.delays[tables.line_of[probe["index"]]]
         share = tables.floats[probe["weights"]]
         q, joint = min(int(share * line["stretches"]), line["stretches"] - 1), joint_at(share, line["stretches"])
         x, sign = share * line["stretches"] - q, 1.0 if probe["kind"] == PIPE_PRESSURE else -1.0

@@ -18,17 +18,23 @@ state : values of the right-hand side at the end of the step, with the jumps tha
 are those of `wave_history`.
 """
 
+from fvsolve.features.delay_lines.kernels import jumps
+from fvsolve.features.delay_lines.kernels import wave_history as history
+from fvsolve.features.delay_lines.kernels.jumps import (
+    add_change,
+    clear_changes,
+    first_waiting_jump,
+    least_jump,
+    send_changes,
+)
+from fvsolve.features.delay_lines.kernels.line_envelopes import update_line_envelopes
+from fvsolve.features.delay_lines.kernels.line_rates import has_friction
+from fvsolve.features.delay_lines.kernels.tables import open_lines
 from fvsolve.jit import njit
 from fvsolve.kernels.calls import CLOSE, observe_in_turn, run_job
-from fvsolve.kernels.delay_lines import jumps
-from fvsolve.kernels.delay_lines import wave_history as history
-from fvsolve.kernels.delay_lines.jumps import add_change, clear_changes, first_waiting_jump, least_jump, send_changes
-from fvsolve.kernels.delay_lines.line_envelopes import update_line_envelopes
-from fvsolve.kernels.delay_lines.line_rates import has_friction
 from fvsolve.kernels.dtypes import ALONE, AMENDED, ARRIVES, JUNCTION, NEVER, PIPE_FLOW, PIPE_PRESSURE, STATUS
 from fvsolve.kernels.dtypes import ARRIVED as LET_ARRIVE
 from fvsolve.kernels.observation import update_extremes
-from fvsolve.kernels.table_handle import open_tables
 
 
 @njit(forceinline=True)
@@ -64,7 +70,7 @@ def store_smooth_values(t, y, state, handle):
 
     state : `out` at t for this case
     """
-    tables = open_tables(handle)
+    tables = open_lines(handle)
     _, _, third, fourth, fifth, _ = spare_offsets(tables)
     pressure = tables.layout[0]["pressure"]
     observe_in_turn(t, y, state, handle, tables.spare[third:fourth])
@@ -80,7 +86,7 @@ def extremes_at_jump(t, time, y, state, handle):
     time : arrival time of the jump [s]; t : end of the step [s]
     state : `out` at t, with the jumps that have arrived before this jump, or with this jump too
     """
-    tables = open_tables(handle)
+    tables = open_lines(handle)
     past, spare, marks, pipes, nodes = tables.past, tables.spare, tables.marks, tables.pipes, tables.nodes
     first, second, third, fourth, fifth, _ = spare_offsets(tables)
     probes, pressure, vapor = tables.probes.size, tables.layout[0]["pressure"], tables.settings[0]["vapor"]
@@ -117,7 +123,7 @@ def record_lines(t, y, out, handle, values):
     time of the next jump that ends a step, t if it is now, or NEVER.
     values : probe values of the state y at t
     """
-    tables = open_tables(handle)
+    tables = open_lines(handle)
     past = tables.past
     k, places, status = int(past[history.COUNT]), history.offsets_of(past), out[STATUS]
     before = history.INFINITE
@@ -395,7 +401,7 @@ def pass_jumps_at_ends(past, places, own, t, y, out, handle):
     if tree[1] > latest:
         return False
     sharp, changing = own.sharp, times_may_change(past, own, t)
-    tables, state = open_tables(sharp), own.spare[: own.layout[0]["size"]]
+    tables, state = open_lines(sharp), own.spare[: own.layout[0]["size"]]
     past[history.ONLY_PASSED_JUMPS], past[history.ARRIVALS_TIME] = 1.0, history.NAN
     run_job(CLOSE, t, y, y[:0], state, handle)
     past[history.ONLY_PASSED_JUMPS] = 0.0
@@ -490,8 +496,8 @@ def enter_plain_node(past, tables, y, state, changes, number, side, size, times)
     change = 2.0 * size / node["admittance"]
     state[layout["pressure"] + i] += change
     jumps.correct_columns(past, tables, y, i, change, times)
-    for k in range(node["line_count"]):
-        end = tables.integers[node["lines"] + k]
+    for k in range(tables.node_ends[i], tables.node_ends[i + 1]):
+        end = tables.node_ends[k]
         other, right = tables.delays[end // 2], end % 2
         pipe = tables.pipes[other["pipe"]]
         part = pipe["admittance"] * change - (size if end == 2 * number + side else 0.0)

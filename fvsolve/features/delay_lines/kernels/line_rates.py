@@ -16,12 +16,11 @@ the forward wave at x passed the middle, for x < 1/2 when the backward wave at x
 give the arriving waves. Arguments are those of `wave_history`.
 """
 
+from fvsolve.features.delay_lines.kernels import wave_history as history
+from fvsolve.features.delay_lines.kernels.tables import open_lines
 from fvsolve.jit import njit
-from fvsolve.kernels.delay_lines import wave_history as history
 from fvsolve.kernels.dtypes import FRICTION_HAZEN, FRICTION_NONE, FRICTION_ROUGH, PIPE_FLOW, PIPE_PRESSURE
-from fvsolve.kernels.node_clusters import row_in_cluster
 from fvsolve.kernels.steady_friction import EXPONENT, drag, power_of_square
-from fvsolve.kernels.table_handle import open_tables
 
 FLOW_TOLERANCE = 1e-6  # relative error of the flow at which Newton stops
 SLOPE_ERROR = 0.2  # relative error of the slope where the friction factor depends on the flow
@@ -119,7 +118,7 @@ def outgoing_line_waves(t, y, dydt, out, handle):
 
     Twice the wave is the mass flow into the node at zero pressure deviation p'.
     """
-    tables = open_tables(handle)
+    tables = open_lines(handle)
     past, layout, lines = tables.past, tables.layout[0], tables.delays
     started, place, ends, net = past[history.COUNT] > 0.0, history.offsets_of(past)[0], layout["ends"], layout["net"]
     if started:
@@ -143,7 +142,7 @@ def incoming_line_waves(t, y, dydt, out, handle):
     In lines shorter than a step the arriving waves depend on p'; this part is added to them in out[ends] first. d/dt of
     the mass [kg/s] is the inflow at both ends; it is not written if `dydt` is empty.
     """
-    tables = open_tables(handle)
+    tables = open_lines(handle)
     layout, lines = tables.layout[0], tables.delays
     ends, pressure = layout["ends"], layout["pressure"]
     for i in range(lines.size):
@@ -161,37 +160,6 @@ def incoming_line_waves(t, y, dydt, out, handle):
         out[at], out[at + 3] = ahead, back
         if dydt.size > 0:
             dydt[pipe["y"]] = (ahead - left) - (right - back)
-
-
-@njit
-def solve_line_clusters(t, y, dydt, out, handle):
-    """Solve for the pressures of nodes that are joined by lines shorter than a step and by no valve.
-
-    p' of each group of such nodes is the inverse of their admittance matrix times the arriving flows. These include the
-    flow through short lines from nodes of known pressure.
-    """
-    tables = open_tables(handle)
-    layout, integers, work = tables.layout[0], tables.integers, tables.scratch
-    for number in range(tables.clusters.size):
-        cluster = tables.clusters[number]
-        if cluster["inverse"] < 0:
-            continue
-        n, first = cluster["nodes"], cluster["first_node"]
-        for i in range(n):
-            work[i] = out[layout["net"] + integers[first + i]]
-        for c in range(cluster["couples"]):
-            line = tables.delays[integers[cluster["first_couple"] + c]]
-            pipe = tables.pipes[line["pipe"]]
-            i, j = row_in_cluster(cluster, tables, pipe["from_node"]), row_in_cluster(cluster, tables, pipe["to_node"])
-            if i >= 0 and j < 0:
-                work[i] += line["couple"] * out[layout["pressure"] + pipe["to_node"]]
-            if j >= 0 and i < 0:
-                work[j] += line["couple"] * out[layout["pressure"] + pipe["from_node"]]
-        for i in range(n):
-            total, at = 0.0, cluster["inverse"] + i * n
-            for j in range(n):
-                total += tables.floats[at + j] * work[j]
-            out[layout["pressure"] + integers[first + i]] = total
 
 
 # waves within a line ----------
@@ -259,7 +227,7 @@ def waves_along_line(t, out, handle, number, r, l):
 
     out : values of the right-hand side at t
     """
-    tables, n = open_tables(handle), r.size
+    tables, n = open_lines(handle), r.size
     for j in range(n):
         r[j], l[j] = waves_at(t, out, tables, number, (j + 0.5) / n)
 
@@ -333,13 +301,13 @@ def waves_in_stretch(t, past, places, clock, line, q, first, r, l, unchanged, gr
 @njit
 def observe_lines(t, y, out, handle, values):
     """Write the values of the pressure and flow probes within delay lines, between their ends, to `values`."""
-    tables = open_tables(handle)
+    tables = open_lines(handle)
     probes = tables.probes
     for k in range(probes.size):
         probe = probes[k]
         if (probe["kind"] == PIPE_PRESSURE or probe["kind"] == PIPE_FLOW) and probe["side"] == 0:
             pipe = tables.pipes[probe["index"]]
-            if pipe["delay"] >= 0:
-                r, l = waves_at(t, out, tables, pipe["delay"], tables.floats[probe["weights"]])
+            if tables.line_of[probe["index"]] >= 0:
+                r, l = waves_at(t, out, tables, tables.line_of[probe["index"]], tables.floats[probe["weights"]])
                 value = r + l if probe["kind"] == PIPE_PRESSURE else pipe["flow"] + (r - l)
                 values[k] = probe["scale"] * value + probe["offset"]

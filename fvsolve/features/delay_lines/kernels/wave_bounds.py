@@ -7,9 +7,9 @@ step. Bounds are written once per entry, and again if the entry is recorded agai
 Arguments are those of `wave_history`; ring, mask : result of `ring_of`.
 """
 
+from fvsolve.features.delay_lines.kernels import wave_history as history
+from fvsolve.features.delay_lines.kernels.line_rates import BEFORE_ALL, entry_before, smooth_wave_linear
 from fvsolve.jit import njit
-from fvsolve.kernels.delay_lines import wave_history as history
-from fvsolve.kernels.delay_lines.line_rates import BEFORE_ALL, entry_before, smooth_wave_linear
 
 BOUND_ROUNDING = 1e-12  # of sums of waves, relative to their parts
 GRID_ROUNDING = 1e-6  # of times in the grid of equal steps, as fraction of a step

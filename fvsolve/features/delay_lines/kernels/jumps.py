@@ -13,10 +13,15 @@ corrected, nor is the mass in delay lines, except for the mass that they give to
 
 from math import exp, expm1
 
+from fvsolve.features.delay_lines.kernels import wave_history as history
+from fvsolve.features.delay_lines.kernels.line_rates import (
+    friction_loss,
+    has_friction,
+    write_all_arrivals,
+    write_arrivals,
+)
 from fvsolve.jit import njit
 from fvsolve.kernels.calls import CLOSE, run_job
-from fvsolve.kernels.delay_lines import wave_history as history
-from fvsolve.kernels.delay_lines.line_rates import friction_loss, has_friction, write_all_arrivals, write_arrivals
 from fvsolve.kernels.dtypes import AMENDED, FIXED, JUNCTION, PATCH, STATUS, TANK
 from fvsolve.kernels.network_balance import stiffness_of
 from fvsolve.kernels.tanks import BOTTOM, EVENTS, RIM
@@ -39,7 +44,7 @@ def least_jump(past, tables, pipe):
 
     A quarter of `numerics.delay_tolerance` times the greatest jump or wave so far, and at least rounding.
     """
-    least = tables.settings[0]["jumps"] * max(past[history.GREATEST_JUMP], past[history.GREATEST_WAVE])
+    least = tables.line_settings[0]["jumps"] * max(past[history.GREATEST_JUMP], past[history.GREATEST_WAVE])
     return max(least, NOISE * 0.5e5) * pipe["admittance"]
 
 
@@ -287,7 +292,7 @@ def change_times(past, tables, t, time, sent):
     """
     if sent > history.time_of(past, int(past[history.COUNT]) - 1) + history.time_tolerance(past):
         return t - time, 0.0
-    before, settings = history.time_of(past, int(past[history.COUNT]) - 1), tables.settings[0]
+    before, settings = history.time_of(past, int(past[history.COUNT]) - 1), tables.line_settings[0]
     h, booked, at, stages = t - before, 0.0, settings["weights"], settings["stages"]
     for i in range(stages):
         if before + tables.floats[at + stages + i] * h >= time - history.time_tolerance(past):

@@ -10,10 +10,12 @@ of the step: there waves grow, unless friction or the interpolation between step
 
 import numpy as np
 
+from fvsolve.assembly.features import with_slot
 from fvsolve.errors import Notice
+from fvsolve.features.delay_lines.kernels.line_rates import drag_and_slope
+from fvsolve.features.delay_lines.kernels.tables import SLOT
+from fvsolve.features.delay_lines.kernels.wave_history import lagrange_four, lagrange_six, lagrange_three
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.delay_lines.line_rates import drag_and_slope
-from fvsolve.kernels.delay_lines.wave_history import lagrange_four, lagrange_six, lagrange_three
 from fvsolve.step_limits.growing_modes import LEAST_GROWTH, growth_factor
 from fvsolve.steppers.tableau import Method
 
@@ -71,9 +73,9 @@ def storing_nodes(model, h: float):
 
     h : step [s]; k : stiffness of the node [Pa/kg]; Y : admittance of its lines [kg/s per Pa]
     """
-    nodes, out = model.tables.nodes, None
+    nodes, out, ends = model.tables.nodes, None, with_slot(model.features, SLOT).node_ends
     for i, (name, node) in enumerate(zip(model.case.places, nodes, strict=True)):
-        if node["line_count"] == 0 or node["kind"] in (rec.FIXED, rec.JUNCTION, rec.PATCH):
+        if ends[i] == ends[i + 1] or node["kind"] in (rec.FIXED, rec.JUNCTION, rec.PATCH):
             continue
         out = model.evaluate(model.case.numerics.start, model.start)[1] if out is None else out
         moving = node["kind"] >= rec.MOVING or (node["kind"] == rec.CHAMBER and node["row"] >= 0)
@@ -83,9 +85,8 @@ def storing_nodes(model, h: float):
 
 def lines_at(model, i: int):
     """Delay lines connected to node number i, as rows of the table of delay lines."""
-    node = model.tables.nodes[i]
-    ends = model.tables.integers[node["lines"] : node["lines"] + node["line_count"]]
-    return [model.tables.delays[end // 2] for end in ends]
+    own = with_slot(model.features, SLOT)
+    return [own.delays[end // 2] for end in own.node_ends[own.node_ends[i] : own.node_ends[i + 1]]]
 
 
 def reflection_factor(method: Method, a: float, steps: float) -> np.ndarray:

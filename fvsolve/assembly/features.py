@@ -1,0 +1,169 @@
+"""Features of models: protocol between the core and a folder of `features`, found by its header, imported at its use.
+
+A feature is what needs a table shared by several parts, a history, or a say in the start; a single part needs none. It
+is a class `class Name(Feature, slot=k, wakes="...")` in `features/*/feature.py`. `wakes` lists words of a case file,
+separated by commas; a case with one of them has the feature. The core imports no feature: it asks `features_of(case)`,
+and calls the methods below in the order of slots. Every method has a default, which does nothing.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+FOLDER = Path(__file__).parents[1] / "features"
+HEADER = re.compile(r'\nclass (\w+)\(Feature, slot=(\d+), wakes="([^"]+)"\)')
+
+
+class Declaration(NamedTuple):
+    """Header of a feature. slot : its number; words : words of case files that wake it"""
+
+    slot: int
+    module: str
+    name: str
+    words: frozenset[str]
+
+
+@cache
+def declarations() -> tuple[Declaration, ...]:
+    """Headers of all features in the order of slots; no feature is imported."""
+    found = []
+    for path in sorted(FOLDER.glob("*/feature.py")):
+        module = f"fvsolve.features.{path.parent.name}.feature"
+        for name, slot, words in HEADER.findall(path.read_text(encoding="utf-8")):
+            found.append(Declaration(int(slot), module, name, frozenset(word.strip() for word in words.split(","))))
+    return tuple(sorted(found))
+
+
+def words_of(case) -> set[str]:
+    """Words of a case that may wake features: "pipe_model NAME" for the model of each pipe."""
+    common = case.numerics.pipe_model
+    return {f"pipe_model {link.pipe_model or common}" for link in case.links.values() if link.kind == "pipe"}
+
+
+def features_of(case, given_up: Collection[str] = ()) -> list[Feature]:
+    """Features of a case, in the order of slots; given_up : names of parts that features do not compute."""
+    words = words_of(case)
+    awake = [one for one in declarations() if one.words & words]
+    return [getattr(import_module(one.module), one.name)(case, given_up) for one in awake]
+
+
+class Feature:
+    """Base of features, with one object for each case. `draft` is the `ModelDraft`, `model` the `Model`, of the case.
+
+    slot : number of the feature, by which its compiled functions find its tables
+    terms : `RhsTerms` of its functions, that is, phases of the right-hand side and jobs
+    sets_arrivals : True if its `record` writes out[ARRIVES], the next time at which a step must end
+    further_cells : number of cells whose cost the feature adds to that of pipes and basins; negative if it saves
+    """
+
+    slot = 0
+    terms: tuple = ()
+    sets_arrivals = False
+    further_cells = 0
+
+    def __init__(self, case, given_up: Collection[str] = ()) -> None:
+        self.case, self.given_up = case, given_up
+
+    def __init_subclass__(cls, slot: int, wakes: str) -> None:
+        cls.slot = slot
+
+    # build ----------
+
+    def fill_pipe(self, draft, name: str, link, row) -> bool:
+        """Fill the row of a pipe that the feature computes, with cells = 0, and add its states; False for others."""
+        return False
+
+    def lower(self, draft) -> None:
+        """Fill the tables of the feature, after those of the pipes; add faults."""
+
+    def grouped(self, draft, group: np.ndarray) -> None:
+        """Continue when nodes are grouped; group : label of the group of each node."""
+
+    def settle(self, draft) -> list[str]:
+        """Continue after the steady start; names of parts to be given up, after which the tables are made again."""
+        return []
+
+    def sizes(self, draft, out: int) -> dict[str, int]:
+        """Least sizes of the work arrays "scratch" and "spare", and "places" of a pipe; out : size of `out`."""
+        return {}
+
+    def close(self, draft) -> None:
+        """Complete the tables of the feature; from here on they are constant."""
+
+    def copy_for(self, case) -> Feature:
+        """Copy of the feature for a case with tables of the same shapes."""
+        return self
+
+    # model ----------
+
+    def refusal(self, function: str) -> str:
+        """Reason why a function of (t, y) is not defined, because the feature has a history; "" if it is."""
+        return ""
+
+    def run(self, run_data) -> FeatureRun:
+        """Data of a run."""
+        return FeatureRun(self, run_data)
+
+    def step_notices(self, model, method, h: float, span: float) -> list:
+        """Notices of steps that are too long; h : step [s]; span : duration of the run [s]"""
+        return []
+
+
+class FeatureRun:
+    """Data that a run writes for a feature, one object for each run. The base has none."""
+
+    def __init__(self, feature: Feature, run_data) -> None:
+        self.feature, self.run_data = feature, run_data
+
+    def tables(self, view: str = "") -> tuple | None:
+        """Tables of the feature as its compiled functions read them; view : name of another view of the model."""
+        return None
+
+    def views(self) -> dict[str, tuple[np.ndarray, dict[str, np.ndarray]]]:
+        """Views that compiled functions open : name -> (array for its handle, tables of the model replaced in it)."""
+        return {}
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Arrays of float64 that a state needs in addition to y, by the name in its memory; they may grow."""
+        return {}
+
+    def store(self, name: str, values: np.ndarray) -> bool:
+        """Set one of `arrays`; True if it is a new array."""
+        return False
+
+    def reset(self) -> None:
+        """Reset for another state."""
+
+    def restore(self, memory: dict[str, np.ndarray]) -> None:
+        """Continue from the memory of a state; raises ValueError if it lacks what the feature needs."""
+
+    def capacity(self) -> float:
+        """Number of steps that fit into the arrays, which grow if it is small."""
+        return np.inf
+
+    def begin_segment(self, t: float, y: np.ndarray, end: float) -> None:
+        """Continue at the begin of a segment of the run, see `RunData.begin_segment`."""
+
+    def waves(self, t: float, out: np.ndarray, parts: int) -> Iterator[tuple[int, tuple[np.ndarray, np.ndarray]]]:
+        """Yield both waves along the pipes of the feature, see `RunData.along`."""
+        yield from ()
+
+    def corrected_at(self, t: float) -> bool:
+        """True if the feature corrected the state at t, so that the step before it cannot be repeated."""
+        return False
+
+    def notices(self) -> list:
+        """Notices at the end of a run."""
+        return []
+
+
+def with_slot(members: list[Any], slot: int) -> Any:
+    """Feature with a slot, or its data of a run; None if the case does not have the feature."""
+    return next((one for one in members if getattr(one, "feature", one).slot == slot), None)

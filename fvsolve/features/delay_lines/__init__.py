@@ -1,0 +1,1 @@
+"""Delay lines: pipes whose waves are a history instead of cells."""
