@@ -14,6 +14,7 @@ from measure import agree, machine, parser
 
 import fvsolve
 from fvsolve.case import load
+from fvsolve.features.delay_lines.feature import lines_of
 from fvsolve.model.build import build
 from fvsolve.output.memory_sink import MemorySink
 from fvsolve.solve.solve import Run
@@ -63,7 +64,7 @@ def energy(case, end):
     ended = run.go()
     out = run.run_data.evaluate(run.loop.t, run.loop.now, np.inf)[1]
     pipes, nodes, total = model.tables.pipes, model.tables.nodes, 0.0
-    for line, (ahead, back) in zip(model.tables.delays, run.run_data.along(run.loop.t, out).values(), strict=True):
+    for line, (ahead, back) in zip(lines_of(model), run.run_data.along(run.loop.t, out).values(), strict=True):
         pipe = pipes[line["pipe"]]
         ahead, back = ahead + 0.5 * pipe["flow"], back - 0.5 * pipe["flow"]
         length = float(pipe["speed"] * line["tau"] * line["stretches"])

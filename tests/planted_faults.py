@@ -75,7 +75,11 @@ FAULTS = [
         'st["reference"] + q / (1.0 / st["beta"] + compliance)',
         'st["reference"] + q / (1.0 / st["beta"] - compliance)',
     ),
-    Fault("kernels/delay_lines/line_rates.py", "per = 1.0 / (1.0 - beta * beta)", "per = 1.0 / (1.0 + beta * beta)"),
+    Fault(
+        "features/delay_lines/kernels/line_rates.py",
+        "per = 1.0 / (1.0 - beta * beta)",
+        "per = 1.0 / (1.0 + beta * beta)",
+    ),
     Fault(
         "kernels/relaxation.py",
         "reference * (0.5 * u - flow / m0)",

@@ -140,8 +140,8 @@ def test_values_of_sources_are_those_of_the_energy_accounts(name):
     run = Run(model, initial_state(model), RowSink(), None)
     run.go()
     watch, loop, data = run.checks.energy, run.loop, RunData(model)
-    for name in ("past", "histories"):
-        setattr(data, name, getattr(loop.run_data, name).copy())
+    for name, array in loop.run_data.arrays().items():
+        data.set_array(name, array.copy())
     data.armed[:], data.discrete[:] = loop.run_data.armed, loop.run_data.discrete
     data.update_network()
     data.clock["limit"] = loop.run_data.clock["limit"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from model.test_delay_lines import short, vessel
+from features.test_delay_lines import short, vessel
 from reference.delays import main, turned
 from reference.scenes import AMBIENT, GRAVITY, RHO, area, chamber, junction, pipe, reservoir, scene, tank, valve
 from scipy.optimize import brentq
@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 import fvsolve
 from fvsolve import build, load, studies
 from fvsolve.errors import FvsolveError
+from fvsolve.features.delay_lines.feature import history_of
 from fvsolve.model.energy_norm import energy_form
 from fvsolve.steppers import METHODS, method_named, stability_function
 from fvsolve.studies import work_limit
@@ -412,7 +413,7 @@ def test_a_step_of_the_linear_system_is_one_of_the_program(method, scene):
     for run in (moved, still):
         run.run(40.0)
     _, _, x, before = one.propagate(x, before, 40, np.inf)
-    found = read_history(moved.run_data.past, one) - read_history(still.run_data.past, one)
+    found = read_history(history_of(moved.run_data), one) - read_history(history_of(still.run_data), one)
     assert found == pytest.approx(before[..., 0], abs=1e-6 * np.abs(before).max())
     assert moved.now[one.states] - still.now[one.states] == pytest.approx(
         x[:, 0], abs=1e-6 * np.abs(x).max(initial=0.0)
@@ -431,7 +432,7 @@ def test_runs_fail_at_the_step_that_is_predicted(method):
 
 
 def test_what_check_tells_to_grow_has_a_limit_below_the_step():
-    """Runs that tests/step_limits/test_lines.py compares with `check`, with steps of 10 ms for 30 s."""
+    """Runs that tests/features/test_growth_in_lines.py compares with `check`, with steps of 10 ms for 30 s."""
     for method, volume, grows in (("euler", 0.6, True), ("ssp-rk3", 0.15, True), ("rk4", 0.15, False)):
         made = DelayLineLimits(
             fvsolve.load(vessel(method, 0.01, 30.0, volume)), "upwind", method_named(method), 3000, 30.0

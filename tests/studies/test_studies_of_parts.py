@@ -6,8 +6,8 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from features.test_delay_lines import vessel
 from invariance.moving import SCENES, flume, u_tube
-from model.test_delay_lines import vessel
 from reference import pulses, pump_trip
 from reference.bodies import bodies, body
 from reference.delays import fork, main, turned

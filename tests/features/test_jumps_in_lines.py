@@ -5,10 +5,6 @@ Jumps that arrive within a step at a junction with a valve or a rigid column are
 
 import numpy as np
 import pytest
-from fvsolve.kernels.delay_lines import wave_bounds
-from fvsolve.kernels.delay_lines import wave_history as history
-from fvsolve.kernels.delay_lines.history_update import earliest_arrival, write_arrival
-from fvsolve.kernels.delay_lines.line_rates import smooth_wave_linear
 from reference.delays import turned
 from reference.scenes import (
     AMBIENT,
@@ -28,6 +24,11 @@ from reference.scenes import (
 from scipy.integrate import solve_ivp
 
 import fvsolve
+from fvsolve.features.delay_lines.feature import history_of, lines_of
+from fvsolve.features.delay_lines.kernels import wave_bounds
+from fvsolve.features.delay_lines.kernels import wave_history as history
+from fvsolve.features.delay_lines.kernels.history_update import earliest_arrival, write_arrival
+from fvsolve.features.delay_lines.kernels.line_rates import smooth_wave_linear
 from fvsolve.solve import initial_state
 from fvsolve.solve.solve import Run
 from fvsolve.studies.outcome import RowSink
@@ -382,11 +383,11 @@ def test_bounds_by_which_cells_are_left_out_contain_all_waves(case, jumps_seen):
     model = fvsolve.build(fvsolve.load(case))
     run = Run(model, initial_state(model), RowSink(), None)
     assert run.go().finished
-    past, random, checked, varied = run.run_data.past, np.random.default_rng(7), 0, 0.0
+    past, random, checked, varied = history_of(run.run_data), np.random.default_rng(7), 0, 0.0
     places, clock = history.offsets_of(past), history.reading_data(past, int(past[history.COUNT]) - 1)
     wrap = int(past[history.CAPACITY]) - 1
     longest = max(np.diff([history.time_of(past, k) for k in range(history.PROFILE_ENTRIES, int(past[history.COUNT]))]))
-    for line, wave in ((model.tables.delays[k].copy(), wave) for k in range(2) for wave in range(2)):
+    for line, wave in ((lines_of(model)[k].copy(), wave) for k in range(2) for wave in range(2)):
         bounds = history.bounds_of(places, line, 0)
         wave_bounds.write_bounds(past, places, clock, line, 0, wave)  # anew, because those of the last entry are there
         (ring, mask), head = history.ring_of(places, line, 0), history.jump_head(places, int(line["stretch"]), wave)

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from fvsolve.step_limits.delay_line_growth import ANGLES, interpolation_factor, reflection_factor
-from model.test_delay_lines import vessel
+from features.test_delay_lines import vessel
 
 import fvsolve
+from fvsolve.features.delay_lines.feature import lines_of
+from fvsolve.features.delay_lines.growth import ANGLES, interpolation_factor, reflection_factor
 from fvsolve.output.memory_sink import MemorySink
 from fvsolve.solve.solve import Run
 from fvsolve.steppers.tableau import method_named
@@ -43,7 +44,7 @@ def energy(case: dict) -> tuple[float, list]:
     warnings = run.go().warnings
     out = run.run_data.evaluate(run.loop.t, run.loop.now, np.inf)[1]
     total = 0.5 * float(model.tables.nodes["stiffness"].max()) * float(run.loop.now[-1]) ** 2
-    for line, (r, l) in zip(model.tables.delays, run.run_data.along(run.loop.t, out).values(), strict=True):  # noqa: E741
+    for line, (r, l) in zip(lines_of(model), run.run_data.along(run.loop.t, out).values(), strict=True):  # noqa: E741
         pipe = model.tables.pipes[line["pipe"]]
         r, l = r + 0.5 * pipe["flow"], l - 0.5 * pipe["flow"]  # noqa: E741
         total += float(np.mean(r**2 + l**2) * line["tau"] * line["stretches"] * pipe["speed"] / pipe["area"])

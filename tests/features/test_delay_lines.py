@@ -26,9 +26,11 @@ from reference.scenes import RHO, junction, lake, ramp, scene, valve
 
 import fvsolve
 from fvsolve import studies
+from fvsolve.assembly.features import with_slot
 from fvsolve.case.text import write
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.model import delay_lines
+from fvsolve.features.delay_lines import history
+from fvsolve.features.delay_lines.kernels.tables import SLOT
 from fvsolve.output.memory_sink import MemorySink
 from fvsolve.solve.solve import Run
 
@@ -171,7 +173,7 @@ def test_lines_shorter_than_a_step_know_each_other():
 @pytest.mark.parametrize("case", [main(), short("delay-line", method="euler", step=0.02)], ids=["long", "short"])
 def test_tables_of_jumps_have_a_handle_whether_they_replace_tables_or_none(case):
     with fvsolve.build(fvsolve.load(case)).run_data() as data:
-        assert data.handle is not None and np.any(data.written.sharp)
+        assert data.handle is not None and np.any(with_slot(data.features, SLOT).sharp)
 
 
 @pytest.mark.parametrize("method", ["euler", "rk4", "gauss-4", "rodas-5p"])
@@ -313,8 +315,8 @@ def test_what_a_store_is_given_is_taken_from_its_own_line(control):
 
 def test_jumps_that_find_no_room_are_told(monkeypatch):
     """A notice reports jumps that do not fit into the storage, here of two jumps per wave."""
-    monkeypatch.setattr(delay_lines, "LEAST_JUMPS", 2)
-    monkeypatch.setattr(delay_lines, "TOTAL_JUMPS", 2)
+    monkeypatch.setattr(history, "LEAST_JUMPS", 2)
+    monkeypatch.setattr(history, "TOTAL_JUMPS", 2)
     found = fvsolve.run(fork({"pipe_model": "delay-line", "delay_tolerance": 1e-6, "method": "euler", "step": 0.04}))
     told = [one for one in found.summary["warnings"] if one["kind"] == "jumps"]
     assert len(told) == 1 and "numerics.delay_tolerance" in told[0]["text"] and 0.0 < told[0]["value"] <= 1.0
