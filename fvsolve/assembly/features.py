@@ -90,9 +90,8 @@ class Feature:
         """Continue after the steady start; names of parts to be given up, after which the tables are made again."""
         return []
 
-    def sizes(self, draft, out: int) -> dict[str, int]:
-        """Least sizes of the work arrays "scratch" and "spare", and "places" of a pipe; out : size of `out`."""
-        return {}
+    def reserve(self, draft) -> None:
+        """Reserve stretches of `out`, rows of the ledger and work arrays, see `assembly.array_sizes`."""
 
     def close(self, draft) -> None:
         """Complete the tables of the feature; from here on they are constant."""

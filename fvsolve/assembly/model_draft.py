@@ -235,6 +235,8 @@ class ModelDraft:
     links: dict[str, list[tuple]] = field(default_factory=dict)
     features: list[Any] = field(default_factory=list)  # see `assembly.features`
 
+    sizes: Any = None  # `assembly.array_sizes.ArraySizes`, while tables are packed
+
     # rows
     node_table: np.ndarray = no_rows(rec.NODE)
     pipe_table: np.ndarray = no_rows(rec.PIPE)

@@ -25,6 +25,17 @@ def lower_basins(draft) -> None:
         draft.basins[row["basin"]].lower_patch(draft, place.patch, row)
 
 
+def reserve_basins(draft) -> None:
+    """Reserve the arrays of basins and moving walls; rows of the ledger: rain, and negative infiltration."""
+    sizes, basins, walls = draft.sizes, len(draft.basin_table), len(draft.wall_table)
+    sizes.ledger("source", draft.sources)
+    sizes.out("wall", walls)
+    sizes.out("tank", rec.TANK_OUT * basins if len(draft.body_table) else 0)
+    sizes.run_array("seen", draft.size if walls else 0)
+    sizes.run_array("bands", 2 * basins)
+    sizes.run_array("maxima", draft.maxima_size)
+
+
 def rows_class(physics: type) -> type:
     """Subclass of `BasinRows` that fills the tables of a type of basin.
 

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from fvsolve.argument_checks import TABLE, instance_of, validated
+from fvsolve.assembly.array_sizes import ArraySizes
 from fvsolve.assembly.features import features_of
 from fvsolve.assembly.lowering import lower_devices, lowering_of
 from fvsolve.assembly.model_draft import ModelDraft
 from fvsolve.assembly.pipe_terms import MAX_TERMS, add_terms, limit_creep_step
 from fvsolve.assembly.scheme_codes import limiter_notices, scheme_settings
 from fvsolve.basins.free_surface.patch_closures import DEEPEST
-from fvsolve.basins.lower import basin_start, lower_basins
+from fvsolve.basins.lower import basin_start, lower_basins, reserve_basins
 from fvsolve.case import load, locate_faults
 from fvsolve.case.case import Case
 from fvsolve.errors import CaseError, FvsolveError, Notice
@@ -27,23 +28,24 @@ from fvsolve.model.control_tables import (
     has_late_sensors,
     lower_controls,
     number_blocks,
+    reserve_controls,
     set_starts,
 )
-from fvsolve.model.input_histories import histories_size
 from fvsolve.model.mechanics_tables import (
     find_closed_chambers,
     lower_bodies,
     lower_lines,
     lower_masses,
     lower_moving_segments,
+    reserve_mechanics,
     supporting_pressures,
 )
 from fvsolve.model.model import Model
 from fvsolve.model.network_start import unknown_speeds
-from fvsolve.model.network_tables import lower_networks, network_rate
+from fvsolve.model.network_tables import lower_networks, network_rate, reserve_networks
 from fvsolve.model.probe_tables import lower_probes, probe_offsets
-from fvsolve.model.reaction_tables import lower_reactions
-from fvsolve.model.scalar_tables import lower_scalars, scale_scalars, start_amounts
+from fvsolve.model.reaction_tables import lower_reactions, reserve_reactions
+from fvsolve.model.scalar_tables import lower_scalars, reserve_scalars, scale_scalars, start_amounts
 from fvsolve.model.start_notices import start_notices
 from fvsolve.model.steady_start import SteadyStart
 
@@ -316,41 +318,67 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     draft.probe_table = lower_probes(draft)
     schedules, pieces = draft.schedules.tables(tanks.EVENTS * draft.tanks)
     schedules.flags.writeable = pieces.flags.writeable = False  # from here on constant, as in the model
-    layout = layout_of(draft)
+    sizes = draft.sizes = ArraySizes()
+    for reserve in (reserve_network, reserve_scalars, reserve_reactions, reserve_basins, reserve_mechanics,
+                    reserve_controls, reserve_networks):  # fmt: skip
+        reserve(draft)
+    for feature in draft.features:
+        feature.reserve(draft)
+    layout = sizes.place()
+    if (draft.probe_table["kind"] == rec.PIPE_FORCE).any():
+        layout["forces"] = draft.to_work(most_states(draft))
+    if draft.moving_segment_table["loads_body"].any():
+        layout["rates"] = draft.to_work(most_states(draft))
     draft.tables = rec.Tables(
-        settings, layout, draft.pipe_table, draft.node_table, draft.valve_table, draft.column_table,
-        draft.cluster_table, schedules, draft.probe_table, draft.body_table, draft.freedom_table,
-        np.array(draft.points, rec.POINT), draft.line_table, draft.pin_table, draft.bushing_table,
-        draft.moving_segment_table, draft.mass_table, draft.brace_table, draft.stop_table, draft.piston_table,
-        draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table,
-        draft.heat_source_table, draft.exchanger_table, draft.wall_table,
-        draft.coupling_table, draft.control_table, draft.sensor_table, draft.driven_table, draft.network_input_table,
-        draft.network_rate_table, draft.network_element_table, draft.network_switch_table, draft.reaction_table,
-        np.array(draft.integers, dtype=np.int64), np.array(draft.floats, dtype=float), profile, draft.plane(), pieces,
+        settings=settings, layout=layout, pipes=draft.pipe_table, nodes=draft.node_table, valves=draft.valve_table,
+        columns=draft.column_table, clusters=draft.cluster_table, schedules=schedules, probes=draft.probe_table,
+        bodies=draft.body_table, freedoms=draft.freedom_table, points=np.array(draft.points, rec.POINT),
+        lines=draft.line_table, pins=draft.pin_table, bushings=draft.bushing_table,
+        moving_segments=draft.moving_segment_table, masses=draft.mass_table, braces=draft.brace_table,
+        stops=draft.stop_table, pistons=draft.piston_table, devices=draft.device_table, basins=draft.basin_table,
+        patches=draft.patch_table, scalars=draft.scalar_table, heat_sources=draft.heat_source_table,
+        exchangers=draft.exchanger_table, walls=draft.wall_table, couplings=draft.coupling_table,
+        controls=draft.control_table, sensors=draft.sensor_table, driven=draft.driven_table,
+        network_inputs=draft.network_input_table, network_rates=draft.network_rate_table,
+        network_elements=draft.network_element_table, network_switches=draft.network_switch_table,
+        reactions=draft.reaction_table, integers=np.array(draft.integers, dtype=np.int64),
+        floats=np.array(draft.floats, dtype=float), profile=profile, plane=draft.plane(), pieces=pieces,
     )  # fmt: skip
-    pipes, nodes, out = len(draft.pipe_table), len(draft.node_table), int(layout["size"][0])
+    sizes.run_array("work", draft.work_size)
+    draft.shapes = sizes.shapes()
+
+
+def reserve_network(draft: ModelDraft) -> None:
+    """Reserve the arrays of nodes, pipes, restrictions and columns."""
+    nodes, pipes, sizes = len(draft.node_table), len(draft.pipe_table), draft.sizes
+    valves, columns, clusters = len(draft.valve_table), len(draft.column_table), draft.cluster_table
+    sizes.out("pressure", nodes)
+    sizes.ledger("supply", nodes)
+    for name, size in (
+        ("net", nodes), ("ends", 4 * pipes), ("valve", valves), ("column", columns), ("valve_controlled", columns),
+        ("stiffness", draft.moving), ("outflow_fraction", draft.moving), ("swept", draft.moving),
+        ("conductance", valves), ("drive", valves), ("isolated", nodes),
+    ):  # fmt: skip
+        sizes.out(name, size)
     # `marks` has the first times at which the model does not hold. Density laws with cavities add three for each pipe:
     # location of the first cavity, greatest cavity volume, and its time. The last are: for each valve the time at which
     # it shut off a demand; for each node the first and the last time at which its demand is not supplied, and the first
     # at which its pressure is not determined.
-    marks = pipes * (4 if draft.case.law.cavitates else 1) + 3 * nodes + len(draft.column_table)
-    marks += 2 * len(draft.device_table) + len(draft.piston_table) + len(draft.valve_table) + 3 * nodes
-    # `spare` has a copy of `out`
-    needed = [feature.sizes(draft, out) for feature in draft.features]
-    spare = max([out, *(sizes.get("spare", 0) for sizes in needed)])
-    draft.shapes = rec.RunArrays(
-        clock=1, work=draft.work_size, marks=marks,
-        armed=tanks.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),
-        scratch=scratch_size(draft, needed), spare=spare, seen=draft.size if len(draft.wall_table) else 0,
-        bands=2 * len(draft.basin_table), joint=0, sums=0,
-        envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)),
-        applied=2 * len(draft.control_table) + 2 * (len(draft.control_table) > 0), readings=len(draft.sensor_table),
-        sensing=int(len(draft.sensor_table) > 0), stack=draft.schedules.stack, discrete=len(draft.discrete),
-        histories=histories_size(draft.control_table),
-        network_places=0 if draft.network is None else 3 * draft.network.rows.count + draft.network.capacity,
-        network_factors=0 if draft.network is None else draft.network.rows.count + draft.network.capacity,
-        maxima=draft.maxima_size, accepted=accepted_size(draft), features=0, memory=0,
-    )  # fmt: skip
+    sizes.marks = pipes * (4 if draft.case.law.cavitates else 1) + 3 * nodes + columns
+    sizes.marks += 2 * len(draft.device_table) + len(draft.piston_table) + valves + 3 * nodes
+    sizes.run_array("clock", 1)
+    sizes.run_array("armed", tanks.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table))
+    sizes.run_array("envelope", (4, draft.cells))
+    sizes.run_array("extremes", (4, len(draft.probe_table)))
+    sizes.run_array("stack", draft.schedules.stack)
+    sizes.run_array("accepted", accepted_size(draft))
+    for cells in draft.pipe_table["cells"]:
+        sizes.need_places(cells)
+    sizes.need_scratch(lambda places: 4 * places + 64)
+    # equations of a cluster, or of nodes between columns, beside the arrays of all nodes and valves
+    system = max((c["matrix"] + 4 * c["nodes"] + 5 * c["valves"] + c["held"] for c in clusters), default=0)
+    between = int(np.sum(draft.node_table["columns"] > 1))
+    sizes.need_scratch(max(system, between * (between + 3)) + 6 * nodes + 2 * valves + 5 * len(clusters))
 
 
 def accepted_size(draft: ModelDraft) -> int:
@@ -405,59 +433,10 @@ def column_rates(draft: ModelDraft):
         yield math.sqrt(k * row["area"] / row["length"])
 
 
-def layout_of(draft: ModelDraft) -> np.ndarray:
-    """Offsets in `out`, the array that the right-hand side writes in addition to dydt : `kernels.dtypes.LAYOUT`[1]."""
-    nodes, pipes = len(draft.node_table), len(draft.pipe_table)
-    valves, columns = len(draft.valve_table), len(draft.column_table)
-    scalars, layout, at = len(draft.scalar_table), np.zeros(1, rec.LAYOUT), rec.OUT_HEAD
-    for name, size in (
-        ("pressure", nodes), ("supply", nodes), ("gain", scalars * nodes), ("loss", sum(draft.scalar_table["losses"])),
-        ("heat", draft.heat_rows + len(draft.exchanger_table)), ("extent", sum(draft.reaction_table["extents"])),
-        ("source", draft.sources),
-        ("net", nodes), ("quickest", len(draft.reaction_table) > 0),
-        ("ends", 4 * pipes), ("valve", valves), ("column", columns), ("valve_controlled", columns),
-        ("stiffness", draft.moving), ("outflow_fraction", draft.moving), ("swept", draft.moving),
-        ("net_force", len(draft.mass_table)), ("push", len(draft.push_names)),
-        ("conductance", valves), ("drive", valves), ("value", scalars * nodes), ("edge", 2 * pipes * scalars),
-        ("carried", 2 * pipes * scalars), ("scalar_inflow", scalars * nodes),
-        ("exchange", 2 * len(draft.exchanger_table)), ("wall", len(draft.wall_table)),
-        ("moving_segment", len(draft.moving_segment_table)),
-        ("tank", rec.TANK_OUT * len(draft.basin_table) if len(draft.body_table) else 0),
-        ("travel", 2 * len(draft.push_names)), ("along", 3 * len(draft.line_table)),
-        ("pin", 3 * len(draft.pin_table)), ("body", rec.BODY_OUT * len(draft.body_table)),
-        ("isolated", nodes),
-        ("control", 2 * len(draft.control_table)), ("network", len(draft.network_input_table)),
-    ):  # fmt: skip
-        layout[name], at = at, at + size
-    layout["size"] = at
-    layout["forces"] = draft.to_work(most_states(draft)) if (draft.probe_table["kind"] == rec.PIPE_FORCE).any() else -1
-    layout["rates"] = draft.to_work(most_states(draft)) if draft.moving_segment_table["loads_body"].any() else -1
-    return layout
-
-
 def most_states(draft: ModelDraft) -> int:
     """Upper bound of the number of states, for the greatest possible number of terms of unsteady friction."""
     unsteady = [mesh.cells for mesh in draft.meshes if draft.case.links[mesh.name].friction.model == "unsteady"]
     return draft.size + MAX_TERMS * sum(unsteady)
-
-
-def scratch_size(draft: ModelDraft, needed: list[dict[str, int]]) -> int:
-    """Size of the work array `scratch`: the largest size that a function of the right-hand side needs.
-
-    needed : sizes that features need
-    """
-    scalars, nodes = len(draft.scalar_table), len(draft.node_table)
-    most = max([0, *draft.pipe_table["cells"], *(sizes.get("places", 0) for sizes in needed)])
-    system = max((c["matrix"] + 4 * c["nodes"] + 5 * c["valves"] + c["held"] for c in draft.cluster_table), default=0)
-    rigid = int(np.sum(draft.node_table["columns"] > 1))
-    system = max(system, rigid * (rigid + 3))
-    system += 6 * nodes + 2 * len(draft.valve_table) + 5 * len(draft.cluster_table)
-    constraints = int(sum(draft.pin_table["rows"]))
-    spatial = 8 * len(draft.freedom_table) + draft.factor_size + 16 * len(draft.body_table)
-    spatial += constraints * (2 * len(draft.freedom_table) + constraints + 1)
-    spatial = max(spatial, 18 if len(draft.body_table) else 0)
-    system = max([system, *(sizes.get("scratch", 0) for sizes in needed)])
-    return int(max(spatial, (5 if scalars else 4) * most + 64, system, 2 * len(draft.mass_table), 4 * scalars * nodes))
 
 
 def model_of(draft: ModelDraft, notices: Callable[[ModelDraft], list[Notice]] = start_notices) -> Model:

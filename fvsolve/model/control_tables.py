@@ -19,6 +19,7 @@ from fvsolve.case.case_notices import unread_text
 from fvsolve.case.controls import Block, decision_order
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
+from fvsolve.model.input_histories import histories_size
 from fvsolve.model.probe_tables import fill_probes
 from fvsolve.units import show
 
@@ -61,6 +62,17 @@ def lower_controls(draft) -> None:
         row["late"] = name not in early
     lower_delays(draft)
     check_order(draft, early)
+
+
+def reserve_controls(draft) -> None:
+    """Reserve the arrays of blocks: outputs and inputs, values of schedules that they set, sensors, histories."""
+    blocks, sensors, sizes = len(draft.control_table), len(draft.sensor_table), draft.sizes
+    sizes.out("control", 2 * blocks)
+    sizes.run_array("applied", 2 * blocks + 2 * (blocks > 0))
+    sizes.run_array("readings", sensors)
+    sizes.run_array("sensing", int(sensors > 0))
+    sizes.run_array("discrete", len(draft.discrete))
+    sizes.run_array("histories", histories_size(draft.control_table))
 
 
 def fill_block(draft, name: str, block: Block, sensors: list[str], row) -> None:

@@ -242,6 +242,22 @@ def lower_bodies(draft) -> None:
     draft.factor_size = at
 
 
+def reserve_mechanics(draft) -> None:
+    """Reserve the arrays of masses and bodies, of force elements and pins, and of pipes on bodies."""
+    pushes, masses, bodies = len(draft.push_names), len(draft.mass_table), len(draft.body_table)
+    for name, size in (
+        ("net_force", masses), ("push", pushes), ("moving_segment", len(draft.moving_segment_table)),
+        ("travel", 2 * pushes), ("along", 3 * len(draft.line_table)), ("pin", 3 * len(draft.pin_table)),
+        ("body", rec.BODY_OUT * bodies),
+    ):  # fmt: skip
+        draft.sizes.out(name, size)
+    constraints, freedoms = int(sum(draft.pin_table["rows"])), len(draft.freedom_table)
+    spatial = 8 * freedoms + draft.factor_size + 16 * bodies
+    spatial += constraints * (2 * freedoms + constraints + 1)
+    draft.sizes.need_scratch(max(spatial, 18 if bodies else 0))
+    draft.sizes.need_scratch(2 * masses)
+
+
 def fill_body(draft, name: str, body: Any, row) -> None:
     """Fill the BODY row of a body, and add the states of its joint."""
     joint, t = body.joint, draft.case.numerics.start

@@ -63,6 +63,15 @@ def lower_networks(draft) -> None:
     fill_tables(draft, network)
 
 
+def reserve_networks(draft) -> None:
+    """Reserve the arrays of networks: their sources, and the coefficients of the present mode."""
+    draft.sizes.out("network", len(draft.network_input_table))
+    if draft.network is not None:
+        count, capacity = draft.network.rows.count, draft.network.capacity
+        draft.sizes.run_array("network_places", 3 * count + capacity)
+        draft.sizes.run_array("network_factors", count + capacity)
+
+
 def parts_of_network(case) -> tuple[list[Element], list[Switch]]:
     """Elements and switches of all parts of a case, then sources of heat of parts with `heat_to`."""
     elements: list[Element] = []

@@ -56,6 +56,12 @@ def lower_reactions(draft) -> None:
         check_start(draft, name, reaction)
 
 
+def reserve_reactions(draft) -> None:
+    """Reserve the arrays of reactions; rows of the ledger: rates times the mass that reacts."""
+    draft.sizes.ledger("extent", sum(draft.reaction_table["extents"]))
+    draft.sizes.out("quickest", len(draft.reaction_table) > 0)
+
+
 def reacting(case, side: str = "") -> set[str]:
     """Names of the scalars that reactions change; side : "right" for those that may grow, "left" for those that fall.
 

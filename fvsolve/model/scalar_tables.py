@@ -55,6 +55,23 @@ def lower_scalars(draft) -> None:
         pipes["center"] = draft.cells + pipes["cell"]
 
 
+def reserve_scalars(draft) -> None:
+    """Reserve the arrays of scalars and heat exchangers; rows of the ledger: inflow through nodes, decay, heat."""
+    scalars, nodes, pipes = len(draft.scalar_table), len(draft.node_table), len(draft.pipe_table)
+    exchangers, sizes = len(draft.exchanger_table), draft.sizes
+    sizes.ledger("gain", scalars * nodes)
+    sizes.ledger("loss", sum(draft.scalar_table["losses"]))
+    sizes.ledger("heat", draft.heat_rows + exchangers)
+    for name, size in (
+        ("value", scalars * nodes), ("edge", 2 * pipes * scalars), ("carried", 2 * pipes * scalars),
+        ("scalar_inflow", scalars * nodes), ("exchange", 2 * exchangers),
+    ):  # fmt: skip
+        sizes.out(name, size)
+    if scalars:
+        sizes.need_scratch(lambda places: 5 * places + 64)
+        sizes.need_scratch(4 * scalars * nodes)
+
+
 def lower_heat(draft, scalar: str, heat_from: Any, by_cell: bool) -> None:
     """Fill the table of restrictions that heat the fluid, and the rows of pipes in the ledger of heat.
 

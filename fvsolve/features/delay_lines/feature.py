@@ -82,15 +82,17 @@ class DelayLines(Feature, slot=0, wakes="pipe_model delay-line, pipe_model auto"
     def settle(self, draft) -> list[str]:
         return lower.divide_lines(draft, self)
 
-    def sizes(self, draft, out) -> dict[str, int]:
+    def reserve(self, draft) -> None:
         if not len(self.delays):
-            return {}
-        lines, nodes = len(self.delays), len(draft.node_table)
-        places = int(self.delays["places"].max())
-        most, stretches = max(places, *draft.pipe_table["cells"]), int(sum(self.delays["stretches"]))
+            return
+        lines, sizes = len(self.delays), draft.sizes
+        capacity = history.jump_capacity(int(sum(self.delays["stretches"])))
+        sizes.need_places(self.delays["places"].max())
+        sizes.need_scratch(lambda places: 3 * places + capacity)
         # two copies of `out`, three values for each probe and node, arrival times of jumps and changes that they cause
-        spare = 2 * out + 3 * (len(draft.probe_table) + nodes) + 2 * (1 << (4 * lines - 1).bit_length()) + 8 * lines + 1
-        return {"spare": spare, "places": places, "scratch": 3 * most + history.jump_capacity(stretches)}
+        values = 3 * (len(draft.probe_table) + len(draft.node_table))
+        arrivals = 2 * (1 << (4 * lines - 1).bit_length()) + 8 * lines + 1
+        sizes.need_spare(lambda out: 2 * out + values + arrivals)
 
     def close(self, draft) -> None:
         self.sharp, self.sharp_delays = lower.jump_tables(draft, self)
