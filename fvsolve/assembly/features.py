@@ -9,7 +9,7 @@ and calls the methods below in the order of slots. Every method has a default, w
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 FOLDER = Path(__file__).parents[1] / "features"
+SECTIONS = ("controls",)  # sections of a case that may wake features
 HEADER = re.compile(r'\nclass (\w+)\(Feature, slot=(\d+), wakes="([^"]+)"\)')
 
 
@@ -42,9 +43,10 @@ def declarations() -> tuple[Declaration, ...]:
 
 
 def words_of(case) -> set[str]:
-    """Words of a case that may wake features: "pipe_model NAME" for the model of each pipe."""
+    """Words of a case that may wake features: "pipe_model NAME" for the model of each pipe, "section NAME"."""
     common = case.numerics.pipe_model
-    return {f"pipe_model {link.pipe_model or common}" for link in case.links.values() if link.kind == "pipe"}
+    models = {f"pipe_model {link.pipe_model or common}" for link in case.links.values() if link.kind == "pipe"}
+    return models | {f"section {name}" for name in SECTIONS if getattr(case, name)}
 
 
 def features_of(case, given_up: Collection[str] = ()) -> list[Feature]:
@@ -58,14 +60,25 @@ class Feature:
     """Base of features, with one object for each case. `draft` is the `ModelDraft`, `model` the `Model`, of the case.
 
     slot : number of the feature, by which its compiled functions find its tables
-    terms : `RhsTerms` of its functions, that is, phases of the right-hand side and jobs
-    sets_arrivals : True if its `record` writes out[ARRIVES], the next time at which a step must end
+    terms : `RhsTerms` of its functions, that is, phases of the right-hand side and jobs, by their place in the order:
+        first: before all others; pipes: behind those of pipes; sources: before event functions, after the nodes are
+        solved; events: with event functions of restrictions; last: behind all others but records of nodes
+    packages : names of further modules with compiled functions, such as laws of parts
+    sets_arrivals : True if its `record` writes out[ARRIVES], the next time at which a step must end, for waves
+    reads_solved : True if it reads values that only the solved nodes determine, before rates are computed
+    shortest_delay : no stage of a step may be later than this after the beginning of the step [s]
+    step_histories : names of arrays in the memory of a state that contain values at past steps
+    single_thread_reason : reason why a model with the feature is stepped by a single thread; "" if it is not
     further_cells : number of cells whose cost the feature adds to that of pipes and basins; negative if it saves
     """
 
     slot = 0
-    terms: tuple = ()
-    sets_arrivals = False
+    terms: Mapping[str, Any] = {}
+    packages: Sequence[str] = ()
+    sets_arrivals = reads_solved = False
+    shortest_delay = np.inf
+    step_histories: Sequence[str] = ()
+    single_thread_reason = ""
     further_cells = 0
 
     def __init__(self, case, given_up: Collection[str] = ()) -> None:
@@ -75,6 +88,9 @@ class Feature:
         cls.slot = slot
 
     # build ----------
+
+    def begin(self, draft) -> None:
+        """Continue before all tables are filled."""
 
     def fill_pipe(self, draft, name: str, link, row) -> bool:
         """Fill the row of a pipe that the feature computes, with cells = 0, and add its states; False for others."""
@@ -86,9 +102,31 @@ class Feature:
     def grouped(self, draft, group: np.ndarray) -> None:
         """Continue when nodes are grouped; group : label of the group of each node."""
 
+    def placed(self, draft) -> None:
+        """Read the offsets of stretches of `out`, in `draft.sizes.offsets`."""
+
+    def balanced(self, draft, start: Callable[[Any], Any]):
+        """Draft whose start the feature has balanced; start : function of a draft -> model with its steady start."""
+        return draft
+
+    def probe(self, draft, probe, row) -> bool:
+        """Fill the row of a probe that the feature computes; False for others."""
+        return False
+
+    def probe_rows(self) -> tuple[np.ndarray, list]:
+        """Rows of probes that the feature reads itself, and these probes."""
+        return np.zeros(0), []
+
     def settle(self, draft) -> list[str]:
         """Continue after the steady start; names of parts to be given up, after which the tables are made again."""
         return []
+
+    def lower_last(self, draft) -> None:
+        """Fill the tables of the feature, after all others; add faults."""
+
+    def rate(self, draft) -> float:
+        """Greatest constant rate of its states [1/s]."""
+        return 0.0
 
     def reserve(self, draft) -> None:
         """Reserve stretches of `out`, rows of the ledger and work arrays, see `assembly.array_sizes`."""
@@ -110,9 +148,40 @@ class Feature:
         """Data of a run."""
         return FeatureRun(self, run_data)
 
+    def pattern(self, couplings) -> FeaturePattern:
+        """Couplings of states, see `model.jacobian_pattern.Couplings`."""
+        return FeaturePattern(self)
+
+    def inputs(self, model) -> dict[str, Any]:
+        """Inputs that can be held at values : name -> `assembly.lowering.Input`."""
+        return {}
+
+    def to_hold(self) -> tuple[Feature, np.ndarray]:
+        """Copy of the feature, and the array in which values of its inputs are set."""
+        return self, np.zeros(0)
+
+    def remedy(self, event: str) -> str:
+        """Remedy if an event of a part follows itself without end; "" for parts of others. event : name of the part"""
+        return ""
+
     def step_notices(self, model, method, h: float, span: float) -> list:
         """Notices of steps that are too long; h : step [s]; span : duration of the run [s]"""
         return []
+
+
+class FeaturePattern:
+    """Couplings of states by a feature, for the sparsity pattern of the Jacobian. The base has none."""
+
+    def __init__(self, feature: Feature) -> None:
+        self.feature = feature
+
+    def schedule(self, *indices: int) -> np.ndarray:
+        """States on which schedules with these numbers depend."""
+        return np.zeros(0, dtype=np.int64)
+
+    def pairs(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Yield pairs (rates, states)."""
+        yield from ()
 
 
 class FeatureRun:
@@ -149,6 +218,16 @@ class FeatureRun:
 
     def begin_segment(self, t: float, y: np.ndarray, end: float) -> None:
         """Continue at the begin of a segment of the run, see `RunData.begin_segment`."""
+
+    def begin_at_break(self) -> None:
+        """Continue at a break of a schedule, at which a segment of the run begins."""
+
+    def flags_changed(self, t: float, before: np.ndarray) -> None:
+        """Continue at an event at t; before : event flags before it, those after it are `run_data.armed`"""
+
+    def failure(self, earliest: float) -> str:
+        """Reason why a run failed, with a time not before `earliest` [s]; "" if the feature knows none."""
+        return ""
 
     def waves(self, t: float, out: np.ndarray, parts: int) -> Iterator[tuple[int, tuple[np.ndarray, np.ndarray]]]:
         """Yield both waves along the pipes of the feature, see `RunData.along`."""

@@ -66,7 +66,7 @@ class Input(NamedTuple):
     node: int = -1  # node, for a pressure or head
     parts: tuple[tuple[int, float, float], ...] = ()  # schedules with the values max(0, a * value + b), and a, b
     scalar: int = -1  # scalar whose value flows in
-    control: int = -1  # block whose output it is, in place of a schedule
+    held: tuple[int, int] | None = None  # in place of a schedule: slot of a feature, and number of its value
 
 
 def opening_input(model, name: str) -> dict[str, Input]:

@@ -265,9 +265,6 @@ class ModelDraft:
     wall_table: np.ndarray = no_rows(rec.WALL)
     coupling_table: np.ndarray = no_rows(rec.COUPLING)
     probe_table: np.ndarray = no_rows(rec.PROBE)
-    control_table: np.ndarray = no_rows(rec.CONTROL)
-    sensor_table: np.ndarray = no_rows(rec.PROBE)
-    driven_table: np.ndarray = no_rows(rec.DRIVEN)
     network_input_table: np.ndarray = no_rows(rec.NETWORK_INPUT)
     network_rate_table: np.ndarray = no_rows(rec.NETWORK_RATE)
     network_element_table: np.ndarray = no_rows(rec.NETWORK_ELEMENT)
@@ -275,10 +272,7 @@ class ModelDraft:
     network: Any = None  # `model.network.Network` of rotation, electricity and heat; None without one
     start_speeds: dict[int, float] = field(default_factory=dict)  # column of a network -> speed found for the start
     network_start: Any = None  # its steady start, with which the start of a network can be computed again
-    sensors: list[Any] = field(default_factory=list)  # probes that blocks of `controls` read
-    discrete: list[float] = field(default_factory=list)  # `discrete` at the start
-    start_flags: dict[int, bool] = field(default_factory=dict)  # event flags at the start, of blocks
-    timed: list[tuple[int, int]] = field(default_factory=list)  # (flag, place in `discrete` of its last change)
+    start_flags: dict[int, bool] = field(default_factory=dict)  # event flags at the start that no state tells
 
     # results of the start
     # piston -> sides whose closed chambers may support a load

@@ -82,13 +82,15 @@ def source_hash() -> str:
     return _digest(PACKAGE, compiled_sources())
 
 
-def add_sources(folder: Path) -> None:
-    """Allow caching of functions defined in a folder under the hash of all sources in it, beside those of the core.
+def add_sources(folder: Path, *patterns: str) -> None:
+    """Allow caching of functions defined in a folder under the hash of its sources, beside those of the core.
 
-    An edit there compiles only these functions again. folder : of another package, or of the kernels of a feature
+    An edit there compiles only these functions again. folder : of another package, or of a feature
+    patterns : files in it on which compiled functions depend; all its modules if none is given
     """
     folder = Path(folder).resolve()
-    EXTRA_FOLDERS[folder] = f"outside/{_digest(folder, sorted(folder.rglob('*.py')))}"
+    paths = {path for pattern in patterns or ("**/*.py",) for path in folder.glob(pattern)}
+    EXTRA_FOLDERS[folder] = f"outside/{_digest(folder, sorted(paths))}"
 
 
 def _digest(top: Path, paths) -> str:

@@ -41,7 +41,7 @@ def free_inputs(model: Model) -> dict[str, Input]:
     schedules = model.tables.schedules
     return {
         name: target for name, target in inputs_of(model).items()
-        if target.control < 0 and schedules[target.schedule]["pieces"] != 0  # 0: follows a control
+        if target.held is None and schedules[target.schedule]["pieces"] != 0  # 0: follows a control
     }  # fmt: skip
 
 

@@ -8,6 +8,7 @@ address are lost.
 """
 
 import functools
+from collections.abc import Callable
 from inspect import Parameter, Signature
 
 import numpy as np
@@ -48,13 +49,6 @@ HOOKS = {  # functions of the law of a part: types of arguments and of the resul
     # t, y, tables, device, p' upstream, p' downstream (changes since the start [Pa]), drop, ahead: dx/dt of the lift x
     # and its slope over the drop [1/s/Pa], for a change of the upstream (`ahead`) or of the downstream pressure
     "lead": ("tVTDtttb", "tt"),
-    # block of `controls`: t, y, tables, control: its output before its limits
-    "decide": ("tVTC", "t"),
-    # t, y, dydt, tables, control, v, u: rates of its states; v, u : output before and after its limits
-    "adapt": ("tVVTCtt", ""),
-    "switch": ("tVTCV", ""),  # t, y, tables, control, g: its event functions
-    # t, y, tables, control: output before its limits at a sample; changes the numbers of the block in `discrete`
-    "sample": ("tVTC", "t"),
 }
 
 
@@ -62,7 +56,7 @@ def argument_types(letters: str) -> tuple:
     """Numba types of arguments, a letter for each.
 
     t : number; v : vector; h : handle; V, H : vector and handle in calls by address
-    T : tables; D : record of a device; C : record of a block; i : integer; b : boolean
+    T : tables; D : record of a device; i : integer; b : boolean; other letters : see `add_kind`
     """
     kinds = _kinds()
     return tuple(kinds[letter] for letter in letters)
@@ -76,8 +70,16 @@ def _kinds() -> dict:
 
     vectors = {"V": Vector(types.float64), "H": Vector(types.int64)}
     own = vectors | {"T": Tables("Tables", table_types), "D": table_types().devices.dtype}
-    own["C"] = table_types().controls.dtype
-    return plain_kinds() | own
+    return plain_kinds() | own | {letter: make() for letter, make in FURTHER_KINDS.items()}
+
+
+FURTHER_KINDS: dict[str, Callable] = {}  # letter of an argument type of a feature -> function that returns the type
+
+
+def add_kind(letter: str, make: Callable) -> None:
+    """Add a letter for the type of an argument of a feature's functions; make : function that returns the type."""
+    FURTHER_KINDS[letter] = make
+    _kinds.cache_clear()
 
 
 def compile_as(function, letters: str):
@@ -93,12 +95,12 @@ def function_address(function, letters: str):
     return function.address(letters, argument_types) if COMPILING else function
 
 
-def hook_of(law, name: str):
+def hook_of(law, name: str, hooks: dict[str, tuple[str, str]] = HOOKS):
     """Function `name` of the module `law`, which contains the law of a part; None if the module has no such function.
 
-    name : key of `HOOKS`. Raises FvsolveError for a wrong number of arguments.
+    name : key of `hooks`. Raises FvsolveError for a wrong number of arguments.
     """
-    function, expected = getattr(law, name, None), len(HOOKS[name][0])
+    function, expected = getattr(law, name, None), len(hooks[name][0])
     if function is None or function.__code__.co_argcount == expected:
         return function
     error = f"{law.__name__}.{name} has {function.__code__.co_argcount} arguments"
@@ -154,10 +156,6 @@ call_step = call_at_address("call_step", *HOOKS["step"])
 call_slope = call_at_address("call_slope", *HOOKS["slope"])
 call_lift = call_at_address("call_lift", *HOOKS["lift"])
 call_bends = call_at_address("call_bends", *HOOKS["bends"])
-call_decide = call_at_address("call_decide", *HOOKS["decide"])
-call_adapt = call_at_address("call_adapt", *HOOKS["adapt"])
-call_switch = call_at_address("call_switch", *HOOKS["switch"])
-call_sample = call_at_address("call_sample", *HOOKS["sample"])
 
 
 @njit(forceinline=True)

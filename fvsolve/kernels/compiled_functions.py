@@ -11,8 +11,8 @@ READER_IMPORTS = (
     "from fvsolve.kernels.compiled_functions import compile_readers; "
 )
 HOOK = {hook: k for k, hook in enumerate(calls.HOOKS)}
-RHS_HOOKS = ("set", "move", "step", "slope", "lift", "decide", "adapt")
-READER_HOOKS = ("value", "outside", "events", "bends", "switch", "sample")
+RHS_HOOKS = ("set", "move", "step", "slope", "lift")
+READER_HOOKS = ("value", "outside", "events", "bends")
 ENERGY_HOOKS = ("power", "stored")
 COMPILE_TIME_LOOP = "from fvsolve.steppers.time_loop import compiled; compiled()"
 

@@ -8,8 +8,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 # columns of `hooks`
 (
-    SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, HEAT, STORED, STEP, SLOPE, LIFT, BENDS, LEAD, DECIDE, ADAPT, SWITCH,
-    SAMPLE,
+    SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, HEAT, STORED, STEP, SLOPE, LIFT, BENDS, LEAD,
 ) = range(len(calls.HOOKS))  # fmt: skip
 TEMPORARY = 2  # result of a hook `outside`: to be reported, but it ends by itself when a check valve closes
 

@@ -57,8 +57,7 @@ SETTINGS = record(
     temperature=i8,  # number of the scalar that is the temperature of the fluid
     ambient=f8,  # ambient pressure [Pa]
     start=f8,  # start of the run [s]
-    late_blocks=i8,  # 1 if a block decides after the nodes are solved
-    late_sensors=i8,  # 1 if a sensor reads what only the solved nodes determine
+    reads_solved=i8,  # 1 if a feature reads values that only the solved nodes determine, before rates are computed
     gravity=f8,
     datum=f8,  # elevation of zero height in energy studies [m]
     vapor=f8,  # vapour pressure [Pa]
@@ -361,44 +360,6 @@ SCHEDULE = record(
 # scale, offset, output u of the block at the start
 PIECE_COLUMNS = 7
 
-CONTROL = record(  # block of `controls`, in an order in which each block comes after those that it reads at once
-    hooks=i8,  # row of `hooks`, the functions of its law
-    y=i8,  # offset in y of its states: filtered inputs first; -1 for none
-    filters=i8,  # number of filtered inputs
-    filter_rate=f8,  # 1 / time constant of the filters [1/s]
-    data=i8,  # offset of the numbers of its law in `floats`
-    inputs=i8,  # offset in `integers` of its inputs: number of a sensor, or -1 - number of another block
-    input_count=i8,
-    starts=i8,  # offset in `floats` of the values of its inputs at the start
-    setpoint=i8,  # schedule of its setpoint; -1 for none
-    setpoint_start=f8,
-    at_once=i8,  # 1 if its output depends on the present values of its inputs
-    late=i8,  # 1 if its output is computed after the nodes are solved, 0 if before
-    least=f8,  # limits of its output
-    greatest=f8,
-    flag=i8,  # first of four event flags of its limits; -1 for none
-    # Offset in `discrete` of numbers that change at events and samples only, -1 for none. Of a block that acts at
-    # samples: its output, the number of its next sample, then numbers of its law.
-    memory=i8,
-    period=f8,  # time between samples [s]; 0 for a block that acts at all times
-    offset=f8,  # time of the first sample after the start of the run [s]
-    start=f8,  # output at the start
-    held=f8,  # output at which a study holds it; nan if it follows its law
-    delay=f8,  # time by which it follows its input [s]; 0 for other blocks
-    history=i8,  # number of the history of its input, see `kernels.input_histories`; -1 for none
-    # Offset in `integers` of the blocks on which the input of a delay depends, not through other delays: first those on
-    # whose present outputs it depends, `source_count`, then `later_count` that it follows through states.
-    sources=i8,
-    source_count=i8,
-    later_count=i8,
-)
-
-DRIVEN = record(  # row of a table that a block drives before the nodes are solved
-    kind=i8,  # DRIVEN_VALVE, DRIVEN_DEVICE or DRIVEN_NODE
-    index=i8,  # its row
-)
-DRIVEN_VALVE, DRIVEN_DEVICE, DRIVEN_NODE = 0, 1, 2
-
 NETWORK_INPUT = record(  # source of a network of potential and flow, see `kernels.potential_networks`
     kind=i8,
     index=i8,  # schedule, device, mass, switch, element or heat exchanger
@@ -488,7 +449,6 @@ LAYOUT = record(
     pin=i8,  # forces of pins, three for each [N]
     body=i8,  # data of bodies, see `kernels.mechanism.body_layout`
     isolated=i8,  # codes of nodes, see `isolated_nodes`
-    control=i8,  # of each block of `controls`: output, and first input after its filter
     network=i8,  # sources of networks: change since the start
     size=i8,
 )
@@ -531,7 +491,6 @@ WALL_VALUE = 19  # of a moving wall
 BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = 20, 21, 22, 23  # quantity in `side`, see `mechanism.body_values`
 SURFACE_VALUE = 24  # of a surface described by modes
 PIPE_FORCE = 25  # on a whole pipe
-CONTROL_VALUE = 26  # of a block of `controls`: 0 output, 1 input, 2 error in `side`
 # of a network, by the code in `side`: value of row `index`; times that of row `cell`; row `cell` over its value;
 # 1 while the friction with the flag `index` sticks; force of the force element `cell` minus the value of row `index`
 NETWORK_VALUE = 27
@@ -540,6 +499,7 @@ SCHEDULE_VALUE = 28  # of schedule `index`
 # of a reaction, by the code in `side`: molar flow, power, mean affinity over all places; affinity at a place, whose
 # scalar probe has the kind in `head` and the index in `scalar`
 REACTION_VALUE, LOCAL_AFFINITY = 29, 30
+FEATURE_VALUE = 100  # plus the slot of a feature: its probes
 MOLAR_RATE, CHEMICAL_POWER, AFFINITY = 0, 1, 2
 # between nodes `index` and `cell`; floats[weights:] : fraction of the way, elevation there [m], and pressure because
 # this place lies below the line between the nodes [Pa]
@@ -762,9 +722,6 @@ RECORDS = {
     "exchangers": EXCHANGER,
     "walls": WALL,
     "couplings": COUPLING,
-    "controls": CONTROL,
-    "sensors": PROBE,
-    "driven": DRIVEN,
     "network_inputs": NETWORK_INPUT,
     "network_rates": NETWORK_RATE,
     "network_elements": NETWORK_ELEMENT,
@@ -777,7 +734,7 @@ Tables = namedtuple("Tables", (*RECORDS, "integers", "floats", "profile", "plane
 RunArrays = namedtuple("RunArrays",
     (
         "clock", "work", "armed", "marks", "scratch", "spare", "seen", "bands", "joint", "sums", "envelope", "extremes",
-        "applied", "readings", "sensing", "stack", "discrete", "histories",
+        "applied", "stack",
         "network_places", "network_factors", "maxima", "accepted", "features", "memory",
     ),
 )  # fmt: skip
@@ -788,7 +745,6 @@ INTEGERS = (
     "bands",
     "joint",
     "sums",
-    "sensing",
     "network_places",
     "features",
     "memory",

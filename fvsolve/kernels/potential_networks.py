@@ -15,7 +15,6 @@ from math import exp
 from fvsolve.jit import njit
 from fvsolve.kernels import calls
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.controls import read_sensors, write_outputs
 from fvsolve.kernels.devices import VALUE
 from fvsolve.kernels.energy_rows import network_power_row, network_stored_row
 from fvsolve.kernels.mass_dynamics import forces
@@ -138,7 +137,7 @@ def network_rates(t, y, dydt, out, handle):
 def known_sources(t, y, dydt, out, handle):
     """Write all sources to `out` before blocks decide that read them."""
     tables = open_tables(handle)
-    if tables.settings[0]["late_sensors"] == 1:
+    if tables.settings[0]["reads_solved"] == 1:
         write_sources(t, y, out, tables)
 
 
@@ -173,13 +172,9 @@ def sources_for_events(t, y, out, handle, g):
 
 
 @njit
-def sources_after_blocks(t, y, out, handle, g):
-    """Write all sources to `out`, after the blocks that they follow have decided; g is not used."""
-    sources_for_events(t, y, out, handle, g)
-    tables = open_tables(handle)
-    read_sensors(t, y, out, tables)
-    write_outputs(t, y, out, tables, 1)
-    write_sources(t, y, out, tables)
+def sources_again(t, y, out, handle, g):
+    """Write all sources to `out` once more, after features have set the schedules that they follow; g is not used."""
+    write_sources(t, y, out, open_tables(handle))
 
 
 @njit(forceinline=True)

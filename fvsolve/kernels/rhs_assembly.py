@@ -115,17 +115,7 @@ FLUID_LOADS = {
     "stored": "mechanism.fluid_energy: add_stored",
 }
 COLUMNS = {"inflow": "rigid_columns: column_inflows", "rate_limits": "rigid_columns: column_rate_limit"}
-CONTROLS = {
-    "prepare": "controls: begin_controls",
-    "move": "controls: decide_late",
-    "control_rates": "controls: control_rates",
-    "observe": "controls: restore_outputs",
-    "record": "controls: take_samples",
-}
 COMPONENTS = {
-    "controls, linear": RhsTerms(**CONTROLS, decide="controls: decide_linear"),
-    "controls, barotropic": RhsTerms(**CONTROLS, decide="controls: decide_barotropic"),
-    "switches": RhsTerms(events="controls: control_events"),
     "formulas": RhsTerms(events="schedule_pieces: formula_events"),
     "networks": RhsTerms(
         rate_limits="potential_networks: known_sources",
@@ -136,8 +126,7 @@ COMPONENTS = {
         stored="potential_networks: stored_networks",
     ),
     "sources of networks": RhsTerms(events="potential_networks: sources_for_events"),
-    "sources after blocks": RhsTerms(events="potential_networks: sources_after_blocks"),
-    "probes of controls": RhsTerms(observe="controls: observe_controls", record="controls: record_controls"),
+    "sources again": RhsTerms(events="potential_networks: sources_again"),
     "pipes": RhsTerms(record="observation: record_pipes"),
     "valves": RhsTerms(rate_limits="network_balance: valve_rate_limit"),
     "bends": RhsTerms(events="restrictions: restriction_events"),
@@ -251,14 +240,14 @@ class ModelFeatures(NamedTuple):
     family : kernels of the density law, "linear", "barotropic" or "cavitating"
     laws : names of the modules of parts' laws, in the order of the rows of `hooks`
     lines : True if force elements join points of bodies
-    features : terms of other features, see `assembly.features`
+    features, further_packages : place and terms of features, and their further modules, see `assembly.features`
     basins, carried : terms of basins, and of the scalars that they carry; see `basins.basin_terms`
     alone : True if there are only basins, and no link
     bands : True if threads or processes step bands of the state
     boundary_exchange : True if several bands have an open boundary
     forces : True if forces on pipes are probed
     device_heat : True if the dissipation of devices heats the fluid
-    scalar_sensors : True if blocks read values of scalars
+    scalar_sensors : True if features read values of scalars for their event functions
     other fields : True if the model has such parts or properties
     """
 
@@ -280,13 +269,13 @@ class ModelFeatures(NamedTuple):
     carried: tuple[RhsTerms, ...] = ()
     scalars: bool = False
     valves: bool = False
-    features: tuple[RhsTerms, ...] = ()
+    features: tuple[tuple[str, RhsTerms], ...] = ()
+    further_packages: tuple[str, ...] = ()
     couplings: bool = False
     alone: bool = False
     bands: bool = False
     boundary_exchange: bool = False
     forces: bool = False
-    controls: bool = False
     formulas: bool = False
     networks: bool = False
     reactions: bool = False
@@ -304,31 +293,33 @@ class ModelFeatures(NamedTuple):
             yield BOUNDARY_EXCHANGE
         linear = self.family == "linear"
         family = self.family if linear or self.pipes else "barotropic"
-        if self.controls:
-            yield COMPONENTS["controls, linear" if linear else "controls, barotropic"]
-        lumped = linear and not self.pipes and not any(terms.outgoing_waves for terms in self.features)
+        yield from self.terms_at("first")
+        lumped = linear and not self.pipes and not any(terms.outgoing_waves for terms in self.terms_at("pipes"))
         yield from (ALONE,) if self.alone else (LUMPED,) if lumped else (NETWORK, NODES[family])
         yield READ["linear" if linear else "barotropic"]
         if self.masses:
             yield COMPONENTS["energy of masses" if linear else "energy of masses, barotropic"]
         if self.pipes:
             yield PIPES[family]
-        yield from self.features
+        yield from self.terms_at("pipes")
         if self.valves:
             yield COMPONENTS["valves"]
         bends = any(hook_of(law, "bends") is not None for law in self.modules())
-        if self.devices or bends or self.controls or self.networks:  # their event functions need solved nodes
+        of_features = any(terms.events for _, terms in self.features)
+        if self.devices or bends or of_features or self.networks:  # their event functions need solved nodes
             yield COMPONENTS["closed"]
         if self.networks:
-            yield COMPONENTS["sources after blocks" if self.controls else "sources of networks"]
+            yield COMPONENTS["sources of networks"]
+        if followed := list(self.terms_at("sources")):
+            yield from followed
+            yield COMPONENTS["sources again"]
         if self.scalar_sensors:
             if self.heat:
                 yield COMPONENTS["heat of sensors, linear" if linear else "heat of sensors, barotropic"]
             yield COMPONENTS["scalars of sensors"]
         if bends:
             yield COMPONENTS["bends"]
-        if self.controls:
-            yield COMPONENTS["switches"]
+        yield from self.terms_at("events")
         if self.formulas:
             yield COMPONENTS["formulas"]
         if self.clusters and linear:
@@ -379,13 +370,16 @@ class ModelFeatures(NamedTuple):
         if self.reactions:  # those in basins are added later
             yield COMPONENTS["reactions"]
         yield from self.carried
-        if self.controls:
-            yield COMPONENTS["probes of controls"]
+        yield from self.terms_at("last")
         if self.forces:
             yield COMPONENTS[f"forces, {family}"]
         if self.pipes:
             yield COMPONENTS["pipes"]
         yield ALWAYS
+
+    def terms_at(self, place: str) -> Iterator[RhsTerms]:
+        """Yield the terms of features at a place in the order of functions."""
+        yield from (terms for where, terms in self.features if where == place)
 
     def modules(self) -> list:
         """Loaded modules of the laws of parts, in the order of `laws`."""
@@ -393,7 +387,7 @@ class ModelFeatures(NamedTuple):
 
     def packages(self) -> list[str]:
         """Names of the modules of laws, and of the packages with functions of basins, that the model needs."""
-        return [*self.laws, *(member.package for member in self.basins)]
+        return [*self.laws, *self.further_packages, *(member.package for member in self.basins)]
 
     def functions(self, *jobs: str) -> list:
         """Functions of the model for these jobs, job by job; modules that the model does not need are not loaded.

@@ -22,15 +22,6 @@ from fvsolve.errors import CaseError, FvsolveError, Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tanks
 from fvsolve.model.cluster_tables import classify_nodes
-from fvsolve.model.control_tables import (
-    Balance,
-    control_rate,
-    has_late_sensors,
-    lower_controls,
-    number_blocks,
-    reserve_controls,
-    set_starts,
-)
 from fvsolve.model.mechanics_tables import (
     find_closed_chambers,
     lower_bodies,
@@ -203,8 +194,8 @@ def tables_with_start(case: Case, draft: ModelDraft | None = None, unfit: Collec
     """
     draft = draft or tables_before_start(case, unfit)
     draft.check()
-    if len(draft.control_table):
-        draft = with_balanced_blocks(draft)
+    for k in range(len(draft.features)):
+        draft = draft.features[k].balanced(draft, model_with_start)
     draft.steady = start_profile(draft)
     scale_scalars(draft)
     worse = settle(draft)
@@ -215,8 +206,9 @@ def tables_with_start(case: Case, draft: ModelDraft | None = None, unfit: Collec
 def tables_before_start(case: Case, unfit: Collection[str] = ()) -> ModelDraft:
     """Tables of a case before its initial steady state is known; unfit : names of pipes that cannot be delay lines."""
     draft = ModelDraft(case)
-    number_blocks(draft)
     draft.features = features_of(case, unfit)
+    for feature in draft.features:
+        feature.begin(draft)
     fill_nodes(draft)
     fill_links(draft)
     classify_nodes(draft)
@@ -225,29 +217,20 @@ def tables_before_start(case: Case, unfit: Collection[str] = ()) -> ModelDraft:
     lower_reactions(draft)
     lower_networks(draft)
     draft.check()
-    lower_controls(draft)
+    for feature in draft.features:
+        feature.lower_last(draft)
     draft.check()
     pack(draft, np.zeros(profile_size(draft)))
     fill_rises(draft)
     return draft
 
 
-def with_balanced_blocks(packed: ModelDraft) -> ModelDraft:
-    """Copy of packed tables in which the outputs of blocks are balanced, and values of blocks at the start are set."""
-
-    def start(draft: ModelDraft) -> Model:
-        draft.steady = start_profile(draft)
-        scale_scalars(draft)
-        settle(draft)
-        return model_of(draft, lambda _: [])
-
-    balance = Balance(packed.case, packed, start)
-    outputs, starts = balance.find()
-    packed.check()
-    draft = balance.draft_with(outputs)
-    set_starts(draft, outputs, starts)
-    draft.check()
-    return draft
+def model_with_start(draft: ModelDraft) -> Model:
+    """Model of tables before the start, whose steady start is computed; without notices."""
+    draft.steady = start_profile(draft)
+    scale_scalars(draft)
+    settle(draft)
+    return model_of(draft, lambda _: [])
 
 
 def fill_nodes(draft: ModelDraft) -> None:
@@ -320,11 +303,13 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     schedules.flags.writeable = pieces.flags.writeable = False  # from here on constant, as in the model
     sizes = draft.sizes = ArraySizes()
     for reserve in (reserve_network, reserve_scalars, reserve_reactions, reserve_basins, reserve_mechanics,
-                    reserve_controls, reserve_networks):  # fmt: skip
+                    reserve_networks):  # fmt: skip
         reserve(draft)
     for feature in draft.features:
         feature.reserve(draft)
     layout = sizes.place()
+    for feature in draft.features:
+        feature.placed(draft)
     if (draft.probe_table["kind"] == rec.PIPE_FORCE).any():
         layout["forces"] = draft.to_work(most_states(draft))
     if draft.moving_segment_table["loads_body"].any():
@@ -338,7 +323,6 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         stops=draft.stop_table, pistons=draft.piston_table, devices=draft.device_table, basins=draft.basin_table,
         patches=draft.patch_table, scalars=draft.scalar_table, heat_sources=draft.heat_source_table,
         exchangers=draft.exchanger_table, walls=draft.wall_table, couplings=draft.coupling_table,
-        controls=draft.control_table, sensors=draft.sensor_table, driven=draft.driven_table,
         network_inputs=draft.network_input_table, network_rates=draft.network_rate_table,
         network_elements=draft.network_element_table, network_switches=draft.network_switch_table,
         reactions=draft.reaction_table, integers=np.array(draft.integers, dtype=np.int64),
@@ -403,8 +387,8 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     if draft.fluid.walther is not None and (draft.scalar_table["specific_heat"] > 0.0).any():
         s["walther_a"], s["walther_b"] = draft.fluid.walther
         s["temperature"] = int(draft.scalar_table["specific_heat"].argmax())
-    s["start"], s["late_blocks"] = case.numerics.start, bool(draft.control_table["late"].any())
-    s["late_sensors"] = has_late_sensors(draft)
+    s["start"] = case.numerics.start
+    s["reads_solved"] = any(feature.reads_solved for feature in draft.features)
     s["ambient"], s["gravity"] = case.ambient_pressure, case.gravity
     s["vapor"], s["unmarked"] = case.law.cavity_pressure, -np.inf
     if case.patches_with_faces:
@@ -417,7 +401,7 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     if case.numerics.step is not None:  # pipes without cells do not limit a given step
         waves = waves[pipes["cells"] > 0]
     rates = [*waves, *column_rates(draft)]
-    s["rate"] = max([0.0, *rates, control_rate(draft), network_rate(draft)])
+    s["rate"] = max([0.0, *rates, *(feature.rate(draft) for feature in draft.features), network_rate(draft)])
     return table
 
 
@@ -458,7 +442,7 @@ def model_of(draft: ModelDraft, notices: Callable[[ModelDraft], list[Notice]] = 
         dict(case.elevations), case.probes, draft.warnings,
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
         draft.basins, case.extreme_probes, draft.watched_start, closed(draft),
-        flags_at_start(draft), np.array(draft.discrete, dtype=float), draft.timed, draft.network,
+        flags_at_start(draft), draft.network,
     )  # fmt: skip
 
 

@@ -17,9 +17,9 @@ from fvsolve.basins import lower_pattern as pattern
 from fvsolve.basins.lower_pattern import all_states
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.pipe_energy import MAX_WIDTH
-from fvsolve.model.control_pattern import BlockCouplings, pairs_of, unique_states
 from fvsolve.model.reaction_tables import names_read
 from fvsolve.model.scalar_tables import STORES
+from fvsolve.model.state_pairs import pairs_of, unique_states
 from fvsolve.schemes import SCHEMES, Reach
 from fvsolve.steady import union
 
@@ -63,7 +63,7 @@ class Couplings:
         self.model, self.basins, self.integers, self.walls = model, model.basins, tables.integers, tables.walls
         self.patches = {int(row["node"]): row for row in tables.patches}
         self.network, self.inputs, self.switches = model.network, tables.network_inputs, tables.network_switches
-        self.blocks = BlockCouplings(self, tables)
+        self.features = [feature.pattern(self) for feature in model.features]
         self.sets: list[np.ndarray] = []
         self.sets = self.pressures()  # for each node, the states that set its pressure
 
@@ -91,8 +91,8 @@ class Couplings:
         yield from self.moving_fluid_pairs()
         if self.network is not None:
             yield from self.network_pairs()
-        if self.blocks.follows or len(self.blocks.controls):
-            yield from self.blocks.pairs()
+        for own in self.features:
+            yield from own.pairs()
 
     def boundary_pairs(self) -> Iterator[Pairs]:
         """Yield couplings of the flow through open patches of basins with the cells there."""
@@ -109,6 +109,10 @@ class Couplings:
                 yield pairs_of(self.behind(i), read)
 
     # nodes ------------------------------------------------------------------------------------------------------
+
+    def schedule(self, *indices: int) -> np.ndarray:
+        """States on which schedules with these numbers depend, because features set them."""
+        return unique_states(*(own.schedule(*indices) for own in self.features))
 
     def joints(self) -> list:
         """Links whose end nodes are solved together: valves, short delay lines, columns that valves can control."""
@@ -146,7 +150,7 @@ class Couplings:
             return unique_states(self.behind(i), pattern.cell_states(self.basins[row["basin"]], read))
         if i in self.patches:
             return unique_states(self.behind(i, 1), *(self.walls["y"][self.walls["basin"] == self.patches[i]["basin"]]))
-        given = self.blocks.schedule(self.nodes["schedule"][i])
+        given = self.schedule(self.nodes["schedule"][i])
         of_devices = (self.device_states(row) for row in self.devices if row["row"] >= 0 and row["node"] == i)
         of_pistons = (self.places(row, 0) for row in self.pistons if i in (row["a"], row["b"]))
         return unique_states(self.own(i), given, *of_pistons, *of_devices)
@@ -165,14 +169,14 @@ class Couplings:
         if "device" not in link.dtype.names:
             return unique_states()
         if link["device"] < 0:
-            return self.blocks.schedule(link["schedule"])
+            return self.schedule(link["schedule"])
         device = self.devices[link["device"]]
         _, part, rows = self.parts[link["device"]]
         shaft, network, turned = rows.turns_with(part), self.network, unique_states()
         if shaft is not None:
             turned = self.network_states(network.columns_of_rows[network.node_row(shaft)])
         lifting = [self.sets[i] if self.sets else self.pressure_states(i) for i in self.lifting_nodes(link)]
-        schedules = self.blocks.schedule(*rows.schedules_at_once(device, self.valves, self.floats))
+        schedules = self.schedule(*rows.schedules_at_once(device, self.valves, self.floats))
         return unique_states(self.acting_states(link["device"]), schedules, turned, *lifting)
 
     def lifting_nodes(self, link) -> list[int]:
@@ -253,7 +257,7 @@ class Couplings:
             enter[group[i]] += [self.pressure_states(j), self.opening_states(link)]
             enter[group[j]] += [self.pressure_states(i), self.opening_states(link)]
         for i in np.flatnonzero(self.inner):
-            enter[group[i]].append(self.blocks.schedule(self.nodes["schedule"][i]))
+            enter[group[i]].append(self.schedule(self.nodes["schedule"][i]))
         joined = [unique_states(*parts) for parts in enter]
         return [joined[group[i]] if self.inner[i] else self.pressure_states(i) for i in range(len(group))]
 
@@ -296,7 +300,7 @@ class Couplings:
             yield pairs_of(self.tree_velocities(points), unique_states(*read))
         for row in [*self.braces, *self.pistons]:
             read = [self.places(row, 0), self.places(row, 1)]
-            read += [self.blocks.schedule(row["schedule"])] if "schedule" in row.dtype.names else []
+            read += [self.schedule(row["schedule"])] if "schedule" in row.dtype.names else []
             if "rod" in row.dtype.names:
                 read += [self.own(row["a"]), self.own(row["b"])]
             pushed = self.places(row, 1) if row["line"] < 0 else self.tree_velocities(self.ends_of_line(row))
@@ -310,7 +314,7 @@ class Couplings:
         for k, (row, (_, _, rows)) in enumerate(zip(self.devices, self.parts, strict=True)):
             ends = ends_of(self.valves[row["valve"]]) if row["valve"] >= 0 else ()
             read = [self.sets[i] for i in (*ends, row["node"], row["second"]) if i >= 0]
-            read.append(self.blocks.schedule(row["schedule"], *rows.schedules_of_rates(row, self.valves, self.floats)))
+            read.append(self.schedule(row["schedule"], *rows.schedules_of_rates(row, self.valves, self.floats)))
             yield pairs_of(self.device_states(row), unique_states(self.acting_states(k), *read))
 
     def network_pairs(self) -> Iterator[Pairs]:
@@ -344,7 +348,7 @@ class Couplings:
         row, network = self.inputs[j], self.network
         i = int(row["index"])
         if row["kind"] == rec.SCHEDULE_INPUT:
-            return self.blocks.schedule(i)
+            return self.schedule(i)
         if row["kind"] == rec.DEVICE_INPUT:
             return self.device_reading(self.devices[i])
         if row["kind"] == rec.FORCE_INPUT:
@@ -354,7 +358,7 @@ class Couplings:
             return unique_states(self.temperature.values[node], *self.temperature.through[node])
         stores = {column for column in network.columns_followed(j) if column in network.states}
         switch = int(self.switches[i]["schedule"]) if row["kind"] == rec.FRICTION_FLOW else -1
-        return unique_states(*(network.states[column] for column in stores), self.blocks.schedule(switch))
+        return unique_states(*(network.states[column] for column in stores), self.schedule(switch))
 
     def device_reading(self, device) -> np.ndarray:
         """States on which a quantity of a device can depend."""
@@ -377,7 +381,7 @@ class Couplings:
             if mass in (row[ends[0]], row[ends[1]]):
                 yield from (self.places(row, 0), self.places(row, 1))
                 if "schedule" in row.dtype.names:
-                    yield self.blocks.schedule(row["schedule"])
+                    yield self.schedule(row["schedule"])
                 if "rod" in row.dtype.names:
                     yield from (self.own(row["a"]), self.own(row["b"]))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fvsolve.assembly.control_rows import small_change
-from fvsolve.assembly.lowering import Input, InputKind, lowering_of
+from fvsolve.assembly.lowering import Input, lowering_of
 from fvsolve.assembly.pipe_terms import mass_in_creep
 from fvsolve.case.controls import decision_order
 from fvsolve.display import Displayable
@@ -21,7 +19,7 @@ from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.run_data import RunData
 from fvsolve.model.scalar_tables import node_values, pipe_values
-from fvsolve.units import DIMENSIONS, show
+from fvsolve.units import show
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -165,8 +163,6 @@ class Model(Displayable):
     watched_start: np.ndarray  # pressures of `watched` along pipes in the profile [Pa], nan for others
     features: list[Any]  # see `assembly.features`
     flags: np.ndarray  # event flags before a run
-    discrete: np.ndarray  # numbers of blocks that change at events and samples only, at the start
-    timed: list[tuple[int, int]]  # (event flag, place in `discrete` of the time of its last change)
     network: Any  # `network.Network` of rotation, electricity and heat; None without one
     # idle run data for evaluating single states; tables before the start is solved, reused by `vary`
     idle_run_data: deque[RunData] = field(default_factory=deque, init=False)
@@ -282,12 +278,14 @@ class Model(Displayable):
         cells = bool((self.tables.pipes["cells"] > 0).any())
         cast = ModelFeatures(self.case.law.family, cells, *mechanics, self.unsteady, self.creeps, has.devices,
                     tuple(self.laws), basins, carried, has.scalars, valves,
-                    tuple(terms for feature in self.features for terms in feature.terms), has.couplings, alone,
-                    forces=bool(self.layout["forces"] >= 0), controls=has.controls,
+                    tuple(pair for feature in self.features for pair in feature.terms.items()),
+                    tuple(name for feature in self.features for name in feature.packages), has.couplings, alone,
+                    forces=bool(self.layout["forces"] >= 0),
                     formulas=bool((self.tables.schedules["pieces"] < 0).any()),
                     networks=self.network is not None, heat=bool((self.tables.scalars["specific_heat"] > 0.0).any()),
                     exchangers=has.exchangers, device_heat=bool((self.tables.heat_sources["device"] >= 0).any()),
-                    scalar_sensors=bool(np.isin(self.tables.sensors["kind"], (rec.NODE_SCALAR, rec.PIPE_SCALAR)).any()),
+                    scalar_sensors=any(row["kind"] in (rec.NODE_SCALAR, rec.PIPE_SCALAR)
+                                       for feature in self.features for row in feature.probe_rows()[0]),
                     viscosity=bool((self.tables.pipes["temperature"] > 0.0).any()),
                     reactions=has.reactions)  # fmt: skip
         return functions(cast)
@@ -351,9 +349,6 @@ class Model(Displayable):
 
     def refuse_histories(self, function: str) -> None:
         """Raise FvsolveError if the model has delay lines or blocks with a delay: their history is not part of y."""
-        if self.shapes.histories:
-            text = f"{function}(t, y) is not defined for a case with a control of type delay: y has no earlier inputs"
-            raise FvsolveError(f"{text}. Expected a case without it, or rhs(State) instead of rhs(t, y)")
         for feature in self.features:
             if text := feature.refusal(function):
                 raise FvsolveError(text)
@@ -547,20 +542,6 @@ def inputs_of(model: Model) -> dict[str, Input]:
     for name, part in parts.items():
         own = lowering_of(type(part)).of(part).inputs(model, name, part)
         inputs |= {f"{name}.{key}": value for key, value in own.items()}
-    return inputs | block_inputs(model)
-
-
-def block_inputs(model: Model) -> dict[str, Input]:
-    """Outputs of all blocks, at which they can be cut, and setpoints : name `controls.NAME.KEY` -> input."""
-    inputs: dict[str, Input] = {}
-    for row, name in zip(model.tables.controls, model.block_names, strict=True):
-        first, output = model.case.controls[name].dimensions
-        least, greatest = float(row["least"]), float(row["greatest"])
-        unit, small = DIMENSIONS[output].si, small_change(output)
-        span = f", {least:g} to {greatest:g}" if math.isfinite(least) and math.isfinite(greatest) else ""
-        sort = InputKind(unit, f"a number [{unit}]{span}", least, greatest, small)
-        inputs[f"controls.{name}.output"] = Input(sort, -1, control=model.block_names.index(name))
-        if row["setpoint"] >= 0:
-            sort = InputKind(DIMENSIONS[first].si, f"a number [{DIMENSIONS[first].si}]", small=small_change(first))
-            inputs[f"controls.{name}.setpoint"] = Input(sort, int(row["setpoint"]))
+    for feature in model.features:
+        inputs |= feature.inputs(model)
     return inputs

@@ -10,7 +10,6 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.nodes_and_links import is_in_network
 
 REACTION_QUANTITIES = ("rate", "power", "affinity")  # in the order of `kernels.dtypes`
-BLOCK_QUANTITIES = ("output", "input", "error")  # in the order of `kernels.controls`
 
 
 def lower_probes(draft) -> np.ndarray:
@@ -24,10 +23,9 @@ def fill_probes(draft, probes: list) -> np.ndarray:
     parts = {"nodes": {**case.places, **case.nodes}, "links": {**case.links, **case.conduits}}
     for row, probe in zip(table, probes, strict=True):
         row["mark"] = -1
-        if probe.part == "controls":
-            row["kind"], row["index"] = rec.CONTROL_VALUE, draft.schedules.blocks[probe.name.removeprefix("controls.")]
-            row["side"] = BLOCK_QUANTITIES.index(probe.quantity)
-        elif probe.part == "reactions":
+        if any(feature.probe(draft, probe, row) for feature in draft.features):
+            continue
+        if probe.part == "reactions":
             lower_reaction_probe(draft, row, probe)
         elif probe.part == "sections":
             lower_section(draft, row, probe)
@@ -141,8 +139,10 @@ def probe_offsets(draft, start) -> None:
     for k, (row, probe) in enumerate(zip(draft.probe_table[count:], draft.case.extreme_probes, strict=True)):
         if probe.straight and row["kind"] == rec.PIPE_PRESSURE:
             draft.watched_start[k] = start.profile_at(int(row["index"]), probe.fraction)[0]
-    rows = [*draft.probe_table, *draft.sensor_table]
-    for row, probe in zip(rows, [*all_probes(draft.case), *draft.sensors], strict=True):
+    pairs = [*zip(draft.probe_table, all_probes(draft.case), strict=True)]
+    for feature in draft.features:
+        pairs += zip(*feature.probe_rows(), strict=True)
+    for row, probe in pairs:
         if row["kind"] >= rec.CELL_FIELD and row["kind"] != rec.PRESSURE_BETWEEN:
             continue  # basins hold the profile of theirs, the others need none
         if draft.case.law.linear:

@@ -10,7 +10,6 @@ import numpy as np
 from fvsolve.assembly.model_draft import aligned_zeros
 from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model import input_histories
 from fvsolve.model.network_elimination import NetworkError
 
 if TYPE_CHECKING:
@@ -22,10 +21,6 @@ def zeros_for_run(shapes: rec.RunArrays) -> rec.RunArrays:
     arrays = {name: np.zeros(shape) for name, shape in shapes._asdict().items() if name not in rec.INTEGERS}
     arrays |= {name: np.zeros(getattr(shapes, name), dtype=np.int64) for name in shapes._fields if name in rec.INTEGERS}
     arrays |= {"clock": np.zeros(1, rec.CLOCK), "work": aligned_zeros(shapes.work)}
-    if shapes.sensing:
-        from fvsolve.kernels.table_handle import empty_handle
-
-        arrays["sensing"] = empty_handle()
     return rec.RunArrays(**arrays)
 
 
@@ -58,9 +53,8 @@ class RunData:
         self.maxima, self.accepted = self.written.maxima, self.written.accepted
         self.features = [feature.run(self) for feature in model.features]
         self.kept: list = []  # arrays behind handles
-        input_histories.reset_histories(self.written.histories, model.tables.controls)
         self.clock["limit"], self.marks[:] = np.inf, np.nan
-        self.armed[:], self.discrete[:] = model.flags, model.discrete
+        self.armed[:] = model.flags
         self.network_mode: tuple[bool, ...] | None = None
         self.update_network()
         basins = model.tables.basins
@@ -102,9 +96,6 @@ class RunData:
         model = self.model
         shared = model.places if self.tables is model.tables else addresses_of(self.tables)
         views = []
-        if len(model.tables.sensors):
-            replaced = {"probes": model.tables.sensors, "controls": model.tables.controls[:0]}
-            views.append(View(written.sensing, addresses_of(self.tables._replace(**replaced)), self.feature_tables()))
         for own in self.features:
             for name, (array, replaced) in own.views().items():
                 views.append(View(array, addresses_of(self.tables._replace(**replaced)), self.feature_tables(name)))
@@ -122,70 +113,38 @@ class RunData:
     def reset(self, armed: np.ndarray | None = None) -> None:
         """Reset for another state: event flags as given or as at the start, and empty histories."""
         self.armed[:], self.clock["limit"] = self.model.flags if armed is None else armed, np.inf
-        self.discrete[:], self.accepted[:] = self.model.discrete, 0.0
+        self.accepted[:] = 0.0
         self.update_network()
         for own in self.features:
             own.reset()
-        if self.histories.size:
-            input_histories.reset_histories(self.histories, self.model.tables.controls)
 
     def return_to_earlier(self) -> None:
         """Let iterations start from the accepted state before the last one, as those of the last one did."""
         half = self.accepted.size // 2
         self.accepted[:half] = self.accepted[half:]
 
-    @property
-    def discrete(self) -> np.ndarray:
-        """Numbers of blocks of `controls` that change at events and samples only."""
-        return self.written.discrete
-
-    @property
-    def histories(self) -> np.ndarray:
-        """Histories of the inputs of blocks with a delay."""
-        return self.written.histories
-
-    @histories.setter
-    def histories(self, histories: np.ndarray) -> None:
-        self.store("histories", histories)
-
-    def store(self, name: str, values: np.ndarray) -> None:
-        """Set an array of `written`; the array and the handle are replaced only if the size is new."""
-        array = getattr(self.written, name)
-        if array.size == values.size:
-            array[:] = values
-            return
-        self.written = self.written._replace(**{name: values})
-        self.__dict__.pop("handle", None)
-
     def arrays(self) -> dict[str, np.ndarray]:
         """Arrays that a state needs in addition to y, by name; they may grow in a run."""
         found = {}
         for own in self.features:
             found |= own.arrays()
-        return found | {"histories": self.histories}
+        return found
 
     def set_array(self, name: str, values: np.ndarray) -> None:
         """Set one of `arrays`; the handle is made again only if the size is new."""
-        if name == "histories":
-            self.histories = values
-            return
         own = next(one for one in self.features if name in one.arrays())
         if own.store(name, values):
             self.__dict__.pop("handle", None)
 
     def restore_history(self, state) -> None:
-        """Set histories of features and of inputs of blocks, and numbers of blocks, from the memory of a state.
+        """Set the arrays of features from the memory of a state.
 
         They are unchanged if state or memory are missing. Raises ValueError if the memory contains no history.
         """
         if state is None or not state.memory:
             return
-        if self.discrete.size:
-            self.discrete[:] = state.memory.get("discrete", self.discrete)
         for own in self.features:
             own.restore(state.memory)
-        if self.histories.size:
-            self.histories = input_histories.stored_histories(state.memory)
 
     def history_capacity(self) -> float:
         """Number of steps that fit before a history would lose an entry that is still needed.
@@ -193,14 +152,7 @@ class RunData:
         Infinite without histories. Where there is little space left it is doubled; then the arrays of the histories
         and `handle` are new.
         """
-        capacities = [own.capacity() for own in self.features]
-        if self.histories.size:
-            histories = input_histories.with_space(self.histories, self.model.tables.controls)
-            if histories is not self.histories:
-                self.histories = histories
-            delays = input_histories.delays_of(self.model.tables.controls)
-            capacities.append(float(input_histories.steps_left(histories, delays)))
-        return min(capacities, default=np.inf)
+        return min((own.capacity() for own in self.features), default=np.inf)
 
     def along(self, t: float, out: np.ndarray, parts: int = 1) -> dict[int, tuple[np.ndarray, np.ndarray]]:
         """Waves along pipes without cells [kg/s] : number of the pipe -> (forward, backward), float64[parts * cells].
@@ -282,10 +234,9 @@ class RunData:
         return ""
 
     def store_times(self, t: float, before: np.ndarray) -> None:
-        """Store the time t [s] for timers whose input has changed; before : event flags before the change."""
-        for flag, place in self.model.timed:
-            if self.armed[flag] != before[flag]:
-                self.discrete[place] = t
+        """Let features continue at an event at t [s]; before : event flags before the change."""
+        for own in self.features:
+            own.flags_changed(t, before)
 
     def fields(self, t: float, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
         """Values as in `Model.fields`, with the least and greatest pressures in pipes up to now, and a key "out".

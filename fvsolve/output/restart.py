@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fvsolve.assembly.features import features_of
 from fvsolve.case.resource_checks import byte_text, fits
 from fvsolve.errors import RunError, listing
 from fvsolve.file_replacement import replacing
@@ -59,7 +60,8 @@ def changed_steps(restart: Restart, case) -> list[dict]:
     values = other_steps(restart, case)
     if not values:
         return restart.continued
-    if any(restart.memory[name].size for name in ("past", "histories") if name in restart.memory):
+    names = [name for feature in features_of(case) for name in feature.step_histories]
+    if any(restart.memory[name].size for name in names if name in restart.memory):
         raise RunError(f"{next(iter(values))} cannot change in a continued run with delay lines or delays of controls, "
                        "whose histories belong to the steps; start again with --force")  # fmt: skip
     if restart.t == case.numerics.start:

@@ -11,7 +11,12 @@ from fvsolve.errors import FvsolveError
 from fvsolve.units import show
 
 PACKAGE = Path(__file__).parents[1]
-PATTERNS = ("parts/[a-z]*.py", "parts/*/part.py", "basins/*/part.py")  # modules that declare types
+PATTERNS = (
+    "parts/[a-z]*.py",
+    "parts/*/part.py",
+    "basins/*/part.py",
+    "features/*/*/part.py",
+)  # modules that declare types
 # Header of a class that declares a type: `kind` of a part, `name` of a physics, `pipe_model` of a pipe. A search for
 # "\nclass" takes a seventh of the time of "^class" in lines.
 DECLARATION = re.compile(r'\nclass \w+\(.*\b(kind|name|pipe_model)=(?:"([^"]+)"|\w+)\)')

@@ -55,8 +55,6 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         if code != loop_records.DONE:
             raise FvsolveError(f"advance stopped: {loop.failure_text(code)}")
     memory = {"step": np.array([loop.state["step"], loop.state["error_old"]]), "armed": loop.armed.copy()}
-    if len(model.discrete):
-        memory["discrete"] = loop.run_data.discrete.copy()
     memory |= {name: array.copy() for name, array in loop.run_data.arrays().items() if array.size}
     end = State(loop.t, loop.now.copy(), memory)
     if reused.is_reusable:

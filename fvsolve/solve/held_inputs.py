@@ -33,7 +33,7 @@ class HeldModel:
         self.targets, tables = [known[name] for name in self.names], model.tables
         self.fixed = bool(self.targets) and (bool(model.basins) or any(target.scalar >= 0 for target in self.targets))
         schedules, nodes, first = tables.schedules.copy(), tables.nodes.copy(), len(tables.pieces)
-        used = [at for target in self.targets if target.control < 0
+        used = [at for target in self.targets if target.held is None
                 for at in (target.schedule, *(part[0] for part in target.parts))]  # fmt: skip
         pieces = np.vstack([tables.pieces, *[[-np.inf, *[0.0] * 6]] * len(used)])
         for row, schedule in enumerate(used, first):
@@ -41,19 +41,21 @@ class HeldModel:
         for target in self.targets:
             if target.node >= 0 and not self.linear:  # under the linear law a head becomes a pressure
                 nodes["head_given"][target.node] = target.sort is HEAD
-        scalars, controls = tables.scalars.copy(), tables.controls.copy()
-        changed = {"schedules": schedules, "nodes": nodes, "scalars": scalars, "pieces": pieces, "controls": controls}
+        scalars, features = tables.scalars.copy(), [feature.to_hold() for feature in model.features]
+        changed = {"schedules": schedules, "nodes": nodes, "scalars": scalars, "pieces": pieces}
         # views that stay writable, while the tables of a model are read-only
-        self.values, self.bounds, self.outputs = pieces[first:, 3], scalars[:], controls["held"]
-        self.model = replace(model, tables=tables._replace(**changed))
+        self.values, self.bounds = pieces[first:, 3], scalars[:]
+        self.of_features = {feature.slot: values for feature, values in features}
+        self.model = replace(model, tables=tables._replace(**changed), features=[feature for feature, _ in features])
 
     def write(self, inputs: Mapping[str, float]) -> None:
         """Write the values of all inputs [SI], in the order of `names`; raises FvsolveError for one out of range."""
         row = 0
         for target, (name, value) in zip(self.targets, inputs.items(), strict=True):
             number = checked(name, value, target)
-            if target.control >= 0:
-                self.outputs[target.control] = number
+            if target.held is not None:
+                slot, place = target.held
+                self.of_features[slot][place] = number
                 continue
             if target.node < 0 or self.linear:
                 number = target.scale * number + target.offset

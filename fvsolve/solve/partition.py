@@ -216,8 +216,8 @@ def single_thread_reason(model: Model) -> str:
         return f"method {method} may change to a method that solves for all states at once; {EXPLICIT_ONLY}"
     if not method_named(method).explicit:
         return f"method {method} solves for all states at once; {EXPLICIT_ONLY}"
-    if len(model.tables.controls):
-        return "controls read the whole state"
+    if reason := next((feature.single_thread_reason for feature in model.features if feature.single_thread_reason), ""):
+        return reason
     if model.network is not None:
         return "parts of rotation, electricity and heat read the whole state"
     meshes = model.case.meshes

@@ -12,7 +12,7 @@ from fvsolve.steppers.integrator import all_arrays
 from fvsolve.steppers.run_handle import RunArrays
 
 # Handles, made anew where an array is replaced, and rows of output, which `advance` neither writes nor reads.
-HANDLES, UNUSED = ("sensing", "features", "histories"), ("calls", "spare", "rows", "coefficients", "dense")
+HANDLES, UNUSED = ("features", "memory"), ("calls", "spare", "rows", "coefficients", "dense")
 
 
 class ReusedLoop:

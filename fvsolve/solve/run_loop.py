@@ -11,13 +11,10 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tanks
 from fvsolve.kernels.column_junctions import gate_inflow
 from fvsolve.kernels.compiled_functions import fused_step_function
-from fvsolve.kernels.input_histories import BEGINS, MOST_POINTS
 from fvsolve.kernels.scalar_transport import GREATEST_RISE
 from fvsolve.model import Model, RunData
-from fvsolve.model.input_histories import delays_of
 from fvsolve.model.scalar_tables import amount_indices, state_bounds
 from fvsolve.model.step_division import dividing_rate
-from fvsolve.parts.schedule import BLOCK_PREFIX
 from fvsolve.solve.partition import blocked_sums, make_partition
 from fvsolve.steppers import automatic, loop_records
 from fvsolve.steppers.integrator import Integrator
@@ -28,8 +25,8 @@ from fvsolve.steppers.tableau import Method, method_named
 ROW_CAPACITY = 512
 NO_LIMIT = 1e308
 # Least steps in the time of a `delay` under error control, which does not see the error of its input between entries:
-# as many as a polynomial needs.
-STEPS_IN_DELAY = MOST_POINTS
+# as many as a polynomial through six of them needs.
+STEPS_IN_DELAY = 6
 MOST_EVENTS_AT_ONCE = 20  # events at the same time; more is chattering
 # events within this fraction of the run, or within a given step; more is chattering
 MOST_EVENTS_IN_SPAN, SPAN = 2000, 1e-5
@@ -164,8 +161,9 @@ class RunLoop:
         stop_at : time [s] from which on the loop writes no output rows
         """
         self.stepper.discard_history()
-        if self.run_data.histories.size and any(t == self.t for t, _ in self.model.breaks):
-            self.run_data.histories[BEGINS] = 1.0
+        if any(t == self.t for t, _ in self.model.breaks):
+            for own in self.run_data.features:
+                own.begin_at_break()
         self.resume(end, stop_at)
 
     def resume(self, end: float, stop_at: float) -> None:
@@ -345,8 +343,8 @@ class RunLoop:
             else:
                 names["place"] = f" at {model.node_names[index]}" if index >= 0 else ""
             self.step_back()
-        if block := self.block_without_output():
-            return f"the output of {block} is not a finite number at {names['when']}; check its formula and its inputs"
+        if reason := self.feature_failure():
+            return f"{reason} at {names['when']}; check its formula and its inputs"
         return text.format(**names)
 
     def demand_above_outflow(self, index: int) -> dict[str, str]:
@@ -387,16 +385,13 @@ class RunLoop:
                 return int(low[0])
         return -1
 
-    def block_without_output(self) -> str:
-        """Name of a control whose output was not finite in a step from the present time on; "" for none.
+    def feature_failure(self) -> str:
+        """Reason of a feature why a step from the present time on failed; "" for none.
 
-        In a model without states no step is rejected, so an output that was not finite at any time counts.
+        In a model without states no step is rejected, so a failure at any time counts.
         """
-        if not len(self.model.tables.controls):
-            return ""
-        number, time = self.run_data.written.applied[-2:]
         earliest = self.t if self.model.y_size else -np.inf
-        return f"{BLOCK_PREFIX}{self.model.block_names[int(number) - 1]}" if number > 0.0 and time >= earliest else ""
+        return next((text for own in self.run_data.features if (text := own.failure(earliest))), "")
 
     def chattering_text(self, when: str) -> str:
         """Text with the devices that change their states without end, and a remedy; when : time of the failure."""
@@ -404,8 +399,8 @@ class RunLoop:
         first = self.t if self.at_once > 1 else self.recent_events[0]  # at the same time, or within a short span
         names = sorted({model.events[k][0] for t, k in self.switched if t >= first})
         remedies = {device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names}
-        if any(name.startswith(BLOCK_PREFIX) for name in names):
-            remedies["set the thresholds of the block farther apart, or give it a `filter`"] = None
+        for text in (feature.remedy(name) for feature in model.features for name in names):
+            remedies |= {text: None} if text else {}
         switches = [] if model.network is None else [item.part.partition(".")[2] for item in model.network.switches]
         if {*names} & {*switches}:
             remedies["give it more resistance or inertia"] = None
@@ -463,7 +458,7 @@ def step_within_delays(model: Model) -> float:
     method = model.case.numerics.method
     methods = (automatic.EXPLICIT, automatic.IMPLICIT) if method == automatic.AUTO else (method,)
     latest = max(1.0, *(time for name in methods for time in method_named(name).times))
-    return float(delays_of(model.tables.controls).min(initial=np.inf)) / latest
+    return min((feature.shortest_delay for feature in model.features), default=np.inf) / latest
 
 
 def fused_step_allowed(model: Model, method: Method) -> bool:
@@ -479,7 +474,7 @@ def fused_step_allowed(model: Model, method: Method) -> bool:
         model.case.law.linear and settings["scheme"] == rec.UPWIND and settings["from_arriving"]
         and method.explicit and method.stages == 1 and numerics.rtol is None
         and model.y_size == 2 * model.cells and model.shapes.armed == 0 and not len(model.tables.moving_segments)
-        and not len(model.tables.controls)
+        and not any(feature.terms for feature in model.features)
         and {*laws.tolist()} <= {rec.FRICTION_NONE, rec.FRICTION_FACTOR}
     )  # fmt: skip
 

@@ -27,7 +27,7 @@ FIRST_CHUNK = 1000.0  # steps before the first pause
 # A run under error control ends if this count of attempted steps advances by less than this fraction of the run.
 STALLED_ATTEMPTS, STALLED_ADVANCE = 2000, 1e-10
 FREQUENT_CHECK_STEPS = loop_records.GROWTH_CHECK_STEPS
-PERSISTENT = ("extremes", "envelope", "maxima", "marks", "armed", "discrete", "accepted")
+PERSISTENT = ("extremes", "envelope", "maxima", "marks", "armed", "accepted")
 
 
 class MemoryMismatch(RunError):
@@ -348,7 +348,7 @@ class Run:
                 if stalled := self.stalled():
                     return self.failure(stalled)
             elif code == loop_records.DONE:
-                lost = self.model.y_size == 0 and self.loop.block_without_output()  # no rate can tell
+                lost = self.model.y_size == 0 and self.loop.feature_failure()  # no rate can tell
                 return self.failure(code) if lost else ""
             elif code not in (loop_records.BUDGET_SPENT, loop_records.ROWS_FULL):
                 return self.failure(code)

@@ -9,6 +9,7 @@ import numpy as np
 from fvsolve.argument_checks import FLAG, NAMES, NUMBER, TABLE, TEXT, validated
 from fvsolve.assembly.lowering import PRESSURE, Input
 from fvsolve.errors import FvsolveError, did_you_mean, listing
+from fvsolve.features.controls.feature import blocks_of
 from fvsolve.model.energy_norm import EnergyForm
 from fvsolve.model.model import inputs_of
 from fvsolve.schemes import SCHEMES
@@ -155,13 +156,13 @@ def linearise_at(at: OperatingPoint, inputs=(), outputs: int = 0, hold_delays: b
             hint = did_you_mean(name, available) or f"; inputs are {listing(available)}"
             raise FvsolveError(f'no input named "{name}"{hint}')
     refuse_limiter(model)
-    controls = model.tables.controls
+    controls = blocks_of(model)
     delays = [f"controls.{model.block_names[k]}" for k in np.flatnonzero(controls["delay"] > 0.0)]
     uncut = [name for name in delays if f"{name}.output" not in inputs]
     if uncut and not hold_delays:
         text = f"{listing(uncut)} of type delay needs earlier inputs, so no matrix A describes it"
         raise FvsolveError(f'{text}; cut the loop there, with the input "{uncut[0]}.output"')
-    cut = {name: value_of_input(at, available[name]) for name in inputs if available[name].control >= 0}
+    cut = {name: value_of_input(at, available[name]) for name in inputs if available[name].held is not None}
     at = replace(at, model=hold(model, cut))
     a, size, error_a, steps = state_matrix(at)
     c, error_c = output_matrix(at, outputs, steps)
@@ -196,8 +197,8 @@ def refuse_limiter(model) -> None:
 
 def value_of_input(at: OperatingPoint, input_: Input) -> float:
     """Value of an input at the operating point, in SI units."""
-    if input_.control >= 0:
-        return float(at.outputs[input_.control])
+    if input_.held is not None:
+        return float(at.outputs[input_.held[1]])
     return input_value(at.model, at.t, at.y, input_)
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from fvsolve.assembly.schedule_tables import slope_at, value_at
 from fvsolve.errors import FvsolveError
+from fvsolve.features.controls.feature import blocks_of, numbers_of, with_blocks
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.ghost_cells import difference_rows
 from fvsolve.kernels.schedule_pieces import POLYNOMIAL
@@ -91,11 +92,11 @@ def operating_point(
     when += f", just {side} a {'jump' if sides[t] else 'kink'} of a schedule" if t in sides else ""
     when += frequency_limit_note(model, delayed) if delayed else ""
     model = with_held_schedules(model, t, before)
-    if len(controls := model.tables.controls):
+    if len(controls := blocks_of(model)):
         controls = controls.copy()
         waits = (controls["delay"] > 0.0) | (controls["period"] > 0.0)
         controls["held"][waits] = outputs[waits]
-        model = replace(model, tables=model.tables._replace(controls=controls))
+        model = with_blocks(model, controls)
     return OperatingPoint(model, t, y, when, armed, outputs, discrete)
 
 
@@ -119,12 +120,12 @@ def _state_at(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray, n
 
     They are those of the start if `at` is None.
     """
-    start, blocks = model.case.numerics.start, len(model.tables.controls)
+    start, blocks = model.case.numerics.start, len(blocks_of(model))
     if at is None or at == start:
         with model.run_data() as data:
             data.evaluate(start, model.start, np.inf)
-            applied = data.written.applied[:blocks].copy()
-        return start, model.start.copy(), model.flags.copy(), applied, model.discrete.copy()
+            applied, numbers = data.written.applied[:blocks].copy(), numbers_of(data).copy()
+        return start, model.start.copy(), model.flags.copy(), applied, numbers
     if not start < at < np.inf:
         raise FvsolveError(f"at = {at:g} s is not a finite time after the start of the case, {start:g} s")
     numerics = model.case.numerics.model_copy(update={"end": float(at)})
@@ -132,7 +133,7 @@ def _state_at(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray, n
     if not run.ok:
         raise FvsolveError(f"the run to t = {at:g} s, where the case is to be linearised, failed: {run.reason}")
     data = run.run_data
-    return float(at), run.y, data.armed, data.written.applied[:blocks].copy(), data.discrete.copy()
+    return float(at), run.y, data.armed, data.written.applied[:blocks].copy(), numbers_of(data).copy()
 
 
 def with_held_schedules(model, t: float, before: bool = False):

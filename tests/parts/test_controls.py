@@ -18,7 +18,7 @@ from solve.test_resume import same_files
 import fvsolve
 from fvsolve.assembly.schedule_tables import period_of
 from fvsolve.errors import CaseError
-from fvsolve.model.control_tables import Balance
+from fvsolve.features.controls.lower import Balance
 from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.parts.formula_program import Program
 from fvsolve.studies.linearise import linearise

@@ -36,6 +36,8 @@ class DelayLines(Feature, slot=0, wakes="pipe_model delay-line, pipe_model auto"
     sharp : tables of the model that are replaced while a jump is solved; sharp_delays : its table of the lines
     """
 
+    step_histories = ("past",)
+
     def __init__(self, case, given_up=()) -> None:
         super().__init__(case, given_up)
         self.chosen = choice.line_methods(case, given_up)
@@ -46,8 +48,8 @@ class DelayLines(Feature, slot=0, wakes="pipe_model delay-line, pipe_model auto"
         self.sharp: dict[str, np.ndarray] = {}
 
     @property
-    def terms(self) -> tuple:
-        return (TERMS,) if len(self.delays) else ()
+    def terms(self) -> dict[str, RhsTerms]:
+        return {"pipes": TERMS} if len(self.delays) else {}
 
     @property
     def sets_arrivals(self) -> bool:

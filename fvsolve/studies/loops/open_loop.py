@@ -10,8 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from fvsolve.assembly.control_rows import small_change
 from fvsolve.errors import FvsolveError, did_you_mean, listing
+from fvsolve.features.controls.feature import blocks_of
+from fvsolve.features.controls.rows import small_change
 from fvsolve.features.delay_lines.feature import history_of, lines_of, seen_by_jumps
 from fvsolve.features.delay_lines.kernels import wave_history as history
 from fvsolve.parts.schedule import BLOCK_PREFIX
@@ -43,7 +44,7 @@ def block_of(case, name: str) -> str:
 
 def delay_blocks(model) -> dict[str, float]:
     """Delay of each control of type delay [s] that acts at all times : name -> delay."""
-    controls = model.tables.controls
+    controls = blocks_of(model)
     acts = (controls["delay"] > 0.0) & (controls["period"] == 0.0)
     return {model.block_names[k]: float(controls["delay"][k]) for k in np.flatnonzero(acts)}
 
@@ -81,7 +82,7 @@ def delayed_system(case, set, input: str, output: str, at: float | None, before:
 def outputs_at_limits(point: OperatingPoint) -> dict[str, float]:
     """Controls whose output is at a limit, up to rounding : name -> limit; without those that only switch."""
     result = {}
-    for k, (name, row) in enumerate(zip(point.model.block_names, point.model.tables.controls, strict=True)):
+    for k, (name, row) in enumerate(zip(point.model.block_names, blocks_of(point.model), strict=True)):
         block, span = point.model.case.controls[name], row["greatest"] - row["least"]
         for limit in (float(row["least"]), float(row["greatest"])):
             size = span if np.isfinite(span) else max(abs(limit), small_change(block.dimensions[1]))

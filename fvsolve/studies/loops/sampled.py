@@ -17,8 +17,9 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from fvsolve.assembly.control_rows import control_rows_of
 from fvsolve.errors import FvsolveError, listing
+from fvsolve.features.controls.feature import blocks_of, numbers_of, with_blocks
+from fvsolve.features.controls.rows import control_rows_of
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.schedule import BLOCK_PREFIX
 from fvsolve.solve.held_inputs import hold
@@ -399,11 +400,11 @@ def tick_differences(point: OperatingPoint, sampled: list[str], others: list[str
     others : controls whose held outputs count too, such as delays
     """
     model = point.model
-    names, controls = model.block_names, model.tables.controls.copy()
+    names, controls = model.block_names, blocks_of(model).copy()
     rows = {name: controls[names.index(name)] for name in (*sampled, *others)}
     for name in sampled:
         controls["held"][names.index(name)] = np.nan
-    model = replace(model, tables=model.tables._replace(controls=controls))
+    model = with_blocks(model, controls)
     sizes = {name: control_rows_of(type(model.case.controls[name].control)).sampled_numbers(
         model.case.controls[name].control) for name in sampled}  # fmt: skip
     numbers = {name: int(rows[name]["memory"]) + np.r_[0, 2 + np.arange(sizes[name])] for name in sampled}
@@ -412,17 +413,18 @@ def tick_differences(point: OperatingPoint, sampled: list[str], others: list[str
         table = controls.copy()
         for other, value in held.items():
             table["held"][names.index(other)] += value
-        own = replace(model, tables=model.tables._replace(controls=table))
+        own = with_blocks(model, table)
         with own.run_data(point.armed) as data:
-            data.discrete[:] = discrete
+            own_numbers = numbers_of(data)
+            own_numbers[:] = discrete
             for name in sampled:
                 row = rows[name]
                 count = (point.t - model.case.numerics.start - row["offset"]) / row["period"]
-                data.discrete[int(row["memory"]) + 1] = count if name == due else count + 1e6
+                own_numbers[int(row["memory"]) + 1] = count if name == due else count + 1e6
             _, out = data.evaluate(point.t, y, np.inf)
             out[rec.STATUS] = rec.ARRIVED
             own.functions.record(point.t, y, out, data.handle, np.zeros(len(model.tables.probes)))
-            return data.discrete[numbers[due]].copy()
+            return own_numbers[numbers[due]].copy()
 
     y, base = point.y, point.discrete
     result = {}

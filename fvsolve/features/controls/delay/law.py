@@ -1,7 +1,7 @@
 """Delay: v(t) = x(t - delay), from the history of the input x."""
 
+from fvsolve.features.controls.kernels.input_histories import START, value_before
 from fvsolve.jit import njit
-from fvsolve.kernels.input_histories import START, value_before
 
 
 @njit

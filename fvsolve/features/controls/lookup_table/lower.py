@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fvsolve.assembly.control_rows import StaticRows
-from fvsolve.parts.lookup_table import law
+from fvsolve.features.controls.lookup_table import law
+from fvsolve.features.controls.rows import StaticRows
 
 EVENTS = ("",) * 4  # both ends of the table, in both directions; not reported
 

@@ -1,7 +1,7 @@
 """Relays, latches and timers in the tables of a model, and their state at the start."""
 
-from fvsolve.assembly.control_rows import StaticRows
-from fvsolve.parts.switching import law
+from fvsolve.features.controls.rows import StaticRows
+from fvsolve.features.controls.switching import law
 
 CHANGES = ("turns on", "turns off")
 

@@ -1,8 +1,8 @@
 """Delays in the tables of a model, and their state at the start."""
 
-from fvsolve.assembly.control_rows import StaticRows, small_change
-from fvsolve.kernels.input_histories import BEFORE, START
-from fvsolve.parts.delay import law
+from fvsolve.features.controls.delay import law
+from fvsolve.features.controls.kernels.input_histories import BEFORE, START
+from fvsolve.features.controls.rows import StaticRows, small_change
 
 
 class DelayRows(StaticRows, kind="delay"):

@@ -1,7 +1,7 @@
 """Block with the value of a formula of its inputs and of the time."""
 
+from fvsolve.features.controls.kernels.blocks import flag_count, input_change
 from fvsolve.jit import njit
-from fvsolve.kernels.controls import flag_count, input_change
 from fvsolve.kernels.formula_programs import run_program
 
 START, VALUE, PROGRAM, FLAG = range(4)

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from fvsolve.assembly.control_rows import StaticRows
+from fvsolve.features.controls.function import law
+from fvsolve.features.controls.rows import StaticRows
 from fvsolve.kernels.formula_programs import run_program
 from fvsolve.parts.formula_program import NO_FLAGS
-from fvsolve.parts.function import law
 
 
 class FunctionRows(StaticRows, kind="function"):

@@ -1,7 +1,7 @@
 """Rate limits in the tables of a model, and their state at the start."""
 
-from fvsolve.assembly.control_rows import ControlRows
-from fvsolve.parts.rate_limit import law
+from fvsolve.features.controls.rate_limit import law
+from fvsolve.features.controls.rows import ControlRows
 
 EVENTS = ("falls at its limit", "leaves its limit", "rises at its limit", "leaves its limit")
 

@@ -1,7 +1,7 @@
 """PI and PID controllers in the tables of a model, and their state at the start."""
 
-from fvsolve.assembly.control_rows import ControlRows
-from fvsolve.parts.pid import law
+from fvsolve.features.controls.pid import law
+from fvsolve.features.controls.rows import ControlRows
 
 ROUNDING = 1e-12  # error at the start, relative to setpoint and input, that is rounding
 

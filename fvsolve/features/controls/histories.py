@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fvsolve.kernels import input_histories as at
+from fvsolve.features.controls.kernels import input_histories as at
 
 FIRST_CAPACITY = 1024  # entries of a block
 ENTRIES_OF_STEP = 2  # most entries at the end of a step: one, and one after a break there

@@ -5,8 +5,8 @@ K Td s / (1 + Td s / N) applied to c r - x; r is the setpoint, x the input (Astr
 All of them are changes since the start, where v is `START`.
 """
 
+from fvsolve.features.controls.kernels.blocks import input_change, setpoint_change
 from fvsolve.jit import njit
-from fvsolve.kernels.controls import input_change, setpoint_change
 
 START, ERROR, GAIN, WEIGHT, INTEGRAL, TRACKING, LEAD, LEAD_WEIGHT, LEAD_RATE = range(9)
 """Numbers of a block: v at the start; r - x at the start; K; b; 1 / Ti [1/s], 0 for none; 1 / Tt [1/s]; K N, 0 without

@@ -3,8 +3,8 @@
 Two pairs of event functions locate the kinks at both ends; their flags select the piece within a step.
 """
 
+from fvsolve.features.controls.kernels.blocks import flag_count, input_change
 from fvsolve.jit import njit
-from fvsolve.kernels.controls import flag_count, input_change
 from fvsolve.kernels.formula_programs import is_low
 
 START, VALUE, FLAG, COUNT, OWN = range(5)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fvsolve.assembly.control_rows import ControlRows
-from fvsolve.parts.transfer_function import law
+from fvsolve.features.controls.rows import ControlRows
+from fvsolve.features.controls.transfer_function import law
 
 
 class TransferFunctionRows(ControlRows, kind="transfer-function"):

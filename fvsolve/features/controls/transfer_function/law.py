@@ -4,8 +4,8 @@ dz_k/dt = z_(k+1) for k < n, dz_n/dt = x - a_n z_1 - ... - a_1 z_n, v = START + 
 change of the input, z the states. `EXCESS` is the constant part of dz_n/dt, from an input that is not at rest.
 """
 
+from fvsolve.features.controls.kernels.blocks import input_change
 from fvsolve.jit import njit
-from fvsolve.kernels.controls import input_change
 
 START, DIRECT, EXCESS, COUNT, OWN = range(5)
 """Numbers of a block: v at the start; D; constant part of dz_n/dt; n; then a_n to a_1 and c_1 to c_n. With samples: the

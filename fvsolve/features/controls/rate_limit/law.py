@@ -1,7 +1,7 @@
 """Rate limit: dv/dt = (x - v) / T between -falling and rising. Event flags select the part of this law."""
 
+from fvsolve.features.controls.kernels.blocks import input_change
 from fvsolve.jit import njit
-from fvsolve.kernels.controls import input_change
 from fvsolve.kernels.formula_programs import is_low
 
 START, FLAG, RISING, FALLING, RATE = range(5)

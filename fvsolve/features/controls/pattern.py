@@ -7,19 +7,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from fvsolve.kernels import dtypes as rec
-
-
-def unique_states(*parts) -> np.ndarray:
-    """Sorted indices of states, each once, from arrays or numbers."""
-    return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(np.atleast_1d(part) for part in parts)]))
+from fvsolve.model.state_pairs import pairs_of, unique_states
 
 
 class BlockCouplings:
     """States of blocks, and states on which their outputs and rates depend. model : `Couplings` of the model"""
 
-    def __init__(self, couplings, tables) -> None:
-        self.model, self.tables, self.controls = couplings, tables, tables.controls
-        self.floats, self.size = tables.floats, couplings.size
+    def __init__(self, feature, couplings) -> None:
+        tables = couplings.model.tables
+        self.feature, self.model, self.tables, self.controls = feature, couplings, tables, feature.table
+        self.sensors, self.floats, self.size = feature.sensor_table, tables.floats, couplings.size
         self.follows = {
             index: int(tables.pieces[row["first"], 2])
             for index, row in enumerate(tables.schedules) if row["pieces"] == 0
@@ -53,7 +50,7 @@ class BlockCouplings:
 
     def read(self, code: int) -> np.ndarray:
         """States on which an input depends."""
-        return self.output(-1 - code) if code < 0 else self.sensor(self.tables.sensors[code])
+        return self.output(-1 - code) if code < 0 else self.sensor(self.sensors[code])
 
     def sensor(self, row) -> np.ndarray:
         """States on which the value of a sensor depends."""
@@ -95,12 +92,7 @@ class BlockCouplings:
         network |= {*tables.valves["command"]}
         inputs = tables.network_inputs
         network |= {*inputs["index"][inputs["kind"] == rec.SCHEDULE_INPUT], *tables.network_switches["schedule"]}
-        network |= {*tables.devices["schedule"], *tables.braces["schedule"], *tables.controls["setpoint"]}
+        network |= {*tables.devices["schedule"], *tables.braces["schedule"], *self.controls["setpoint"]}
         other = [index for index in self.follows if index not in network]  # shafts, scalars
         if other:
             yield pairs_of(np.arange(self.size), self.schedule(*other))
-
-
-def pairs_of(rows: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Couplings of all given rows with all given states : (row, state) of each pair."""
-    return np.repeat(rows, states.size), np.tile(states, rows.size)

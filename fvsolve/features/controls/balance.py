@@ -1,33 +1,21 @@
-"""Tables of blocks of `controls`, and their balance at the start.
-
-A block decides before the nodes are solved if it drives the network. All inputs that it passes on at once must then
-follow from states alone.
-"""
+"""Balance of blocks at the start: outputs with which loops of blocks and the case are at rest."""
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from fvsolve.assembly.control_rows import BlockStart, StaticRows, control_rows_of, small_change
+from fvsolve.assembly.features import with_slot
 from fvsolve.assembly.schedule_tables import value_at
 from fvsolve.case.case_notices import unread_text
-from fvsolve.case.controls import Block, decision_order
 from fvsolve.errors import Notice, listing
+from fvsolve.features.controls.kernels.tables import SLOT
+from fvsolve.features.controls.rows import BlockStart, StaticRows, control_rows_of, small_change
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.input_histories import histories_size
-from fvsolve.model.probe_tables import fill_probes
 from fvsolve.units import show
 
-STATE_KINDS = (rec.LEVEL, rec.POSITION, rec.VELOCITY, rec.PISTON_POSITION, rec.PISTON_VELOCITY)
-STORED = (rec.FIXED, rec.TANK, rec.CHAMBER, rec.MOVING, rec.VESSEL)
-LIMIT_EVENTS = (
-    "reaches its lower limit", "leaves its lower limit", "reaches its upper limit", "leaves its upper limit",
-)  # fmt: skip
 TURNS = 30  # Newton iterations of the balance
 DIFFERENCE = 1e-6  # change of an output for differences, relative to its range
 MOST_STATES = 32  # a sensor of more states has no rate
@@ -36,205 +24,6 @@ ROUNDING = 1e-8  # change of an output below which it is rounding if it no longe
 BESIDE = 1e-7  # distance of the residuals of the last step, relative to the range
 STOPPED = 1e-6  # residual of an integrating block at its limit that stops it, over its change with the outputs
 BALANCED = 4e-16  # change of an output in the last iteration, relative to its range: rounding
-
-
-def number_blocks(draft) -> None:
-    """Number the blocks, so that schedules can refer to them: each after those that it needs at once."""
-    draft.schedules.blocks = {name: k for k, name in enumerate(decision_order(draft.case.controls))}
-
-
-def lower_controls(draft) -> None:
-    """Fill the tables of blocks, of sensors and of driven rows; add the states of blocks."""
-    blocks = draft.schedules.blocks
-    if not blocks:
-        return
-    probes = {item.text: item for block in draft.case.controls.values() for item in block.inputs
-              if not isinstance(item, str)}  # fmt: skip
-    draft.sensors = list(probes.values())
-    draft.sensor_table = fill_probes(draft, draft.sensors)
-    table = draft.control_table = np.zeros(len(blocks), rec.CONTROL)
-    driven = list(driven_rows(draft))
-    early = early_blocks(draft, driven)
-    draft.driven_table = np.array([(kind, row) for kind, row, _ in driven], rec.DRIVEN)
-    for (name, _), row in zip(blocks.items(), table, strict=True):
-        block = draft.case.controls[name]
-        fill_block(draft, name, block, list(probes), row)
-        row["late"] = name not in early
-    lower_delays(draft)
-    check_order(draft, early)
-
-
-def reserve_controls(draft) -> None:
-    """Reserve the arrays of blocks: outputs and inputs, values of schedules that they set, sensors, histories."""
-    blocks, sensors, sizes = len(draft.control_table), len(draft.sensor_table), draft.sizes
-    sizes.out("control", 2 * blocks)
-    sizes.run_array("applied", 2 * blocks + 2 * (blocks > 0))
-    sizes.run_array("readings", sensors)
-    sizes.run_array("sensing", int(sensors > 0))
-    sizes.run_array("discrete", len(draft.discrete))
-    sizes.run_array("histories", histories_size(draft.control_table))
-
-
-def fill_block(draft, name: str, block: Block, sensors: list[str], row) -> None:
-    """Fill the row of a block, except what depends on the start; sensors : texts of the probes of all sensors."""
-    control, rows = block.control, control_rows_of(type(block.control))
-    filters = len(block.inputs) if control.filter is not None else 0
-    small = [small_change(dimension) for dimension in block.dimensions]
-    if all(map(math.isfinite, block.limits)):
-        small[1] = min(small[1], 0.1 * (block.limits[1] - block.limits[0]))
-    names = [f"controls.{name}.filtered{k or ''}" for k in range(filters)]
-    if control.period is None:
-        names += [f"controls.{name}.{state}" for state in rows.states(control)]
-    scales = [small[0]] * filters + (rows.scales(control, tuple(small)) if control.period is None else [])
-    row["y"] = draft.states(names, scales) if names else -1
-    row["filters"], row["filter_rate"] = filters, 1.0 / control.filter if filters else 0.0
-    row["hooks"], row["data"] = draft.hooks(rows), len(draft.floats)
-    draft.floats += rows.numbers(draft, name, block)
-    row["at_once"] = control.feeds_through
-    row["inputs"], row["input_count"] = len(draft.integers), len(block.inputs)
-    draft.integers += [-1 - draft.schedules.blocks[item] if isinstance(item, str) else sensors.index(item.text)
-                       for item in block.inputs]  # fmt: skip
-    row["starts"] = len(draft.floats)
-    draft.floats += [0.0] * len(block.inputs)
-    setpoint = control.setpoint_schedule
-    row["setpoint"] = -1 if setpoint is None else draft.schedules.add(setpoint)
-    row["least"], row["greatest"], row["held"] = *block.limits, np.nan
-    row["period"], row["offset"], row["delay"] = control.period or 0.0, control.offset, rows.delay(control)
-    limited = not control.switches and control.period is None and any(map(math.isfinite, block.limits))
-    row["flag"] = draft.flags(f"controls.{name}", LIMIT_EVENTS) if limited else -1
-    flag = rows.timed_flag(np.array(draft.floats[row["data"] :]))
-    row["memory"] = len(draft.discrete) if flag >= 0 or control.period else -1
-    if control.period:
-        draft.discrete += [0.0] * (2 + rows.sampled_numbers(control))
-    if flag >= 0:
-        draft.timed.append((flag, len(draft.discrete)))
-        draft.discrete.append(-np.inf)
-
-
-def lower_delays(draft) -> None:
-    """Number the histories of blocks with a delay, and list the blocks on which their inputs depend."""
-    table, blocks, numbers = draft.control_table, draft.case.controls, draft.schedules.blocks
-    table["history"] = np.where(table["delay"] > 0.0, np.cumsum(table["delay"] > 0.0) - 1, -1)
-    names, rows = list(numbers), draft.schedules.rows
-    drives_scene = {names[int(rows[first][2])] for first, pieces in draft.schedules.records if pieces == 0}
-    for name, row in zip(names, table, strict=True):
-        if row["delay"] > 0.0:
-            now = {item for item in blocks[name].inputs if isinstance(item, str)}
-            while more := {other for item in now for other in blocks[item].blocks_needed} - now:
-                now |= more
-            found, ahead = set(now), [name, *now]
-            while ahead:
-                block = blocks[item := ahead.pop()]
-                if item == name or control_rows_of(type(block.control)).delay(block.control) == 0.0:
-                    reads_scene = any(not isinstance(given, str) for given in block.inputs)
-                    more = {*block.blocks_read, *(drives_scene if reads_scene else ())} - found
-                    found, ahead = found | more, [*ahead, *more]
-            row["sources"], row["source_count"] = len(draft.integers), len(now)
-            row["later_count"] = len(found) - len(now)
-            draft.integers += [numbers[item] for group in (now, found - now) for item in sorted(group)]
-
-
-def control_rate(draft) -> float:
-    """Greatest constant rate of filters and states of blocks [1/s]."""
-    blocks = draft.case.controls.values()
-    own = [control_rows_of(type(block.control)).rate(block.control) for block in blocks if not block.control.period]
-    return max([0.0, *own, *draft.control_table["filter_rate"]])
-
-
-def driven_rows(draft) -> Iterator[tuple[int, int, int]]:
-    """Yield the rows of tables that blocks drive before the nodes are solved: (kind, row, number of the block)."""
-    followers = {index: int(draft.schedules.rows[first][2])
-                 for index, (first, pieces) in enumerate(draft.schedules.records) if pieces == 0}  # fmt: skip
-    linear = draft.case.law.linear
-    for k, row in enumerate(draft.valve_table):
-        if row["schedule"] in followers and row["device"] < 0:
-            yield rec.DRIVEN_VALVE, k, followers[row["schedule"]]
-    for k, row in enumerate(draft.device_table):
-        _, part, device = draft.devices[k]
-        shaft, own = device.turns_with(part), device.schedules_at_once(row, draft.valve_table, draft.floats)
-        turned = [] if shaft is None else draft.network.schedules_of_node(shaft)
-        for block in {followers[index] for index in (*own, *turned) if index in followers}:
-            yield rec.DRIVEN_DEVICE, k, block
-    for i, row in enumerate(draft.node_table):
-        if row["schedule"] in followers:
-            if row["kind"] == rec.FIXED or linear:
-                yield rec.DRIVEN_NODE, i, followers[row["schedule"]]
-            else:
-                yield rec.DRIVEN_NODE, -1, followers[row["schedule"]]
-
-
-def early_blocks(draft, driven: list[tuple[int, int, int]]) -> set[str]:
-    """Names of the blocks that decide before the nodes are solved, because they drive the network or such a block."""
-    names = list(draft.schedules.blocks)
-    early = {names[block] for _, _, block in driven}
-    while more := {other for name in early for other in draft.case.controls[name].blocks_needed} - early:
-        early |= more
-    return early
-
-
-def is_known_early(draft, row, probe) -> bool:
-    """True if the value of a sensor follows from states alone, before the nodes are solved."""
-    kind = row["kind"]
-    if kind == rec.PRESSURE:
-        return draft.node_table[row["index"]]["kind"] in STORED
-    if kind in (rec.PIPE_PRESSURE, rec.PIPE_FLOW):
-        return row["side"] == 0 and draft.pipe_table[row["index"]]["cells"] > 0
-    if kind == rec.DEVICE_VALUE:
-        name, part, device = draft.devices[row["index"]]
-        return probe.quantity in device.states_of(draft, name, part)
-    if kind == rec.NETWORK_VALUE:
-        return draft.network.is_known_early(row)
-    return kind in STATE_KINDS or kind == rec.CELL_FIELD
-
-
-def has_late_sensors(draft) -> bool:
-    """True if a sensor reads what only the solved nodes determine."""
-    return not all(map(functools.partial(is_known_early, draft), draft.sensor_table, draft.sensors))
-
-
-def check_order(draft, early: set[str]) -> None:
-    """Add a fault for each block that drives the network, and passes on at once what only the solved network tells."""
-    rows = dict(zip([probe.text for probe in draft.sensors], draft.sensor_table, strict=True))
-    names_of_rows = {name: k for k, name in enumerate(draft.schedules.blocks)}
-    for name in draft.schedules.blocks:
-        block = draft.case.controls[name]
-        if name not in early:
-            check_network_order(draft, name, block, rows, names_of_rows)
-            continue
-        names = list(getattr(block.control, "inputs", ()))
-        for k, probe in enumerate(block.inputs if block.control.feeds_through else ()):
-            if not isinstance(probe, str) and not is_known_early(draft, rows[probe.text], probe):
-                text = f"{probe.text} may follow at once from what the control drives, a loop without a state"
-                place = f"inputs.{names[k]}" if names else "input"
-                draft.fault(f"controls.{name}.{place}", f"{text}; give [controls.{name}] a `filter`")
-
-
-def check_network_order(draft, name: str, block: Block, rows: dict, numbers: dict[str, int]) -> None:
-    """Add a fault if a block passes on at once what a block drives in a network of rotation, electricity and heat.
-
-    Values of scalars, and heat of the fluid, are known only after these blocks.
-    """
-    for probe in block.inputs if block.control.feeds_through else ():
-        if not isinstance(probe, str) and follows_scalars(draft, rows[probe.text]):
-            text = f"{probe.text} is known only after what the control drives"
-            draft.fault(f"controls.{name}", f"{text}; give [controls.{name}] a `filter`")
-    for probe in block.inputs if block.control.feeds_through and draft.network is not None else ():
-        if not isinstance(probe, str) and rows[probe.text]["kind"] == rec.NETWORK_VALUE:
-            if draft.network.follows_blocks(draft, rows[probe.text]):
-                text = f"{probe.text} may follow at once from what a control drives, a loop without a state"
-                draft.fault(f"controls.{name}", f"{text}; give [controls.{name}] a `filter`")
-
-
-def follows_scalars(draft, row) -> bool:
-    """True if a sensor reads the value of a scalar, or the heat of a heat exchanger."""
-    if row["kind"] in (rec.NODE_SCALAR, rec.PIPE_SCALAR, rec.CELL_SCALAR):
-        return True
-    sources = draft.network.inputs_of(row) if row["kind"] == rec.NETWORK_VALUE else ()
-    reads = (draft.network.sources[j].reads for j in sources)
-    return any(item is not None and item[0] == rec.FLUID_HEAT for item in reads)
-
-
-# start --------------------------------------------------------------------------------------------------------------
 
 
 class Balance:
@@ -247,11 +36,12 @@ class Balance:
     """
 
     def __init__(self, case, packed, make) -> None:
-        self.case, self.packed, self.make = case, packed, make
+        self.case, self.packed, self.make, own = case, packed, make, with_slot(packed.features, SLOT)
+        self.own = own
         self.blocks = {name: case.controls[name] for name in packed.schedules.blocks}
         self.unstated = [k for k, block in enumerate(self.blocks.values()) if block.control.initial_output is None]
         self.free = self.sought()
-        low, high = packed.control_table["least"], packed.control_table["greatest"]
+        low, high = own.table["least"], own.table["greatest"]
         small = [small_change(block.dimensions[1]) for block in self.blocks.values()]
         finite = np.isfinite(low) & np.isfinite(high)
         self.range = np.where(finite, high - low, small)
@@ -266,7 +56,7 @@ class Balance:
         """
         blocks, numbers = list(self.blocks.values()), {name: k for k, name in enumerate(self.blocks)}
         static = [control_rows_of(type(block.control)).is_static(block.control) for block in blocks]
-        rows = dict(zip([probe.text for probe in self.packed.sensors], self.packed.sensor_table, strict=True))
+        rows = dict(zip([probe.text for probe in self.own.sensors], self.own.sensor_table, strict=True))
         tables = self.packed.tables
         ahead = {int(tables.pieces[first, 2]) for first, count in tables.schedules.tolist() if count == 0}
         static = [own and not block.followed for own, block in zip(static, blocks, strict=True)]
@@ -306,7 +96,8 @@ class Balance:
         pieces.flags.writeable = False
         draft.schedules = replace(draft.schedules, known_values={})
         draft.tables = draft.tables._replace(pieces=pieces)
-        draft.tables.controls["start"] = draft.tables.controls["held"] = outputs
+        table = with_slot(draft.features, SLOT).table
+        table["start"] = table["held"] = outputs
         return draft
 
     def starts(self, outputs: np.ndarray, by_rates: bool = False) -> tuple[list[BlockStart], np.ndarray]:
@@ -318,7 +109,7 @@ class Balance:
         t, codes = self.case.numerics.start, []
         values, slopes = sensor_values(model, t, by_rates)
         starts = []
-        for block, row, output in zip(self.blocks.values(), model.tables.controls, outputs, strict=True):
+        for block, row, output in zip(self.blocks.values(), blocks_of(model), outputs, strict=True):
             codes.append(model.tables.integers[row["inputs"] :][: row["input_count"]].tolist())
             inputs = tuple(float(values[code] if code >= 0 else outputs[-1 - code]) for code in codes[-1])
             setpoint = value_at(model.tables, row["setpoint"], t, t) if row["setpoint"] >= 0 else 0.0
@@ -537,6 +328,11 @@ def listing_of(values: dict[str, float]) -> str:
     return ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
 
 
+def blocks_of(model) -> np.ndarray:
+    """Blocks of a model : CONTROL[blocks]."""
+    return with_slot(model.features, SLOT).table
+
+
 def sensor_values(model, t: float, with_rates: bool = True) -> tuple[np.ndarray, np.ndarray]:
     """Values of all sensors at the start, and their rates : float64[sensors] each [SI, SI/s].
 
@@ -545,13 +341,14 @@ def sensor_values(model, t: float, with_rates: bool = True) -> tuple[np.ndarray,
     """
     from fvsolve.model.jacobian_pattern import Couplings  # it imports SciPy, which a run without controls does not need
 
+    sensors = with_slot(model.features, SLOT).sensor_table
     with model.run_data() as data:
         y = model.start.copy()
         rates, out = data.evaluate(t, y, t)
-        value, slopes = read_sensors(model, data, t, y, out), np.zeros(len(model.tables.sensors))
-        couplings = Couplings(model) if with_rates else None
-        for k, row in enumerate(model.tables.sensors if with_rates else ()):
-            for j in states if (states := couplings.blocks.sensor(row)).size <= MOST_STATES else ():
+        value, slopes = read_sensors(model, data, t, y, out), np.zeros(len(sensors))
+        pattern = with_slot(Couplings(model).features, SLOT) if with_rates else None
+        for k, row in enumerate(sensors if with_rates else ()):
+            for j in states if (states := pattern.sensor(row)).size <= MOST_STATES else ():
                 high, low = y.copy(), y.copy()
                 high[j] += DIFFERENCE * model.scale[j]
                 low[j] -= DIFFERENCE * model.scale[j]
@@ -563,9 +360,11 @@ def sensor_values(model, t: float, with_rates: bool = True) -> tuple[np.ndarray,
 
 def read_sensors(model, data, t: float, y: np.ndarray, out: np.ndarray) -> np.ndarray:
     """Values of all sensors at (t, y) : float64[sensors]."""
-    values = np.zeros(len(model.tables.sensors))
+    data.handle  # noqa: B018, it fills the handle of the view
+    own = with_slot(data.features, SLOT)
+    values = np.zeros(own.readings.size)
     if values.size:
-        model.functions.observe(t, y, out, data.written.sensing, values)
+        model.functions.observe(t, y, out, own.sensing, values)
     return values
 
 
@@ -583,15 +382,15 @@ def before_limits(own, control, start: BlockStart, row) -> BlockStart:
 
 def set_starts(draft, outputs: np.ndarray, starts: list[BlockStart]) -> None:
     """Write the values of all blocks at the start to the tables of a draft."""
-    tables = draft.tables
+    tables, feature = draft.tables, with_slot(draft.features, SLOT)
     for (name, k), start in zip(draft.schedules.blocks.items(), starts, strict=True):
-        control, row = draft.case.controls[name].control, tables.controls[k]
+        control, row = draft.case.controls[name].control, feature.table[k]
         row["start"], row["setpoint_start"], row["held"] = outputs[k], start.setpoint, np.nan
         tables.floats[row["starts"] :][: len(start.inputs)] = start.inputs
         own, numbers = control_rows_of(type(control)), tables.floats[row["data"] :]
         own.begin(control, before_limits(own, control, start, row), numbers)
         if row["period"] > 0.0:
-            draft.discrete[row["memory"]] = outputs[k]
+            feature.discrete[row["memory"]] = outputs[k]
         draft.start_flags |= own.flags_at_start(control, start, numbers)
         if text := own.fault(control, start):
             draft.fault(f"controls.{name}", text)

@@ -194,7 +194,7 @@ def record_inputs(t, out, tables):
                 level = KINK
             elif caused and histories[at + BREAK_LEVEL] <= LAST_LEVEL:
                 level = max(KINK, histories[at + BREAK_LEVEL])
-            change = out[tables.layout[0]["control"] + 2 * k + 1] - tables.floats[control["starts"]]
+            change = out[tables.block_settings[0]["outputs"] + 2 * k + 1] - tables.floats[control["starts"]]
             before, small = tables.floats[control["data"] + BEFORE], tables.floats[control["data"] + SMALL]
             store_input(histories, at, t, change, level, before, small)
             limit = accurate_step(histories, at, tables.settings[0]["tolerance"])

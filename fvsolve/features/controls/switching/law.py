@@ -4,8 +4,8 @@ The event function of a flag is above zero while it is off, and below while it i
 A timer has a flag for its input, then one for its state; `discrete` has the time at which its input last changed.
 """
 
+from fvsolve.features.controls.kernels.blocks import input_change
 from fvsolve.jit import njit
-from fvsolve.kernels.controls import input_change
 from fvsolve.kernels.formula_programs import TIE
 
 MODE, FLAG, LOW, HIGH, ON, OFF = range(6)

@@ -9,13 +9,7 @@ has the outputs before their limits, then number + 1 of the last block whose out
 
 from math import inf, nan
 
-from fvsolve.jit import njit, specialise
-from fvsolve.kernels import calls
-from fvsolve.kernels.barotropic_nodes import head_pressure
-from fvsolve.kernels.devices import ADAPT, DECIDE, SAMPLE, SET, SWITCH
-from fvsolve.kernels.dtypes import ARRIVED, ARRIVES, CONTROL_VALUE, DRIVEN_DEVICE, DRIVEN_VALVE, FIXED, NEVER, STATUS
-from fvsolve.kernels.formula_programs import is_low
-from fvsolve.kernels.input_histories import (
+from fvsolve.features.controls.kernels.input_histories import (
     JUMP,
     admit_breaks,
     awaits_break,
@@ -24,6 +18,26 @@ from fvsolve.kernels.input_histories import (
     record_inputs,
     set_breaks,
 )
+from fvsolve.features.controls.kernels.tables import (
+    ADAPT,
+    BLOCK_VALUE,
+    DECIDE,
+    DRIVEN_DEVICE,
+    DRIVEN_VALVE,
+    SAMPLE,
+    SWITCH,
+    call_adapt,
+    call_decide,
+    call_sample,
+    call_switch,
+    open_blocks,
+)
+from fvsolve.jit import njit, specialise
+from fvsolve.kernels import calls
+from fvsolve.kernels.barotropic_nodes import head_pressure
+from fvsolve.kernels.devices import SET
+from fvsolve.kernels.dtypes import ARRIVED, ARRIVES, FIXED, NEVER, STATUS
+from fvsolve.kernels.formula_programs import is_low
 from fvsolve.kernels.restrictions import valve_conductance
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
@@ -64,7 +78,7 @@ def setpoint_change(t, tables, control):
 @njit
 def begin_controls(t, y, dydt, out, handle):
     """Set the outputs of all blocks to those at the start, which schedules have until the blocks decide."""
-    tables = open_tables(handle)
+    tables = open_blocks(handle)
     for k in range(tables.controls.size):
         tables.applied[k] = applied_output(tables.controls[k], tables.controls[k]["start"])
 
@@ -113,14 +127,14 @@ def apply_output(t, tables, k, output):
 @njit
 def write_outputs(t, y, out, tables, late):
     """Write the outputs of the blocks that decide before (late 0) or after (late 1) the nodes are solved."""
-    controls, applied, at = tables.controls, tables.applied, tables.layout[0]["control"]
+    controls, applied, at = tables.controls, tables.applied, tables.block_settings[0]["outputs"]
     for k in range(controls.size):
         control = controls[k]
         if control["late"] == late:
             if control["period"] > 0.0:
                 v = out[at + 2 * k] = tables.discrete[control["memory"]]
             else:
-                v = calls.call_decide(tables.hooks[control["hooks"], DECIDE], t, y, tables, control)
+                v = call_decide(tables.block_hooks[control["hooks"], DECIDE], t, y, tables, control)
                 out[at + 2 * k] = limited(v, tables.armed, control)
             applied[controls.size + k] = v
             apply_output(t, tables, k, out[at + 2 * k])
@@ -142,18 +156,18 @@ def drive_node(t, out, tables, i):
 
 def _decide_early(t, y, dydt, out, handle):
     """Write the outputs of blocks that drive the network, from states alone, and apply them to valves and nodes."""
-    tables = open_tables(handle)
+    tables, core = open_blocks(handle), open_tables(handle)
     read_sensors(t, y, out, tables)
     write_outputs(t, y, out, tables, 0)
     for m in range(tables.driven.size):
         kind, i = tables.driven[m]["kind"], tables.driven[m]["index"]
         if kind == DRIVEN_VALVE:
-            out[tables.layout[0]["conductance"] + i] = valve_conductance(tables, i, t)
+            out[core.layout[0]["conductance"] + i] = valve_conductance(core, i, t)
         elif kind == DRIVEN_DEVICE:
-            device = tables.devices[i]
-            calls.call_set(tables.hooks[device["hooks"], SET], t, y, out, tables, device)
+            device = core.devices[i]
+            calls.call_set(core.hooks[device["hooks"], SET], t, y, out, core, device)
         elif i >= 0:
-            drive_node(t, out, tables, i)
+            drive_node(t, out, core, i)
 
 
 decide_linear = specialise(_decide_early, "decide_linear", LINEAR=True)
@@ -163,8 +177,8 @@ decide_barotropic = specialise(_decide_early, "decide_barotropic", LINEAR=False)
 @njit
 def decide_late(t, y, dydt, out, handle):
     """Write the outputs of blocks that only rates read, such as forces, after the nodes are solved."""
-    tables = open_tables(handle)
-    if tables.settings[0]["late_blocks"] == 1:
+    tables = open_blocks(handle)
+    if tables.block_settings[0]["late"] == 1:
         read_sensors(t, y, out, tables)
         write_outputs(t, y, out, tables, 1)
 
@@ -172,9 +186,9 @@ def decide_late(t, y, dydt, out, handle):
 @njit
 def control_rates(t, y, dydt, out, handle):
     """Write the rates of filters and other states of blocks to `dydt`, and the first input of each block to `out`."""
-    tables = open_tables(handle)
-    controls, applied, at = tables.controls, tables.applied, tables.layout[0]["control"]
-    if tables.settings[0]["late_sensors"] == 1:  # others have been read before the nodes were solved
+    tables = open_blocks(handle)
+    controls, applied, at = tables.controls, tables.applied, tables.block_settings[0]["outputs"]
+    if tables.block_settings[0]["late_sensors"] == 1:  # others have been read before the nodes were solved
         read_sensors(t, y, out, tables)
     for k in range(controls.size):
         control = controls[k]
@@ -185,25 +199,33 @@ def control_rates(t, y, dydt, out, handle):
         for j in range(control["filters"]):
             i = control["y"] + j
             dydt[i] = (measured_change(tables, control, j) - y[i]) * control["filter_rate"]
-        hook = tables.hooks[control["hooks"], ADAPT]
+        hook = tables.block_hooks[control["hooks"], ADAPT]
         if hook != 0 and control["y"] >= 0 and control["period"] == 0.0:
-            calls.call_adapt(hook, t, y, dydt, tables, control, applied[controls.size + k], out[at + 2 * k])
+            call_adapt(hook, t, y, dydt, tables, control, applied[controls.size + k], out[at + 2 * k])
         if not abs(applied[k]) < inf:
             dydt[0] = nan  # the run must not go on, whatever a driven part makes of this output
 
 
 @njit
+def outputs_for_events(t, y, out, handle, g):
+    """Write the outputs of all blocks, which sources of networks follow, for event functions; g is not used."""
+    tables = open_blocks(handle)
+    read_sensors(t, y, out, tables)
+    write_outputs(t, y, out, tables, 1)
+
+
+@njit
 def control_events(t, y, out, handle, g):
     """Write the event functions of all blocks to g, from solved nodes."""
-    tables = open_tables(handle)
+    tables = open_blocks(handle)
     controls, applied, none = tables.controls, tables.applied, tables.armed[:0]
     read_sensors(t, y, out, tables)
     write_outputs(t, y, out, tables, 1)
     for k in range(controls.size):
         control = controls[k]
-        hook, flag = tables.hooks[control["hooks"], SWITCH], control["flag"]
+        hook, flag = tables.block_hooks[control["hooks"], SWITCH], control["flag"]
         if hook != 0 and control["period"] == 0.0:
-            calls.call_switch(hook, t, y, tables, control, g)
+            call_switch(hook, t, y, tables, control, g)
         if flag >= 0:
             v = applied[controls.size + k]
             is_low(v - control["least"], 0.0, flag, none, g)
@@ -242,7 +264,7 @@ def let_breaks_arrive(t, tables):
 @njit
 def take_samples(t, y, out, handle, values):
     """At a time at which a sample is due (STATUS is ARRIVED), let the blocks act, in the order of their table."""
-    tables = open_tables(handle)
+    tables = open_blocks(handle)
     controls, discrete = tables.controls, tables.discrete
     if out[STATUS] != ARRIVED or let_breaks_arrive(t, tables):
         return
@@ -254,11 +276,11 @@ def take_samples(t, y, out, handle, values):
                 admit_breaks(tables, k, t)
             if tables.histories.size > 0:
                 set_breaks(tables, k, t, JUMP)
-            sample = tables.hooks[control["hooks"], SAMPLE]
+            sample = tables.block_hooks[control["hooks"], SAMPLE]
             if sample != 0:
-                v = calls.call_sample(sample, t, y, tables, control)
+                v = call_sample(sample, t, y, tables, control)
             else:
-                v = calls.call_decide(tables.hooks[control["hooks"], DECIDE], t, y, tables, control)
+                v = call_decide(tables.block_hooks[control["hooks"], DECIDE], t, y, tables, control)
             discrete[control["memory"]] = clipped(v, control)
             discrete[control["memory"] + 1] += 1.0
             apply_output(t, tables, k, discrete[control["memory"]])
@@ -272,7 +294,7 @@ def record_controls(t, y, out, handle, values):
     if this comes first. A sample or break at the end of a segment of the run acts at the start of the next one, after a
     jump of a schedule there.
     """
-    tables = open_tables(handle)
+    tables = open_blocks(handle)
     record_inputs(t, out, tables)
     arrives, ends = out[ARRIVES] if tables.settings[0]["arrivals"] == 1 else NEVER, t >= tables.clock[0]["limit"]
     for k in range(tables.controls.size):
@@ -291,19 +313,19 @@ def record_controls(t, y, out, handle, values):
 @njit
 def restore_outputs(t, y, out, handle, values):
     """Write the outputs of blocks at this state to `applied`, before other functions read schedules."""
-    tables = open_tables(handle)
+    tables = open_blocks(handle)
     for k in range(tables.controls.size):  # there is none behind the handle of the sensors
-        tables.applied[k] = applied_output(tables.controls[k], out[tables.layout[0]["control"] + 2 * k])
+        tables.applied[k] = applied_output(tables.controls[k], out[tables.block_settings[0]["outputs"] + 2 * k])
 
 
 @njit
 def observe_controls(t, y, out, handle, values):
     """Write output, input or error of blocks to `values`."""
-    tables = open_tables(handle)
-    controls, at = tables.controls, tables.layout[0]["control"]
+    tables = open_blocks(handle)
+    controls, at = tables.controls, tables.block_settings[0]["outputs"]
     for k in range(tables.probes.size):
         probe = tables.probes[k]
-        if probe["kind"] == CONTROL_VALUE:
+        if probe["kind"] == BLOCK_VALUE:
             i = probe["index"]
             if probe["side"] == OUTPUT:
                 values[k] = out[at + 2 * i]
