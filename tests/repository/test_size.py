@@ -68,7 +68,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/parts": (19675, 52),
     "tests/reference": (3830, 36),
     "tests/report": (863, 4),
-    "tests/repository": (5332, 28),
+    "tests/repository": (5339, 28),
     "tests/schemes": (569, 2),
     "tests/solve": (2995, 14),
     "tests/step_limits": (1100, 5),
