@@ -35,7 +35,7 @@ STEPS, STOP = 6, 3  # number of steps in total and before the stop
 class Kept(MemorySink):
     """Sink that stores the last checkpoint."""
 
-    def checkpoint(self, state, extra: dict) -> None:
+    def checkpoint(self, state) -> None:
         self.state = state
 
 

@@ -100,7 +100,7 @@ def arguments(found) -> str:
 def docstring(found, name: str) -> str:
     """Docstring as Markdown. Raises ValueError for a public name without docstring."""
     if not (text := inspect.getdoc(found)):
-        raise ValueError(f"{name} has no docstring. Expected a sentence, because the site lists all public names")
+        raise ValueError(f"{name} has no docstring; expected a sentence, because the site lists all public names")
     return prose(text)
 
 

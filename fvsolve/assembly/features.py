@@ -52,8 +52,8 @@ def words_of(case) -> set[str]:
 def features_of(case, given_up: Collection[str] = ()) -> list[Feature]:
     """Features of a case, in the order of slots; given_up : names of parts that features do not compute."""
     words = words_of(case)
-    awake = [one for one in declarations() if one.words & words]
-    return [getattr(import_module(one.module), one.name)(case, given_up) for one in awake]
+    awake = [declaration for declaration in declarations() if declaration.words & words]
+    return [getattr(import_module(found.module), found.name)(case, given_up) for found in awake]
 
 
 class Feature:
@@ -244,4 +244,4 @@ class FeatureRun:
 
 def with_slot(members: list[Any], slot: int) -> Any:
     """Feature with a slot, or its data of a run; None if the case does not have the feature."""
-    return next((one for one in members if getattr(one, "feature", one).slot == slot), None)
+    return next((member for member in members if getattr(member, "feature", member).slot == slot), None)

@@ -29,7 +29,7 @@ def code_of_limiter(limiter: str, basins: bool) -> int:
     if own is None:
         return CODES[limiter]
     if basins and not own.symmetric:  # flows through walls would not be zero
-        raise FvsolveError(f"numerics.limiter: {limiter} is not symmetric: {own.costs[-1]}. Expected a limiter with "
+        raise FvsolveError(f"numerics.limiter: {limiter} is not symmetric: {own.costs[-1]}; expected a limiter with "
                            "phi(r) / r = phi(1 / r) for basins on grids")  # fmt: skip
     try:
         return limiter_code(own.phi, own.symmetric, own.digest, basins)
@@ -38,8 +38,8 @@ def code_of_limiter(limiter: str, basins: bool) -> int:
             raise
         reason = next((line.strip() for line in str(error).splitlines()[1:] if line.strip()), str(error))
         raise FvsolveError(
-            f"numerics.limiter: the function of {limiter} cannot be compiled: {reason} Expected a function of a "
-            "float that returns a float, and uses numbers, math and numpy only"
+            f"numerics.limiter: the function of {limiter} cannot be compiled: {reason.rstrip('.')}; expected a "
+            "function of a float that returns a float, and uses numbers, math and numpy only"
         ) from error
 
 

@@ -50,7 +50,7 @@ def name_faults(basin: Any, mesh: Mesh, name: str) -> Iterator[str]:
     if name in mesh.patches:
         yield "is also a group of lines of the mesh; expected another name"
     if not basin.physics_type.has_closures:
-        yield "lies inside the basin; interior patches need a free surface, expected a patch on the boundary"
+        yield "lies inside the basin; interior patches need a free surface; expected a patch on the boundary"
     elif basin.on is not None or any(patch.moves for patch in basin.patches.values()):
         where = "on a body" if basin.on is not None else "with a moving wall"
         yield f"lies inside a basin {where}; expected a patch on the boundary"

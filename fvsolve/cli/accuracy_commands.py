@@ -54,7 +54,7 @@ def chart(
         raise FvsolveError(f"{text}. Remove it")
     if target is not None and not 0.0 < target < 1.0:
         text = f"--target: {target:g} is not a valid error"
-        raise FvsolveError(f"{text}. Expected a fraction of the range, between 0 and 1")
+        raise FvsolveError(f"{text}; expected a fraction of the range, between 0 and 1")
     if models:
         several_jobs = None if jobs == 1 else jobs
         _refuse(scheme=scheme, method=method, cells=cells, rtol=rtol, step=step, jobs=several_jobs, dask=dask, out=out)

@@ -158,7 +158,7 @@ def comma_list(text: str | None, option: str = "") -> list[str] | None:
         return None
     words = list(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))
     if not words:
-        raise FvsolveError(f'{option} "{text}" is an empty list. Expected names or numbers separated by commas')
+        raise FvsolveError(f'{option} "{text}" is an empty list; expected names or numbers separated by commas')
     return words
 
 

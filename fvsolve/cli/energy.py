@@ -75,7 +75,7 @@ def refuse_without_case(options: dict) -> None:
     """
     given = [name for name, value in options.items() if value]
     if given:
-        raise FvsolveError(f"{', '.join(given)}: valid only with a case. Expected fvsolve energy CASE {given[0]} ...; "
+        raise FvsolveError(f"{', '.join(given)}: valid only with a case; expected fvsolve energy CASE {given[0]} ...; "
                            "without a case the passivity of schemes and methods is listed, without files")  # fmt: skip
 
 

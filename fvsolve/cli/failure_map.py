@@ -57,7 +57,7 @@ def _numbers(option: str, text: str | None) -> list[float] | None:
         return None if text is None else [float(word) for word in cli.comma_list(text)]
     except ValueError:
         raise FvsolveError(
-            f"{option} {text}: not a list of numbers. Expected numbers with commas, for example {option} 0.5,0.9,1"
+            f"{option} {text}: not a list of numbers; expected numbers with commas, for example {option} 0.5,0.9,1"
         ) from None
 
 

@@ -156,7 +156,7 @@ def respond(case, port, input, output, at, before, scheme, out, as_json: bool) -
 
     if port is not None or input is None or output is None:
         given = "--port" if port is not None else "--input" if input is not None else "no option"
-        raise FvsolveError(f"{given} alone names no transfer function. Expected --port NODE, or --input NAME with "
+        raise FvsolveError(f"{given} alone names no transfer function; expected --port NODE, or --input NAME with "
                            "--output PROBE")  # fmt: skip
     result = input_response(case, input, output, at, before, scheme)
     folder, stem, h = cli.folder_of(case, "response", out), f"{input}-{output}.response".replace("/", "-"), result.h

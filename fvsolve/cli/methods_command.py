@@ -34,7 +34,7 @@ def single_method(name: str, out: Path | None) -> tuple[dict, Iterator]:
     facts = analyse(method)
     path = out or Path(f"{name}.png")
     if path.suffix.lower() not in PICTURES:
-        raise FvsolveError(f"{path}: unknown type of picture. Expected a name that ends in {' or '.join(PICTURES)}")
+        raise FvsolveError(f"{path}: unknown type of picture; expected a name that ends in {' or '.join(PICTURES)}")
     path.parent.mkdir(parents=True, exist_ok=True)
     save(region_figure(facts.stability_function, f"{method.name}: |R(hλ)| ≤ 1"), path)
     array = {"a": method.a, "b": method.b, "c": method.c, "error": method.error, "start_error": method.start_error}

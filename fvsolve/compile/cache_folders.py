@@ -54,7 +54,7 @@ def _check_access(folder: Path) -> None:
     if fault := file_access.fault(folder):
         stated = "FVSOLVE_CACHE = " if os.environ.get("FVSOLVE_CACHE") else ""
         raise FvsolveError(
-            f"{stated}{folder}: {fault}, so that another user could store machine code that would run here. Expected a "
+            f"{stated}{folder}: {fault}, so that another user could store machine code that would run here; expected a "
             f"folder of this user or of root that only its owner can write; {file_access.REMEDY}, or set FVSOLVE_CACHE "
             "to another folder"
         )

@@ -32,9 +32,9 @@ def view(scene: DrawnScene, out: Path) -> None:
     """
     animated = len(scene.frames) > 1
     if animated and out.suffix not in (".gif", ".mp4"):
-        raise FvsolveError(f"{out.name} is not an animation. Expected a file name that ends in .gif or .mp4")
+        raise FvsolveError(f"{out.name} is not an animation; expected a file name that ends in .gif or .mp4")
     if out.suffix == ".html" and scene.pipes:
-        raise FvsolveError(f"{out.name}: only basins and bodies are drawn as a page. Expected .png, .svg or .pdf")
+        raise FvsolveError(f"{out.name}: only basins and bodies are drawn as a page; expected .png, .svg or .pdf")
     if out.suffix == ".mp4" and animated:
         _need_imageio()
     if scene.pipes:

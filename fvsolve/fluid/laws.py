@@ -63,7 +63,7 @@ def air_of(given: dict[str, float]) -> Air:
     if not 1.0 <= exponent <= 2.0:
         raise FluidError("gas_exponent", f"{exponent:g} is out of range; expected a value between 1 (isothermal) and 2")
     if cavitation and exponent != 1.0:
-        raise FluidError("gas_exponent", f"{exponent:g} is not 1; with cavitation the gas is isothermal, expected 1")
+        raise FluidError("gas_exponent", f"{exponent:g} is not 1; with cavitation the gas is isothermal; expected 1")
     if saturation <= ATMOSPHERE:
         text = f"{saturation:g} Pa is not above 1 atm, the pressure to which `air_fraction` refers"
         raise FluidError("saturation_pressure", f"{text}; expected more than {ATMOSPHERE:g} Pa")

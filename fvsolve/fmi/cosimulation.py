@@ -55,7 +55,7 @@ class CoSimulation:
         numerics = self.model.case.numerics
         if start_time != numerics.start:
             text = f"the start time is {start_time:g} s, but the case starts at {numerics.start:g} s"
-            self.refuse(f"{text}. Expected startTime = {numerics.start:g}")
+            self.refuse(f"{text}; expected startTime = {numerics.start:g}")
         if stop_time is not None and stop_time > numerics.end:
             text = f"the stop time is {stop_time:g} s; kinks of schedules after numerics.end = {numerics.end:g} s"
             self.report(WARNING, f"{text} are not located. Export the case with a later end")
@@ -69,7 +69,7 @@ class CoSimulation:
         """Advance to the end of a communication step; False if the run cannot continue, and the state is as before."""
         if abs(current_time - self.state.t) > max(TIME_TOLERANCE * step_size, 1e-12 * abs(current_time)):
             text = f"the host is at t = {current_time:.9g} s, and the FMU at {self.state.t:.9g} s"
-            self.refuse(f"{text}. Expected equal times; fmi2SetFMUstate goes back to an earlier time")
+            self.refuse(f"{text}; expected equal times; fmi2SetFMUstate goes back to an earlier time")
         try:
             self.state = advance(self.model, self.state, current_time + step_size, self.held)
         except FvsolveError as error:
@@ -97,7 +97,7 @@ class CoSimulation:
         for reference, value in zip(references, values, strict=True):
             name = self.variables[reference].name
             if name not in self.targets:
-                self.refuse(f"{name} is an output of the FMU, which cannot be set. Expected an input")
+                self.refuse(f"{name} is an output of the FMU, which cannot be set; expected an input")
             try:
                 number = checked(name, value, self.targets[name])
             except FvsolveError as error:

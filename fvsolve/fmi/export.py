@@ -68,7 +68,7 @@ def write_fmu(case: Case, path: str | Path | None = None) -> tuple[Path, list[Va
     """
     path = Path(path or f"{case.name}{SUFFIX}")
     if path.suffix.lower() != SUFFIX:
-        raise FvsolveError(f"{path}: unknown type of file. Expected a name that ends in {SUFFIX}")
+        raise FvsolveError(f"{path}: unknown type of file; expected a name that ends in {SUFFIX}")
     package = folder_of_pythonfmu()
     variables = variables_of(build(case))
     version, identifier = fvsolve.__version__, identifier_of(case.name)

@@ -105,7 +105,7 @@ def hook_of(law, name: str, hooks: dict[str, tuple[str, str]] = HOOKS):
         return function
     error = f"{law.__name__}.{name} has {function.__code__.co_argcount} arguments"
     raise FvsolveError(
-        f"{error}. Expected the {expected} arguments listed in kernels.calls.HOOKS, or another name of the function"
+        f"{error}; expected the {expected} arguments listed in kernels.calls.HOOKS, or another name of the function"
     )
 
 

@@ -189,10 +189,12 @@ def faces(settings, scheme, small, backward, p, f):
 
 @njit
 def rhs_periodic(t, y, dydt, out, handle):
-    """Write du_j/dt = F[j] - F[j+1] for values u of cells in a ring, with face values F of a forward wave.
+    """Rates du_j/dt = F[j] - F[j+1] of the values of cells in a ring.
 
-    The wave passes a cell per unit of time. `noise` of the pipe record is the small number of WENO.
-    scratch : float64[2 n + 7]  window of values, then face values
+    The face values F are those of a forward wave, which passes one cell per unit of time.
+    y, dydt : float64[n]  values u and their rates; nothing is written for an empty `dydt`, except to `out`
+    scratch : float64[2 n + 7]  window of values with three cells of the ring on both sides, then face values
+    `noise` of the pipe : square of a negligible value, as `small` of `faces`
     """
     tables = open_tables(handle)
     settings, scratch, n = tables.settings[0], tables.scratch, y.size

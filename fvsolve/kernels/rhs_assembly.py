@@ -305,9 +305,8 @@ class ModelFeatures(NamedTuple):
         if self.valves:
             yield COMPONENTS["valves"]
         bends = any(hook_of(law, "bends") is not None for law in self.modules())
-        of_features = any(terms.events for _, terms in self.features)
-        if self.devices or bends or of_features or self.networks:  # their event functions need solved nodes
-            yield COMPONENTS["closed"]
+        if self.devices or bends or self.networks or any(terms.events for _, terms in self.features):
+            yield COMPONENTS["closed"]  # their event functions need solved nodes
         if self.networks:
             yield COMPONENTS["sources of networks"]
         if followed := list(self.terms_at("sources")):

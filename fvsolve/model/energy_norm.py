@@ -137,8 +137,8 @@ def form_of(rows: Any, parts: tuple[str, ...], scale: np.ndarray) -> EnergyForm:
     for at in blocks:
         if at.size > MAX_GROUP:
             raise FvsolveError(
-                f"{at.size} positions are joined by springs; the energy norm is computed for at most {MAX_GROUP}. "
-                "Expected fewer bodies or masses that springs join to each other"
+                f"{at.size} positions are joined by springs; the energy norm is computed for at most {MAX_GROUP}; "
+                "expected fewer bodies or masses that springs join to each other"
             )
         part = rows[:, at].toarray() * scale[at]
         part = np.vstack([part[np.any(part, axis=1)], np.zeros((1, at.size))])

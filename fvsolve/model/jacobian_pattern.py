@@ -87,7 +87,7 @@ class Couplings:
             yield pairs_of(unique_states(column["y"]), unique_states(*(self.sets[i] for i in ends_of(column))))
         yield from self.moving()
         yield from self.device_pairs()
-        yield from self.wpairs_of()
+        yield from self.wall_pairs()
         yield from self.moving_fluid_pairs()
         if self.network is not None:
             yield from self.network_pairs()
@@ -385,7 +385,7 @@ class Couplings:
                 if "rod" in row.dtype.names:
                     yield from (self.own(row["a"]), self.own(row["b"]))
 
-    def wpairs_of(self) -> Iterator[Pairs]:
+    def wall_pairs(self) -> Iterator[Pairs]:
         """Yield couplings of basin cells with the travel of moving walls, and of this travel with masses and bodies.
 
         The masses and bodies are those that move the walls; their couplings with the cells at the walls are included.

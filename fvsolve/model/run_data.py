@@ -132,7 +132,7 @@ class RunData:
 
     def set_array(self, name: str, values: np.ndarray) -> None:
         """Set one of `arrays`; the handle is made again only if the size is new."""
-        own = next(one for one in self.features if name in one.arrays())
+        own = next(owner for owner in self.features if name in owner.arrays())
         if own.store(name, values):
             self.__dict__.pop("handle", None)
 

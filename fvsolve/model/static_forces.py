@@ -227,8 +227,8 @@ def refuse_massless(draft, at: StaticForces) -> None:
                 return draft.fault(f"nodes.{name}.mass", f"{text}; {remedy}")
             if not left > least:
                 text = "the inertia of the body is 0 in a direction in which its joint allows motion"
-                remedy = "Expected an inertia above 0 about the axis of the joint"
-                return draft.fault(f"nodes.{name}.inertia", f"{text}. {remedy}")
+                remedy = "expected an inertia above 0 about the axis of the joint"
+                return draft.fault(f"nodes.{name}.inertia", f"{text}; {remedy}")
 
 
 def start_bodies(draft, start) -> list[str]:
@@ -298,7 +298,7 @@ def start_pins(draft, at: StaticForces) -> np.ndarray:
     for name, slip in slips.items():
         if slip > PIN_RATE_TOLERANCE:
             text = f"separate the two points of this pin at {draft.case.amount(slip, 'velocity')}"
-            draft.fault(f"links.{name}", f"velocities at the start {text}. Expected equal velocities")
+            draft.fault(f"links.{name}", f"velocities at the start {text}; expected equal velocities")
     draft.check()
     forces = at.out[int(at.layout["pin"]) :][: 3 * len(draft.pin_table)].reshape(-1, 3)
     for row, force in zip(draft.pin_table, forces, strict=True):

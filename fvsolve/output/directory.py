@@ -87,7 +87,7 @@ class RunDirectory:
         self.fields = FieldSeries(self.folder, model) if drawn else None
         self.lines = csv_files.LineSeries(self.folder, model) if model.case.output.lines else None
         if self.folder.exists() and not self.folder.is_dir():
-            raise RunError(f"{self.folder} is a file. Expected a directory; choose another directory with --out DIR")
+            raise RunError(f"{self.folder} is a file; expected a directory; choose another directory with --out DIR")
         self.lock = lock_folder(self.folder, "a run")
         try:
             self.restart = self._checkpoint() if resume else None
@@ -136,7 +136,7 @@ class RunDirectory:
                 if series:
                     series.start()
             self._write_case()
-            self.checkpoint(state, {})
+            self.checkpoint(state)
             return
         self._write_case()
         self.history.continue_from(restart.rows, restart.history_bytes)
@@ -166,10 +166,10 @@ class RunDirectory:
         if self.fields:
             self.fields.pieces = ParallelBasinWriter(comm, rows)
 
-    def checkpoint(self, state, extra: dict) -> None:
+    def checkpoint(self, state) -> None:
         """Replace restart.npz by a checkpoint.
 
-        It contains the state with its memory, and the numbers of rows and frames written so far; `extra` is empty.
+        It contains the state with its memory, and the numbers of rows and frames written so far.
         """
         with self.report_write_errors():
             size = self.history.flush()
@@ -357,7 +357,7 @@ def _refuse_full_disk(folder: Path, case) -> None:
     least, free = disk_size(case, LEAST_TEXT, 0), shutil.disk_usage(folder).free
     if least > free:
         text = f"{folder}: history.csv needs at least {byte_text(least)}, but {byte_text(free)} are free"
-        raise RunError(f"{text}. Expected a longer interval `output.every`, or another directory with --out DIR")
+        raise RunError(f"{text}; expected a longer interval `output.every`, or another directory with --out DIR")
 
 
 def picture_paths(folder: Path) -> list[Path]:

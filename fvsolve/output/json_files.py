@@ -66,7 +66,7 @@ def faults_of(value: Any, kind: Any, place: str = "") -> Iterator[str]:
     elif kind is Any:
         yield from unreasonable_numbers(value, place)
     elif not fits(value, kind):
-        yield f"{place}{': ' if place else ''}{value_and_type(value)}. Expected {expected_text(kind)}"
+        yield f"{place}{': ' if place else ''}{value_and_type(value)}; expected {expected_text(kind)}"
 
 
 def faults_of_record(value: dict, kind: Any, place: str) -> Iterator[str]:
@@ -87,7 +87,7 @@ def unreasonable_numbers(value: Any, place: str) -> Iterator[str]:
         for key, item in value.items() if isinstance(value, dict) else enumerate(value):
             yield from unreasonable_numbers(item, joined(place, key))
     elif type(value) in (int, float) and not fits(value, float):
-        yield f"{place}: {value_and_type(value)}. Expected a finite number"
+        yield f"{place}: {value_and_type(value)}; expected a finite number"
 
 
 @functools.cache

@@ -34,7 +34,7 @@ class MemorySink:
     def field(self, t: float, frame: dict) -> None:
         """Do nothing: fields are not stored."""
 
-    def checkpoint(self, state, extra: dict) -> None:
+    def checkpoint(self, state) -> None:
         """Do nothing: checkpoints are not stored."""
 
     def end(self, summary) -> None:

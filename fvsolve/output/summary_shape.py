@@ -359,12 +359,12 @@ def contradictions(summary: dict[str, Any]) -> Iterator[str]:
     columns |= {joined("probes", name): (row["dimension"], row["unit"]) for name, row in summary["probes"].items()}
     for place, (dimension, unit) in columns.items():
         if dimension not in units.DIMENSIONS:
-            yield f'{place}.dimension: {show(dimension)} is unknown. Expected a dimension such as "pressure"'
+            yield f'{place}.dimension: {show(dimension)} is unknown; expected a dimension such as "pressure"'
         elif fault := unit_fault(unit, dimension):
             yield f"{place}: {fault}"
     for key in ("extremes", *(["peaks"] if "peaks" in summary else [])):
         if summary[key].keys() != summary["probes"].keys():
-            yield f"{key}: its names differ from those of probes. Expected the same names"
+            yield f"{key}: its names differ from those of probes; expected the same names"
 
 
 def unit_fault(unit: str, dimension: str) -> str:

@@ -156,7 +156,7 @@ class Torque(Link, kind="torque"):
             yield ("axis",), "is all zeros; expected for example [0, 1, 0]"
         turned = around.links.get(self.to.removesuffix(".shaft"))
         if around.spatial(self.to) and self.axis is None:
-            yield (), "axis is missing: expected the axis of the torque in the axes of the body, for example [0, 1, 0]"
+            yield (), "axis is missing; expected the axis of the torque in the axes of the body, for example [0, 1, 0]"
         if around.spatial(self.to):
             return
         for key, given in (("from", self.from_), ("axis", self.axis)):

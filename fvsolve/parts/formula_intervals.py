@@ -8,14 +8,11 @@ difference. Intervals in doubt are halved, so that each finding has a time at wh
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from fvsolve.kernels import formula_programs as code
-
-if TYPE_CHECKING:
-    from fvsolve.parts.formula_program import Program
 
 ROUNDS = 80  # greatest number of bisections: enough for neighbouring floating-point numbers
 RANGE_ROUNDS = 24  # the same in a search for values out of range, which a smooth maximum at the limit never ends
@@ -34,6 +31,9 @@ class Enclosure(NamedTuple):
     low: np.ndarray
     high: np.ndarray
     doubt: np.ndarray
+
+
+Bounds = Callable[[np.ndarray, np.ndarray], Enclosure]  # of a formula of time, in intervals from `begin` to `end` [s]
 
 
 def bounds_of(low: np.ndarray, high: np.ndarray, doubt: np.ndarray) -> Enclosure:
@@ -183,15 +183,15 @@ def opposite(x: Enclosure) -> Enclosure:
     return Enclosure(1.0 - x.high, 1.0 - x.low, x.doubt)
 
 
-def enclose(program: Program, begin: np.ndarray, end: np.ndarray) -> Enclosure:
-    """Bounds of a formula of time in the intervals from `begin` to `end` [s], in SI; the value where they are equal.
+def enclose(steps: list[tuple[int, float]], begin: np.ndarray, end: np.ndarray) -> Enclosure:
+    """Bounds of a formula of time in the intervals from `begin` to `end` [s]; the value where they are equal.
 
-    It is in doubt where it may be infinite.
+    steps : (code, number) of each step of the stack machine
     """
     stack: list[Enclosure] = []
     sure = np.zeros(begin.size, dtype=bool)
     with np.errstate(all="ignore"):
-        for step, number in program.steps:
+        for step, number in steps:
             if step == code.CONSTANT:
                 stack.append(Enclosure(np.full(begin.size, number), np.full(begin.size, number), sure))
             elif step == code.TIME:
@@ -206,14 +206,20 @@ def enclose(program: Program, begin: np.ndarray, end: np.ndarray) -> Enclosure:
                 stack[-1] = ONE[step](stack[-1])
             else:
                 stack[-2:] = [TWO[step](*stack[-2:])]
-        low, high = (program.scale * bound + program.offset for bound in stack[0][:2])
-    doubt = stack[0].doubt | ~np.isfinite(low) | ~np.isfinite(high)
+    return stack[0]
+
+
+def in_unit(x: Enclosure, scale: float, offset: float) -> Enclosure:
+    """Bounds of scale * x + offset, in doubt where it may be infinite."""
+    with np.errstate(all="ignore"):
+        low, high = (scale * bound + offset for bound in (x.low, x.high))
+    doubt = x.doubt | ~np.isfinite(low) | ~np.isfinite(high)
     return Enclosure(np.minimum(low, high), np.maximum(low, high), doubt)
 
 
-def values_at(program: Program, times: np.ndarray) -> np.ndarray:
+def values_at(bounds: Bounds, times: np.ndarray) -> np.ndarray:
     """Values of a formula at times [s] : float64[n]; NaN where it is no number."""
-    found = enclose(program, times, times)
+    found = bounds(times, times)
     return np.where(found.doubt, np.nan, found.low)
 
 
@@ -225,7 +231,7 @@ def bisected(begin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return np.concatenate([begin, middle]), np.concatenate([middle, end])
 
 
-def find_pole(program: Program, times: np.ndarray, values: np.ndarray) -> float | None:
+def find_pole(bounds: Bounds, times: np.ndarray, values: np.ndarray) -> float | None:
     """Time [s] between samples at which a formula is no number, or grows beyond all samples; None without such a time.
 
     times, values : samples of the formula, increasing
@@ -233,12 +239,12 @@ def find_pole(program: Program, times: np.ndarray, values: np.ndarray) -> float 
     begin, end, most = times[:-1], times[1:], POLE * (1.0 + np.abs(values).max())
     begin, end = begin[begin < end], end[begin < end]
     for _ in range(ROUNDS):
-        doubt = enclose(program, begin, end).doubt
+        doubt = bounds(begin, end).doubt
         begin, end = begin[doubt][:MOST], end[doubt][:MOST]
         if not begin.size:
             return None
         for places in (0.5 * (begin + end), begin, end):
-            found = values_at(program, places)
+            found = values_at(bounds, places)
             bad = ~(np.abs(found) <= most)
             if bad.any():
                 return float(places[int(np.argmax(bad))])
@@ -246,19 +252,19 @@ def find_pole(program: Program, times: np.ndarray, values: np.ndarray) -> float 
     return None
 
 
-def find_outside(program: Program, times: np.ndarray, least: float, greatest: float) -> float | None:
+def find_outside(bounds: Bounds, times: np.ndarray, least: float, greatest: float) -> float | None:
     """Time [s] between samples at which a formula is below `least` or above `greatest`; None if none is found."""
     begin, end = times[:-1], times[1:]
     begin, end = begin[begin < end], end[begin < end]
     slack = 1e-12 * max((abs(x) for x in (least, greatest) if np.isfinite(x)), default=0.0)
     for _ in range(RANGE_ROUNDS):
-        found = enclose(program, begin, end)
+        found = bounds(begin, end)
         outside = (found.low < least - slack) | (found.high > greatest + slack)
         begin, end = begin[outside], end[outside]
         if not begin.size or begin.size > MOST:
             return None
         middle = 0.5 * (begin + end)
-        value = values_at(program, middle)
+        value = values_at(bounds, middle)
         bad = (value < least - slack) | (value > greatest + slack)
         if bad.any():
             return float(middle[int(np.argmax(bad))])
@@ -266,7 +272,7 @@ def find_outside(program: Program, times: np.ndarray, least: float, greatest: fl
     return None
 
 
-def find_pulses(program: Program, times: np.ndarray, values: np.ndarray) -> list[float]:
+def find_pulses(bounds: Bounds, times: np.ndarray, values: np.ndarray) -> list[float]:
     """Times [s] at which steps end, so that they do not pass over a pulse between two samples, increasing.
 
     times, values : samples of the formula; a pulse lies between two of them and is not seen at either.
@@ -277,7 +283,7 @@ def find_pulses(program: Program, times: np.ndarray, values: np.ndarray) -> list
     least, greatest, narrow = values.min(), values.max(), NARROW * (times[-1] - times[0])
     first, last = values[:-1], values[1:]
     for _ in range(ROUNDS):
-        found = enclose(program, begin, end)
+        found = bounds(begin, end)
         margin = max(PULSE * (greatest - least), 1e-9 * max(abs(least), abs(greatest)))
         low, high = np.minimum(first[owner], last[owner]), np.maximum(first[owner], last[owner])
         excess = np.maximum(found.high - high, low - found.low)
@@ -287,7 +293,7 @@ def find_pulses(program: Program, times: np.ndarray, values: np.ndarray) -> list
             break
         begin, end, owner = begin[keep], end[keep], owner[keep]
         middle = 0.5 * (begin + end)
-        value = values_at(program, middle)
+        value = values_at(bounds, middle)
         for k, t, v in zip(owner.tolist(), middle.tolist(), value.tolist(), strict=True):
             seen.setdefault(k, []).append((t, v))
         least, greatest = np.fmin(least, np.nanmin(value)), np.fmax(greatest, np.nanmax(value))

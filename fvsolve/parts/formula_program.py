@@ -13,7 +13,7 @@ import numpy as np
 from fvsolve import units
 from fvsolve.kernels import formula_programs as code
 from fvsolve.parts.formula import FUNCTIONS, TIME_NAMES, Arithmetic
-from fvsolve.parts.formula_intervals import find_pole, find_pulses
+from fvsolve.parts.formula_intervals import Enclosure, enclose, find_pole, find_pulses, in_unit
 from fvsolve.parts.value import ValueFault
 from fvsolve.units import show
 
@@ -159,11 +159,15 @@ class Program:
         pairs.sort(key=lambda pair: pair[0])
         return tuple(np.array(pairs).T)
 
+    def bounds(self, begin: np.ndarray, end: np.ndarray) -> Enclosure:
+        """Bounds of the SI value of a formula of time in the intervals from `begin` to `end` [s]."""
+        return in_unit(enclose(self.steps, begin, end), self.scale, self.offset)
+
     def pole_fault(self, start: float, end: float) -> str:
         """Text of the fault of a formula of time that has a pole, or is no number, at a time in a run; "" without."""
         times, found = self.samples(start, end)
         bad = ~np.isfinite(found)
-        t = float(times[int(np.argmax(bad))]) if bad.any() else find_pole(self, times, found)
+        t = float(times[int(np.argmax(bad))]) if bad.any() else find_pole(self.bounds, times, found)
         if t is None:
             return ""
         with np.errstate(all="ignore"):
@@ -176,7 +180,7 @@ class Program:
     def pulses(self, start: float, end: float) -> list[float]:
         """Times in a run at which steps end, so that none passes over a pulse of a formula of time, increasing [s]."""
         times, values = self.samples(start, end)
-        return find_pulses(self, times, values) if np.isfinite(values).all() else []
+        return find_pulses(self.bounds, times, values) if np.isfinite(values).all() else []
 
     def has_jump(self, start: float, end: float) -> bool:
         """True if the value of a formula of time jumps in a run, at a break or at the steepest place of its samples."""

@@ -67,8 +67,8 @@ class Junction(PlaceOnBody, kind="junction"):
             yield ("required_pressure",), text
         if least < around.ambient:
             message = (
-                f"{least:g} Pa is below ambient pressure, at which nothing can flow out. "
-                f"Expected at least {around.ambient:g} Pa"
+                f"{least:g} Pa is below ambient pressure, at which nothing can flow out; "
+                f"expected at least {around.ambient:g} Pa"
             )
             yield ("minimum_pressure",), message
         full = float(self.demand.value.max())

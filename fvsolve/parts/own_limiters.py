@@ -81,12 +81,12 @@ def value_at(phi: Callable, name: str, r: float) -> float:
         value = phi(r)
     except Exception as error:
         raise FvsolveError(
-            f"register_limiter: {name}({r:g}) fails: {error}. Expected a number; a limiter may use numbers, math, "
+            f"register_limiter: {name}({r:g}) fails: {error}; expected a number; a limiter may use numbers, math, "
             "numpy, and functions of these"
         ) from error
     if not isinstance(value, Real) or isinstance(value, (bool, np.bool_)) or not math.isfinite(value):
         raise FvsolveError(
-            f"register_limiter: {name}({r:g}) is {value!r}. Expected a finite number for every r from "
+            f"register_limiter: {name}({r:g}) is {value!r}; expected a finite number for every r from "
             f"-1e{LARGEST} to 1e{LARGEST}"
         )
     return float(value)

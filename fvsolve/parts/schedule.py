@@ -324,7 +324,7 @@ class Scheduled(Value):
         """
         if text := program.pole_fault(float(times[0]), float(times[-1])):
             raise ValueFault([(place, text)])
-        if (t := find_outside(program, times, self.range.least, self.range.greatest)) is not None:
+        if (t := find_outside(program.bounds, times, self.range.least, self.range.greatest)) is not None:
             text = f"is {program.value(t):.6g}, out of range; expected a value {self.range}"
             raise ValueFault([(place, f"{show(program.text)} at t = {t:.9g} s {text}")])
 

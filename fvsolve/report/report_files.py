@@ -82,7 +82,7 @@ def open_checked_run(directory: Path):
     """Open the run in a directory and check that its tables are complete; raises RunError otherwise."""
     if not directory.is_dir():
         problem = "is a file" if directory.exists() else "does not exist"
-        raise RunError(f"{directory} {problem}. Expected a run directory, as written by fvsolve run CASE --out DIR")
+        raise RunError(f"{directory} {problem}; expected a run directory, as written by fvsolve run CASE --out DIR")
     if not (directory / "summary.json").is_file() and (directory / "restart.npz").is_file():
         resume = f"fvsolve run CASE --out {directory} --resume"
         raise RunError(f"{directory} holds an unfinished run: continue it with {resume}, then report it")

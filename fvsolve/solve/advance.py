@@ -26,14 +26,14 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     if not isinstance(model, Model) or not isinstance(state, State):
         raise FvsolveError(f"advance takes a Model and a State, not {type(model).__name__} and {type(state).__name__}")
     if inputs is not None and not isinstance(inputs, Mapping):
-        raise FvsolveError(f"inputs = {show(inputs)} is not a dict. Expected a number for each name of an input")
+        raise FvsolveError(f"inputs = {show(inputs)} is not a dict; expected a number for each name of an input")
     if isinstance(until, bool) or not isinstance(until, Real):
-        raise FvsolveError(f"until = {show(until)} is not a time. Expected a finite number of seconds")
+        raise FvsolveError(f"until = {show(until)} is not a time; expected a finite number of seconds")
     if not math.isfinite(until):
-        raise FvsolveError(f"until = {until} is not a time. Expected a finite number of seconds")
+        raise FvsolveError(f"until = {until} is not a time; expected a finite number of seconds")
     if not until >= state.t:
         text = f"until = {until:g} s is before the time of the state, {state.t:g} s"
-        raise FvsolveError(f"{text}. Expected at least {state.t:g} s")
+        raise FvsolveError(f"{text}; expected at least {state.t:g} s")
     model.checked(state.t, state.y)
     reused = reused_loop(model, inputs or {})
     loop = reused.start(state)

@@ -84,16 +84,16 @@ def checked(name: str, value: float, target: Input) -> float:
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
-        raise FvsolveError(f"{name} = {show(value)} is not a number. Expected {target.sort.expected}")
+        raise FvsolveError(f"{name} = {show(value)} is not a number; expected {target.sort.expected}")
     number = float(value)
     if not math.isfinite(number):
-        raise FvsolveError(f"{name} = {number} is not finite. Expected {target.sort.expected}")
+        raise FvsolveError(f"{name} = {number} is not finite; expected {target.sort.expected}")
     if not target.sort.least <= number <= target.sort.greatest:
-        raise FvsolveError(f"{name} = {number:g} is out of range. Expected {target.sort.expected}")
+        raise FvsolveError(f"{name} = {number:g} is out of range; expected {target.sort.expected}")
     pressure = target.scale * number + target.offset
     if target.node >= 0 and not pressure > 0.0:
         text = f"{name} = {number:g}" + (f" is {pressure:.4g} Pa absolute" if target.sort is HEAD else " is a vacuum")
-        raise FvsolveError(f"{text}. Expected {target.sort.expected}")
+        raise FvsolveError(f"{text}; expected {target.sort.expected}")
     return number
 
 

@@ -266,7 +266,7 @@ def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
     if few:
         counts = listing(f"{name} has {divisible['texts'][name]}" for name in few)
         text = f"threads = {threads}: {counts}, and each thread needs at least one"
-        raise FvsolveError(f"{text}. Expected at most {divisible['most']}")
+        raise FvsolveError(f"{text}; expected at most {divisible['most']}")
     text = f"each thread computes all rows of these basins: {undivided_basins(model)}"
     return threads, [Notice("threads", "numerics", text, "threads")] if divisible["whole"] else []
 

@@ -37,7 +37,7 @@ class MemoryMismatch(RunError):
 def initial_state(model: Model) -> State:
     """Initial state of a model: zero, as states are deviations from the steady start, except for a dam break."""
     if not isinstance(model, Model):
-        raise FvsolveError(f"initial_state takes a Model, not {type(model).__name__}. Expected the result of build()")
+        raise FvsolveError(f"initial_state takes a Model, not {type(model).__name__}; expected the result of build()")
     return State(model.case.numerics.start, model.start.copy())
 
 
@@ -57,15 +57,15 @@ def solve(
     MemoryMismatch for restart data of another run.
     """
     if not isinstance(model, Model) or not isinstance(state, State):
-        raise FvsolveError(f"solve takes a Model and a State, not {type(model).__name__} and {type(state).__name__}. "
-                           "Expected the results of build() and initial_state()")  # fmt: skip
+        raise FvsolveError(f"solve takes a Model and a State, not {type(model).__name__} and {type(state).__name__}; "
+                           "expected the results of build() and initial_state()")  # fmt: skip
     if progress is not None and not callable(progress):
-        raise FvsolveError(f"progress = {progress!r} cannot be called. Expected progress(t, seconds, steps)")
+        raise FvsolveError(f"progress = {progress!r} cannot be called; expected progress(t, seconds, steps)")
     if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
-        raise FvsolveError(f"threads = {show(threads)} is not a number of threads. Expected an integer of 1 or more")
+        raise FvsolveError(f"threads = {show(threads)} is not a number of threads; expected an integer of 1 or more")
     if comm is not None and not callable(getattr(comm, "bcast", None)):
         text = f"comm = {show(comm)} is not an MPI communicator"
-        raise FvsolveError(f"{text}. Expected MPI.COMM_WORLD of mpi4py, or None")
+        raise FvsolveError(f"{text}; expected MPI.COMM_WORLD of mpi4py, or None")
     missing = [name for name in ("rows", "field", "checkpoint", "end") if not callable(getattr(sink, name, None))]
     try:
         model.checked(state.t, state.y)
@@ -387,7 +387,7 @@ class Run:
         return loop_records.NEWTON_STUCK if state["newton_failures"] > 0.0 else loop_records.TINY_STEP
 
     def save(self) -> None:
-        self.sink.checkpoint(self.state(), {})
+        self.sink.checkpoint(self.state())
         self.saved = time.perf_counter()
 
     def failure(self, code: int) -> str:

@@ -40,7 +40,7 @@ def coefficients(method: Method, damped: bool = False) -> tuple[np.ndarray, np.n
         except (np.linalg.LinAlgError, ValueError):
             raise FvsolveError(
                 f"{method.name} cannot be used for steps: A without its explicit first stage is singular or has no "
-                "basis of eigenvectors. Expected an invertible, diagonalisable A, or a diagonally implicit array"
+                "basis of eigenvectors; expected an invertible, diagonalisable A, or a diagonally implicit array"
             ) from None
     flat.append(start_slope_correction(method))
     flat.append([flat[-1].size])

@@ -74,15 +74,15 @@ def integrate(
     if automatic_choice and step is not None:
         raise FvsolveError('method "auto" uses error control; give rtol, not step')
     if not isinstance(method, (str, Method)):
-        raise FvsolveError(f"method = {method!r} is not a method. Expected a name or a tableau")
+        raise FvsolveError(f"method = {method!r} is not a method; expected a name or a tableau")
     if not callable(f):
-        raise FvsolveError(f"f = {f!r} cannot be called. Expected f(t, y) or f(t, y, dydt)")
+        raise FvsolveError(f"f = {f!r} cannot be called; expected f(t, y) or f(t, y, dydt)")
     if counts is not None and not isinstance(counts, dict):
-        raise FvsolveError(f"counts = {counts!r} is not a dict. Expected a dict")
+        raise FvsolveError(f"counts = {counts!r} is not a dict; expected a dict")
     method = method_named(automatic.first_method(method)) if isinstance(method, str) else method
     t, y0 = _numbers("t", t), np.atleast_1d(_numbers("y0", y0))
     if y0.ndim != 1:
-        raise FvsolveError(f"y0 has shape {y0.shape}. Expected a single row of numbers")
+        raise FvsolveError(f"y0 has shape {y0.shape}; expected a single row of numbers")
     _check(method, t, rtol, step)
     _check_steps(t, step, max_step, first_step)
     found = read_events(events) if events is not None else []
@@ -159,7 +159,7 @@ def _critical_times(tcrit, t) -> list[tuple[float, float]]:
     """
     times = np.unique(_numbers("tcrit", tcrit))
     if not np.isfinite(times).all():
-        raise FvsolveError(f"tcrit = {tcrit!r} is not valid. Expected finite times")
+        raise FvsolveError(f"tcrit = {tcrit!r} is not valid; expected finite times")
     gap = 4.0 * np.finfo(float).eps * np.abs(t).max()
     return [(time - gap, time + gap) for time in times.tolist() if t[0] + 4.0 * gap < time < t[-1] - 4.0 * gap]
 
@@ -250,7 +250,7 @@ def _numbers(name, given) -> np.ndarray:
             raise TypeError
         return np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):
-        raise FvsolveError(f"{name} = {given!r} is not valid. Expected real numbers") from None
+        raise FvsolveError(f"{name} = {given!r} is not valid; expected real numbers") from None
 
 
 def _scale(atol, rtol: float, n: int) -> np.ndarray:
@@ -261,7 +261,7 @@ def _scale(atol, rtol: float, n: int) -> np.ndarray:
     """
     atol = _numbers("atol", atol)
     if atol.shape not in ((), (n,)) or not np.all(np.isfinite(atol) & (atol > 0)):
-        raise FvsolveError(f"atol = {atol.tolist()} is not valid. Expected a positive number, or a row of positive "
+        raise FvsolveError(f"atol = {atol.tolist()} is not valid; expected a positive number, or a row of positive "
                            f"numbers with the length of y0, {n}")  # fmt: skip
     return np.broadcast_to(atol / rtol, n).copy()
 
@@ -285,15 +285,15 @@ def _check(method, t, rtol, step) -> None:
         adaptive = ", ".join(dict.fromkeys(other.name for other in METHODS.values() if other.adaptive))
         raise FvsolveError(f"{method.name} has no error estimate; give step, or one of the methods {adaptive}")
     if t.ndim != 1 or t.size < 2 or not np.all(np.diff(t) > 0):
-        raise FvsolveError("t is not valid. Expected at least two times in rising order")
+        raise FvsolveError("t is not valid; expected at least two times in rising order")
     for name, value in (("rtol", rtol), ("step", step)):
         if value is not None and not (isinstance(value, Real) and np.isfinite(value) and value > 0):
             raise FvsolveError(f"{name} = {value!r} is not a positive number")
     least = LEAST_STEP * np.abs(t).max(initial=0.0)
     if step is not None and 0 < step <= least:
-        raise FvsolveError(f"step = {step:g} is too small to change the time. Expected more than {least:.2g}")
+        raise FvsolveError(f"step = {step:g} is too small to change the time; expected more than {least:.2g}")
     if rtol is not None and 0 < rtol < LEAST_TOLERANCE:
-        raise FvsolveError(f"rtol = {rtol:g} is below rounding errors. Expected {LEAST_TOLERANCE:g} or more")
+        raise FvsolveError(f"rtol = {rtol:g} is below rounding errors; expected {LEAST_TOLERANCE:g} or more")
 
 
 _COMPILED: dict[Any, tuple] = {}  # functions of the time loop, by compiled function or by `frozen_values`

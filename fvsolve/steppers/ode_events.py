@@ -55,14 +55,14 @@ def read_events(given: Any) -> list[EventFunction]:
     """Event functions with their attributes `terminal` and `direction`; raises FvsolveError for invalid ones."""
     functions = [given] if callable(given) else given
     if not isinstance(functions, Sequence) or isinstance(functions, str) or not all(map(callable, functions)):
-        raise FvsolveError(f"events = {given!r} is not valid. Expected a function g(t, y), or a list of such functions")
+        raise FvsolveError(f"events = {given!r} is not valid; expected a function g(t, y), or a list of such functions")
     events = []
     for function in functions:
         terminal, direction = getattr(function, "terminal", False), getattr(function, "direction", 0.0)
         if not isinstance(terminal, (bool, np.bool_, Integral)) or terminal < 0:
-            raise FvsolveError(f"terminal = {terminal!r} of an event is not valid. Expected True, False, or a number")
+            raise FvsolveError(f"terminal = {terminal!r} of an event is not valid; expected True, False, or a number")
         if not isinstance(direction, Real) or direction != direction:
-            raise FvsolveError(f"direction = {direction!r} of an event is not valid. Expected a number: 1, 0 or -1")
+            raise FvsolveError(f"direction = {direction!r} of an event is not valid; expected a number: 1, 0 or -1")
         events.append(EventFunction(function, int(terminal), float(direction)))
     return events
 
@@ -110,7 +110,7 @@ class EventSearch:
         """Value of an event function at a time within the last step."""
         value = np.asarray(event.function(t, self.state(t)), dtype=float)
         if value.size != 1:
-            raise FvsolveError(f"an event function returns {value.size} values. Expected a single number")
+            raise FvsolveError(f"an event function returns {value.size} values; expected a single number")
         return float(value.reshape(()))
 
     def search_step(self) -> bool:

@@ -52,7 +52,7 @@ class Structure:
         pattern.eliminate_zeros()
         pattern.sort_indices()
         if pattern.shape[0] < pattern.shape[1]:
-            raise FvsolveError(f"a Jacobian pattern of shape {pattern.shape} has fewer rows than states. Expected a "
+            raise FvsolveError(f"a Jacobian pattern of shape {pattern.shape} has fewer rows than states; expected a "
                                "column for each state, and at least as many rows as columns")  # fmt: skip
         if self.kind is not None and self.kind not in KINDS:
             near = nearest(str(self.kind), KINDS)

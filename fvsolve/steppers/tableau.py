@@ -221,14 +221,14 @@ def tableau(
         raise FvsolveError(f'method "{name}": expected either text or A, as in tableau(name, A=A, b=b)')
     text = A if text is None else text
     if digits is not None and not 1 <= digits <= DIGITS_MOST:
-        raise FvsolveError(f"digits = {digits} is out of range. Expected 1 to {DIGITS_MOST}")
+        raise FvsolveError(f"digits = {digits} is out of range; expected 1 to {DIGITS_MOST}")
     if b is not None:
         if isinstance(text, str):
-            raise FvsolveError("b is given twice: as an argument and in the text. Expected A, b, c in numbers, or only "
+            raise FvsolveError("b is given twice: as an argument and in the text; expected A, b, c in numbers, or only "
                                "the text")  # fmt: skip
         text = printed(text, b, c)
     elif not isinstance(text, str):
-        raise FvsolveError(f'method "{name}": b is missing. Expected tableau(name, A, b) or tableau(name, A, b, c)')
+        raise FvsolveError(f'method "{name}": b is missing; expected tableau(name, A, b) or tableau(name, A, b, c)')
     method = Method(name, source, text, numbers or {}, dense, start_weight, digits)
     if method.exact and (faults := estimate_faults(method)):
         raise FvsolveError(_message(name, faults))
@@ -252,8 +252,8 @@ def estimate_faults(method: Method) -> list[str]:
         zero = "equals the new state for y' = lambda y, so the error estimate is zero there"
     elif not conditions.differ(b, embedded, len(b), conditions.bushy_trees()):
         zero = "equals the new state for y' = f(t), so the error estimate is zero there"
-    text = "Expected an embedded solution of another order, or a single row of weights"
-    return [f"the embedded solution {zero}. {text}"] if zero else []
+    text = "expected an embedded solution of another order, or a single row of weights"
+    return [f"the embedded solution {zero}; {text}"] if zero else []
 
 
 def _rounded_order(text: str, a: Sequence, b: Sequence, given_digits: int | None) -> int | None:
@@ -267,9 +267,9 @@ def _rounded_order(text: str, a: Sequence, b: Sequence, given_digits: int | None
 def rounding_text(text: str, order: int) -> str:
     """Text on the order with exact numbers of a tableau whose text has decimals of few digits."""
     expected = (
-        f"Expected fractions, or decimals of {EXACT_DECIMALS + 1} digits or more: shorter decimals count as exact"
+        f"expected fractions, or decimals of {EXACT_DECIMALS + 1} digits or more: shorter decimals count as exact"
     )
-    return f"with exact numbers in place of decimals of {digits(text)} digits it has order {order}. {expected}"
+    return f"with exact numbers in place of decimals of {digits(text)} digits it has order {order}; {expected}"
 
 
 def method_of_file(path: Path) -> Method:
@@ -296,13 +296,13 @@ def printed(a: Sequence, b: Sequence, c: Sequence | None = None) -> str:
     a, b = _numbers("A", a, 2), _numbers("b", b, 2)
     s = a.shape[0]
     if a.shape != (s, s) or b.ndim != 2 or b.shape[0] > 2 or b.shape[1] != s:
-        raise FvsolveError(f"A has shape {a.shape}, b {b.shape}. Expected s x s numbers in A and s in b, or two rows "
+        raise FvsolveError(f"A has shape {a.shape}, b {b.shape}; expected s x s numbers in A and s in b, or two rows "
                            "of s in b for an embedded solution (s: number of stages)")  # fmt: skip
     if c is None:
         c = [sum(map(_number, row), Fraction(0)) for row in a]
     c = _numbers("c", c, 1)
     if c.shape != (s,):
-        raise FvsolveError(f"c has shape {c.shape}. Expected {s} numbers")
+        raise FvsolveError(f"c has shape {c.shape}; expected {s} numbers")
     rows = [f"{_entry(left)} | {' '.join(map(_entry, row))}" for left, row in zip(c, a, strict=True)]
     return "\n".join([*rows, "---", *(f"| {' '.join(map(_entry, row))}" for row in b)])
 
@@ -313,14 +313,14 @@ def _numbers(name: str, value: Sequence, axes: int) -> np.ndarray:
         value = np.fromiter(value.flat, dtype=object).reshape(value.shape)  # keeps the precision of float32
     array = np.array(value, dtype=object, ndmin=axes) if not _is_ragged(value) else None
     if array is None or any(isinstance(x, (Sequence, np.ndarray)) and not isinstance(x, str) for x in array.flat):
-        raise FvsolveError(f"{name} has rows of different lengths. Expected the same number of entries in all rows")
+        raise FvsolveError(f"{name} has rows of different lengths; expected the same number of entries in all rows")
     wrong = {place: x for place, x in np.ndenumerate(array) if not is_number(x)}
     faults = [f"{name}{[*at]} = {show(x.item() if isinstance(x, np.generic) else x)}" for at, x in wrong.items()]
     if faults:
         more = f" and {len(faults) - FAULTS_SHOWN} more" if len(faults) > FAULTS_SHOWN else ""
         verb = "is not a finite number" if len(faults) == 1 else "are not finite numbers"
-        text = 'Expected numbers or fractions; texts such as "1/3" only in a tableau that is a text as a whole'
-        raise FvsolveError(f"{', '.join(faults[:FAULTS_SHOWN])}{more} {verb}. {text}")
+        text = 'expected numbers or fractions, and texts such as "1/3" only in a tableau that is a text as a whole'
+        raise FvsolveError(f"{', '.join(faults[:FAULTS_SHOWN])}{more} {verb}; {text}")
     return array
 
 
@@ -373,7 +373,7 @@ def method_named(name: str | Method) -> Method:
     if isinstance(name, Method):
         return name
     if not isinstance(name, str):
-        raise FvsolveError(f"method = {show(name)} is not a name. Expected the name of a method")
+        raise FvsolveError(f"method = {show(name)} is not a name; expected the name of a method")
     if name in METHODS:
         return METHODS[name]
     near = nearest(name, METHODS)
@@ -387,12 +387,12 @@ def _exact(method: Method) -> Array:
     faults: list[str] = []
     numbers = _named_numbers(method.numbers, faults)
     if len(method.text) > LETTERS_MOST:
-        faults.append(f"the text has more than {LETTERS_MOST} characters. Expected a tableau")
+        faults.append(f"the text has more than {LETTERS_MOST} characters; expected a tableau")
     if faults:
         raise FvsolveError(_message(method.name, faults))
     head, weights = _rows(method.text, numbers, faults)
     if len(head) > STAGES_MOST:
-        faults = [f"the text has more than {STAGES_MOST} stages. Expected at most {STAGES_MOST}"]
+        faults = [f"the text has more than {STAGES_MOST} stages; expected at most {STAGES_MOST}"]
     if not faults:
         faults += _mixed_roots([*head, *weights]) or _faults(head, weights, method)
     if not faults and method.start_weight is not None and len(weights) == 2:
@@ -497,7 +497,7 @@ def _rows(text: str, numbers: Mapping, faults: list[str]) -> tuple[list, list]:
                 faults.append(f'row "{shown}": {error}')
         (weights if below else head).append(row)
     if not head or not below:
-        faults.append("incomplete tableau. Expected rows, a line of dashes and weights")
+        faults.append("incomplete tableau; expected rows, a line of dashes and weights")
     return head, weights
 
 
@@ -527,7 +527,7 @@ def _faults(head: list, weights: list, method: Method) -> list[str]:
         elif differs(row, c):
             wrong_sums.append(f"row {i} adds up to {_show(sum(row, Fraction(0)))}; expected c = {_show(c)}")
     if not 1 <= len(weights) <= 2 or any(len(row) != s for row in weights):
-        text = f"wrong rows of weights below the line. Expected one or two rows of {s} numbers"
+        text = f"wrong rows of weights below the line; expected one or two rows of {s} numbers"
         longer = [len(row) for row in weights] == [s + 1]
         faults.append(f"{text}; is the first row `0 |` missing?" if longer else text)
     else:
@@ -539,7 +539,7 @@ def _faults(head: list, weights: list, method: Method) -> list[str]:
             wrong_sums[-1] += f"; {rounding_text(method.text, order)}" if order else ""
         faults += wrong_sums
         if len(weights) == 2 and not faults and not _estimates(head, weights, rounding):
-            faults.append("both rows of weights give the same solution, so the error estimate is zero. Expected an "
+            faults.append("both rows of weights give the same solution, so the error estimate is zero; expected an "
                           "embedded solution of another order, or a single row of weights")  # fmt: skip
     return faults or wrong_sums
 

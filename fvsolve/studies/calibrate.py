@@ -112,7 +112,7 @@ def calibrate(
     if not vary:
         raise FvsolveError("no key to fit. Give at least one key and its range: links.main.wave_speed=900,1300")
     if not loaded.compare:
-        raise FvsolveError("no measured series to fit to. Expected a series under [compare] in the case")
+        raise FvsolveError("no measured series to fit to; expected a series under [compare] in the case")
     bounds = key_ranges(loaded, vary)
     points = sample_points(loaded, vary, f"sobol:{SAMPLE_PER_KEY * len(bounds)}", seed)
     return LeastSquaresFit(loaded, bounds, points, progress or (lambda done, total, text: None)).solve(jobs, dask)

@@ -134,10 +134,10 @@ def find_faults(case: Case | None, key: str, minimise: str, knots: int, runs: in
     faults: list[Fault] = []
     fewest = len(START_SHAPES) * (min(max(knots, 1), MAX_KNOTS) + 2)
     if not 1 <= knots <= MAX_KNOTS:
-        faults.append(Fault("knots", f"{knots} is out of range. Expected 1 to {MAX_KNOTS}"))
+        faults.append(Fault("knots", f"{knots} is out of range; expected 1 to {MAX_KNOTS}"))
     if runs < fewest:
-        least = f"Expected {fewest} or more for knots = {fewest // len(START_SHAPES) - 2}"
-        faults.append(Fault("runs", f"{runs} is too few. {least}"))
+        least = f"expected {fewest} or more for knots = {fewest // len(START_SHAPES) - 2}"
+        faults.append(Fault("runs", f"{runs} is too few; {least}"))
     if case is not None:
         with collect_faults(faults, f"--schedule {key}"):
             span_of(case, key)
@@ -167,10 +167,10 @@ def span_of(case: Case, key: str) -> tuple[float, float, float, float]:
         raise FvsolveError(f"is not a schedule of this case{suggestion or f'. {known}'}")
     if schedule.constant or schedule.kind not in ("linear", "smooth", "ramp") or len(schedule.time) < 2:
         example = '{ start = "1 s", duration = "10 s", value = [1, 0] }'
-        raise FvsolveError(f"does not change from one value to another. Expected a ramp or a table, such as {example}")
+        raise FvsolveError(f"does not change from one value to another; expected a ramp or a table, such as {example}")
     ends = float(schedule.time[0]), float(schedule.time[-1]), float(schedule.value[0]), float(schedule.value[-1])
     if ends[2] == ends[3]:
-        raise FvsolveError(f"begins and ends at {show(ends[2])}. Expected different values at start and end")
+        raise FvsolveError(f"begins and ends at {show(ends[2])}; expected different values at start and end")
     return ends
 
 

@@ -482,7 +482,7 @@ def check_port(case, port: str | None) -> None:
     if port is not None and port not in ports:
         hint = did_you_mean(port, ports) or f". Ports are {', '.join(ports)}"
         hint = hint if ports else "; the case has no such node"
-        raise FvsolveError(f'no port named "{port}". Expected a reservoir, an inflow or a junction{hint}')
+        raise FvsolveError(f'no port named "{port}"; expected a reservoir, an inflow or a junction{hint}')
 
 
 def port_verdict(run: EnergyRun, port: str) -> Port:

@@ -327,7 +327,7 @@ def failure_map(
     refuse_basins(case, "map")
     case = load(case, fixed_choices(case))
     if not (math.isfinite(tolerance) and tolerance > 0):
-        raise FvsolveError(f"--tolerance {tolerance} is out of range. Expected a positive number, for example 0.02")
+        raise FvsolveError(f"--tolerance {tolerance} is out of range; expected a positive number, for example 0.02")
     base = {"output.every": (case.numerics.end - case.numerics.start) / OUTPUT_ROWS}
     column_set = map_columns(case, base, courants, steps, key)
     own_schemes = name_list(schemes) or default_schemes(case, column_set)

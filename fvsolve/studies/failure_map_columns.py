@@ -260,11 +260,11 @@ def _check_options(courants, steps, key) -> None:
         if values is not None and not all(math.isfinite(value) and value > 0 for value in values):
             raise FvsolveError(f"{option}: expected positive numbers")
         if values is not None and len(values) == 0:
-            raise FvsolveError(f"{option} is empty. Expected at least one number")
+            raise FvsolveError(f"{option} is empty; expected at least one number")
     if key is not None and len(courants or steps or [0]) > 1:
         text = "with --key, the values of the key are the columns"
-        raise FvsolveError(f"{text}. Expected at most one number in --step or --courant")
+        raise FvsolveError(f"{text}; expected at most one number in --step or --courant")
     if key is not None and not key[1]:
-        raise FvsolveError("--key has no values. Expected KEY=a,b,c with at least one value")
+        raise FvsolveError("--key has no values; expected KEY=a,b,c with at least one value")
     if key is not None and key[0] in MAP_KEYS:
         raise FvsolveError(f"--key {key[0]} is impossible: the map sets it by --scheme, --method, --courant and --step")

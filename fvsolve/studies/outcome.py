@@ -84,7 +84,7 @@ class RowSink:
     def field(self, t: float, frame: dict) -> None:
         """Ignore a field frame with values of cells."""
 
-    def checkpoint(self, state, extra: dict) -> None:
+    def checkpoint(self, state) -> None:
         """Ignore a checkpoint."""
 
     def end(self, summary) -> None:

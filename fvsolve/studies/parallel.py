@@ -59,7 +59,7 @@ class TaskPool:
 
     def __init__(self, work: Work, jobs: int = 1, dask: str | None = None) -> None:
         if jobs < 1:
-            raise FvsolveError(f"jobs = {jobs} is out of range. Expected 1 or more")
+            raise FvsolveError(f"jobs = {jobs} is out of range; expected 1 or more")
         self.work, self.jobs, self.dask = work, jobs, dask
         self.in_process, self.has_started = dask is None and jobs == 1, False
         self.workers: Any = None
@@ -301,7 +301,7 @@ def connect(address: str) -> Any:
         text = str(error).split("\n")[0] or type(error).__name__
     if client is None:
         gc.collect()  # closes the failed client now: while another client starts, Dask would wait for ever
-        raise FvsolveError(f'no Dask scheduler answers at "{address}": {text}. Expected an address such as '
+        raise FvsolveError(f'no Dask scheduler answers at "{address}": {text}; expected an address such as '
                            "tcp://10.0.0.1:8786; the command `dask scheduler` prints it")  # fmt: skip
     return client
 

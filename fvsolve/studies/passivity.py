@@ -136,7 +136,7 @@ def check_names(given, known: list[str], kind: str) -> list[str]:
                     f'method "{AUTO}" is not a single method: it changes between {EXPLICIT} and {IMPLICIT} '
                     f"({TIGHT_IMPLICIT} below rtol {TIGHT_BELOW:g}); name these methods instead"
                 )
-            hint = did_you_mean(name, known) or f". Expected {', '.join(known)}"
+            hint = did_you_mean(name, known) or f"; expected {', '.join(known)}"
             raise FvsolveError(f'no {kind} named "{name}"{hint}')
     return given or list(known)
 

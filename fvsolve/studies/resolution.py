@@ -227,7 +227,7 @@ def refinable_counts(case) -> Counts:
     if not cells_by_key:
         files, reason = basins_from_files(case), "this case has no pipe or basin, and so no cells"
         reason = f"meshes from files cannot be refined ({listing(files)})" if files else reason
-        raise FvsolveError(f'{reason}: refine = "both" or "space" is impossible. Expected "time"')
+        raise FvsolveError(f'{reason}: refine = "both" or "space" is impossible; expected "time"')
     return cells_by_key
 
 

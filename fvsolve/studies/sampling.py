@@ -40,7 +40,7 @@ def sample_points(case: Case, vary: Mapping[str, Sequence[Any]], sample: str, se
     """
     match = re.fullmatch(r"(\w+):(\d+)", sample.strip())
     if match is None or match[1] not in SAMPLERS or not 0 < int(match[2]) <= MAX_RUNS:
-        raise FvsolveError(f"sample = {show(sample)} is not valid. Expected {SAMPLE_FORMAT}")
+        raise FvsolveError(f"sample = {show(sample)} is not valid; expected {SAMPLE_FORMAT}")
     low, high = (np.array(side) for side in zip(*key_ranges(case, vary).values(), strict=True))
     from scipy.stats import qmc
 
@@ -70,16 +70,16 @@ def range_of(case: Case, key: str, given: Sequence[Any]) -> tuple[float, float]:
     given : two values, each a number or a text with a unit
     """
     if len(given) != 2:
-        raise ValueError(f"{show(list(given))} is not a range. Expected two values, LOW,HIGH")
+        raise ValueError(f"{show(list(given))} is not a range; expected two values, LOW,HIGH")
     quantity, setting = key_quantity(case.raw, key), ReadContext(ambient=case.ambient_pressure)
     if quantity is None:
         raise ValueError("is not a continuous quantity, so it has no range. Use a grid: --set KEY=a,b,c")
     low, high = (quantity.read(parsed(end), setting) for end in given)
     if isinstance(low, units.Kinematic) or isinstance(high, units.Kinematic):
-        raise ValueError(f"{show(list(given))} is a kinematic viscosity. Expected dynamic viscosities in Pa s or mPa s")
+        raise ValueError(f"{show(list(given))} is a kinematic viscosity; expected dynamic viscosities in Pa s or mPa s")
     if not low < high:
         reason = "is empty" if low == high else "is reversed"
-        raise ValueError(f"the range from {show(given[0])} to {show(given[1])} {reason}. Expected LOW below HIGH")
+        raise ValueError(f"the range from {show(given[0])} to {show(given[1])} {reason}; expected LOW below HIGH")
     return float(low), float(high)
 
 
@@ -140,7 +140,7 @@ def points_from_file(path: Path, source: Any, raw: dict[str, Any]) -> list[dict[
     try:
         table = read_rows(path)
     except ValueError as error:
-        raise FvsolveError(f"{error}. Expected a header of keys and a row for each run") from None
+        raise FvsolveError(f"{error}; expected a header of keys and a row for each run") from None
     faults = [f"two columns have the key {name}" for name in dict.fromkeys(table.names) if table.names.count(name) > 1]
     keys = [Heading.of(header, raw, faults) for header in table.header]
     rows = [{key.name: key.read(cell, f"line {line}, {key.name}", faults) for key, cell in zip(keys, row, strict=True)}
@@ -183,10 +183,10 @@ class Heading:
         """Value of a cell of the file as an override; faults, with the name `place` of the cell, go to `faults`."""
         value = number(cell)
         if not cell:
-            faults.append(f"{place}: is empty. Expected a value in every row")
+            faults.append(f"{place}: is empty; expected a value in every row")
         elif self.unit and value is None:
-            expected = "Expected a number without unit: the unit is in the header"
-            faults.append(f"{place}: {show(cell)} is not a number. {expected}")
+            expected = "expected a number without unit: the unit is in the header"
+            faults.append(f"{place}: {show(cell)} is not a number; {expected}")
         elif self.unit:
             return f"{value!r} {self.unit}"
         elif value is not None and self.quantity is not None:

@@ -70,13 +70,13 @@ def read_scenarios(path: str | Path) -> Scenarios:
         raise CaseError([Fault("", f"is a case, not a study. {text}")], path.name)
     for key in data:
         if key not in KEYS:
-            fault((key,), f"unknown key{did_you_mean(key, KEYS) or '. Expected ' + ', '.join(KEYS)}")
+            fault((key,), f"unknown key{did_you_mean(key, KEYS) or '; expected ' + ', '.join(KEYS)}")
     for key, kind, kind_text in (("title", str, "text"), ("estimate_error", bool, "true or false")):
         if not isinstance(data.get(key, kind()), kind):
             fault((key,), f"{show(data[key])} is not {kind_text}")
     sets = {group: read_overrides(data.get(group, {}), group, fault) for group in ("events", "protections")}
     if not faults and not any(sets.values()):
-        fault((), "the study has no runs. Expected [events.NAME], [protections.NAME] or both")
+        fault((), "the study has no runs; expected [events.NAME], [protections.NAME] or both")
     for event, protection, key, other in all_conflicts(**sets):
         text = f"{key} is set here, and {other} in protections.{protection}; the two are in conflict"
         fault(("events", event, key), text)
@@ -109,7 +109,7 @@ def case_path(case: Any, folder: Path, fault: AddFault) -> Path | None:
     fault : fault(keys, message) records a fault
     """
     if not isinstance(case, str):
-        missing = "case is missing. Expected the name of the case file of the study"
+        missing = "case is missing; expected the name of the case file of the study"
         text = missing if case is None else f"{show(case)} is not a text"
         fault(() if case is None else ("case",), text)
         return None
@@ -127,14 +127,14 @@ def case_path(case: Any, folder: Path, fault: AddFault) -> Path | None:
 def read_overrides(table: Any, group: str, fault) -> dict[str, dict[str, Any]]:
     """Overrides of a group, "events" or "protections" : name -> {dotted key: value}; adds faults by fault()."""
     if not isinstance(table, dict):
-        fault((group,), f"{show(table)} is not a table. Expected named tables, [{group}.NAME]")
+        fault((group,), f"{show(table)} is not a table; expected named tables, [{group}.NAME]")
         return {}
     sets = {}
     for name, overrides in table.items():
         if not isinstance(overrides, dict):
-            fault((group, name), f'{show(overrides)} is not a table. Expected keys such as links.pump.trip = "2 s"')
+            fault((group, name), f'{show(overrides)} is not a table; expected keys such as links.pump.trip = "2 s"')
         elif not name.replace("-", "").replace("_", "").isalnum():
-            fault((group, name), f"{show(name)} is not a valid name. Expected letters, digits, _ and -")
+            fault((group, name), f"{show(name)} is not a valid name; expected letters, digits, _ and -")
         else:
             sets[name] = dict(dotted_keys(overrides))
     return sets
@@ -414,9 +414,9 @@ def study_faults(data: Any) -> Iterator[str]:
     """Yield a text for each entry of study.json with a wrong type, and for run directories outside of its folder."""
     faults = list(faults_of(data, StudyShape))
     if not faults and not data["runs"]:
-        faults = ["runs: an empty list. Expected at least one run"]
+        faults = ["runs: an empty list; expected at least one run"]
     yield from faults
     for k, row in enumerate(() if faults else data["runs"]):
         path = PurePath(row["directory"])
         if path.is_absolute() or ".." in path.parts or "\0" in row["directory"]:
-            yield f"runs.{k}.directory: {show(row['directory'])} is outside of the folder. Expected a path below it"
+            yield f"runs.{k}.directory: {show(row['directory'])} is outside of the folder; expected a path below it"

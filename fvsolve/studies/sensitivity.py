@@ -79,7 +79,7 @@ def sensitivity(
     Raises FvsolveError if a run does not have the quantity, if the quantity is constant, and if SALib is not installed.
     """
     if samples < MIN_SAMPLES:
-        raise FvsolveError(f"samples = {samples} is too small. Expected {MIN_SAMPLES} or more, a power of two")
+        raise FvsolveError(f"samples = {samples} is too small; expected {MIN_SAMPLES} or more, a power of two")
     if callable(case):
         bounds = {key: (float(low), float(high)) for key, (low, high) in vary.items()}
     else:
@@ -91,10 +91,10 @@ def sensitivity(
     if callable(case):
         values = np.array([float(case(point)) for point in points])
         if not np.isfinite(values).all():
-            raise FvsolveError("the function is not finite at some points. Expected ranges in which it is finite")
+            raise FvsolveError("the function is not finite at some points; expected ranges in which it is finite")
     else:
         if quantity is None:
-            raise FvsolveError('no quantity. Expected a quantity such as "max(gate.pressure)"')
+            raise FvsolveError('no quantity; expected a quantity such as "max(gate.pressure)"')
         sweep_result = sweep(case, set=set, jobs=jobs, out=out, progress=progress, points=points, dask=dask)
         quantity, values = sweep_result.quantity(quantity), values_of(sweep_result, quantity)
     indices = analyse_values(bounds, sobol, values[: len(sobol)], morris, values[len(sobol) :], seed)
@@ -109,7 +109,7 @@ def values_of(result, quantity: str) -> np.ndarray:
         values = ", ".join(f"{key} = {missing[0][key]:.6g}" for key in result.keys)
         verb = "has" if len(missing) == 1 else "have"
         raise FvsolveError(f"{len(missing)} of {len(result.rows)} runs {verb} no {name}, the first at {values}: "
-                           f"{missing[0]['reason']}. Expected ranges in which all runs have {name}")  # fmt: skip
+                           f"{missing[0]['reason']}; expected ranges in which all runs have {name}")  # fmt: skip
     return np.array([float(row[name]) for row in result.rows])
 
 

@@ -85,7 +85,7 @@ def number_and_unit(given: Any) -> tuple[float, str]:
         return float(given), ""
     match = _VALUE.fullmatch(given.strip()) if isinstance(given, str) else None
     if match is None:
-        raise ValueError(f'{show(given)} is not a number. Expected a value such as 2 or "2 m3"')
+        raise ValueError(f'{show(given)} is not a number; expected a value such as 2 or "2 m3"')
     return float(match[1]), match[2]
 
 
@@ -105,7 +105,7 @@ def parse_range(low: Any, high: Any) -> tuple[float, float, str]:
             raise FvsolveError(f"{text}. Use the same unit for both")
         a = float(second.number(first.si(a)))
     if not a < b:
-        raise FvsolveError(f"{show(low)} is not below {show(high)}. Expected LOW,HIGH")
+        raise FvsolveError(f"{show(low)} is not below {show(high)}; expected LOW,HIGH")
     return a, b, unit_b
 
 
@@ -290,10 +290,10 @@ def find_faults(
     """
     faults: list[Fault] = []
     if goal not in GOALS:
-        hint = did_you_mean(str(goal), GOALS) or f". Expected {' or '.join(GOALS)}"
+        hint = did_you_mean(str(goal), GOALS) or f"; expected {' or '.join(GOALS)}"
         faults.append(Fault("goal", f"{show(goal)} is unknown{hint}"))
     if not 0.0 < rtol < 1.0:
-        faults.append(Fault("rtol", f"{rtol} is out of range. Expected a number between 0 and 1"))
+        faults.append(Fault("rtol", f"{rtol} is out of range; expected a number between 0 and 1"))
     count = len(faults)
     with collect_faults(faults, f"--vary {key}"):
         low, high, unit = parse_range(*span) if span else (0.0, 1.0, "")
@@ -303,9 +303,9 @@ def find_faults(
         with collect_faults(faults, f"--dependent {name}"):
             Arithmetic(text)
             if name == key:
-                raise ValueError("is the key that is sized. Expected another key")
+                raise ValueError("is the key that is sized; expected another key")
     if case is not None and not case.limits:
-        text = 'has no limits. Expected a table under [limits], such as { on = "pipes", maximum = "10 barg" }'
+        text = 'has no limits; expected a table under [limits], such as { on = "pipes", maximum = "10 barg" }'
         faults.append(Fault("", f"{case.name} {text}"))
     if case is not None and span and len(faults) == count + (not case.limits):
         run_faults: list[Fault] = []

@@ -149,7 +149,7 @@ def sweep(
     be read or a key is unknown, and with `sample` also for other faults of the case; RunError if `out` is in use.
     """
     if jobs < 1:
-        raise FvsolveError(f"jobs = {jobs} is out of range. Expected 1 or more")
+        raise FvsolveError(f"jobs = {jobs} is out of range; expected 1 or more")
     base = dict(set or {})
     raw = case.raw if isinstance(case, Case) else read_raw(find_source(case)).table
     runs = planned_values(case, raw, base, vary or {}, points, sample, seed)
@@ -169,11 +169,11 @@ def planned_values(
     """
     if points is not None:
         if vary or sample:
-            raise FvsolveError("`points` has all values of every run. Expected no `vary` and no `sample` in addition")
+            raise FvsolveError("`points` has all values of every run; expected no `vary` and no `sample` in addition")
         in_file = PATH.accepts(points)
         runs = points_from_file(Path(points), source, raw) if in_file else [dict(point) for point in points]
         if not runs or not runs[0] or any(point.keys() != runs[0].keys() for point in runs):
-            raise FvsolveError("`points` is empty or has different keys. Expected one or more keys, equal in every run")
+            raise FvsolveError("`points` is empty or has different keys; expected one or more keys, equal in every run")
         return runs
     if sample is not None:
         if not vary:
@@ -183,7 +183,7 @@ def planned_values(
         raise FvsolveError("no key varies. Give at least two values of a key, for example links.main.cells=100,200")
     empty = [key for key, values in vary.items() if not len(values)]
     if empty:
-        raise FvsolveError(f"{', '.join(empty)}: no values. Expected at least one value")
+        raise FvsolveError(f"{', '.join(empty)}: no values; expected at least one value")
     return grid(vary)
 
 

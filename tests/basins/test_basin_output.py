@@ -391,7 +391,7 @@ def test_view_animates_all_frames(dam, fvs):
     bar = [frame[-60:, 30:430].std() for frame in frames]  # every frame has the colour bar
     assert min(bar) > 20.0 and np.abs(frames[1] - frames[0])[:400].max() > 50
     code, _, err = fvs("view", dam, "--animate", "dam.avi")
-    assert code == 2 and "Expected a file name that ends in .gif or .mp4" in err
+    assert code == 2 and "expected a file name that ends in .gif or .mp4" in err
     code, _, err = fvs("view", dam, "--animate", "dam.gif", "--time", "0 s")
     assert code == 2 and "--animate draws all times" in err
 

@@ -80,11 +80,11 @@ INTEGRATE = {
     "misspelt": (dict(method="radau-iia5"), 'no method named "radau-iia5"; did you mean "radau-iia-5"'),
     "below rounding": (
         dict(method="radau-iia-5", rtol=1e-14),
-        "rtol = 1e-14 is below rounding errors. Expected 1e-13 or more",
+        "rtol = 1e-14 is below rounding errors; expected 1e-13 or more",
     ),
     "moves nothing": (
         dict(method="gauss-4", step=1e-17),
-        "step = 1e-17 is too small to change the time. Expected more",
+        "step = 1e-17 is too small to change the time; expected more",
     ),
     "neither": (dict(method="gauss-4"), "gauss-4 has no error estimate; give step, or one of"),
     "rtol without an estimate": (dict(method="gauss-4", rtol=1e-6), "gauss-4 has no error estimate"),
@@ -93,7 +93,7 @@ INTEGRATE = {
     "infinite": (dict(method="radau-iia-5", step=float("inf")), "step = inf is not a positive number"),
     "text": (dict(rtol="1e-6"), "rtol = '1e-6' is not a positive number"),
     "auto by steps": (dict(method="auto", step=0.1), 'method "auto" uses error control; give rtol'),
-    "negative atol": (dict(atol=-1.0), "atol = -1.0 is not valid. Expected a positive number, or a row"),
+    "negative atol": (dict(atol=-1.0), "atol = -1.0 is not valid; expected a positive number, or a row"),
     "atol of another length": (dict(atol=[1e-6, 1e-6]), "positive numbers with the length of y0, 1"),
 }
 
@@ -110,7 +110,7 @@ WRONG = {
     "too many": (lambda t, y: np.array([y[1], y[0], 0.0]), [1.0, 0.0], "f(t, y) gives 3 rates for 2 states"),
     "nothing": (lambda t, y: None, [1.0], "f(t, y) gives 0 rates for 1 states"),
     "no function": (5, [1.0], "f = 5 cannot be called"),
-    "no numbers": (lambda t, y: -y, ["a"], "y0 = ['a'] is not valid. Expected real numbers"),
+    "no numbers": (lambda t, y: -y, ["a"], "y0 = ['a'] is not valid; expected real numbers"),
 }
 
 

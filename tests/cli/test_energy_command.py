@@ -110,7 +110,7 @@ def test_without_a_case_it_says_what_schemes_and_methods_claim(told):
     "arguments, fault",
     [
         (["--port", "gat"], 'no port named "gat"'), (["--scheme", "upwnd"], 'did you mean "upwind"'),
-        (["--method", "xyz"], "Expected euler, improved-euler"), (["--scheme", "quik"], "Expected upwind, muscl"),
+        (["--method", "xyz"], "expected euler, improved-euler"), (["--scheme", "quik"], "expected upwind, muscl"),
         (["--method", "rk5"], 'no method named "rk5"'), (["--set", "nodes.lake.hed=3"], "unknown key"),
     ],
 )  # fmt: skip
@@ -163,7 +163,7 @@ def test_without_a_case_auto_is_said_to_be_several_methods(told):
 def test_a_case_without_ports_says_that_it_has_none(told, tanks):
     code, _, err = told(tanks, "--port", "a")
     assert code == 2
-    assert err.strip().endswith("Expected a reservoir, an inflow or a junction; the case has no such node")
+    assert err.strip().endswith("expected a reservoir, an inflow or a junction; the case has no such node")
 
 
 def test_what_newton_leaves_is_told_beside_the_verdict(told, tmp_path):

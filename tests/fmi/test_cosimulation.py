@@ -172,7 +172,7 @@ def test_the_head_and_the_pressure_of_a_reservoir_are_held_by_the_last_value(sla
 def test_values_out_of_range_and_outputs_are_refused_in_words(slave, capsys):
     running = slave("valve-closure")
     for name, value, words in (
-        ("valve.opening", 1.5, "valve.opening = 1.5 is out of range. Expected a number from 0, shut, to 1, open"),
+        ("valve.opening", 1.5, "valve.opening = 1.5 is out of range; expected a number from 0, shut, to 1, open"),
         ("lake.pressure", np.nan, "lake.pressure = nan is not finite"),
         ("gate.head", 1.0, "gate.head is an output of the FMU"),
     ):
@@ -187,7 +187,7 @@ def test_times_of_the_host_are_checked_in_words(slave, capsys):
     running = slave("two-tanks")
     running.setup_experiment(0.0, 320.0, None)
     assert capsys.readouterr().err == ""
-    with pytest.raises(FvsolveError, match="the start time is 5 s, but the case starts at 0 s. Expected startTime = 0"):
+    with pytest.raises(FvsolveError, match="the start time is 5 s, but the case starts at 0 s; expected startTime = 0"):
         running.setup_experiment(5.0, None, None)
     capsys.readouterr()
     running.setup_experiment(0.0, 400.0, None)
@@ -228,5 +228,5 @@ def test_a_missing_package_is_named_with_its_remedy(fvs, tmp_path, monkeypatch):
 
 
 def test_a_name_of_another_type_is_refused(tmp_path):
-    with pytest.raises(FvsolveError, match=r"tanks.zip: unknown type of file. Expected a name that ends in .fmu"):
+    with pytest.raises(FvsolveError, match=r"tanks.zip: unknown type of file; expected a name that ends in .fmu"):
         write_fmu(fvsolve.load("two-tanks"), str(tmp_path / "tanks.zip"))

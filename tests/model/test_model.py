@@ -119,13 +119,13 @@ def test_advance_stops_for_the_reason_for_which_a_run_stops():
 @pytest.mark.parametrize(
     "name, value, said",
     [
-        ("v1.opening", 2, "v1.opening = 2 is out of range. Expected a number from 0, shut, to 1, open"),
+        ("v1.opening", 2, "v1.opening = 2 is out of range; expected a number from 0, shut, to 1, open"),
         ("v1.opening", -1, "v1.opening = -1 is out of range"),
-        ("v1.opening", np.nan, "v1.opening = nan is not finite. Expected a number from 0"),
-        ("v1.opening", "50 %", 'v1.opening = "50 %" is not a number. Expected a number from 0'),
-        ("sea.pressure", -5e5, "sea.pressure = -500000 is a vacuum. Expected an absolute pressure above 0"),
-        ("lake.head", -20.0, "lake.head = -20 is -9.481e+04 Pa absolute. Expected a head"),
-        ("gate.demand", np.inf, "gate.demand = inf is not finite. Expected a finite number"),
+        ("v1.opening", np.nan, "v1.opening = nan is not finite; expected a number from 0"),
+        ("v1.opening", "50 %", 'v1.opening = "50 %" is not a number; expected a number from 0'),
+        ("sea.pressure", -5e5, "sea.pressure = -500000 is a vacuum; expected an absolute pressure above 0"),
+        ("lake.head", -20.0, "lake.head = -20 is -9.481e+04 Pa absolute; expected a head"),
+        ("gate.demand", np.inf, "gate.demand = inf is not finite; expected a finite number"),
         ("gate.demand", None, "gate.demand = None is not a number"),
     ],
 )

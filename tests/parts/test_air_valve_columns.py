@@ -258,7 +258,7 @@ class Kept:
     def field(self, t, fields):
         pass
 
-    def checkpoint(self, state, extra):
+    def checkpoint(self, state):
         self.states.append(state)
 
     def end(self, summary):

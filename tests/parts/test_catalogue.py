@@ -143,7 +143,7 @@ def test_what_was_not_read_is_refused_and_asked_for():
         ({"class": "K9", "nominal": "DN310", "material": "ductile-iron"}, "the nearest sizes are DN250, DN300, DN350"),
         ({"class": "C20", "nominal": "DN300", "material": "ductile-iron"}, "expected one of C100, C40, C50, C64"),
         ({"class": "X9", "nominal": "DN300"}, 'unknown class "X9"'),
-        ({"class": "PN16", "nominal": "DN110", "material": "PVC-U"}, "Expected one of these materials, or a class"),
+        ({"class": "PN16", "nominal": "DN110", "material": "PVC-U"}, "expected one of these materials, or a class"),
         ({"class": "SDR11", "nominal": "DN110", "material": "PE80", "restraint": "joints"}, "needs Poisson's ratio"),
         ({"diameter": 0.3, "restraint": "ancored"}, 'unknown restraint "ancored"'),
         ({"diameter": 0.3, "wave_speed": 1e3, "restraint": 1.0}, "wave_speed and restraint are given; keep one"),

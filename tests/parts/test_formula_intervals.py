@@ -8,7 +8,7 @@ from reference.scenes import scene, tank
 
 import fvsolve
 from fvsolve.errors import FvsolveError
-from fvsolve.parts.formula_intervals import enclose, find_pole, find_pulses
+from fvsolve.parts.formula_intervals import find_pole, find_pulses
 from fvsolve.parts.formula_program import Program
 
 POLES = {
@@ -25,7 +25,7 @@ REGULAR = [
 
 def sampled(text):
     program = Program(text)
-    return program, *program.samples(0.0, 10.0)
+    return program.bounds, *program.samples(0.0, 10.0)
 
 
 @pytest.mark.parametrize("text", POLES)
@@ -52,7 +52,7 @@ def test_values_lie_within_their_bounds(text):
     width = 10.0 ** random.uniform(-6, 0, 400)
     program = Program(text)
     breaks = np.array(program.break_times)
-    found = enclose(program, begin, begin + width)
+    found = program.bounds(begin, begin + width)
     for share in random.uniform(0.0, 1.0, 5):
         with np.errstate(all="ignore"):
             values = np.array([program.value(t) for t in (begin + share * width).tolist()])

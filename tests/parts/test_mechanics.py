@@ -378,7 +378,7 @@ def test_a_controller_may_hold_spool_and_force():
         x = model.state_names.index("load.position")
         assert sign * state.y[x] > 1e-3 and sign * other.y[x] < 0.0
     with pytest.raises(
-        fvsolve.FvsolveError, match="spool.position = 2 is out of range. Expected a number from -1 to 1"
+        fvsolve.FvsolveError, match="spool.position = 2 is out of range; expected a number from -1 to 1"
     ):
         fvsolve.advance(model, fvsolve.initial_state(model), 0.02, {"spool.position": 2.0})
 

@@ -216,7 +216,7 @@ def test_without_stored_fields_the_page_says_why_nothing_moves(tmp_path):
 
 
 def test_a_report_of_what_is_no_run_says_what_is_there(closure, tmp_path, monkeypatch):
-    with pytest.raises(fvsolve.RunError, match=r"nowhere does not exist\. Expected a run directory"):
+    with pytest.raises(fvsolve.RunError, match=r"nowhere does not exist; expected a run directory"):
         write_report(tmp_path / "nowhere")
     with pytest.raises(fvsolve.RunError, match="does not hold a finished run"):
         write_report(tmp_path)

@@ -131,7 +131,7 @@ def test_each_entry_of_a_summary_has_a_declared_type(key, whole, tmp_path):
     said = str(error.value)
     assert said.startswith(f"{tmp_path / 'summary.json'}: {key}: ") and "run the case again with --force" in said
     found = "it is a table" if wrong == {"a": 1} else '"words" is a text'
-    assert f"{key}: {found}. Expected " in said
+    assert f"{key}: {found}; expected " in said
 
 
 def test_all_faults_of_a_summary_are_listed_up_to_five_and_the_rest_is_counted(whole, tmp_path):
@@ -141,7 +141,7 @@ def test_all_faults_of_a_summary_are_listed_up_to_five_and_the_rest_is_counted(w
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     with pytest.raises(RunError) as error:
         fvsolve.open_run(tmp_path)
-    assert str(error.value).count("Expected a number or null") == 5 and "; and 3 more. " in str(error.value)
+    assert str(error.value).count("expected a number or null") == 5 and "; and 3 more. " in str(error.value)
 
 
 @pytest.mark.parametrize("change, told", [

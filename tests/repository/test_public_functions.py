@@ -262,7 +262,7 @@ def test_a_study_says_what_is_wrong_with_what_it_is_given():
         model = fvsolve.build(fvsolve.load(still()))
         advance(model, initial_state(model), 1.0, {3: 1.0})
     for bad in (lambda s: "a", lambda s: np.zeros(3), lambda s: {}):
-        with pytest.raises(FvsolveError, match="Expected a number for each"):
+        with pytest.raises(FvsolveError, match="expected a number for each"):
             studies.sweep_positive_real(bad, 0.0, 1.0)
 
 

@@ -24,6 +24,7 @@ IN_NAMES = frozenset(
 IN_TEXTS = re.compile(
     r"\b(wanted|wants|is none|(?<!there )is no [a-z]+|are none|told|asked for|heeded|nobody|bears|meant)\b"
 )
+FULL_STOP = re.compile(r"\. Expected (?!orders)")  # the words of a message are "FAULT; expected ..."
 PUBLIC = frozenset({"what", "found", "told", "rungs", "kept", "why"})  # fields of JSON files
 OPENINGS = re.compile(r"(What|Which|Whether|That|As|The same)\b")
 
@@ -96,6 +97,10 @@ def test_no_module_has_a_forbidden_word_in_its_name():
 
 def test_no_message_nor_help_has_a_forbidden_word():
     assert [(place, text) for place, text in found()["texts"] if IN_TEXTS.search(text)] == []
+
+
+def test_an_expectation_follows_its_fault_in_the_same_sentence():
+    assert [(place, text) for place, text in found()["texts"] if FULL_STOP.search(text)] == []
 
 
 def test_no_docstring_begins_with_a_relative_clause():

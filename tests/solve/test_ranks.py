@@ -176,7 +176,7 @@ for name""", 1)  # fmt: skip
 def test_more_ranks_than_rows_threads_of_ranks_and_a_fault_are_said_once(tmp_path, monkeypatch):
     case = water(basin={"cells": [8, 2], "patches": {}}, link=None)
     found = ranks(3, sys.executable, "-c", SCRIPT, json.dumps({"run": case}), tmp_path / "a")
-    assert found.returncode != 0 and found.stderr.count("Expected at most 2") == 1
+    assert found.returncode != 0 and found.stderr.count("; expected at most 2") == 1
     found = ranks(2, sys.executable, "-m", "fvsolve", "run", "dam-break", "--threads", "2", "--out", tmp_path / "b")
     assert found.returncode != 0 and found.stderr.count("under MPI each of the 2 ranks is one thread") == 1
     found = ranks(2, sys.executable, "-m", "fvsolve", "run", "dam-brake", "--out", tmp_path / "c")

@@ -287,7 +287,7 @@ class Keeping(MemorySink):
         super().__init__(model)
         self.states = []
 
-    def checkpoint(self, state, extra) -> None:
+    def checkpoint(self, state) -> None:
         self.states.append(state)
 
 

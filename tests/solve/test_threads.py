@@ -320,9 +320,9 @@ def test_a_number_of_threads_that_is_none_is_named(threads):
 
 
 def test_more_threads_than_rows_are_named():
-    with pytest.raises(FvsolveError, match="pool has 12 rows, and each thread needs at least one. Expected at most 12"):
+    with pytest.raises(FvsolveError, match="pool has 12 rows, and each thread needs at least one; expected at most 12"):
         fvsolve.run(water(), threads=13)
-    text = "pool has 12 blocks of 256 cells, and each thread needs at least one. Expected at most 12"
+    text = "pool has 12 blocks of 256 cells, and each thread needs at least one; expected at most 12"
     with pytest.raises(FvsolveError, match=text):
         fvsolve.run(water(basin=MESH), threads=13)
 

@@ -154,8 +154,8 @@ def test_every_decimal_of_a_published_array_counts():
         ("0 |\n1 | sqrt(1/2)\n--+--\n | 1/2 1/2", "expected sqrt(n) of an integer"),
         ("0 |\n1 | sqrt(123456789012)\n--+--\n | 1/2 1/2", "expected sqrt(n) of an integer"),
         ("0 |\n1e99 | 1e99\n--+--\n | 1/2 1/2", '"1e99" is beyond 1e+30'),
-        ("0 |", "Expected rows, a line of dashes and weights"),
-        ("", "Expected rows, a line of dashes and weights"),
+        ("0 |", "expected rows, a line of dashes and weights"),
+        ("", "expected rows, a line of dashes and weights"),
         ("0\n--+--\n | 1", 'has no "|"'),
         ("0 |\n--+----\n | 1/2 1/2", "one or two rows of 1"),
         (
@@ -249,7 +249,7 @@ ALL, LINEAR, TIME = "too small", "zero there", "y' = f(t), so the error estimate
 def test_an_error_estimate_that_is_zero_for_all_problems_of_a_kind_is_refused(arguments, wanted):
     with pytest.raises(FvsolveError) as caught:
         tableau("blind", **arguments)
-    assert wanted in str(caught.value) and "Expected an embedded solution of another order" in str(caught.value)
+    assert wanted in str(caught.value) and "expected an embedded solution of another order" in str(caught.value)
     assert "blind" not in METHODS
 
 
@@ -284,10 +284,10 @@ def test_a_row_of_weights_of_fehlbergs_pair_is_a_method():
         (dict(A=[[[0, 0], [1, 0]], [1, 0]], b=[0.5, 0.5]), "A has rows of different lengths"),
         (dict(A=HEUN_2, b=[[0.5, 0.5], [1]]), "b has rows of different lengths"),
         (dict(A=[HEUN_2], b=[0.5, 0.5]), "A has shape (1, 2, 2)"),
-        (dict(A=HEUN_2, b=[[0.5, 0.5]] * 3), "b (3, 2). Expected"),
+        (dict(A=HEUN_2, b=[[0.5, 0.5]] * 3), "b (3, 2); expected"),
         (dict(A=[], b=[]), "A has shape (1, 0)"),
         (dict(A={0: 1}, b=[1]), "is not a finite number"),
-        (dict(text="1 | 1\n--\n | 1", digits=0), "digits = 0 is out of range. Expected 1 to 75"),
+        (dict(text="1 | 1\n--\n | 1", digits=0), "digits = 0 is out of range; expected 1 to 75"),
         (dict(text="1 | 1\n--\n | 1", digits=10**9), "digits = 1000000000 is out of range"),
         (dict(text="1 | 1\n--\n | 1", start_weight="nan"), 'start_weight: "nan": unknown symbol'),
         (dict(text="1 | 1\n--\n | 1", start_weight="1e400"), 'start_weight: "1e400" is beyond 1e+30'),
@@ -306,7 +306,7 @@ def test_a_row_of_weights_of_fehlbergs_pair_is_a_method():
         (dict(text="g | g\n--\n | 1", numbers={"g": ("(x^64)^64-2", 1.0)}), "is too large for exact arithmetic"),
         (dict(text="((((2^64)^64)^64)^64)^64 | 1\n--\n | 1"), "is too large for exact arithmetic"),
         (dict(text="(" * 900 + " | 1\n--\n | 1"), "has more than 20 brackets within each other"),
-        (dict(text="1" * 5000 + " | 1\n--\n | 1"), "has 5000 characters. Expected at most 1000"),
+        (dict(text="1" * 5000 + " | 1\n--\n | 1"), "has 5000 characters; expected at most 1000"),
         (dict(text="1 | 1\n" * 10**5 + "--\n | 1"), "more than 100 stages"),
         (dict(text="x" * (10**6 + 1)), "the text has more than 1000000 characters"),
         (dict(text="0 | x\n" * 40 + "--\n | 1"), "and 20 more"),
@@ -340,7 +340,7 @@ def test_a_refusal_that_follows_from_rounding_names_the_order_with_exact_numbers
         "weights add up to 10001/10000; expected 1; with exact numbers in place of decimals of 4 digits it has order 3"
         in (str(caught.value))
     )
-    assert "Expected fractions, or decimals of 7 digits or more" in str(caught.value)
+    assert "expected fractions, or decimals of 7 digits or more" in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -111,7 +111,7 @@ def test_a_value_at_an_end_of_its_range_is_named(measured):
 def test_what_cannot_be_fitted_is_named(measured):
     case = line(LEAK, SPEED, 20, MODEL)
     with pytest.raises(
-        FvsolveError, match="no measured series to fit to. Expected a series under .compare. in the case"
+        FvsolveError, match="no measured series to fit to; expected a series under .compare. in the case"
     ):
         calibrate(case, {"links.valve.area": [0.0006, 0.001]})
     with pytest.raises(FvsolveError, match="no key to fit"):

@@ -398,7 +398,7 @@ def test_what_is_no_law_is_named(key: str, told: str) -> None:
 def test_what_cannot_be_minimised_is_named() -> None:
     with pytest.raises(fvsolve.CaseError, match='did you mean "gate"'):
         optimise(column(), "links.tap.opening", "max(gaet.pressure)")
-    with pytest.raises(FvsolveError, match="Expected 15 or more"):
+    with pytest.raises(FvsolveError, match="expected 15 or more"):
         optimise(column(), "links.tap.opening", "max(gate.pressure)", runs=4)
 
 

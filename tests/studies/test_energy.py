@@ -287,7 +287,7 @@ def test_a_port_that_is_none_is_named():
     case = scene({"pump": reservoir(5e6), "pot": chamber(0.5, 1e6)}, {"hole": valve("pump", "pot", 1e-6)}, 1.0, TIGHT)
     with pytest.raises(FvsolveError, match='did you mean "pump"'):
         energy(case, port="pumpp")
-    with pytest.raises(FvsolveError, match="Expected a reservoir"):
+    with pytest.raises(FvsolveError, match="expected a reservoir"):
         energy(case, port="pot")
 
 

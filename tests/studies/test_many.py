@@ -132,7 +132,7 @@ def test_a_scheduler_that_is_not_there_is_named(monkeypatch):
         free.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
         for wrong in (address, "nowhere:at:all", "tcp://"):
-            said = f'no Dask scheduler answers at "{wrong}": .*. Expected an address such as tcp'
+            said = f'no Dask scheduler answers at "{wrong}": .*; expected an address such as tcp'
             with pytest.raises(FvsolveError, match=said):
                 dict(run_tasks(Work(), [1, 2, 3], dask=wrong))
 
@@ -262,10 +262,10 @@ def test_workers_of_dask_find_the_same(line, cluster, study, asked):
 
 def test_what_has_no_name_to_be_sent_by_is_refused(line):
     with pytest.raises(
-        FvsolveError, match="initial, source and exact are functions of this process. Expected jobs = 1"
+        FvsolveError, match="initial, source and exact are functions of this process; expected jobs = 1"
     ):
         order(line, jobs=2, initial=lambda pipe, x: (x, x))
-    with pytest.raises(FvsolveError, match="jobs = 0 is out of range. Expected 1 or more"):
+    with pytest.raises(FvsolveError, match="jobs = 0 is out of range; expected 1 or more"):
         order(line, jobs=0)
 
 

@@ -479,8 +479,8 @@ def test_scatter_of_ten_percent_still_shows_the_order_within_its_spread(p):
 @pytest.mark.parametrize(
     ("errors", "words"),
     [
-        ([1e-2, 1e-3], "rows with a known error is 2. Expected at least 3"),
-        ([1e-2, math.nan, 1e-4], "rows with a known error is 2. Expected at least 3"),
+        ([1e-2, 1e-3], "rows with a known error is 2; expected at least 3"),
+        ([1e-2, math.nan, 1e-4], "rows with a known error is 2; expected at least 3"),
         ([0.0, 0.0, 0.0, 0.0], "above zero"),
         ([1.0, 1.0, 1.0, 1.0], "hardly fall"),
         ([1.0, 2.0, 3.0, 4.0], "do not fall"),

@@ -110,11 +110,11 @@ def test_what_cannot_be_asked_is_named(line):
     bounds = {"links.main.wave_speed": [900.0, 1300.0]}
     for given, said in (
         ({"vary": bounds, "quantity": "max(gate.flow)"}, 'no quantity "max.gate.flow."'),
-        ({"vary": bounds}, "no quantity. Expected a quantity such as"),
+        ({"vary": bounds}, "no quantity; expected a quantity such as"),
         ({"vary": {}, "quantity": "max(gate.pressure)"}, "no key varies"),
         (
             {"vary": bounds, "quantity": "max(gate.pressure)", "samples": 1},
-            "samples = 1 is too small. Expected 2 or more",
+            "samples = 1 is too small; expected 2 or more",
         ),
         (
             {"vary": {"nodes.gate.position": [0.0, 1.0]}, "quantity": "max(gate.pressure)"},

@@ -104,7 +104,7 @@ def test_other_parts_wrong_nodes_and_steps_are_refused():
     with pytest.raises(FvsolveError, match="step = 0.0 s is out of range"):
         water_quality(case, step=0.0)
     case["links"]["main"]["pipe_model"] = "finite-volume"
-    with pytest.raises(FvsolveError, match='main: not supported. Expected a network .* pipe_model = "quasi-steady"'):
+    with pytest.raises(FvsolveError, match='main: not supported; expected a network .* pipe_model = "quasi-steady"'):
         water_quality(case)
 
 

@@ -72,7 +72,7 @@ class TransportRows(BasinRows):
             around = is_outer_loop(mesh)[own - mesh.inner]  # report the outer outline, before the outlines of holes
             at = mesh.middle[own[np.argmax(np.where(around, speed, 0.0) if speed[around].any() else speed)]]
             text = f"the flow crosses the outline at x = {at[0]:.6g} m, y = {at[1]:.6g} m"
-            remedy = "where there is no named patch. Expected a patch with a name there"
+            remedy = "where there is no named patch; expected a patch with a name there"
             draft.fault(f"nodes.{self.name}.velocity", f"{text}, {remedy}")
             draft.check()
         row["unsplit"] = self.unsplit(row, passing)

@@ -158,7 +158,7 @@ class Controls(Feature, slot=1, wakes="section controls"):
         if not self.delays.size:
             return ""
         text = f"{function}(t, y) is not defined for a case with a control of type delay: y has no earlier inputs"
-        return f"{text}. Expected a case without it, or rhs(State) instead of rhs(t, y)"
+        return f"{text}; expected a case without it, or rhs(State) instead of rhs(t, y)"
 
     def run(self, run_data) -> ControlRun:
         return ControlRun(self, run_data)
@@ -281,7 +281,7 @@ def blocks_of(model) -> np.ndarray:
 def with_blocks(model, table: np.ndarray):
     """Copy of a model with other blocks."""
     own = with_slot(model.features, SLOT)
-    return replace(model, features=[own.with_table(table) if one is own else one for one in model.features])
+    return replace(model, features=[own.with_table(table) if other is own else other for other in model.features])
 
 
 def numbers_of(run_data) -> np.ndarray:

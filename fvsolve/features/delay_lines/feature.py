@@ -114,7 +114,7 @@ class DelayLines(Feature, slot=0, wakes="pipe_model delay-line, pipe_model auto"
         if not len(self.delays):
             return ""
         text = f"{function}(t, y) is not defined for a model with delay lines: y does not contain their waves"
-        return f'{text}. Expected pipe_model = "finite-volume" (or rhs(State) instead of rhs(t, y))'
+        return f'{text}; expected pipe_model = "finite-volume" (or rhs(State) instead of rhs(t, y))'
 
     def run(self, run_data) -> LineRun:
         return LineRun(self, run_data)
@@ -231,5 +231,5 @@ def history_of(run_data) -> np.ndarray:
 def seen_by_jumps(model):
     """Copy of a model with the tables of the view "sharp", in which short lines need their travel time."""
     own = with_slot(model.features, SLOT)
-    others = [own.seen_by_jumps() if one is own else one for one in model.features]
+    others = [own.seen_by_jumps() if other is own else other for other in model.features]
     return replace(model, tables=model.tables._replace(**own.sharp), features=others)

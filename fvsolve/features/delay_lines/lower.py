@@ -80,7 +80,7 @@ def jump_tables(draft, feature) -> tuple[dict[str, np.ndarray], np.ndarray]:
     own, tables, line = copy.copy(draft), draft.tables, copy.copy(feature)
     own.node_table, own.valve_table = draft.node_table.copy(), draft.valve_table.copy()
     own.coupling_table, line.delays = draft.coupling_table[:0], feature.delays.copy()
-    own.features = [line if one is feature else one for one in draft.features]
+    own.features = [line if other is feature else other for other in draft.features]
     own.integers, own.floats, own.faults = tables.integers.tolist(), tables.floats.tolist(), []
     for row in feature.delays[short]:
         pipe = draft.pipe_table[row["pipe"]]

@@ -83,7 +83,7 @@ class Relieving(Sized, Link):
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if self.to is None and getattr(around.nodes.get(self.from_), "kind", "") == "reservoir":
-            text = f"is a reservoir, whose pressure a {self.kind} cannot change. Expected a junction or another place"
+            text = f"is a reservoir, whose pressure a {self.kind} cannot change; expected a junction or another place"
             yield ("from",), f"{self.from_} {text}"
 
 

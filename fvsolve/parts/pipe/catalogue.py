@@ -254,11 +254,11 @@ def _ductile(series: str, number: int, name: str, size: float) -> ClassSize:
 def _plastic(series: str, number: float, name: str, size: float, material: str | None) -> ClassSize:
     strength = MRS.get(material or "")
     if series == "PN" and strength is None:
-        raise ValueError(f"the wall of {name} is known only for {listing(list(MRS))}. Expected one of these "
+        raise ValueError(f"the wall of {name} is known only for {listing(list(MRS))}; expected one of these "
                          'materials, or a class such as "SDR11" and the key `allowable_pressure`')  # fmt: skip
     ratio = number if series == "SDR" else 1.0 + 20.0 * strength / (DESIGN_COEFFICIENT * number)
     if not SDR_RANGE[0] <= ratio <= SDR_RANGE[1]:
-        text = f"{name} has SDR {ratio:g} (diameter over wall). Expected {SDR_RANGE[0]:g} to {SDR_RANGE[1]:g}"
+        text = f"{name} has SDR {ratio:g} (diameter over wall); expected {SDR_RANGE[0]:g} to {SDR_RANGE[1]:g}"
         raise ValueError(text)
     wall = size / ratio
     allowable = None if strength is None else BAR * 20.0 * strength / (DESIGN_COEFFICIENT * (ratio - 1.0))

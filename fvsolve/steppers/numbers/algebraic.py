@@ -11,7 +11,7 @@ from math import isqrt
 from fvsolve.steppers.numbers.polynomial import Polynomial, count_roots, sign
 
 MIXED_ROOTS = (
-    "{} are used in one tableau. Expected a single root, or decimals of 20 digits or more in place of all roots"
+    "{} are used in one tableau; expected a single root, or decimals of 20 digits or more in place of all roots"
 )
 BITS = 160  # precision of the first bracket of a square root: enough for most signs and every float
 
@@ -257,7 +257,7 @@ def _isolated(p: Polynomial, near: Fraction, name: str) -> tuple[Fraction, Fract
             return low, high
         width *= 2
     raise ValueError(
-        f"the polynomial of {name} has no single root near {float(near):.12g}. Expected a value closer to a real root"
+        f"the polynomial of {name} has no single root near {float(near):.12g}; expected a value closer to a real root"
     )
 
 
@@ -274,7 +274,7 @@ def value_of(text: str, names: Mapping | None = None):
     products.
     """
     if len(text) > LETTERS_MOST:
-        raise ValueError(f'"{text[:20]}..." has {len(text)} characters. Expected at most {LETTERS_MOST}')
+        raise ValueError(f'"{text[:20]}..." has {len(text)} characters; expected at most {LETTERS_MOST}')
     tokens = TOKEN.findall(text)
     if "".join(tokens) != re.sub(r"\s", "", text):
         raise ValueError(f'"{text}" is not a number')

@@ -323,5 +323,5 @@ def check_names(schemes: Sequence[str] | None, methods: Sequence[str] | None) ->
     for kind, given, names in (("scheme", schemes, tuple(SCHEMES)), ("method", methods, (AUTO, *METHODS))):
         for name in given or ():
             if name not in names:
-                hint = did_you_mean(name, names) or f". Expected {listing(names, 60)}"
+                hint = did_you_mean(name, names) or f"; expected {listing(names, 60)}"
                 raise FvsolveError(f"unknown {kind} {name}{hint}")

@@ -66,9 +66,9 @@ def fit(sizes, errors, floor: float = 0.0) -> Fit:
     """
     h, e = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
     if floor < 0.0:
-        raise FvsolveError(f"floor = {floor:g} is negative. Expected a number of at least 0")
+        raise FvsolveError(f"floor = {floor:g} is negative; expected a number of at least 0")
     if h.shape != e.shape:
-        raise FvsolveError(f"{h.size} sizes and {e.size} errors. Expected one error for each size")
+        raise FvsolveError(f"{h.size} sizes and {e.size} errors; expected one error for each size")
     if np.any(~np.isfinite(h)) or np.any(h <= 0.0) or np.any(np.diff(h) >= 0.0):
         raise FvsolveError("sizes must be positive and fall from row to row")
     if np.any(e < 0.0):
@@ -153,9 +153,9 @@ class FitRows:
             verb = "is" if len(self.good) == 1 else "are"
             return (
                 f"no order: only {len(self.good)} of {len(self.h)} rows {verb} above the floor and on the line of the "
-                f"fit. Expected at least {LEAST_ROWS} such rows"
+                f"fit; expected at least {LEAST_ROWS} such rows"
             )
-        return f"no order: the number of rows with a known error is {len(self.good)}. Expected at least {LEAST_ROWS}"
+        return f"no order: the number of rows with a known error is {len(self.good)}; expected at least {LEAST_ROWS}"
 
     def failure_reason(self) -> str:
         """Reason why no successive rows show an order."""

@@ -51,11 +51,11 @@ def order(
     Raises CaseError, FvsolveError.
     """
     if reference not in REFERENCE_KINDS:
-        hint = did_you_mean(reference, REFERENCE_KINDS) or f". Expected {', '.join(REFERENCE_KINDS)}"
+        hint = did_you_mean(reference, REFERENCE_KINDS) or f"; expected {', '.join(REFERENCE_KINDS)}"
         raise FvsolveError(f'reference = "{reference}" is unknown{hint}')
     given = initial, source, exact
     if any(given) and (jobs != 1 or dask is not None):
-        raise FvsolveError("initial, source and exact are functions of this process. Expected jobs = 1 and no dask")
+        raise FvsolveError("initial, source and exact are functions of this process; expected jobs = 1 and no dask")
     report, studies = progress or (lambda *_: None), []
     pairs = [(scheme, method) for scheme in name_list(schemes) or [None] for method in name_list(methods) or [None]]
     with cache_in(out) as points, RunQueue(case, jobs, dask) as queue:
@@ -105,7 +105,7 @@ class ManufacturedStudy(OrderStudy):
         self.against = against
         if against == "exact" and exact is None:
             raise FvsolveError(
-                'reference = "exact" needs the function exact(pipe, x, t). Expected that function, or "finer"'
+                'reference = "exact" needs the function exact(pipe, x, t); expected that function, or "finer"'
             )
         if not pipes(case):
             raise FvsolveError("initial, source and exact are functions along pipes, but this case has no pipes")

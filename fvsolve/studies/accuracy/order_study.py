@@ -203,7 +203,7 @@ class OrderStudy:
         self.queue, self.stages = queue, (dict(settings),)
         self.probe_names = tuple(probe.text for probe in case.probes)
         if against == "exact" and case.exact is None:
-            raise FvsolveError('reference = "exact": the case names no solution under [exact]. Expected "finer"')
+            raise FvsolveError('reference = "exact": the case names no solution under [exact]; expected "finer"')
         if against == "auto" and case.exact is None and basins(case):  # 4 times the cells along both axes take too long
             self.against = "richardson"
 

@@ -115,7 +115,7 @@ def refinement_plan(
         raise FvsolveError(f"{key} is not a resolution of this case; expected one of {listing(known)}{hint}")
     refine = refine or (known[key] if key else "both" if cell_counts(case) or delay_lines(case) else "time")
     if refine not in WAYS:
-        hint = did_you_mean(refine, WAYS) or f". Expected {', '.join(WAYS)}"
+        hint = did_you_mean(refine, WAYS) or f"; expected {', '.join(WAYS)}"
         raise FvsolveError(f'refine = "{refine}" is unknown{hint}')
     if refine != "time" and not delay_lines(case):
         refinable_counts(case)
@@ -124,7 +124,7 @@ def refinement_plan(
         raise FvsolveError(f'{key} refines {way}, so refine = "{refine}" is impossible. Leave `refine` out')
     levels = DEFAULT_LEVELS[refine] if levels is None else levels
     if levels < 2:
-        raise FvsolveError(f"levels = {levels} is too few. Expected at least 2, and at least 3 for a fitted order")
+        raise FvsolveError(f"levels = {levels} is too few; expected at least 2, and at least 3 for a fitted order")
     if refine == "time" and cells is not None:
         text = "only steps are refined here. Leave `cells` out, or set the cells of the case"
         raise FvsolveError(f"cells = {cells}: {text}")
@@ -161,8 +161,8 @@ def delay_line_plan(case, way: str, levels: int) -> Plan:
     line = int(np.argmax(tables[-1]["stretches"]))
     if tables[0]["stretches"][line] == tables[-1]["stretches"][line]:
         raise FvsolveError("a smaller numerics.delay_tolerance divides no delay line of this case into more stretches: "
-                           'there is no friction, or stretches are as short as a step. '
-                           'Expected refine = "both" or refine = "time"')  # fmt: skip
+                           'there is no friction, or stretches are as short as a step; '
+                           'expected refine = "both" or refine = "time"')  # fmt: skip
     refined = [Level(row, float(table["tau"][line]), count, step) for row, table in zip(rows, tables, strict=True)]
     return Plan(way, "stretch [s]", tuple(refined), f"{STRETCH_WORDS}, one step for all rows")
 
@@ -197,7 +197,7 @@ def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) 
                    for name, numbers in first.items()} for k in range(levels)]  # fmt: skip
     finest = total_cells(case, all_counts[-1])
     if finest > MAX_CELLS:
-        raise FvsolveError(f"the finest of {levels} levels would have {finest:.3g} cells. Expected at most "
+        raise FvsolveError(f"the finest of {levels} levels would have {finest:.3g} cells; expected at most "
                            f"{MAX_CELLS:.0e}; try fewer levels, or fewer cells in the first row")  # fmt: skip
     rows, courant = [], space_courant(case, levels) if way == "space" else case.numerics.courant
     for k, row_counts in enumerate(all_counts):
@@ -221,7 +221,7 @@ def coarsest_counts(case, key: str | None, cells: int | None) -> Counts:
     if cells is None:
         return own_counts
     if cells < 1:
-        raise FvsolveError(f"cells = {cells} is too few. Expected at least 1")
+        raise FvsolveError(f"cells = {cells} is too few; expected at least 1")
     if key in own_counts:
         return own_counts | scaled({key: own_counts[key]}, cells / max(own_counts[key]))
     return scaled(own_counts, cells / most_cells(own_counts))
@@ -286,14 +286,14 @@ def time_plan(case, key: str | None, levels: int) -> Plan:
     by_error = key == "numerics.rtol" or (key is None and numerics.rtol is not None)
     if by_error:
         if numerics.method != AUTO and not METHODS[numerics.method].adaptive:
-            raise FvsolveError(f"{numerics.method} estimates no error, so rtol cannot be refined. Expected "
+            raise FvsolveError(f"{numerics.method} estimates no error, so rtol cannot be refined; expected "
                                "numerics.step, or another method")  # fmt: skip
         first = max(FIRST_RTOL, numerics.rtol or 0.0)
         tolerances = [first / 10.0**k for k in range(levels)]
         rows = tuple(Level({"numerics.rtol": rtol}, rtol, count, math.nan) for rtol in tolerances)
         return Plan("time", "rtol", rows, "rtol divided by ten, on one grid" if count else "rtol divided by ten")
     if numerics.method == AUTO:
-        raise FvsolveError('method "auto" chooses its steps by their error. Expected the key numerics.rtol')
+        raise FvsolveError('method "auto" chooses its steps by their error; expected the key numerics.rtol')
     step = first_step(case)
     steps = [step / 2**k for k in range(levels)]
     rows = tuple(Level({"numerics.step": h}, h, count, h) for h in steps)

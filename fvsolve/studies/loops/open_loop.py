@@ -25,7 +25,7 @@ from fvsolve.units import DIMENSIONS, show
 
 MAX_STATES = 800  # greatest number of states
 SAME_OUTPUT = 1e-9  # distance of an output from its limit, relative to the range of the output, that is rounding
-ANOTHER_POINT = "Expected an output between its limits: another time (--at), initial output or setpoint"
+ANOTHER_POINT = "expected an output between its limits: another time (--at), initial output or setpoint"
 
 
 def block_of(case, name: str) -> str:
@@ -38,7 +38,7 @@ def block_of(case, name: str) -> str:
         raise FvsolveError(f"no control named {show(name)}{hint}")
     if case.controls[name].control.switches:
         kind = case.controls[name].control.kind
-        raise FvsolveError(f"controls.{name} is a {kind}, whose output has no slope. Expected another type of control")
+        raise FvsolveError(f"controls.{name} is a {kind}, whose output has no slope; expected another type of control")
     return name
 
 
@@ -102,7 +102,7 @@ def refuse_limits(point: OperatingPoint, cut: str | None) -> None:
         if name == cut or block.control.kind == "delay":
             effect = "so its loop is open" if name == cut else "so it passes only a rise or only a fall"
             raise FvsolveError(f"the output of controls.{name} is at a limit, {limit_text(block, limit)}, at "
-                               f"{point.when}, {effect}. {ANOTHER_POINT}")  # fmt: skip
+                               f"{point.when}, {effect}; {ANOTHER_POINT}")  # fmt: skip
 
 
 def linear_with_names(point: OperatingPoint, inputs, outputs: int) -> Linear:
@@ -111,7 +111,7 @@ def linear_with_names(point: OperatingPoint, inputs, outputs: int) -> Linear:
         return linearise_at(point, inputs, outputs)
     except FvsolveError as error:
         if stopped := outputs_at_limits(point):
-            raise FvsolveError(f"{error}; at a limit: {at_limits(point, stopped)}. {ANOTHER_POINT}") from None
+            raise FvsolveError(f"{error}; at a limit: {at_limits(point, stopped)}; {ANOTHER_POINT}") from None
         raise
 
 
@@ -130,14 +130,14 @@ def open_loop_error(point: OperatingPoint, name: str) -> FvsolveError:
     """Error for a control whose output does not affect its input, with the controls that are at a limit."""
     stopped = outputs_at_limits(point)
     reason = f"; at a limit: {at_limits(point, stopped)}" if stopped else ""
-    remedy = ANOTHER_POINT if stopped else "Expected a control whose output affects its input"
+    remedy = ANOTHER_POINT if stopped else "expected a control whose output affects its input"
     text = f"the output of controls.{name} does not affect its input at {point.when}, so its loop is open"
-    return FvsolveError(f"{text}{reason}. {remedy}")
+    return FvsolveError(f"{text}{reason}; {remedy}")
 
 
 def state_limit_error(count: int) -> FvsolveError:
     """Error for a case with too many states."""
-    text = f"the case has {count} states. Expected {MAX_STATES} or fewer"
+    text = f"the case has {count} states; expected {MAX_STATES} or fewer"
     return FvsolveError(f"{text}; give pipes fewer cells: --set links.NAME.cells=...")
 
 

@@ -75,7 +75,7 @@ class SampledLoop:
         blocks = case.controls
         self.sampled = {key: block.control for key, block in blocks.items() if block.control.period is not None}
         if late := [key for key in self.sampled if blocks[key].control.kind == "delay"]:
-            raise FvsolveError(f"controls.{late[0]} is a delay with `period`. Expected a delay that acts at all times")
+            raise FvsolveError(f"controls.{late[0]} is a delay with `period`; expected a delay that acts at all times")
         delays = [key for key, block in blocks.items() if block.control.kind == "delay"]
         self.period, self.ticks = common_period(self.sampled)
         own = f"{BLOCK_PREFIX}{name}.output"
@@ -131,7 +131,7 @@ class SampledLoop:
                 sends, arrivals = [time - tau for time in instants], instants
             else:
                 raise FvsolveError(f"controls.{key} delays what changes between samples, and drives what moves between "
-                                   "samples: such a loop has no finite map. Expected a delay at a sampled control, or "
+                                   "samples: such a loop has no finite map; expected a delay at a sampled control, or "
                                    "loops without samples")  # fmt: skip
             ages = [1 + sum(count_within(send, arrival - tau, arrival, self.period) for send in sends)
                     for arrival in arrivals]  # fmt: skip
@@ -354,14 +354,14 @@ def common_period(sampled: dict) -> tuple[float, dict[str, list[float]]]:
     first = sampled[names[0]].period
     ratios = {name: Fraction(sampled[name].period / first).limit_denominator(RATIONAL) for name in names}
     if odd := [name for name in names if abs(float(ratios[name]) * first / sampled[name].period - 1.0) > 1e-12]:
-        raise FvsolveError(f"the periods of {listing([names[0], odd[0]])} have no common period. Expected whole ratios")
+        raise FvsolveError(f"the periods of {listing([names[0], odd[0]])} have no common period; expected whole ratios")
     whole = Fraction(1)
     for ratio in ratios.values():
         whole = Fraction(np.lcm(whole.numerator * ratio.denominator, ratio.numerator * whole.denominator),
                          whole.denominator * ratio.denominator)  # fmt: skip
     counts = {name: int(whole / ratio) for name, ratio in ratios.items()}
     if sum(counts.values()) > MOST_TICKS:
-        raise FvsolveError(f"the common period of {listing(names)} has {sum(counts.values())} samples. Expected "
+        raise FvsolveError(f"the common period of {listing(names)} has {sum(counts.values())} samples; expected "
                            f"{MOST_TICKS} or fewer")  # fmt: skip
     ticks = {name: [sampled[name].offset + k * sampled[name].period for k in range(counts[name])] for name in names}
     return float(whole) * first, ticks
@@ -459,7 +459,7 @@ def checked_slope(point: OperatingPoint, name: str, f: Callable[[float], np.ndar
         stopped = outputs_at_limits(point)
         reason = f"; at a limit: {at_limits(point, stopped)}" if stopped else ""
         raise FvsolveError(f"controls.{name} cannot be linearised at {point.when}: the slopes of its sample for a rise "
-                           f"and a fall differ{reason}. {ANOTHER_POINT}")  # fmt: skip
+                           f"and a fall differ{reason}; {ANOTHER_POINT}")  # fmt: skip
     coarse, fine = 0.5 * (rise + fall)
     return (4.0 * fine - coarse) / 3.0
 

@@ -34,7 +34,7 @@ class LineImpedance:
         for name, kind in (("z0", POSITIVE), ("time", POSITIVE), ("reflection", NUMBER)):
             if not kind.accepts(getattr(self, name)):
                 text = f"LineImpedance {name} = {show(getattr(self, name))} is not valid"
-                raise FvsolveError(f"{text}. Expected {kind.expected}")
+                raise FvsolveError(f"{text}; expected {kind.expected}")
 
     @validated(s=COMPLEX)
     def __call__(self, s):
@@ -141,7 +141,7 @@ def _value_per_point(name: str, given, shape: tuple, kind: type) -> np.ndarray:
     try:
         return np.broadcast_to(np.asarray(given, kind), shape)
     except (TypeError, ValueError):
-        raise FvsolveError(f"{name} returned {show(given)} for {shape[0]} points. Expected a number for each") from None
+        raise FvsolveError(f"{name} returned {show(given)} for {shape[0]} points; expected a number for each") from None
 
 
 def _slopes(slope, w: np.ndarray, shift: float) -> np.ndarray:
@@ -149,8 +149,8 @@ def _slopes(slope, w: np.ndarray, shift: float) -> np.ndarray:
     bounds = _value_per_point("the slope", values, (len(w) - 1,), float)
     if not np.all(np.isfinite(bounds) & (bounds >= 0.0)):
         raise FvsolveError(
-            f"the bound of the slope of H is negative or not finite on the line Re s = {shift:g} 1/s. "
-            "Expected finite numbers of at least 0. If poles lie on this line, use a greater shift"
+            f"the bound of the slope of H is negative or not finite on the line Re s = {shift:g} 1/s; "
+            "expected finite numbers of at least 0. If poles lie on this line, use a greater shift"
         )
     return bounds
 

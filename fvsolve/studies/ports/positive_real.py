@@ -28,10 +28,10 @@ def coefficients(given, name: str) -> Polynomial:
     if isinstance(given, (str, Real, Decimal, complex)) or np.ndim(given) == 0 and isinstance(given, np.ndarray):
         given = [given[()] if isinstance(given, np.ndarray) else given]
     if isinstance(given, (bytes, Mapping)) or not isinstance(given, Iterable):
-        raise FvsolveError(f"{name} = {given!r} is not a polynomial. Expected its coefficients, highest power first")
+        raise FvsolveError(f"{name} = {given!r} is not a polynomial; expected its coefficients, highest power first")
     values = [_exact(x, f"{name}[{k}]") for k, x in enumerate(given)]
     if not values:
-        raise FvsolveError(f"{name} has no coefficients. Expected at least one, highest power first")
+        raise FvsolveError(f"{name} has no coefficients; expected at least one, highest power first")
     return Polynomial(values[::-1])
 
 
@@ -44,7 +44,7 @@ def _exact(x, name: str) -> Fraction:
     except (ValueError, OverflowError, ZeroDivisionError):
         pass
     raise FvsolveError(
-        f"{name} = {x!r} is not a coefficient. Expected a finite real number: "
+        f"{name} = {x!r} is not a coefficient; expected a finite real number: "
         'a whole number, a fraction, a float, or text like "0.1"'
     )
 
@@ -320,7 +320,7 @@ def positive_real(numerator, denominator) -> Verdict:
     n, d = coefficients(numerator, "numerator"), coefficients(denominator, "denominator")
     refuse_digits(n, d)
     if d.degree < 0:
-        raise FvsolveError("the denominator is zero. Expected at least one coefficient other than 0")
+        raise FvsolveError("the denominator is zero; expected at least one coefficient other than 0")
     common = n.gcd(d)
     n, d = n // common, d // common
     where = locate_roots(d)
@@ -352,7 +352,7 @@ def refuse_digits(n: Polynomial, d: Polynomial) -> None:
     degree, digits = max(n.degree, d.degree), max((value.bit_length() for value in values), default=0)
     if degree**2 * digits > MOST_DIGITS:
         raise FvsolveError(f"coefficients of degree {degree} with up to {digits} binary digits take too long in exact "
-                           f"arithmetic. Expected {MOST_DIGITS // digits} or less for the squared degree: give rounded "
+                           f"arithmetic; expected {MOST_DIGITS // digits} or less for the squared degree: give rounded "
                            "coefficients as texts, or the state-space form to state_positive_real")  # fmt: skip
 
 

@@ -44,7 +44,7 @@ class Transfer:
         sizes = (*np.shape(a), np.size(b), np.size(c))
         if len({*sizes}) > 1:
             sizes_text = f"A of {sizes[0]} x {sizes[1]}, {sizes[2]} numbers in B and {sizes[3]} in C"
-            raise FvsolveError(f"{sizes_text} do not match. Expected n x n, n and n")
+            raise FvsolveError(f"{sizes_text} do not match; expected n x n, n and n")
         self.error = float(error)
         self.a, self.b, self.c, self.d = (np.asarray(x, float) for x in (a, b, c, d))
         if self.a.size:
@@ -399,14 +399,14 @@ def response(
 
     case = load(case, dict(set or {}))
     if not any(node.domain == "hydraulic" for node in case.places.values()):
-        raise FvsolveError(f"{case.name} has no port, because no node has a pressure. Expected a reservoir, junction, "
+        raise FvsolveError(f"{case.name} has no port, because no node has a pressure; expected a reservoir, junction, "
                            "inflow, chamber or tank")  # fmt: skip
     if port not in case.places:
         hint = did_you_mean(port, case.places) or f". Ports are {listing(case.places)}"
         raise FvsolveError(f'no port named "{port}"{hint}')
     basin = port.partition(".")[0]
     if basin != port and getattr(case.nodes.get(basin), "kind", "") == "basin" and not port_flows(case, port):
-        raise FvsolveError(f"{port} joins no link, so nothing can flow into it there. Expected a patch with a link; "
+        raise FvsolveError(f"{port} joins no link, so nothing can flow into it there; expected a patch with a link; "
                            "the inputs and outputs of a driven patch are given by: fvsolve linearise")  # fmt: skip
     system, flows = _linear_system(case, port, at, before, scheme)
     a, b, c, d = system
@@ -474,6 +474,6 @@ def _dense(a) -> np.ndarray:
     """Matrix A as a full array; raises FvsolveError for more than 800 states."""
     if a.shape[0] > MAX_STATES:
         percent = math.floor(100 * MAX_STATES / a.shape[0])
-        raise FvsolveError(f"the case has {a.shape[0]} states. Expected {MAX_STATES} or fewer. Reduce the cells of its "
+        raise FvsolveError(f"the case has {a.shape[0]} states; expected {MAX_STATES} or fewer. Reduce the cells of its "
                            f"pipes to {percent} %: --set links.NAME.cells=...")  # fmt: skip
     return a if isinstance(a, np.ndarray) else a.toarray()

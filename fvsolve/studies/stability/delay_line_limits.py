@@ -444,11 +444,11 @@ class DelayLineLimits:
         step = {} if h is None else {"numerics.step": h}
         model = study_model(self.case, self.set | step)
         if model.case.numerics.scheme in LIMITED and (model.tables.pipes["cells"] > 0).any():
-            raise FvsolveError(f"numerics.scheme: {model.case.numerics.scheme} is not linear. Expected a linear scheme "
+            raise FvsolveError(f"numerics.scheme: {model.case.numerics.scheme} is not linear; expected a linear scheme "
                                "for stability with delay lines, such as scheme = \"upwind5\"")  # fmt: skip
         if model.y_size > MAX_STATES:
             raise FvsolveError(
-                f"the case has {model.y_size} states, where each delay line counts as one. Expected at most "
+                f"the case has {model.y_size} states, where each delay line counts as one; expected at most "
                 f"{MAX_STATES} with delay lines: use fewer cells, or a part of the network"
             )
         return with_held_schedules(model, model.case.numerics.start)

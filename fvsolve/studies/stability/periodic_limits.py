@@ -240,7 +240,7 @@ def limited_limits(
     chosen = [method_named(name) for name in name_list(methods) or LIMITED_METHODS]
     implicit = [tableau.name for tableau in chosen if not tableau.explicit]
     if implicit:
-        raise FvsolveError(f"{implicit[0]} is implicit. Expected explicit methods for runs with limited schemes")
+        raise FvsolveError(f"{implicit[0]} is implicit; expected explicit methods for runs with limited schemes")
     for name in schemes:
         if name not in LIMITED:
             hint = did_you_mean(name, LIMITED) or f"; limited schemes are {', '.join(LIMITED)}"

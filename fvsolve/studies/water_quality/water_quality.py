@@ -77,11 +77,11 @@ def water_quality(
     for name in trace:
         if name not in nodes:
             raise FvsolveError(
-                f"trace {show(name)}: unknown node{did_you_mean(name, nodes)}. Expected a node of the case"
+                f"trace {show(name)}: unknown node{did_you_mean(name, nodes)}; expected a node of the case"
             )
     span = loaded.numerics.end - loaded.numerics.start
     if not 0.0 < step <= span or span / step > MOST_STEPS:
-        raise FvsolveError(f"step = {step} s is out of range. Expected up to the time of the run, {span:g} s, and at "
+        raise FvsolveError(f"step = {step} s is out of range; expected up to the time of the run, {span:g} s, and at "
                            f"most {MOST_STEPS} steps")  # fmt: skip
     steps = int(np.ceil(span / step - 1e-9))
     probes = [f"links.{name}.flow" for name in links]
@@ -108,7 +108,7 @@ def network_of(case: Case) -> tuple[list[str], dict[str, Any]]:
         links[name] = link
     wrong = [name for name, node in case.nodes.items() if node.kind not in ("junction", "inflow", "reservoir", "tank")]
     if other or wrong:
-        raise FvsolveError(f"{listing([*other, *wrong])}: not supported. Expected a network of junctions, reservoirs, "
+        raise FvsolveError(f"{listing([*other, *wrong])}: not supported; expected a network of junctions, reservoirs, "
                            'tanks, valves, pumps and pipes with pipe_model = "quasi-steady"')  # fmt: skip
     return list(case.nodes), links
 
