@@ -9,7 +9,7 @@ and calls the methods below in the order of slots. Every method has a default, w
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 FOLDER = Path(__file__).parents[1] / "features"
-SECTIONS = ("controls",)  # sections of a case that may wake features
+SECTIONS = ("controls", "scalars", "reactions")  # sections of a case that may wake features
 HEADER = re.compile(r'\nclass (\w+)\(Feature, slot=(\d+), wakes="([^"]+)"\)')
 
 
@@ -60,9 +60,6 @@ class Feature:
     """Base of features, with one object for each case. `draft` is the `ModelDraft`, `model` the `Model`, of the case.
 
     slot : number of the feature, by which its compiled functions find its tables
-    terms : `RhsTerms` of its functions, that is, phases of the right-hand side and jobs, by their place in the order:
-        first: before all others; pipes: behind those of pipes; sources: before event functions, after the nodes are
-        solved; events: with event functions of restrictions; last: behind all others but records of nodes
     packages : names of further modules with compiled functions, such as laws of parts
     sets_arrivals : True if its `record` writes out[ARRIVES], the next time at which a step must end, for waves
     reads_solved : True if it reads values that only the solved nodes determine, before rates are computed
@@ -73,7 +70,6 @@ class Feature:
     """
 
     slot = 0
-    terms: Mapping[str, Any] = {}
     packages: Sequence[str] = ()
     sets_arrivals = reads_solved = False
     shortest_delay = np.inf
@@ -121,6 +117,9 @@ class Feature:
         """Continue after the steady start; names of parts to be given up, after which the tables are made again."""
         return []
 
+    def lower_behind_basins(self, draft) -> None:
+        """Fill the tables of the feature, after those of basins and before those of networks; add faults."""
+
     def lower_last(self, draft) -> None:
         """Fill the tables of the feature, after all others; add faults."""
 
@@ -128,8 +127,14 @@ class Feature:
         """Greatest constant rate of its states [1/s]."""
         return 0.0
 
+    def reserve_ledger(self, draft) -> None:
+        """Reserve rows of the ledger behind those of nodes, and what belongs to them, see `assembly.array_sizes`."""
+
     def reserve(self, draft) -> None:
-        """Reserve stretches of `out`, rows of the ledger and work arrays, see `assembly.array_sizes`."""
+        """Reserve stretches of `out`, and work arrays, see `assembly.array_sizes`."""
+
+    def start(self, draft, y: np.ndarray) -> None:
+        """Write the states of the feature at the start; those that it leaves are 0."""
 
     def close(self, draft) -> None:
         """Complete the tables of the feature; from here on they are constant."""
@@ -139,6 +144,16 @@ class Feature:
         return self
 
     # model ----------
+
+    def terms(self, model, cast) -> Iterable[tuple[str, Any]]:
+        """Terms of its functions, that is, phases of the right-hand side and jobs: (place in the order, `RhsTerms`).
+
+        cast : `ModelFeatures` of the model without those of features
+        Places: first: before all others; pipes: behind those of pipes; sources: with event functions, after the nodes
+        are solved and before sources of networks; solved: then, behind these; events: with event functions of
+        restrictions; basins: behind those of basins; last: behind all others but records of nodes.
+        """
+        return ()
 
     def refusal(self, function: str) -> str:
         """Reason why a function of (t, y) is not defined, because the feature has a history; "" if it is."""
@@ -151,6 +166,32 @@ class Feature:
     def pattern(self, couplings) -> FeaturePattern:
         """Couplings of states, see `model.jacobian_pattern.Couplings`."""
         return FeaturePattern(self)
+
+    def modes(self, model) -> list[tuple[str, np.ndarray]]:
+        """Modes of cells: pairs of a name and eigenvalues [1/s], see `step_limits.growing_modes`."""
+        return []
+
+    def weigh(self, model, weights: np.ndarray) -> None:
+        """Write the weights of its states in the norm of deviations, from those of masses, see `model.energy_norm`."""
+
+    def add_fields(self, fields: dict, model, y: np.ndarray, out: np.ndarray) -> None:
+        """Add values along pipes and at nodes to the result of `Model.fields`."""
+
+    def facts(self, model) -> dict[str, Any]:
+        """Facts for `fvsolve check`."""
+        return {}
+
+    def stored_states(self, model) -> np.ndarray:
+        """Numbers of the states that are stored amounts, whose sums are compensated."""
+        return np.zeros(0, dtype=np.int64)
+
+    def bounds(self, model) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Bounds of its states, see `model.state_bounds`."""
+        return []
+
+    def ledgers(self, model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict]:
+        """Balances of a run, by name; y : its last state; ledger : float64[2, m], sums of its rates by sign"""
+        return {}
 
     def inputs(self, model) -> dict[str, Any]:
         """Inputs that can be held at values : name -> `assembly.lowering.Input`."""
@@ -178,6 +219,10 @@ class FeaturePattern:
     def schedule(self, *indices: int) -> np.ndarray:
         """States on which schedules with these numbers depend."""
         return np.zeros(0, dtype=np.int64)
+
+    def source(self, row) -> np.ndarray | None:
+        """States on which a source of a network depends; None if the feature knows none. row : of the source"""
+        return None
 
     def pairs(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yield pairs (rates, states)."""

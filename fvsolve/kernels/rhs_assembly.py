@@ -190,29 +190,6 @@ COMPONENTS = {
         power="devices: power_devices",
         stored="devices: stored_devices",
     ),
-    "scalars": RhsTerms(outlet_values="scalar_transport: clear_losses", observe="scalar_transport: observe_scalars"),
-    "carried": RhsTerms(
-        outlet_values="scalar_transport: pipe_outlet_values", scalar_rates="scalar_transport: scalar_rates"
-    ),
-    "reactions": RhsTerms(
-        prepare="reactions: limit_rates",
-        scalar_rates="reactions: reaction_rates",
-        observe="reactions: observe_reactions",
-    ),
-    "heat, linear": RhsTerms(
-        outlet_values="fluid_heat: heat_of_restrictions", scalar_rates="fluid_heat: heat_of_pipes"
-    ),
-    "heat, barotropic": RhsTerms(
-        outlet_values="fluid_heat: heat_of_restrictions_barotropic",
-        scalar_rates="fluid_heat: heat_of_pipes_barotropic",
-    ),
-    "heat of sensors, linear": RhsTerms(events="fluid_heat: heat_for_events"),
-    "heat of sensors, barotropic": RhsTerms(events="fluid_heat: heat_for_events_barotropic"),
-    "scalars of sensors": RhsTerms(events="scalar_transport: mix_for_events"),
-    "viscosity": RhsTerms(rates="viscosity: viscous_friction"),
-    "heat exchangers": RhsTerms(
-        outlet_values="fluid_heat: node_temperatures", scalar_rates="potential_networks: network_rates"
-    ),
     "forces, linear": RhsTerms(observe="pipe_forces: observe_forces_linear"),
     "forces, barotropic": RhsTerms(observe="pipe_forces: observe_forces_barotropic"),
     "forces, cavitating": RhsTerms(observe="pipe_forces: observe_forces_cavitating"),
@@ -247,7 +224,6 @@ class ModelFeatures(NamedTuple):
     boundary_exchange : True if several bands have an open boundary
     forces : True if forces on pipes are probed
     device_heat : True if the dissipation of devices heats the fluid
-    scalar_sensors : True if features read values of scalars for their event functions
     other fields : True if the model has such parts or properties
     """
 
@@ -267,7 +243,6 @@ class ModelFeatures(NamedTuple):
     laws: tuple[str, ...] = ()
     basins: tuple[RhsTerms, ...] = ()
     carried: tuple[RhsTerms, ...] = ()
-    scalars: bool = False
     valves: bool = False
     features: tuple[tuple[str, RhsTerms], ...] = ()
     further_packages: tuple[str, ...] = ()
@@ -278,12 +253,7 @@ class ModelFeatures(NamedTuple):
     forces: bool = False
     formulas: bool = False
     networks: bool = False
-    reactions: bool = False
-    heat: bool = False
     device_heat: bool = False
-    scalar_sensors: bool = False
-    exchangers: bool = False
-    viscosity: bool = False
 
     def components(self) -> Iterator[RhsTerms]:
         """Yield the terms (`RhsTerms`) of all components of the model, in the order in which the functions run."""
@@ -312,10 +282,7 @@ class ModelFeatures(NamedTuple):
         if followed := list(self.terms_at("sources")):
             yield from followed
             yield COMPONENTS["sources again"]
-        if self.scalar_sensors:
-            if self.heat:
-                yield COMPONENTS["heat of sensors, linear" if linear else "heat of sensors, barotropic"]
-            yield COMPONENTS["scalars of sensors"]
+        yield from self.terms_at("solved")
         if bends:
             yield COMPONENTS["bends"]
         yield from self.terms_at("events")
@@ -354,20 +321,7 @@ class ModelFeatures(NamedTuple):
         if self.viscoelastic_walls:
             yield COMPONENTS["creep" if linear else "creep, barotropic"]
         yield from self.basins
-        if self.scalars:  # carried by the flow from the rates of waves, which come before
-            yield COMPONENTS["scalars"]
-            if not self.alone:
-                yield MIXED
-            if self.pipes:
-                yield COMPONENTS["carried"]
-            if self.heat:
-                yield COMPONENTS["heat, linear" if family == "linear" else "heat, barotropic"]
-            if self.viscosity and self.pipes:
-                yield COMPONENTS["viscosity"]
-            if self.exchangers:
-                yield COMPONENTS["heat exchangers"]
-        if self.reactions:  # those in basins are added later
-            yield COMPONENTS["reactions"]
+        yield from self.terms_at("basins")  # from the rates of waves, which come before
         yield from self.carried
         yield from self.terms_at("last")
         if self.forces:

@@ -35,8 +35,6 @@ from fvsolve.model.model import Model
 from fvsolve.model.network_start import unknown_speeds
 from fvsolve.model.network_tables import lower_networks, network_rate, reserve_networks
 from fvsolve.model.probe_tables import lower_probes, probe_offsets
-from fvsolve.model.reaction_tables import lower_reactions, reserve_reactions
-from fvsolve.model.scalar_tables import lower_scalars, reserve_scalars, scale_scalars, start_amounts
 from fvsolve.model.start_notices import start_notices
 from fvsolve.model.steady_start import SteadyStart
 
@@ -197,7 +195,6 @@ def tables_with_start(case: Case, draft: ModelDraft | None = None, unfit: Collec
     for k in range(len(draft.features)):
         draft = draft.features[k].balanced(draft, model_with_start)
     draft.steady = start_profile(draft)
-    scale_scalars(draft)
     worse = settle(draft)
     draft.check()
     return tables_with_start(case, None, {*unfit, *worse}) if worse else draft
@@ -213,8 +210,8 @@ def tables_before_start(case: Case, unfit: Collection[str] = ()) -> ModelDraft:
     fill_links(draft)
     classify_nodes(draft)
     lower_basins(draft)
-    lower_scalars(draft)
-    lower_reactions(draft)
+    for feature in draft.features:
+        feature.lower_behind_basins(draft)
     lower_networks(draft)
     draft.check()
     for feature in draft.features:
@@ -228,7 +225,6 @@ def tables_before_start(case: Case, unfit: Collection[str] = ()) -> ModelDraft:
 def model_with_start(draft: ModelDraft) -> Model:
     """Model of tables before the start, whose steady start is computed; without notices."""
     draft.steady = start_profile(draft)
-    scale_scalars(draft)
     settle(draft)
     return model_of(draft, lambda _: [])
 
@@ -302,11 +298,11 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     schedules, pieces = draft.schedules.tables(tanks.EVENTS * draft.tanks)
     schedules.flags.writeable = pieces.flags.writeable = False  # from here on constant, as in the model
     sizes = draft.sizes = ArraySizes()
-    for reserve in (reserve_network, reserve_scalars, reserve_reactions, reserve_basins, reserve_mechanics,
-                    reserve_networks):  # fmt: skip
-        reserve(draft)
+    reserve_network(draft)
     for feature in draft.features:
-        feature.reserve(draft)
+        feature.reserve_ledger(draft)
+    for reserve in (reserve_basins, reserve_mechanics, reserve_networks, *(own.reserve for own in draft.features)):
+        reserve(draft)
     layout = sizes.place()
     for feature in draft.features:
         feature.placed(draft)
@@ -429,7 +425,8 @@ def model_of(draft: ModelDraft, notices: Callable[[ModelDraft], list[Notice]] = 
     The state at the start is zero except in basins that deviate from the initial steady state, and for scalar amounts.
     """
     case, start = draft.case, basin_start(draft.basins, draft.size)
-    start_amounts(draft, start)
+    for feature in draft.features:
+        feature.start(draft, start)
     first, last = case.numerics.start, case.numerics.end
     inside = sorted((t, jump) for t, jump in draft.schedules.breaks.items() if first <= t <= last)
     basin_notices = [notice for basin in draft.basins for notice in basin.notices(basin.deviations(start))]

@@ -12,7 +12,6 @@ from fvsolve.assembly.lowering import rows_in
 from fvsolve.assembly.pipe_terms import elements, memory_shares
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.scalar_tables import typical_value
 from fvsolve.model.static_forces import mass_factor
 
 RANK_TOLERANCE = 1e-12  # singular values below this share of a group's greatest: motions that store no energy
@@ -192,8 +191,6 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
             weights[first : first + row["cells"]] = 0.5 * row["dx"] / (rho * row["area"]) * gain / rate
     for basin in model.basins:
         basin.states_of(weights)[:] = basin.weights(basin.deviations(y))
-        for q, amount in enumerate(basin.amounts(weights) if basin.scalars else ()):
-            amount[:] = SCALAR_WEIGHT * 0.5 * basin.mesh.area / greatest_value(model, q) ** 2
     for row in tables.nodes:
         if row["y"] >= 0 and row["kind"] not in (rec.MOVING, rec.VESSEL):
             weights[row["y"]] = stiffness(model, row) / (2.0 * rho)
@@ -202,27 +199,9 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
     for row in tables.masses:
         if row["y"] >= 0:
             weights[int(row["y"]) + 1] = 0.5 / row["lightness"]
-    weigh_scalars(model, weights)
+    for feature in model.features:
+        feature.weigh(model, weights)
     return weights
-
-
-def weigh_scalars(model, weights: np.ndarray) -> None:
-    """Write the weights of scalar amounts in pipes, tanks and chambers, from the weights of the mass there."""
-    tables, rho = model.tables, model.case.properties.density
-    for q, scalar in enumerate(tables.scalars):
-        share = SCALAR_WEIGHT / greatest_value(model, q) ** 2
-        for row in tables.pipes:
-            cells = slice(scalar["y"] + row["cell"], scalar["y"] + row["cell"] + row["cells"])
-            weights[cells] = share * row["dx"] * row["speed"] ** 2 / (rho * row["area"])
-        places = tables.integers[scalar["places"] :]
-        for place, node in zip(places, tables.nodes, strict=False):
-            if node["kind"] in (rec.TANK, rec.CHAMBER):
-                weights[place] = share * weights[node["y"]]
-
-
-def greatest_value(model, q: int) -> float:
-    """Greatest possible magnitude of the value of scalar q; 1 if all values are 0."""
-    return typical_value(model.case, list(model.case.scalars)[q])
 
 
 def network_rows(model):

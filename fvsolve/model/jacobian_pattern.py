@@ -7,8 +7,7 @@ masses. Cells of a basin depend on the cells around them (`basins.lower_pattern`
 set by the cells behind it.
 """
 
-from collections.abc import Callable, Iterator
-from functools import cached_property
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array
@@ -16,9 +15,6 @@ from scipy.sparse import coo_array, csc_array
 from fvsolve.basins import lower_pattern as pattern
 from fvsolve.basins.lower_pattern import all_states
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.pipe_energy import MAX_WIDTH
-from fvsolve.model.reaction_tables import names_read
-from fvsolve.model.scalar_tables import STORES
 from fvsolve.model.state_pairs import pairs_of, unique_states
 from fvsolve.schemes import SCHEMES, Reach
 from fvsolve.steady import union
@@ -353,9 +349,9 @@ class Couplings:
             return self.device_reading(self.devices[i])
         if row["kind"] == rec.FORCE_INPUT:
             return unique_states(*self.pushing_states(i))
-        if row["kind"] == rec.FLUID_HEAT:
-            node = int(self.model.tables.exchangers[i]["node"])
-            return unique_states(self.temperature.values[node], *self.temperature.through[node])
+        for own in self.features:
+            if (states := own.source(row)) is not None:
+                return states
         stores = {column for column in network.columns_followed(j) if column in network.states}
         switch = int(self.switches[i]["schedule"]) if row["kind"] == rec.FRICTION_FLOW else -1
         return unique_states(*(network.states[column] for column in stores), self.schedule(switch))
@@ -368,11 +364,6 @@ class Couplings:
         mass = self.masses[device["mass"]] if device["mass"] >= 0 else -1
         masses = unique_states(*([mass, mass + 1] if mass >= 0 else []))
         return unique_states(self.device_states(device), opening, masses, *(self.sets[n] for n in nodes if n >= 0))
-
-    @cached_property
-    def temperature(self):
-        """Couplings of the scalar that is the temperature of the fluid."""
-        return ScalarCouplings(self, self.model, int(np.argmax(self.model.tables.scalars["specific_heat"])))
 
     def pushing_states(self, mass: int) -> Iterator[np.ndarray]:
         """Yield states of all force elements that act on a mass."""
@@ -527,233 +518,6 @@ def ends_of(link) -> tuple[int, int]:
     return int(link["from_node"]), int(link["to_node"])
 
 
-LIMITER_CELLS = 2  # cells that a limited value at a face reads on each side; at an end of a pipe, 1 more
-
-
-class ScalarCouplings:
-    """Couplings of one scalar: pairs (rate, state on which it depends).
-
-    They are in addition to the couplings of the flow that carries the scalar. q : number of the scalar
-    """
-
-    def __init__(self, couplings, model, q: int) -> None:
-        self.of, self.row = couplings, model.tables.scalars[q]
-        self.q, of, nodes = q, couplings, len(couplings.nodes)
-        self.ledger = of.size + nodes * (1 + q)
-        self.loss = of.size + nodes * (1 + len(model.tables.scalars)) + self.row["loss"]
-        self.places = model.tables.integers[self.row["places"] : self.row["places"] + nodes]
-        self.stores = np.isin(of.nodes["kind"], STORES)
-        self.wide = max(LIMITER_CELLS, of.reach.behind, of.reach.ahead)
-        # for each node, states that set flows there, and values at ends of pipes
-        self.through: list[list] = [[] for _ in range(nodes)]
-        for pipe in of.pipes:
-            for right, i in enumerate(ends_of(pipe)):
-                self.through[i] += [of.sets[i], of.edge_cells(pipe, right), *self.edge(pipe, right)]
-        for valve in of.valves:
-            i, j = ends_of(valve)
-            flow = [of.sets[i], of.sets[j], of.opening_states(valve)]
-            self.through[i] += flow
-            self.through[j] += flow
-        self.heated, self.tables = self.row["specific_heat"] > 0.0, model.tables
-        self.heat_end = int(model.layout["extent"] - model.layout["supply"])  # rows of the ledger up to that of heat
-        for exchanger in self.tables.exchangers if self.heated else ():
-            self.through[exchanger["node"]].append(of.network_potential(exchanger["place"]))
-        for source in self.tables.heat_sources if self.heated else ():
-            for i in ends_of(of.valves[source["valve"]]):
-                self.through[i] += self.heat_states(source)
-        self.values = self.mixed_values()
-
-    def heat_states(self, source) -> list[np.ndarray]:
-        """States that set the heat of a restriction."""
-        valve = self.of.valves[source["valve"]]
-        device = [self.of.acting_states(source["device"])] if source["device"] >= 0 else []
-        return [*(self.of.sets[i] for i in ends_of(valve)), self.of.opening_states(valve), *device]
-
-    def heat_pairs(self) -> Iterator[Pairs]:
-        """Yield couplings of the heat in the ledger, and of amounts in cells with the waves that friction reads."""
-        first = self.of.size + len(self.of.nodes) * (1 + len(self.tables.scalars))
-        first += int(self.tables.scalars["losses"].sum())
-        for k, source in enumerate(self.tables.heat_sources):
-            yield pairs_of(unique_states(first + k), unique_states(*self.heat_states(source)))
-        for pipe in self.of.pipes[self.of.pipes["temperature"] > 0.0]:
-            n, cells = int(pipe["cells"]), np.arange(pipe["cells"])
-            for wave in (pipe["y"], pipe["y"] + n):
-                yield wave + cells, self.row["y"] + pipe["cell"] + cells
-        for pipe in self.of.pipes[self.of.pipes["heat"] >= 0]:
-            n, cells = int(pipe["cells"]), np.arange(pipe["cells"])
-            row = first + pipe["heat"] + (cells if self.row["by_cell"] else 0 * cells)
-            yield row, self.row["y"] + pipe["cell"] + cells
-            memory = [pipe["memory"] + k * n for k in range(pipe["terms"])]
-            for offset in range(1 - MAX_WIDTH, MAX_WIDTH):
-                here = cells[(cells + offset >= 0) & (cells + offset < n)]
-                for at in (pipe["y"], pipe["y"] + n, *memory):
-                    yield self.row["y"] + pipe["cell"] + here, at + here + offset
-                    yield row[here], at + here + offset
-        first = self.of.size + self.heat_end - len(self.tables.exchangers)
-        for k, exchanger in enumerate(self.tables.exchangers):
-            i = exchanger["node"]
-            yield pairs_of(unique_states(first + k), unique_states(self.values[i], *self.through[i]))
-
-    def own(self, i: int) -> list:
-        """States that set the scalar's value at node i, a storing node or a patch of a basin; else an empty list."""
-        if i in self.of.patches:
-            faces = self.of.patches[i]["closure"] in pattern.THROUGH_FACES  # outflow has the weights of flows
-            return [self.behind(i), *(self.through[i] if faces else [self.of.behind(i, 1)])]
-        return [self.places[i], self.of.own(i)] if self.stores[i] else []
-
-    def behind(self, i: int) -> np.ndarray:
-        """States of the amounts in the basin cells behind patch i."""
-        row = self.of.patches[i]
-        cells = self.of.integers[row["first"] : row["first"] + row["count"]]
-        return pattern.amount_states(self.of.basins[row["basin"]], self.q, cells)
-
-    def edge(self, pipe, right: int) -> list[np.ndarray]:
-        """States of amounts and waves in the cells that give the value at an end of a pipe; right : 1 for `to`."""
-        n = int(pipe["cells"])
-        cells = np.arange(n)[::-1][: LIMITER_CELLS + 1] if right else np.arange(n)[: LIMITER_CELLS + 1]
-        return [self.row["y"] + pipe["cell"] + cells, pipe["y"] + cells, pipe["y"] + n + cells]
-
-    def mixed_values(self) -> list[np.ndarray]:
-        """For each node, the states that set the scalar's value there.
-
-        In a group of nodes without storage these are the states of all flows into the group.
-        """
-        inner, valves = self.of.inner, [ends_of(valve) for valve in self.of.valves]
-        group = union(len(inner), [(i, j) for i, j in valves if inner[i] and inner[j]])
-        enter: list[list] = [[] for _ in group]
-        for i in np.flatnonzero(inner):
-            enter[group[i]] += self.through[i]
-        for i, j in valves:
-            enter[group[i]] += self.own(j)
-            enter[group[j]] += self.own(i)
-        joined = [unique_states(*parts) for parts in enter]
-        return [joined[group[i]] if inner[i] else unique_states(*self.own(i)) for i in range(len(group))]
-
-    def pairs(self) -> Iterator[Pairs]:
-        """Yield the couplings of the scalar; some couplings of a state with itself are missing.
-
-        Those within basins are yielded for all scalars together, with the first scalar.
-        """
-        sources = [[self.values[i], *self.through[i]] for i in range(len(self.values))]
-        for valve in self.of.valves:
-            i, j = ends_of(valve)
-            sources[i].append(self.values[j])
-            sources[j].append(self.values[i])
-        for i, read in enumerate(sources):
-            affected = [self.places[i]] if self.stores[i] else [self.behind(i)] if i in self.of.patches else []
-            yield pairs_of(unique_states(*affected, self.ledger + i), unique_states(*read))
-        if self.q == 0:
-            yield from map(pattern.scalar_pattern, self.of.basins)
-        for basin in self.of.basins:
-            yield from self.boundary_pairs(basin)
-        if self.row["losses"] > 0:
-            yield from self.decay_pairs()
-        if self.heated:
-            yield from self.heat_pairs()
-        for pipe in self.of.pipes:
-            yield from self.inside(pipe)
-            for right, i in enumerate(ends_of(pipe)):
-                yield pairs_of(self.edge(pipe, right)[0], unique_states(self.values[i]))
-                yield pairs_of(self.close(pipe, right), self.read(pipe, right, i))
-
-    def boundary_pairs(self, basin) -> Iterator[Pairs]:
-        """Yield couplings of the flow through open boundaries of a basin with the cells there.
-
-        This flow is booked at the patches of the basin.
-        """
-        nodes = [i for i, row in self.of.patches.items() if self.of.basins[row["basin"]] is basin]
-        if basin.row["through"] >= 0:
-            behind = [self.of.integers[row["first"] :][: row["count"]] for row in map(self.of.patches.get, nodes)]
-            cells = pattern.cells_read(pattern.scalar_neighbours(basin), np.concatenate(behind))
-            read = unique_states(pattern.amount_states(basin, self.q, cells), pattern.cell_states(basin, cells))
-            yield pairs_of(self.ledger + np.array(nodes), read)
-
-    def decay_pairs(self) -> Iterator[Pairs]:
-        """Yield couplings of the decay in the ledger with the amounts and masses that decay.
-
-        The ledger has a single row for the decay of all states, or a row for each state.
-        """
-        rows = self.loss + np.arange(self.row["losses"])
-        pick = (lambda k: rows[k]) if rows.size > 1 else (lambda k: np.repeat(rows, np.size(k)))
-        for pipe in self.of.pipes:
-            cells = np.arange(pipe["cells"])
-            for first in (self.row["y"] + pipe["cell"], pipe["y"], pipe["y"] + pipe["cells"]):
-                yield pick(pipe["cell"] + cells), first + cells
-        for i in np.flatnonzero(self.stores):
-            read = unique_states(*self.own(i))
-            yield pairs_of(np.atleast_1d(pick(self.places[i] - self.row["y"])), read)
-        for basin in self.of.basins:
-            cells = np.arange(basin.n)
-            for first in (pattern.amount_states(basin, self.q, 0), *([basin.row["y"]] if basin.quantities else [])):
-                yield pick(basin.row["lost"] + cells), first + cells
-
-    def inside(self, pipe) -> Iterator[Pairs]:
-        """Yield couplings of the amount in each cell of a pipe with amounts and waves in neighbouring cells."""
-        n = int(pipe["cells"])
-        cells, at = np.arange(n), self.row["y"] + pipe["cell"]
-        for offset in range(-self.wide, self.wide + 1):
-            here = cells[(cells + offset >= 0) & (cells + offset < n)]
-            for first in (pipe["y"], pipe["y"] + n, *([at] if abs(offset) <= LIMITER_CELLS else [])):
-                yield at + here, first + here + offset
-
-    def close(self, pipe, right: int) -> np.ndarray:
-        """Indices of the states (amounts) of cells near one end of a pipe, whose face flows depend on that end.
-
-        right : 1 for the end `to`, 0 for the end `from`
-        """
-        cells = self.row["y"] + pipe["cell"] + np.arange(pipe["cells"])
-        return (cells[::-1] if right else cells)[: self.wide]
-
-    def read(self, pipe, right: int, i: int) -> np.ndarray:
-        """States on which the flows near an end of a pipe depend, in addition to those of adjacent cells.
-
-        right : as for `close`; i : node at this end
-        """
-        enters, leaves = self.of.sides(pipe, right)
-        reach = self.of.reach
-        near = enters[: reach.entering], leaves[: reach.leaving]
-        return unique_states(self.of.sets[i], self.of.edge_cells(pipe, right), *near)
-
-
-def reaction_pairs(couplings, model) -> Iterator[Pairs]:
-    """Yield couplings of amounts that reactions change, and of the ledger of reactions, with what rates depend on.
-
-    These are amounts of scalars and the mass at the same place.
-    """
-    tables, scalars = model.tables, list(model.case.scalars)
-    ledger = couplings.size + len(couplings.nodes) * (1 + len(scalars)) + int(sum(tables.scalars["losses"]))
-    stores = np.flatnonzero(np.isin(tables.nodes["kind"], STORES))
-    for row, reaction in zip(tables.reactions, model.case.reactions.values(), strict=True):
-        changed = [scalars.index(name) for name in reaction.sides.names if reaction.sides.change(name) != 0.0]
-        read = [scalars.index(name) for name in names_read(reaction, model.case.scalars)]
-        first, single = ledger + row["extent"], row["extents"] == 1
-        for entries, masses, amounts in reacting_places(couplings, model, stores):
-            rows = [amounts(q) for q in changed] + [np.full(entries.size, first) if single else first + entries]
-            for states in [*(amounts(q) for q in read), *masses]:
-                yield from ((here, states) for here in rows)
-
-
-def reacting_places(couplings, model, stores: np.ndarray) -> Iterator[tuple[np.ndarray, list, Callable]]:
-    """Yield groups of places of reactions: their numbers, states of the masses there, states of amounts of a scalar.
-
-    stores : numbers of nodes with storage
-    """
-    tables = model.tables
-    scalars, nodes = tables.scalars, tables.nodes
-    for pipe in tables.pipes:
-        cells = np.arange(pipe["cells"])
-        masses = [pipe["y"] + cells, pipe["y"] + pipe["cells"] + cells]
-        yield pipe["cell"] + cells, masses, lambda q, k=pipe["cell"] + cells: scalars[q]["y"] + k
-    if stores.size:
-        places = tables.integers[scalars[0]["places"] + stores] - scalars[0]["y"]
-        yield places, [nodes["y"][stores]], lambda q: scalars[q]["y"] + places
-    for basin in couplings.basins:
-        cells = np.arange(basin.n)
-        depths = [basin.row["y"] + cells] if basin.quantities else []
-        if basin.scalars:
-            yield basin.row["lost"] + cells, depths, lambda q, b=basin, k=cells: pattern.amount_states(b, q, k)
-
-
 def jacobian_pattern(model) -> csc_array:
     """Sparsity pattern : bool[n + m, n], True where a derivative may differ from zero in any state of the model.
 
@@ -762,9 +526,6 @@ def jacobian_pattern(model) -> csc_array:
     """
     n, couplings = model.y_size, Couplings(model)
     pairs = [(np.arange(n), np.arange(n)), *couplings.pairs()]
-    for q in range(len(model.tables.scalars)):
-        pairs += ScalarCouplings(couplings, model, q).pairs()
-    pairs += reaction_pairs(couplings, model)
     rows, states = (np.concatenate(side) for side in zip(*pairs, strict=True))
     entries = np.ones(rows.size, dtype=bool), (rows, states)
     return csc_array(coo_array(entries, shape=(n + model.ledgers, n)), dtype=bool)

@@ -18,7 +18,6 @@ from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.run_data import RunData
-from fvsolve.model.scalar_tables import node_values, pipe_values
 from fvsolve.units import show
 
 if TYPE_CHECKING:
@@ -277,17 +276,13 @@ class Model(Displayable):
         alone = alone and bool((self.tables.nodes["kind"] == rec.PATCH).all())
         cells = bool((self.tables.pipes["cells"] > 0).any())
         cast = ModelFeatures(self.case.law.family, cells, *mechanics, self.unsteady, self.creeps, has.devices,
-                    tuple(self.laws), basins, carried, has.scalars, valves,
-                    tuple(pair for feature in self.features for pair in feature.terms.items()),
-                    tuple(name for feature in self.features for name in feature.packages), has.couplings, alone,
-                    forces=bool(self.layout["forces"] >= 0),
-                    formulas=bool((self.tables.schedules["pieces"] < 0).any()),
-                    networks=self.network is not None, heat=bool((self.tables.scalars["specific_heat"] > 0.0).any()),
-                    exchangers=has.exchangers, device_heat=bool((self.tables.heat_sources["device"] >= 0).any()),
-                    scalar_sensors=any(row["kind"] in (rec.NODE_SCALAR, rec.PIPE_SCALAR)
-                                       for feature in self.features for row in feature.probe_rows()[0]),
-                    viscosity=bool((self.tables.pipes["temperature"] > 0.0).any()),
-                    reactions=has.reactions)  # fmt: skip
+                    tuple(self.laws), basins, carried, valves, (), (), has.couplings, alone,
+                    forces=bool(self.layout["forces"] >= 0), formulas=bool((self.tables.schedules["pieces"] < 0).any()),
+                    networks=self.network is not None,
+                    device_heat=bool((self.tables.heat_sources["device"] >= 0).any()))  # fmt: skip
+        terms = tuple(pair for feature in self.features for pair in feature.terms(self, cast))
+        packages = tuple(name for feature in self.features for name in feature.packages)
+        cast = cast._replace(features=terms, further_packages=packages)
         return functions(cast)
 
     @property
@@ -477,7 +472,7 @@ class Model(Displayable):
             fields[pipe.name] = {
                 "pressure": pressure, "head": self.head(pressure, pipe.elevation),
                 "velocity": flow / law.area(row, pressure), "flow": flow,
-                "min_pressure": pressure, "max_pressure": pressure, **pipe_values(self, k, y),
+                "min_pressure": pressure, "max_pressure": pressure,
             }  # fmt: skip
         nodes, at = self.tables.nodes, int(self.layout["pressure"])
         for basin in self.basins:
@@ -488,7 +483,9 @@ class Model(Displayable):
         for i, name in enumerate(self.node_names):
             pressure = float(nodes[i]["pressure"] + out[at + i])
             head = float(self.head(pressure, self.elevation[name]))
-            fields["nodes"][name] = {"pressure": pressure, "head": head, **node_values(self, i, out)}
+            fields["nodes"][name] = {"pressure": pressure, "head": head}
+        for feature in self.features:
+            feature.add_fields(fields, self, y, out)
         return fields
 
     def contents(self, y: np.ndarray) -> tuple[float, float]:

@@ -12,7 +12,6 @@ from fvsolve.case.basins import boundary_cells, patch_names
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.steady_friction import drag
-from fvsolve.model.reaction_tables import reaction_facts
 from fvsolve.model.step_division import step_at_start
 from fvsolve.parts.pipe.pipe_wall import HEAT_KEYS, Wall, materials, restraint_factor
 from fvsolve.steppers.automatic import first_method
@@ -75,12 +74,15 @@ def checks(model) -> dict[str, Any]:
     method = method_named(first_method(numerics.method))
     timed = steps is not None and method.explicit
     expected = steps * (SECONDS_PER_STEP + method.stages * rhs_seconds(model)) if timed else None
+    facts: dict[str, Any] = {}
+    for feature in model.features:
+        facts |= feature.facts(model)
     return {
         "fluid": model.case.properties.plain(), "nodes": nodes, "masses": masses, "bodies": bodies,
         "pipes": pipes, "basins": {item.name: basin_facts(item) for item in model.basins},
         "states": model.y_size, "cells": model.all_cells, "step": step, "step_set_by": set_by, "steps": steps,
         "steps_if_full": steps_if_full if steps_if_full > (steps or 0) else None,
-        "network": None if model.network is None else model.network.facts(), "reactions": reaction_facts(model),
+        "network": None if model.network is None else model.network.facts(), "reactions": {}, **facts,
         "expected_seconds": expected, "moving": model.steady["moving"],
         "warnings": [item.plain() for item in (*model.warnings, *cost_notices(model, steps, set_by))],
     }  # fmt: skip

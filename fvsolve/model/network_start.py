@@ -12,7 +12,7 @@ from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.network_elimination import Elimination, NetworkError, Terms, substituted
 from fvsolve.model.network_faults import network_faults, tie_fault
-from fvsolve.model.scalar_tables import exchanger_names
+from fvsolve.parts.heat import exchanger_names
 from fvsolve.steady import union
 
 TURNS = 60  # changes of switches, and of nonlinear sources, in the search

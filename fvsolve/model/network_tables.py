@@ -12,8 +12,8 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.model.network import MOST_STATES, Network
 from fvsolve.model.network_elimination import Elimination, NetworkError, dependent_stores, substituted
 from fvsolve.model.network_faults import NO_INERTIA, NO_SPEED, network_faults, stated_faults
-from fvsolve.model.scalar_tables import exchanger_names
 from fvsolve.model.static_forces import rounding
+from fvsolve.parts.heat import exchanger_names
 
 CURRENT_ROUNDING = 1e-13  # of diodes, over the sum of all sources divided by their resistance
 SAMPLES = 12  # times at which responses are computed for the sizes of states

@@ -4,12 +4,8 @@ import numpy as np
 
 from fvsolve.assembly.lowering import lowering_of
 from fvsolve.assembly.mechanics import point_row
-from fvsolve.assembly.scheme_codes import lower_position
 from fvsolve.case import sloshing
 from fvsolve.kernels import dtypes as rec
-from fvsolve.parts.nodes_and_links import is_in_network
-
-REACTION_QUANTITIES = ("rate", "power", "affinity")  # in the order of `kernels.dtypes`
 
 
 def lower_probes(draft) -> np.ndarray:
@@ -25,17 +21,13 @@ def fill_probes(draft, probes: list) -> np.ndarray:
         row["mark"] = -1
         if any(feature.probe(draft, probe, row) for feature in draft.features):
             continue
-        if probe.part == "reactions":
-            lower_reaction_probe(draft, row, probe)
-        elif probe.part == "sections":
+        if probe.part == "sections":
             lower_section(draft, row, probe)
         elif probe.point is not None:
             lower_basin_point(draft, row, probe)
         elif probe.part == "nodes" and probe.name in case.meshes:
             row["kind"], row["index"] = rec.CELL_FIELD, list(case.meshes).index(probe.name)
             draft.basins[row["index"]].lower_probe(row, probe.quantity, np.zeros(0, int), np.zeros(0))
-        elif probe.quantity in draft.case.scalars and not is_in_network(parts[probe.part].get(probe.name)):
-            scalar_probe(draft, row, probe)
         elif probe.name in draft.case.network_places and probe.name not in parts["nodes"]:  # PUMP.shaft
             draft.network.fill_node_probe(draft, row, probe.name, False)
         elif probe.part == "nodes" and probe.name not in parts["nodes"]:  # a point of a body, or of the world
@@ -51,34 +43,6 @@ def all_probes(case) -> list:
     return [*case.probes, *case.extreme_probes]
 
 
-def scalar_probe(draft, row, probe) -> None:
-    """Fill the row of a probe of a scalar at a node or along a pipe.
-
-    Along a pipe its value is interpolated linearly between cell centres.
-    """
-    row["scalar"] = draft.scalar_index[probe.quantity]
-    if probe.part == "nodes":
-        row["kind"], row["index"] = rec.NODE_SCALAR, draft.node_index[draft.inside(probe.name)]
-    elif probe.name in draft.case.meshes:
-        lowering_of(type(draft.case.links[probe.name])).probe(draft, probe.name, probe, row)
-    else:
-        row["kind"], row["index"] = rec.PIPE_SCALAR, draft.pipe_names.index(probe.name)
-        lower_position(draft, row, probe.fraction, 1)
-
-
-def lower_reaction_probe(draft, row, probe) -> None:
-    """Fill the row of a probe of a reaction; of an affinity at a place with the data of a scalar probe there."""
-    place = probe.place
-    if place is not None:
-        of_scalar = fill_probes(draft, [place])[0]
-        for key in ("side", "cell", "count", "weights"):
-            row[key] = of_scalar[key]
-        row["kind"], row["head"], row["scalar"] = rec.LOCAL_AFFINITY, of_scalar["kind"], of_scalar["index"]
-    else:
-        row["kind"], row["side"] = rec.REACTION_VALUE, REACTION_QUANTITIES.index(probe.quantity)
-    row["index"] = list(draft.case.reactions).index(probe.name.removeprefix("reactions."))
-
-
 def lower_body_point(draft, row, probe) -> None:
     """Fill the row of a probe at a named point of a body or of the world."""
     from fvsolve.kernels.mechanism.body_values import POINT_QUANTITIES
@@ -88,21 +52,23 @@ def lower_body_point(draft, row, probe) -> None:
 
 
 def lower_basin_point(draft, row, probe) -> None:
-    """Fill the row of a probe at a point of a basin: the cells that it reads, and their weights."""
+    """Fill the row of a probe at a point of a basin."""
     if probe.name in draft.case.lumped:
         return lower_surface(draft, row, probe)
+    row["kind"] = rec.CELL_FIELD
+    cells, weights = cells_at_point(draft, row, probe)
+    draft.basins[row["index"]].lower_probe(row, probe.quantity, cells, weights)
+
+
+def cells_at_point(draft, row, probe) -> tuple[np.ndarray, np.ndarray]:
+    """Cells of a basin that a probe at a point reads, and their weights, after they are written to its row."""
     k = list(draft.case.meshes).index(probe.name)
-    basin = draft.basins[k]
-    cells, weights = basin.points.cell_weights(*probe.point)
+    cells, weights = draft.basins[k].points.cell_weights(*probe.point)
     row["index"], row["count"], row["cell"] = k, cells.size, len(draft.integers)
     row["weights"] = len(draft.floats)
     draft.integers += cells.tolist()
     draft.floats += weights.tolist()
-    if probe.quantity in draft.case.scalars:
-        row["kind"], row["scalar"] = rec.CELL_SCALAR, draft.scalar_index[probe.quantity]
-    else:
-        row["kind"] = rec.CELL_FIELD
-        basin.lower_probe(row, probe.quantity, cells, weights)
+    return cells, weights
 
 
 def lower_section(draft, row, probe) -> None:

@@ -211,3 +211,8 @@ class HeatExchangerRows(NetworkRows, kind="heat-exchanger"):
         place, to = f"links.{name}", node_or_reference(case, part.to)
         return [Element(FLOW, place, place, (None, to), reads=(rec.FLUID_HEAT, name), ledger="supplied",
                         thermal=True)], []  # fmt: skip
+
+
+def exchanger_names(case) -> list[str]:
+    """Names of the heat exchangers of a case, in the order of their table."""
+    return [name for name, link in case.links.items() if link.kind == "heat-exchanger"]

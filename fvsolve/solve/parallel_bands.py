@@ -27,7 +27,7 @@ from fvsolve.kernels import band_exchange
 from fvsolve.kernels.calls import compile_as
 from fvsolve.kernels.compiled_functions import functions
 from fvsolve.model import RunData
-from fvsolve.model.scalar_tables import state_bounds
+from fvsolve.model.state_bounds import state_bounds
 from fvsolve.solve.partition import Partition, blocked_sums
 from fvsolve.steppers import loop_records
 from fvsolve.steppers.integrator import Integrator

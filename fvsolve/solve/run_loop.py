@@ -13,7 +13,7 @@ from fvsolve.kernels.column_junctions import gate_inflow
 from fvsolve.kernels.compiled_functions import fused_step_function
 from fvsolve.kernels.scalar_transport import GREATEST_RISE
 from fvsolve.model import Model, RunData
-from fvsolve.model.scalar_tables import amount_indices, state_bounds
+from fvsolve.model.state_bounds import state_bounds
 from fvsolve.model.step_division import dividing_rate
 from fvsolve.solve.partition import blocked_sums, make_partition
 from fvsolve.steppers import automatic, loop_records
@@ -88,7 +88,9 @@ class RunLoop:
         self.fused_step = fused_step_function(fused_allowed := fused_step_allowed(model, method))
         ledgers, structure = model.ledgers, structure or (lambda: model.structure)
         self.stepper = stepper = Integrator(method, model.y_size, ledgers, structure, model.scale.copy(), model.damped)
-        sums = [*model.tables.nodes["y"], *model.tables.masses["y"], *amount_indices(model)]  # travel is stored too
+        sums = [*model.tables.nodes["y"], *model.tables.masses["y"]]  # travel is stored too
+        for feature in model.features:
+            sums += feature.stored_states(model).tolist()
         stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         stepper.carry = np.zeros(len(stepper.stored))
         stepper.bounded_states, stepper.bounds = state_bounds(model)
@@ -474,7 +476,7 @@ def fused_step_allowed(model: Model, method: Method) -> bool:
         model.case.law.linear and settings["scheme"] == rec.UPWIND and settings["from_arriving"]
         and method.explicit and method.stages == 1 and numerics.rtol is None
         and model.y_size == 2 * model.cells and model.shapes.armed == 0 and not len(model.tables.moving_segments)
-        and not any(feature.terms for feature in model.features)
+        and not model.functions.cast.features
         and {*laws.tolist()} <= {rec.FRICTION_NONE, rec.FRICTION_FACTOR}
     )  # fmt: skip
 

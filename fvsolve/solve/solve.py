@@ -8,7 +8,6 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.model import Model, State
-from fvsolve.model.scalar_tables import scalar_ledgers
 from fvsolve.parts.pump.energy_use import energy_use
 from fvsolve.solve import run_summary as found
 from fvsolve.solve.parallel_bands import CLOSE_MESSAGE, postponed_interrupts
@@ -420,7 +419,8 @@ class Run:
         first = int(model.layout["source"] - model.layout["supply"])
         booked = ledger[:, [*range(len(model.node_names)), *range(first, first + len(model.sources))]]
         ledgers = {"mass": mass_ledger(model, loop.now, booked)}
-        ledgers |= scalar_ledgers(model, loop.now, ledger)
+        for feature in model.features:
+            ledgers |= feature.ledgers(model, loop.now, ledger)
         basin_notices = [notice for entry in self.watches for notice in entry.notices()]
         warnings = [*self.notices, *basin_notices, *self.checks.warnings(ledgers)]
         warnings += found.device_notices(self.run_data) + found.spill_notices(self.run_data)

@@ -1,7 +1,7 @@
-"""Greatest fixed step for modes other than plain waves: vessels, columns, bodies, devices, friction, scalars.
+"""Greatest fixed step for modes other than plain waves: vessels, columns, bodies, devices, friction, features.
 
 It is estimated at the start, from the eigenvalues s of the rates of all states outside cells, with the cells held
-constant, and from the modes of cells: friction, unsteady friction, wall creep, decay and diffusion of scalars. In a
+constant, and from the modes of cells: friction, unsteady friction, wall creep, and those of features. In a
 step h the method multiplies a deviation by |R(h s)|, with its stability function R, and the exact solution by
 |exp(h s)|; the quotient is the growth by the method. Slopes are differences over a hundredth of the forcing range: the
 slope of a valve at zero pressure drop is infinite, and smaller oscillations about it are not relevant.
@@ -25,7 +25,6 @@ from fvsolve.assembly.pipe_terms import elements
 from fvsolve.errors import Notice
 from fvsolve.kernels.steady_friction import drag_slope
 from fvsolve.model.model import once_per_model
-from fvsolve.model.reaction_tables import reaction_modes
 from fvsolve.schemes import SCHEMES
 from fvsolve.step_limits.grid_limits import bisected
 from fvsolve.step_limits.symbol import symbol
@@ -33,7 +32,7 @@ from fvsolve.steppers.analysis.stability_function import stability_function
 from fvsolve.steppers.analysis.stability_properties import imaginary_interval
 from fvsolve.steppers.tableau import Method, method_named
 
-OTHER_STATES = 1e3  # further factor for states driven by more than waves: contents, bodies, scalars
+OTHER_STATES = 1e3  # further factor for states driven by more than waves: contents, bodies, amounts
 FORCING_KEYS = {"pressure": "pressure", "head": "head", "demand": "flow", "flow": "flow"}  # scheduled keys of nodes
 
 
@@ -115,8 +114,6 @@ LEAST_GROWTH = 10.0  # growth factor in a run below which no notice is given: so
 LEAST = 1e-15  # least step in the search for the limit, relative to the given step
 RESOLVED = 1.0  # |h s| up to which a mode is resolved by the steps, and grows as predicted at the start
 PHASES = np.linspace(0.0, np.pi, 65)
-LEAST_DIFFUSION_CELLS = 3  # least number of cells of a basin for diffusion modes
-DIFFUSION = 1.0 - np.cos(PHASES)  # diffusion rate of a wave, relative to 2 D / dx^2
 NOTICE_GROWTH = 1.01  # growth of an undamped oscillation in a run above which a notice is given
 GREATEST_DAMPING = 0.1  # greatest damping rate of a mode that counts as undamped, relative to its frequency
 
@@ -152,8 +149,9 @@ def lumped_modes(model, method: str, step: float, count: float | None = None) ->
     own = modes_outside_cells(model) if fixed else []
     cells = friction_modes(model)
     if fixed:  # a Courant number limits the other modes
-        cells += memory_modes(model) + pipe_scalar_modes(model) + basin_scalar_modes(model)
-        cells += reaction_modes(model)
+        cells += memory_modes(model)
+        for feature in model.features:
+            cells += feature.modes(model)
     span = max(span, step * (count or 0.0))  # breaks of schedules shorten steps, but each still is a step
     candidates = [fastest_growing(r, modes, step, span, modes is own) for modes in (own, cells)]
     return [mode for mode in candidates if mode is not None]
@@ -287,50 +285,6 @@ def friction_slope(row) -> float:
     row : row of the pipe in the table of pipes
     """
     return float(drag_slope(*(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))))
-
-
-def pipe_scalar_modes(model) -> Modes:
-    """Modes of transported scalars in pipes, at the initial flow: pairs of "pipe.scalar" and eigenvalues [1/s]."""
-    modes, rho = [], model.case.properties.density
-    for name, scalar in model.case.scalars.items():
-        for mesh, row in zip(model.pipes, model.tables.pipes, strict=True):
-            q = abs(float(row["flow"])) / (rho * row["area"] * row["dx"])
-            s = -q * (1.0 - np.exp(-1j * PHASES)) - 2.0 * scalar.diffusivity / row["dx"] ** 2 * DIFFUSION - scalar.decay
-            modes.append((f"{mesh.name}.{name}", s / model.case.retardation(mesh.name, name)))
-    return modes
-
-
-def basin_scalar_modes(model) -> Modes:
-    """Modes of scalars in basins, from decay and from diffusion of the shortest wave of the mesh.
-
-    Returns pairs of "basin.scalar" and eigenvalue [1/s].
-    """
-    return [
-        (f"{basin.name}.{name}", np.array([-scalar.decay - scalar.diffusivity * greatest_diffusion_rate(basin.mesh)]))
-        for name, scalar in model.case.scalars.items()
-        for basin in model.basins
-        if scalar.decay > 0.0 or scalar.diffusivity > 0.0
-    ]
-
-
-def greatest_diffusion_rate(mesh) -> float:
-    """Greatest decay rate by diffusion on a mesh, over the diffusivity [1/m2]; no flux passes the boundary.
-
-    It is 0 for fewer than 3 cells.
-    """
-    from scipy.sparse import coo_array, diags_array
-    from scipy.sparse.linalg import eigsh
-
-    n, left, right = mesh.area.size, mesh.left[: mesh.inner], mesh.right[: mesh.inner]
-    if n < LEAST_DIFFUSION_CELLS:
-        return 0.0
-    near = mesh.length[: mesh.inner] / np.linalg.norm(mesh.centre[right] - mesh.centre[left], axis=1)
-    through = coo_array((near, (left, right)), shape=(n, n))
-    sides = np.bincount(left, near, n) + np.bincount(right, near, n)
-    root = diags_array(1.0 / np.sqrt(mesh.area))
-    operator = root @ (diags_array(sides) - through - through.T) @ root
-    start = np.random.default_rng(1).standard_normal(n)
-    return float(eigsh(operator.tocsr(), k=1, which="LM", tol=1e-3, v0=start, return_eigenvectors=False)[0])
 
 
 # undamped oscillations ----------

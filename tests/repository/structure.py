@@ -56,7 +56,7 @@ LIMITS = {
 # Files of the core that each stage of a run needs. A hub that moved or was divided is stated by its new paths.
 HUBS = """
 model/build.py model/model.py model/jacobian_pattern.py model/run_data.py model/energy_accounts.py model/energy_norm.py
-model/probe_tables.py model/model_facts.py model/start_notices.py model/scalar_tables.py assembly/model_draft.py
+model/probe_tables.py model/model_facts.py model/start_notices.py model/state_bounds.py assembly/model_draft.py
 solve/run_loop.py solve/run_summary.py solve/run_checks.py solve/solve.py solve/partition.py case/case.py case/load.py
 case/checks.py case/connections.py case/part_reading.py case/probe.py output/fields.py kernels/rhs_assembly.py
 kernels/dtypes.py kernels/energy_rows.py kernels/observation.py step_limits/growing_modes.py studies/resolution.py

@@ -68,7 +68,6 @@ class Controls(Feature, slot=1, wakes="section controls"):
         lower.lower_controls(draft, self)
         self.settings[0]["late"] = bool(self.table["late"].any())
         self.settings[0]["late_sensors"] = lower.has_late_sensors(draft, self)
-        self.has_network = draft.network is not None
 
     def law_row(self, rows) -> int:
         """Row of a law in the table of functions of blocks; added on first use."""
@@ -124,11 +123,10 @@ class Controls(Feature, slot=1, wakes="section controls"):
 
     # model ----------
 
-    @property
-    def terms(self) -> dict[str, RhsTerms]:
-        decide = "blocks: decide_linear" if self.case.law.linear else "blocks: decide_barotropic"
-        found = {"first": FIRST._replace(decide=decide), "events": EVENTS, "last": LAST}
-        return found | ({"sources": FOR_EVENTS} if self.has_network else {})
+    def terms(self, model, cast) -> list[tuple[str, RhsTerms]]:
+        decide = "blocks: decide_linear" if cast.family == "linear" else "blocks: decide_barotropic"
+        found = [("first", FIRST._replace(decide=decide)), ("events", EVENTS), ("last", LAST)]
+        return found + ([("sources", FOR_EVENTS)] if model.network is not None else [])
 
     @property
     def packages(self) -> list[str]:

@@ -48,10 +48,6 @@ class DelayLines(Feature, slot=0, wakes="pipe_model delay-line, pipe_model auto"
         self.sharp: dict[str, np.ndarray] = {}
 
     @property
-    def terms(self) -> dict[str, RhsTerms]:
-        return {"pipes": TERMS} if len(self.delays) else {}
-
-    @property
     def sets_arrivals(self) -> bool:
         return len(self.delays) > 0
 
@@ -109,6 +105,9 @@ class DelayLines(Feature, slot=0, wakes="pipe_model delay-line, pipe_model auto"
         return own
 
     # model ----------
+
+    def terms(self, model, cast) -> list[tuple[str, RhsTerms]]:
+        return [("pipes", TERMS)] if len(self.delays) else []
 
     def refusal(self, function: str) -> str:
         if not len(self.delays):

@@ -1,0 +1,1 @@
+"""Scalars that the flow carries, their reactions, and heat of the fluid."""

@@ -1,0 +1,162 @@
+"""Scalars of a case that the flow carries, with their reactions and the heat of the fluid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fvsolve.assembly.features import Feature, FeatureRun
+from fvsolve.assembly.lowering import lowering_of
+from fvsolve.assembly.scheme_codes import lower_position
+from fvsolve.features.scalars import lower, reactions
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.rhs_assembly import MIXED, RhsTerms
+from fvsolve.model.probe_tables import cells_at_point, fill_probes
+from fvsolve.parts.nodes_and_links import is_in_network
+
+REACTION_QUANTITIES = ("rate", "power", "affinity")  # in the order of `kernels.dtypes`
+SENSED = (rec.NODE_SCALAR, rec.PIPE_SCALAR)
+AMOUNTS = RhsTerms(outlet_values="scalar_transport: clear_losses", observe="scalar_transport: observe_scalars")
+CARRIED = RhsTerms(outlet_values="scalar_transport: pipe_outlet_values", scalar_rates="scalar_transport: scalar_rates")
+REACTIONS = RhsTerms(
+    prepare="reactions: limit_rates", scalar_rates="reactions: reaction_rates", observe="reactions: observe_reactions"
+)
+HEAT = {
+    True: RhsTerms(outlet_values="fluid_heat: heat_of_restrictions", scalar_rates="fluid_heat: heat_of_pipes"),
+    False: RhsTerms(
+        outlet_values="fluid_heat: heat_of_restrictions_barotropic", scalar_rates="fluid_heat: heat_of_pipes_barotropic"
+    ),
+}
+HEAT_FOR_EVENTS = {
+    True: RhsTerms(events="fluid_heat: heat_for_events"),
+    False: RhsTerms(events="fluid_heat: heat_for_events_barotropic"),
+}
+VALUES_FOR_EVENTS = RhsTerms(events="scalar_transport: mix_for_events")
+VISCOSITY = RhsTerms(rates="viscosity: viscous_friction")
+EXCHANGERS = RhsTerms(outlet_values="fluid_heat: node_temperatures", scalar_rates="potential_networks: network_rates")
+
+
+class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
+    """Scalars, reactions and heat of a case."""
+
+    def lower_behind_basins(self, draft) -> None:
+        lower.lower_scalars(draft)
+        reactions.lower_reactions(draft)
+
+    def reserve_ledger(self, draft) -> None:
+        lower.reserve_scalars(draft)
+        reactions.reserve_reactions(draft)
+
+    def settle(self, draft) -> list[str]:
+        lower.scale_scalars(draft)
+        return []
+
+    def start(self, draft, y: np.ndarray) -> None:
+        lower.start_amounts(draft, y)
+
+    def probe(self, draft, probe, row) -> bool:
+        case = draft.case
+        if probe.part == "reactions":
+            self.reaction_probe(draft, row, probe)
+            return True
+        part = {**case.links, **case.conduits}.get(probe.name)
+        part = {**case.places, **case.nodes}.get(probe.name) if probe.part == "nodes" else part
+        if probe.quantity not in case.scalars or probe.part == "sections" or is_in_network(part):
+            return False
+        if probe.part == "nodes" and (probe.name in case.lumped or (probe.name in case.meshes and probe.point is None)):
+            return False
+        row["scalar"] = draft.scalar_index[probe.quantity]
+        if probe.point is not None:
+            row["kind"] = rec.CELL_SCALAR
+            cells_at_point(draft, row, probe)
+        elif probe.part == "nodes":
+            row["kind"], row["index"] = rec.NODE_SCALAR, draft.node_index[draft.inside(probe.name)]
+        elif probe.name in case.meshes:
+            lowering_of(type(case.links[probe.name])).probe(draft, probe.name, probe, row)
+        else:  # interpolated linearly between cell centres
+            row["kind"], row["index"] = rec.PIPE_SCALAR, draft.pipe_names.index(probe.name)
+            lower_position(draft, row, probe.fraction, 1)
+        return True
+
+    def reaction_probe(self, draft, row, probe) -> None:
+        """Fill the row of a probe of a reaction; of an affinity at a place with the data of a scalar probe there."""
+        place = probe.place
+        if place is not None:
+            of_scalar = fill_probes(draft, [place])[0]
+            for key in ("side", "cell", "count", "weights"):
+                row[key] = of_scalar[key]
+            row["kind"], row["head"], row["scalar"] = rec.LOCAL_AFFINITY, of_scalar["kind"], of_scalar["index"]
+        else:
+            row["kind"], row["side"] = rec.REACTION_VALUE, REACTION_QUANTITIES.index(probe.quantity)
+        row["index"] = list(draft.case.reactions).index(probe.name.removeprefix("reactions."))
+
+    # model ----------
+
+    def terms(self, model, cast) -> Iterator[tuple[str, RhsTerms]]:
+        linear, tables = cast.family == "linear", model.tables
+        heated = bool((tables.scalars["specific_heat"] > 0.0).any())
+        if any(row["kind"] in SENSED for feature in model.features for row in feature.probe_rows()[0]):
+            if heated:
+                yield "solved", HEAT_FOR_EVENTS[linear]
+            yield "solved", VALUES_FOR_EVENTS
+        if len(tables.scalars):
+            yield "basins", AMOUNTS
+            if not cast.alone:
+                yield "basins", MIXED
+            if cast.pipes:
+                yield "basins", CARRIED
+            if heated:
+                yield "basins", HEAT[linear]
+            if cast.pipes and (tables.pipes["temperature"] > 0.0).any():
+                yield "basins", VISCOSITY
+            if len(tables.exchangers):
+                yield "basins", EXCHANGERS
+        if len(tables.reactions):  # those in basins are added later
+            yield "basins", REACTIONS
+
+    def run(self, run_data) -> FeatureRun:
+        return FeatureRun(self, run_data)
+
+    def pattern(self, couplings):
+        from fvsolve.features.scalars.pattern import ScalarPattern
+
+        return ScalarPattern(self, couplings)
+
+    def modes(self, model) -> list:
+        from fvsolve.features.scalars.modes import basin_scalar_modes, pipe_scalar_modes
+
+        return pipe_scalar_modes(model) + basin_scalar_modes(model) + reactions.reaction_modes(model)
+
+    def weigh(self, model, weights: np.ndarray) -> None:
+        from fvsolve.features.scalars.weights import weigh_scalars
+
+        weigh_scalars(model, weights)
+
+    def add_fields(self, fields: dict, model, y: np.ndarray, out: np.ndarray) -> None:
+        from fvsolve.features.scalars.balances import node_values, pipe_values
+
+        for k, pipe in enumerate(model.pipes):
+            fields[pipe.name] |= pipe_values(model, k, y)
+        for i, name in enumerate(model.node_names):
+            fields["nodes"][name] |= node_values(model, i, out)
+
+    def facts(self, model) -> dict:
+        return {"reactions": reactions.reaction_facts(model)}
+
+    def stored_states(self, model) -> np.ndarray:
+        from fvsolve.features.scalars.balances import amount_indices
+
+        return amount_indices(model)
+
+    def bounds(self, model) -> list[tuple[np.ndarray, np.ndarray]]:
+        from fvsolve.features.scalars.bounds import scalar_bounds
+
+        reacting = reactions.reacting(model.case)  # limits of single amounts would break sums that reactions keep
+        names = [(q, name) for q, name in enumerate(model.case.scalars) if name not in reacting]
+        return [row for q, _ in names for row in scalar_bounds(model, q)]
+
+    def ledgers(self, model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict]:
+        from fvsolve.features.scalars.balances import scalar_ledgers
+
+        return scalar_ledgers(model, y, ledger)
