@@ -530,4 +530,4 @@ class Output(Table):
 class ExactSpec(Table):
     """Table `[exact]`: exact solution of the case, from which studies compute errors."""
 
-    name: Annotated[str, Choice("exact solution", tuple(NAMES), "name of the exact solution", changes=VALUE)]
+    name: Annotated[str, Choice("exact solution", NAMES, "name of the exact solution", changes=VALUE)]

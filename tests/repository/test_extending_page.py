@@ -1,0 +1,39 @@
+"""Package, cases and commands of docs/extending.md, installed and run as they stand."""
+
+import re
+import shlex
+import tomllib
+from pathlib import Path
+
+import pytest
+from reference.folders import page
+from reference.outside_packages import install, python
+
+TEXT = page("extending")
+FILES = dict(re.findall(r"`([\w./]+\.\w+)`[^`]*?:\n\n```\w+\n(.*?)```", TEXT, re.DOTALL))
+RUNS = re.findall(r"```sh\n(.*?)```(?:\n\n```text\n(.*?)```)?", TEXT, re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory) -> Path:
+    """Folder with the cases of the page and its installed package."""
+    project = tomllib.loads(FILES["pyproject.toml"])["project"]
+    files = {name: text for name, text in FILES.items() if name != "pyproject.toml"} | {"fieldkit/__init__.py": ""}
+    return install(tmp_path_factory.mktemp("home"), project["name"], files, project["entry-points"])
+
+
+@pytest.mark.parametrize("commands, output", RUNS, ids=[commands.splitlines()[0] for commands, _ in RUNS])
+def test_the_commands_of_the_page_print_what_it_shows(commands, output, home):
+    done = ""
+    for line in commands.splitlines():
+        program, *words = shlex.split(line)
+        done += python(home, *(["-m", "fvsolve"] if program == "fvsolve" else []), *words).stdout
+    shown = [line for line in output.splitlines() if line != "..."]
+    assert shown and [line for line in shown if line not in done.splitlines()] == []
+
+
+def test_each_entry_point_of_the_page_is_used_by_it():
+    entries = tomllib.loads(FILES["pyproject.toml"])["project"]["entry-points"]
+    text = "\n".join([*(commands for commands, _ in RUNS), *(FILES[name] for name in FILES if name.endswith(".toml"))])
+    assert [name for group in entries.values() for name in group if text.count(name) < 2] == []
+    assert len(FILES) >= 4 and len(RUNS) >= 2
