@@ -14,6 +14,7 @@ from fvsolve.errors import CaseError, Notice, RunError
 from fvsolve.output.directory import RunDirectory, change_text, existing_pictures, read_directory
 from fvsolve.output.memory_sink import MemorySink
 from fvsolve.output.restart import identity
+from fvsolve.output.several_sinks import SeveralSinks, read_sinks
 from fvsolve.output.summary_file import summary_data, write_summary
 from fvsolve.run import mpi_run
 from fvsolve.run.result import Result
@@ -96,6 +97,7 @@ def model_of(case, set: Mapping | None = None, like=None):
 def sink_of(model, out: str | Path | None, force: bool, resume: bool, threads: int = 1):
     """Object that stores the output of a run: in memory, or in a run directory, which is locked until it is closed.
 
+    It also passes the output to the sinks that the case names.
     out : run directory, None for memory; force, resume : as for `RunDirectory`. Raises RunError for `threads` above 1
     under MPI, and for `resume` without `out`.
     """
@@ -103,11 +105,11 @@ def sink_of(model, out: str | Path | None, force: bool, resume: bool, threads: i
         if comm is not None and threads > 1:
             text = f"threads = {threads}: under MPI each of the {comm.size} ranks is one thread"
             raise RunError(f"{text}; leave out `threads`")
-        if out is not None:
-            return RunDirectory(Path(out), model, force, resume)
-        if resume:
+        if resume and out is None:
             raise RunError("resume needs the run directory; give it as the argument `out`")
-        return MemorySink(model)
+        sinks = read_sinks(model.case.output.sinks)  # before the run directory is locked
+        first = MemorySink(model) if out is None else RunDirectory(Path(out), model, force, resume)
+        return SeveralSinks(first, sinks) if sinks else first
 
 
 def solved(model, sink, progress=None, threads: int = 1, begun: float | None = None) -> Result:
