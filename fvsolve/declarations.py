@@ -34,9 +34,9 @@ def declared(noun: str, name: str = "", **options: Any) -> Callable[[Declared], 
 
 
 def header_of(noun: str) -> re.Pattern[str]:
-    """Regular expression of a header `@declared("NOUN", "NAME")` and of the class or function below it."""
+    """Regular expression of a header `@declared("NOUN", "NAME")`, further decorators, and the class or function."""
     head = rf'\n@declared\("{noun}"(?:, "(?P<name>[\w-]+)")?[^\n]*\)\n'
-    return re.compile(head + r"(?:class|def) (?P<attribute>\w+)")
+    return re.compile(head + r"(?:[@ )].*\n)*(?:class|def) (?P<attribute>\w+)")
 
 
 def headers(patterns: Iterable[str], header: re.Pattern[str]) -> Iterator[tuple[str, re.Match[str]]]:
@@ -93,7 +93,9 @@ def _entry_points_on(path: tuple[str, ...]) -> list[EntryPoint]:
             from importlib.metadata import distributions
 
             for package in distributions(path=[folder]):
-                packages.setdefault(package.name, package.read_text("entry_points.txt") or "")
+                text = package.read_text("entry_points.txt") or ""
+                if "[fvsolve." in text:
+                    packages.setdefault(package.name, text)
             continue
         except OSError:
             continue

@@ -147,7 +147,7 @@ def test_packages_in_zip_files_are_found_and_a_second_copy_of_a_package_is_not(i
     zipped = install(tmp_path / "zipped", "gadget_zip", {"gadget_zip/__init__.py": "x = 3\n"},
                      {GROUP: {"zipped": "gadget_zip:x"}})  # fmt: skip
     with zipfile.ZipFile(tmp_path / "packages.zip", "w") as archive:
-        for path in zipped.rglob("*.*"):
+        for path in zipped.rglob("*"):
             archive.write(path, path.relative_to(zipped))
     monkeypatch.syspath_prepend(tmp_path / "packages.zip")
     assert list(index.others()) == ["zipped", "new"]

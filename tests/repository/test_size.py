@@ -22,9 +22,10 @@ BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")  # fields of state
 # links by a curve of losses (GPV and PBV of EPANET over a day), search for events beside jumps, hidden stiffness,
 # rules in windows of time, sums of schedules, pumps that follow a pattern, leaks behind empty tanks, links that rest
 # between switches, events located by secants, one Newton step for each difference of the Jacobian.
-# Raised for issue 61 (what other packages declare): index of declarations; commands, exact solutions, sinks of others.
+# Raised for issue 61 (what other packages declare): index of declarations; commands, exact solutions, sinks and studies
+# of others, with the page that shows them.
 FOLDERS: dict[str, tuple[int, int]] = {
-    "fvsolve": (2384, 14),
+    "fvsolve": (2400, 14),
     "tests": (1066, 8),
     "benchmarks": (9565, 64),
     "fvsolve/assembly": (2018, 10),
@@ -46,9 +47,9 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/report": (2080, 7),
     "fvsolve/run": (1621, 7),
     "fvsolve/solve": (3159, 12),
-    "fvsolve/step_limits": (1720, 7),
+    "fvsolve/step_limits": (1724, 7),
     "fvsolve/steppers": (7970, 35),
-    "fvsolve/studies": (16170, 57),
+    "fvsolve/studies": (16193, 57),
     "fvsolve/validation": (1462, 11),
     "tests/attitude": (447, 2),
     "tests/basins": (10723, 37),
@@ -67,12 +68,12 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/parts": (19675, 52),
     "tests/reference": (3864, 37),
     "tests/report": (863, 4),
-    "tests/repository": (5028, 28),
+    "tests/repository": (5067, 28),
     "tests/schemes": (569, 2),
     "tests/solve": (2995, 14),
     "tests/step_limits": (1100, 5),
     "tests/steppers": (2858, 16),
-    "tests/studies": (9018, 26),
+    "tests/studies": (9086, 27),
     "tests/units": (359, 1),
     "tests/validation": (319, 1),
 }
