@@ -14,7 +14,6 @@ from fvsolve.errors import CaseError, Notice, RunError
 from fvsolve.output.directory import RunDirectory, change_text, existing_pictures, read_directory
 from fvsolve.output.memory_sink import MemorySink
 from fvsolve.output.restart import identity
-from fvsolve.output.several_sinks import SeveralSinks, read_sinks
 from fvsolve.output.summary_file import summary_data, write_summary
 from fvsolve.run import mpi_run
 from fvsolve.run.result import Result
@@ -107,9 +106,14 @@ def sink_of(model, out: str | Path | None, force: bool, resume: bool, threads: i
             raise RunError(f"{text}; leave out `threads`")
         if resume and out is None:
             raise RunError("resume needs the run directory; give it as the argument `out`")
-        sinks = read_sinks(model.case.output.sinks)  # before the run directory is locked
-        first = MemorySink(model) if out is None else RunDirectory(Path(out), model, force, resume)
-        return SeveralSinks(first, sinks) if sinks else first
+        names = model.case.output.sinks
+        if not names:
+            return RunDirectory(Path(out), model, force, resume) if out is not None else MemorySink(model)
+        from fvsolve.output.several_sinks import SeveralSinks, read_sinks
+
+        sinks = read_sinks(names)  # before the run directory is locked
+        first = RunDirectory(Path(out), model, force, resume) if out is not None else MemorySink(model)
+        return SeveralSinks(first, sinks)
 
 
 def solved(model, sink, progress=None, threads: int = 1, begun: float | None = None) -> Result:
