@@ -10,50 +10,63 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from functools import cache
-from importlib import import_module
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-FOLDER = Path(__file__).parents[1] / "features"
+from fvsolve.declarations import Declaration, Declarations
+from fvsolve.errors import FvsolveError
+
 SECTIONS = ("controls", "scalars", "reactions")  # sections of a case that may wake features
-HEADER = re.compile(r'\nclass (\w+)\(Feature, slot=(\d+), wakes="([^"]+)"\)')
+HEADER = re.compile(r'\nclass (?P<attribute>\w+)\(Feature, slot=(?P<slot>\d+), wakes="(?P<wakes>[^"]+)"\)')
+FEATURES = Declarations("feature", "features", ("features/*/feature.py",), HEADER)
 
 
-class Declaration(NamedTuple):
-    """Header of a feature. slot : its number; words : words of case files that wake it"""
+class Header(NamedTuple):
+    """Header of a feature. slot : its number; wakes : words of case files that wake it; declaration : in the index"""
 
     slot: int
-    module: str
-    name: str
-    words: frozenset[str]
+    wakes: frozenset[str]
+    declaration: Declaration
 
 
-@cache
-def declarations() -> tuple[Declaration, ...]:
-    """Headers of all features in the order of slots; no feature is imported."""
-    found = []
-    for path in sorted(FOLDER.glob("*/feature.py")):
-        module = f"fvsolve.features.{path.parent.name}.feature"
-        for name, slot, words in HEADER.findall(path.read_text(encoding="utf-8")):
-            found.append(Declaration(int(slot), module, name, frozenset(word.strip() for word in words.split(","))))
-    return tuple(sorted(found))
+def header_of(declaration: Declaration) -> Header:
+    """Header of a feature. One of an entry point has no text in the index, so its class is imported."""
+    found = declaration.options
+    if not found:
+        of_class = declaration.load()
+        return Header(of_class.slot, of_class.wakes, declaration)
+    return Header(int(found["slot"]), words_in(found["wakes"]), declaration)
+
+
+def words_in(text: str) -> frozenset[str]:
+    """Words of case files in a header."""
+    return frozenset(word.strip() for word in text.split(","))
 
 
 def words_of(case) -> set[str]:
-    """Words of a case that may wake features: "pipe_model NAME" for the model of each pipe, "section NAME"."""
+    """Words of a case that may wake features: "pipe_model NAME" of pipes, "section NAME", and "kind NAME" of parts."""
     common = case.numerics.pipe_model
     models = {f"pipe_model {link.pipe_model or common}" for link in case.links.values() if link.kind == "pipe"}
-    return models | {f"section {name}" for name in SECTIONS if getattr(case, name)}
+    kinds = {f"kind {part.kind}" for part in (*case.nodes.values(), *case.links.values())}
+    return models | kinds | {f"section {name}" for name in SECTIONS if getattr(case, name)}
 
 
 def features_of(case, given_up: Collection[str] = ()) -> list[Feature]:
-    """Features of a case, in the order of slots; given_up : names of parts that features do not compute."""
-    words = words_of(case)
-    awake = [declaration for declaration in declarations() if declaration.words & words]
-    return [getattr(import_module(found.module), found.name)(case, given_up) for found in awake]
+    """Features of a case, in the order of slots; given_up : names of parts that features do not compute.
+
+    Raises FvsolveError if two of them have the same slot.
+    """
+    words, awake = words_of(case), {}
+    for header in map(header_of, FEATURES.values()):
+        if header.wakes & words:
+            name = header.declaration.name
+            if header.slot in awake:
+                other = awake[header.slot].declaration.name
+                text = f"{other} and {name} both have the slot {header.slot}"
+                raise FvsolveError(f"features: {text}; expected another slot in one of them")
+            awake[header.slot] = header
+    return [awake[slot].declaration.load()(case, given_up) for slot in sorted(awake)]
 
 
 class Feature:
@@ -70,6 +83,7 @@ class Feature:
     """
 
     slot = 0
+    wakes: frozenset[str] = frozenset()
     packages: Sequence[str] = ()
     sets_arrivals = reads_solved = False
     shortest_delay = np.inf
@@ -81,7 +95,7 @@ class Feature:
         self.case, self.given_up = case, given_up
 
     def __init_subclass__(cls, slot: int, wakes: str) -> None:
-        cls.slot = slot
+        cls.slot, cls.wakes = slot, words_in(wakes)
 
     # build ----------
 

@@ -9,7 +9,8 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from fvsolve import units
-from fvsolve.errors import FvsolveError, did_you_mean
+from fvsolve.declarations import Declarations
+from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.exact import NAMES
 from fvsolve.fluid import LAWS
 from fvsolve.fluid.coolprop import OIL_WORDS
@@ -38,6 +39,9 @@ DEFAULT_METHOD_RTOL, DEFAULT_RTOL = AUTO, 1e-6
 DEFAULT_CELLS = 100  # in the pipe with the longest travel time; other pipes get cells of the same travel time
 DEFAULT_ROWS, DEFAULT_FRAMES = 1000, 50
 DEFAULT_ACCURACY = 1e-2  # fraction of the largest jump
+
+SINKS = Declarations("sink", "sinks", ("output/*_sink.py",))  # names in the case file
+EMPTY = (("maxima", []), ("sinks", []))  # keys of [output] that a written case omits
 
 
 # Ranges of liquids, after CoolProp and the CRC Handbook: liquid hydrogen to mercury, light liquids to cold heavy oil.
@@ -349,6 +353,20 @@ class NameList(val.Value):
         return f"list of {self.noun}"
 
 
+@dataclass(frozen=True)
+class SinkNames(NameList):
+    """Value of `sinks` in `[output]`: names of sinks of other packages; only these are read."""
+
+    def read(self, given: Any, setting: ReadContext) -> tuple[str, ...]:
+        names = super().read(given, setting)
+        for name in names:
+            if not isinstance(name, str) or name not in SINKS:
+                near = did_you_mean(name, SINKS) if isinstance(name, str) else ""
+                installed = listing(SINKS) if SINKS else "a package with entry points fvsolve.sinks"
+                raise ValueError(f"no sink named {show(name)}{near or f'; expected {installed}'}")
+        return tuple(dict.fromkeys(names))
+
+
 class OutputLine(Table):
     """Table of one line across a basin, along which its fields are written with every frame."""
 
@@ -508,6 +526,9 @@ class Output(Table):
     grids: Annotated[
         Any, NamedTables(OutputGrid, "fields of basins on pixels: { flood = { basin, fields, format, cell } }")
     ] = {}
+    sinks: Annotated[Any, SinkNames(
+        "sinks", '["json-lines"]', "names of sinks of other packages, which also receive the output of `run`", VALUE,
+    )] = ()  # fmt: skip
     units: Annotated[dict[str, str], OutputUnits()] = {}
 
     @property
@@ -524,10 +545,10 @@ class Output(Table):
     def table(self) -> dict[str, Any]:
         """Keys and values as in a case file."""
         values = {**super().table(), "probes": [probe.text for probe in self.probes]}
-        return {key: value for key, value in values.items() if value != {} and (key, value) != ("maxima", [])}
+        return {key: value for key, value in values.items() if value != {} and (key, value) not in EMPTY}
 
 
 class ExactSpec(Table):
     """Table `[exact]`: exact solution of the case, from which studies compute errors."""
 
-    name: Annotated[str, Choice("exact solution", tuple(NAMES), "name of the exact solution", changes=VALUE)]
+    name: Annotated[str, Choice("exact solution", NAMES, "name of the exact solution", changes=VALUE)]

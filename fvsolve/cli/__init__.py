@@ -8,43 +8,19 @@ import os
 import re
 import sys
 import warnings
-from importlib import import_module
-from pathlib import Path
 
 from fvsolve.cli.streams import safe_streams
+from fvsolve.declarations import Declaration, Declarations
 from fvsolve.errors import FvsolveError, visible
 
 __all__ = ["main"]
 
-# Command -> module that adds it to the application, in the order of the help text.
-COMMANDS = dict.fromkeys(("run", "check", "list", "new", "schema", "methods", "compare", "view"), "commands") | {
-    "chart": "accuracy_commands",
-    "energy": "energy",
-    "failure-map": "failure_map",
-    "fmu": "fmu_command",
-    "import": "file_commands",
-    "export": "file_commands",
-    "linearise": "linear_commands",
-    "loop": "loop_commands",
-    "methods": "methods_command",
-    "optimise": "design_commands",
-    "order": "accuracy_commands",
-    "precompile": "file_commands",
-    "quality": "quality",
-    "report": "file_commands",
-    "plot": "file_commands",
-    "fatigue": "file_commands",
-    "response": "linear_commands",
-    "study": "design_commands",
-    "sweep": "sweep",
-    "sensitivity": "sweep",
-    "calibrate": "sweep",
-    "size": "design_commands",
-    "stability": "stability",
-    "validate": "validate_command",
-}
-# Command in the source of its module : name if it is not that of the function, name of the function, help text.
-DECLARATION = re.compile(r'app\.command\((?:"([\w-]+)")?\)\ndef (\w+)\(.*?\n    """(.*?)"""', re.DOTALL)
+# A command is a function with the header `@command("NAME", order=N)`; its help text is its docstring.
+HEADER = re.compile(
+    r'\n@(?:cli\.)?command\("(?P<name>[\w-]+)"(?:, order=(?P<order>\d+))?\)\ndef (?P<attribute>\w+)\('
+    r'(?:.*\n(?:(?:    |\)).*\n)*?    """(?P<help>[\s\S]*?)""")?'
+)
+COMMANDS = Declarations("command", "commands", ("cli/*.py",), HEADER)
 
 
 def main() -> None:
@@ -88,7 +64,11 @@ def run_command() -> None:
     except MemoryError:
         _exit_with("out of memory. Try fewer cells, fewer probes, or a longer output interval ([output] every)", 1)
     except Exception as error:  # a defect of fvsolve: print its location, so that it can be reported
-        _exit_with(f"internal error in {_location(error)}: {type(error).__name__}: {error}; please report it", 1)
+        command = COMMANDS.get(sys.argv[1]) if len(sys.argv) > 1 else None
+        source = f"{command.source}: " if command and command.source else ""
+        reader = " to its authors" if source else ""
+        text = f"internal error in {_location(error)}: {type(error).__name__}: {error}"
+        _exit_with(f"{source}{text}; please report it{reader}", 1)
     finally:
         gc.enable()
         os.environ.pop("PYDANTIC_DISABLE_PLUGINS", None)
@@ -96,12 +76,22 @@ def run_command() -> None:
 
 
 def application(command: str = ""):
-    """Typer application with the commands of the module of `command`, or with all commands for any other text."""
-    for module in dict.fromkeys([COMMANDS[command]] if command in COMMANDS else COMMANDS.values()):
-        import_module(f"fvsolve.cli.{module}")
-    from fvsolve.cli.app import app
+    """Typer application with the commands of the module of `command`, or with all commands for any other text.
 
-    app.registered_commands.sort(key=lambda info: [*COMMANDS].index(info.name or info.callback.__name__))
+    Raises FvsolveError if `command` is of another package that cannot be imported; of all commands, warns of these.
+    """
+    from fvsolve.cli.app import add_command, app
+
+    if command in COMMANDS:
+        add_command(COMMANDS[command])
+        return app
+    names = [*COMMANDS]
+    for name in names:
+        try:
+            add_command(COMMANDS[name])
+        except FvsolveError as error:
+            warnings.warn(str(error), RuntimeWarning, stacklevel=2)
+    app.registered_commands.sort(key=lambda info: names.index(info.name))
     return app
 
 
@@ -111,11 +101,21 @@ def overview():
 
     result = copy.copy(app)
     result.registered_commands = []
-    sources = [Path(__file__).with_name(f"{module}.py") for module in dict.fromkeys(COMMANDS.values())]
-    found = [row for path in sources for row in DECLARATION.findall(path.read_text(encoding="utf-8"))]
-    for name, function, text in sorted(found, key=lambda row: [*COMMANDS].index(row[0] or row[1])):
-        result.command(name or function, help=text)(lambda: None)
+    for name, found in COMMANDS.items():
+        result.command(name, help=found.options.get("help") or help_text(found))(lambda: None)
     return result
+
+
+def help_text(command: Declaration) -> str:
+    """Docstring of a function, from the text of its module; "" if it has none."""
+    import ast
+
+    try:
+        statements = ast.parse(command.text()).body
+    except (SyntaxError, ValueError):
+        return ""
+    functions = [part for part in statements if isinstance(part, ast.FunctionDef) and part.name == command.attribute]
+    return (ast.get_docstring(functions[-1]) or "") if functions else ""
 
 
 def _exit_with(message: str, code: int) -> None:

@@ -21,7 +21,7 @@ ORDER_FILE = columns(
 )  # fmt: skip
 
 
-@cli.app.command()
+@cli.command("chart", order=90)
 def chart(
     case: cli.SingleCase,
     scheme: Annotated[str | None, Option(metavar="A,B", help="schemes to compare (default "
@@ -203,7 +203,7 @@ ORDER_COLUMNS = (
 )  # fmt: skip
 
 
-@cli.app.command()
+@cli.command("order", order=180)
 def order(
     case: cli.SingleCase, overrides: cli.Set = [],  # noqa: B006
     refine: Annotated[str | None, Option(help="resolution to refine: both (cells and time steps), space or time "

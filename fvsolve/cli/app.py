@@ -3,12 +3,14 @@
 import functools
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from typer import Argument, Option
 
+from fvsolve.declarations import Declaration, unreadable
 from fvsolve.errors import CaseError, Fault, FvsolveError
 
 app = typer.Typer(
@@ -74,6 +76,31 @@ def all_commands(
         "exit")] = False,
 ) -> None:  # fmt: skip
     """Hydraulic transients by finite volumes: a TOML file in; pressures, flows and fields out."""
+
+
+def command(name: str, order: int = 0) -> Callable:
+    """Decorator that adds a command to the application. It is a header: fvsolve.cli reads its text.
+
+    order : number by which the help sorts the commands of fvsolve; those of others follow by name
+    """
+    return app.command(name)
+
+
+def add_command(found: Declaration) -> None:
+    """Import the module of a command, whose header adds it to the application; add that of another package.
+
+    Raises FvsolveError if a command of another package cannot be imported, or is no function for typer.
+    """
+    function = found.load()
+    if not found.source:
+        return
+    try:
+        trial = typer.Typer(add_completion=False)
+        trial.command(found.name)(function)
+        typer.main.get_command(trial)
+    except Exception as error:  # of typer, about the arguments of the function
+        raise FvsolveError(unreadable(found.source, found.place, error)) from error
+    app.command(found.name)(function)
 
 
 def load_case(name: str, overrides: list[str], scheme: str | None = None, method: str | None = None):

@@ -9,12 +9,12 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from fvsolve.cli.app import Cases, Json, RunDirectory, Set, SingleCase, app, load_case, quantity_of
+from fvsolve.cli.app import Cases, Json, RunDirectory, Set, SingleCase, command, load_case, quantity_of
 from fvsolve.cli.terminal import TextTable, present, print_json, show
 from fvsolve.errors import FvsolveError, visible
 
 
-@app.command()
+@command("run", order=10)
 def run(
     cases: Cases,
     out: Annotated[Path | None, Option(metavar="DIR", help="run directory, or for several cases the folder of their "
@@ -92,7 +92,7 @@ def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, q
     return result
 
 
-@app.command()
+@command("check", order=20)
 def check(
     case: SingleCase, set: Set = [],  # noqa: B006
     every: Annotated[bool, Option("--all", help="print all rows of long tables")] = False,
@@ -111,7 +111,7 @@ def check(
     present(as_json, report_data, printing.check_text(model.case, report_data, every))
 
 
-@app.command("list")
+@command("list", order=30)
 def list_cases(as_json: Json = False) -> None:
     """List the shipped cases."""
     from fvsolve.case import shipped
@@ -120,7 +120,7 @@ def list_cases(as_json: Json = False) -> None:
     present(as_json, titles, [TextTable(["case", "title"], [*titles.items()])])
 
 
-@app.command()
+@command("new", order=40)
 def new(
     name: Annotated[str, Argument(metavar="NAME", help="a shipped case, see `fvsolve list`")],
     file: Annotated[Path | None, Argument(metavar="FILE", help="file to write (default NAME.toml)")] = None,
@@ -132,7 +132,7 @@ def new(
         print(path)
 
 
-@app.command()
+@command("schema", order=50)
 def schema() -> None:
     """Print the JSON schema of a case file."""
     from fvsolve.case.schema import schema as made
@@ -141,7 +141,7 @@ def schema() -> None:
     print(schema_text(made()))
 
 
-@app.command()
+@command("compare", order=70)
 def compare(
     run_a: Annotated[Path, Argument(metavar="RUN_A", help="run directory, as written by fvsolve run --out")],
     run_b: Annotated[Path, Argument(metavar="RUN_B", help="run directory that is compared with RUN_A")],
@@ -157,7 +157,7 @@ def compare(
     present(as_json, result, printing.difference_text(result, first.summary))
 
 
-@app.command()
+@command("view", order=80)
 def view(
     directory: RunDirectory,
     time: Annotated[str | None, Option(metavar="T", help='time whose nearest frame is drawn: seconds, or "20 ms" '

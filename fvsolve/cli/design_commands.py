@@ -6,13 +6,13 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from fvsolve.cli.app import Dask, Jobs, Json, Set, SingleCase, app, load_case
+from fvsolve.cli.app import Dask, Jobs, Json, Set, SingleCase, command, load_case
 from fvsolve.cli.sweep import RANGE_FORMAT, key_and_values
 from fvsolve.cli.terminal import TextTable, present, progress_line
 from fvsolve.errors import CaseError, FvsolveError, collect_faults
 
 
-@app.command()
+@command("size", order=290)
 def size(
     case: SingleCase,
     vary: Annotated[str, Option("--vary", metavar="KEY=LOW,HIGH", help="key to size and its range, in SI or with "
@@ -89,7 +89,7 @@ def _no_value_text(result) -> str:
     )
 
 
-@app.command()
+@command("optimise", order=170)
 def optimise(
     case: SingleCase,
     schedule: Annotated[str, Option(metavar="KEY", help="key of the schedule to optimise, for example "
@@ -135,7 +135,7 @@ def schedule_text(result, case) -> Iterator:
     yield result.schedule
 
 
-@app.command()
+@command("study", order=250)
 def study(
     file: Annotated[Path, Argument(metavar="FILE", help="TOML file of a study: case, events, protections")],
     out: Annotated[Path | None, Option(metavar="DIR", help="folder of the run directories and tables (default "

@@ -40,7 +40,7 @@ METHOD = (
 )  # fmt: skip
 
 
-@cli.app.command()
+@cli.command("energy", order=100)
 def energy(
     case: Annotated[str | None, Argument(metavar="CASE", help="case file or shipped case to run (default none: list "
         "the passivity of schemes and methods)")] = None,

@@ -13,7 +13,7 @@ from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable
 
 
-@cli.app.command("failure-map")
+@cli.command("failure-map", order=110)
 def failure_map(
     case: cli.SingleCase,
     scheme: Annotated[str | None, Option(metavar="A,B", help="schemes, one panel for each (default upwind and the "

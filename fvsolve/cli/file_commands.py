@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument, Exit, Option
 
 from fvsolve.case import shipped
-from fvsolve.cli.app import Json, RunDirectory, Set, SingleCase, app, load_case, quantity_of
+from fvsolve.cli.app import Json, RunDirectory, Set, SingleCase, command, load_case, quantity_of
 from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.file_replacement import replacing, write_file
@@ -25,7 +25,7 @@ SHORT = (
 )
 
 
-@app.command()
+@command("report", order=210)
 def report(
     directory: Annotated[Path, Argument(metavar="RUN_OR_STUDY", help="directory of a run or a study")],
     out: Annotated[Path | None, Option(metavar="FILE", help="file of the report (default "
@@ -40,7 +40,7 @@ def report(
         print(path)
 
 
-@app.command()
+@command("plot", order=220)
 def plot(
     directory: RunDirectory,
     probes: Annotated[str, Option(metavar="A,B", help="probes whose histories are drawn (default none)")] = "",
@@ -57,7 +57,7 @@ def plot(
         print(path)
 
 
-@app.command()
+@command("fatigue", order=230)
 def fatigue(
     directory: RunDirectory,
     probes: Annotated[str, Option(metavar="A,B", help="probes of pressure or head whose cycles are counted (default "
@@ -104,7 +104,7 @@ def cycle_text(results: list[dict], per_day: float) -> Iterator:
         )
 
 
-@app.command("import")
+@command("import", order=130)
 def import_(
     source: Annotated[Path, Argument(metavar="FILE", help="EPANET network to import, for example town.inp")],
     case: Annotated[Path | None, Argument(metavar="CASE", help="case file to write, or its folder (default the name "
@@ -163,7 +163,7 @@ def import_(
             print(f"self-check: the day of {nodes} nodes is not compared; --check compares it", file=sys.stderr)
 
 
-@app.command()
+@command("export", order=140)
 def export(
     case: SingleCase,
     epanet: Annotated[Path | None, Option(metavar="FILE", help="EPANET network (.inp) to write (needed)")] = None,
@@ -210,7 +210,7 @@ def _positive(option: str, text: str, dimension: str) -> float:
     return value
 
 
-@app.command()
+@command("precompile", order=190)
 def precompile(
     cases: Annotated[list[str], Option("--for", metavar="CASE", help="case file or shipped case to "
         "compile for; repeat the option for more (default all shipped cases)")] = [],  # noqa: B006

@@ -6,11 +6,11 @@ from typing import Annotated
 
 from typer import Option
 
-from fvsolve.cli.app import Set, SingleCase, app, load_case
+from fvsolve.cli.app import Set, SingleCase, command, load_case
 from fvsolve.cli.terminal import TextTable, present
 
 
-@app.command()
+@command("fmu", order=120)
 def fmu(
     case: SingleCase,
     out: Annotated[Path | None, Option(metavar="FILE", help="file of the FMU (default NAME.fmu in the current "

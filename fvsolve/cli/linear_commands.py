@@ -19,7 +19,7 @@ POLES_SHOWN = 24  # greatest number of poles on the terminal; poles.csv has all
 SYMBOLS = {"admittance": "Y", "impedance": "Z"}
 
 
-@cli.app.command()
+@cli.command("linearise", order=150)
 def linearise(
     case: cli.SingleCase,
     inputs: Annotated[str | None, Option(metavar="A,B", help="inputs of the linear system, such as "
@@ -115,7 +115,7 @@ def system_text(system, values, poles: list[dict], folder: Path) -> Iterator:
     yield f"{folder}: linear.npz, {'A-sparse' if system.sparse else 'A'}.csv, B.csv, C.csv, D.csv, poles.csv"
 
 
-@cli.app.command()
+@cli.command("response", order=240)
 def response(
     case: cli.SingleCase,
     port: Annotated[str | None, Option(metavar="NODE", help="node at which flow and pressure are taken: a reservoir, "

@@ -16,7 +16,7 @@ POLES_SHOWN = 12  # greatest number of poles on the terminal
 PICTURES = ("bode", "nyquist", "step", "locus")
 
 
-@cli.app.command()
+@cli.command("loop", order=160)
 def loop(
     case: cli.SingleCase,
     name: Annotated[str, Argument(metavar="NAME", help="control at whose output the loop is cut")],

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from fvsolve.cli.app import Json, app, method_name
+from fvsolve.cli.app import Json, command, method_name
 from fvsolve.cli.terminal import TextTable, present
 from fvsolve.display import save
 from fvsolve.errors import FvsolveError
@@ -158,7 +158,7 @@ def _length(value: float, digits: int = 6) -> str:
     return "infinite" if math.isinf(value) else f"{value:.{digits}g}"
 
 
-@app.command()
+@command("methods", order=60)
 def methods(
     name: Annotated[str | None, Argument(metavar="NAME", help="name of a method, or file of its tableau (default all "
         "methods)")] = None,

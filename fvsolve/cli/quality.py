@@ -12,7 +12,7 @@ from fvsolve.cli.terminal import TextTable, present, run_progress
 NODES_SHOWN = 40  # greatest number of nodes on a terminal; the files have all
 
 
-@cli.app.command()
+@cli.command("quality", order=200)
 def quality(
     case: cli.SingleCase,
     trace: Annotated[str | None, Option(metavar="A,B", help="nodes whose water is traced (default none)")] = None,

@@ -201,7 +201,7 @@ STABILITY_FILE = columns(
 )  # fmt: skip
 
 
-@cli.app.command()
+@cli.command("stability", order=300)
 def stability(
     case: Annotated[str | None, Argument(metavar="CASE", help="case file or shipped case (default none: advection on "
         "a periodic grid)")] = None,

@@ -43,7 +43,7 @@ MAX_COLUMNS = 6  # greatest number of columns of the table on a terminal, withou
 MAX_ROWS = 100  # greatest number of rows of that table
 
 
-@cli.app.command()
+@cli.command("sweep", order=260)
 def sweep(
     case: cli.SingleCase, set: Values = [],  # noqa: B006
     points: Annotated[Path | None, Option(metavar="FILE.csv", help="CSV file of the values of keys in all runs: a "
@@ -158,7 +158,7 @@ def _text(value) -> str:
     return "-" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-@cli.app.command()
+@cli.command("sensitivity", order=270)
 def sensitivity(
     case: cli.SingleCase,
     vary: Annotated[list[str], Option("--vary", metavar="KEY=LOW,HIGH", help="key to vary and its range, in SI or "
@@ -185,7 +185,7 @@ def sensitivity(
     present(as_json, result.plain() | {"directory": str(folder)}, [_key_table(result), below])
 
 
-@cli.app.command()
+@cli.command("calibrate", order=280)
 def calibrate(
     case: cli.SingleCase,
     vary: Annotated[list[str], Option("--vary", metavar="KEY=LOW,HIGH", help="key to calibrate and its range, in SI or "

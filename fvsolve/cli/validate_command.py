@@ -7,13 +7,13 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from fvsolve.cli.app import Jobs, Json, announce_compilation, app
+from fvsolve.cli.app import Jobs, Json, announce_compilation, command
 from fvsolve.cli.terminal import TextTable, present
 
 STYLES = {"within": "green", "outside": "bold red"}
 
 
-@app.command()
+@command("validate", order=310)
 def validate(
     names: Annotated[list[str] | None, Argument(metavar="[NAME]...", help="names of shipped validations, or case files "
         "with a table [validation] (default all shipped validations)")] = None,

@@ -1,27 +1,16 @@
 """Exact solutions, which a case file names under `[exact]`."""
 
+import re
 from collections.abc import Iterator
-from importlib import import_module
 
+from fvsolve.declarations import Declarations, unreadable
+from fvsolve.errors import FvsolveError
 from fvsolve.exact.solution import Exact, ExactStart, Solution, law_faults, type_faults
 
-__all__ = ["NAMES", "Solution", "ExactStart", "find_faults", "solution"]
+__all__ = ["NAMES", "Exact", "ExactStart", "Solution", "find_faults", "solution"]
 
-NAMES = {  # name in the case file -> (module of this package, description)
-    "rays": ("rays", "waves in frictionless pipes between reservoirs, junctions and valves, by ray tracing"),
-    "laminar-line": ("laminar_line", "a laminar pipe from a reservoir to a demand, with its velocity profile"),
-    "creeping-line": (
-        "laminar_line",
-        "a pipe with wall creep from a reservoir to a demand, frictionless or laminar",
-    ),
-    "levelling": (
-        "lumped",
-        "a tank or chamber joined by an orifice to a reservoir, or to another tank or chamber: a parabola in time",
-    ),
-    "column": ("lumped", "one rigid column between given pressures: tanh in time"),
-    "oscillation": ("lumped", "two open tanks, or a tank and a reservoir, joined by a frictionless rigid column"),
-    "spring-mass": ("lumped", "one mass on linear springs and dampers under constant force"),
-}
+HEADER = re.compile(r'\n(?P<attribute>[A-Z_]+) = Exact\(\s*"(?P<name>[\w-]+)"')
+NAMES = Declarations("exact solution", "exact solutions", ("exact/*.py",), HEADER)  # names in the case file
 
 
 def find_faults(case) -> Iterator[tuple[tuple, str]]:
@@ -43,4 +32,8 @@ def solution(case, start: ExactStart) -> Solution:
 
 
 def _exact(name: str) -> Exact:
-    return getattr(import_module(f"{__name__}.{NAMES[name][0]}"), name.replace("-", "_").upper())
+    value = NAMES.load(name)
+    if not isinstance(value, Exact):
+        found = NAMES[name]
+        raise FvsolveError(unreadable(found.source, found.place, "it is not an Exact; expected one of fvsolve.exact"))
+    return value

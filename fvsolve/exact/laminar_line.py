@@ -246,5 +246,5 @@ class LineDeviation:
         return self.rho * value(self.demand, t)
 
 
-LAMINAR_LINE = Exact(("reservoir", "junction"), ("pipe",), laminar_faults, solution)
-CREEPING_LINE = Exact(("reservoir", "junction"), ("pipe",), creep_faults, solution)
+LAMINAR_LINE = Exact("laminar-line", ("reservoir", "junction"), ("pipe",), laminar_faults, solution)
+CREEPING_LINE = Exact("creeping-line", ("reservoir", "junction"), ("pipe",), creep_faults, solution)

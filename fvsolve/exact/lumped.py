@@ -339,15 +339,27 @@ def spring_mass_solution(case, start: ExactStart) -> Solution:
     return Solution(case, position={name: position}, velocity={name: velocity})
 
 
-COLUMN = Exact(("reservoir", "junction"), ("rigid-column", "valve", "orifice"), column_faults, column_solution)
+COLUMN = Exact(
+    "column", ("reservoir", "junction"), ("rigid-column", "valve", "orifice"), column_faults, column_solution
+)
 LEVELLING = Exact(
-    ("reservoir", "tank", "chamber"), ("valve", "orifice"), with_level_faults(levelling_faults, levelling_solution),
+    "levelling",
+    ("reservoir", "tank", "chamber"),
+    ("valve", "orifice"),
+    with_level_faults(levelling_faults, levelling_solution),
     levelling_solution,
-)  # fmt: skip
+)
 OSCILLATION = Exact(
-    ("reservoir", "tank"), ("rigid-column",), with_level_faults(oscillation_faults, oscillation_solution),
+    "oscillation",
+    ("reservoir", "tank"),
+    ("rigid-column",),
+    with_level_faults(oscillation_faults, oscillation_solution),
     oscillation_solution,
-)  # fmt: skip
+)
 SPRING_MASS = Exact(
-    ("mass", "frame", "reservoir"), ("spring", "damper", "force"), spring_mass_faults, spring_mass_solution
+    "spring-mass",
+    ("mass", "frame", "reservoir"),
+    ("spring", "damper", "force"),
+    spring_mass_faults,
+    spring_mass_solution,
 )

@@ -264,4 +264,4 @@ def valve_equation_flow(conductance, slack, drop) -> np.ndarray:
     return np.copysign(flow, drop)
 
 
-RAYS = Exact(("reservoir", "junction", "inflow"), ("pipe", "valve", "orifice"), find_faults, solution)
+RAYS = Exact("rays", ("reservoir", "junction", "inflow"), ("pipe", "valve", "orifice"), find_faults, solution)

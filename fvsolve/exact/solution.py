@@ -16,12 +16,14 @@ PLACES, WEIGHTS = np.polynomial.legendre.leggauss(5)  # Gauss points on -1 to 1,
 
 
 class Exact(NamedTuple):
-    """Exact solution by its name in a case file: types of nodes and links that it supports, and two functions.
+    """Exact solution: its name in a case file, types of nodes and links that it supports, and two functions.
 
+    `NAME = Exact("name", ...)` is a header, which fvsolve.exact finds in the text of its module.
     find_faults(case) yields a fault (keys, message) for each difference of a case from those that it covers
     solution(case, start) computes the `Solution` of a case for which `find_faults` yields nothing
     """
 
+    name: str
     nodes: tuple[str, ...]
     links: tuple[str, ...]
     find_faults: Callable

@@ -4,13 +4,12 @@ import re
 from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
+from fvsolve.declarations import headers
 from fvsolve.errors import FvsolveError
 from fvsolve.units import show
 
-PACKAGE = Path(__file__).parents[1]
 PATTERNS = (
     "parts/[a-z]*.py",
     "parts/*/part.py",
@@ -27,12 +26,10 @@ SHARED = {"name": "basin", "pipe_model": "pipe"}  # a basin or a pipe needs the 
 def modules_of_types() -> dict[str, list[str]]:
     """Modules that declare each type : type in the case file -> names of modules."""
     modules: dict[str, list[str]] = {}
-    for pattern in PATTERNS:
-        for path in sorted(PACKAGE.glob(pattern)):
-            name = ".".join((PACKAGE.name, *path.relative_to(PACKAGE).with_suffix("").parts))
-            for key, kind in DECLARATION.findall(path.read_text(encoding="utf-8")):
-                for needed in {kind, SHARED.get(key, kind)} - {""}:
-                    modules.setdefault(needed, []).append(name)
+    for module, match in headers(PATTERNS, DECLARATION):
+        key, kind = match.groups(default="")
+        for needed in {kind, SHARED.get(key, kind)} - {""}:
+            modules.setdefault(needed, []).append(module)
     return modules
 
 

@@ -6,12 +6,12 @@ import warnings
 from collections.abc import Callable
 from importlib import import_module
 from importlib.machinery import ModuleSpec
-from importlib.metadata import EntryPoint, EntryPoints, distributions
 from importlib.util import module_from_spec
 from pathlib import Path
 from typing import Any
 
 from fvsolve.argument_checks import PATH, validated
+from fvsolve.declarations import EntryPoint, entry_points, unreadable
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import add_sources
 from fvsolve.parts import own_limiters
@@ -65,22 +65,14 @@ def register_installed(entry: EntryPoint) -> None:
 
 def declare_installed() -> None:
     """Declare parts and limiters of installed packages and of environment variables; warn of unreadable ones."""
-    # half of the time of `entry_points()`, which parses the file of every installed package
-    found = [package for package in distributions() if "[fvsolve." in (package.read_text("entry_points.txt") or "")]
-    packages = {package.name: package for package in reversed(found)}  # the first of a name, as in `entry_points()`
-    installed = EntryPoints(entry for package in packages.values() for entry in package.entry_points)
     offered: list[tuple[str, Callable[[Any], None], Any]] = [
-        *(
-            (f"{entry.name} of the entry points {GROUP}", declare, entry.value)
-            for entry in installed.select(group=GROUP)
-        ),
+        *((f"{entry.name} of the entry points {GROUP}", declare, entry.place) for entry in entry_points(GROUP)),
         *((VARIABLE, register_part, folder) for folder in registered_folders()),
-        *((f"entry points {LIMITERS}", register_installed, entry) for entry in installed.select(group=LIMITERS)),
+        *((f"entry points {LIMITERS}", register_installed, entry) for entry in entry_points(LIMITERS)),
         *((own_limiters.VARIABLE, own_limiters.read_entry, entry) for entry in own_limiters.entries()),
     ]
     for source, read, place in offered:
         try:
             read(place)
         except Exception as error:
-            text = f"{source}: {place} cannot be read: {error}; correct or remove it"
-            warnings.warn(text, RuntimeWarning, stacklevel=2)
+            warnings.warn(unreadable(source, place, error), RuntimeWarning, stacklevel=2)

@@ -96,6 +96,7 @@ def model_of(case, set: Mapping | None = None, like=None):
 def sink_of(model, out: str | Path | None, force: bool, resume: bool, threads: int = 1):
     """Object that stores the output of a run: in memory, or in a run directory, which is locked until it is closed.
 
+    It also passes the output to the sinks that the case names.
     out : run directory, None for memory; force, resume : as for `RunDirectory`. Raises RunError for `threads` above 1
     under MPI, and for `resume` without `out`.
     """
@@ -103,11 +104,16 @@ def sink_of(model, out: str | Path | None, force: bool, resume: bool, threads: i
         if comm is not None and threads > 1:
             text = f"threads = {threads}: under MPI each of the {comm.size} ranks is one thread"
             raise RunError(f"{text}; leave out `threads`")
-        if out is not None:
-            return RunDirectory(Path(out), model, force, resume)
-        if resume:
+        if resume and out is None:
             raise RunError("resume needs the run directory; give it as the argument `out`")
-        return MemorySink(model)
+        names = model.case.output.sinks
+        if not names:
+            return RunDirectory(Path(out), model, force, resume) if out is not None else MemorySink(model)
+        from fvsolve.output.several_sinks import SeveralSinks, read_sinks
+
+        sinks = read_sinks(names)  # before the run directory is locked
+        first = RunDirectory(Path(out), model, force, resume) if out is not None else MemorySink(model)
+        return SeveralSinks(first, sinks)
 
 
 def solved(model, sink, progress=None, threads: int = 1, begun: float | None = None) -> Result:

@@ -24,6 +24,7 @@ from numbers import Rational
 import numpy as np
 
 from fvsolve.argument_checks import NAME, NAMES, POSITIVE, TEXT, Kind, is_row, validated
+from fvsolve.declarations import declared
 from fvsolve.step_limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
 from fvsolve.steppers.analysis.stability_function import StabilityFunction, stability_function
 from fvsolve.steppers.analysis.stability_properties import a_stable
@@ -195,6 +196,7 @@ class AdvectionLimit:
         return values
 
 
+@declared("study")
 @validated(scheme=NAME, method=NAME, courant=POSITIVE)
 def advection_limit(scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
     """Exact Courant limit of a linear scheme and a time method, and the growth of waves at the number `courant`.
@@ -204,6 +206,7 @@ def advection_limit(scheme: str, method: str, courant: float | None = None) -> A
     return limit_of(weights_of(scheme), scheme, method, courant)
 
 
+@declared("study")
 @validated(schemes=NAMES, methods=NAMES, courant=POSITIVE)
 def advection_limits(
     schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, courant: float | None = None
@@ -228,6 +231,7 @@ FACE_WEIGHTS = Kind(
 )
 
 
+@declared("study")
 @validated(weights=FACE_WEIGHTS, scheme=TEXT, method=NAME, courant=POSITIVE)
 def limit_of(weights: Sequence[Fraction], scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
     """Exact Courant limit of the linear scheme with the given face weights, and the growth at the number `courant`.

@@ -1,40 +1,12 @@
-"""Studies of a case by many runs: order of convergence, accuracy against cost, stability, energy, sizing, sweeps."""
+"""Studies of a case by many runs: order of convergence, accuracy against cost, stability, energy, sizing, sweeps.
 
-from fvsolve.lazy_exports import lazy_names
+A public function or class has the header `@declared("study")`. It is found by the text of its module, and imported on
+first use. Studies of other packages are found by their entry points.
+"""
 
-_HOMES = {  # public name -> module of this package
-    "LineImpedance": "ports.line_impedance",
-    "Linear": "linearise",
-    "Loop": "loops.loop",
-    "Transfer": "ports.response",
-    "advection_limit": ".step_limits.advection_limit",
-    "advection_limits": ".step_limits.advection_limit",
-    "calibrate": "calibrate",
-    "chart": "accuracy.chart",
-    "optimise": "closure_optimisation",
-    "energy": "energy_balance",
-    "failure_map": "failure_map",
-    "fit": "accuracy.fit",
-    "input_response": "loops.input_response",
-    "ladder": "accuracy.model_hierarchy",
-    "limit_of": ".step_limits.advection_limit",
-    "limited_limits": "stability.periodic_limits",
-    "line_positive_real": "ports.line_impedance",
-    "linearise": "linearise",
-    "loop": "loops.loop",
-    "measured_limits": "stability.periodic_limits",
-    "order": "accuracy.order",
-    "passivity": "passivity",
-    "positive_real": "ports.positive_real",
-    "response": "ports.response",
-    "sensitivity": "sensitivity",
-    "size": "sizing",
-    "stability": "stability.stability",
-    "study": "scenarios",
-    "state_positive_real": "ports.response",
-    "sweep": "sweep",
-    "sweep_positive_real": "ports.line_impedance",
-    "water_quality": "water_quality.water_quality",
-}
+from fvsolve.declarations import Declarations
+from fvsolve.lazy_exports import lazy_attributes
 
-__all__ = lazy_names(__name__, _HOMES)  # noqa: PLE0605
+STUDIES = Declarations("study", "studies", ("studies/**/*.py", "step_limits/advection_limit.py"))
+
+lazy_attributes(__name__, STUDIES, STUDIES.load)

@@ -8,6 +8,7 @@ import numpy as np
 
 from fvsolve.argument_checks import COUNT, COUNT_FROM_ZERO, FUNCTION, TABLE, TEXT, validated
 from fvsolve.case import Case, load
+from fvsolve.declarations import declared
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.run.verdicts import interpolated
 from fvsolve.studies.outcome import end_if_interrupted, refusal_text
@@ -91,6 +92,7 @@ def series_range(measured: np.ndarray) -> float:
     return float(np.ptp(measured)) or 1.0
 
 
+@declared("study")
 @validated(vary=VARY, set=TABLE, seed=COUNT_FROM_ZERO, jobs=COUNT, dask=TEXT, progress=FUNCTION)
 def calibrate(
     case, vary: Mapping[str, Sequence[Any]], set: Mapping[str, Any] | None = None, seed: int = 0, jobs: int = 1,

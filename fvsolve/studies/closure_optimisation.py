@@ -8,6 +8,7 @@ import numpy as np
 
 from fvsolve.case import Case, load
 from fvsolve.case.text import path
+from fvsolve.declarations import declared
 from fvsolve.errors import Fault, FvsolveError, collect_faults, did_you_mean, listing
 from fvsolve.parts.schedule import Schedule
 from fvsolve.run import run
@@ -95,6 +96,7 @@ class ClosureSearch:
         return np.inf if peak is None else peak
 
 
+@declared("study")
 def optimise(
     case, key: str, minimise: str, knots: int = 3, runs: int = 60, set: Mapping[str, Any] | None = None,
     progress: Callable | None = None,

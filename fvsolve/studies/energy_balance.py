@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, TABLE, TEXT, validated
+from fvsolve.declarations import declared
 from fvsolve.errors import CaseError, FvsolveError, did_you_mean
 from fvsolve.features.delay_lines.feature import history_of, lines_of
 from fvsolve.features.delay_lines.history import jump_times
@@ -412,6 +413,7 @@ JSON_NAMES = {"supplied": "supplied", "stored": "stored", "dissipated": "dissipa
          "law": "law_loss"}  # fmt: skip
 
 
+@declared("study")
 @validated(set=TABLE, port=TEXT, progress=FUNCTION)
 def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
     """Run a case with changed keys and compute its energy balance; `case` as for `run`, or a Model.

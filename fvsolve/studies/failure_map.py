@@ -11,6 +11,7 @@ import numpy as np
 
 from fvsolve.argument_checks import NAMES, NUMBER, NUMBERS, ROW, TEXT, Kind, is_row, validated
 from fvsolve.case import load
+from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.model.build import build
 from fvsolve.model.step_division import dividing_rate
@@ -301,6 +302,7 @@ KEY_VALUES = Kind(
 )
 
 
+@declared("study")
 @validated(
     schemes=NAMES, methods=NAMES, courants=NUMBERS, steps=NUMBERS, key=KEY_VALUES, tolerance=NUMBER, out=OUT,
     **STUDY_ARGUMENTS,

@@ -8,6 +8,7 @@ import numpy as np
 
 from fvsolve.argument_checks import FLAG, NAMES, NUMBER, TABLE, TEXT, validated
 from fvsolve.assembly.lowering import PRESSURE, Input
+from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.features.controls.feature import blocks_of
 from fvsolve.model.energy_norm import EnergyForm
@@ -44,6 +45,7 @@ STATE_UNITS = {
 }
 
 
+@declared("study")
 @dataclass(frozen=True, eq=False)
 class Linear:
     """Linear system dx/dt = A x + B u, y = C x + D u for deviations of states x, inputs u, outputs y from a state; SI.
@@ -124,6 +126,7 @@ def state_unit(name: str, opens: bool) -> str:
     return "1/s" if quantity == "speed" and opens else STATE_UNITS.get(quantity, amount)
 
 
+@declared("study")
 @validated(inputs=NAMES, outputs=NAMES, at=NUMBER, before=FLAG, scheme=TEXT, set=TABLE)
 def linearise(
     case, inputs=(), outputs=None, at: float | None = None, before: bool = False, scheme: str | None = None, set=None,

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, NAMES, validated
+from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT, TIGHT_BELOW, TIGHT_IMPLICIT
@@ -102,6 +103,7 @@ class Passivity(PlainData):
         return [(pair.scheme, pair.method) for pair in self.pairs if pair.courant == 0.0]
 
 
+@declared("study")
 @validated(schemes=NAMES, methods=NAMES, progress=FUNCTION)
 def passivity(schemes=None, methods=None, progress=None) -> Passivity:
     """Compute the passivity of schemes, of methods and of their pairs. Raises FvsolveError for unknown names.

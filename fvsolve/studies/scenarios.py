@@ -12,6 +12,7 @@ from typing import Any, TypedDict
 from fvsolve.case import Case, load, shipped
 from fvsolve.case.reading import read_toml, split_key
 from fvsolve.case.text import key_lines
+from fvsolve.declarations import declared
 from fvsolve.errors import CaseError, Fault, FvsolveError, RunError, did_you_mean
 from fvsolve.file_replacement import replacing, write_file
 from fvsolve.output.directory import clear_reports
@@ -279,6 +280,7 @@ def run_passes(row: dict[str, Any]) -> bool:
     return row["ok"] and all(verdict["ok"] for verdict in row["verdicts"])
 
 
+@declared("study")
 def study(source, out: str | Path | None = None, jobs: int = 1, dask: str | None = None, force: bool = False,
           progress=None) -> ScenarioResults:  # fmt: skip
     """Run all events with all protections of a study file, `jobs` runs at a time, each in its own run directory.

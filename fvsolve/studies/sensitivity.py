@@ -10,6 +10,7 @@ import numpy as np
 
 from fvsolve.argument_checks import COUNT, COUNT_FROM_ZERO, PATH, TEXT, validated
 from fvsolve.case import load
+from fvsolve.declarations import declared
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.outcome import STUDY_ARGUMENTS
@@ -64,6 +65,7 @@ class Sensitivity(Displayable, PlainData):
         return self.sheet.table_columns()
 
 
+@declared("study")
 @validated(vary=VARY, quantity=TEXT, samples=COUNT, seed=COUNT_FROM_ZERO, out=PATH, **STUDY_ARGUMENTS)
 def sensitivity(
     case, vary: Mapping[str, Sequence[Any]], quantity: str | None = None, samples: int = 64, seed: int = 0,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case import Case, load
+from fvsolve.declarations import declared
 from fvsolve.errors import CaseError, Fault, FvsolveError, collect_faults, did_you_mean
 from fvsolve.output.summary_shape import FAILS, OPEN
 from fvsolve.parts.formula import Arithmetic
@@ -257,6 +258,7 @@ def relative_margin(row: Mapping[str, Any], quantity: str) -> float:
     return (row["margin"] - (row["error"] or 0.0)) / (max(abs(row["limit"]), least) or abs(row["value"]) or 1.0)
 
 
+@declared("study")
 def size(
     case, key: str, low: Any, high: Any, goal: str = "minimum", ties: Mapping[str, str] | None = None,
     set: Mapping[str, Any] | None = None, rtol: float = 0.01, progress: Callable | None = None,

@@ -13,6 +13,7 @@ from fvsolve.case import Case, load
 from fvsolve.case.load import find_source
 from fvsolve.case.reading import read_raw
 from fvsolve.case.text import inline
+from fvsolve.declarations import declared
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing
 from fvsolve.file_replacement import replacing
@@ -128,6 +129,7 @@ POINTS = Kind(
 )
 
 
+@declared("study")
 @validated(vary=VARY, out=PATH, points=POINTS, sample=TEXT, seed=COUNT_FROM_ZERO, **STUDY_ARGUMENTS)
 def sweep(
     case, vary: Mapping[str, Sequence[Any]] | None = None, set: Mapping[str, Any] | None = None, jobs: int = 1,

@@ -42,6 +42,8 @@ def test_a_run_imports_only_the_kinds_of_its_case(tmp_path):
         "parts.reaction",
         "parts.outlet.part",
         "case.schema",
+        "output.several_sinks",
+        "studies",
     )
     assert not modules & {f"fvsolve.{name}" for name in others}
     assert not modules & {"numba", "CoolProp", "meshio", "rich", "matplotlib", "numpy.random"}

@@ -21,8 +21,9 @@ REST_IS_MISSING = re.compile(
     r"|(is|are) missing$|main: expected one of"
     r"|is missing: |unknown scalar|is not a formula of Cl2|is a study of a case|without a scene"
 )
-# A part of the reader, pyproject.toml, and forms that tests/repository/test_doc_pages.py reads.
-OTHER = {("a-part-from-nothing", 0), ("a-part-from-nothing", 1), ("attitudes", 0)}
+# A part of the reader, pyproject.toml, a case for another package, and forms that
+# tests/repository/test_doc_pages.py reads.
+OTHER = {("a-part-from-nothing", 0), ("a-part-from-nothing", 1), ("attitudes", 0), ("extending", 0), ("extending", 1)}
 GIVEN_BY_PIPES = re.compile(r"\.(on|at): unknown key")  # a node on a pipe, whose case has the pipe
 TYPES = {"nodes": "basin", "links": "pipe"}  # of the parts that blocks continue
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from fvsolve.argument_checks import NAMES, NUMBER, NUMBERS, PATH, validated
 from fvsolve.case import load
 from fvsolve.case.case import Case
+from fvsolve.declarations import declared
 from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.steppers.tableau import AUTO, BUILT_IN, METHODS
 from fvsolve.studies.accuracy.chart_settings import (
@@ -58,6 +59,7 @@ from fvsolve.studies.result_cache import ResultCache
 WRONG_ERROR = 1.0  # errors above the range of the component are wrong results
 
 
+@declared("study")
 @validated(
     schemes=NAMES, methods=NAMES, cells=NUMBERS, rtol=NUMBERS, step=NUMBERS, target=NUMBER, out=PATH, **STUDY_ARGUMENTS
 )

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.argument_checks import NUMBER, SERIES, Kind, is_array, validated
+from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import PlainData
 
@@ -55,6 +56,7 @@ class Fit(PlainData):
 ERRORS = Kind(lambda value: is_array(value, "fiu", 1, 1, finite=False), "a row of numbers")
 
 
+@declared("study")
 @validated(sizes=SERIES, errors=ERRORS, floor=NUMBER)
 def fit(sizes, errors, floor: float = 0.0) -> Fit:
     """Fit the order p of convergence, errors ~ C sizes^p with a constant C.

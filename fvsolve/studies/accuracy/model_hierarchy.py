@@ -18,6 +18,7 @@ from fvsolve.assembly.schedule_tables import value_at
 from fvsolve.case.chainage import add_bends, placed
 from fvsolve.case.reading import raw_link
 from fvsolve.case.sloshing import slowest
+from fvsolve.declarations import declared
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.features.delay_lines.choice import reason_for_cells
 from fvsolve.fluid import LAWS
@@ -322,6 +323,7 @@ class Hierarchy(PlainData):
         return f"{text}, more than dp/K = {self.strain:.2g} (greatest pressure change / bulk modulus): {reason}"
 
 
+@declared("study")
 @validated(set=TABLE, target=NUMBER, progress=FUNCTION)
 def ladder(
     case, set: Mapping | None = None, target: float = DEFAULT_TARGET,

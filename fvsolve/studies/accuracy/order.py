@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.argument_checks import COUNT, FUNCTION, NAMES, TEXT, validated
+from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.exact.solution import Solution, averages
 from fvsolve.model import RunData
@@ -23,6 +24,7 @@ from fvsolve.studies.result_cache import OUT, ResultCache, cache_in
 REFERENCE_KINDS = ("auto", "exact", "finer", "richardson")
 
 
+@declared("study")
 @validated(
     refine=TEXT, key=TEXT, levels=COUNT, cells=COUNT, schemes=NAMES, methods=NAMES, reference=TEXT, initial=FUNCTION,
     source=FUNCTION, exact=FUNCTION, out=OUT, **STUDY_ARGUMENTS,

@@ -9,6 +9,7 @@ import numpy as np
 
 from fvsolve.argument_checks import FLAG, NUMBER, TABLE, TEXT, validated
 from fvsolve.case import load
+from fvsolve.declarations import declared
 from fvsolve.studies.loops.delay_system import DelaySystem
 from fvsolve.studies.loops.loop import MOST_POLES, frequencies
 from fvsolve.studies.loops.open_loop import delayed_system
@@ -64,6 +65,7 @@ def residues_of(system: DelaySystem, poles: np.ndarray) -> list:
     return [[float(found[k].real), float(found[k].imag)] for k in order]
 
 
+@declared("study")
 @validated(input=TEXT, output=TEXT, at=NUMBER, before=FLAG, scheme=TEXT, set=TABLE)
 def input_response(
     case, input: str, output: str, at: float | None = None, before: bool = False, scheme: str | None = None,

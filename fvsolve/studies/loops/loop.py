@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, NUMBER, TABLE, TEXT, validated
+from fvsolve.declarations import declared
 from fvsolve.studies.loops.delay_system import EIGENVALUE_OPERATIONS, DelaySystem, sorted_poles
 from fvsolve.studies.loops.margins import Margins, find_margins
 from fvsolve.studies.loops.open_loop import block_of, open_loop, open_loop_error
@@ -27,6 +28,7 @@ MOST_DECADES = 9  # added at both ends, where |L| is 1 beyond the rates
 LOWEST, LOW_POINTS, LINEAR_POINTS = 1e-9, 1800, 800
 
 
+@declared("study")
 @dataclass(frozen=True, eq=False)
 class Loop(PlainData):
     """Result of `loop`; arrays in SI.
@@ -68,6 +70,7 @@ class Loop(PlainData):
 STAGES = 4  # of a study, for `progress`
 
 
+@declared("study")
 @validated(name=TEXT, at=NUMBER, set=TABLE, progress=FUNCTION)
 def loop(
     case, name: str, at: float | None = None, set: Mapping | None = None, progress: Progress | None = None

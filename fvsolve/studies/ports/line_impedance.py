@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.argument_checks import COMPLEX, FUNCTION, NUMBER, POSITIVE, Kind, instance_of, is_number, validated
+from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import PlainData
 from fvsolve.units import show
@@ -15,6 +16,7 @@ MAX_SAMPLES = 200_000  # greatest number of samples of a sweep
 ROUNDING = 1e-12  # rounding error of a sample, relative to |H|
 
 
+@declared("study")
 @dataclass(frozen=True)
 class LineImpedance:
     """Input impedance of a lossless line with a reflection at its end.
@@ -96,6 +98,7 @@ NOT_NEGATIVE = Kind(lambda given: is_number(given) and given >= 0, "a number fro
 POLE_ABSCISSA = Kind(lambda given: is_number(given) or str(given) == "-inf", "a finite number, or -infinity")
 
 
+@declared("study")
 @validated(
     h=FUNCTION, slope=SLOPE_BOUND, high=POSITIVE, shift=NOT_NEGATIVE, tolerance=POSITIVE, rightmost=POLE_ABSCISSA
 )
@@ -155,6 +158,7 @@ def _slopes(slope, w: np.ndarray, shift: float) -> np.ndarray:
     return bounds
 
 
+@declared("study")
 @validated(line=instance_of(LineImpedance), shift=NOT_NEGATIVE, tolerance=POSITIVE)
 def line_positive_real(line: LineImpedance, shift: float | None = None, tolerance: float = 1e-6) -> SweepVerdict:
     """Test if the impedance H of a lossless pipe has Re H >= 0 along Re s = shift [1/s], over a whole period of H.

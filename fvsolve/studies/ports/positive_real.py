@@ -11,6 +11,7 @@ from numbers import Integral, Rational, Real
 
 import numpy as np
 
+from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.numbers.polynomial import Polynomial, chain, odd_part, sign
 from fvsolve.studies.result_table import PlainData
@@ -308,6 +309,7 @@ class Verdict(PlainData):
         return self.positive_real
 
 
+@declared("study")
 def positive_real(numerator, denominator) -> Verdict:
     """Test if H(s) = numerator / denominator is positive real, from coefficients, HIGHEST power FIRST as in numpy.
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.argument_checks import COMPLEX, FLAG, MATRIX, NUMBER, POSITIVE, SERIES, TABLE, TEXT, instance_of, validated
+from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.studies.result_table import PlainData
 
@@ -25,6 +26,7 @@ HIDDEN_RESIDUE = 1e-10  # a mode is hidden if its residue is below this fraction
 DEFECT = 1e-7  # greatest error of a pole relative to the norm of A, also for defective poles
 
 
+@declared("study")
 class Transfer:
     """Transfer function H(s) = D + C (s - A)^-1 B with a single input and output, by a Schur form of the balanced A.
 
@@ -155,6 +157,7 @@ class StateVerdict(PlainData):
         return {True: "yes", False: "no", None: f"undecided within {self.tolerance:.0e}"}[self.positive_real]
 
 
+@declared("study")
 @validated(h=instance_of(Transfer), tolerance=POSITIVE)
 def state_positive_real(h: Transfer, tolerance: float = TOLERANCE) -> StateVerdict:
     """Test if a transfer function H is positive real, from the sign of Re H between all points where it can change.
@@ -381,6 +384,7 @@ class Response:
         }  # fmt: skip
 
 
+@declared("study")
 @validated(port=TEXT, at=NUMBER, before=FLAG, scheme=TEXT, set=TABLE)
 def response(
     case, port: str, at: float | None = None, before: bool = False, scheme: str | None = None,

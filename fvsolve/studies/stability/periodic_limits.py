@@ -21,6 +21,7 @@ import numpy as np
 
 from fvsolve.argument_checks import COUNT, FUNCTION, NAMES, validated
 from fvsolve.assembly.scheme_codes import scheme_settings
+from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.table_handle import make_handle
@@ -96,6 +97,7 @@ class PeriodicPipe:
         return stepper.y[stepper.progress[0]["now"]].copy()
 
 
+@declared("study")
 @validated(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=FUNCTION)
 def measured_limits(
     schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, cells: int = CELLS, steps: int = STEPS,
@@ -223,6 +225,7 @@ class LimitedLimit(PlainData):
         return cells
 
 
+@declared("study")
 @validated(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=FUNCTION)
 def limited_limits(
     schemes: Sequence[str] = tuple(LIMITED), methods: Sequence[str] | None = None, cells: int = LIMITED_CELLS,

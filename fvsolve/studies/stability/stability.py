@@ -16,6 +16,7 @@ import numpy as np
 
 from fvsolve.argument_checks import COUNT, FLAG, NAMES, NUMBER, PATH, validated
 from fvsolve.case import load
+from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError
 from fvsolve.model.energy_norm import EnergyForm, energy_form
 from fvsolve.schemes import SCHEMES, branches
@@ -111,6 +112,7 @@ class LinearSystem:
         return self.at.model.wave_rate
 
 
+@declared("study")
 @validated(
     schemes=NAMES, methods=NAMES, at=NUMBER, before=FLAG, steps=COUNT, threshold=NUMBER, out=PATH, **STUDY_ARGUMENTS
 )

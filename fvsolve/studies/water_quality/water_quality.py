@@ -9,6 +9,7 @@ import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, TABLE, validated
 from fvsolve.case import Case, load
+from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.run import run
 from fvsolve.studies.outcome import NO_FIELDS, end_if_interrupted
@@ -59,6 +60,7 @@ class WaterQuality:
         return paths
 
 
+@declared("study")
 @validated(set=TABLE, progress=FUNCTION)
 def water_quality(
     case, trace: Sequence[str] = (), step: float = 60.0, set: Mapping[str, Any] | None = None,
