@@ -262,14 +262,20 @@ class FeatureRun:
         return {}
 
     def store(self, name: str, values: np.ndarray) -> bool:
-        """Set one of `arrays`; True if it is a new array."""
+        """Set one of `arrays`; True if it is a new array. The base writes into the array, whose size does not change."""
+        self.arrays()[name][:] = values
         return False
 
     def reset(self) -> None:
         """Reset for another state."""
 
     def restore(self, memory: dict[str, np.ndarray]) -> None:
-        """Continue from the memory of a state; raises ValueError if it lacks what the feature needs."""
+        """Continue from the memory of a state; raises ValueError if it lacks what the feature needs.
+
+        The base sets the arrays that the memory contains.
+        """
+        for name in self.arrays().keys() & memory.keys():
+            self.run_data.set_array(name, memory[name].copy())
 
     def capacity(self) -> float:
         """Number of steps that fit into the arrays, which grow if it is small."""
