@@ -262,7 +262,7 @@ class FeatureRun:
         return {}
 
     def store(self, name: str, values: np.ndarray) -> bool:
-        """Set one of `arrays`; True if it is a new array. The base writes into the array, whose size does not change."""
+        """Set one of `arrays`; True if it is a new array. The base writes into the array, which does not grow."""
         self.arrays()[name][:] = values
         return False
 
