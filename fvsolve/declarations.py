@@ -249,7 +249,7 @@ class Declarations(Mapping[str, Declaration]):
         for found in [*self._of_entry_points(), *self._of_files()]:
             if found.name in result or found.name in self.own():
                 error = f'a declaration of the {self.noun} "{found.name}" exists already; expected another name'
-                warnings.warn(unreadable(found.source, found.place, error), RuntimeWarning, stacklevel=4)
+                warnings.warn(unreadable(found.source, found.place, error), RuntimeWarning, stacklevel=2)
             else:
                 result[found.name] = found
         return result
@@ -262,7 +262,7 @@ class Declarations(Mapping[str, Declaration]):
                 yield Declaration(self.noun, entry.name, module, attribute, {}, source)
             else:
                 text = unreadable(source, entry.place, "it names no object; expected MODULE:OBJECT")
-                warnings.warn(text, RuntimeWarning, stacklevel=5)
+                warnings.warn(text, RuntimeWarning, stacklevel=2)
 
     def _of_files(self) -> Iterator[Declaration]:
         for place in filter(None, os.environ.get(self.variable, "").split(os.pathsep)):
@@ -272,7 +272,7 @@ class Declarations(Mapping[str, Declaration]):
                     for match in self.header.finditer(file.read_text(encoding="utf-8")):
                         yield self._declaration(str(file), match, self.variable)
             except (OSError, ValueError) as error:
-                warnings.warn(unreadable(self.variable, place, error), RuntimeWarning, stacklevel=5)
+                warnings.warn(unreadable(self.variable, place, error), RuntimeWarning, stacklevel=2)
 
     def __getitem__(self, name: str) -> Declaration:
         own = self.own(name)

@@ -359,10 +359,9 @@ class Case(Displayable):
 
     @cached_property
     def identity_text(self) -> str:
-        """JSON of `table` without the end time, `STEP_KEYS`, sinks, and keys that change only the report of a run."""
+        """JSON of `table` without the end time, `STEP_KEYS`, and the keys that change the report of a run only."""
         table = {key: value for key, value in self.table().items() if key not in REPORT_KEYS}
         table["numerics"] = {key: x for key, x in table["numerics"].items() if key not in ("end", *STEP_KEYS)}
-        table["output"] = {key: x for key, x in table["output"].items() if key != "sinks"}
         return json.dumps(table, sort_keys=True, default=str)
 
     @cached_property

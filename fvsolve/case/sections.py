@@ -41,7 +41,6 @@ DEFAULT_ROWS, DEFAULT_FRAMES = 1000, 50
 DEFAULT_ACCURACY = 1e-2  # fraction of the largest jump
 
 SINKS = Declarations("sink", "sinks", ("output/*_sink.py",))  # names in the case file
-EMPTY = (("maxima", []), ("sinks", []))  # keys of [output] that a written case omits
 
 
 # Ranges of liquids, after CoolProp and the CRC Handbook: liquid hydrogen to mercury, light liquids to cold heavy oil.
@@ -527,7 +526,8 @@ class Output(Table):
         Any, NamedTables(OutputGrid, "fields of basins on pixels: { flood = { basin, fields, format, cell } }")
     ] = {}
     sinks: Annotated[Any, SinkNames(
-        "sinks", '["json-lines"]', "names of sinks of other packages, which also receive the output of `run`", VALUE,
+        "sinks", '["json-lines"]', "names of sinks of other packages, which receive what the run directory receives",
+        VALUE,
     )] = ()  # fmt: skip
     units: Annotated[dict[str, str], OutputUnits()] = {}
 
@@ -543,9 +543,10 @@ class Output(Table):
         return tuple(dict.fromkeys([*self.maxima, *(spec.basin for spec in self.run_up.values()), *drawn]))
 
     def table(self) -> dict[str, Any]:
-        """Keys and values as in a case file."""
+        """Keys and values as in a case file, without sinks: they change no number, and other machines may lack them."""
         values = {**super().table(), "probes": [probe.text for probe in self.probes]}
-        return {key: value for key, value in values.items() if value != {} and (key, value) not in EMPTY}
+        del values["sinks"]
+        return {key: value for key, value in values.items() if value != {} and (key, value) != ("maxima", [])}
 
 
 class ExactSpec(Table):

@@ -1,8 +1,8 @@
-"""Sinks of other packages that a case names: they receive the output of a run, after its run directory.
+"""Sinks of other packages that a case names: they receive what the run directory of a run receives.
 
 A sink is a class without arguments. Its object is made for one run, and has these methods:
 
-open(model, folder) : before the run, or before its continuation; folder : run directory, None for a run in memory
+open(model, folder) : before the run, or before its continuation; folder : path of the run directory
 rows(t, values)     : rows of the history. t : float64[k] [s]; values : float64[k, probes] in SI, in the order of
                       `model.probes`
 field(t, frame)     : fields of pipes, basins and bodies at time t [s], optional; frame : part -> quantity -> values
@@ -11,7 +11,6 @@ close()             : after the run, also after a failed run, if `open` succeede
 """
 
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ import numpy as np
 from fvsolve.case.sections import SINKS
 from fvsolve.declarations import Declaration, unreadable
 from fvsolve.errors import FvsolveError, RunError
+from fvsolve.output.directory import RunDirectory
 
 METHODS = ("open", "rows", "close")  # methods that each sink has
 
@@ -38,11 +38,6 @@ class OtherSink:
         except Exception as error:
             raise FvsolveError(unreadable(declaration.source, declaration.place, error)) from error
 
-    @property
-    def takes_fields(self) -> bool:
-        """True if the sink has the method `field`."""
-        return callable(getattr(self.sink, "field", None))
-
     def call(self, method: str, *arguments: Any) -> None:
         """Call a method, if the sink has it. Raises RunError for any exception of the sink."""
         function: Callable | None = getattr(self.sink, method, None)
@@ -61,49 +56,47 @@ def read_sinks(names: Iterable[str]) -> list[OtherSink]:
 
 
 class SeveralSinks:
-    """Receiver of the output of a run: the run directory or the memory, followed by sinks of other packages.
+    """Receiver of the output of a run: the run directory, followed by sinks of other packages.
 
-    All other attributes are those of the first receiver.
+    All other attributes are those of the run directory.
     """
 
-    def __init__(self, first: Any, sinks: list[OtherSink]):
-        self.first = first
+    def __init__(self, directory: RunDirectory, sinks: list[OtherSink]):
+        self.directory = directory
         self.sinks = sinks
         self.complete = False  # True after the end of the run
-        self.takes_fields = getattr(first, "takes_fields", True) or any(sink.takes_fields for sink in sinks)
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self.first, name)
+        return getattr(self.directory, name)
 
     def begin(self, model: Any, state: Any) -> None:
         """Open the sinks, then the files: a sink that fails leaves an earlier run as it is."""
-        folder: Path | None = self.first.folder
         for sink in self.sinks:
-            sink.call("open", model, folder)
+            sink.call("open", model, self.directory.folder)
             sink.opened = True
-        self.first.begin(model, state)
+        self.directory.begin(model, state)
 
     def rows(self, t: np.ndarray, values: np.ndarray) -> None:
         """Pass rows of probe values on. Each sink gets its own copy, which it may keep or change."""
-        self.first.rows(t, values)
+        self.directory.rows(t, values)
         for sink in self.sinks:
             sink.call("rows", np.array(t), np.array(values))
 
     def field(self, t: float, frame: dict) -> None:
         """Pass the fields at time t [s] on."""
-        self.first.field(t, frame)
+        self.directory.field(t, frame)
         for sink in self.sinks:
             sink.call("field", t, frame)
 
     def end(self, summary: Any) -> None:
         """Pass the summary on."""
-        self.first.end(summary)
+        self.directory.end(summary)
         for sink in self.sinks:
             sink.call("end", summary)
         self.complete = True
 
     def close(self) -> None:
-        """Close the opened sinks, then the first receiver; then raise the first error of a sink.
+        """Close the opened sinks, then the run directory; then raise the first error of a sink.
 
         After a failed run it raises nothing, so that the message is about the failure.
         """
@@ -114,6 +107,6 @@ class SeveralSinks:
                     sink.call("close")
             except RunError as error:
                 errors.append(error)
-        self.first.close()
+        self.directory.close()
         if errors and self.complete:
             raise errors[0]

@@ -96,7 +96,7 @@ def model_of(case, set: Mapping | None = None, like=None):
 def sink_of(model, out: str | Path | None, force: bool, resume: bool, threads: int = 1):
     """Object that stores the output of a run: in memory, or in a run directory, which is locked until it is closed.
 
-    It also passes the output to the sinks that the case names.
+    A run directory is followed by the sinks that the case names.
     out : run directory, None for memory; force, resume : as for `RunDirectory`. Raises RunError for `threads` above 1
     under MPI, and for `resume` without `out`.
     """
@@ -104,16 +104,21 @@ def sink_of(model, out: str | Path | None, force: bool, resume: bool, threads: i
         if comm is not None and threads > 1:
             text = f"threads = {threads}: under MPI each of the {comm.size} ranks is one thread"
             raise RunError(f"{text}; leave out `threads`")
-        if resume and out is None:
+        if out is not None:
+            return with_sinks(model.case.output.sinks, lambda: RunDirectory(Path(out), model, force, resume))
+        if resume:
             raise RunError("resume needs the run directory; give it as the argument `out`")
-        names = model.case.output.sinks
-        if not names:
-            return RunDirectory(Path(out), model, force, resume) if out is not None else MemorySink(model)
-        from fvsolve.output.several_sinks import SeveralSinks, read_sinks
+        return MemorySink(model)
 
-        sinks = read_sinks(names)  # before the run directory is locked
-        first = RunDirectory(Path(out), model, force, resume) if out is not None else MemorySink(model)
-        return SeveralSinks(first, sinks)
+
+def with_sinks(names: tuple[str, ...], make_directory: Callable[[], RunDirectory]):
+    """Run directory, followed by the sinks with these names, which are read before the directory is locked."""
+    if not names:
+        return make_directory()
+    from fvsolve.output.several_sinks import SeveralSinks, read_sinks
+
+    sinks = read_sinks(names)
+    return SeveralSinks(make_directory(), sinks)
 
 
 def solved(model, sink, progress=None, threads: int = 1, begun: float | None = None) -> Result:

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -115,17 +116,30 @@ def test_a_run_of_the_command_line_writes_to_the_sink_of_its_case(tmp_path):
     python(home, "-m", "fvsolve", *words)
     rows = [json.loads(line) for line in (home / "out" / "history.jsonl").read_text().splitlines()]
     found = fvsolve.open_run(home / "out")
-    assert len(rows) == 21 and 'sinks = ["json-lines"]' in (home / "out" / "case.toml").read_text()
+    assert len(rows) == 21
     assert np.array(rows)[:, 1] == pytest.approx(found["high.level"], rel=1e-15)
 
 
-def test_a_sink_receives_all_output_of_a_run_in_memory(home):
-    result = fvsolve.run(tank("recorder"))
+def test_a_sink_receives_all_output_of_a_run_directory(home):
+    result = fvsolve.run(tank("recorder"), out="run", pictures=False)
     names = [name for name, *_ in calls()]
     assert names[0] == "open" and names[-2:] == ["end", "close"] and {*names[1:-2]} == {"rows", "field"}
-    assert calls()[0][1:] == (None, result.case.name) and calls()[-2] == ("end", result.reason)
+    assert calls()[0][1:] == (Path("run"), result.case.name) and calls()[-2] == ("end", result.reason)
     values = np.concatenate([rest[1][:, 0] for name, *rest in calls() if name == "rows"])
-    assert np.array_equal(values, result["tank.level"]) and result["tank.level"].min() > 0.0  # the sink has a copy
+    assert np.array_equal(values, result["tank.level"])
+
+
+def test_a_run_in_memory_uses_no_sink(home):
+    assert np.array_equal(fvsolve.run(tank("recorder"))["tank.level"], fvsolve.run(tank())["tank.level"])
+    assert "store" not in sys.modules
+
+
+def test_a_run_directory_is_read_where_the_sink_is_not_installed(home, monkeypatch):
+    fvsolve.run(tank("recorder"), out="run", pictures=False)
+    monkeypatch.setattr(sys, "path", [place for place in sys.path if place != str(home)])
+    assert fvsolve.load("run/case.toml").output.sinks == ()
+    with pytest.raises(CaseError, match="no sink named"):
+        fvsolve.load(tank("recorder"))
 
 
 def test_two_sinks_receive_the_same_and_a_run_directory_is_as_without_sinks(home):
@@ -134,7 +148,8 @@ def test_two_sinks_receive_the_same_and_a_run_directory_is_as_without_sinks(home
     assert (home / "bare" / "history.csv").read_bytes() == (home / "both" / "history.csv").read_bytes()
     rows = [json.loads(line) for line in (home / "both" / "history.jsonl").read_text().splitlines()]
     assert [t for t, _ in rows] == [float(t) for t in range(11)]  # that of the recorder is a copy
-    assert "sinks" not in (home / "bare" / "case.toml").read_text()
+    texts = [(home / name / "case.toml").read_text() for name in ("bare", "both")]
+    assert texts[0] == texts[1]
     assert sum(len(rest[0]) for name, *rest in calls() if name == "rows") == 11
 
 
