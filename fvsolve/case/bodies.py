@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from fvsolve import attitude
+from fvsolve.case.connections import WORLD
 from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.exact.solution import value
 from fvsolve.parts.attitude_keys import is_zero_vector
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 # Largest gap of a pin at the start, relative to its lengths: typed numbers have few digits.
 PIN_GAP = 1e-4
-WORLD = ""  # root of all bodies; it has no name
 Faults = Iterator[tuple[tuple, str]]
 
 

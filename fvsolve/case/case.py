@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fvsolve import units
-from fvsolve.case import basins, bodies, case_notices, sloshing, text
+from fvsolve.case import case_notices, text
 from fvsolve.case.claims import Compare, DesignLimit, Expect
 from fvsolve.case.controls import Block
 from fvsolve.case.pipe_routes import Route
@@ -24,12 +24,13 @@ from fvsolve.fluid.laws import Law
 from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.parts.pipe.pipe_wall import OF_WALL, elastic_compliance, heat_retardation
-from fvsolve.parts.pump.energy_use import EnergyUse, watched_powers
 from fvsolve.parts.table_model import plain_value
 from fvsolve.schemes import SCHEMES
 from fvsolve.units import show
 
 if TYPE_CHECKING:
+    from fvsolve.case import bodies
+    from fvsolve.parts.pump.energy_use import EnergyUse
     from fvsolve.parts.reaction import Reaction
 
 REPORT_KEYS = ("title", "expect", "compare", "validation")
@@ -115,8 +116,11 @@ class Case(Displayable):
         extents += [row.measure.extent for row in rows if row.measure.extent is not None]
         for extent in extents:
             named += extent.probes(self.links)
-        powers = watched_powers(self.links) if self.energy is not None else {}
-        named += [Probe(text, "links", *place, None, "power") for text, place in powers.items()]
+        if self.energy is not None:
+            from fvsolve.parts.pump.energy_use import watched_powers
+
+            powers = watched_powers(self.links)
+            named += [Probe(text, "links", *place, None, "power") for text, place in powers.items()]
         return list({probe.text: probe for probe in named}.values())
 
     @cached_property
@@ -142,10 +146,12 @@ class Case(Displayable):
         result = {}
         for name, node in self.nodes.items():
             if name in self.meshes:
+                from fvsolve.case import basins
+
                 pose = self.poses.get(node.on)
                 result |= basins.places(name, node, self.meshes[name], pose, self.patches_with_faces)
             elif node.domain == "hydraulic":
-                result |= bodies.with_elevation(node, self.poses).inner(name)[0]
+                result |= self.at_start(node).inner(name)[0]
         for name, link in self.links.items():
             result |= link.inner(name)[0]
             if "A" in link.owns:
@@ -156,14 +162,31 @@ class Case(Displayable):
     @cached_property
     def poses(self) -> dict[str, Any]:
         """Poses of bodies at the start, name -> `bodies.Pose`; each body comes after its carrier."""
-        return bodies.poses(self.nodes_with_water, self.numerics.start)
+        nodes = self.nodes_with_water
+        if not any(node.kind == "body" for node in nodes.values()):
+            return {}
+        from fvsolve.case import bodies
+
+        return bodies.poses(nodes, self.numerics.start)
+
+    def at_start(self, node: Node) -> Node:
+        """Node with its elevation at the start, if it is on a body."""
+        if not self.poses:
+            return node
+        from fvsolve.case import bodies
+
+        return bodies.with_elevation(node, self.poses)
 
     def body_point(self, place: str) -> tuple[str, Any]:
         """Name of the body ("" for the world) and position in its axes [m] of a place, see `bodies.body_point`."""
+        from fvsolve.case import bodies
+
         return bodies.body_point(self.nodes, place)
 
     def pose_of(self, name: str) -> bodies.Pose:
         """Pose of a body at the start; the pose at rest for the world and for other nodes."""
+        from fvsolve.case import bodies
+
         return self.poses.get(name, bodies.AT_REST)
 
     @cached_property
@@ -172,6 +195,8 @@ class Case(Displayable):
         nodes = {**self.nodes, **self.equilibrium_nodes} if self.equilibrium_nodes else self.nodes
         if not self.lumped:
             return nodes
+        from fvsolve.case import sloshing
+
         return sloshing.nodes_with_water(nodes, self.lumped, self.properties.density, self.gravity, self.numerics.start)
 
     @cached_property
@@ -201,6 +226,8 @@ class Case(Displayable):
 
         Between masses on their common axis it is positive if `second` has the greater coordinate, else negative.
         """
+        from fvsolve.case import bodies
+
         return bodies.separation(self.nodes_with_water, self.poses, first, second)
 
     @cached_property
@@ -209,6 +236,10 @@ class Case(Displayable):
         result = {}
         for name, part in [*self.nodes.items(), *self.links.items()]:
             result |= part.inner(name)[1]
+        if not self.meshes:
+            return result
+        from fvsolve.case import basins
+
         return result | basins.face_links(self.nodes, self.meshes, self.patches_with_faces)
 
     @cached_property
@@ -216,6 +247,8 @@ class Case(Displayable):
         """Patches through whose faces the flow of their links passes, see `basins.patches_with_faces`."""
         if not self.meshes:
             return frozenset()
+        from fvsolve.case import basins
+
         return basins.patches_with_faces(self.nodes, self.links, self.meshes)
 
     @cached_property

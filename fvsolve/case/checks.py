@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator
 from typing import Any
 
 from fvsolve import units
-from fvsolve.case import basins, bodies, connections, sloshing
+from fvsolve.case import connections
 from fvsolve.case.claims import Expect
 from fvsolve.case.reading import Raw
 from fvsolve.case.resource_checks import name_faults
@@ -47,11 +47,17 @@ def part_faults(
     raw : case before its values were read, for messages; it may be None if `fluid` is None; start : start time [s]
     meshes, lumped : basin -> mesh, of basins with cells and of basins whose water is lumped masses
     """
-    poses = bodies.poses(nodes, start)
+    has_bodies, poses = any(node.kind == "body" or getattr(node, "on", None) for node in nodes.values()), {}
     named, raw_links = (nodes, {}) if raw is None else (raw.table.get(group, {}) for group in ("nodes", "links"))
-    high = {name: node for name, node in nodes.items() if bodies.has_elevation(node, poses)}
+    high = dict(nodes)
+    if has_bodies:
+        from fvsolve.case import bodies  # only cases with bodies need it
+
+        poses = bodies.poses(nodes, start)
+        high = {name: node for name, node in nodes.items() if bodies.has_elevation(node, poses)}
     lends = any(_may_lend(link, named) for name, link in raw_links.items() if name not in links or "profile" in link)
-    high = {name: bodies.with_elevation(node, poses) for name, node in high.items()}
+    if has_bodies:
+        high = {name: bodies.with_elevation(node, poses) for name, node in high.items()}
     yield from _elevations(high, links, lends)
 
     def vacuum(group: str, name: str, key: str, pressures: list[float]) -> Faults:
@@ -60,6 +66,8 @@ def part_faults(
                 yield (ROOT, *keys), text
 
     if meshes or lumped or gravity == 0.0 or any(map(in_space, (*nodes.values(), *links.values()))):
+        from fvsolve.case import basins, bodies, sloshing
+
         yield from bodies.find_faults(nodes, named)
         yield from bodies.faults_on_bodies(nodes, links, basins.places_on_bodies(nodes, meshes), named)
         yield from bodies.coincident_ends(nodes, links, poses)
@@ -69,6 +77,8 @@ def part_faults(
         yield from bodies.overturned(nodes, poses)
 
     def separation(*ends: str) -> float | None:
+        from fvsolve.case import bodies
+
         return bodies.separation(nodes, poses, *ends)
 
     around = CaseContext(nodes, links, ambient, gravity, fluid, vacuum, separation)
@@ -233,6 +243,8 @@ def scalar_faults(
                 text = f"scalars are not supported with physics {show(part.physics)}; expected a free surface"
                 yield (group, name), text
             for patch, patch_options in getattr(part, "patches", {}).items():
+                from fvsolve.case import basins
+
                 for scalar in patch_options.scalars:
                     place = (group, name, "patches", patch, "scalars", scalar)
                     if scalar not in scalars:

@@ -7,13 +7,15 @@ import functools
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from fvsolve.case.bodies import WORLD
 from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts import KINDS, Chamber
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.units import show
 
 Faults = Iterator[tuple[tuple, str]]
+
+
+WORLD = ""  # root of all bodies; it has no name
 
 
 def network(table: dict[str, Any]) -> Faults:

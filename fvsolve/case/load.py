@@ -5,11 +5,11 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fvsolve import exact, units
 from fvsolve.argument_checks import TABLE, validated
-from fvsolve.case import basins, chainage, checks, claims, connections, part_reading, resource_checks, shipped
+from fvsolve.case import chainage, checks, claims, connections, part_reading, resource_checks, shipped
 from fvsolve.case.case import Case, wave_speed
 from fvsolve.case.conduits import water_of_conduits
 from fvsolve.case.controls import read_controls
@@ -25,10 +25,12 @@ from fvsolve.parts import value as val
 from fvsolve.parts.carried_scalar import ZEROS
 from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.pipe.pipe_wall import OF_WALL
-from fvsolve.parts.pump.energy_use import EnergyUse, price_faults
 from fvsolve.parts.schedule import Schedule, Scheduled, signal_fault
 from fvsolve.parts.table_model import read_keys
 from fvsolve.units import Kinematic, show
+
+if TYPE_CHECKING:
+    from fvsolve.parts.pump.energy_use import EnergyUse
 
 SCHEMA = 1
 MOST_SCALARS = 500  # each has a value in each cell and at each node, and a default probe at each node
@@ -172,11 +174,16 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     return case if named is None else with_exact(reading, case)
 
 
-def read_energy(reading: Reading, parts: Parts) -> EnergyUse | None:
+def read_energy(reading: Reading, parts: Parts) -> "EnergyUse | None":
     """Table `[energy]`; None without it or if it is faulty."""
     if "energy" in reading.raw.table:
+        from fvsolve.parts.pump.energy_use import EnergyUse
+
         return reading.table("energy", EnergyUse)
-    reading.add(price_faults(parts.links))
+    if any(link.kind == "pump" for link in parts.links.values()):
+        from fvsolve.parts.pump.energy_use import price_faults
+
+        reading.add(price_faults(parts.links))
     return None
 
 
@@ -335,9 +342,14 @@ def read_output(reading: Reading, numerics: Numerics | None, kinds: dict[str, An
     """Table `[output]` with its probes and its interval of rows; None if it is faulty. kinds : as for `read_probe`"""
     output = reading.table("output", Output)
     valid = output if output is not None else reading.valid_keys("output", Output)
-    reading.add(basins.add_gauges(valid, kinds["nodes"]))
-    kinds["sections"], faults = basins.section_kinds(valid, kinds)
-    reading.add(faults)
+    kinds["sections"] = {}
+    names_basins = any((valid.gauges, valid.sections, valid.lines, valid.run_up, valid.grids, valid.maxima))
+    if names_basins:
+        from fvsolve.case import basins  # only output of basins needs it
+
+        reading.add(basins.add_gauges(valid, kinds["nodes"]))
+        kinds["sections"], faults = basins.section_kinds(valid, kinds)
+        reading.add(faults)
     if valid.probes is None:
         probes = default_probes(kinds)
     else:
@@ -347,7 +359,8 @@ def read_output(reading: Reading, numerics: Numerics | None, kinds: dict[str, An
                 probe = read_probe(text, kinds)
                 named |= {} if probe is None else {probe.text: probe}
         probes = list(named.values())
-    reading.add(basins.output_faults(valid, kinds["nodes"]))
+    if names_basins:
+        reading.add(basins.output_faults(valid, kinds["nodes"]))
     if output is None:
         return None
     changes: dict[str, Any] = {"probes": probes}
@@ -402,8 +415,11 @@ def check_times(
     if times is None:
         return
     reading.add(checks.cavity_faults(times, cells, fluid))
-    span, named = (times.start, times.end), network.table.get("nodes", {})
-    reading.add(basins.find_faults(parts.nodes, parts.links, parts.meshes, state, span, named))
+    if any(is_kind(node, "basin") for node in parts.nodes.values()):
+        from fvsolve.case import basins
+
+        span, named = (times.start, times.end), network.table.get("nodes", {})
+        reading.add(basins.find_faults(parts.nodes, parts.links, parts.meshes, state, span, named))
     reading.add(checks.claim_faults(expect, times))
 
 

@@ -3,7 +3,7 @@
 import functools
 from typing import Any, NamedTuple
 
-from fvsolve.case import basins, bodies, chainage, connections, resource_checks
+from fvsolve.case import chainage, connections, resource_checks
 from fvsolve.case.case import default_cells
 from fvsolve.case.reading import GROUPS, Reading, fill_pipes, with_defaults
 from fvsolve.case.sections import Numerics
@@ -66,6 +66,8 @@ def read_parts(reading: Reading, network: chainage.CutTable) -> Parts:
     lumped: dict[str, Any] = {}
     for name, node in nodes.items():
         if is_kind(node, "basin"):
+            from fvsolve.case import basins
+
             with reading.catch("nodes", name):
                 read_mesh = functools.partial(basins.mesh_of, node, reading.setting)
                 (lumped if node.lumped else meshes)[name] = reading.reuse(("meshes", name), node, read_mesh)
@@ -162,7 +164,11 @@ def place_kinds(network: chainage.CutTable, parts: Parts, scalars: dict[str, Any
         from fvsolve.parts.rotation import ShaftPlace
 
         nodes |= dict.fromkeys(shafts, ShaftPlace)
-    nodes |= {name: bodies.BodyQuantities(node) for name, node in parts.nodes.items() if is_kind(node, "body")}
+    for name, node in parts.nodes.items():
+        if is_kind(node, "body"):
+            from fvsolve.case.bodies import BodyQuantities
+
+            nodes[name] = BodyQuantities(node)
     for name, node in table.get("nodes", {}).items():  # faulty nodes included
         if points := connections.points_of(name, node):
             from fvsolve.parts.body import BodyPoint
@@ -170,6 +176,8 @@ def place_kinds(network: chainage.CutTable, parts: Parts, scalars: dict[str, Any
             nodes |= dict.fromkeys(points, BodyPoint)
     nodes |= dict.fromkeys(bare)  # faulty
     for name in (*parts.meshes, *parts.lumped):
+        from fvsolve.case import basins
+
         nodes |= basins.probe_kinds(name, parts.nodes[name], parts.meshes.get(name), parts.lumped.get(name), scalars)
     pipes = {name: link for name, link in parts.links.items() if getattr(link, "along", None)}
     uncut = dict.fromkeys(_uncounted(table) if faulty else ())
@@ -191,7 +199,11 @@ def network_table(network: chainage.CutTable, parts: Parts) -> dict[str, Any]:
     junction; links that cannot be read are left out, except pipes.
     """
     nodes, links = network.table.get("nodes", {}), network.table.get("links", {})
-    patches = {name: basins.patch_names(mesh) for name, mesh in parts.meshes.items()}
+    patches = {}
+    for name, mesh in parts.meshes.items():
+        from fvsolve.case import basins
+
+        patches[name] = basins.patch_names(mesh)
     lost = [name for name, part in nodes.items()
             if connections.has_mesh_file(part) and name not in (*parts.meshes, *parts.lumped)]  # fmt: skip
     patches |= {name: connections.named_places(name, links) for name in lost}

@@ -14,7 +14,6 @@ from fvsolve.assembly.lowering import lower_devices, lowering_of
 from fvsolve.assembly.model_draft import ModelDraft
 from fvsolve.assembly.pipe_terms import MAX_TERMS, add_terms, limit_creep_step
 from fvsolve.assembly.scheme_codes import limiter_notices, scheme_settings
-from fvsolve.basins.free_surface.patch_closures import DEEPEST
 from fvsolve.basins.lower import basin_start, lower_basins, reserve_basins
 from fvsolve.case import load, locate_faults
 from fvsolve.case.case import Case
@@ -22,18 +21,7 @@ from fvsolve.errors import CaseError, FvsolveError, Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tanks
 from fvsolve.model.cluster_tables import classify_nodes
-from fvsolve.model.mechanics_tables import (
-    find_closed_chambers,
-    lower_bodies,
-    lower_lines,
-    lower_masses,
-    lower_moving_segments,
-    reserve_mechanics,
-    supporting_pressures,
-)
 from fvsolve.model.model import Model
-from fvsolve.model.network_start import unknown_speeds
-from fvsolve.model.network_tables import lower_networks, network_rate, reserve_networks
 from fvsolve.model.probe_tables import lower_probes, probe_offsets
 from fvsolve.model.start_notices import start_notices
 from fvsolve.model.steady_start import SteadyStart
@@ -44,9 +32,11 @@ def start_profile(draft) -> dict[str, Any]:
 
     Raises CaseError if no steady state is found.
     """
-    turning = any(device.turns_with(part) is not None for _, part, device in draft.devices)
-    if turning and (columns := unknown_speeds(draft, SteadyStart(draft))):
-        draft.start_speeds = balanced_speeds(draft, columns)
+    if any(device.turns_with(part) is not None for _, part, device in draft.devices):
+        from fvsolve.model.network_start import unknown_speeds  # only cases of rotation need it
+
+        if columns := unknown_speeds(draft, SteadyStart(draft)):
+            draft.start_speeds = balanced_speeds(draft, columns)
     return steady_profile(draft)
 
 
@@ -98,10 +88,13 @@ def steady_profile(draft) -> dict[str, Any]:
 
         start = NonlinearStart(draft)
     start.solve()
-    find_closed_chambers(draft, start)
-    start.loads = supporting_pressures(draft, start)
-    if start.loads:
-        start.solve()
+    if len(draft.piston_table):
+        from fvsolve.model.mechanics_tables import find_closed_chambers, supporting_pressures
+
+        find_closed_chambers(draft, start)
+        start.loads = supporting_pressures(draft, start)
+        if start.loads:
+            start.solve()
     start.report_frictionless()
     start.freeze_factors()
     start.fill_nodes()
@@ -212,7 +205,10 @@ def tables_before_start(case: Case, unfit: Collection[str] = ()) -> ModelDraft:
     lower_basins(draft)
     for feature in draft.features:
         feature.lower_behind_basins(draft)
-    lower_networks(draft)
+    if elements_of(case):
+        from fvsolve.model.network_tables import lower_networks  # only cases of rotation, electricity or heat need it
+
+        lower_networks(draft)
     draft.check()
     for feature in draft.features:
         feature.lower_last(draft)
@@ -250,10 +246,28 @@ def fill_links(draft: ModelDraft) -> None:
     for row in draft.pipe_table:
         for end in ("from_node", "to_node"):
             draft.node_table["admittance"][row[end]] += row["end_admittance"]
-    lower_bodies(draft)
-    lower_moving_segments(draft)
-    lower_masses(draft)
-    lower_lines(draft)
+    draft.mass_index = {None: 0}
+    if has_motion(draft):
+        from fvsolve.model import mechanics_tables  # only cases with masses or bodies need it
+
+        mechanics_tables.lower_bodies(draft)
+        mechanics_tables.lower_moving_segments(draft)
+        mechanics_tables.lower_masses(draft)
+        mechanics_tables.lower_lines(draft)
+
+
+def has_motion(draft: ModelDraft) -> bool:
+    """True if a case has masses, bodies, or elements between them."""
+    case, elements = draft.case, ("brace", "stop", "piston", "pin", "bushing")
+    has_masses = any(node.domain == "translational" for node in case.nodes.values())
+    return bool(case.poses) or has_masses or any(draft.links.get(table) for table in elements)
+
+
+def elements_of(case: Case) -> list:
+    """Elements of rotation, electricity and heat of all parts of a case."""
+    parts = (*case.nodes.items(), *case.links.items())
+    return [element for name, part in parts
+            for element in lowering_of(type(part)).of(part).network_elements(case, name, part)[0]]  # fmt: skip
 
 
 def profile_size(draft: ModelDraft) -> int:
@@ -301,8 +315,17 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     reserve_network(draft)
     for feature in draft.features:
         feature.reserve_ledger(draft)
-    for reserve in (reserve_basins, reserve_mechanics, reserve_networks, *(own.reserve for own in draft.features)):
-        reserve(draft)
+    reserve_basins(draft)
+    if has_motion(draft):
+        from fvsolve.model.mechanics_tables import reserve_mechanics
+
+        reserve_mechanics(draft)
+    if draft.network is not None:
+        from fvsolve.model.network_tables import reserve_networks
+
+        reserve_networks(draft)
+    for feature in draft.features:
+        feature.reserve(draft)
     layout = sizes.place()
     for feature in draft.features:
         feature.placed(draft)
@@ -388,6 +411,8 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     s["ambient"], s["gravity"] = case.ambient_pressure, case.gravity
     s["vapor"], s["unmarked"] = case.law.cavity_pressure, -np.inf
     if case.patches_with_faces:
+        from fvsolve.basins.free_surface.patch_closures import DEEPEST
+
         s["unmarked"] = s["vapor"] - 0.5 * DEEPEST * case.properties.density * case.gravity
     s["stop_below"] = case.numerics.below_vapor == "stop"
     case.law.lower(draft.fluid, s, draft.floats)
@@ -397,7 +422,12 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     if case.numerics.step is not None:  # pipes without cells do not limit a given step
         waves = waves[pipes["cells"] > 0]
     rates = [*waves, *column_rates(draft)]
-    s["rate"] = max([0.0, *rates, *(feature.rate(draft) for feature in draft.features), network_rate(draft)])
+    rates += [feature.rate(draft) for feature in draft.features]
+    if draft.network is not None:
+        from fvsolve.model.network_tables import network_rate
+
+        rates.append(network_rate(draft))
+    s["rate"] = max([0.0, *rates])
     return table
 
 

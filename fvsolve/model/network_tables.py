@@ -27,10 +27,7 @@ EVENTS = {
 
 def lower_networks(draft) -> None:
     """Fill the tables of the network of a case, and add the states of its stores and of angles that are probed."""
-    draft.network = None
     elements, switches = parts_of_network(draft.case)
-    if not elements:
-        return
     network = Network(elements, switches, tuple(sorted(draft.case.network_places)), rounding=rounding(draft))
     try:
         found = network.equations(network.conducting)
@@ -66,10 +63,9 @@ def lower_networks(draft) -> None:
 def reserve_networks(draft) -> None:
     """Reserve the arrays of networks: their sources, and the coefficients of the present mode."""
     draft.sizes.out("network", len(draft.network_input_table))
-    if draft.network is not None:
-        count, capacity = draft.network.rows.count, draft.network.capacity
-        draft.sizes.run_array("network_places", 3 * count + capacity)
-        draft.sizes.run_array("network_factors", count + capacity)
+    count, capacity = draft.network.rows.count, draft.network.capacity
+    draft.sizes.run_array("network_places", 3 * count + capacity)
+    draft.sizes.run_array("network_factors", count + capacity)
 
 
 def parts_of_network(case) -> tuple[list[Element], list[Switch]]:
@@ -234,7 +230,7 @@ def source_size(item: Element) -> float:
 def network_rate(draft) -> float:
     """Greatest rate of a network [1/s], in the mode in which all switches conduct."""
     network = draft.network
-    if network is None or not network.states:
+    if not network.states:
         return 0.0
     columns = list(network.states)
     rows = network.terms(network.conducting)[: len(columns)]

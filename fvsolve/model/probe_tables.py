@@ -3,8 +3,6 @@
 import numpy as np
 
 from fvsolve.assembly.lowering import lowering_of
-from fvsolve.assembly.mechanics import point_row
-from fvsolve.case import sloshing
 from fvsolve.kernels import dtypes as rec
 
 
@@ -45,6 +43,7 @@ def all_probes(case) -> list:
 
 def lower_body_point(draft, row, probe) -> None:
     """Fill the row of a probe at a named point of a body or of the world."""
+    from fvsolve.assembly.mechanics import point_row
     from fvsolve.kernels.mechanism.body_values import POINT_QUANTITIES
 
     row["kind"], row["side"] = rec.POINT_VALUE, POINT_QUANTITIES.index(probe.quantity)
@@ -85,6 +84,8 @@ def lower_section(draft, row, probe) -> None:
 
 def lower_surface(draft, row, probe) -> None:
     """Fill the row of a probe of depth at a point of a basin with sloshing modes."""
+    from fvsolve.case import sloshing
+
     case, basin = draft.case, draft.case.nodes[probe.name]
     arguments = basin, case.lumped[probe.name]
     modes, shares = sloshing.surface_factors(*arguments, *probe.point, case.properties.density, case.gravity)

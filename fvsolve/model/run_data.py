@@ -10,7 +10,6 @@ import numpy as np
 from fvsolve.assembly.model_draft import aligned_zeros
 from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.network_elimination import NetworkError
 
 if TYPE_CHECKING:
     from fvsolve.model.model import Model
@@ -207,6 +206,8 @@ class RunData:
         network = self.model.network
         if network is None or (mode := network.mode_of(self.armed)) == self.network_mode:
             return
+        from fvsolve.model.network_elimination import NetworkError
+
         try:
             places, factors = network.arrays(mode)
         except NetworkError:  # the run ends, see `apply_network`

@@ -17,11 +17,8 @@ from fvsolve.kernels.restrictions import conductance_of, flow_at_drop, transitio
 from fvsolve.kernels.steady_edges import FRICTION, LEAK, RESTRICTION, friction_drop, law_of
 from fvsolve.kernels.steady_friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.table_handle import make_handle
-from fvsolve.model.mechanics_tables import driven_at_start, start_masses
-from fvsolve.model.network_start import known_potentials, start_network
 from fvsolve.model.run_data import zeros_for_run
 from fvsolve.model.shut_off import shut_off_faults
-from fvsolve.model.static_forces import start_bodies
 from fvsolve.steady import Edge, solve_steady, union
 
 FIXED_PRESSURE = (rec.FIXED, rec.TANK, rec.PATCH)  # nodes whose pressure does not depend on flows
@@ -82,6 +79,10 @@ class SteadyStart:
     @cached_property
     def network_potentials(self) -> dict[str, float]:
         """Potentials of the nodes of networks at the start, where stores and schedules give them."""
+        if self.draft.network is None:
+            return {}
+        from fvsolve.model.network_start import known_potentials
+
         return known_potentials(self.draft, self)
 
     def pressure(self, i: int) -> float:
@@ -506,8 +507,17 @@ class SteadyStart:
                     net[node] *= abs(net[node]) > 1e-12 * self.flow_scale  # without rounding
 
     def report(self) -> dict[str, Any]:
-        moving = start_masses(self.draft, self) + start_bodies(self.draft, self)
-        moving += driven_at_start(self.draft, self) + self.moving + start_network(self.draft, self)
+        draft, moving = self.draft, []
+        if len(draft.mass_table) or len(draft.body_table):
+            from fvsolve.model.mechanics_tables import driven_at_start, start_masses
+            from fvsolve.model.static_forces import start_bodies
+
+            moving = start_masses(draft, self) + start_bodies(draft, self) + driven_at_start(draft, self)
+        moving += self.moving
+        if draft.network is not None:
+            from fvsolve.model.network_start import start_network
+
+            moving += start_network(draft, self)
         fluid, net = self.draft.fluid, self.nodes["inflow"].copy()
         for row in self.pistons:
             net[[row["a"], row["b"]]] -= row["speed"] * np.array([row["sweep_a"], row["sweep_b"]])

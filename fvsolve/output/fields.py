@@ -16,12 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fvsolve.case.basins import patch_names
 from fvsolve.errors import RunError
 from fvsolve.file_replacement import write_file
 from fvsolve.kernels.dtypes import BODY_OUT, PRISMATIC
-from fvsolve.kernels.mechanism.body_layout import ATTITUDE, POSITION, SPIN, VELOCITY
-from fvsolve.output import network_layout
 
 FIELD_UNITS = {
     "pressure": "Pa", "head": "m", "velocity": "m/s", "flow": "m3/s", "min_pressure": "Pa", "max_pressure": "Pa",
@@ -103,6 +100,8 @@ def world_points(model, out: np.ndarray, owner: np.ndarray, place: np.ndarray) -
     owner : int[p]         body of each point, -1 for the world
     place : float64[p, 3]  coordinates in the axes of the body [m]
     """
+    from fvsolve.kernels.mechanism.body_layout import ATTITUDE, POSITION, SPIN, VELOCITY
+
     first, n = int(model.layout["body"]), len(model.body_names)
     points, speed = place.copy(), np.zeros_like(place)
     for i, row in enumerate(out[first : first + BODY_OUT * n].reshape(n, BODY_OUT)):
@@ -125,6 +124,8 @@ class FieldSeries:
         self.fixed_grids: dict[str, str] = {}  # file name of a part -> `grid_xml` of points that do not move
         places = {basin.name: np.array(basin.part.position or (0.0, 0.0)) for basin in model.basins}
         if model.pipes:
+            from fvsolve.output import network_layout
+
             places = network_layout.plan_positions(model.case, {pipe.name: pipe.length for pipe in model.pipes})
             self.points, self.lines = pipe_geometry(model, places)
             self.owner = points_on_bodies(model, self.points)
@@ -312,8 +313,12 @@ def pipe_geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.nd
     Pipes share the point of their common node; the point of a basin patch is the mean of its faces.
     plan : part -> plan position float64[2] [m]
     """
+    from fvsolve.output import network_layout
+
     places = {name: plan[network_layout.place(name)] for name in model.node_names}
     for basin in model.basins:
+        from fvsolve.case.basins import patch_names
+
         for patch in patch_names(basin.mesh):
             places[f"{basin.name}.{patch}"] = plan[basin.name] + basin.mesh.middle[basin.mesh.faces(patch).index].mean(
                 axis=0

@@ -12,12 +12,10 @@ or signal.
 import ctypes
 import math
 import os
-import signal
 import sys
 import threading
 import time
 import traceback
-from contextlib import contextmanager
 from queue import SimpleQueue
 
 import numpy as np
@@ -29,6 +27,7 @@ from fvsolve.kernels.compiled_functions import functions
 from fvsolve.model import RunData
 from fvsolve.model.state_bounds import state_bounds
 from fvsolve.solve.partition import Partition, blocked_sums
+from fvsolve.solve.requests import CLOSE, CLOSE_MESSAGE, RUN_LOOP, SEND_STATES, postponed_interrupts
 from fvsolve.steppers import loop_records
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.run_handle import JOIN
@@ -209,25 +208,7 @@ class ThreadTeam:
             thread.join()
 
 
-@contextmanager
-def postponed_interrupts():
-    """Postpone Ctrl-C until all workers have returned, because they wait for each other."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    signals, before = [], signal.getsignal(signal.SIGINT)
-    signal.signal(signal.SIGINT, lambda *arguments: signals.append(arguments))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-    if signals and callable(before):
-        before(*signals[0])
-
-
 CALLBACK = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
-RUN_LOOP, SEND_STATES, CLOSE = range(3)  # requests of rank 0: run the time loop, send states, end
-CLOSE_MESSAGE = CLOSE, None
 
 
 class Exchange:

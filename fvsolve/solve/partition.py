@@ -9,8 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.basins.boundary_cells import BAND_MARGIN
-from fvsolve.basins.cell_sides import BLOCK
 from fvsolve.errors import FvsolveError, Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import stage_sums
@@ -118,6 +116,8 @@ class Partition:
             if nx > 0:
                 row = np.concatenate([np.arange(ny), np.arange(ny), np.zeros(nx, int), np.full(nx, ny - 1)])
             else:
+                from fvsolve.basins.cell_sides import BLOCK
+
                 mesh = self.model.basins[b].mesh
                 row = mesh.left[mesh.inner :] // BLOCK
             owner = np.searchsorted(rows, row, "right") - 1
@@ -138,6 +138,8 @@ def quantities(model: Model, b: int) -> int:
 
 def row_size(model: Model, b: int) -> int:
     """Number of cells of a row of basin b; a row of a mesh that is not a grid is a block of cells, see `cell_sides`."""
+    from fvsolve.basins.cell_sides import BLOCK
+
     return int(model.tables.basins[b]["nx"]) or BLOCK
 
 
@@ -155,6 +157,8 @@ def cells_of_rows(model: Model, b: int, first: int, stop: int) -> tuple[int, int
 def rows_read(model: Model, b: int, first: int, stop: int) -> tuple[int, int]:
     """(first, last + 1) of the rows of basin b whose values the rates of the rows from `first` to `stop` - 1 read."""
     if model.tables.basins[b]["nx"] > 0:
+        from fvsolve.basins.boundary_cells import BAND_MARGIN
+
         return max(first - BAND_MARGIN, 0), min(stop + BAND_MARGIN, row_count(model, b))
     need = model.basins[b].blocks_needed  # rates read values at sides, and these read the cells next to them
     sides = int(np.searchsorted(need, first, "right")), int(need[stop - 1])
@@ -241,6 +245,8 @@ def divisible_rows(model: Model) -> dict:
     whole : reason for each undivided basin; most : greatest number of threads
     why : reason why only one thread is possible, or ""
     """
+    from fvsolve.basins.cell_sides import BLOCK
+
     reason = single_thread_reason(model)
     divided = [b for b, basin in enumerate(model.basins) if not basin.undivided_reason]
     rows = {} if reason else {model.basins[b].name: row_count(model, b) for b in divided}
@@ -286,6 +292,8 @@ def blocked_sums(cut: Partition, k: int) -> np.ndarray:
     blocked_basins = [b for b in forming if quantities(model, b) * model.basins[b].n >= LEAST_STATES]
     if not blocked_basins:
         return np.zeros(0, dtype=np.int64)
+    from fvsolve.basins.boundary_cells import BAND_MARGIN
+
     others, common_cells, edges = list(cut.common_states()), [], []
     for rows, b in zip(cut.firsts, cut.basins, strict=True):
         first, stop = (int(row) for row in rows[k : k + 2])

@@ -10,8 +10,6 @@ errors remain.
 
 import numpy as np
 
-from fvsolve.case import sloshing
-from fvsolve.case.bodies import free_joints
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.solve.energy_watch import EnergyWatch
@@ -157,6 +155,8 @@ class SloshingCheck:
         self.model, self.tanks = model, []
         case = model.case
         for name, mesh in {**case.meshes, **case.lumped}.items():
+            from fvsolve.case.bodies import free_joints
+
             basin = case.nodes[name]
             modal = basin.on is not None and basin.sloshing == "modes"
             free = basin.on is not None and basin.physics_type.has_modes and any(free_joints(basin.on, case.nodes))
@@ -220,6 +220,8 @@ class SloshingCheck:
 
 def rises(model, name: str) -> tuple:
     """Arguments `at`, `start`, `lifts` and `is_round` of the function `rise` for the basin `name`."""
+    from fvsolve.case import sloshing
+
     case = model.case
     basin, mesh = case.nodes[name], case.lumped[name]
     modes = sloshing.modes_of(basin, mesh, case.properties.density, case.gravity)

@@ -9,9 +9,7 @@ from fvsolve.assembly.lowering import Device
 from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tanks
-from fvsolve.kernels.column_junctions import gate_inflow
 from fvsolve.kernels.compiled_functions import fused_step_function
-from fvsolve.kernels.scalar_transport import GREATEST_RISE
 from fvsolve.model import Model, RunData
 from fvsolve.model.state_bounds import state_bounds
 from fvsolve.model.step_division import dividing_rate
@@ -46,7 +44,7 @@ STATUS_FAILURES = {  # status of the right-hand side -> text
     "a flow that its pressure does not change: open one, give a machine a leakage, or replace the node by a chamber",
     rec.NO_VOLUME: "the chamber volume{place} is zero at {when}; give the piston an end-stop",
     rec.NO_WIDTH: "the wall has no space left{place} at {when}; give its mass an end-stop, or a wider zone",
-    rec.NO_COOLANT: f"{{part}} heats {{name}} by more than {GREATEST_RISE:g} K at {{when}}: too little fluid flows "
+    rec.NO_COOLANT: "{part} heats {name} by more than {rise:g} K at {when}: too little fluid flows "
     "through this junction to take up the heat; make it a chamber, or leave the part out of `heat_from`",
     rec.NO_LIQUID: "a cavity{place} cannot supply the flow that is drawn from it at {when}; give a demand the key "
     "`required_pressure`, so that it falls with the pressure; a pump would lose its suction there: trip it earlier",
@@ -339,6 +337,9 @@ class RunLoop:
                 bodies = [*(basin.name for basin in model.basins), *model.node_names]
                 names["name"] = bodies[index].removesuffix(".inside")
             elif status == rec.NO_COOLANT:
+                from fvsolve.kernels.scalar_transport import GREATEST_RISE
+
+                names["rise"] = GREATEST_RISE
                 k = model.tables.heat_sources[index]["valve"]
                 end = "from_node" if self.out[model.layout["valve"] + k] < 0.0 else "to_node"
                 names["part"], names["name"] = model.valve_names[k], model.node_names[model.tables.valves[k][end]]
@@ -532,6 +533,8 @@ def impact_impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: 
     carried : float64[columns]  result of `flow_before`; out : output array of the right-hand side
     places : nodes from `shut_places`
     """
+    from fvsolve.kernels.column_junctions import gate_inflow
+
     sums = np.array([model.tables.nodes["inflow"][i] - gate_inflow(model.tables, i) for i in places])
     matrix = np.zeros((len(places), len(places)))
     row = {i: r for r, i in enumerate(places)}

@@ -8,10 +8,9 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.model import Model, State
-from fvsolve.parts.pump.energy_use import energy_use
 from fvsolve.solve import run_summary as found
-from fvsolve.solve.parallel_bands import CLOSE_MESSAGE, postponed_interrupts
 from fvsolve.solve.partition import threads_of
+from fvsolve.solve.requests import CLOSE_MESSAGE, postponed_interrupts
 from fvsolve.solve.run_checks import RunChecks, split_step_notices
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 from fvsolve.solve.run_summary import Event, Summary, mass_ledger
@@ -409,6 +408,14 @@ class Run:
         control = self.loop.control
         return automatic.method_history(self.start, self.changes, control["price"], control["size"])
 
+    def pumped_energy(self, watched: dict) -> dict:
+        """Energy of pumps and its cost; empty without `[energy]`. watched : extremes by probe"""
+        if self.model.case.energy is None:
+            return {}
+        from fvsolve.parts.pump.energy_use import energy_use
+
+        return energy_use(self.model, self.loop.now, watched, self.loop.t - self.start)
+
     def close(self, reason: str, saved: bool = True) -> Summary:
         model, loop = self.model, self.loop
         if reason != "finished" and saved and loop.t > self.start and np.all(np.isfinite(loop.now)):
@@ -443,7 +450,7 @@ class Run:
             self.setup, events,
             found.find_cavities(self.run_data), warnings, self.threads, self.invalid_from,
             maxima := found.find_maxima(self.run_data, loop.t), found.find_run_ups(model, maxima),
-            energy_use(model, loop.now, watched, loop.t - self.start),
+            self.pumped_energy(watched),
         )  # fmt: skip
         self.sink.end(summary)
         return summary
