@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.attitude import roll_pitch_yaw
-from fvsolve.case.basins import boundary_cells, patch_names
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.steady_friction import drag
@@ -107,6 +105,8 @@ def wall_facts(link) -> dict[str, Any]:
 def pose_facts(pose) -> dict[str, float]:
     """Position, attitude, speed and angular speed of a body at the start."""
     place = dict(zip("xyz", pose.place.tolist(), strict=True))
+    from fvsolve.attitude import roll_pitch_yaw
+
     angles = dict(zip(("roll", "pitch", "yaw"), roll_pitch_yaw(pose.attitude), strict=True))
     return place | angles | {"speed": float(np.linalg.norm(pose.velocity)), "spin": float(np.linalg.norm(pose.spin))}
 
@@ -143,6 +143,8 @@ def basin_facts(basin) -> dict[str, Any]:
     Facts of a patch are the length of its faces, and the area of the cells behind them.
     """
     mesh, patches = basin.mesh, {}
+    from fvsolve.case.basins import boundary_cells, patch_names
+
     for name in patch_names(mesh):
         faces, part = mesh.faces(name).index, basin.part.patches.get(name)
         patches[name] = {

@@ -16,15 +16,7 @@ from fvsolve.file_replacement import remove_unfinished, replacing, write_file
 from fvsolve.output import csv_files
 from fvsolve.output.csv_files import read_envelope, read_table
 from fvsolve.output.fields import FieldSeries, ParallelBasinWriter
-from fvsolve.output.grid_files import GRID_FILES, write_grids
-from fvsolve.output.maxima_files import (
-    MAXIMA_FILES,
-    RUN_UP_FILES,
-    RUN_UP_PICTURES,
-    read_maxima,
-    write_maxima,
-    write_run_up,
-)
+from fvsolve.output.file_names import GRID_FILES, MAXIMA_FILES, RUN_UP_FILES, RUN_UP_PICTURES
 from fvsolve.output.restart import OtherCase, Restart, changed_steps, identity, other_steps, read_restart, write_restart
 from fvsolve.output.summary_file import read_summary
 from fvsolve.output.unit_columns import probe_columns, time_column
@@ -182,10 +174,16 @@ class RunDirectory:
         """Close history.csv and write the files of extremes; the caller writes summary.json last."""
         with self.report_write_errors():
             self.history.close()
-            write_maxima(self.folder, self.model, summary.maxima)
-            write_grids(self.folder, self.model, summary.t, summary.maxima)
-            for name, table in summary.run_ups.items():
-                write_run_up(self.folder / f"run_up-{name}.csv", table, self.model.case)
+            if summary.maxima:
+                from fvsolve.output.maxima_files import write_maxima, write_run_up
+
+                write_maxima(self.folder, self.model, summary.maxima)
+                for name, table in summary.run_ups.items():
+                    write_run_up(self.folder / f"run_up-{name}.csv", table, self.model.case)
+            if self.model.case.output.grids:
+                from fvsolve.output.grid_files import write_grids
+
+                write_grids(self.folder, self.model, summary.t, summary.maxima)
             if summary.envelope:
                 case = self.model.case
                 envelope = csv_files.with_initial_heads(summary, self.model)
@@ -224,7 +222,7 @@ class RunDirectory:
 
     def maxima(self) -> dict:
         """Greatest values in the cells of basins: basin -> quantity -> float64[cells] in SI; {} without files."""
-        return read_maxima(self.folder)
+        return maxima_in(self.folder)
 
     def files(self) -> list[str]:
         """Sorted names of the existing files of the run, with summary.json and without pictures."""
@@ -321,7 +319,7 @@ def read_directory(folder: Path) -> tuple:
     summary = read_summary(folder / SUMMARY_FILE)
     envelope = folder / "envelope.csv"
     read = (lambda: read_envelope(envelope)) if envelope.name in summary["files"] else dict
-    return summary, lambda: read_table(folder / "history.csv"), read, folder, lambda: read_maxima(folder)
+    return summary, lambda: read_table(folder / "history.csv"), read, folder, lambda: maxima_in(folder)
 
 
 def clear_run_files(folder: Path) -> None:
@@ -363,6 +361,15 @@ def _refuse_full_disk(folder: Path, case) -> None:
 def picture_paths(folder: Path) -> list[Path]:
     """Paths of the pictures of a run in its directory; the first two may be missing."""
     return [*(folder / name for name in PICTURE_FILES), *sorted(folder.glob(RUN_UP_PICTURES))]
+
+
+def maxima_in(folder: Path) -> dict:
+    """Greatest values in the cells of basins in a run directory: basin -> quantity -> float64[cells] in SI."""
+    if not any(folder.glob(MAXIMA_FILES)):
+        return {}
+    from fvsolve.output.maxima_files import read_maxima
+
+    return read_maxima(folder)
 
 
 def maxima_paths(folder: Path) -> list[Path]:

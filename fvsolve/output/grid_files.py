@@ -13,7 +13,6 @@ from fvsolve.output.fields import FILE_ATTRIBUTE, read_series
 from fvsolve.parts.raster_files import import_library
 from fvsolve.units import DIMENSIONS
 
-GRID_FILES = "grids/*.*"
 SOURCE = FILE_ATTRIBUTE.pattern.replace("file", "Source")
 NEAR = 1e-12  # of the size of a cell squared: twice the area by which a point may lie outside
 MERCATOR = {  # parameter of Transverse_Mercator in the text of a CRS -> its name in CF-1.8

@@ -8,10 +8,8 @@ from fvsolve.errors import RunError
 from fvsolve.file_replacement import write_file
 from fvsolve.output.csv_files import csv_quoted
 from fvsolve.output.fields import basin_geometry, grid_xml, reference_xml, split_blocks, write_frame
+from fvsolve.output.file_names import MAXIMA_FILES
 from fvsolve.output.unit_columns import UnitColumn, column, to_column_units
-
-MAXIMA_FILES, RUN_UP_FILES = "maxima-*.vtu", "run_up-*.csv"
-RUN_UP_PICTURES = "run_up-*.png"
 
 
 def write_maxima(folder: Path, model, maxima: dict[str, dict[str, np.ndarray]]) -> None:

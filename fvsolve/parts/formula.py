@@ -16,7 +16,6 @@ import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.csv_rows import copy_name, find_file, read_rows
-from fvsolve.parts.raster import Raster, read_raster
 from fvsolve.parts.value import PROFILE, Quantity, Range, ReadContext, Value, ValueFault, anything
 from fvsolve.units import show
 
@@ -307,6 +306,8 @@ class SpatialFieldKey(Value):
     def _samples(self, given: dict, setting: ReadContext) -> SpatialField:
         if "raster" in given:
             try:
+                from fvsolve.parts.raster import read_raster  # only fields of files need it
+
                 return SpatialField(*read_raster(given, self.dimension, self.range, setting))
             except ValueFault:
                 raise
@@ -438,9 +439,12 @@ def samples(shape: SpatialField | None, mesh: Any) -> np.ndarray:
     On full rectangular grids there are nine Gauss points per cell, in the order of `GAUSS`; on other meshes there is
     only the centre. The values of a raster are its means over the cells, at all points.
     """
-    if shape is not None and isinstance(shape.rule, Raster):
-        mean = shape.rule.over(mesh)
-        return np.broadcast_to(mean, (len(GAUSS) if is_grid(mesh) else 1, mean.size))
+    if shape is not None:
+        from fvsolve.parts.raster import Raster  # only cases with basins need it
+
+        if isinstance(shape.rule, Raster):
+            mean = shape.rule.over(mesh)
+            return np.broadcast_to(mean, (len(GAUSS) if is_grid(mesh) else 1, mean.size))
     x, y = np.ascontiguousarray(mesh.centre.T)
     if not is_grid(mesh):
         places = np.array([x]), np.array([y])

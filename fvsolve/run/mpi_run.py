@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from functools import cache
 
 from fvsolve.errors import FvsolveError
-from fvsolve.solve.parallel_bands import abort_ranks
 from fvsolve.solve.partition import make_partition, threads_of
 from fvsolve.solve.run_checks import RunChecks
 from fvsolve.solve.run_loop import RunLoop
@@ -113,4 +112,6 @@ def serve_rank(make: Callable) -> None:
         loop.stepper.largest = RunChecks(loop.run_data).largest_if_needed
         loop.team.serve(*loop.functions)
     except BaseException as error:  # the other ranks wait for this rank
+        from fvsolve.solve.parallel_bands import abort_ranks
+
         abort_ranks(comm, f"fvsolve: rank {comm.rank}: {type(error).__name__}: {error}")
