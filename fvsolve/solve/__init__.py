@@ -1,7 +1,12 @@
 """Runs of a model from an initial state: rows and frames of results go to an output sink; a summary is returned."""
 
-from fvsolve.solve.advance import advance
-from fvsolve.solve.run_summary import Mark, Summary
-from fvsolve.solve.solve import initial_state, solve
+from fvsolve.lazy_exports import lazy_names
 
-__all__ = ["Mark", "Summary", "advance", "initial_state", "solve"]
+MODULES = {
+    "Mark": "run_summary",
+    "Summary": "run_summary",
+    "advance": "advance",
+    "initial_state": "solve",
+    "solve": "solve",
+}
+__all__ = lazy_names(__name__, MODULES)  # noqa: PLE0605
