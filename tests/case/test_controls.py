@@ -10,6 +10,7 @@ import pytest
 
 import fvsolve
 from fvsolve import CaseError
+from fvsolve.features.controls.feature import blocks_of
 
 LEVEL = """\
 schema = 1
@@ -364,7 +365,7 @@ def test_a_loop_through_the_network_without_a_state_needs_a_filter():
 
 def test_a_loop_on_a_pressure_with_a_filter_starts_balanced():
     model = fvsolve.build(fvsolve.load(edited(LEVEL, BY_PRESSURE | with_block(filter="1 s"))))
-    assert model.tables.controls["start"][0] == pytest.approx(0.78102, abs=1e-5)  # where mid has 2 bar
+    assert blocks_of(model)["start"][0] == pytest.approx(0.78102, abs=1e-5)  # where mid has 2 bar
 
 
 def test_a_speed_without_limits_is_balanced_from_full_speed():
@@ -375,14 +376,14 @@ def test_a_speed_without_limits_is_balanced_from_full_speed():
     case["nodes"] = {name: node for name, node in case["nodes"].items() if name in ("source", "mid")}
     case["controls"]["level"] |= {"setpoint": "7 bar", "gain": "0.1 1/bar", "filter": "1 s"}
     model = fvsolve.build(fvsolve.load(case))
-    assert model.tables.controls["start"][0] > 0.5
+    assert blocks_of(model)["start"][0] > 0.5
     assert fvsolve.run(case)["mid.pressure"] == pytest.approx(7e5, rel=1e-9)
 
 
 def test_a_cascade_starts_balanced():
     outer = {"controls.outer": {"type": "function", "formula": "4"}}
     model = fvsolve.build(fvsolve.load(edited(LEVEL, with_block(setpoint={"control": "outer"}) | outer)))
-    assert sorted(model.tables.controls["start"]) == pytest.approx([0.25, 4.0])
+    assert sorted(blocks_of(model)["start"]) == pytest.approx([0.25, 4.0])
 
 
 @pytest.mark.parametrize(
@@ -675,7 +676,7 @@ def test_an_input_that_the_formula_does_not_use_is_legal():
 def test_a_formula_is_finite_if_the_blocks_that_it_reads_are_at_rest():
     blocks = {"controls.level": {"type": "function", "inputs": {"a": "controls.b"}, "formula": "1/a"}}
     model = fvsolve.build(fvsolve.load(edited(LEVEL, blocks | {"controls.b": {"type": "function", "formula": "2"}})))
-    assert sorted(model.tables.controls["start"]) == pytest.approx([0.5, 2.0])
+    assert sorted(blocks_of(model)["start"]) == pytest.approx([0.5, 2.0])
 
 
 # numbers ------------------------------------------------------------------------------------------------------------

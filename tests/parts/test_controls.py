@@ -18,7 +18,8 @@ from solve.test_resume import same_files
 import fvsolve
 from fvsolve.assembly.schedule_tables import period_of
 from fvsolve.errors import CaseError
-from fvsolve.features.controls.lower import Balance
+from fvsolve.features.controls.balance import Balance
+from fvsolve.features.controls.feature import blocks_of
 from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.parts.formula_program import Program
 from fvsolve.studies.linearise import linearise
@@ -264,7 +265,7 @@ def test_an_output_that_is_no_number_ends_the_run_whatever_it_drives(driven, mon
 
 def test_a_balanced_start_finds_the_opening_that_the_flow_needs():
     model = fvsolve.build(fvsolve.load(tower({"control": "hold"}, 0.5, controls={"hold": pi(4.0)})))
-    assert model.tables.controls[0]["start"] == pytest.approx(0.25, rel=1e-14)  # sqrt(4 / 16) / 2
+    assert blocks_of(model)[0]["start"] == pytest.approx(0.25, rel=1e-14)  # sqrt(4 / 16) / 2
     assert model.steady["moving"] == []
 
 

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from scipy.sparse import csc_array
 
 import fvsolve
+from fvsolve.features.controls.feature import blocks_of
 from fvsolve.kernels.node_clusters import solve_in_order
 from fvsolve.model.cluster_tables import SparseMatrix
 from fvsolve.output.memory_sink import MemorySink
@@ -195,7 +196,7 @@ def test_constant_blocks_cost_no_steady_states_at_the_start(count, monkeypatch):
                                "discharge_coefficient": 0.6, "opening": {"control": f"latch-{k}"}}  # fmt: skip
     model = fvsolve.build(fvsolve.load(case))
     assert len(solved) <= 3
-    start = model.tables.controls["start"]
+    start = blocks_of(model)["start"]
     names = list(fvsolve.load(case).controls)
     known = {name: value for name, value in zip(model.tables and sorted(names), start, strict=False)}
     assert sorted(start) == sorted([0.0] * 2 * count + [1.0] * count + [0.5]) and known

@@ -8,6 +8,8 @@ from reference.scenes import scene, tank, valve
 
 import fvsolve
 from fvsolve import FvsolveError, advance, initial_state
+from fvsolve.assembly.features import with_slot
+from fvsolve.features.controls.kernels.tables import SLOT
 from fvsolve.solve.advance import observe
 from fvsolve.solve.held_inputs import hold
 
@@ -110,6 +112,8 @@ def test_probes_of_a_state_see_the_last_sample():
     start = initial_state(model)
     later = advance(model, start, 1.0, {"town.demand": 0.031})
     later = advance(model, later, 3.2, {"town.demand": 0.031})
-    blank = fvsolve.State(later.t, later.y, later.memory | {"discrete": model.discrete})
+    blank = fvsolve.State(
+        later.t, later.y, later.memory | {"discrete": np.array(with_slot(model.features, SLOT).discrete)}
+    )
     output = [probe.text for probe in model.probes].index("controls.pressure.output")
     assert model.observe(later)[output] != model.observe(start)[output] == model.observe(blank)[output]
