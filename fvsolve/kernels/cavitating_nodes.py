@@ -78,6 +78,7 @@ def end_flow_of_state(st, floats, pipe, p_in, v_in, p_node, still):
     """
     inside = state_at(st, floats, pipe, p_in)
     side, v, slope = end_side(st, floats, pipe, inside, v_in, p_node, still)
+    # A flow into the node may be supersonic: the face then lies within the wave, or before it.
     if v >= 0.0:
         m, at, _ = sample_wave(st, floats, pipe, inside, v_in, side, v)
         return m * at, side[1] * slope, m
@@ -187,6 +188,7 @@ def solve_nodes_cavitating(t, y, dydt, out, handle):
     given_flows(t, y, out, tables)
     begin_clusters(out, tables, space)
     for sweep in range(1, MAX_SWEEPS + 1):
+        # Bounds found with wide open valves do not hold for their real lifts.
         reset_bounds(tables, low, high, sweep == 1)
         end_inflows_cavitating(out, tables, space[0], False)
         for i in range(n):
@@ -221,6 +223,7 @@ def balance_junctions(t, y, dydt, out, handle):
             p = nodes[i]["pressure"] + out[layout["pressure"] + i]
             if p - floor > BAR and abs(imbalance[i]) > BALANCE_ERROR * nodes[i]["admittance"] * (BAR + abs(p)):
                 out[STATUS], out[WHERE] = NOT_CONVERGED, i
+    # The first sweep sums the mass at the ends, by which the second distributes the imbalance.
     for sweep in range(2 if unbalanced else 0):
         for k in range(pipes.size):
             for side in range(2):
