@@ -126,6 +126,7 @@ def copy_run(run, own):
 
     run, own : open handles of the model
     """
+    # All sizes are compared before the first copy: a part of the arrays would be another state.
     for k in range(run.memory.size // 2):
         if run.memory[2 * k + 1] != own.memory[2 * k + 1]:
             return False
@@ -156,6 +157,7 @@ def energies_at(t, y, w):
     for k in range(nodes.size):
         values[k] = 0.0
         by_node += nodes[k] >= 0
+    # Energies per mass of nodes need no rates; only powers do.
     dydt = w.dydt if by_node < nodes.size else w.dydt[:0]
     rhs_in_turn(t, y, dydt, w.out, w.own)
     stored_in_turn(t, y, dydt[:0], w.out, w.own, stored)

@@ -68,6 +68,7 @@ def run_program(pieces, first, t, limit, base, stack, armed, g):
         elif code == NEGATE:
             stack[k - 1] = -stack[k - 1]
         elif code == BEFORE:
+            # At a time of switching that ends the segment, the value before it still holds.
             stack[k] = 0.0 if time > number or (time == number and limit > number) else 1.0
             k += 1
         elif code == AFTER:

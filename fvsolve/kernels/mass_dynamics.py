@@ -116,6 +116,7 @@ def chamber_state(tables, node, volume, excess):
     if st["law"] == rec.LAW_LINEAR:
         stiffness = node["stiffness"] * node["volume"] / volume
         return stiffness * excess, stiffness
+    # log1p keeps the digits of a small excess, which the quotient of two masses would lose.
     share = node["volume"] / volume * excess / node["mass"]
     q0 = log(node["mass"] / (st["rho"] * node["volume"]))
     p = pressure_of_log(st, floats, 0.0, q0 + log1p(share))
@@ -158,6 +159,7 @@ def piston_chambers(t, y, dydt, out, handle):
             out[layout["pressure"] + i] = p
             out[layout["stiffness"] + nodes[i]["row"]] = stiffness
             out[layout["swept"] + nodes[i]["row"]] = sweep * speed if piston["line"] < 0 else 0.0
+        # After the swept flows of both sides are written, because the leak is added to them.
         if piston["leakage"] > 0.0:
             a, b = piston["a"], piston["b"]
             p_a = nodes[a]["pressure"] + out[layout["pressure"] + a]
@@ -217,6 +219,7 @@ def forces(t, y, out, tables):
 def add_stiffness(tables, i, j, stiffness, damping):
     """Add stiffness and damping of an element, per mass [1/s2, 1/s], to the sums of its masses i and j in scratch."""
     masses, work = tables.masses, tables.scratch
+    # Two masses on a spring oscillate at the rate sqrt(k (1/m_i + 1/m_j)).
     lightness = masses[i]["lightness"] + masses[j]["lightness"]
     for mass in (i, j):
         work[2 * mass] += lightness * stiffness
@@ -281,6 +284,7 @@ def contact_rate(out, tables):
         i, j = stop["from_mass"], stop["to_mass"]
         lightness = masses[i]["lightness"] + masses[j]["lightness"]
         stiffness, brake = lightness * stop["stiffness"], lightness * stop["damping"]
+        # Contacts between points of bodies are part of the rates of bodies.
         if not stiffness > 0.0 or stop["line"] >= 0:
             continue
         travel, speed = stop_travel(out, tables, k)
@@ -313,6 +317,7 @@ def mass_rates(t, y, dydt, out, handle):
             out[rec.CLOSING] = max(closing, contact_rate(out, tables))
     for k in range(tables.pistons.size):
         for i in (tables.pistons[k]["a"], tables.pistons[k]["b"]):
+            # Written so that a stiffness that is not a number is a fault too.
             if not out[layout["stiffness"] + nodes[i]["row"]] > 0.0:
                 out[rec.STATUS], out[rec.WHERE] = rec.NO_VOLUME, i
     if dydt.size == 0:

@@ -26,6 +26,7 @@ def wave_sum(probe, pipe, sign, index, y, out, tables):
     index : number of the pipe
     """
     at = tables.layout[0]["ends"] + 4 * index
+    # At an end the wave that enters is known from the node; an extrapolation of cells would miss it.
     if probe["side"] < 0:
         return out[at] + sign * out[at + 1]
     if probe["side"] > 0:
@@ -141,6 +142,7 @@ def update_envelope(t, r, l, at, low, high, index, tables):
     b, bad = at + r.size, 0
     if low > 0:
         bad += update_minima(t, r, l, e[0, at:b], e[1, at:b])
+        # A first pressure below vapour pressure is also a new minimum, so it is sought only here.
         if marks[index] != marks[index]:
             if count_below(r, l, profile[at:b]) > 0:
                 marks[index] = t
@@ -153,6 +155,7 @@ def update_envelope(t, r, l, at, low, high, index, tables):
 def record_pipe(t, r, l, pipe, index, tables):
     """Update the envelope of r + l of pipe number `index`; blocks of cells without a new extreme are only compared."""
     start, at, envelope = 0, pipe["cell"], tables.envelope
+    # Few blocks contain a new extreme; comparing is cheaper than updating.
     while start < r.size:
         stop = min(start + BLOCK, r.size)
         a, b = at + start, at + stop
@@ -220,6 +223,7 @@ def record_nodes(t, y, out, handle, values):
             marks[mark] = t
     for i in range(nodes.size):
         at = pipes.size + i
+        # The pressure of an isolated node is a convention, not a result.
         if has_codes and out[layout["isolated"] + i] > JOINED:
             last = marks.size - nodes.size + i
             if out[layout["isolated"] + i] == UNSUPPLIED:

@@ -89,6 +89,7 @@ def schedule_value(tables, index, t):
     From the end of the schedule segment on, a schedule of several pieces keeps its left limit at this end.
     """
     record = tables.schedules[index]
+    # The usual case, a single piece, needs neither a search nor a call.
     if record["pieces"] == 1:
         return piece_value(tables.pieces, record["first"], t)
     return piecewise_value(tables, index, t)

@@ -54,6 +54,7 @@ def flow_template(floats, at, setting, ahead, z, fall):
 
 def slopes_template(floats, at, setting, ahead, z, fall):
     """Derivatives [m2/s] of the flow by the fall at a constant higher level, and by this level at a constant fall."""
+    # A fall is never negative, so the difference is one-sided at equal levels.
     low, high = max(fall - CHANGE, 0.0), fall + CHANGE
     by_fall = FLOW(floats, at, setting, ahead, z, high)[0] - FLOW(floats, at, setting, ahead, z, low)[0]
     by_level = FLOW(floats, at, setting, ahead, z + CHANGE, fall)[0]
@@ -181,6 +182,7 @@ def step_template(out, tables, k, g, m, drop, denser, wide):
     """(a [kg/s], s [kg/s/Pa]) of the next Newton step dM = a + s d(drop); arguments as for `restriction_step`."""
     st, floats, at, setting = tables.settings[0], tables.floats, tables.valves[k]["data"], setting_of(tables, out, k)
     rho = st["rho"] * denser
+    # Both levels are known, so the flow is too, and Newton needs no slope.
     if not ends_at_junction(tables, k):
         ahead, z, fall = higher_level(tables, out, k, drop)
         flow = rho * FLOW(floats, at, setting, ahead, z, fall)[0]
