@@ -180,8 +180,10 @@ def factor(structure, jacobian, shift, factors):
         for p in range(starts[i], starts[i + 1]):
             row[places[p]] = -jacobian[entries[p]]
         own = row[4 * i : 4 * i + 4]
+        # A state without a partner has a second row without entries, which gets a pivot of 1.
         own[0] += shift
         own[3] += shift if order[2 * i] != order[2 * i + 1] else 1.0
+        # The size before elimination, against which cancellation shows.
         first = size_of(own[0] * own[3]) + size_of(own[1] * own[2])
         for p in range(l_starts[i], l_starts[i + 1]):
             k = l_columns[p]
@@ -196,6 +198,7 @@ def factor(structure, jacobian, shift, factors):
                 y2, y3 = y[2] - (l2 * u[0] + l3 * u[2]), y[3] - (l2 * u[1] + l3 * u[3])
                 y[0], y[1], y[2], y[3] = y0, y1, y2, y3
         a, b, c, d = own[0], own[1], own[2], own[3]
+        # The work row must be empty for the next row.
         clear(own)
         diagonal, cross = a * d, b * c
         det = diagonal - cross

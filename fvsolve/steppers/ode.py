@@ -316,6 +316,7 @@ def _python(t, y, dydt, key):
     try:
         _PYTHON[key](t, y, dydt)
     except BaseException as error:
+        # NaN ends the time loop; then the stored exception is raised.
         _EXCEPTIONS[key] = error
         dydt[:] = np.nan
 

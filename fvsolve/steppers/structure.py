@@ -219,6 +219,7 @@ def differences(evaluate, handle, r, t, y, f, ledger_rates, f_work):
                 y_work[j] = y[j] - ROOT * scale[j]
             else:
                 y_work[j] = y[j] + max((LEAST_ROOT if fine[j] == 1 else ROOT) * abs(y[j]), ROOT * scale[j])
+        # Columns of a colour share no row, so that one call gives the differences of all of them.
         evaluate(handle, r, t, y_work, f_work)
         for e in range(color_starts[color], color_starts[color + 1]):
             j = columns[e]
@@ -270,6 +271,7 @@ def bad_row(structure, jacobian):
     """
     n = structure[SIZE]
     last, rows, good = structure[structure[STARTS] + n], structure[structure[ROWS] :], True
+    # Without a branch this loop is vectorised; the row is sought only if an entry is bad.
     for p in range(last):
         good &= abs(jacobian[p]) < 1.0 / LEAST_PIVOT
     if not good:

@@ -55,6 +55,7 @@ def set_segment_drives(t, y, dydt, out, handle):
     segments, at, last = tables.moving_segments, tables.layout[0]["moving_segment"], -1
     for k in range(segments.size):
         segment = segments[k]
+        # Segments of a body follow each other, so that its motion is set once for them.
         if segment["body"] != last:
             last = segment["body"]
             fluid.set_body_motion(tables, out, last, layout.BIAS, layout.SPIN_BIAS)
@@ -85,6 +86,7 @@ def tank_drives(tables, out, i, level):
     """
     segment = tables.moving_segments[tables.nodes[i]["moving_segment"]]
     drive = bottom_pressure_per_density(tables, out, segment, level)
+    # The pressure must rise with depth at the surface, or the fluid would leave it.
     if not bottom_pressure_per_density(tables, out, segment, level + THIN_LAYER) > drive:
         out[STATUS], out[WHERE] = NO_WEIGHT, tables.basins.size + i
     return drive, segment["rest"]
@@ -224,6 +226,7 @@ def accelerate_network_flow(t, y, dydt, out, handle):
     pipes, columns = tables.pipes, tables.columns
     if dydt.size == 0 or tables.freedoms.size == 0:
         return
+    # Before the rates of flow change, with which these loads were added.
     fluid.add_all_fluid_loads(y, dydt, out, tables, JOINT_LOAD_READ, -1.0, layout.BIAS, layout.SPIN_BIAS)
     for k in range(pipes.size):
         if fluid.free_carrier(tables, pipes[k]["moving_segment"]) >= 0:
