@@ -48,6 +48,7 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
     v = v_in - change
     if (still and v >= 0.0) or 2.0 * v * side[1] > side[3]:
         return side, v, -rise
+    # A part of the enthalpy of the node is kinetic energy at the end, so its pressure is not above p_node.
     slope, rho, low, high = 1.0, 1.0, floor, p_node
     for _ in range(60):
         p, rho = side[0], st["rho"] / relative_volume(st, side[0])[0]
@@ -60,6 +61,7 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
         if abs(step) <= 1e-15 * abs(p) + 1e-12 * (p - floor):
             break
         p -= step
+        # The gas pressure may change by orders of magnitude, so bounds are halved in its logarithm.
         side = state_at(st, floats, pipe, p if low < p < high else intermediate_pressure(floor, low, high, side[0]))
         change, rise = wave_jump(st, floats, pipe, inside, side)
         v = v_in - change
@@ -192,6 +194,7 @@ def solve_nodes_cavitating(t, y, dydt, out, handle):
         reset_bounds(tables, low, high, sweep == 1)
         end_inflows_cavitating(out, tables, space[0], False)
         for i in range(n):
+            # Newton's step starts here; `bound_steps` compares its end with these pressures.
             last_pressure[i] = out[pressure + i]
         step_clusters(sweep, out, tables, space)
         bound_steps(sweep, out, tables, last_pressure, low, high)

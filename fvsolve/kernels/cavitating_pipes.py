@@ -33,6 +33,7 @@ def cell_state(st, floats, profile, pipe, i, r, l):
     m, dry = m0 + (r[i] + l[i]) / pipe["speed"], DRY * st["rho"] * pipe["area"]
     p0, v0 = pressure_of_mass(st, floats, pipe, m0), flow / m0
     v = (flow + (r[i] - l[i])) / m
+    # Below DRY the velocity falls linearly to zero with the content, so that the quotient stays bounded.
     if m < dry:
         v, m = (flow + (r[i] - l[i])) * max(m, 0.0) / (dry * dry), dry
     return pressure_of_mass(st, floats, pipe, m), v, p0, v0
@@ -105,6 +106,7 @@ def end_states(st, floats, profile, pipe, r, l, ends, scratch):
     ends : float64[4]  receives pressure and velocity at the `from` end, then at the `to` end [Pa, m/s]
     """
     n = r.size
+    # The limiter and the extrapolation at an end need three cells; the others are not evaluated.
     n_near = min(n, 3)
     p, v, dp, dv = scratch[: n_near + 2], scratch[5 : n_near + 7], scratch[10 : n_near + 12], scratch[15 : n_near + 17]
     for side in range(2):

@@ -212,6 +212,7 @@ def solve_junctions(tables, out, n):
     # Without a reference only differences of pressures are determined: the matrix would be singular.
     for r in range(n):
         if pinned[r] > 0.0:
+            # The row becomes the identity, so that the held value stays as it is.
             matrix[n * r : n * r + n] = 0.0
             matrix[n * r + r] = 1.0
     if solve_dense(matrix, right, n) == 0.0:

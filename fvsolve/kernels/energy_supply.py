@@ -94,6 +94,7 @@ def watch_state(t, steps, y, ledger, handle, watch, begins):
             data[least + k] = value
         if value > data[greatest + k]:
             data[greatest + k] = value
+        # The value of a source that is no node is a power, so that its amount is the time.
         net, gross = t - data[T], t - data[T]
         if node >= 0:
             came = ledger[node] + ledger[2 * width + node] - data[entered + node]
@@ -110,6 +111,7 @@ def watch_state(t, steps, y, ledger, handle, watch, begins):
         data[left + i] = ledger[width + i] + ledger[3 * width + i]
     data[T] = t
     data[STATES] += 1.0
+    # After a jump only the values are renewed; nothing has been supplied meanwhile.
     if begins:
         return data[NEXT]
     released = 0.0

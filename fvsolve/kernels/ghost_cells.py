@@ -186,6 +186,7 @@ def end_value(c, right, family, degree, limiter, small, scratch):
         for k in range(d + 1):
             total += END_VALUE[d, k] * edge[k]
         return total
+    # A single cell has no slope.
     if n == 1:
         return edge[0]
     leaving_ghosts(edge, n, family, degree, limiter, small, ghosts)

@@ -99,6 +99,7 @@ def find_connected(cluster, tables, c, g, connected, group):
             if (i < 0) != (j < 0) and valve["one_way"] == BOTH_WAYS:
                 connected[root_of(group, max(i, j))] = 1.0
             outward = outward or valve["one_way"] != BOTH_WAYS
+    # Last, because outward valves only matter for groups that nothing else connects.
     if outward:
         connect_outward(cluster, tables, c, g, connected, group)
     for i in range(connected.size):

@@ -158,6 +158,7 @@ def piston_chambers(t, y, dydt, out, handle):
             p, stiffness = chamber_state(tables, nodes[i], nodes[i]["volume"] + area * x, excess)
             out[layout["pressure"] + i] = p
             out[layout["stiffness"] + nodes[i]["row"]] = stiffness
+            # Between points of bodies the state is the mass itself, which a piston does not change.
             out[layout["swept"] + nodes[i]["row"]] = sweep * speed if piston["line"] < 0 else 0.0
         # After the swept flows of both sides are written, because the leak is added to them.
         if piston["leakage"] > 0.0:
@@ -239,6 +240,7 @@ def push_stiffness(out, tables, k):
             return stops[k]["stiffness"], stops[k]["damping"]
         return 0.0, 0.0
     piston, stiffness, nodes = pistons[k - stops.size], tables.layout[0]["stiffness"], tables.nodes
+    # A chamber acts as a spring: its pressure rises by the swept mass, and pushes on the area.
     stiff_a, stiff_b = out[stiffness + nodes[piston["a"]]["row"]], out[stiffness + nodes[piston["b"]]["row"]]
     stiff = piston["area_a"] * stiff_a * piston["sweep_a"] - piston["area_b"] * stiff_b * piston["sweep_b"]
     return stiff, piston["damping"]
@@ -263,6 +265,7 @@ def mechanical_rate(out, tables):
         )
     rate = 0.0
     for i in range(masses.size):
+        # A mass without states does not move, so that it limits nothing.
         if masses[i]["y"] >= 0:
             brake = 0.5 * work[2 * i + 1]
             rate = max(rate, brake + sqrt(brake * brake + work[2 * i]))

@@ -48,6 +48,7 @@ def power_masses(t, y, dydt, out, tables, power, at):
         brace = braces[k]
         speed = travel_of(out, tables, k)[1]
         power[at] = out[layout["push"] + k] * speed
+        # The entry of a spring or damper is the absorbed power, that of a given force the supplied power.
         if brace["schedule"] < 0:
             power[at] = -power[at]
         at += BRACE

@@ -102,6 +102,7 @@ def solve_dense(a, b, n):
             b[i], b[pivot] = b[pivot], b[i]
         for k in range(i + 1, n):
             f = a[n * k + i] / a[row + i]
+            # Nodes have few neighbours, so that most factors are zero.
             if f != 0.0:
                 for m in range(i, n):
                     a[n * k + m] -= f * a[row + m]
@@ -253,6 +254,7 @@ def add_couplings(cluster, tables, out, matrix, right, sparse):
         i, j = inner_row(nodes, link["from_node"]), inner_row(nodes, link["to_node"])
         p, q = out[layout["pressure"] + link["from_node"]], out[layout["pressure"] + link["to_node"]]
         places = places_of(cluster, tables, cluster["valves"] + k, i, j, sparse)
+        # The flow is linear in the pressures, so that its Newton step is exact (a = 0).
         add_valve(i, j, places, g * (p - q), 0.0, g, 0.0, matrix, right)
 
 
@@ -374,6 +376,7 @@ def _assemble(cluster, tables, out, g, m, c, connected, slope, wide, work, spars
         # The values of a closed valve: the step takes away its whole flow.
         a[e], s[e], lift[e] = -m[e], 0.0, 0.0
         if sparse and g[e] > 0.0 and is_held(tables, out, k):
+            # The flow of a valve that holds a pressure follows from the balance of its node, after the solution.
             a[e] = 0.0
             if integers[valves[k]["hold"]] == FLOW_HELD:
                 a[e], s[e] = out[tables.layout[0]["drive"] + k] - m[e], LOOSE * sqrt(g[e])
@@ -499,6 +502,7 @@ def apply_step(cluster, tables, out, m, a, s, lift, right):
         # A valve that is nearly at rest is compared with its flow at 1 Pa, not with its own.
         scale = max(scale, abs(m[e]), sqrt(valve["conductance"]))
         p = nodes[valve["from_node"]]["pressure"] + out[layout["pressure"] + valve["from_node"]]
+        # A steep law turns the rounding of pressures into changes of flow.
         rounding = s[e] * ROUNDING * (BAR + abs(p))
         change, rounded = max(change, max(abs(step), abs(a[e])) - rounding), max(rounded, rounding)
     relative = change / scale
@@ -790,6 +794,7 @@ def is_undisturbed(cluster, tables, out):
     """True if pipes bring exactly their initial steady flow into every node of a cluster."""
     for i in range(cluster["nodes"]):
         node = tables.integers[cluster["first_node"] + i]
+        # Exact: a steady state must stay steady to the bit, and any change has to be solved.
         if out[tables.layout[0]["net"] + node] != 0.0:
             return False
     return True
@@ -808,6 +813,7 @@ def step_clusters(sweep, out, tables, space):
     for k in range(clusters.size):
         cluster = clusters[k]
         i, j = a + cluster["nodes"], b + cluster["valves"]
+        # The flows from pipe ends were not known when the cluster was marked as unchanged.
         if sweep == 1 and done[k] == 1.0:
             if is_undisturbed(cluster, tables, out):
                 change[k] = 0.0
@@ -929,6 +935,7 @@ def solve_cluster(out, tables, index):
     zero_isolated(cluster, tables, g, m, connected)
     change, flows, wide, limits, out[FIRM] = 1e300, 0.0, True, group[:0], 0.0
     for sweep in range(MAX_SWEEPS + LIMITED_SWEEPS):
+        # Nothing has changed, so the profile is the solution, to the bit.
         if undisturbed:
             change = 0.0
             break

@@ -191,6 +191,7 @@ def record_unsupplied(t, out, tables, i):
     marks, layout, first = tables.marks, tables.layout[0], marks_of_islands(tables)
     at = first + tables.valves.size + i
     marks[at + tables.nodes.size] = t
+    # Only valves that are shut at the first time are the cause.
     if marks[at] == marks[at]:
         return
     marks[at] = t
@@ -234,6 +235,7 @@ def record_nodes(t, y, out, handle, values):
         if lowest < nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:
             marks[at] = t
         if nodes[i]["kind"] == rec.TANK and abs(out[layout["supply"] + i]) > SUPPLY_ROUNDING * mass_per_metre(nodes[i]):
+            # A positive supply holds a dry tank at its bottom, a negative one is the spill of a full tank.
             at += nodes.size if out[layout["supply"] + i] > 0.0 else 2 * nodes.size
             if marks[at] != marks[at]:
                 marks[at] = t

@@ -172,6 +172,7 @@ def pipe_power_barotropic(t, y, dydt, out, tables, k, rows):
             h += st["gravity"] * (z + rise_at(profile, pipe, (i + 0.5 + GAUSS_POINTS[g]) * dx))
             force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], reynolds, flow)
             friction += GAUSS_WEIGHTS[g] * v * force * (reference / m)
+            # Derivative of M^2 / (2 m) + W(m) + m g z: h + g z - v^2 / 2 per dm/dt, and v per dM/dt.
             rate += GAUSS_WEIGHTS[g] * ((h - 0.5 * v * v) * (da + db) / c + v * (da - db))
     rows[1], rows[2], rows[3] = dx * friction, jet_losses(out, tables, k), dx * rate
 

@@ -91,6 +91,7 @@ def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
 @njit
 def rates_from_faces(k, fr, fl, dr, dl):
     """Write d/dt of forward and backward wave (dr, dl) without friction, from their face values fr and fl."""
+    # A cell gains what its neighbour loses through a face, so that mass and momentum are conserved.
     for i in range(dr.size):
         dr[i] = -k * (fr[i + 1] - fr[i])
         dl[i] = k * (fl[i + 1] - fl[i])
@@ -280,6 +281,7 @@ def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
             return
         rates_upwind(k, 0.0, 0.0, 0.0, r, l, r_in, l_in, dr, dl)
     elif settings["scheme"] == LINEAR and n >= 5:
+        # A linear scheme needs no face values: its weights give the differences of fluxes.
         for backward in range(2):
             c, datum, d = (l, l_in, dl) if backward == 1 else (r, r_in, dr)
             rates_linear(settings, k, backward, c, datum, scratch[:5], d)

@@ -238,6 +238,7 @@ def _relaxation_power(st, floats, profile, pipe, w, y, dydt):
     n, width, taken, rate = w.size, polynomial_width(st, w.size), 0.0, 0.0
     for k in range(pipe[COUNT]):
         gain, at = floats[pipe[TERMS] + 2 * k], pipe[VARIABLES] + k * n
+        # A variable stores g z^2 / (2 n), which changes at the rate (g / n) z dz/dt.
         share = gain / floats[pipe[TERMS] + 2 * k + 1]
         z, dz = y[at : at + n], dydt[at : at + n]
         for i in range(n):
@@ -266,6 +267,7 @@ def friction_energy(st, floats, profile, pipe, y):
             start = steady_flow(st, profile, pipe, i)
             for g in range(3):
                 z = at_point(y[at : at + n], width, i, g)
+                # A product of change and sum: no difference of large squares.
                 total += GAUSS_WEIGHTS[g] * share * z * (2.0 * start + z)
     return 0.5 * total * pipe["dx"] / (st["rho"] * pipe["area"])
 

@@ -357,6 +357,7 @@ def is_sensing(tables, k):
 @njit
 def has_lifted_backflow(tables, k, m):
     """True if the upstream pressure lifts restriction k and its flow m [kg/s] is negative."""
+    # A structure between two levels has no event flags, and may flow backwards.
     return m < 0.0 and tables.valves[k]["event"] >= 0 and is_lifted(tables, k)
 
 

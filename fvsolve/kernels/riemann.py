@@ -195,10 +195,12 @@ def face_flux(st, floats, pipe, p_l, v_l, p_r, v_r):
     """
     left, right = state_at(st, floats, pipe, p_l), state_at(st, floats, pipe, p_r)
     middle, after, ahead = star_state(st, floats, pipe, left, v_l, right, v_r)
+    # Both velocities agree but for the error of Newton, except at a vacuum.
     m, v, force = middle[1], 0.5 * (after + ahead), middle[2]
     if after >= 0.0 and v >= 0.0:
         m, v, force = sample_wave(st, floats, pipe, left, v_l, middle, after)
     elif ahead <= 0.0 and v <= 0.0:
         m, v, force = sample_wave(st, floats, pipe, right, -v_r, middle, -ahead)
+        # The right wave was sampled as its mirror image, a wave to the left.
         v = -v
     return m * v, m * v * v + force

@@ -107,6 +107,7 @@ def find_control_end(tables, out, k):
 def find_controlled_columns(tables, out):
     """Write for each rigid column the end at which valves control its flow to `out`: results of `find_control_end`."""
     at, n = tables.layout[0]["valve_controlled"], tables.columns.size
+    # Cleared first, because `has_pressure_reference` reads the results of all columns.
     out[at : at + n] = 0.0
     for k in range(n):
         out[at + k] = find_control_end(tables, out, k)

@@ -383,6 +383,7 @@ def exchange_amounts(t, y, dydt, out, tables, q):
             node = pipes[p]["to_node"] if right == 1 else pipes[p]["from_node"]
             flow = end_flow(out, tables, p, right)
             cell = cell_value(y, tables, q, p, end_cell(tables, p, right, 0))
+            # Upwind: flow out of the pipe carries the value at its end, flow into it that of the node.
             through = flow * (out[layout["edge"] + at] if sign * flow > 0.0 else out[value + node])
             through += sign * end_conductance(y, tables, q, p, right) * (cell - out[value + node])
             out[layout["carried"] + at] = through
@@ -516,6 +517,7 @@ def pipe_scalar_rates(y, dydt, out, tables, p):
         scratch[4 * n + 1 : 5 * n + 2],
     )  # fmt: skip
     cell_masses(base, 1.0 / pipe["speed"], r, l, m)
+    # The flows of the solved nodes, by which scalars at nodes are balanced too.
     first, last = end_flow(out, tables, p, 0), end_flow(out, tables, p, 1)
     face_flows(first, last, dx / pipe["speed"], dydt[o : o + n], dydt[o + n : o + 2 * n], flow)
     least, most = extremes(m, flow)

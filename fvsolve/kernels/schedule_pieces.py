@@ -40,6 +40,7 @@ def piece_value(pieces, row, t):
     if pieces[row, 1] == POLYNOMIAL:
         return pieces[row, 3] + s * (pieces[row, 4] + s * (pieces[row, 5] + s * pieces[row, 6]))
     if pieces[row, 1] == POWER:
+        # Beyond its duration the piece keeps its end value; a power of a negative number does not exist.
         rest = min(max(1.0 - s / pieces[row, 5], 0.0), 1.0)
         return pieces[row, 4] + (pieces[row, 3] - pieces[row, 4]) * rest ** pieces[row, 6]
     value = pieces[row, 3] + pieces[row, 4] * sin(pieces[row, 5] * s + pieces[row, 6])

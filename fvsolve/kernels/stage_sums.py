@@ -62,6 +62,7 @@ def combine(begin, end, y, h, weights, count, k, out):
         for i in range(out.size):
             out[i] = base[i] + c0 * k0[i]
     elif not copied:
+        # All weights are zero, so the sum is the state itself.
         copy(y, out)
 
 

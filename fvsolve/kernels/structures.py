@@ -81,10 +81,12 @@ def chord_template(floats, at, setting, ahead, z, fall, flow, present, by_level)
     sought = max(present, 0.0) if by_level else abs(present)
     begin, reach, x = z if by_level else fall, max(fall, LINEAR_FALL), 0.0
     low, high, found = begin if by_level else 0.0, begin, flow
+    # The law gives more than the present flow, so a level with this flow lies below.
     while by_level and found > sought and reach < FARTHEST:
         low, reach = low - reach, 2.0 * reach
         found = FLOW(floats, at, setting, ahead, low, fall)[0]
     found = flow
+    # The law gives less than the present flow, so it is sought above.
     while found < sought and reach < FARTHEST:
         low, high, reach = high, high + reach, 2.0 * reach
         found = FLOW(floats, at, setting, ahead, high if by_level else z, fall if by_level else high)[0]

@@ -66,6 +66,7 @@ def viscous_friction(t, y, dydt, out, handle):
             for sign in (-1.0, 1.0):
                 excess += drag(kind, loss, rough, roughness, now, flow + sign * d)
                 excess -= drag(kind, loss, rough, roughness, before, flow + sign * d)
+            # A quarter: half of the friction for each wave, as the mean of two points.
             excess *= 0.25
             if st["law"] != LAW_LINEAR:
                 mass = tables.profile[pipe["center"] + i] + (y[o + i] + y[o + n + i]) / pipe["speed"]

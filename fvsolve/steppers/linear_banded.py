@@ -26,6 +26,7 @@ def prepare(pattern) -> tuple[np.ndarray, int]:
     """
     n = pattern.shape[1]
     order, below, above = band(pattern)
+    # Row exchanges widen U to both bandwidths together; rows end with a whole chunk.
     width = below + 1 + CHUNK * -(-(below + above) // CHUNK)
     size = n * width + n * below + 2 * n + 2
     rows, columns = entries(pattern)

@@ -92,6 +92,7 @@ def fill(n: int, starts, columns) -> tuple[np.ndarray, np.ndarray, np.ndarray, n
     """
     starts, columns = np.asarray(starts, dtype=np.int64), np.asarray(columns, dtype=np.int64)
     capacity = 4 * columns.size + 16
+    # The number of entries that fill in is not known before.
     while True:
         l_starts, u_starts, chain = (np.zeros(n + 1, dtype=np.int64) for _ in range(3))
         l_columns, u_columns = np.empty(capacity, dtype=np.int64), np.empty(capacity, dtype=np.int64)
@@ -124,6 +125,7 @@ def eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
             last = k
             for p in range(u_starts[k], u_starts[k + 1]):
                 j = u_columns[p]
+                # Both rows have rising columns, so that a single pass merges them.
                 while chain[last] < j:
                     last = chain[last]
                 if chain[last] != j:

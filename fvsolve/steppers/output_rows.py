@@ -84,6 +84,7 @@ def limit_ratio(states, row, y_old, y, out):
     found = per_amount(out[states[0]], total, row[LEAST])
     limited = min(max(found, min(first, last)), max(first, last))
     if limited != found:
+        # The ratio of `per_amount`, solved for the state.
         wide = max(total, row[LEAST])
         out[states[0]] = limited * (total * total + wide * wide) / (2.0 * total) if total > 0.0 else 0.0
 

@@ -157,11 +157,13 @@ def column_colors(pattern) -> np.ndarray:
     """
     rows, n = pattern.shape
     result = np.full(n, -1, dtype=np.int64)
+    # In a full pattern all columns share all rows.
     if pattern.indptr[-1] == rows * n:
         return np.arange(n, dtype=np.int64)
     by_rows = pattern.tocsr()
     per_row = np.diff(by_rows.indptr)
     degree = np.add.reduceat(np.append(per_row[pattern.indices], 0), pattern.indptr[:-1])
+    # For an empty column `reduceat` returns the entry of the next one instead of 0.
     degree[np.diff(pattern.indptr) == 0] = 0
     order = np.argsort(-degree, kind="stable")
     tables = (pattern.indptr, pattern.indices, by_rows.indptr, by_rows.indices, order)

@@ -450,6 +450,7 @@ def take_fused_steps(handle, r, h):
         t_new = state["t_mark"] + (state["n_mark"] + 1.0) * h
         run_handle.call_fused_step(address, t_new, h, r.y[now], r.y[new], out, handle, r.values)
         accept(handle, r, h, False, NEVER)
+        # Only these values change the length of the next step.
         same = out[rec.RATE] == rate and out[rec.CLOSING_RATE] == closing and out[rec.JUMP_TIME] == jump
         due_soon = due <= state["t_mark"] + (state["n_mark"] + 1.0) * h
         if not same or due_soon or h >= (control["end"] - t_new) * full or check_state(r) != rec.DONE:

@@ -299,6 +299,7 @@ def kinematics(t, y, dydt, out, handle):
         write_vector(own, layout.VELOCITY, *plus(vector(own, layout.VELOCITY_AT_O), turning))
         write_vector(own, layout.BIAS, *origin_acceleration(own, layout.BIAS_AT_O, layout.SPIN_BIAS))
         weight = -body["mass"] * gravity
+        # The weight acts at the centre of mass, so that it has a torque about the origin.
         x, y0, z = rotate(own, layout.ATTITUDE, body["centre"], 0)
         write_vector(own, layout.FORCE, 0.0, 0.0, weight)
         write_vector(own, layout.TORQUE, y0 * weight, -x * weight, 0.0)

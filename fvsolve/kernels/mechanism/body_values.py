@@ -105,6 +105,7 @@ def joint_load(out, tables, i):
         turn = inertia_product(body["inertia"], out, here + layout.ATTITUDE, *vector(out, here + layout.SPIN_RATE))
         turn = plus(turn, cross(out, here + layout.SPIN, *angular_momentum(body, out, here)))
         turn = minus(plus(turn, vector_product(plus(centre, offset), push)), vector(out, here + layout.TORQUE))
+        # The joint supplies what the other loads on the bodies do not.
         force = minus(plus(force, push), applied)
         torque = plus(torque, minus(turn, vector_product(offset, applied)))
         for k in range(tables.basins.size):

@@ -183,6 +183,7 @@ def bushing_rate_limit(t, y, dydt, out, handle):
         bushing = bushings[k]
         i, j = body_of_point(tables, bushing["from_point"]), body_of_point(tables, bushing["to_point"])
         p = bushing_motion(out, tables, bushing)[2]
+        # Three directions of displacement, then three axes of rotation, each with its own stiffness.
         for axis in range(6):
             along = 1.0 * (axis % 3 == 0), 1.0 * (axis % 3 == 1), 1.0 * (axis % 3 == 2)
             mass.clear_column(tables, at)

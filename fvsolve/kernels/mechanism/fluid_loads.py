@@ -404,6 +404,7 @@ def add_segment_inertia(out, tables, i, segment):
         v, a = freedom_velocity(work, 6 * j, start), cross(work, 6 * j, *along)
         first, second = plus(scaled(m[0], v), scaled(m[1], a)), plus(scaled(m[1], v), scaled(m[2], a))
         row = 8 * tables.freedoms.size + tables.freedoms[j]["row"]
+        # M is symmetric: row j has only the degrees of freedom from the root to j.
         for q in range(p + 1):
             s = 6 * tables.integers[path + q]
             v, a = freedom_velocity(work, s, start), cross(work, s, *along)

@@ -154,6 +154,7 @@ def add_cell_drives(t, y, dydt, out, handle):
     for i in range(pipes.size if dydt.size > 0 else 0):
         pipe = pipes[i]
         n, o, first = pipe["cells"], pipe["y"], pipe["moving_segment"]
+        # Half for each wave, with opposite signs: the drive changes M = r - l and not m.
         half = 0.5 * pipe["area"] * rho / pipe["dx"]
         for k in range(n if first >= 0 else 0):
             push = half * out[at + first + k]
@@ -209,6 +210,7 @@ def accelerate_pipe_flow(y, dydt, out, tables, k):
     push = 0.5 * length / n / pipe["dx"] * acceleration
     linear = tables.settings[0]["law"] == LAW_LINEAR
     for i in range(n):
+        # Under `linear` the mass that waves add does not slide, as in `fluid_loads.add_pipe_inertia`.
         m = fluid.mass_per_length(tables, pipe, i) + (0.0 if linear else (y[o + i] + y[o + n + i]) / pipe["speed"])
         dydt[o + i] -= m * push
         dydt[o + n + i] += m * push

@@ -55,6 +55,7 @@ def joint_columns(body, own, s):
     if kind == FREE:
         for k in range(18):
             s[k] = 0.0
+        # For a free body o is its centre of mass, so that these columns are unit vectors of the world.
         s[3] = s[10] = s[17] = 1.0
         first = 18
     if kind == REVOLUTE or kind == PRISMATIC:
@@ -89,6 +90,7 @@ def inertia_about_o(body, own, result):
     ax, ay, az = inertia_row(own, r, inertia)
     bx, by, bz = inertia_row(own, r + 3, inertia)
     cx, cy, cz = inertia_row(own, r + 6, inertia)
+    # Steiner's theorem: the moments of a point mass at the centre are added to those about it.
     result[4] = ax * own[r] + ay * own[r + 1] + az * own[r + 2] + m * (gy * gy + gz * gz)
     result[5] = bx * own[r + 3] + by * own[r + 4] + bz * own[r + 5] + m * (gx * gx + gz * gz)
     result[6] = cx * own[r + 6] + cy * own[r + 7] + cz * own[r + 8] + m * (gx * gx + gy * gy)
