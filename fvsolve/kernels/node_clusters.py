@@ -387,7 +387,7 @@ def _assemble(cluster, tables, out, g, m, c, connected, slope, wide, work, spars
         upstream = lift[e]
         if senses and upstream != 0.0 and is_sensing(tables, k):
             add_sensed(cluster, tables, k, i, j, upstream, n, matrix)
-            # The sensed pressures have received this lift, so that at the valve itself must not count too.
+            # The lift follows the sensed pressures, to which it has been added, and not the upstream pressure.
             upstream = 0.0
         add_valve(i, j, places_of(cluster, tables, e, i, j, sparse), m[e], a[e], s[e], upstream, matrix, right)
     add_couplings(cluster, tables, out, matrix, right, sparse)
@@ -542,7 +542,7 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, limits, 
     imbalance, sign = largest_magnitude(right) if BAROTROPIC else 0.0, 0.0
     if sparse:
         sign = solve_in_order(matrix, right, n, tables.integers, cluster["order"])
-        # The elimination in order has no pivoting; with it the equations may have a solution.
+        # The elimination in order has no pivoting; with pivoting the equations may have a solution.
         if sign == 0.0 and full:
             ASSEMBLE(cluster, tables, out, g, m, c, connected, slope, wide, work, False)
     if sign == 0.0 and full:

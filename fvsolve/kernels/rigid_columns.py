@@ -127,8 +127,8 @@ def stationary_pressure(y, tables, out, k, end, solved):
     """
     column = tables.columns[k]
     p, softness = junctions.far_end_pressure(y, tables, out, k, end, solved)
-    # At rest there is no friction: the pressure loss of the profile is added back.
     inertia = column["length"] / column["area"]
+    # At rest there is no friction: the pressure loss of the profile is added back.
     return p + end * (junctions.driving_offset(tables, out, column) + column["drag"] * inertia), inertia + softness
 
 
@@ -145,7 +145,6 @@ def lift_drop(drop, still, slope, heavy):
     if drop <= 0.0 or still == 0.0:
         return drop, still
     r, speed = sqrt(drop), still
-    # The start must lie above the greatest root.
     while r * r - drop + heavy * r * (still + slope * (r * r - drop)) < 0.0:
         r *= 2.0
     for _ in range(100):
