@@ -100,6 +100,7 @@ def barrier(joint):
     board, count = joint[BOARD], joint[BAND_COUNT]
     joint[TURNS] += 1
     turn = joint[TURNS]
+    # Release and acquire order the data: who sees the counter also sees what was written before it.
     store_release(board + 8 * LINE * joint[BAND], turn)
     for k in range(count):
         polls = 0
@@ -124,8 +125,10 @@ def get_runs(joint, content, values):
     if content == SEND_FLOWS:
         first, count = HEAD + 3 * joint[STATES], joint[FLOWS]
     place = joint[BOARD] + 8 * SHARED_ADDRESS
+    # Each band uses rows of its own arrays in turn, so the address is given for every exchange.
     store_release(place + 8 * LINE * joint[BAND], address_of(values))
     barrier(joint)
+    # All bands have written their data and addresses.
     for r in range(count):
         at = first + 3 * r
         owner, begin, stop = joint[at], joint[at + 1], joint[at + 2]
@@ -133,6 +136,7 @@ def get_runs(joint, content, values):
         ours = values[begin:stop]
         for i in range(ours.size):
             ours[i] = theirs[i]
+    # No band may overwrite its values while another band still reads them.
     barrier(joint)
 
 
@@ -157,6 +161,7 @@ def reduce_rate(t, y, dydt, out, handle):
     if joint[PROCESS_CALL] != 0:
         call_processes(joint[PROCESS_CALL], SEND_RATES, address_of(out), 1)
         return
+    # Two columns in turn: a quick band may write its next rate while a slow one reads the last.
     count, column = joint[BAND_COUNT], SHARED_RATES + joint[TURNS] % 2
     rates = floats_at(joint[BOARD], LINE * count)
     rates[LINE * joint[BAND] + column] = out[RATE]
@@ -181,6 +186,7 @@ def gather_sums(sums, spans, handle):
     if joint[PROCESS_CALL] != 0:
         call_processes(joint[PROCESS_CALL], SEND_SUMS, address_of(sums), sums.size)
         return
+    # Two halves in turn, so that no second barrier is needed after reading.
     buffer = floats_at(joint[SUM_BUFFER] + 8 * sums.size * (joint[TURNS] % 2), sums.size)
     for m in range(joint[COMMON_SPANS] if joint[BAND] > 0 else 0, spans.shape[0]):
         for r in range(spans[m, 2], spans[m, 2] + spans[m, 3]):

@@ -43,10 +43,12 @@ def known_pressures_barotropic(t, y, dydt, out, handle):
             out[at] = p - node["pressure"]
         elif kind == TANK:
             level = tank_level(node, floats, node["density"], y[node["y"]])
+            # Both pressures follow from the same function, so an undisturbed tank has a change of exactly zero.
             out[at] = head_pressure(st, floats, level) - head_pressure(st, floats, node["level"])
         elif kind == CHAMBER:
             mass = node["mass"] + y[node["y"]]
             p = law.pressure_of_log(st, floats, 0.0, np.log(mass / (st["rho"] * node["volume"])))
+            # The pressure of the profile by the same function: an undisturbed chamber has a change of exactly zero.
             q0 = np.log(node["mass"] / (st["rho"] * node["volume"]))
             out[at] = p - law.pressure_of_log(st, floats, 0.0, q0)
             if node["row"] >= 0:
@@ -72,10 +74,12 @@ def end_flow(st, floats, pipe, m_inside, into_inside, p_node, still):
     m, dm = law.mass_of_pressure(st, floats, pipe, p)
     v = v_inside - law.velocity_change(st, floats, pipe, p_inside, p)
     slope = v * dm - m / law.impedance(st, floats, pipe, p)
+    # The jet loses its v^2 / 2, so the end has the pressure of the node and nothing is iterated.
     if still and v >= 0.0:
         return m * v, slope, m
     rise = 1.0
     for _ in range(30):
+        # Derivative of h + v^2 / 2: dh = dp / rho, and dv = -dp / (rho c) along the wave.
         rise = 1.0 / law.density(st, floats, p) - v / law.impedance(st, floats, pipe, p)
         step = (law.enthalpy(st, floats, p) + 0.5 * v * v - target) / rise
         p -= step
@@ -84,6 +88,7 @@ def end_flow(st, floats, pipe, m_inside, into_inside, p_node, still):
         if abs(step) <= 1e-15 * abs(p) + 1e-12:
             break
     slope = v * dm - m / law.impedance(st, floats, pipe, p)
+    # By the chain rule: h(p_node) changes by dp_node / rho(p_node), h(p) + v^2 / 2 by `rise` dp.
     return m * v, slope / (rise * law.density(st, floats, p_node)), m
 
 
@@ -121,6 +126,7 @@ def write_end_waves(out, tables, k, side, into, m):
     side : 0 for the `from` end, 1 for the `to` end
     """
     pipe, at = tables.pipes[k], tables.layout[0]["ends"] + 4 * k + 2 * side
+    # A flow into the node runs along the pipe at its `to` end, against it at its `from` end.
     change = (2.0 * side - 1.0) * (into - (pipe["to_base"] if side == 1 else pipe["from_base"]))
     dm = pipe["speed"] * (m - (pipe["to_mass"] if side == 1 else pipe["from_mass"]))
     out[at] = 0.5 * (dm + change)
@@ -175,6 +181,7 @@ def given_flows(t, y, out, tables):
     """
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     junction_flows(t, out, tables)
+    # Newton starts from the profile, so that its result depends on (t, y) alone.
     for i in range(nodes.size):
         if nodes[i]["kind"] == JUNCTION:
             out[layout["pressure"] + i] = 0.0
@@ -202,4 +209,5 @@ def solve_nodes_barotropic(t, y, dydt, out, handle):
         if not clusters.check_clusters(out, tables, space):
             break
     clusters.write_clusters(out, tables, space)
+    # Once more at the solved pressures, now with the waves that the cells read.
     end_inflows_barotropic(out, tables, space[0], True)

@@ -52,23 +52,28 @@ def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
     for i in range(n + 1):
         dm, dflow = (fr[i] + fl[i]) / c, fr[i] - fl[i]
         m, total = profile[face + i] + dm, flow + dflow
+        # Without the flux of the profile, so that rounding does not disturb a steady state.
         flux = momentum_flux(st, floats, pipe, m, total) - profile[pipe["flux"] + i]
         least, greatest, quickest = min(least, m), max(greatest, m), max(quickest, abs(total))
         if i > 0:
             k = i - 1
             m0 = profile[cell + k]
             dm_cell, m_flow = (r[k] + l[k]) / c, flow + (r[k] - l[k])
+            # Friction at two Gauss points of the cell, as in `pipes.subtract_friction`.
             a, b = GAUSS * (dflow - left_flow), GAUSS * (dm - left_mass)
             friction = wall_force(pipe, reference, m0 + dm_cell + b, m_flow + a)
             friction += wall_force(pipe, reference, m0 + dm_cell - b, m_flow - a)
+            # The profile balances the weight of its own mass.
             force = -weight * dm_cell - (0.5 * friction - pipe["drag"] * (reference / m0))
             mass_rate = -(dflow - left_flow) / dx
             flow_rate = -(flux - left_flux) / dx + force
             dr[k] = 0.5 * (c * mass_rate + flow_rate)
             dl[k] = 0.5 * (c * mass_rate - flow_rate)
         left_flow, left_flux, left_mass = dflow, flux, dm
+    # Such a pipe has `slope` 0, so its weight is not counted twice.
     if pipe["rise"] >= 0:
         add_slope_force(st, profile, pipe, r, l, dr, dl)
+    # The wave speed is evaluated at two masses only: it is monotone between them.
     low = law.local_speed(st, floats, pipe, law.pressure_of_mass(st, floats, pipe, least))
     high = law.local_speed(st, floats, pipe, law.pressure_of_mass(st, floats, pipe, greatest))
     return (quickest / least + max(low, high)) / dx * pipe["rate_factor"]

@@ -48,6 +48,7 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
     v = v_in - change
     if (still and v >= 0.0) or 2.0 * v * side[1] > side[3]:
         return side, v, -rise
+    # A part of the enthalpy of the node is kinetic energy at the end, so its pressure is not above p_node.
     slope, rho, low, high = 1.0, 1.0, floor, p_node
     for _ in range(60):
         p, rho = side[0], st["rho"] / relative_volume(st, side[0])[0]
@@ -60,6 +61,7 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
         if abs(step) <= 1e-15 * abs(p) + 1e-12 * (p - floor):
             break
         p -= step
+        # The gas pressure may change by orders of magnitude, so bounds are halved in its logarithm.
         side = state_at(st, floats, pipe, p if low < p < high else intermediate_pressure(floor, low, high, side[0]))
         change, rise = wave_jump(st, floats, pipe, inside, side)
         v = v_in - change
@@ -78,6 +80,7 @@ def end_flow_of_state(st, floats, pipe, p_in, v_in, p_node, still):
     """
     inside = state_at(st, floats, pipe, p_in)
     side, v, slope = end_side(st, floats, pipe, inside, v_in, p_node, still)
+    # A flow into the node may be supersonic: the face then lies within the wave, or before it.
     if v >= 0.0:
         m, at, _ = sample_wave(st, floats, pipe, inside, v_in, side, v)
         return m * at, side[1] * slope, m
@@ -187,9 +190,11 @@ def solve_nodes_cavitating(t, y, dydt, out, handle):
     given_flows(t, y, out, tables)
     begin_clusters(out, tables, space)
     for sweep in range(1, MAX_SWEEPS + 1):
+        # Bounds found with wide open valves do not hold for their real lifts.
         reset_bounds(tables, low, high, sweep == 1)
         end_inflows_cavitating(out, tables, space[0], False)
         for i in range(n):
+            # Newton's step starts here; `bound_steps` compares its end with these pressures.
             last_pressure[i] = out[pressure + i]
         step_clusters(sweep, out, tables, space)
         bound_steps(sweep, out, tables, last_pressure, low, high)
@@ -221,6 +226,7 @@ def balance_junctions(t, y, dydt, out, handle):
             p = nodes[i]["pressure"] + out[layout["pressure"] + i]
             if p - floor > BAR and abs(imbalance[i]) > BALANCE_ERROR * nodes[i]["admittance"] * (BAR + abs(p)):
                 out[STATUS], out[WHERE] = NOT_CONVERGED, i
+    # The first sweep sums the mass at the ends, by which the second distributes the imbalance.
     for sweep in range(2 if unbalanced else 0):
         for k in range(pipes.size):
             for side in range(2):

@@ -33,6 +33,7 @@ def cell_state(st, floats, profile, pipe, i, r, l):
     m, dry = m0 + (r[i] + l[i]) / pipe["speed"], DRY * st["rho"] * pipe["area"]
     p0, v0 = pressure_of_mass(st, floats, pipe, m0), flow / m0
     v = (flow + (r[i] - l[i])) / m
+    # Below DRY the velocity falls linearly to zero with the content, so that the quotient stays bounded.
     if m < dry:
         v, m = (flow + (r[i] - l[i])) * max(m, 0.0) / (dry * dry), dry
     return pressure_of_mass(st, floats, pipe, m), v, p0, v0
@@ -105,6 +106,7 @@ def end_states(st, floats, profile, pipe, r, l, ends, scratch):
     ends : float64[4]  receives pressure and velocity at the `from` end, then at the `to` end [Pa, m/s]
     """
     n = r.size
+    # The limiter and the extrapolation at an end need three cells; the others are not evaluated.
     n_near = min(n, 3)
     p, v, dp, dv = scratch[: n_near + 2], scratch[5 : n_near + 7], scratch[10 : n_near + 12], scratch[15 : n_near + 17]
     for side in range(2):
@@ -133,6 +135,7 @@ def pipe_rates_cavitating(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
         else:
             p_l, v_l, still_l = face_state(st, floats, profile, pipe, i, i, 1, p, v, dp, dv)
             p_r, v_r, still_r = face_state(st, floats, profile, pipe, i, i + 1, -1, p, v, dp, dv)
+            # Undisturbed faces need no Riemann problem, and keep the flux of the profile to the bit.
             dflow, flux = 0.0, 0.0
             if not (still_l and still_r):
                 total, flux = face_flux(st, floats, pipe, p_l, v_l, p_r, v_r)
@@ -142,13 +145,16 @@ def pipe_rates_cavitating(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
             m0 = profile[pipe["center"] + k]
             dm = (r[k] + l[k]) / c
             friction = wall_force(pipe, reference, max(m0 + dm, DRY * reference), flow + (r[k] - l[k]))
+            # The profile balances the weight of its own mass.
             force = -weight * dm - (friction - pipe["drag"] * (reference / m0))
             mass_rate, flow_rate = -(dflow - left_flow) / dx, -(flux - left_flux) / dx + force
             dr[k], dl[k] = 0.5 * (c * mass_rate + flow_rate), 0.5 * (c * mass_rate - flow_rate)
             highest, quickest = max(highest, p[i]), max(quickest, abs(v[i]))
         left_flow, left_flux = dflow, flux
+    # Such a pipe has `slope` 0, so its weight is not counted twice.
     if pipe["rise"] >= 0:
         add_slope_force(st, profile, pipe, r, l, dr, dl)
+    # The wave speed of a mixture rises with pressure.
     return (quickest + local_speed(st, floats, pipe, highest)) / dx * pipe["rate_factor"]
 
 
@@ -158,6 +164,7 @@ def end_flux(st, floats, profile, pipe, i, r, l):
 
     r, l : waves at this face
     """
+    # The formula below would leave rounding, which would disturb a steady state.
     if r == 0.0 and l == 0.0:
         return 0.0, 0.0
     m, total = profile[pipe["face"] + i] + (r + l) / pipe["speed"], pipe["flow"] + (r - l)
@@ -210,6 +217,7 @@ def record_cavity(t, pipe, r, l, at, tables):
             liquid = 1.0 - (p - st["reference"]) / st["beta"]
             volume += pipe["area"] * pipe["dx"] * (1.0 - liquid / relative_volume(st, p)[0])
     if first >= 0:
+        # Marks are NaN until something is recorded.
         if marks[at] != marks[at]:
             marks[at], marks[at + 1] = (first + 0.5) / r.size, 0.0
         if volume > marks[at + 1]:

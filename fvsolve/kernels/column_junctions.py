@@ -112,6 +112,7 @@ def has_pressure_reference(tables, out, i, k, seen):
         changed = False
         for j in range(columns.size):
             a, b = columns[j]["from_node"], columns[j]["to_node"]
+            # A column with both ends seen, or both unseen, leads to no new node.
             if j == k or out[controlled + j] != 0.0 or seen[a] == seen[b]:
                 continue
             other = b if seen[a] > 0.0 else a
@@ -208,8 +209,10 @@ def solve_junctions(tables, out, n):
     NO_SOLUTION for a singular matrix.
     """
     _, _, matrix, right, pinned, _ = junction_work(tables, n)
+    # Without a reference only differences of pressures are determined: the matrix would be singular.
     for r in range(n):
         if pinned[r] > 0.0:
+            # The row becomes the identity, so that the held value stays as it is.
             matrix[n * r : n * r + n] = 0.0
             matrix[n * r + r] = 1.0
     if solve_dense(matrix, right, n) == 0.0:
@@ -236,6 +239,7 @@ def balance_junction_flows(tables, out):
     layout, columns = tables.layout[0], tables.columns
     add_flow_sums(tables, out, rows, right)
     for r in range(n):
+        # Only differences of impulses act, so the impulse of one held junction may be 0.
         right[r] *= 1.0 - pinned[r]
     solve_junctions(tables, out, n)
     for k in range(columns.size):
@@ -262,6 +266,7 @@ def gate_inflow(tables, i):
 def add_flow_sums(tables, out, rows, right):
     """Add the sum of the flows of columns into each column junction [kg/s] to `right`; it is exactly 0 at the start."""
     nodes, columns, at = tables.nodes, tables.columns, tables.layout[0]["column"]
+    # The valves are closed now, so their flow in the profile is taken out of `inflow`.
     for i in range(rows.size):
         if rows[i] >= 0.0:
             right[int(rows[i])] += nodes[i]["inflow"] - gate_inflow(tables, i)
@@ -290,6 +295,7 @@ def add_column_rates(y, tables, out, n, skip, solved):
         if k == skip or out[layout["valve_controlled"] + k] != 0.0 or (rows[i] < 0.0 and rows[j] < 0.0):
             continue
         flow = out[layout["column"] + k] if solved else column["flow"] + y[column["y"]]
+        # The pressures of the junctions are the unknowns, so here they count as unchanged.
         p_i = 0.0 if rows[i] >= 0.0 else pressure_at(tables, out, i, -flow, solved)
         p_j = 0.0 if rows[j] >= 0.0 else pressure_at(tables, out, j, flow, solved)
         rate = column["area"] / column["length"] * (p_i - p_j + driving_offset(tables, out, column))
@@ -320,6 +326,7 @@ def far_end_pressure(y, tables, out, k, end, solved):
     add_column_rates(y, tables, out, n, k, solved)
     solve_junctions(tables, out, n)
     p = right[int(rows[i])]
+    # Again, because the elimination has overwritten the matrix: now the response to a unit flow rate.
     assemble_junctions(tables, out, n, k)
     right[int(rows[i])] = 1.0
     solve_junctions(tables, out, n)

@@ -31,6 +31,7 @@ class Functions:
         self.hooks = calls.empty_calls(len(cast.laws), len(calls.HOOKS))
         others = "" if all(name.startswith("fvsolve.") for name in cast.packages()) else "import fvsolve.parts; "
         code = f"{others}{READER_IMPORTS}compile_readers({cast!r}); {COMPILE_TIME_LOOP}"
+        # A second process compiles the readers and the time loop at the same time.
         with compile_in_parallel(code, "run_steps"):
             self.rhs = self.compile_job(calls.RHS, rates, calls.rhs_in_turn)
             self.store_hooks(*RHS_HOOKS, *["lead"] * cast.columns, *["power", "heat"] * cast.device_heat)

@@ -28,5 +28,6 @@ def cube_root_reciprocal(x):
     r = estimate(x)
     e = 1.0 - x * r * r * r
     r *= 1.0 + e * (1.0 / 3.0 + e * (2.0 / 9.0 + e * (14.0 / 81.0 + e * (35.0 / 243.0))))
+    # The error left is so small that two terms of the series reach round-off.
     e = 1.0 - x * r * r * r
     return r * (1.0 + e * (1.0 / 3.0 + e * (2.0 / 9.0)))

@@ -20,6 +20,7 @@ def set_devices(t, y, dydt, out, handle):
     for k in range(tables.devices.size):
         device = tables.devices[k]
         hook = tables.hooks[device["hooks"], SET]
+        # The address 0 stands for a function that the law of the device does not have.
         if hook != 0:
             calls.call_set(hook, t, y, out, tables, device)
 
@@ -72,6 +73,7 @@ def record_devices(t, y, out, handle, values):
         hook = tables.hooks[devices[k]["hooks"], OUTSIDE]
         beyond = calls.call_outside(hook, out, tables, devices[k]) if hook != 0 else 0
         at = first + k + (devices.size if beyond == TEMPORARY else 0)
+        # A mark is NaN until the first time is recorded.
         if beyond != 0 and marks[at] != marks[at]:
             marks[at] = t
 

@@ -94,6 +94,7 @@ def watch_state(t, steps, y, ledger, handle, watch, begins):
             data[least + k] = value
         if value > data[greatest + k]:
             data[greatest + k] = value
+        # The value of a source that is no node is a power, so that its amount is the time.
         net, gross = t - data[T], t - data[T]
         if node >= 0:
             came = ledger[node] + ledger[2 * width + node] - data[entered + node]
@@ -110,6 +111,7 @@ def watch_state(t, steps, y, ledger, handle, watch, begins):
         data[left + i] = ledger[width + i] + ledger[3 * width + i]
     data[T] = t
     data[STATES] += 1.0
+    # After a jump only the values are renewed; nothing has been supplied meanwhile.
     if begins:
         return data[NEXT]
     released = 0.0
@@ -126,6 +128,7 @@ def copy_run(run, own):
 
     run, own : open handles of the model
     """
+    # All sizes are compared before the first copy: a part of the arrays would be another state.
     for k in range(run.memory.size // 2):
         if run.memory[2 * k + 1] != own.memory[2 * k + 1]:
             return False
@@ -156,6 +159,7 @@ def energies_at(t, y, w):
     for k in range(nodes.size):
         values[k] = 0.0
         by_node += nodes[k] >= 0
+    # Energies per mass of nodes need no rates; only powers do.
     dydt = w.dydt if by_node < nodes.size else w.dydt[:0]
     rhs_in_turn(t, y, dydt, w.out, w.own)
     stored_in_turn(t, y, dydt[:0], w.out, w.own, stored)

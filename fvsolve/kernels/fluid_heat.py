@@ -61,10 +61,12 @@ def _heat_of_pipes(t, y, dydt, out, handle):
                 flow = pipe["flow"] + (a - b)
                 force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], reynolds, flow)
                 if BAROTROPIC:
+                    # Velocity and wall force per length both go with 1 / m.
                     ratio = full / mass_at_point(st, tables.profile, pipe, i, g, (a + b) / pipe["speed"])
                     power += GAUSS_WEIGHTS[g] * flow * force * ratio * ratio
                 else:
                     power += GAUSS_WEIGHTS[g] * flow * force
+                # Only what the variables dissipate is heat: what they store returns to the flow.
                 for k in range(pipe["terms"]):
                     memory = pipe["memory"] + k * n
                     lag = (a - b) - at_point(y[memory : memory + n], width, i, g)

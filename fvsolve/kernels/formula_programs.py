@@ -68,6 +68,7 @@ def run_program(pieces, first, t, limit, base, stack, armed, g):
         elif code == NEGATE:
             stack[k - 1] = -stack[k - 1]
         elif code == BEFORE:
+            # At a time of switching that ends the segment, the value before it still holds.
             stack[k] = 0.0 if time > number or (time == number and limit > number) else 1.0
             k += 1
         elif code == AFTER:
@@ -203,6 +204,7 @@ def slope_of_pair(code, k, stack):
         df = (dx - f * dy) / y
         ddf = (ddx - 2.0 * df * dy - f * ddy) / y
     elif code == POWER_OF and dy == 0.0 and ddy == 0.0:
+        # A constant power also has slopes for a negative base, whose logarithm does not exist.
         f, slope = x**y, y * x ** (y - 1.0) if y != 0.0 else 0.0
         df, ddf = slope * dx, slope * ddx
         if y != 0.0 and y != 1.0:

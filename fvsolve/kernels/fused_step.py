@@ -90,6 +90,7 @@ def fused_step_linear(t, h, y, y_new, out, handle, values):
             bad += fused_cell(t, h, terms, index, at, i, outer_waves, r, l, r_new, l_new, tables)
         for i in range(1, n - 1, BLOCK):
             bad += fused_block(t, h, terms, index, at, i, min(i + BLOCK, n - 1), r, l, r_new, l_new, tables)
+    # With an empty dydt only nodes are solved: the loops above have computed the rates.
     run_job(RHS, t, y_new, y_new[:0], out, handle)
     observe_linear(t, y_new, out, handle, values)
     record_nodes(t, y_new, out, handle, values)

@@ -95,6 +95,7 @@ def edge_cells(c, right, edge):
     """
     n = c.size
     for k in range(5):
+        # Closures of few cells give the repeated cells weight zero, or see no slope between them.
         m = min(k, n - 1)
         edge[k] = c[n - 1 - m] if right == 1 else c[m]
 
@@ -135,6 +136,7 @@ def leaving_ghosts(edge, n, family, degree, limiter, small, ghosts):
     for g in range(3):
         ghosts[g] = low
     if family == WENO5:
+        # Two extrapolations: by a polynomial, and by a limited line near a jump, where it would overshoot.
         slope = value_muscl(limiter, b, a, low) - a
         d3, d4 = edge[3], edge[4]
         rough = roughness(a - b, a - 2.0 * b + e, a - 3.0 * b + 3.0 * e - d3,
@@ -143,6 +145,7 @@ def leaving_ghosts(edge, n, family, degree, limiter, small, ghosts):
             high = 0.0
             for k in range(5):
                 high += END_LEAVING[4, g, k] * edge[k]
+            # `slope` is the rise over half a cell: ghost cell g lies 2 (g + 1) of them beyond the last cell.
             ghosts[g] = high + rough * (a + 2.0 * (g + 1.0) * slope - high)
 
 
@@ -159,6 +162,7 @@ def entering_ghosts(edge, n, family, degree, datum, small, ghosts):
         return
     a, b, e, d3 = edge[0], edge[1], edge[2], edge[3]
     for g in range(3):
+        # The mean of ghost cell and first cell is then the datum at the face between them.
         ghosts[g] = 2.0 * datum - a
     if family == WENO5:
         bend = 5.5 * a - 3.5 * b + e - 3.0 * datum  # zero for every parabola
@@ -167,6 +171,7 @@ def entering_ghosts(edge, n, family, degree, datum, small, ghosts):
             high = END_ENTERING[4, g, 0] * datum
             for k in range(4):
                 high += END_ENTERING[4, g, k + 1] * edge[k]
+            # In rough data the datum itself: a polynomial would overshoot at an arriving jump.
             ghosts[g] = high + rough * (datum - high)
 
 
@@ -181,6 +186,7 @@ def end_value(c, right, family, degree, limiter, small, scratch):
         for k in range(d + 1):
             total += END_VALUE[d, k] * edge[k]
         return total
+    # A single cell has no slope.
     if n == 1:
         return edge[0]
     leaving_ghosts(edge, n, family, degree, limiter, small, ghosts)

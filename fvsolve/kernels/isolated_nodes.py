@@ -55,6 +55,7 @@ def inner_row(nodes, i):
 def root_of(group, i):
     """Number of the first node of the group of node i; each entry of `group` is a node nearer to it, or the node."""
     while group[i] != i:
+        # Each search shortens the path, so that later searches take fewer steps.
         group[i] = group[int(group[i])]
         i = int(group[i])
     return i
@@ -83,6 +84,7 @@ def find_connected(cluster, tables, c, g, connected, group):
             i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
             if i >= 0 and j >= 0:
                 join(group, i, j)
+    # Groups are complete now: a single node with a pipe connects its whole group.
     for i in range(connected.size):
         connected[i] = 0.0
     for i in range(connected.size):
@@ -93,9 +95,11 @@ def find_connected(cluster, tables, c, g, connected, group):
         if g[e] > 0.0:
             valve = valves[integers[cluster["first_valve"] + e]]
             i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+            # A valve with exactly one end outside the cluster joins its group to a known pressure.
             if (i < 0) != (j < 0) and valve["one_way"] == BOTH_WAYS:
                 connected[root_of(group, max(i, j))] = 1.0
             outward = outward or valve["one_way"] != BOTH_WAYS
+    # Last, because outward valves only matter for groups that nothing else connects.
     if outward:
         connect_outward(cluster, tables, c, g, connected, group)
     for i in range(connected.size):
@@ -121,6 +125,7 @@ def connect_outward(cluster, tables, c, g, connected, group):
             if i >= 0 and connected[root_of(group, i)] == FED:
                 connected[root_of(group, i)] = 1.0
     for i in range(connected.size):
+        # A group that is fed, but has no open outward valve, remains isolated.
         connected[i] = 1.0 if connected[i] == 1.0 else 0.0
 
 
@@ -147,6 +152,7 @@ def leak_balance(cluster, tables, out, leaks, group, number, level):
         i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
         from_inside = i >= 0 and group[i] == number
         to_inside = j >= 0 and group[j] == number
+        # A valve within the group, or between two other groups, lets nothing into this group.
         if from_inside != to_inside:
             other = total_pressure(tables, out, valve["to_node"] if from_inside else valve["from_node"])
             low, high = min(low, other), max(high, other)
@@ -194,6 +200,7 @@ def isolated_pressures(cluster, tables, out, g, connected, group, work):
     """
     layout, integers = tables.layout[0], tables.integers
     leaks = work[: closed_at_isolated(cluster, tables, g, connected, work)]
+    # Groups may lie behind each other's closed valves, so each depends on the pressure of the next.
     for _ in range(200):
         greatest = 0.0
         for number in range(group.size):
@@ -201,8 +208,10 @@ def isolated_pressures(cluster, tables, out, g, connected, group, work):
             if connected[number] > 0.0 or group[number] != number or out[at] > UNDETERMINED:
                 continue
             _, low, high = leak_balance(cluster, tables, out, leaks, group, number, 0.0)
+            # No closed valve leads to another node, so nothing determines this pressure.
             if low > high:
                 continue
+            # The balance falls with the level, with infinite slopes: bisection finds the root, Newton might not.
             for _ in range(100):
                 level = 0.5 * (low + high)
                 if level <= low or level >= high:
@@ -240,6 +249,7 @@ def mark_isolated(cluster, tables, out, g, c, connected, group, scale, work):
         undetermined = connected[i] == 0.0 and tables.nodes[node]["gates"] < 0  # a rigid column determines a pressure
         out[layout["isolated"] + node] = UNDETERMINED if undetermined else JOINED
         totals[number] += c[i]
+        # Only a demand alone may be left unsupplied; any other flow has nowhere to come from or go to.
         if not (c[i] <= 0.0 and c[i] == out[layout["supply"] + node]):
             drawn[number] = 0.0
     for number in range(n):
@@ -258,6 +268,7 @@ def mark_isolated(cluster, tables, out, g, c, connected, group, scale, work):
             node = integers[cluster["first_node"] + i]
             if group[i] == number and abs(level) < NO_LEVEL:
                 out[layout["pressure"] + node] += level - total_pressure(tables, out, node)
+                # `drain` may have marked the node as UNSUPPLIED, the greater code.
                 out[layout["isolated"] + node] = max(out[layout["isolated"] + node], DRAINED)
 
 
@@ -309,6 +320,7 @@ def drain(cluster, tables, out, group, number, level):
     for i in range(group.size):
         node = integers[cluster["first_node"] + i]
         if group[i] == number and out[layout["supply"] + node] < 0.0:
+            # A gauge pressure of zero at the lowest demand: no flow leaves there any more.
             level = min(level, tables.settings[0]["ambient"] + weight * nodes[node]["elevation"])
             out[layout["supply"] + node], out[layout["isolated"] + node] = 0.0, UNSUPPLIED
     return level

@@ -25,12 +25,14 @@ from fvsolve.kernels.tanks import tank_level
 def stored_pressures(t, y, out, tables):
     """Write the pressure changes since the start [Pa] of fixed nodes, tanks and chambers to `out`."""
     settings, layout, nodes = tables.settings[0], tables.layout[0], tables.nodes
+    # Moving chambers, vessels and patches have no branch: other functions write their pressures.
     for i in range(nodes.size):
         node = nodes[i]
         at = layout["pressure"] + i
         if node["kind"] == FIXED:
             out[at] = schedule_value(tables, node["schedule"], t) - node["pressure"]
         elif node["kind"] == TANK:
+            # Levels are subtracted, not pressures: an undisturbed tank has a change of exactly zero.
             level = tank_level(node, tables.floats, settings["rho"], y[node["y"]])
             out[at] = settings["rho"] * settings["gravity"] * (level - node["level"])
         elif node["kind"] == CHAMBER:
@@ -49,6 +51,7 @@ def junction_flows(t, out, tables):
         if nodes[i]["kind"] == JUNCTION:
             demand = schedule_value(tables, nodes[i]["schedule"], t)
             out[layout["supply"] + i] = -demand
+            # `inflow` already contains the demand of the profile, so only its change is subtracted.
             out[layout["net"] + i] += nodes[i]["inflow"] - (demand - nodes[i]["demand"])
 
 
@@ -70,6 +73,7 @@ def begin_lumped(t, y, dydt, out, handle):
     It clears outputs, writes conductances of restrictions and known pressures, and adds given flows into junctions.
     """
     tables = open_tables(handle)
+    # First, because junctions add their given flows to out[net].
     clear_outputs(out, tables)
     open_scheduled(t, out, tables)
     stored_pressures(t, y, out, tables)
@@ -88,6 +92,7 @@ def solve_free_nodes(out, tables):
 @njit(forceinline=True)
 def valve_side(out, layout, nodes, i):
     """(pressure change of node i at unchanged valve flow [Pa], its fall per outflow through the valve [Pa s/kg])."""
+    # Storage or a schedule determines this pressure, so the flow of the valve does not change it at once.
     if nodes[i]["kind"] != JUNCTION:
         return out[layout["pressure"] + i], 0.0
     return out[layout["net"] + i] / nodes[i]["admittance"], 1.0 / nodes[i]["admittance"]
@@ -110,9 +115,11 @@ def solve_single_valves(out, tables):
         pj, zj = valve_side(out, layout, nodes, j)
         g = conductance(tables, out, k)
         if valve["transition"] > 0.0:
+            # The law may differ from the flow of the profile, at least by rounding: `base` keeps the steady state.
             base = flow_at_drop(valve["open"], transition_of(valve, valve["open"]), valve["drop"]) - valve["flow"]
             x = flow_change_laminar(g, transition_of(valve, g), zi + zj, valve["flow"], base, valve["drop"] + (pi - pj))
         else:
+            # The change of the target is summed from changes, so it is exactly zero in the steady state.
             surplus = (g - valve["open"]) * valve["drop"] + g * (pi - pj)
             x = flow_change(g, zi + zj, valve["flow"], surplus, g * (valve["drop"] + (pi - pj)))
         out[layout["valve"] + k] = valve["flow"] + x

@@ -116,6 +116,7 @@ def chamber_state(tables, node, volume, excess):
     if st["law"] == rec.LAW_LINEAR:
         stiffness = node["stiffness"] * node["volume"] / volume
         return stiffness * excess, stiffness
+    # log1p keeps the digits of a small excess, which the quotient of two masses would lose.
     share = node["volume"] / volume * excess / node["mass"]
     q0 = log(node["mass"] / (st["rho"] * node["volume"]))
     p = pressure_of_log(st, floats, 0.0, q0 + log1p(share))
@@ -157,7 +158,9 @@ def piston_chambers(t, y, dydt, out, handle):
             p, stiffness = chamber_state(tables, nodes[i], nodes[i]["volume"] + area * x, excess)
             out[layout["pressure"] + i] = p
             out[layout["stiffness"] + nodes[i]["row"]] = stiffness
+            # Between points of bodies the state is the mass itself, which a piston does not change.
             out[layout["swept"] + nodes[i]["row"]] = sweep * speed if piston["line"] < 0 else 0.0
+        # After the swept flows of both sides are written, because the leak is added to them.
         if piston["leakage"] > 0.0:
             a, b = piston["a"], piston["b"]
             p_a = nodes[a]["pressure"] + out[layout["pressure"] + a]
@@ -217,6 +220,7 @@ def forces(t, y, out, tables):
 def add_stiffness(tables, i, j, stiffness, damping):
     """Add stiffness and damping of an element, per mass [1/s2, 1/s], to the sums of its masses i and j in scratch."""
     masses, work = tables.masses, tables.scratch
+    # Two masses on a spring oscillate at the rate sqrt(k (1/m_i + 1/m_j)).
     lightness = masses[i]["lightness"] + masses[j]["lightness"]
     for mass in (i, j):
         work[2 * mass] += lightness * stiffness
@@ -236,6 +240,7 @@ def push_stiffness(out, tables, k):
             return stops[k]["stiffness"], stops[k]["damping"]
         return 0.0, 0.0
     piston, stiffness, nodes = pistons[k - stops.size], tables.layout[0]["stiffness"], tables.nodes
+    # A chamber acts as a spring: its pressure rises by the swept mass, and pushes on the area.
     stiff_a, stiff_b = out[stiffness + nodes[piston["a"]]["row"]], out[stiffness + nodes[piston["b"]]["row"]]
     stiff = piston["area_a"] * stiff_a * piston["sweep_a"] - piston["area_b"] * stiff_b * piston["sweep_b"]
     return stiff, piston["damping"]
@@ -260,6 +265,7 @@ def mechanical_rate(out, tables):
         )
     rate = 0.0
     for i in range(masses.size):
+        # A mass without states does not move, so that it limits nothing.
         if masses[i]["y"] >= 0:
             brake = 0.5 * work[2 * i + 1]
             rate = max(rate, brake + sqrt(brake * brake + work[2 * i]))
@@ -281,6 +287,7 @@ def contact_rate(out, tables):
         i, j = stop["from_mass"], stop["to_mass"]
         lightness = masses[i]["lightness"] + masses[j]["lightness"]
         stiffness, brake = lightness * stop["stiffness"], lightness * stop["damping"]
+        # Contacts between points of bodies are part of the rates of bodies.
         if not stiffness > 0.0 or stop["line"] >= 0:
             continue
         travel, speed = stop_travel(out, tables, k)
@@ -313,6 +320,7 @@ def mass_rates(t, y, dydt, out, handle):
             out[rec.CLOSING] = max(closing, contact_rate(out, tables))
     for k in range(tables.pistons.size):
         for i in (tables.pistons[k]["a"], tables.pistons[k]["b"]):
+            # Written so that a stiffness that is not a number is a fault too.
             if not out[layout["stiffness"] + nodes[i]["row"]] > 0.0:
                 out[rec.STATUS], out[rec.WHERE] = rec.NO_VOLUME, i
     if dydt.size == 0:

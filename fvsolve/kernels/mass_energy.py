@@ -48,6 +48,7 @@ def power_masses(t, y, dydt, out, tables, power, at):
         brace = braces[k]
         speed = travel_of(out, tables, k)[1]
         power[at] = out[layout["push"] + k] * speed
+        # The entry of a spring or damper is the absorbed power, that of a given force the supplied power.
         if brace["schedule"] < 0:
             power[at] = -power[at]
         at += BRACE
@@ -80,14 +81,17 @@ def stored_masses(y, out, tables, stored, at):
     for k in range(braces.size):
         x = travel_of(out, tables, k)[0]
         stored[at] = x * (0.5 * braces[k]["stiffness"] * x - braces[k]["force"])
+        # A damper or a given force stores nothing, whatever its travel.
         if braces[k]["stiffness"] == 0.0:
             stored[at] = 0.0
         at += 1
     for k in range(stops.size):
         stop = stops[k]
         x = stop_travel(out, tables, k)[0]
+        # Depth in the contact at either side, now and at the start; it may begin closed.
         now = max(0.0, max(-(stop["below"] + x), x - stop["above"]))
         then = max(0.0, max(-stop["below"], -stop["above"]))
+        # As a product of difference and sum: no difference of large squares.
         stored[at] = 0.5 * stop["stiffness"] * (now - then) * (now + then)
         at += 1
 

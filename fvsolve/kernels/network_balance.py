@@ -49,6 +49,7 @@ def net_flows(out, tables):
     layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes
     valves, columns = tables.valves, tables.columns
     net = layout["net"]
+    # The flows of the profile enter once, with `inflow`; below, each link adds the change of its flow.
     for i in range(nodes.size):
         out[net + i] = nodes[i]["inflow"]
     for i in range(pipes.size):
@@ -63,6 +64,7 @@ def net_flows(out, tables):
         change = out[layout["column"] + k] - columns[k]["flow"]
         out[net + columns[k]["from_node"]] -= change
         out[net + columns[k]["to_node"]] += change
+    # The state of a moving chamber is its excess mass, so a growing volume counts as an outflow.
     for k in range(tables.pistons.size):
         for i in (tables.pistons[k]["a"], tables.pistons[k]["b"]):
             out[net + i] -= out[layout["swept"] + nodes[i]["row"]]
@@ -92,6 +94,7 @@ def chain_impedance(tables, out, i, k):
     restriction leaves a junction, it is followed to its other end.
     """
     valves, nodes, impedance = tables.valves, tables.nodes, 0.0
+    # A chain visits each node at most once; the bound ends the loop where restrictions form a ring.
     for _ in range(nodes.size):
         if nodes[i]["kind"] != JUNCTION:
             return impedance
@@ -102,8 +105,10 @@ def chain_impedance(tables, out, i, k):
                 total += restriction_slope(tables, out, e, head_drop(tables, out, e)[1])
                 count, last = count + 1, e
         impedance += 1.0 / total if total > 0.0 else NO_WAY_OUT
+        # Behind a branch or a pipe only a part of the flow goes on, so further impedances are not in series.
         if count != 1 or nodes[i]["admittance"] > 0.0:
             break
+        # The sum of both node numbers minus this node is the opposite end.
         i, k = valves[last]["from_node"] + valves[last]["to_node"] - i, last
     return impedance
 
@@ -117,6 +122,7 @@ def stored_rates(y, dydt, out, tables):
     layout, nodes, armed = tables.layout[0], tables.nodes, tables.armed
     for i in range(nodes.size):
         kind, net = nodes[i]["kind"], out[layout["net"] + i]
+        # The supply of a junction is its demand, written before. A patch gives its flow to its basin.
         if kind == JUNCTION or kind == PATCH:
             continue
         supply = 0.0
@@ -124,6 +130,7 @@ def stored_rates(y, dydt, out, tables):
             supply = -net
         elif kind == TANK:
             k = EVENTS * nodes[i]["row"]
+            # A tank held at its bottom or rim keeps its level: the supply takes up the whole net flow.
             if armed[k + BOTTOM] > 0.0 or armed[k + RIM] > 0.0:
                 supply = -net
         if kind != FIXED and dydt.size > 0:
@@ -176,12 +183,14 @@ def valve_rate_limit(t, y, dydt, out, handle):
             stiff_i *= out[layout["outflow_fraction"] + nodes[i]["row"]]
         if nodes[j]["kind"] == PATCH and drop <= 0.0:
             stiff_j *= out[layout["outflow_fraction"] + nodes[j]["row"]]
+        # A flow lowers the pressure upstream and raises it downstream, so both stiffnesses add.
         stiff = stiff_i + stiff_j
         if valve["flow_given"] == 1 or (valve["device"] >= 0 and tables.devices[valve["device"]]["row"] >= 0):
             continue  # the device of a vessel sets its own rate
         if stiff > 0.0:
             g = conductance(tables, out, k)
             slope = restriction_slope(tables, out, k, drop)
+            # Pressures of junctions respond at once and limit the flow, however steep the law of the valve is.
             soft = node_impedance(tables, i) + node_impedance(tables, j)
             if valve["chained"] == 1:
                 soft = chain_impedance(tables, out, i, k) + chain_impedance(tables, out, j, k)
@@ -189,6 +198,7 @@ def valve_rate_limit(t, y, dydt, out, handle):
             if valve["transition"] > 0.0 and g > 0.0 and valve["chained"] == 0:
                 change = stiff_i * out[layout["net"] + i]
                 change -= stiff_j * out[layout["net"] + j]
+                # Below this drop the law is nearly linear: a smaller distance to zero needs no shorter step.
                 width = max(valve["transition"] ** 2 / g, valve["rounding_drop"])
                 if change * drop < 0.0:  # at least two steps to a drop of zero: a longer step would pass it
                     rate = max(rate, 2.5 * abs(change) / max(abs(drop), width))

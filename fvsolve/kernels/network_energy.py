@@ -183,6 +183,7 @@ def _fill_power(t, y, dydt, out, handle, power):
         pipe, end = pipes[k], layout["ends"] + 4 * k
         into = POTENTIAL(tables, out, pipe["from_node"]) * (pipe["flow"] + (out[end] - out[end + 1]))
         into -= POTENTIAL(tables, out, pipe["to_node"]) * (pipe["flow"] + (out[end + 2] - out[end + 3]))
+        # Creep adds to its entries later.
         power[at], power[at + CREEP : at + PIPE] = into * per, 0.0
         PIPE_POWER(t, y, dydt, out, tables, k, power[at : at + PIPE])
         at += PIPE
@@ -192,6 +193,7 @@ def _fill_power(t, y, dydt, out, handle, power):
         at += VALVE
     for k in range(columns.size):
         column, size = columns[k], column_inertia(st, columns[k])
+        # While valves control a column, its flow in `out` differs from that of the state, which has the energy.
         flow, own = out[layout["column"] + k], column["flow"] + y[column["y"]]
         drop = POTENTIAL(tables, out, column["from_node"]) - POTENTIAL(tables, out, column["to_node"])
         power[at], power[at + 1] = per * drop * flow, size * flow * column_drag(column, flow)

@@ -93,6 +93,7 @@ def solve_dense(a, b, n):
         if a[n * pivot + i] == 0.0:
             b[0] = float(i)
             return 0.0
+        # An exchange of rows and a negative pivot each change the sign of the determinant.
         if (pivot != i) != (a[n * pivot + i] < 0.0):
             sign = -sign
         if pivot != i:
@@ -101,6 +102,7 @@ def solve_dense(a, b, n):
             b[i], b[pivot] = b[pivot], b[i]
         for k in range(i + 1, n):
             f = a[n * k + i] / a[row + i]
+            # Nodes have few neighbours, so that most factors are zero.
             if f != 0.0:
                 for m in range(i, n):
                     a[n * k + m] -= f * a[row + m]
@@ -128,6 +130,7 @@ def solve_in_order(a, b, n, integers, at):
         p, count = integers[e], integers[e + 1]
         right, places = integers[e + 2 + count], e + 3 + count
         pivot = a[p]
+        # Not `pivot <= 0.0`, so that a pivot that is not a number ends the elimination too.
         if not pivot > 0.0:
             b[0] = float(p)
             return 0.0
@@ -185,6 +188,7 @@ def add_valve(i, j, places, m, a, s, lift, matrix, right):
         right[j] += m + a
         matrix[places[1]] += s
     if i >= 0 and j >= 0:
+        # Only the pressure at node i lifts the valve, so the matrix is not symmetric.
         matrix[places[2]] -= s
         matrix[places[3]] -= s + lift
 
@@ -250,6 +254,7 @@ def add_couplings(cluster, tables, out, matrix, right, sparse):
         i, j = inner_row(nodes, link["from_node"]), inner_row(nodes, link["to_node"])
         p, q = out[layout["pressure"] + link["from_node"]], out[layout["pressure"] + link["to_node"]]
         places = places_of(cluster, tables, cluster["valves"] + k, i, j, sparse)
+        # The flow is linear in the pressures, so that its Newton step is exact (a = 0).
         add_valve(i, j, places, g * (p - q), 0.0, g, 0.0, matrix, right)
 
 
@@ -280,12 +285,14 @@ def hold_pressures(cluster, tables, out, g, matrix, right, kept):
         for c in range(count):
             own, place = integers[h + 5 + 3 * c], integers[h + 6 + 3 * c]
             kept[at + 1 + c] = matrix[own]
+            # In the sum of both balances the unknown flow of the valve cancels.
             if other >= 0:
                 matrix[place] += matrix[own]
             matrix[own] = 0.0
         if other >= 0:
             right[other] += right[held]
         node = integers[cluster["first_node"] + held]
+        # The row becomes that of a known pressure, which the step reaches exactly.
         matrix[held], right[held] = 1.0, out[layout["drive"] + k] - out[layout["pressure"] + node]
         at += 1 + count
 
@@ -360,13 +367,16 @@ def _assemble(cluster, tables, out, g, m, c, connected, slope, wide, work, spars
     for i in range(integers[cluster["order"] - 1] if sparse else n * n):
         matrix[i] = 0.0
     width = 1 if sparse else n + 1
+    # The balance without valves, to which each valve then adds its terms.
     for i in range(n):
         right[i], matrix[width * i] = BALANCE(cluster, tables, out, c, slope, i)
     for e in range(m.size):
         k = integers[cluster["first_valve"] + e]
         i, j = inner_row(nodes, valves[k]["from_node"]), inner_row(nodes, valves[k]["to_node"])
+        # The values of a closed valve: the step takes away its whole flow.
         a[e], s[e], lift[e] = -m[e], 0.0, 0.0
         if sparse and g[e] > 0.0 and is_held(tables, out, k):
+            # The flow of a valve that holds a pressure follows from the balance of its node, after the solution.
             a[e] = 0.0
             if integers[valves[k]["hold"]] == FLOW_HELD:
                 a[e], s[e] = out[tables.layout[0]["drive"] + k] - m[e], LOOSE * sqrt(g[e])
@@ -377,12 +387,15 @@ def _assemble(cluster, tables, out, g, m, c, connected, slope, wide, work, spars
         upstream = lift[e]
         if senses and upstream != 0.0 and is_sensing(tables, k):
             add_sensed(cluster, tables, k, i, j, upstream, n, matrix)
+            # The lift follows the sensed pressures, to which it has been added, and not the upstream pressure.
             upstream = 0.0
         add_valve(i, j, places_of(cluster, tables, e, i, j, sparse), m[e], a[e], s[e], upstream, matrix, right)
     add_couplings(cluster, tables, out, matrix, right, sparse)
     for i in range(n):
+        # No equation determines the pressure of an isolated node; this row keeps the matrix regular.
         if connected[i] == 0.0:
             right[i], matrix[width * i] = 0.0, 1.0
+    # Last, because it moves balances that must be complete.
     if cluster["held"] > 0:
         hold_pressures(cluster, tables, out, g, matrix, right, kept)
 
@@ -437,6 +450,7 @@ def cut_steps(right):
     limited = False
     for i in range(right.size):
         if not abs(right[i]) <= MOST_RISE:
+            # A step that is not a number becomes 0, otherwise it would spread to all pressures.
             right[i] = copysign(MOST_RISE, right[i]) if right[i] == right[i] else 0.0
             limited = True
     return limited
@@ -485,8 +499,10 @@ def apply_step(cluster, tables, out, m, a, s, lift, right):
         lifting = sensed_step(cluster, tables, k, right) if senses else rise
         step = a[e] + s[e] * (rise - (right[j] if j >= 0 else 0.0)) + lift[e] * lifting
         m[e] += step
+        # A valve that is nearly at rest is compared with its flow at 1 Pa, not with its own.
         scale = max(scale, abs(m[e]), sqrt(valve["conductance"]))
         p = nodes[valve["from_node"]]["pressure"] + out[layout["pressure"] + valve["from_node"]]
+        # A steep law turns the rounding of pressures into changes of flow.
         rounding = s[e] * ROUNDING * (BAR + abs(p))
         change, rounded = max(change, max(abs(step), abs(a[e])) - rounding), max(rounded, rounding)
     relative = change / scale
@@ -526,6 +542,7 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, limits, 
     imbalance, sign = largest_magnitude(right) if BAROTROPIC else 0.0, 0.0
     if sparse:
         sign = solve_in_order(matrix, right, n, tables.integers, cluster["order"])
+        # The elimination in order has no pivoting; with pivoting the equations may have a solution.
         if sign == 0.0 and full:
             ASSEMBLE(cluster, tables, out, g, m, c, connected, slope, wide, work, False)
     if sign == 0.0 and full:
@@ -547,6 +564,7 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, limits, 
         limited = limit_each_step(limits, right)
     elif not BAROTROPIC:
         limited = cut_steps(right)
+    # After the limits, because these flows follow from the steps that are made.
     if cluster["held"] > 0:
         put_held_flows(cluster, tables, out, g, right, kept, a)
     pressures, flows = apply_step(cluster, tables, out, m, a, s, lift, right)
@@ -607,6 +625,7 @@ def total_inflows(cluster, tables, out, c):
         c[i] = out[layout["supply"] + node]  # exact where only valves and columns join
         if nodes[node]["admittance"] > 0.0:
             c[i] = out[layout["net"] + node]
+    # Where pipes join, out[net] already contains the changes of column flows.
     for k in range(tables.columns.size):
         column = tables.columns[k]
         i, j = row_in_cluster(cluster, tables, column["from_node"]), row_in_cluster(cluster, tables, column["to_node"])
@@ -614,6 +633,7 @@ def total_inflows(cluster, tables, out, c):
             c[i] -= out[layout["column"] + k]
         if j >= 0 and nodes[column["to_node"]]["admittance"] == 0.0:
             c[j] += out[layout["column"] + k]
+    # The unknown flows are totals, out[net] counts changes: valve flows of the profile are added back.
     for e in range(cluster["valves"]):
         valve = valves[integers[cluster["first_valve"] + e]]
         i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
@@ -641,6 +661,7 @@ def prepare_cluster(cluster, tables, out, g, m):
     """
     layout, valves = tables.layout[0], tables.valves
     integers, unchanged, senses = tables.integers, True, cluster["senses"] == 1
+    # Newton starts from the profile, so that its result depends on (t, y) alone.
     for i in range(cluster["nodes"]):
         out[layout["pressure"] + integers[cluster["first_node"] + i]] = 0.0
     for e in range(g.size):
@@ -649,6 +670,7 @@ def prepare_cluster(cluster, tables, out, g, m):
         g[e], m[e] = conductance(tables, out, k), valve["flow"]
         if valve["hooks"] < 0 and 0.0 < g[e] < valve["open"]:
             m[e] *= sqrt(g[e] / valve["open"])  # flow at the drop of the profile: its own flow needs a huge drop
+        # Exact comparison: a start in the steady state must stay there without rounding.
         unchanged = unchanged and g[e] == valve["open"] and out[layout["drive"] + k] == valve["drive"]
         for i in (valve["from_node"], valve["to_node"]):
             unchanged = unchanged and out[layout["pressure"] + i] == 0.0
@@ -667,6 +689,7 @@ def prepare_cluster(cluster, tables, out, g, m):
 def begin_accepted(cluster, tables, out, g, m):
     """Set the pressures of a cluster and the flows m of its open valves to those of the last accepted state, if any."""
     accepted, integers, pressure = tables.accepted, tables.integers, tables.layout[0]["pressure"]
+    # No state has been accepted so far: the iteration starts from the profile.
     if accepted[0] == 0.0:
         return
     for i in range(cluster["nodes"]):
@@ -757,6 +780,7 @@ def begin_clusters(out, tables, space):
         i, j = a + cluster["nodes"], b + cluster["valves"]
         unchanged = prepare_cluster(cluster, tables, out, g[b:j], m[b:j])
         done[k] = 1.0 if total_inflows(cluster, tables, out, c[a:i]) and unchanged else 0.0
+        # No change is known before the first step, so the test of convergence must fail there.
         change[k], wide[k] = 1e300, 1.0
         if done[k] == 0.0:
             begin_level(cluster, tables, out)
@@ -770,6 +794,7 @@ def is_undisturbed(cluster, tables, out):
     """True if pipes bring exactly their initial steady flow into every node of a cluster."""
     for i in range(cluster["nodes"]):
         node = tables.integers[cluster["first_node"] + i]
+        # Exact: a steady state must stay steady to the bit, and any change has to be solved.
         if out[tables.layout[0]["net"] + node] != 0.0:
             return False
     return True
@@ -788,6 +813,7 @@ def step_clusters(sweep, out, tables, space):
     for k in range(clusters.size):
         cluster = clusters[k]
         i, j = a + cluster["nodes"], b + cluster["valves"]
+        # The flows from pipe ends were not known when the cluster was marked as unchanged.
         if sweep == 1 and done[k] == 1.0:
             if is_undisturbed(cluster, tables, out):
                 change[k] = 0.0
@@ -815,6 +841,7 @@ def check_clusters(out, tables, space):
     for k in range(clusters.size):
         j = b + clusters[k]["valves"]
         if done[k] == 0.0 and has_converged(change[k], last_change[k]):
+            # Wide open valves with backflow are no solution: the iteration goes on with their real lifts.
             if wide[k] == 1.0 and has_backflow(clusters[k], tables, m[b:j]):
                 change[k], wide[k] = 1e300, 0.0
             else:
@@ -847,6 +874,7 @@ def write_cluster(cluster, tables, out, g, m, c, connected, group, change, worst
     for i in range(connected.size):
         isolated = isolated or connected[i] == 0.0
         out[tables.layout[0]["isolated"] + tables.integers[cluster["first_node"] + i]] = JOINED
+    # Last, because the leaks of closed valves depend on the solved pressures of connected nodes.
     if isolated:
         group_by_open_valves(cluster, tables, g, group)
         mark_isolated(cluster, tables, out, g, c, connected, group, scale, work)
@@ -907,6 +935,7 @@ def solve_cluster(out, tables, index):
     zero_isolated(cluster, tables, g, m, connected)
     change, flows, wide, limits, out[FIRM] = 1e300, 0.0, True, group[:0], 0.0
     for sweep in range(MAX_SWEEPS + LIMITED_SWEEPS):
+        # Nothing has changed, so the profile is the solution, to the bit.
         if undisturbed:
             change = 0.0
             break
@@ -925,6 +954,7 @@ def solve_cluster(out, tables, index):
             change, flows = 0.0, 0.0
         settled = has_settled(change, last_change) or has_followed(out, change)
         if settled if from_accepted else has_converged(change, last_change):
+            # Wide open valves with backflow are no solution: iterate again with their real lifts.
             if not (wide and has_backflow(cluster, tables, m)):
                 break
             change, flows, wide = 1e300, 1e300, False
@@ -965,6 +995,7 @@ def solve_coupled_clusters(t, y, dydt, out, handle):
         for c in range(cluster["couples"]):
             link = tables.couplings[integers[cluster["first_couple"] + c]]
             i, j = row_in_cluster(cluster, tables, link["from_node"]), row_in_cluster(cluster, tables, link["to_node"])
+            # The inverse contains couplings within the group only; a known pressure acts as an inflow.
             if i >= 0 and j < 0:
                 work[i] += link["conductance"] * out[layout["pressure"] + link["to_node"]]
             if j >= 0 and i < 0:

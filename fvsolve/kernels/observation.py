@@ -26,6 +26,7 @@ def wave_sum(probe, pipe, sign, index, y, out, tables):
     index : number of the pipe
     """
     at = tables.layout[0]["ends"] + 4 * index
+    # At an end the wave that enters is known from the node; an extrapolation of cells would miss it.
     if probe["side"] < 0:
         return out[at] + sign * out[at + 1]
     if probe["side"] > 0:
@@ -141,6 +142,7 @@ def update_envelope(t, r, l, at, low, high, index, tables):
     b, bad = at + r.size, 0
     if low > 0:
         bad += update_minima(t, r, l, e[0, at:b], e[1, at:b])
+        # A first pressure below vapour pressure is also a new minimum, so it is sought only here.
         if marks[index] != marks[index]:
             if count_below(r, l, profile[at:b]) > 0:
                 marks[index] = t
@@ -153,6 +155,7 @@ def update_envelope(t, r, l, at, low, high, index, tables):
 def record_pipe(t, r, l, pipe, index, tables):
     """Update the envelope of r + l of pipe number `index`; blocks of cells without a new extreme are only compared."""
     start, at, envelope = 0, pipe["cell"], tables.envelope
+    # Few blocks contain a new extreme; comparing is cheaper than updating.
     while start < r.size:
         stop = min(start + BLOCK, r.size)
         a, b = at + start, at + stop
@@ -188,6 +191,7 @@ def record_unsupplied(t, out, tables, i):
     marks, layout, first = tables.marks, tables.layout[0], marks_of_islands(tables)
     at = first + tables.valves.size + i
     marks[at + tables.nodes.size] = t
+    # Only valves that are shut at the first time are the cause.
     if marks[at] == marks[at]:
         return
     marks[at] = t
@@ -220,6 +224,7 @@ def record_nodes(t, y, out, handle, values):
             marks[mark] = t
     for i in range(nodes.size):
         at = pipes.size + i
+        # The pressure of an isolated node is a convention, not a result.
         if has_codes and out[layout["isolated"] + i] > JOINED:
             last = marks.size - nodes.size + i
             if out[layout["isolated"] + i] == UNSUPPLIED:
@@ -230,6 +235,7 @@ def record_nodes(t, y, out, handle, values):
         if lowest < nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:
             marks[at] = t
         if nodes[i]["kind"] == rec.TANK and abs(out[layout["supply"] + i]) > SUPPLY_ROUNDING * mass_per_metre(nodes[i]):
+            # A positive supply holds a dry tank at its bottom, a negative one is the spill of a full tank.
             at += nodes.size if out[layout["supply"] + i] > 0.0 else 2 * nodes.size
             if marks[at] != marks[at]:
                 marks[at] = t

@@ -79,6 +79,7 @@ def uncached(function, **constants):
     inner = {name: copied(seen[name]) for name in plain.__code__.co_names if name in seen} | constants
     cells = tuple(CellType(copied(cell.cell_contents)) for cell in plain.__closure__ or ())
     copy = njit(FunctionType(plain.__code__, seen | inner, plain.__name__, plain.__defaults__, cells or None))
+    # Not stored by itself: the loop that contains this copy is stored as a whole.
     copy.folder = None
     return copy
 

@@ -66,6 +66,7 @@ def polynomial_width(settings, n):
 @njit(forceinline=True)
 def at_point(c, width, i, point):
     """Value at a Gauss point of cell i, from the polynomial through the averages c of `width` cells around it."""
+    # Near an end of the pipe the polynomial is one-sided.
     first = min(max(i - width // 2, 0), c.size - width)
     total = 0.0
     for k in range(width):
@@ -102,9 +103,11 @@ def pipe_power(t, y, dydt, out, tables, k, rows):
             a, b = at_point(r, width, i, g), at_point(l, width, i, g)
             da, db = at_point(dr, width, i, g), at_point(dl, width, i, g)
             total = flow + (a - b)
+            # The drag of the profile is constant along the pipe, so its potential falls linearly.
             p = pipe["admittance"] * (start - fall * (i + 0.5 + GAUSS_POINTS[g]) * pipe["dx"])
             force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], reynolds, total)
             friction += GAUSS_WEIGHTS[g] * (total * force)
+            # The derivative of a cross term with the profile and of a square, as for `pipe_energy`.
             rate += GAUSS_WEIGHTS[g] * ((p * (da + db) + flow * (da - db)) + 2.0 * (a * da + b * db))
     rows[1], rows[2], rows[3] = per * pipe["dx"] * friction, 0.0, per * pipe["dx"] * rate
 
@@ -123,6 +126,7 @@ def pipe_energy(t, y, out, tables, k, rows):
         for g in range(3):
             a, b = at_point(r, width, i, g), at_point(l, width, i, g)
             p = pipe["admittance"] * (start - fall * (i + 0.5 + GAUSS_POINTS[g]) * pipe["dx"])
+            # Products of sum and change: no difference of large squares.
             kinetic += GAUSS_WEIGHTS[g] * ((2.0 * flow + (a - b)) * (a - b))
             elastic += GAUSS_WEIGHTS[g] * ((2.0 * p + (a + b)) * (a + b))
     rows[0], rows[1] = per * pipe["dx"] * kinetic, per * pipe["dx"] * elastic
@@ -168,6 +172,7 @@ def pipe_power_barotropic(t, y, dydt, out, tables, k, rows):
             h += st["gravity"] * (z + rise_at(profile, pipe, (i + 0.5 + GAUSS_POINTS[g]) * dx))
             force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], reynolds, flow)
             friction += GAUSS_WEIGHTS[g] * v * force * (reference / m)
+            # Derivative of M^2 / (2 m) + W(m) + m g z: h + g z - v^2 / 2 per dm/dt, and v per dM/dt.
             rate += GAUSS_WEIGHTS[g] * ((h - 0.5 * v * v) * (da + db) / c + v * (da - db))
     rows[1], rows[2], rows[3] = dx * friction, jet_losses(out, tables, k), dx * rate
 

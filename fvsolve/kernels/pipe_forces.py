@@ -26,6 +26,7 @@ def read_forces(dydt, tables, values):
             n, o = pipe["cells"], pipe["y"]
             for i in range(n):
                 total += dydt[o + i] - dydt[o + n + i]
+            # A force of zero must not become a negative zero.
             values[k] = (0.0 - total) * pipe["dx"]
 
 
@@ -37,6 +38,7 @@ def _observe_forces(t, y, out, handle, values):
     tables = open_tables(handle)
     at = tables.layout[0]["forces"]
     dydt = tables.work[at : at + y.size]
+    # A state that is observed has no rates, so they are computed here, in a work array.
     RATES(t, y, dydt, out, handle)
     FRICTION(t, y, dydt, out, handle)
     read_forces(dydt, tables, values)

@@ -47,6 +47,7 @@ def wave_faces(settings, family, small, backward, c, left, right, scratch, f):
     left, right : float64[3]  ghost cells, nearest first
     """
     n = c.size
+    # The stencils of both ends overlap in so short a pipe: all its faces are computed from a single padded array.
     if n <= 5:
         pad = scratch[: n + 6]
         for k in range(n):
@@ -55,6 +56,7 @@ def wave_faces(settings, family, small, backward, c, left, right, scratch, f):
             pad[2 - g], pad[n + 3 + g] = left[g], right[g]
         faces(settings, family, small, backward, pad, f)
         return
+    # Inner faces read the cells in place. Only the three faces at each end need ghost cells and a copy.
     faces(settings, family, small, backward, c, f[3 : n - 2])
     for side in range(2):
         pad, target = scratch[:8], f[:3]
@@ -74,12 +76,14 @@ def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
     edge, ghosts, beyond = scratch[16:21], scratch[21:24], scratch[24:27]
     for backward in range(2):
         c = l if backward == 1 else r
+        # Edge cells are listed from the end inwards, so a backward wave is computed as the mirror image.
         edge_cells(c, backward, edge)
         entering_ghosts(edge, n, family, degree, l_in if backward == 1 else r_in, small, ghosts)
         edge_cells(c, 1 - backward, edge)
         leaving_ghosts(edge, n, family, degree, limiter, small, beyond)
         left, right = (beyond, ghosts) if backward == 1 else (ghosts, beyond)
         wave_faces(settings, family, small, backward, c, left, right, scratch, fl if backward == 1 else fr)
+    # The end faces keep the waves of the solved nodes: what leaves a pipe is what enters its node.
     fr[0], fr[n] = r_in, r_out
     fl[0], fl[n] = l_out, l_in
 
@@ -87,6 +91,7 @@ def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
 @njit
 def rates_from_faces(k, fr, fl, dr, dl):
     """Write d/dt of forward and backward wave (dr, dl) without friction, from their face values fr and fl."""
+    # A cell gains what its neighbour loses through a face, so that mass and momentum are conserved.
     for i in range(dr.size):
         dr[i] = -k * (fr[i + 1] - fr[i])
         dl[i] = k * (fl[i + 1] - fl[i])
@@ -111,12 +116,15 @@ def rates_linear(settings, k, backward, c, datum, edge, d):
     datum : value of the wave at the end where it enters [kg/s]; edge : float64[5]  work array
     """
     n, inside, enter, leave = c.size, settings["inside"], settings["enter"], settings["leave"]
+    # The factor k enters six weights once instead of every cell.
     e0, e1, e2, e3, e4, e5 = k * inside[0], k * inside[1], k * inside[2], k * inside[3], k * inside[4], k * inside[5]
+    # A forward wave reads cells i-3 .. i+2, a backward wave i-2 .. i+3: their first full stencils differ by a cell.
     if backward == 1:
         convolve(e5, e4, e3, e2, e1, e0, c, d[2 : n - 3])
     else:
         convolve(e0, e1, e2, e3, e4, e5, c, d[3 : n - 2])
     edge_cells(c, backward, edge)
+    # At the ends the weights contain the ghost cells, as sums of the datum and of five cells.
     for j in range(3):
         total = enter[j, 0] * datum
         for m in range(5):
@@ -138,9 +146,11 @@ def subtract_friction(k, flow, loss, base, r, l, dr, dl):
     times the differences of face values.
     The friction is averaged over two Gauss points of a cell: fourth order, and no kink of the law is missed.
     """
+    # A quarter: half of the friction for each wave, as the mean of two points.
     half, spread = 0.25 * loss, GAUSS / k
     for i in range(r.size):
         m = flow + (r[i] - l[i])
+        # dr + dl is -k times the difference of M over the cell, so m + d and m - d are M at the Gauss points.
         d = spread * (dr[i] + dl[i])
         hi, lo = m + d, m - d
         s = half * (abs(hi) * hi + abs(lo) * lo) - base
@@ -188,6 +198,7 @@ def subtract_friction_hazen(k, flow, loss, rough, base, r, l, dr, dl):
 @njit
 def rates_upwind(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
     """Write d/dt of both waves by the first-order upwind scheme with friction, in a single loop without face arrays."""
+    # Cells that read a datum stand outside the loops, which then have no branch and are vectorised.
     n = r.size
     half = 0.5 * loss
     m = flow + (r[0] - l[0])
@@ -209,6 +220,7 @@ def rates_upwind(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
 @njit(forceinline=True)
 def arriving_cell(k, flow, loss, base, before, behind, r, l):
     """Rates of both waves in a cell, as in `rates_arriving`; before, behind : waves that enter it [kg/s]."""
+    # Both waves that enter meet in this cell after the step, and friction acts on their difference.
     m = flow + (before - behind)
     s = 0.5 * loss * (abs(m) * m) - base
     return -k * (r - before) - s, k * (behind - l) + s
@@ -224,6 +236,7 @@ def rates_arriving(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
     """
     n = r.size
     half = 0.5 * loss
+    # In a pipe of a single cell both waves enter from nodes.
     dr[0], dl[0] = arriving_cell(k, flow, loss, base, r_in, l[1] if n > 1 else l_in, r[0], l[0])
     if n > 1:
         dr[n - 1], dl[n - 1] = arriving_cell(k, flow, loss, base, r[n - 2], l_in, r[n - 1], l[n - 1])
@@ -258,6 +271,7 @@ def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
         if pipe["friction"] != FRICTION_ROUGH and pipe["friction"] != FRICTION_HAZEN:
             rates_arriving(k, pipe["flow"], pipe["loss"], base, r, l, r_in, l_in, dr, dl)
         else:
+            # Without friction here: this law needs a logarithm or a power, and a loop of its own.
             rates_arriving(k, 0.0, 0.0, 0.0, r, l, r_in, l_in, dr, dl)
             subtract_friction_arriving(pipe, base, r, l, r_in, l_in, dr, dl)
         return
@@ -267,10 +281,12 @@ def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
             return
         rates_upwind(k, 0.0, 0.0, 0.0, r, l, r_in, l_in, dr, dl)
     elif settings["scheme"] == LINEAR and n >= 5:
+        # A linear scheme needs no face values: its weights give the differences of fluxes.
         for backward in range(2):
             c, datum, d = (l, l_in, dl) if backward == 1 else (r, r_in, dr)
             rates_linear(settings, k, backward, c, datum, scratch[:5], d)
     else:
+        # The scratch numbers before 32 belong to `both_faces`.
         fr, fl = scratch[32 : 33 + n], scratch[40 + n : 41 + 2 * n]
         both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl)
         rates_from_faces(k, fr, fl, dr, dl)
@@ -300,6 +316,7 @@ def outgoing_waves_linear(t, y, dydt, out, handle):
             wave = end_value(r if right == 1 else l, right, family, degree, limiter, small, scratch)
             out[at + 1 + right] = wave
             node = pipe["to_node"] if right == 1 else pipe["from_node"]
+            # From M' = r - l and Y p' = r + l: the flow into a node is 2 w - Y p', here at p' = 0.
             out[layout["net"] + node] += 2.0 * wave
 
 

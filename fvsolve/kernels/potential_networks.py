@@ -126,6 +126,7 @@ def write_sources(t, y, out, tables):
 def network_rates(t, y, dydt, out, handle):
     """Write all sources to `out`, and the rates of stores to `dydt`."""
     tables = open_tables(handle)
+    # Sources also without rates to write: probes read them.
     write_sources(t, y, out, tables)
     rates = tables.network_rates
     if dydt.size > 0:
@@ -199,6 +200,7 @@ def friction_events(t, y, out, tables, switch, g):
     elif direction < 0.0:
         backward = slip
     else:
+        # Neither function of a pair may be exactly zero: both would count as crossed.
         most, torque = torque_at_rest(t, tables, switch), row_value(y, out, tables, switch["flow"])
         forward = most - torque if torque != most else TINY
         backward = most + torque if torque != -most else TINY
@@ -242,6 +244,7 @@ def stored_networks(t, y, dydt, out, handle, stored):
     for k in range(elements.size):
         element, energy = elements[k], 0.0
         if element["capacity"] > 0.0:
+            # A product of change and mean value: no difference of large energies.
             change = row_change(y, out, tables, element["drop"])
             level = 1.0 if element["thermal"] == 1 else element["start"] + 0.5 * change
             energy = element["capacity"] * change * level

@@ -120,6 +120,7 @@ def react(y, dydt, out, tables, first, stride, mass, p, present, weight, entry):
         change = present * (ahead - back)
         for e in range(reaction["count"] if dydt.size > 0 else 0):
             coefficient = floats[reaction["data"] + 3 * e + CHANGE]
+            # A scalar may determine the rate without being changed, as a catalyst does.
             if coefficient != 0.0:
                 dydt[first + stride * integers[reaction["scalars"] + e]] += coefficient * change
         at = tables.layout[0]["extent"] + reaction["extent"]

@@ -106,10 +106,12 @@ def value_weno5(a, b, c, d, e, small):
     s0 = 13.0 / 12.0 * (a - 2.0 * b + c) ** 2 + 0.25 * (a - 4.0 * b + 3.0 * c) ** 2
     s1 = 13.0 / 12.0 * (b - 2.0 * c + d) ** 2 + 0.25 * (b - d) ** 2
     s2 = 13.0 / 12.0 * (c - 2.0 * d + e) ** 2 + 0.25 * (3.0 * c - 4.0 * d + e) ** 2
+    # In smooth data tau is of higher order than the indicators, so the weights stay near the ideal ones.
     tau = abs(s0 - s2)
     r0 = tau / (s0 + small)
     r1 = tau / (s1 + small)
     r2 = tau / (s2 + small)
+    # The weights 0.1, 0.6, 0.3 of the three parabolas give fifth order.
     w0 = 0.1 * (1.0 + r0 * r0)
     w1 = 0.6 * (1.0 + r1 * r1)
     w2 = 0.3 * (1.0 + r2 * r2)
@@ -173,6 +175,7 @@ def faces(settings, scheme, small, backward, p, f):
         else:
             faces_linear(s["w0"], s["w1"], s["w2"], s["w3"], s["w4"], s["w5"], p, f)
     elif scheme == rec.SHORT:
+        # Third order: the value at the face of the parabola through three cell averages.
         b, c, d = -1.0 / 6.0, 5.0 / 6.0, 1.0 / 3.0
         if backward == 1:
             faces_linear(0.0, 0.0, d, c, b, 0.0, p, f)

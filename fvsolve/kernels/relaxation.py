@@ -91,6 +91,7 @@ def velocity_change(st, floats, profile, pipe, r, l, w):
         a = gauss * ((r[high] - l[high]) - (r[low] - l[low]))
         b = gauss * ((r[high] + l[high]) - (r[low] + l[low])) / c
         u = (flow + (dflow + a)) / (m0 + (dm + b)) + (flow + (dflow - a)) / (m0 + (dm - b))
+        # Minus the value of the profile, so that the variables start at zero.
         w[i] = reference * (0.5 * u - flow / m0)
 
 
@@ -105,6 +106,7 @@ def wall_pressure(st, floats, profile, pipe, r, l, w):
         low, high = max(i - 1, 0), min(i + 1, n - 1)
         dm_gauss = GAUSS / max(high - low, 1) * ((r[high] + l[high]) - (r[low] + l[low])) / c
         m0, dm = profile[pipe["center"] + i], (r[i] + l[i]) / c
+        # A cell may be nearly empty while a cavity is open; its pressure must stay defined.
         p = pressure_of_mass(st, floats, pipe, max(m0 + (dm + dm_gauss), least))
         p += pressure_of_mass(st, floats, pipe, max(m0 + (dm - dm_gauss), least))
         w[i] = pipe["admittance"] * (0.5 * p - pressure_of_mass(st, floats, pipe, m0))
@@ -158,6 +160,7 @@ def _add_relaxation(t, y, dydt, out, handle):
         pipe = pipes[i]
         if pipe[COUNT] > 0:
             n, o, at = pipe["cells"], pipe["y"], pipe[VARIABLES]
+            # The terms of all exponentials are summed first, so the waves are changed in a single pass.
             w, loss = scratch[:n], scratch[n : 2 * n]
             INPUT(st, floats, profile, pipe, y[o : o + n], y[o + n : o + 2 * n], w)
             for j in range(n):
@@ -235,6 +238,7 @@ def _relaxation_power(st, floats, profile, pipe, w, y, dydt):
     n, width, taken, rate = w.size, polynomial_width(st, w.size), 0.0, 0.0
     for k in range(pipe[COUNT]):
         gain, at = floats[pipe[TERMS] + 2 * k], pipe[VARIABLES] + k * n
+        # A variable stores g z^2 / (2 n), which changes at the rate (g / n) z dz/dt.
         share = gain / floats[pipe[TERMS] + 2 * k + 1]
         z, dz = y[at : at + n], dydt[at : at + n]
         for i in range(n):
@@ -263,6 +267,7 @@ def friction_energy(st, floats, profile, pipe, y):
             start = steady_flow(st, profile, pipe, i)
             for g in range(3):
                 z = at_point(y[at : at + n], width, i, g)
+                # A product of change and sum: no difference of large squares.
                 total += GAUSS_WEIGHTS[g] * share * z * (2.0 * start + z)
     return 0.5 * total * pipe["dx"] / (st["rho"] * pipe["area"])
 
@@ -345,6 +350,7 @@ def density_law_power(st, floats, profile, pipe, node, w, y, dydt):
             carried = relative_enthalpy(st, floats, pressure_of_mass(st, floats, pipe, m)) - 0.5 * v * v
             carried += gravity_potential(st, profile, pipe, node, i, g)
             P = potential_along_barotropic(st, floats, profile, pipe, node, i, g)
+            # w is the change of pressure in units of the admittance: this gives the present potential.
             P += at_point(w, width, i, g) / pipe["admittance"]
             total += GAUSS_WEIGHTS[g] * (carried - P / st["rho"]) * bore_growth(st, floats, pipe, i, g, dydt)
     return total * pipe["dx"] / pipe["speed"]

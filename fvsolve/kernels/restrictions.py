@@ -28,6 +28,7 @@ def relative_area(kind, floats, table, size, opening):
     """
     if kind == 0:
         return opening
+    # The formula leaves 1/50 of the area at opening 0, where a valve is shut.
     if kind == 1:
         return exp(log(50.0) * (opening - 1.0)) if opening > 0.0 else 0.0
     if opening <= floats[table]:
@@ -71,6 +72,7 @@ def flow_at_drop(conductance, transition, drop):
         return 0.0
     size = conductance * abs(drop)
     if transition > 0.0 and size < transition * transition:
+        # With these coefficients value, slope and second derivative at x = 1 are those of sqrt(x).
         x = size / (transition * transition)
         flow = transition * x * (45.0 + x * x * (5.0 * x * x - 18.0)) / 32.0
     else:
@@ -103,6 +105,7 @@ def valve_step(g, transition, m, drop):
     finite and never too steep.
     """
     if transition > 0.0:
+        # The slope of the polynomial is greatest at zero drop, 45 g / (32 transition).
         target = flow_at_drop(g, transition, drop)
         steepest = 45.0 / 32.0 * g / transition
         return target - m, min(steepest, g / max(abs(target) + abs(m), 1e-300))
@@ -123,9 +126,11 @@ def flow_change(conductance, impedance, flow, surplus, target):
         return -flow
     gz = conductance * impedance
     side = 1.0 if flow >= 0.0 else -1.0
+    # A small change: this form of the root subtracts no nearly equal numbers, so x keeps its digits.
     if abs(surplus) <= 0.5 * flow * flow:
         b = 2.0 * abs(flow) + gz
         return 2.0 * surplus / (b + sqrt(b * b + 4.0 * side * surplus)) if b > 0.0 else 0.0
+    # A large change may reverse the flow, so the root is found for the total flow M + x.
     total = target + gz * flow
     root = gz + sqrt(gz * gz + 4.0 * abs(total))
     return (2.0 * total / root if root > 0.0 else 0.0) - flow
@@ -144,6 +149,7 @@ def flow_change_laminar(conductance, transition, impedance, flow, base, drop):
     x = flow_at_drop(conductance, transition, drop) - flow - base
     if impedance == 0.0 or x == 0.0:
         return x
+    # Pressures at the pipe ends oppose the change, so the root lies between zero and this change.
     low, high = min(x, 0.0), max(x, 0.0)
     for _ in range(100):
         rest = drop - impedance * x
@@ -155,6 +161,7 @@ def flow_change_laminar(conductance, transition, impedance, flow, base, drop):
         step = g / (1.0 + impedance * flow_slope(conductance, transition, rest))
         new = x - step
         if not (low <= new <= high):
+            # The slope of the law changes fast near the transition, where Newton may leave the bounds.
             new = 0.5 * (low + high)
         if abs(new - x) <= 1e-15 * (abs(flow) + abs(new)):
             return new
@@ -167,6 +174,7 @@ def open_scheduled(t, out, tables):
     """Write conductances [kg2/s2/Pa] of restrictions that follow schedules, without a device, to out[conductance]."""
     valves, at = tables.valves, tables.layout[0]["conductance"]
     for k in range(valves.size):
+        # Devices write the conductances of their own restrictions.
         if valves[k]["device"] < 0:
             out[at + k] = valve_conductance(tables, k, t)
 
@@ -233,6 +241,7 @@ def head_drop(tables, out, k):
     i, j = valve["from_node"], valve["to_node"]
     p_i, p_j = out[layout["pressure"] + i], out[layout["pressure"] + j]
     if st["law"] == LAW_LINEAR:
+        # The drop of the profile contains the elevations.
         return st["rho"], valve["drop"] + (p_i - p_j)
     p_i, p_j = p_i + nodes[i]["pressure"], p_j + nodes[j]["pressure"]
     rise = st["gravity"] * (nodes[j]["elevation"] - nodes[i]["elevation"])
@@ -244,6 +253,7 @@ def head_drop(tables, out, k):
 def mean_density(st, floats, p_i, p_j):
     """Mean density dp / dh between the pressures p_i and p_j [kg/m3], h : specific enthalpy."""
     dp = p_i - p_j
+    # At smaller differences of pressure the difference of enthalpies is rounding.
     if abs(dp) > 1e-3:
         return dp / (enthalpy(st, floats, p_i) - enthalpy(st, floats, p_j))
     return density(st, floats, p_i)
@@ -257,6 +267,7 @@ def driving_pressure(st, floats, p_i, z_i, p_j, z_j):
     elevations it is p_i - p_j.
     """
     dp = p_i - p_j
+    # At equal elevations the formula reduces to p_i - p_j, without the rounding of enthalpies.
     if z_i != z_j:
         dh = enthalpy(st, floats, p_i) - enthalpy(st, floats, p_j)
         dp = mean_density(st, floats, p_i, p_j) * (dh + st["gravity"] * (z_i - z_j))
@@ -346,6 +357,7 @@ def is_sensing(tables, k):
 @njit
 def has_lifted_backflow(tables, k, m):
     """True if the upstream pressure lifts restriction k and its flow m [kg/s] is negative."""
+    # A structure between two levels has no event flags, and may flow backwards.
     return m < 0.0 and tables.valves[k]["event"] >= 0 and is_lifted(tables, k)
 
 
@@ -357,6 +369,7 @@ def restriction_events(t, y, out, handle, g):
     for k in range(valves.size):
         i, j = valves[k]["from_node"], valves[k]["to_node"]
         if valves[k]["hooks"] >= 0 and tables.hooks[valves[k]["hooks"], BENDS] != 0:
+            # Profile pressures are subtracted first, so the difference of small changes keeps its digits.
             drop = nodes[i]["pressure"] - nodes[j]["pressure"] + (out[pressure + i] - out[pressure + j])
             call_bends(tables.hooks[valves[k]["hooks"], BENDS], tables, k, drop, g)
 

@@ -88,6 +88,7 @@ def wave_jump(st, floats, pipe, side, to):
     area = pipe["area"] * area_ratio(st, pipe["compliance"], to[0])
     if abs(to[0] - side[0]) <= NEAR * (to[0] - st["floor"]):
         return (to[2] - side[2]) * 0.5 * (1.0 / side[3] + 1.0 / to[3]), area / to[3]
+    # The pressure falls: a rarefaction, with the Riemann integral; otherwise a shock.
     if to[0] < side[0]:
         return -rarefaction_change(st, floats, pipe, to, side), area / to[3]
     force, contraction = to[2] - side[2], 1.0 / side[1] - 1.0 / to[1]
@@ -104,6 +105,7 @@ def star_state(st, floats, pipe, left, v_l, right, v_r):
     that a vacuum remains between them.
     """
     floor, low, high = st["floor"], st["floor"], UNBOUNDED
+    # The acoustic solution, with constant impedances, is the first value.
     both = right[3] * left[0] + left[3] * right[0] + left[3] * right[3] * (v_l - v_r) / pipe["area"]
     p = both / (left[3] + right[3])
     if p <= floor:
@@ -113,6 +115,7 @@ def star_state(st, floats, pipe, left, v_l, right, v_r):
         change_l, rise_l = wave_jump(st, floats, pipe, left, middle)
         change_r, rise_r = wave_jump(st, floats, pipe, right, middle)
         gap, before = (v_l - change_l) - (v_r + change_r), p
+        # The gap of velocities falls as p rises, so its sign bounds the root.
         if gap > 0.0:
             low = p
         else:
@@ -146,6 +149,7 @@ def sonic_state(st, floats, pipe, side, v0, end):
     side, v0 : state of `state_at` before the rarefaction, and its velocity [m/s]; end : state behind it
     """
     floor = st["floor"]
+    # Bisection of the logarithm: the gas pressure may fall by orders of magnitude in a rarefaction.
     low, high = log(end[0] - floor), log(side[0] - floor)
     state, v = side, v0
     for _ in range(50):
@@ -169,11 +173,14 @@ def sample_wave(st, floats, pipe, side, v0, end, v):
     The wave travels to the left; the velocity v behind it is not negative. F : integral of A dp
     """
     if end[0] > side[0]:
+        # From a shock speed of zero on (jump of mass flow over jump of mass), the face lies before the shock.
         if end[1] * v >= side[1] * v0 and end[1] > side[1]:
             return side[1], v0, side[2]
         return end[1], v, end[2]
+    # The flow before the wave is supersonic, so the whole rarefaction is swept past the face.
     if v0 * side[1] >= side[3]:
         return side[1], v0, side[2]
+    # The rarefaction contains the face, where the flow has exactly the speed of sound.
     if v * end[1] > end[3]:
         end, v = sonic_state(st, floats, pipe, side, v0, end)
     return end[1], v, end[2]
@@ -188,10 +195,12 @@ def face_flux(st, floats, pipe, p_l, v_l, p_r, v_r):
     """
     left, right = state_at(st, floats, pipe, p_l), state_at(st, floats, pipe, p_r)
     middle, after, ahead = star_state(st, floats, pipe, left, v_l, right, v_r)
+    # Both velocities agree but for the error of Newton, except at a vacuum.
     m, v, force = middle[1], 0.5 * (after + ahead), middle[2]
     if after >= 0.0 and v >= 0.0:
         m, v, force = sample_wave(st, floats, pipe, left, v_l, middle, after)
     elif ahead <= 0.0 and v <= 0.0:
         m, v, force = sample_wave(st, floats, pipe, right, -v_r, middle, -ahead)
+        # The right wave was sampled as its mirror image, a wave to the left.
         v = -v
     return m * v, m * v * v + force

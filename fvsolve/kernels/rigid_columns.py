@@ -55,6 +55,7 @@ def is_controlled(tables, out, i):
     areas are known, or the only valve is near its seat.
     """
     node = tables.nodes[i]
+    # With two columns and closed valves the node is a column junction, see `column_junctions`.
     if node["gates"] < 0 or node["columns"] > 1:
         return False
     if node["gate_count"] == 1 and seating_valve(tables, i) >= 0:
@@ -70,6 +71,7 @@ def area_rate_known(tables, out, i):
     It is known from a schedule, near the seat, or as zero until an event opens the valve.
     """
     node = tables.nodes[i]
+    # The decelerating pressure follows from these rates, so all of them must be known.
     for e in range(node["gate_count"]):
         k = tables.integers[node["gates"] + e]
         if (
@@ -105,6 +107,7 @@ def find_control_end(tables, out, k):
 def find_controlled_columns(tables, out):
     """Write for each rigid column the end at which valves control its flow to `out`: results of `find_control_end`."""
     at, n = tables.layout[0]["valve_controlled"], tables.columns.size
+    # Cleared first, because `has_pressure_reference` reads the results of all columns.
     out[at : at + n] = 0.0
     for k in range(n):
         out[at + k] = find_control_end(tables, out, k)
@@ -125,6 +128,7 @@ def stationary_pressure(y, tables, out, k, end, solved):
     column = tables.columns[k]
     p, softness = junctions.far_end_pressure(y, tables, out, k, end, solved)
     inertia = column["length"] / column["area"]
+    # At rest there is no friction: the pressure loss of the profile is added back.
     return p + end * (junctions.driving_offset(tables, out, column) + column["drag"] * inertia), inertia + softness
 
 
@@ -172,6 +176,7 @@ def seating_drop(t, y, tables, out, k, index, stationary, inertia, other, drop):
     before, behind = (stationary, other) if ahead else (other, stationary)
     still, slope = call_lead(tables.hooks[device["hooks"], LEAD], t, y, tables, device, before, behind, drop, ahead)
     driving, speed = lift_drop(drop, still, slope, heavy)
+    # Steps under error control (step 0) resolve the exchange of lift and flow, so need no correction.
     if driving <= 0.0 or conductance(tables, out, index) == 0.0 or tables.clock[0]["step"] == 0.0:
         return driving, speed
     way = 1.0 if valve["from_node"] == column["to_node"] or valve["to_node"] == column["from_node"] else -1.0
@@ -223,6 +228,7 @@ def gate_flow(t, tables, out, x, p, solved):
         k = tables.integers[tables.nodes[x]["gates"] + e]
         drop = p - zero_flow_pressure(tables, out, x, k, solved)
         root = sqrt(drop) if drop >= 0.0 else -sqrt(-drop)
+        # Near a kink t is not the present time, to which conductances in `out` belong: both are evaluated.
         later = sqrt(conductance_at(t + RATE_INTERVAL, tables, out, k))
         widening = (later - sqrt(conductance_at(t, tables, out, k))) / RATE_INTERVAL
         flow += sqrt(conductance(tables, out, k)) * root
@@ -256,6 +262,7 @@ def opening_pressure(t, tables, out, x, stationary, inertia, solved):
 
     It is the only root p of p - stationary + inertia rate(p) = 0, with the rate of flow in the results of `gate_flow`.
     """
+    # An opening valve moves the pressure from its stationary value towards that without flow.
     low, high = zero_flow_range(tables, out, x, solved)
     low, high, p = min(low, stationary), max(high, stationary), stationary
     for _ in range(200):
@@ -264,6 +271,7 @@ def opening_pressure(t, tables, out, x, stationary, inertia, solved):
         low, high = (low, p) if residual > 0.0 else (p, high)
         new = p - residual / (1.0 + inertia * rise)
         if not low < new < high:
+            # The slope is infinite where a valve has no drop; there Newton may leave the bounds.
             new = 0.5 * (low + high)
         if abs(new - p) <= PRESSURE_TOLERANCE * (1e5 + abs(new)):
             return new
@@ -284,6 +292,7 @@ def closing_pressure(t, tables, out, x, way, start, stationary, inertia, solved)
     for _ in range(200):
         flow, rate, rise = gate_flow(t, tables, out, x, p, solved)
         slope = 1.0 + inertia * rise
+        # Past the minimum of the convex function: it has no root with this direction of flow.
         if slope <= 0.0 or flow * way <= 0.0:
             return p, False
         step = (p - stationary + inertia * rate) / slope
@@ -303,12 +312,14 @@ def controlled_pressure(t, tables, out, x, own, stationary, inertia, solved):
     flow, rate, _ = gate_flow(t, tables, out, x, stationary, solved)
     if flow == 0.0 and rate == 0.0:
         return stationary
+    # Opening valves: the residual rises with the pressure and has a single root.
     if rate * flow >= 0.0:
         return opening_pressure(t, tables, out, x, stationary, inertia, solved)
     brake = -inertia * rate / flow * junctions.gate_area(tables, out, x)[0]
     way = 1.0 if own > 0.0 or (own == 0.0 and flow > 0.0) else -1.0
     least, most = zero_flow_range(tables, out, x, solved)
     reach = brake + sqrt(max(abs(stationary - least), abs(stationary - most)))
+    # Where the present direction has no root, the flow has the opposite direction.
     for _ in range(2):
         start = most + reach * reach if way > 0.0 else least - reach * reach
         p, exists = closing_pressure(t, tables, out, x, way, start, stationary, inertia, solved)
@@ -452,6 +463,7 @@ def column_rate(t, y, tables, out, k, change):
     """
     column, end = tables.columns[k], control_end(tables, out, k)
     node = column["to_node"] if end == 1 else column["from_node"]
+    # At a seat that is closed the general formula would accelerate a column that cannot move.
     if end != 0 and (seating_valve(tables, node) < 0 or junctions.gate_area(tables, out, node)[0] == 0.0):
         return end * controlled_rate(t, y, tables, out, k, end)
     friction = junctions.column_drag(column, out[tables.layout[0]["column"] + k])
@@ -505,8 +517,10 @@ def junction_pressures_barotropic(t, y, tables, out):
         return
     pressure, change = tables.layout[0]["pressure"], 1e300
     add_controlled_rates(t, y, tables, out, n)
+    # Here to mark junctions with held pressure; each sweep assembles again, because elimination overwrites.
     junctions.assemble_with_given(tables, out, n)
     rows, _, _, right, pinned, _ = junctions.junction_work(tables, n)
+    # The iteration starts from the profile, so its result depends on (t, y) alone.
     for i in range(rows.size):
         if rows[i] >= 0.0 and pinned[int(rows[i])] == 0.0:
             out[pressure + i] = 0.0

@@ -105,6 +105,7 @@ def outlet_values(y, out, tables, q):
             if st["scheme"] != UPWIND:
                 b = cell_value(y, tables, q, p, end_cell(tables, p, right, 1))
                 c = cell_value(y, tables, q, p, end_cell(tables, p, right, 2))
+                # A pipe of two cells has a single difference, which counts on both sides.
                 near, far = a - b, b - c if pipes[p]["cells"] > 2 else a - b
                 slope = limited(limiter, near, far)
                 if slope != 0.0:
@@ -144,6 +145,7 @@ def pipe_inflows(y, out, tables, q, amount, weight, cells, count):
             weight[node] += g
             cells[node] += cell
             count[node] += 1.0
+            # Flow out of a node carries the value of the node, which is still unknown.
             if flow > 0.0:
                 amount[node] += flow * out[edge + 2 * (q * pipes.size + p) + right]
                 weight[node] += flow
@@ -176,6 +178,7 @@ def mixes(y, out, tables, i):
     node = tables.nodes[i]
     if not has_storage(node["kind"]):
         return node["kind"] == JUNCTION
+    # A dry tank stores nothing, so what flows in leaves at once with its own value.
     dry = node["mass"] + y[node["y"]] <= DRY_DEPTH * node["density"] * node["area"]
     return dry or out[tables.layout[0]["supply"] + i] > 0.0
 
@@ -225,6 +228,7 @@ def add_heat(out, tables, specific_heat, amount, weight):
     heat, at = tables.layout[0]["heat"], tables.layout[0]["exchange"]
     for j in range(tables.heat_sources.size):
         amount[heated_node(out, tables, j)] += out[heat + j]
+    # As an inflow with the value of the thermal node, so that the mean stays between both values.
     for k in range(tables.exchangers.size):
         g = tables.exchangers[k]["conductance"] / specific_heat
         amount[tables.exchangers[k]["node"]] += g * out[at + 2 * k]
@@ -270,6 +274,7 @@ def write_exchange(y, out, tables, q, total, share):
         arriving = leaving = out[layout["value"] + q * nodes.size + i]
         capacity = 0.0
         if exchanger["effectiveness"] > 0.0:
+            # `value` at such a node is that after the exchanger; the heat follows from the fluid that arrives.
             if mixes(y, out, tables, i):
                 flow, arriving = share[i], total[i] / share[i] if share[i] > 0.0 else other
             else:
@@ -324,6 +329,7 @@ def mix_nodes(t, y, out, tables, q):
         add_heat(out, tables, specific_heat, amount, weight)
     for _ in range(MAX_SWEEPS):
         for i in range(n):
+            # A value passes one valve in each sweep, so a chain of nodes without volume needs several.
             total[i], share[i] = amount[i], weight[i]
         for k in range(valves.size):
             flow = out[layout["valve"] + k]
@@ -334,6 +340,7 @@ def mix_nodes(t, y, out, tables, q):
             share[downstream] += abs(flow)
         changed = False
         for i in range(n):
+            # Without any inflow the node keeps the mean of the cells beside it.
             if share[i] > 0.0 and mixes(y, out, tables, i):
                 value = after_exchange(out, tables, q, i, total[i] / share[i])
                 changed = changed or abs(value - out[at + i]) > CHANGE_TOLERANCE * abs(value)
@@ -376,6 +383,7 @@ def exchange_amounts(t, y, dydt, out, tables, q):
             node = pipes[p]["to_node"] if right == 1 else pipes[p]["from_node"]
             flow = end_flow(out, tables, p, right)
             cell = cell_value(y, tables, q, p, end_cell(tables, p, right, 0))
+            # Upwind: flow out of the pipe carries the value at its end, flow into it that of the node.
             through = flow * (out[layout["edge"] + at] if sign * flow > 0.0 else out[value + node])
             through += sign * end_conductance(y, tables, q, p, right) * (cell - out[value + node])
             out[layout["carried"] + at] = through
@@ -392,6 +400,7 @@ def exchange_amounts(t, y, dydt, out, tables, q):
             out[inflow + tables.exchangers[k]["node"]] += out[layout["net"] - tables.exchangers.size + k]
     for i in range(n):
         kind, supply = nodes[i]["kind"], out[layout["supply"] + i]
+        # Outside a reservoir everything that flows in is taken away, and everything that leaves is supplied.
         if kind == FIXED:
             out[gain + i] = -out[inflow + i]
         elif kind != PATCH and supply > 0.0:
@@ -424,6 +433,7 @@ def face_flows(first, last, slowness, dr, dl, flow):
     flow[0] = first
     for i in range(dr.size - 1):
         flow[i + 1] = flow[i] - slowness * (dr[i] + dl[i])
+    # Not the sum, which differs by rounding from the flow with which the node is balanced.
     flow[dr.size] = last
 
 
@@ -477,6 +487,7 @@ def subtract_decay(decay, ambient, s, m, wall, c, ds):
     """
     lost = 0.0
     for i in range(s.size):
+        # What the wall stores does not decay.
         fades = decay * ((s[i] - wall * c[i]) - ambient * m[i])
         ds[i] -= fades
         lost += fades
@@ -506,6 +517,7 @@ def pipe_scalar_rates(y, dydt, out, tables, p):
         scratch[4 * n + 1 : 5 * n + 2],
     )  # fmt: skip
     cell_masses(base, 1.0 / pipe["speed"], r, l, m)
+    # The flows of the solved nodes, by which scalars at nodes are balanced too.
     first, last = end_flow(out, tables, p, 0), end_flow(out, tables, p, 1)
     face_flows(first, last, dx / pipe["speed"], dydt[o : o + n], dydt[o + n : o + 2 * n], flow)
     least, most = extremes(m, flow)
@@ -523,12 +535,15 @@ def pipe_scalar_rates(y, dydt, out, tables, p):
                 near, inner = (n - 1, n - 2) if right == 1 else (0, 1)
                 sign = 1.0 if right == 1 else -1.0
                 if sign * (last if right == 1 else first) > 0.0:  # outflow: the slope follows from the value at the end
+                    # The face is half a cell away, so the slope over a cell is twice the difference.
                     d[near] = 2.0 * sign * (out[layout["edge"] + ends + right] - c[near])
                 elif n > 1:
+                    # Where fluid enters, the value of the node at the face bounds the slope.
                     node = pipe["to_node"] if right == 1 else pipe["from_node"]
                     datum = out[layout["value"] + q * nodes + node]
                     d[near] = sign * limited(limiter, 2.0 * (datum - c[near]), c[near] - c[inner])
         inner_fluxes(0.5 * scalar["diffusivity"] / dx, c, d, m, flow, f)
+        # The flows that the nodes have booked: what leaves a pipe enters its node.
         f[0], f[n] = out[layout["carried"] + ends], out[layout["carried"] + ends + 1]
         amount_rates(1.0 / dx, f, ds)
         lost = subtract_decay(scalar["decay"], scalar["ambient"], s, m, wall, c, ds) if scalar["losses"] > 0 else 0.0
@@ -599,6 +614,7 @@ def value_at_probe(y, out, tables, probe, kind, i, q):
         return out[layout["value"] + q * nodes + i]
     if probe["side"] != 0:
         right = 1 if probe["side"] > 0 else 0
+        # Where fluid enters the pipe, its end has the value of the node.
         if probe["side"] * end_flow(out, tables, i, right) < 0.0:
             node = pipes[i]["to_node"] if right == 1 else pipes[i]["from_node"]
             return out[layout["value"] + q * nodes + node]

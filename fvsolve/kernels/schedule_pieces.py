@@ -40,6 +40,7 @@ def piece_value(pieces, row, t):
     if pieces[row, 1] == POLYNOMIAL:
         return pieces[row, 3] + s * (pieces[row, 4] + s * (pieces[row, 5] + s * pieces[row, 6]))
     if pieces[row, 1] == POWER:
+        # Beyond its duration the piece keeps its end value; a power of a negative number does not exist.
         rest = min(max(1.0 - s / pieces[row, 5], 0.0), 1.0)
         return pieces[row, 4] + (pieces[row, 3] - pieces[row, 4]) * rest ** pieces[row, 6]
     value = pieces[row, 3] + pieces[row, 4] * sin(pieces[row, 5] * s + pieces[row, 6])
@@ -89,6 +90,7 @@ def schedule_value(tables, index, t):
     From the end of the schedule segment on, a schedule of several pieces keeps its left limit at this end.
     """
     record = tables.schedules[index]
+    # The usual case, a single piece, needs neither a search nor a call.
     if record["pieces"] == 1:
         return piece_value(tables.pieces, record["first"], t)
     return piecewise_value(tables, index, t)

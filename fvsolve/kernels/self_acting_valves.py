@@ -41,6 +41,7 @@ def loop_rate(out, tables, k, i, speed):
     drop = head_drop(tables, out, k)[1]
     soft = node_impedance(tables, valve["from_node"]) + node_impedance(tables, valve["to_node"])
     gain = speed * sqrt(valve["conductance"] * abs(drop)) / (1.0 + soft * restriction_slope(tables, out, k, drop))
+    # A stored mass adds an integration to the loop, which then oscillates: its rate is a square root.
     stiff = stiffness_of(tables.nodes, layout, out, i) if tables.nodes[i]["kind"] != JUNCTION else 0.0
     return max(gain * node_impedance(tables, i), sqrt(gain * stiff))
 

@@ -40,6 +40,7 @@ def combine(begin, end, y, h, weights, count, k, out):
     y, out = y[begin:end], out[begin:end]
     base = y
     for j in range(count):
+        # Many weights of a tableau are zero; each skipped term saves a pass over memory.
         if weights[j] == 0.0:
             continue
         if first < 0:
@@ -61,6 +62,7 @@ def combine(begin, end, y, h, weights, count, k, out):
         for i in range(out.size):
             out[i] = base[i] + c0 * k0[i]
     elif not copied:
+        # All weights are zero, so the sum is the state itself.
         copy(y, out)
 
 
@@ -84,6 +86,7 @@ def request_sums(sums, mode, y, h, weights, count, k, to, last):
     sums[MODE], sums[NOW], sums[TO], sums[RATES] = mode, address_of(y), address_of(to), address_of(k)
     sums[WEIGHTS], sums[LAST] = address_of(weights), address_of(last)
     sums[SIZE], sums[COUNT], sums[STAGES] = y.size, count, k.shape[0]
+    # The step is a float in an array of integers, so it is written through its address.
     floats_at(address_of(sums) + 8 * STEP, 1)[0] = h
 
 
@@ -118,6 +121,7 @@ def form_rows(sums, behind, at, width, begin, stop, left, right):
     y, to, h = floats_at(sums[NOW], size), floats_at(sums[TO], size), floats_at(address_of(sums) + 8 * STEP, 1)[0]
     k = floats_at(sums[RATES], stages * size).reshape((stages, size))
     weights, count = floats_at(sums[LAST if behind else WEIGHTS], stages), stages if behind else sums[COUNT]
+    # Whole rows follow each other in memory: a single long loop.
     if left == 0 and right == width:
         combine(at + width * begin, at + width * stop, y, h, weights, count, k, to)
         return

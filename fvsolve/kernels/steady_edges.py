@@ -46,6 +46,7 @@ def edge_row(law, flow, drop):
     """
     if law[0] == FRICTION:
         jet = 2.0 * (law[10] if flow > 0.0 else law[9]) * abs(flow)
+        # Turbulent friction has the slope zero at rest, where Newton's step would be infinite.
         slope = max(drag_slope(law[2], law[3], law[4], law[5], law[6], flow), law[7])
         return law[1] * slope + jet, 1.0, drop - friction_drop(law, flow)
     if law[0] == LEAK:
@@ -55,6 +56,7 @@ def edge_row(law, flow, drop):
     if transition > 0.0 and abs(target) < transition:
         slope = flow_slope(here, transition, drop)
         return 1.0 / slope, 1.0, (target - flow) / slope
+    # Without flow and drop the chord would be zero.
     chord = max(abs(target) + abs(flow), 1e-6 * math.sqrt(law[1]))
     return chord / here, 1.0, drop - abs(flow) * flow / here
 
@@ -83,6 +85,7 @@ def fill_systems(numbers, rows, laws, terms, places, drawn, scales, flow, potent
             if rows[r, 6] == 1:
                 values[k, at + 1 + rows[r, 5]] = beta
             right[k, rows[r, 0]] = gamma / pressure
+        # A balance has several terms, so its row is set before any flow is subtracted.
         for t in range(terms.shape[0]):
             right[k, terms[t, 0]] = drawn[k, terms[t, 0]]
         for t in range(terms.shape[0]):

@@ -51,6 +51,7 @@ def factor_swamee_jain(reynolds, roughness):
     EPANET computes it so (Rossman et al. 2020, EPANET 2.2 User Manual, chapter 12).
     reynolds : Reynolds number above 2000 [-]; roughness : relative to the diameter [-]
     """
+    # Below Re 4000 the cubic needs factor and slope at Re 4000.
     inner = roughness / 3.7 + 5.74 / max(reynolds, TURBULENT) ** 0.9
     root = -TWO_OVER_LN10 * log(inner)
     factor = 1.0 / (root * root)
@@ -70,6 +71,7 @@ def factor_times_reynolds(reynolds, roughness):
     This makes the drop a monotone function of the flow. A roughness below zero stands for the factor of Swamee and
     Jain, see `signed_roughness`. roughness : relative to the diameter [-]
     """
+    # The product with Re is finite at rest, where the factor itself is infinite.
     if reynolds <= LAMINAR:
         return 64.0
     if roughness < 0.0:
@@ -77,6 +79,7 @@ def factor_times_reynolds(reynolds, roughness):
     turbulent = factor_turbulent(reynolds, roughness) * reynolds
     if reynolds >= TURBULENT:
         return turbulent
+    # A blend of fifth degree has continuous slope and curvature at both ends.
     s = (reynolds - LAMINAR) / (TURBULENT - LAMINAR)
     weight = s * s * s * (10.0 + s * (6.0 * s - 15.0))
     return 64.0 + weight * (turbulent - 64.0)
@@ -91,6 +94,7 @@ def power_of_square(square):
     """
     bits = np.float64(square).view(np.int64)
     u = np.int64((bits & MANTISSA) | BITS_OF_ONE).view(np.float64) - 1.5
+    # Two short chains of products, which a processor computes at the same time.
     high = C8 + u * (C9 + u * (C10 + u * (C11 + u * (C12 + u * (C13 + u * (C14 + u * C15))))))
     low = C0 + u * (C1 + u * (C2 + u * (C3 + u * (C4 + u * (C5 + u * (C6 + u * C7))))))
     u *= u
@@ -117,6 +121,7 @@ def drag(kind, loss, rough, roughness, reynolds, flow):
     size = abs(flow)
     force = loss * (size * flow)
     if kind == FRICTION_ROUGH:
+        # f |M| as (f Re) over Re per mass flow, which is finite at rest.
         force += rough * factor_times_reynolds(reynolds * size, roughness) / reynolds * flow
     return force
 
@@ -131,6 +136,7 @@ def drag_slope(kind, loss, rough, roughness, reynolds, flow):
     size = abs(flow)
     slope = 2.0 * loss * size
     if kind == FRICTION_ROUGH:
+        # The second term, a Reynolds number of 1e-9, keeps the increment above zero at rest.
         step = 1e-6 * size + 1e-9 / reynolds
         high = drag(kind, 0.0, rough, roughness, reynolds, size + step)
         slope += (high - drag(kind, 0.0, rough, roughness, reynolds, size)) / step

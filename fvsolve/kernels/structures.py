@@ -54,6 +54,7 @@ def flow_template(floats, at, setting, ahead, z, fall):
 
 def slopes_template(floats, at, setting, ahead, z, fall):
     """Derivatives [m2/s] of the flow by the fall at a constant higher level, and by this level at a constant fall."""
+    # A fall is never negative, so the difference is one-sided at equal levels.
     low, high = max(fall - CHANGE, 0.0), fall + CHANGE
     by_fall = FLOW(floats, at, setting, ahead, z, high)[0] - FLOW(floats, at, setting, ahead, z, low)[0]
     by_level = FLOW(floats, at, setting, ahead, z + CHANGE, fall)[0]
@@ -80,10 +81,12 @@ def chord_template(floats, at, setting, ahead, z, fall, flow, present, by_level)
     sought = max(present, 0.0) if by_level else abs(present)
     begin, reach, x = z if by_level else fall, max(fall, LINEAR_FALL), 0.0
     low, high, found = begin if by_level else 0.0, begin, flow
+    # The law gives more than the present flow, so a level with this flow lies below.
     while by_level and found > sought and reach < FARTHEST:
         low, reach = low - reach, 2.0 * reach
         found = FLOW(floats, at, setting, ahead, low, fall)[0]
     found = flow
+    # The law gives less than the present flow, so it is sought above.
     while found < sought and reach < FARTHEST:
         low, high, reach = high, high + reach, 2.0 * reach
         found = FLOW(floats, at, setting, ahead, high if by_level else z, fall if by_level else high)[0]
@@ -181,6 +184,7 @@ def step_template(out, tables, k, g, m, drop, denser, wide):
     """(a [kg/s], s [kg/s/Pa]) of the next Newton step dM = a + s d(drop); arguments as for `restriction_step`."""
     st, floats, at, setting = tables.settings[0], tables.floats, tables.valves[k]["data"], setting_of(tables, out, k)
     rho = st["rho"] * denser
+    # Both levels are known, so the flow is too, and Newton needs no slope.
     if not ends_at_junction(tables, k):
         ahead, z, fall = higher_level(tables, out, k, drop)
         flow = rho * FLOW(floats, at, setting, ahead, z, fall)[0]

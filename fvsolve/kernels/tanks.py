@@ -29,6 +29,7 @@ def level_of_volume(floats, shape, rows, volume):
     z0, z1 = floats[shape + k], floats[shape + k + 1]
     a0, a1 = floats[shape + rows + k], floats[shape + rows + k + 1]
     rest = volume - floats[shape + 2 * rows + k]
+    # Below the lowest level the tank is a prism, or has no area at all.
     if rest <= 0.0:
         return z0 + rest / a0 if a0 > 0.0 else z0
     top = floats[shape + 3 * rows - 1]
@@ -36,6 +37,7 @@ def level_of_volume(floats, shape, rows, volume):
         last = floats[shape + 2 * rows - 1]
         return floats[shape + rows - 1] + (volume - top) / last
     growth = (a1 - a0) / (z1 - z0)
+    # This form of the root also holds for a constant area and for an area of zero at the lower level.
     return z0 + 2.0 * rest / (a0 + sqrt(max(a0 * a0 + 2.0 * growth * rest, 0.0)))
 
 
@@ -76,6 +78,7 @@ def limit_events(node, armed, g, k, distance, away):
         g[k] = g[k + 1] = distance
     elif armed[k] > 0.0:
         over = away - RETURN_SPEED * mass_per_metre(node)
+        # With a zero both functions would count as crossed, and the tank would be held and free at once.
         over = LEAST if over == 0.0 else over
         g[k], g[k + 1] = over, -over
     elif armed[k + 1] > 0.0 and distance <= 0.0:

@@ -34,6 +34,7 @@ def cell_reynolds(y, tables, p, i):
     mass = tables.profile[pipe["center"] + i] + (y[pipe["y"] + i] + y[pipe["y"] + n + i]) / pipe["speed"]
     mass += tables.floats[tables.scalars[k]["wall_masses"] + p]
     temperature = y[tables.scalars[k]["y"] + pipe["cell"] + i] / mass + tables.scalars[k]["zero"]
+    # Rounding of the temperature must not disturb a steady flow.
     if abs(temperature - pipe["temperature"]) <= SAME * pipe["temperature"]:
         return pipe["reynolds"]
     start = walther_viscosity(st["walther_a"], st["walther_b"], pipe["temperature"])
@@ -57,6 +58,7 @@ def viscous_friction(t, y, dydt, out, handle):
         kind, loss, rough, roughness, before = FRICTION_ROUGH, 0.0, pipe["rough"], pipe["roughness"], pipe["reynolds"]
         for i in range(n):
             now = cell_reynolds(y, tables, p, i)
+            # The rates of waves already contain the friction at this temperature.
             if now == before:
                 continue
             flow = pipe["flow"] + (y[o + i] - y[o + n + i])
@@ -64,6 +66,7 @@ def viscous_friction(t, y, dydt, out, handle):
             for sign in (-1.0, 1.0):
                 excess += drag(kind, loss, rough, roughness, now, flow + sign * d)
                 excess -= drag(kind, loss, rough, roughness, before, flow + sign * d)
+            # A quarter: half of the friction for each wave, as the mean of two points.
             excess *= 0.25
             if st["law"] != LAW_LINEAR:
                 mass = tables.profile[pipe["center"] + i] + (y[o + i] + y[o + n + i]) / pipe["speed"]

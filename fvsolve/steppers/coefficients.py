@@ -110,6 +110,7 @@ def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
     t, blocks = np.zeros((q, q)), np.zeros((q, q))
     real = np.abs(values.imag) <= 1e-12 * np.abs(values)
     at = 0
+    # Real eigenvalues first: error estimates use the first block as a real shift.
     for i in [*np.flatnonzero(real), *np.flatnonzero(~real & (values.imag > 0))]:
         v = vectors[:, i] / np.abs(vectors[:, i]).max()
         if real[i]:
@@ -121,6 +122,7 @@ def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
     if at < q or np.linalg.cond(t) > 1e8:
         raise ValueError("no basis of eigenvectors")
     back, ahead = np.linalg.inv(t), np.zeros((q, q))
+    # Equal nodes have no Lagrange polynomials; then the prediction is zero.
     if len(np.unique(c)) == q:
         lagrange = np.linalg.inv(np.vander(c - 1.0, increasing=True))  # in x, by columns
         ahead = (lagrange / (1.0 + np.arange(q))[:, None]).T

@@ -69,6 +69,7 @@ def try_stages(handle, r, t, h, now):
     for i in range(1, s):
         row, ki = row_of(r.coefficients, s, i), k[i]
         combine(0, y.size, y, h, row, i, k, base)
+        # An explicit first stage has no equation to solve.
         if row[i] == 0.0:
             stage_rates(handle, r, t + c[i] * h, base, ki)
             note_stage(r)
@@ -80,10 +81,12 @@ def try_stages(handle, r, t, h, now):
         if r.newton[0]["known_steps"] > 0.0:
             predict(b, c, c[i] * h / state["last"], k[0], r.last_stages, ki)
         else:
+            # No earlier step is known, so the slope of the stage before is the best start.
             copy(k[i - 1], ki)
         status = solve_stage(handle, r, t + c[i] * h, h * row[i], i)
         if status == iterations.FAILED and fresh:
             if adaptive:
+                # The iterate has diverged: damped Newton starts from the state at the start of the step.
                 for j in range(y.size):
                     ki[j] = shift * (y[j] - base[j])
             status = iterations.solve_stage_from_start(handle, r, t + c[i] * h, h * row[i], i, y)
@@ -108,6 +111,7 @@ def attempt(handle, run, t, h, now, new):
             iterations.renew_at_start(handle, r, t, now)
         if try_stages(handle, r, t, h, now) == iterations.CONVERGED:
             break
+        # Only a failure with a fresh Jacobian ends the attempt.
         if newton["jacobian_step"] == state["steps"]:
             return rec.NEWTON_FAILED
         newton["has_jacobian"] = 0.0

@@ -57,10 +57,12 @@ def attempt(handle, run, t, h, now, new):
     last_is_new, blocked = control["fsal"] == 1, structure.size > 0
     for i in range(1, s):
         last, row = i == s - 1, row_of(r.coefficients, s, i)
+        # First same as last: the last stage is the end of the step. In blocks, the end replaces the last stage.
         target = r.y[new] if last and (last_is_new or blocked) else r.y[3]
         if blocked:
             runs = structure[OTHERS] + structure[CHECKED] + structure[EDGES]
             sum_runs(structure, 0, runs, y, h, row, i, k, target)
+            # Sums of rows are formed by the rhs itself, while its block lies in the cache.
             mode = STAGE_AND_END if last and not last_is_new else STAGE
             request_sums(structure, mode, y, h, row, i, k, target, b)
         else:
@@ -71,6 +73,7 @@ def attempt(handle, run, t, h, now, new):
             stage_rates(handle, r, t + c[i] * h, target, k[i])
         note_stage(r)
         if blocked:
+            # Other calls of the rhs must not form stages.
             structure[MODE] = OFF
         store_ledger_rates(r, i)
     if blocked and s > 1 and not last_is_new:
@@ -78,6 +81,7 @@ def attempt(handle, run, t, h, now, new):
     elif not last_is_new:
         form_sum(r, h, b, s, now, r.y[new])
     if control["watch"] != 0:
+        # y[3] still holds the state of the second-last stage, since the last one went to y[new].
         r.state[0]["radius"] = quotient(k[s - 1], k[s - 2], r.y[new], r.y[3], r.scale)
     if control["mode"] != rec.TOLERANCE:
         return 0.0
@@ -112,6 +116,7 @@ def second_order_correction(begin, end, b, damping, k, means):
         k[2, begin:end],
         k[last, begin:end],
     )
+    # Most blocks have no fast decay: then the correction is zero, and its passes are saved.
     if not any_nonzero(q):
         return
     for i in range(mean.size):
@@ -139,6 +144,7 @@ def damped_attempt(handle, run, t, h, now, new):
     early, late = r.factors[:n], r.factors[n:]
     for m in range(row_blocks.shape[0]):
         copy(k[0, row_blocks[m, BEGIN] : row_blocks[m, STOP]], k[1, row_blocks[m, BEGIN] : row_blocks[m, STOP]])
+    # The ledger has the rates of the equations, without damping.
     copy(ledger_rates[0], ledger_rates[1])
     damp_in_turn(h, r.y[now], k[1], early, handle)
     for i in range(2, s):
@@ -148,6 +154,7 @@ def damped_attempt(handle, run, t, h, now, new):
         store_ledger_rates(r, i)
         damp_in_turn(h, r.y[3], k[i], early if i == 2 else late, handle)
     for m in range(row_blocks.shape[0]):
+        # In chunks, so that correction and sum find their operands in the cache.
         for first in range(row_blocks[m, BEGIN], row_blocks[m, STOP], CHUNK):
             stop = min(first + CHUNK, row_blocks[m, STOP])
             if s > 2:

@@ -55,6 +55,7 @@ def reach(r):
 def is_function_near(r, i, h, far):
     """True if event function i could reach zero and return within a step of length h; far : result of `reach`."""
     g, g_new = r.g[i], r.g_new[i]
+    # A function at or below zero has no event ahead; infinite values stand for times that never come.
     if not 0.0 < g < rec.UNKNOWN_PACE or not abs(g_new) < rec.UNKNOWN_PACE:
         return False
     return min(g, g_new) < far * max(h * r.pace[i], abs(g_new - g))
@@ -198,6 +199,7 @@ def zero_within(handle, run, r, h, t_new, now, new):
     if needs_end_rates(r):
         run_handle.evaluate(handle, r, t_new, r.y[new], r.y[3])
     f_new = r.y[3] if needs_end_rates(r) else r.k[r.k.shape[0] - 1]
+    # A value in the middle excludes most steps, at the cost of a single evaluation.
     interpolated_events(handle, r, h, 0.5, f_new, now, new, inner[MIDDLE])
     if is_excluded(r, h, inner[MIDDLE], far) and not reaches_zero(g, inner[MIDDLE]):
         return NOWHERE, False

@@ -35,6 +35,7 @@ def has_returned(r, h, now, new):
         rest = abs(returns[SUM, e])
         tolerance = size * (scale[e] + abs(y_new[e]))
         found = found or (rest > PRODUCTS * returns[GREATEST, e] and rest > TOLERANCES * tolerance)
+        # The next window starts anew: a long step of this one would raise its threshold.
         returns[SUM, e] = returns[GREATEST, e] = 0.0
     state["window"] = 0.0
     return found

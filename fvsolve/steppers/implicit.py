@@ -305,6 +305,7 @@ class Rosenbrock(Method):
             [(1 / Fraction(self.gamma) if i == j else Fraction(0)) - c[i][j] for j in range(s)] for i in range(s)
         ]
         gamma = _inverse(inverse)
+        # The new state is y+ = y_s + u_s, the embedded solution is y_s.
         m = [*a[-1][:-1], Fraction(1)]
         hat = [*a[-1][:-1], Fraction(0)]
         alpha = _product(a, gamma)
@@ -366,6 +367,7 @@ class Rosenbrock(Method):
             [0],
         ]
         h = np.vstack([padded_row(row) for row in h])
+        # Terms theta (1 - theta) theta^k, sorted by powers of theta.
         dense = np.column_stack([m + h[0], *(h[i + 1] - h[i] for i in range(len(h) - 1)), -h[-1]])
         return np.concatenate(flat), np.ascontiguousarray(dense), s + 1
 

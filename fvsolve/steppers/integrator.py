@@ -212,6 +212,7 @@ class Integrator:
 
         separate_rows : True if separate steps for output rows must be possible
         """
+        # Compiled code has the addresses of arrays, so that a replaced array needs a new handle.
         if self.linked is None or any(map(is_not, all_arrays(self), self.linked)):
             if separate_rows:
                 self.prepare_spare()

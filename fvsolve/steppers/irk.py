@@ -59,12 +59,14 @@ def sweep_once(handle, r, low, t, h, now, turn):
     """
     k, y, base, weights, c = r.k, r.y[now], r.base, r.weights, nodes_of(r.coefficients, r.k.shape[0])
     s, total = k.shape[0], 0.0
+    # All slopes of the last sweep are stored first, because stages read those of later stages.
     for i in range(1, s):
         copy(k[i], r.transformed[i - 1])
     for i in range(1, s):
         own, ki, last = h * low[(i - 1) * s], k[i], r.transformed[i - 1]
         base_of_stage(r, low, h, i, y)
         if turn == 0:
+            # The first sweep starts from the state at the start of the step.
             for e in range(y.size):
                 ki[e] = (y[e] - base[e]) / own
         if iterations.solve_stage_from_start(handle, r, t + c[i] * h, own, i, y) == iterations.FAILED:
@@ -97,6 +99,7 @@ def sweep(handle, r, low, t, h, now):
         if total == -1.0:
             return iterations.FAILED
         size = sqrt(total / max(q * n, 1))
+        # Stiff components need q sweeps, so that earlier changes do not show convergence.
         slow = turn >= q and size >= 0.5 * before
         if size <= enough or size <= settled and slow or size <= floor and turn == MOST_SWEEPS - 1:
             return iterations.CONVERGED
@@ -123,6 +126,7 @@ def extrapolate(r, weight):
             difference = d - change[e] * weights[e]
             dot += d * difference
             square += difference * difference
+    # A difference of zero, or values that are not finite, leave the slopes as they are.
     g = weight * max(dot / square, -GREATEST_EXTRAPOLATION) if square > 0.0 and square < np.inf else 0.0
     for i in range(q):
         ki, last, change, swept = k[i + 1], rows[i], rows[q + i], rows[2 * q + i]
@@ -167,6 +171,7 @@ def blend(base_weight, base, m, at, q, first, rows, target):
     """
     n = target.size
     for j in range(0, q, 3):
+        # A missing row is replaced by the last one with weight 0: each pass adds three terms.
         v0, v1, v2 = rows[first + j], rows[first + min(j + 1, q - 1)], rows[first + min(j + 2, q - 1)]
         c0, c1, c2 = m[at + j], m[at + j + 1] if j + 1 < q else 0.0, m[at + j + 2] if j + 2 < q else 0.0
         if j > 0:
@@ -217,6 +222,7 @@ def factor_blocks(r, h):
     blocks, size = matrix(r.coefficients, q + 1, BLOCKS), int(r.newton[0]["factor_size"])
     while b < q:
         shift = blocks[b * q + b] / h
+        # The factors of the conjugate block are conjugate too, so one complex factorisation serves both.
         if is_pair(blocks, q, b):
             pair_shift = complex(shift, blocks[(b + 1) * q + b] / h)
             pair_factors, address = r.complex_factors[pair:], r.calls[run_handle.PAIR_FACTOR]
@@ -270,6 +276,7 @@ def evaluate_stages(handle, r, t, h, now):
         store_ledger_rates(r, i + 1)
         if r.out[rec.STATUS] != 0.0:
             status, where = r.out[rec.STATUS], r.out[rec.PLACE]
+    # The later stages have overwritten the status of the faulty one.
     if status != 0.0:
         r.out[rec.STATUS], r.out[rec.PLACE] = status, where
     r.state[0]["newton"] += 1.0
@@ -326,6 +333,7 @@ def iterate(handle, r, t, h, now):
         if done:
             break
     if status == iterations.FAILED:
+        # A rate that is not finite in any stage shows in the sum.
         copy(rows[F * q], f)
         for i in range(1, q):
             for e in range(f.size):
@@ -342,6 +350,7 @@ def try_stages(handle, r, t, h, now):
     """
     newton, state, q = r.newton[0], r.state[0], r.k.shape[0] - 1
     if newton["shift"] != 1.0 / h:
+        # A restored shift is negative: its factors were counted before the restart.
         known = newton["shift"] == -1.0 / h
         newton["shift"] = 0.0
         count = factor_blocks(r, h)
@@ -467,6 +476,7 @@ def step_error(handle, r, t, h, now, new, retry):
         size = filtered_error(handle, r, t, now, new, retry)
     else:
         size = error_norm(r, h, now, new)
+    # Only at the end of a segment, where an opening may close.
     if collocates and 0.0 <= size <= 1.0 and h >= (r.control[0]["end"] - t) * (1.0 - 1e-9):
         size = max(size, DEFECT_WEIGHT * defect_before_end(handle, r, t, h, new))
     return size
@@ -493,6 +503,7 @@ def attempt(handle, run, t, h, now, new):
             finish(r, h)
             break
         if newton["jacobian_step"] == state["steps"]:
+            # A shorter step costs less than sweeps.
             if r.progress[0]["no_sweeps"] == 1:
                 return rec.NEWTON_FAILED
             status = sweep(handle, r, matrix(r.coefficients, s, CROUT), t, h, now)

@@ -67,6 +67,7 @@ def smaller_side(total, r0, r1, m, ledger_rates, dense):
     if at_low * at_high >= 0.0:
         return 0.0
     for _ in range(TURNS):
+        # Regula falsi with the Illinois rule, which never leaves the step.
         middle = high - at_high * (high - low) / (at_high - at_low)
         rate, before = amount_and_rate(middle, total, r0, r1, m, ledger_rates, dense)[1], high
         if rate * at_high < 0.0:
@@ -76,6 +77,7 @@ def smaller_side(total, r0, r1, m, ledger_rates, dense):
         high, at_high = middle, rate
         if abs(high - before) <= NEAR or abs(high - low) <= NEAR:
             break
+    # The amount has its extremum where the rate is zero: one side up to there, the other side after it.
     first = amount_and_rate(high, total, r0, r1, m, ledger_rates, dense)[0]
     return max(0.0, min(abs(first), abs(total - first)))
 
@@ -136,6 +138,7 @@ def book(h, b, ledger_rates, dense, use_stage_rates, known, end, ledger):
         total = combined(b, ledger_rates, m)
         r0, r1, part, gross = ledger_rates[0, m], end[m], 0.0, ledger[m] - ledger[count + m]
         side, threshold, direction = 0 if total > 0.0 else 1, NOISE * gross, r0 + r1
+        # Without a rate at either end, the sign of all amounts so far decides.
         if direction == 0.0:
             direction = ledger[m] + ledger[count + m]
         if r0 * r1 >= 0.0 and direction != 0.0:
@@ -144,6 +147,7 @@ def book(h, b, ledger_rates, dense, use_stage_rates, known, end, ledger):
         if use_stage_rates:
             r0, r1 = ledger[4 * count + m] if known else r0, ledger_rates[s - 1, m]
         ledger[4 * count + m] = ledger_rates[s - 1, m]
+        # The smaller side adds to both sums, the rest to one of them: the net amount stays exact.
         if r0 * r1 < 0.0:
             part = smaller_side(total, r0, r1, m, ledger_rates, dense)
         up, down = part + max(total, 0.0), part - min(total, 0.0)

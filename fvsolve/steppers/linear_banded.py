@@ -26,6 +26,7 @@ def prepare(pattern) -> tuple[np.ndarray, int]:
     """
     n = pattern.shape[1]
     order, below, above = band(pattern)
+    # Row exchanges widen U to both bandwidths together; rows end with a whole chunk.
     width = below + 1 + CHUNK * -(-(below + above) // CHUNK)
     size = n * width + n * below + 2 * n + 2
     rows, columns = entries(pattern)
@@ -98,6 +99,7 @@ def factor(structure, jacobian, shift, factors):
             size = size_of(factors[at + d * (width - 1)])
             if size > best:
                 best, pivot = size, d
+        # A diagonal entry that is large enough spares the exchange of two rows.
         if here >= DIAGONAL_PIVOT * best:
             pivot, best = 0, here
         if not LEAST_PIVOT < best < 1.0 / LEAST_PIVOT:
@@ -107,6 +109,7 @@ def factor(structure, jacobian, shift, factors):
             exchanged = at + pivot * (width - 1)
             for e in range(below + above + 1):
                 factors[at + e], factors[exchanged + e] = factors[exchanged + e], factors[at + e]
+            # An exchanged row reaches further to the right, and so do the rows from which it is subtracted.
             last = max(last, k + pivot + above)
         chunks = (max(above, last - k) + CHUNK - 1) // CHUNK
         per = reciprocal(factors[at])

@@ -45,6 +45,7 @@ def factor(structure, jacobian, shift, factors):
         if pivot != k:
             for j in range(n):
                 a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+        # The reciprocal is stored, so that solutions multiply instead of divide.
         per = reciprocal(a[k, k])
         a[k, k] = per
         for i in range(k + 1, n):

@@ -92,6 +92,7 @@ def fill(n: int, starts, columns) -> tuple[np.ndarray, np.ndarray, np.ndarray, n
     """
     starts, columns = np.asarray(starts, dtype=np.int64), np.asarray(columns, dtype=np.int64)
     capacity = 4 * columns.size + 16
+    # The number of entries that fill in is not known before.
     while True:
         l_starts, u_starts, chain = (np.zeros(n + 1, dtype=np.int64) for _ in range(3))
         l_columns, u_columns = np.empty(capacity, dtype=np.int64), np.empty(capacity, dtype=np.int64)
@@ -124,6 +125,7 @@ def eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
             last = k
             for p in range(u_starts[k], u_starts[k + 1]):
                 j = u_columns[p]
+                # Both rows have rising columns, so that a single pass merges them.
                 while chain[last] < j:
                     last = chain[last]
                 if chain[last] != j:
@@ -180,8 +182,10 @@ def factor(structure, jacobian, shift, factors):
         for p in range(starts[i], starts[i + 1]):
             row[places[p]] = -jacobian[entries[p]]
         own = row[4 * i : 4 * i + 4]
+        # A state without a partner has a second row without entries, which gets a pivot of 1.
         own[0] += shift
         own[3] += shift if order[2 * i] != order[2 * i + 1] else 1.0
+        # The size before elimination, against which cancellation shows.
         first = size_of(own[0] * own[3]) + size_of(own[1] * own[2])
         for p in range(l_starts[i], l_starts[i + 1]):
             k = l_columns[p]
@@ -196,6 +200,7 @@ def factor(structure, jacobian, shift, factors):
                 y2, y3 = y[2] - (l2 * u[0] + l3 * u[2]), y[3] - (l2 * u[1] + l3 * u[3])
                 y[0], y[1], y[2], y[3] = y0, y1, y2, y3
         a, b, c, d = own[0], own[1], own[2], own[3]
+        # The work row must be empty for the next row.
         clear(own)
         diagonal, cross = a * d, b * c
         det = diagonal - cross

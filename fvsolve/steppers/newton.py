@@ -49,6 +49,7 @@ def begin(r, now):
     r : open handle of the run; now : row of y at the start of the step
     """
     state, newton, control, k, scale, y = r.state[0], r.newton[0], r.control[0], r.k, r.scale, r.y[now]
+    # A repeated attempt: the stages of the last step are already stored, and k holds failed ones.
     if newton["stages_step"] == state["steps"]:
         return
     tolerance = control["size"] if control["mode"] == rec.TOLERANCE else FIXED
@@ -82,6 +83,7 @@ def renew(handle, r, t, y, f, ledger_rates, f_work):
     differences(stage_rates, handle, r, t, y, f, ledger_rates, f_work)
     state["jacobians"] += 1.0
     newton["has_jacobian"], newton["jacobian_step"] = 1.0, state["steps"]
+    # The factors belong to the old Jacobian.
     newton["shift"] = newton["increment_ratio"] = 0.0
 
 
@@ -106,7 +108,9 @@ def factor_for(r, shift):
     newton = r.newton[0]
     if newton["shift"] == shift:
         return 0
+    # A restored shift is negative: its factors were counted before the restart.
     r.state[0]["factorisations"] += 0.0 if newton["shift"] == -shift else 1.0
+    # Until the factors are complete, none are valid.
     newton["shift"] = 0.0
     bad = run_handle.call_factor(r.calls[run_handle.REAL_FACTOR], r.structure, r.jacobian, shift, r.factors)
     if bad == 0:
@@ -119,6 +123,7 @@ def spectral_radius(r):
     """Approximate largest |eigenvalue| of the Jacobian, by five iterations of the power method."""
     v, product, scale, before, now = r.increment, r.product, r.scale, 0.0, 0.0
     for e in range(v.size):
+        # Alternating signs contain the shortest waves of a grid, which are its fastest modes.
         v[e] = scale[e] if e % 2 == 0 else -scale[e]
     for _ in range(5):
         multiply(r.structure, r.jacobian, v, product)
@@ -219,15 +224,18 @@ def convergence(r, turn, size, before):
     if turn > 0:
         ratio = size / before if before > 0.0 else 0.0
         newton["increment_ratio"] = max(newton["increment_ratio"], ratio)
+        # Tiny increments that hardly fall any more are rounding.
         if ratio >= 0.3 and size <= rounded:
             return True, valid
         if ratio >= 0.99:
             return True, FAILED
         factor = ratio / (1.0 - ratio)
         newton["convergence_factor"] = factor
+        # At this rate the increments left would not fall to the limit (Hairer and Wanner 1996, IV.8).
         if factor * size * ratio ** (MOST - 1 - turn) > rounded:
             return True, FAILED
     else:
+        # No ratio is known yet: that of the last stage, moved towards 1 (Hairer and Wanner 1996, IV.8).
         factor = max(newton["convergence_factor"], 1e-4) ** 0.8
         newton["convergence_factor"] = factor
     if factor * size <= enough:
@@ -275,6 +283,7 @@ def damped_increment(handle, r, t, h_gamma, i):
     if run_handle.call_factor(r.calls[run_handle.REAL_FACTOR], r.structure, r.jacobian, shift, r.factors) != 0:
         return -1.0
     newton["shift"] = shift
+    # The differences of the Jacobian have used `increment` as work space.
     for j in range(ki.size):
         d[j] = f[j] - ki[j]
     run_handle.call_solve(r.calls[run_handle.REAL_SOLVE], r.structure, r.factors, d)
@@ -291,6 +300,7 @@ def damped_update(handle, r, t, h_gamma, i, size, rounded):
     """
     d, other, ki, shift = r.increment, r.moved, r.k[i], 1.0 / h_gamma
     part, tried, length = 1.0, 0.0, 0.0
+    # Trials reuse the factors; only accepted iterates get a new Jacobian.
     while part != tried and part > LEAST_PART:
         for j in range(ki.size):
             ki[j] += shift * (part - tried) * d[j]
@@ -331,9 +341,11 @@ def damped_newton(handle, r, t, h_gamma, i):
             for j in range(ki.size):
                 ki[j] += shift * (1.0 - tried) * d[j]
             book_increment(r, d, i)
+            # The next step gets a new Jacobian, and its error estimate is smoothed.
             newton["damped_step"], newton["increment_ratio"] = r.state[0]["steps"], 1.0
             newton["convergence_factor"] = 1.0
             return CONVERGED
+        # No damping factor was accepted, or the increment is not finite.
         if part != tried or not size < np.inf:
             break
     find_worst(r, d, r.rate)
@@ -353,6 +365,7 @@ def solve_stage_from_start(handle, r, t, h_gamma, i, y):
     done, part, turn, worst = 0.0, 1.0, 0, state["worst"]  # `worst` keeps the result of simplified Newton
     while part >= LEAST_STAGE_PART:
         if turn == 1:
+            # The state y itself: the slope that leads from the base back to the start of the step.
             for j in range(ki.size):
                 ki[j] = (y[j] - base[j]) / h_gamma
         elif turn > 1:
@@ -386,6 +399,7 @@ def smoothed_error(handle, r, t, h, now, new, error, shift):
     """
     k, d, f, y, y_new, scale = r.k, r.increment, r.rate, r.y[now], r.y[new], r.scale
     size, plain, dot, smooth = r.control[0]["size"], 0.0, 0.0, 0.0
+    # Damped Newton has replaced the Jacobian by those of its iterates.
     renew_at_start(handle, r, t, now)
     r.state[0]["factorisations"] += 1.0
     r.newton[0]["increment_ratio"] = 1.0

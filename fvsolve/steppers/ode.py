@@ -127,6 +127,7 @@ def _solve_steps(stepper: Integrator, functions: tuple, key: int, t, y0, critica
         if code != loop_records.DONE:
             raise FvsolveError(_failure(stepper.method, code, stepper.state[0])) from _EXCEPTIONS.get(key)
         if end < t[-1]:
+            # f may jump there, so that step size, errors and Jacobian of the time before are useless.
             stepper.discard_history()
             stepper.state["t"] = start
     states[1:-1], states[-1] = stepper.rows[: t.size - 2, 1:], stepper.y[stepper.progress[0]["now"]]
@@ -142,6 +143,7 @@ def _solve_segment(stepper: Integrator, functions: tuple, key: int, search) -> i
     while code == loop_records.BUDGET_SPENT:
         if automatic.is_change_due(stepper):
             automatic.change(stepper)
+        # With events the loop returns after each step, in which Python then searches for zeros.
         stepper.set_control(budget=1.0 if search.events else NO_LIMIT)
         code = stepper.call(*functions, handle, WHERE, stepper.no_floats)
         if search.events and stepper.state[0]["steps"] > steps and code in AFTER_STEP:
@@ -206,6 +208,7 @@ def frozen_values(f: Callable) -> tuple | None:
     """
     if not isinstance(f, FunctionType) or f.__kwdefaults__:
         return None
+    # A function within f may read other variables, which are not listed with those of f.
     if any(isinstance(constant, CodeType) for constant in f.__code__.co_consts):
         return None
     try:
@@ -316,6 +319,7 @@ def _python(t, y, dydt, key):
     try:
         _PYTHON[key](t, y, dydt)
     except BaseException as error:
+        # NaN ends the time loop; then the stored exception is raised.
         _EXCEPTIONS[key] = error
         dydt[:] = np.nan
 

@@ -122,6 +122,7 @@ class EventSearch:
             for number, event in enumerate(self.events)
             for t in self.zeros(event, times.tolist(), [self.value(event, t) for t in times])
         )
+        # In the order of time, because a terminal event makes all later ones void.
         for t, number in found:
             self.times[number].append(t)
             self.states[number].append(self.state(t))
@@ -136,6 +137,7 @@ class EventSearch:
         for k in range(len(times) - 1):
             ends = [(times[k], g[k]), (times[k + 1], g[k + 1])]
             if g[k] * g[k + 1] > 0.0 and has_extremum(times, g, k):
+                # Two zeros between points of equal sign lie on either side of the extremum.
                 ends.insert(1, self.extremum(event, *ends))
             for (a, left), (b, right) in zip(ends, ends[1:], strict=False):
                 if left == 0.0 or left * right > 0.0 or event.direction * left > 0.0:

@@ -84,6 +84,7 @@ def limit_ratio(states, row, y_old, y, out):
     found = per_amount(out[states[0]], total, row[LEAST])
     limited = min(max(found, min(first, last)), max(first, last))
     if limited != found:
+        # The ratio of `per_amount`, solved for the state.
         wide = max(total, row[LEAST])
         out[states[0]] = limited * (total * total + wide * wide) / (2.0 * total) if total > 0.0 else 0.0
 
@@ -106,6 +107,7 @@ def limit_to_bounds(states, bounds, y_old, y, out, checked):
             if not checked:
                 limit_ratio(row_states, bounds[r], y_old, y, out)
             continue
+        # A state that is outside its bounds at an end must stay continuous there.
         for y_end in (y_old, y):
             total = reference_amount(row_states, bounds[r], y_end)
             if total > NEGLIGIBLE:
@@ -133,6 +135,7 @@ def separate_step(handle, r, t, h, old, new):
     nor the stages that energy studies read depend on the output rows. Its calls of rhs are counted.
     """
     own, state = open_run(r.spare), r.state[0]
+    # A row must leave no trace in what the steps report and decide.
     worst, radius, newton = state["worst"], state["radius"], own.newton[0]
     newton["has_jacobian"] = newton["jacobian_step"] = newton["known_steps"] = 0.0  # no Jacobian, no earlier stages
     newton["shift"] = newton["increment_ratio"] = 0.0
@@ -173,6 +176,7 @@ def compute_row(handle, r, t_old, due, now, old):
     t, new, y_out, row_blocks = r.state[0]["t"], 3 - now - old, r.y_out, r.row_blocks
     separate = needs_separate_step(r)
     within = due < t - AT_END * (t - t_old)
+    # From the most accurate source to the cheapest: substeps, a separate step, the dense output.
     if within and needs_defect(r) and substep_row(handle, r, t_old, due, now, old):
         pass
     elif separate and within and separate_step(handle, r, t_old, due - t_old, old, new):
@@ -182,6 +186,7 @@ def compute_row(handle, r, t_old, due, now, old):
     else:
         interpolate_row(r, t_old, due, separate, now, old)
     limit_to_bounds(r.bounded_states, r.bounds, r.y[old], r.y[now], y_out, needs_defect(r))
+    # Without rates: a row only needs the solved nodes.
     run_handle.call_rhs(r.calls[run_handle.RHS_CALL], due, y_out, y_out[:0], r.out_row, handle)
 
 
@@ -208,6 +213,7 @@ def emit(handle, r):
             run_handle.call_observer(r.calls[run_handle.OBSERVER], due, r.y_out, r.out_row, handle, values)
             progress["rows"] += 1
             state["next_output"] += 1.0
+        # After the row of the same time, because the caller writes the frame and then calls again.
         if field <= due:
             state["next_field"] += 1.0
             return rec.FIELD

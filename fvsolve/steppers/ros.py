@@ -23,6 +23,7 @@ def slope_in_time(handle, r, t, h, now):
     Arguments as for `attempt`.
     """
     slope, first, out, ledger_slopes, offset = r.base, r.k[0], r.out, r.ledger_slopes, r.control[0]["ledger_offset"]
+    # The root balances rounding and curvature; a difference within the step meets no later kink.
     step = min((2.2e-16 * max(1e-5, abs(t))) ** 0.5, 1e-3 * h)
     later = t + step
     out[rec.NEARBY] = 1.0
@@ -56,6 +57,7 @@ def prepare(handle, r, t, h, now):
     """Compute the Jacobian and the time slopes at the start of a step, unless a repeated attempt has them already."""
     newton, state = r.newton[0], r.state[0]
     first = newton["stages_step"] != state["steps"]
+    # A repeated attempt starts from the same state, so its Jacobian is valid.
     if newton["has_jacobian"] != 0.0 and not first:
         return
     renew_at_start(handle, r, t, now)
@@ -99,12 +101,14 @@ def attempt(handle, run, t, h, now, new):
         evaluate_stage(handle, r, t, h, i, now)
         f = k[0] if i == 1 else r.rate
         time_weight, u, row = extra[s * s + i] * h, k[i], extra[i * s : (i + 1) * s]
+        # f may be k[0], which must not change, so the sum goes to work space.
         if time_weight != 0.0:
             for e in range(n):
                 d[e] = f[e] + time_weight * slope[e]
             f = d
         combine(0, n, f, 1.0, row, i, k, u)
         call_solve(r.calls[REAL_SOLVE], r.structure, r.factors, u)
+        # Before u is divided by h: the ledger needs the increment u_i itself.
         if r.ledger_rates.shape[1] > 0:
             copy(u, d)
             book_stage(r, i, gamma, time_weight, row, d)

@@ -42,6 +42,7 @@ def store_start_slopes(r):
     control, row_blocks, k, f_old, s = r.control[0], r.row_blocks, r.k, r.f_old, r.k.shape[0]
     known = control["kind"] == rec.NEWTON_SOLVED and r.newton[0]["known_steps"] > 0.0
     start_slope, use_slope = start_slope_of(r.coefficients, s), control["stage_slope"] == 1 and known
+    # The rate f at the start would amplify the distance of y from the slow solution.
     slope = r.last_stages[s - 1] if known else k[0]
     for m in range(row_blocks.shape[0]):
         begin, end = row_blocks[m, BEGIN], row_blocks[m, STOP]
@@ -74,6 +75,7 @@ def defect(handle, r, own, t, h, theta, now, old):
     start_slope = start_slope_of(r.coefficients, s)
     interpolate(0, y.size, theta, h, y, r.f_old, y_new, k[s - 1], k, r.dense, start_slope, stage)
     interpolate_slope(theta, h, y, r.f_old, y_new, k[s - 1], k, r.dense, start_slope, d)
+    # The rate that limits steps costs time and is not needed here.
     out[rec.RATE] = RATE_UNWANTED
     run_handle.call_rhs(r.calls[run_handle.RHS_CALL], t + theta * h, stage, f, out, handle)
     r.state[0]["calls"] += 1.0
@@ -108,6 +110,7 @@ def begin_substeps(handle, r, own, t, h, now, old):
     Arguments as for `defect`
     """
     state, progress, newton, size = own.state[0], own.progress[0], own.newton[0], r.state[0]["t"]
+    # The defect of a step is computed once for all its rows.
     if progress["t_old"] != t or progress["t_new"] != size:
         error = greatest_defect(handle, r, own, t, h, now, old)
         state["step"] = h * length_factor(error, r.control[0]["order"]) if error > 1.0 else 0.0
@@ -179,6 +182,7 @@ def substep_row(handle, r, t_old, due, now, old):
         solved = substep(handle, r, own, end - state["t"], end, due)
         count_work(r, own)
         if not solved:
+            # No further row of this step is tried by substeps.
             state["step"] = 0.0
             return False
     y, y_new, last, k, s = own.y[progress["old"]], own.y[progress["now"]], state["last"], own.k, own.k.shape[0]

@@ -51,6 +51,7 @@ def first_step(k, scale, control, state):
     for i in range(scale.size):
         total += (k[0, i] / scale[i]) ** 2
     d = sqrt(total / max(scale.size, 1))
+    # At rates of zero nothing limits the step but the span.
     return min(limit, 0.05 * tolerance ** (1.0 / (control["order"] + 1.0)) / d) if d > 0.0 else limit
 
 
@@ -74,7 +75,9 @@ def next_step(control, state, out_rate, longest, k, scale):
     h = control["size"]
     if control["mode"] == rec.COURANT:
         h = min(control["size"] / out_rate, control["step_max"]) if out_rate > 0.0 else control["step_max"]
+        # A rate without bound, as at a closing valve, must not stop the run.
         h = max(h, shortest(control, state))
+    # Ends of given steps are multiples of the step, counted from this mark.
     if h != state["step"]:
         state["step"], state["t_mark"], state["n_mark"] = h, state["t"], 0.0
     return h
@@ -116,6 +119,7 @@ def end_of(control, state, h, last, due):
     """
     if last:
         return control["end"]
+    # Not t + h: the sum may miss the time of the row by rounding.
     if h == due - state["t"]:
         return due
     if control["mode"] != rec.TOLERANCE and (h == state["step"] or h == state["split_remainder"]):
@@ -130,6 +134,7 @@ def closing_step(state, closing, h, least):
     A step that is divided is stored as `split_remainder` in `state`, and counted.
     closing : relative rate -x'/x of the closing opening x [1/s]; least : least length of a part [s]
     """
+    # A step of twice the least length cannot be divided.
     if h * closing <= CLOSING_FRACTION or h <= 2.0 * least:
         return h
     if state["split_remainder"] == 0.0:  # the parts end together where the given step would have ended
@@ -163,6 +168,7 @@ def arriving_step(control, state, arrives, h):
     rest = arrives - state["t"]
     if not 0.0 < rest < h * (1.0 - 1e-9):
         return h
+    # Given steps end where they would have ended without the jump.
     if control["mode"] != rec.TOLERANCE and state["split_remainder"] == 0.0:
         state["split_remainder"] = h
     return rest
@@ -171,6 +177,7 @@ def arriving_step(control, state, arrives, h):
 @njit(forceinline=True)
 def reduced(control, e):
     """Factor on the length of a step whose error e, in units of the tolerance, was too large."""
+    # The error goes with h^order; 0.9 makes a second rejection unlikely.
     return max(0.1, 0.9 * e ** (-1.0 / control["order"])) if e == e else 0.1
 
 
@@ -182,6 +189,7 @@ def grown(control, state, h, e, shortened):
     shortened by an event or a due time may be shorter by orders of magnitude, so it shows no trend of the error.
     control, state : records of the time loop, see `loop_records`
     """
+    # Errors of zero would give infinite factors.
     e, old, order = max(e, 1e-10), max(state["error_old"], 1e-4), control["order"]
     if control["kind"] == rec.EXPLICIT:
         return min(5.0, max(0.2, 0.9 * e ** (-0.7 / order) * old ** (0.4 / order)))
@@ -198,6 +206,7 @@ def after_failure(control, state, h):
     A given step is taken in parts that end together where it would have ended.
     """
     state["newton_failures"] += 1.0
+    # No error is known, so a fixed factor is used.
     if control["mode"] == rec.TOLERANCE:
         state["step"] = 0.25 * h
     elif state["split_remainder"] == 0.0:
@@ -214,8 +223,10 @@ def store_next(control, state, h, e, shortened, failed, out_rate):
     out_rate : as for `watch`, which may end the call after this step, to change the method
     """
     grow = grown(control, state, h, e, shortened)
+    # A longer step has just failed.
     if failed:
         grow = min(grow, 1.0)
+    # A shortened step keeps the stored length for full steps, unless its error requires shorter ones.
     if (not shortened or grow < 1.0) and not retains_length(control, grow):
         state["step"] = h * grow
     state["error_old"] = e

@@ -29,6 +29,7 @@ def squares(begin, end, h, error, k, y, y_new, scale, tolerance):
     Its unit is `tolerance` times `error_scale` at the greater of |y| and |y_new|, the sizes at the start and the end.
     scale : see `error_scale`
     """
+    # Weights of zero at both ends are common, and each would cost a product for every state.
     first, last = 0, error.size
     while last > 0 and error[last - 1] == 0.0:
         last -= 1
@@ -114,6 +115,7 @@ def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, start_slope,
         for i in range(begin, end):
             out[i] = y[i] + w * f[i]
         j = 1
+        # Two stages in each pass over memory.
         while j < dense.shape[0]:
             if j + 1 < dense.shape[0]:
                 a, b, ka, kb = h * weight(theta, dense, j), h * weight(theta, dense, j + 1), k[j], k[j + 1]
@@ -233,6 +235,7 @@ def stored_sum(r, h, b, y, q):
     i, k, total = r.stored[q], r.k, 0.0
     for j in range(b.size):
         total += b[j] * k[j, i]
+    # The change is summed before it is added: it is small against the mass.
     return add_up(y[i], h * total, r.carry[q])
 
 

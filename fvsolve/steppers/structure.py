@@ -157,11 +157,13 @@ def column_colors(pattern) -> np.ndarray:
     """
     rows, n = pattern.shape
     result = np.full(n, -1, dtype=np.int64)
+    # In a full pattern all columns share all rows.
     if pattern.indptr[-1] == rows * n:
         return np.arange(n, dtype=np.int64)
     by_rows = pattern.tocsr()
     per_row = np.diff(by_rows.indptr)
     degree = np.add.reduceat(np.append(per_row[pattern.indices], 0), pattern.indptr[:-1])
+    # For an empty column `reduceat` returns the entry of the next one instead of 0.
     degree[np.diff(pattern.indptr) == 0] = 0
     order = np.argsort(-degree, kind="stable")
     tables = (pattern.indptr, pattern.indices, by_rows.indptr, by_rows.indices, order)
@@ -219,6 +221,7 @@ def differences(evaluate, handle, r, t, y, f, ledger_rates, f_work):
                 y_work[j] = y[j] - ROOT * scale[j]
             else:
                 y_work[j] = y[j] + max((LEAST_ROOT if fine[j] == 1 else ROOT) * abs(y[j]), ROOT * scale[j])
+        # Columns of a colour share no row, so that one call gives the differences of all of them.
         evaluate(handle, r, t, y_work, f_work)
         for e in range(color_starts[color], color_starts[color + 1]):
             j = columns[e]
@@ -270,6 +273,7 @@ def bad_row(structure, jacobian):
     """
     n = structure[SIZE]
     last, rows, good = structure[structure[STARTS] + n], structure[structure[ROWS] :], True
+    # Without a branch this loop is vectorised; the row is sought only if an entry is bad.
     for p in range(last):
         good &= abs(jacobian[p]) < 1.0 / LEAST_PIVOT
     if not good:

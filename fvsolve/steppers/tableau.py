@@ -279,6 +279,7 @@ def method_of_file(path: Path) -> Method:
     """
     try:
         with path.open(encoding="utf-8") as file:
+            # One character more than allowed, by which a longer file is recognised without reading it all.
             text = file.read(LETTERS_MOST + 1)
     except (OSError, UnicodeDecodeError) as error:
         raise FvsolveError(f"{path} cannot be read as a tableau: {error}") from None
@@ -390,6 +391,7 @@ def _exact(method: Method) -> Array:
         faults.append(f"the text has more than {LETTERS_MOST} characters; expected a tableau")
     if faults:
         raise FvsolveError(_message(method.name, faults))
+    # Not before the named numbers are valid: each entry with a wrong one would be a further fault.
     head, weights = _rows(method.text, numbers, faults)
     if len(head) > STAGES_MOST:
         faults = [f"the text has more than {STAGES_MOST} stages; expected at most {STAGES_MOST}"]

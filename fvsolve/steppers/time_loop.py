@@ -183,6 +183,7 @@ def after_jump(handle, run, r, h, length, now, new, e):
     """
     control = r.control[0]
     fixed = control["kind"] == rec.NEWTON_SOLVED and control["mode"] != rec.TOLERANCE
+    # The stages of this step may have several solutions, those of a shorter step a single one.
     if fixed and length > JUMP * r.state[0]["step"]:
         return length, rec.NEWTON_FAILED
     if not control["has_jumps"]:
@@ -221,6 +222,7 @@ def run_steps(handle, run):
             continue
         if status == rec.DONE and has_ended(r):
             return rec.DONE
+        # After rows, events and jumps, so that the watched state is the one from which the next step starts.
         if status == rec.DONE and 0.0 < r.control[0]["watch_at"] <= r.state[0]["steps"]:
             watch_present_state(handle, r)
         if status == rec.DONE:
@@ -239,6 +241,7 @@ def switches_at_start(handle, r):
     After a step the equations switch when its rows are written, because these still use the previous equations.
     """
     progress, g = r.progress[0], r.g
+    # The last step has already evaluated the event functions at its end.
     if progress["event_known"] == 1:
         update_pace(r)
         copy(r.g_new, g)
@@ -263,8 +266,10 @@ def evaluate_state(handle, r):
     """
     progress, t, k, out, structure = r.progress[0], r.state[0]["t"], r.k, r.out, r.structure
     y, row_blocks, last_stage = r.y[progress["now"]], r.row_blocks, k[k.shape[0] - 1]
+    # Where the rhs forms the stages, it also searches for NaN: a further pass over memory is saved.
     checked = r.control[0]["kind"] == rec.EXPLICIT and structure.size > 0 and progress["reuse"] == 0
     if progress["reuse"] == 1:
+        # First same as last: the last stage has the rates at the end of the step.
         for m in range(row_blocks.shape[0]):
             begin, end = row_blocks[m, BEGIN], row_blocks[m, STOP]
             copy(last_stage[begin:end], k[0, begin:end])
@@ -278,6 +283,7 @@ def evaluate_state(handle, r):
             return False
     progress["reuse"], progress["phase"] = 0, rec.EMIT
     run_handle.call_observer(r.calls[run_handle.RECORDER], t, y, out, handle, r.values)
+    # The record has changed the state, so that its rates and recorded values are out of date.
     if out[rec.STATUS] == rec.CORRECTED:
         evaluate(handle, r, t, y, k[0])
         run_handle.call_observer(r.calls[run_handle.RECORDER], t, y, out, handle, r.values)
@@ -295,11 +301,13 @@ def reject_end(handle, r):
     state, progress, control, out = r.state[0], r.progress[0], r.control[0], r.out
     if control["mode"] != rec.TOLERANCE or progress["has_last_step"] == 0 or not state["unbooked"] > 0.0:
         return False
+    # NaN in place of an error gives the greatest reduction.
     h = state["last"] * step_control.reduced(control, nan)
     faults = 0 if out[rec.STATUS] == 0.0 and isfinite(out[rec.RATE]) else 1
     if too_short(control, state, h) or all_finite(handle, r, r.k[0], False, faults):
         return False
     state["t"], state["step"], state["unbooked"] = progress["t_old"], h, 0.0
+    # The step had been accepted and counted.
     state["steps"] -= 1.0
     state["rejections"] += 1.0
     progress["now"], progress["old"] = progress["old"], progress["now"]
@@ -339,6 +347,7 @@ def finish_last_step(handle, r):
     Returns DONE to take the next step, REPEAT where the state has changed, or a reason to return.
     """
     state, progress, control, out = r.state[0], r.progress[0], r.control[0], r.out
+    # Rows within the step belong to the equations before the switch.
     if progress["has_last_step"] == 1 and next_due(r) <= state["t"]:
         status = emit(handle, r)
         if status != rec.DONE:
@@ -401,10 +410,13 @@ def reason_to_stop(r):
 def take_step(handle, run, r):
     """Take the next step; returns DONE, REPEAT if the rates at its start are missing, or a reason to return."""
     state, control, progress = r.state[0], r.control[0], r.progress[0]
+    # Rows 0, 1 and 2 of y hold the present, the last and the new state in turn; row 3 is a stage.
     new, full = 3 - progress["now"] - progress["old"], state["split_remainder"]
     if not full > 0.0:
+        # No rest of a divided step is left.
         full = step_control.next_step(control, state, r.out[rec.RATE], r.out[rec.LONGEST_STEP], r.k, r.scale)
     if control["mode"] != rec.TOLERANCE:
+        # Error control shortens steps by itself; given steps have to be divided.
         least = step_control.shortest(control, state)
         full = step_control.closing_step(state, r.out[rec.CLOSING_RATE], full, least)
         full = step_control.divided_step(control, state, r.out[rec.RATE], full, least)
@@ -434,9 +446,11 @@ def take_fused_steps(handle, r, h):
     while True:
         now, new = progress["now"], 3 - progress["now"] - progress["old"]
         state["calls"] += 1.0
+        # As a multiple of the step, so that rounding does not add up.
         t_new = state["t_mark"] + (state["n_mark"] + 1.0) * h
         run_handle.call_fused_step(address, t_new, h, r.y[now], r.y[new], out, handle, r.values)
         accept(handle, r, h, False, NEVER)
+        # Only these values change the length of the next step.
         same = out[rec.RATE] == rate and out[rec.CLOSING_RATE] == closing and out[rec.JUMP_TIME] == jump
         due_soon = due <= state["t_mark"] + (state["n_mark"] + 1.0) * h
         if not same or due_soon or h >= (control["end"] - t_new) * full or check_state(r) != rec.DONE:
@@ -466,17 +480,20 @@ def find_step(handle, run, r, h, full, due, new):
     unswept = UNSWEPT if control["mode"] == rec.TOLERANCE and control["size"] > LOOSE else 0
     for _ in range(1 << 62):
         rest = control["end"] - state["t"]
+        # A rest of 1e-9 of a step would be a step of its own: this step takes it.
         last = h >= rest * (1.0 - 1e-9)
         if last and step_control.approaches(control, state, rest):
             h, last = step_control.APPROACH * rest, False
         elif last:
             h = rest
+        # The rest of a segment may be very short, except after a failed attempt.
         if too_short(control, state, h) and (not last or failure != rec.TINY_STEP):
             return failure, h, last
         near_kink = rest <= 1e3 * step_control.shortest(control, state)
         r.progress[0]["no_sweeps"] = 1 if state["last"] > 0.0 and failures < unswept and not near_kink else 0
         e, length, last = try_step(handle, run, r, h, last, due, now, new, near_kink)
         if e == rec.NEWTON_FAILED:
+            # If shorter steps fail too, the last reason is the one to report.
             failure = rec.NEWTON_STUCK if r.out[rec.STATUS] == 0.0 else rec.BAD_STATUS
             failures += 1
             h = full = step_control.after_failure(control, state, h)
@@ -511,6 +528,7 @@ def try_step(handle, run, r, h, last, due, now, new, near_kink):
     if e == rec.NEWTON_FAILED or not acceptable(e, near_kink):
         return e, h, last
     progress["event_known"] = 1
+    # Event functions must see the states with compensated sums, as the next step does.
     end_step(r, h, last, due, now, new)
     if g.size > 0:
         run_handle.call_events(r.calls[run_handle.EVENT_FUNCTIONS], progress["t_new"], r.y[new], handle, r.g_new)
@@ -524,6 +542,7 @@ def try_step(handle, run, r, h, last, due, now, new, near_kink):
         return e, h, last
     if found:
         progress["event_known"] = 0
+        # The equations may change at the event: a step of 0 makes the next one cautious.
         state["step"], state["split_remainder"] = state["step"] * r.control[0]["keeps_step"], 0.0
         last = last and state["t"] + length >= r.control[0]["end"]
         e = error_with_ledger(r, length, e)
@@ -541,6 +560,7 @@ def shorten_to_first(handle, run, r, h, e, found, now, new):
     for _ in range(MOST_SEARCHES):
         t_end = t + h if found else progress["t_new"]
         store_start_slopes(r)
+        # Each event found may hide an earlier one, so the shortened step is searched again.
         theta, stepped = zero_within(handle, run, r, h, t_end, now, new)
         if theta < NOWHERE:
             progress["stage_status"] = 0
@@ -558,6 +578,7 @@ def shorten_to_first(handle, run, r, h, e, found, now, new):
                 return h, rec.NEWTON_FAILED, found
             if not found:
                 progress["changed"] = 1 if add_stored(r, h, now, new) else 0
+        # The search has evaluated them at other times.
         call_events(r.calls[EVENT_FUNCTIONS], t_end, r.y[new], handle, r.g_new)
         break
     return h, e, found
@@ -605,6 +626,7 @@ def accept(handle, r, h, last, due):
         end_step(r, h, last, due, now, new)
     update_carry(r, h, now)
     state["unbooked"] = h
+    # `n_mark` counts full given steps, at whose multiples steps end.
     is_part = state["split_remainder"] > h
     state["split_remainder"] = state["split_remainder"] - h if is_part else 0.0
     state["n_mark"] += 0.0 if is_part else 1.0
@@ -614,8 +636,10 @@ def accept(handle, r, h, last, due):
     control["budget"] -= 1.0
     if r.largest.size > 0 and state["steps"] % rec.GROWTH_CHECK_STEPS == 0.0 and exceeded(handle, r, r.y[new]):
         control["budget"] = rec.GROWTH_FOUND
+    # The next evaluation overwrites the slopes at the start of the step, which rows within it need.
     if next_due(r) <= state["t"] or control["dense_steps"] == 1:
         store_start_slopes(r)
+    # At the end of a segment schedules pass to their right limits, so the last stage is no longer valid.
     reuses = control["fsal"] == 1 and control["mode"] == rec.TOLERANCE and not last and progress["changed"] == 0
     progress["reuse"] = 1 if reuses else 0
     progress["old"], progress["now"], progress["has_last_step"] = now, new, 1

@@ -49,7 +49,7 @@ LIMITS = {
     "cells of the hub matrix, code alone": Limit(limit=199, goal=70, slack=6),
     "functions per 1000 code lines": Limit(limit=96, goal=75, slack=2),
     "characters of the mean code line": Limit(limit=53.5, goal=46, slack=1),
-    "comment lines per 100 code lines of kernels and steppers": Limit(limit=1.1, goal=4, slack=0.2),
+    "comment lines per 100 code lines of kernels and steppers": Limit(limit=3.9, goal=4, slack=0.2),
     "circles of imports": Limit(limit=1, goal=0, slack=0),
 }
 

@@ -114,6 +114,7 @@ def thrust(st, floats, pipe, p):
     if st["law"] != LAW_LOG and st["law"] != LAW_TABLE:
         return nan
     x = pipe["compliance"] * (p - st["reference"])
+    # A rigid wall: the general formula would divide by zero.
     if abs(x) < 1e-14:
         return pipe["area"] * (p - st["reference"])
     return pipe["area"] * expm1(x) / pipe["compliance"]

@@ -14,12 +14,14 @@ def log_density(st, floats, p):
 @njit
 def enthalpy(st, floats, p):
     """Specific enthalpy h at the pressure p: integral of dp / rho from the reference pressure [J/kg]."""
+    # expm1 keeps the digits where the pressure is near its reference.
     return -st["beta"] / st["rho"] * expm1(-(p - st["reference"]) / st["beta"])
 
 
 @njit
 def pressure_of_enthalpy(st, floats, h):
     """Pressure [Pa] at which the specific enthalpy is h [J/kg]."""
+    # log1p keeps the digits where the enthalpy is small.
     return st["reference"] - st["beta"] * log1p(-h * st["rho"] / st["beta"])
 
 

@@ -23,6 +23,7 @@ def free_gas(st, x):
 
     The volume of liquid is that at the reference pressure.
     """
+    # All gas is dissolved at this pressure.
     if x >= st["saturation"]:
         return 0.0, 0.0
     k, share = st["gas_power"], x / st["saturation"]
@@ -101,6 +102,7 @@ def gas_root(st, compliance, share, slope, rest):
     low = st["reference"] - st["floor"]
     a = compliance + share / st["beta"]
     b = 1.0 - compliance * low - share * (1.0 + low / st["beta"] + rest)
+    # Both forms of the root are equal; the one used adds numbers of the same sign.
     root = sqrt(b * b + 4.0 * a * share * slope)
     return 0.5 * (root - b) / a if b < 0.0 else 2.0 * share * slope / (b + root)
 
@@ -117,6 +119,7 @@ def pressure_of_mass_ratio(st, compliance, share):
     floor, gas, saturation = st["floor"], st["gas"], st["saturation"]
     x = gas_root(st, compliance, share, gas, -gas / saturation) if st["gas_power"] == 1.0 else saturation
     if x >= saturation and saturation < 1e300:
+        # All gas may be dissolved: then the root without gas lies above the saturation pressure.
         x = gas_root(st, compliance, share, 0.0, 0.0)
         if x >= saturation:
             return x + floor
@@ -221,6 +224,7 @@ def velocity_change(st, floats, pipe, p_from, p_to):
     for _ in range(200):
         x = low - floor
         end = min(high, floor + 2.0 * x)
+        # The integrand has a kink where the last gas dissolves, which a panel must not contain.
         if x < st["saturation"]:
             end = min(end, floor + st["saturation"])
         else:

@@ -39,6 +39,7 @@ def mass_of_bernoulli(st, floats, pipe, bernoulli, flow):
 
     h : specific enthalpy; v = flow / m : velocity, with the mass flow [kg/s]
     """
+    # Newton starts from the fluid at rest, on the subsonic side of the root.
     p = pressure_of_enthalpy(st, floats, bernoulli)
     m, dm = mass_of_pressure(st, floats, pipe, p)
     for _ in range(50):
@@ -78,6 +79,7 @@ def profile_along(st, floats, profile, pipe, start, z, flow, faces, centers):
         m = mass_of_bernoulli(st, floats, pipe, b + half * k3 - end, flow)
         b += half * (k1 + 2.0 * k2 + 2.0 * k3 - pull / (m * m)) / 6.0
         m = mass_of_bernoulli(st, floats, pipe, b - end, flow)
+        # Steps of half a cell end at the centre and at the face of a cell in turn.
         if i % 2 == 0:
             centers[i // 2] = m
         else:

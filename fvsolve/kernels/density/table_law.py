@@ -28,6 +28,7 @@ def log_density(st, floats, p):
     x = (p - st["table_start"]) / step
     if x <= 0.0:
         return floats[o] + floats[o + n] * x * step, floats[o + n]
+    # The end belongs to the line beyond it: there is no interval number n - 1.
     if x >= n - 1.0:
         return floats[o + n - 1] + floats[o + 2 * n - 1] * (x - (n - 1.0)) * step, floats[o + 2 * n - 1]
     k = int(x)

@@ -87,6 +87,7 @@ def set_free_body(body, y, own):
     write_vector(own, layout.POSITION, *minus(plus(vector(body["start"], 0), vector(y, body["y"])), centre))
     write_vector(own, layout.VELOCITY_AT_O, *v)
     write_vector(own, layout.SPIN, *rotate(own, layout.ATTITUDE, joint_velocities(body, 3, y), 0))
+    # A spatial acceleration at o is the acceleration of the point there minus w x v.
     write_vector(own, layout.BIAS_AT_O, *scaled(-1.0, cross(own, layout.SPIN, *v)))
     write_vector(own, layout.SPIN_BIAS, 0.0, 0.0, 0.0)
 
@@ -150,6 +151,7 @@ def add_joint_velocity(own, w, v):
     """
     add_vector(own, layout.SPIN, w)
     add_vector(own, layout.VELOCITY_AT_O, v)
+    # V contains S q' by now, whose product with S q' itself is zero.
     add_vector(own, layout.SPIN_BIAS, cross(own, layout.SPIN, *w))
     add_vector(own, layout.BIAS_AT_O, plus(cross(own, layout.SPIN, *v), cross(own, layout.VELOCITY_AT_O, *w)))
 
@@ -263,6 +265,7 @@ def update_elements(out, tables):
             out[to], out[to + 1] = 0.0, out[at] * (u - a) + out[at + 1] * (v - b) + out[at + 2] * (w - c)
             continue
         root = root_of(tables, i)
+        # Within a tree positions count from o, so that a body far from the origin of the world loses no digits.
         base = layout.ARM if root >= 0 and root == root_of(tables, j) else layout.POSITION
         x, y, z, a, b, c = point_at(out, tables, i, base)
         p, q, r, u, v, w = point_at(out, tables, j, base)
@@ -284,6 +287,7 @@ def kinematics(t, y, dydt, out, handle):
     """
     tables = open_tables(handle)
     bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
+    # Parents come before the bodies that they carry.
     for i in range(bodies.size):
         body, at = bodies[i], body_row(tables, i)
         own = out[at : at + BODY_OUT]
@@ -295,6 +299,7 @@ def kinematics(t, y, dydt, out, handle):
         write_vector(own, layout.VELOCITY, *plus(vector(own, layout.VELOCITY_AT_O), turning))
         write_vector(own, layout.BIAS, *origin_acceleration(own, layout.BIAS_AT_O, layout.SPIN_BIAS))
         weight = -body["mass"] * gravity
+        # The weight acts at the centre of mass, so that it has a torque about the origin.
         x, y0, z = rotate(own, layout.ATTITUDE, body["centre"], 0)
         write_vector(own, layout.FORCE, 0.0, 0.0, weight)
         write_vector(own, layout.TORQUE, y0 * weight, -x * weight, 0.0)

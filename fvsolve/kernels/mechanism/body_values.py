@@ -93,6 +93,7 @@ def joint_load(out, tables, i):
     force = torque = (0.0, 0.0, 0.0)
     for j in range(i, bodies.size):
         k = j
+        # Parents have lower numbers, so that the way up meets i exactly for the bodies that it carries.
         while k > i:
             k = bodies[k]["parent"]
         if k != i:
@@ -104,6 +105,7 @@ def joint_load(out, tables, i):
         turn = inertia_product(body["inertia"], out, here + layout.ATTITUDE, *vector(out, here + layout.SPIN_RATE))
         turn = plus(turn, cross(out, here + layout.SPIN, *angular_momentum(body, out, here)))
         turn = minus(plus(turn, vector_product(plus(centre, offset), push)), vector(out, here + layout.TORQUE))
+        # The joint supplies what the other loads on the bodies do not.
         force = minus(plus(force, push), applied)
         torque = plus(torque, minus(turn, vector_product(offset, applied)))
         for k in range(tables.basins.size):
@@ -166,6 +168,7 @@ def euler_parameters(body, y, out, here):
     x, y0, z = out[r + 7] - out[r + 5], out[r + 2] - out[r + 6], out[r + 3] - out[r + 1]
     p, q, s = out[r + 1] + out[r + 3], out[r + 2] + out[r + 6], out[r + 5] + out[r + 7]
     h, a, b, c = 1.0 + xx + yy + zz, 1.0 + xx - yy - zz, 1.0 - xx + yy - zz, 1.0 - xx - yy + zz  # 4 e^2
+    # Division by the greatest parameter: a small one would lose digits.
     greatest = max(max(h, a), max(b, c))
     if greatest == h:
         a, b, c = x, y0, z

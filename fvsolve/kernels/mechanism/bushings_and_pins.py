@@ -183,6 +183,7 @@ def bushing_rate_limit(t, y, dydt, out, handle):
         bushing = bushings[k]
         i, j = body_of_point(tables, bushing["from_point"]), body_of_point(tables, bushing["to_point"])
         p = bushing_motion(out, tables, bushing)[2]
+        # Three directions of displacement, then three axes of rotation, each with its own stiffness.
         for axis in range(6):
             along = 1.0 * (axis % 3 == 0), 1.0 * (axis % 3 == 1), 1.0 * (axis % 3 == 2)
             mass.clear_column(tables, at)
@@ -300,6 +301,7 @@ def fill_constraint_rows(out, tables):
             direction, at = pin_direction(out, tables, pin, r), row * n
             mass.clear_column(tables, g + at)
             mass.add_pair_force(out, tables, pin, p, direction, g + at)
+            # A copy, because the rows of G are needed again for the forces on bodies.
             for m in range(n):
                 work[z + at + m] = work[g + at + m]
             mass.solve_factor(tables, z + at)
@@ -368,11 +370,13 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
     """
     tables = open_tables(handle)
     pins, work, n, at = tables.pins, tables.scratch, tables.freedoms.size, tables.layout[0]["pin"]
+    # lambda is then the change of the pin forces since the start, which is zero in an equilibrium.
     add_start_pin_forces(t, y, dydt, out, handle)
     mass.fill_mass_matrix(y, out, tables)
     mass.factor_mass_matrix(tables)
     mass.solve_mass_matrix(tables, 6 * n)
     mass.spread_accelerations(out, tables)
+    # lambda follows from the accelerations without pins.
     rows = fill_constraint_rows(out, tables)
     multipliers(tables, rows)
     g = constraint_offset(tables)
@@ -387,12 +391,14 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
         work[6 * n + m] += work[7 * n + m]
     row, rate = 0, 0.0
     for k in range(pins.size):
+        # The stabilisation is a decay at the rate `pull`, which limits explicit steps too.
         rate = max(rate, pins[k]["pull"])
         for r in range(pins[k]["rows"]):
             force = scaled(work[last + row], pin_direction(out, tables, pins[k], r))
             add_pair_load(out, tables, pins[k], point_at(out, tables, pins[k]["to_point"], layout.POSITION), force)
             out[at + 3 * k + r] = pins[k]["force"][r] + work[last + row]
             row += 1
+    # Once more, now with the pin forces.
     mass.spread_accelerations(out, tables)
     if out[RATE] != RATE_UNWANTED:
         out[RATE] = max(mass.body_rate_limit(out, tables), rate)

@@ -151,6 +151,7 @@ def pipe_energy_rate(y, dydt, out, tables, k, here):
     (d, rate) = fluid.pipe_moments(tables, dydt, k, length, 0.0)
     total = segment_energy_rate(tables, out, here, (r, t, m), d, z, rise)
     total += path_energy_rate(tables, out, here, fluid.straight_path(r, t), fluid.ZERO_FLOW_PATH, flow, rate)
+    # In a tank the flow goes on from the end of the pipe to the surface.
     for right in range(2):
         i, flow = fluid.pipe_end(y, tables, k, right, 1.0)
         if i >= 0:
@@ -172,6 +173,7 @@ def pipe_extra_energy(y, out, tables, k, here):
     total = segment_energy(tables, out, here, (r, t, m), z, rise) + flow * path_velocity(
         motion, fluid.straight_path(r, t)
     )
+    # In a tank the flow goes on from the end of the pipe to the surface.
     for right in range(2):
         i, flow = fluid.pipe_end(y, tables, k, right, 1.0)
         if i >= 0:

@@ -211,6 +211,7 @@ def pipe_moments(tables, y, k, length, share):
         mass, s = (share * mass_per_length(tables, pipe, i) + per * (y[o + i] + y[o + n + i])) * pipe["dx"], i + 0.5
         m0, m1, m2 = m0 + mass, m1 + mass * s, m2 + mass * s * s
         flow += y[o + i] - y[o + n + i]
+    # 1 / 12: the mass of a cell is spread over its length, not concentrated at its centre.
     return (m0, m1 * step, (m2 + m0 / 12.0) * step * step), flow * step
 
 
@@ -283,6 +284,7 @@ def column_segment(tables, column, k):
     segment = tables.moving_segments[column["moving_segment"] + k]
     long, mass = segment_length(segment), tables.settings[0]["rho"] * column["area"] * column["length"]
     r = vector(segment["start"], 0)
+    # A column whose segments all have length zero has its mass at a point.
     if not long > 0.0:
         return r, ZERO_VECTOR, (mass if total == 0.0 else 0.0, 0.0, 0.0)
     span = minus(vector(segment["end"], 0), r)
@@ -402,6 +404,7 @@ def add_segment_inertia(out, tables, i, segment):
         v, a = freedom_velocity(work, 6 * j, start), cross(work, 6 * j, *along)
         first, second = plus(scaled(m[0], v), scaled(m[1], a)), plus(scaled(m[1], v), scaled(m[2], a))
         row = 8 * tables.freedoms.size + tables.freedoms[j]["row"]
+        # M is symmetric: row j has only the degrees of freedom from the root to j.
         for q in range(p + 1):
             s = 6 * tables.integers[path + q]
             v, a = freedom_velocity(work, s, start), cross(work, s, *along)
@@ -445,6 +448,7 @@ def add_pipe_inertia(y, out, tables, k):
     """
     pipe, (r, t, span) = tables.pipes[k], pipe_segment(tables, k)
     i, m = tables.moving_segments[pipe["moving_segment"]]["body"], pipe_moments(tables, y, k, span, 1.0)[0]
+    # First as if fixed to the body, then without what slides along the axis.
     add_segment_inertia(out, tables, i, (r, t, m))
     length, slides = pipe["cells"] * pipe["dx"], m[0]
     if tables.settings[0]["law"] == LAW_LINEAR:

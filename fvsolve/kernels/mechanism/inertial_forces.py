@@ -55,6 +55,7 @@ def set_segment_drives(t, y, dydt, out, handle):
     segments, at, last = tables.moving_segments, tables.layout[0]["moving_segment"], -1
     for k in range(segments.size):
         segment = segments[k]
+        # Segments of a body follow each other, so that its motion is set once for them.
         if segment["body"] != last:
             last = segment["body"]
             fluid.set_body_motion(tables, out, last, layout.BIAS, layout.SPIN_BIAS)
@@ -85,6 +86,7 @@ def tank_drives(tables, out, i, level):
     """
     segment = tables.moving_segments[tables.nodes[i]["moving_segment"]]
     drive = bottom_pressure_per_density(tables, out, segment, level)
+    # The pressure must rise with depth at the surface, or the fluid would leave it.
     if not bottom_pressure_per_density(tables, out, segment, level + THIN_LAYER) > drive:
         out[STATUS], out[WHERE] = NO_WEIGHT, tables.basins.size + i
     return drive, segment["rest"]
@@ -152,6 +154,7 @@ def add_cell_drives(t, y, dydt, out, handle):
     for i in range(pipes.size if dydt.size > 0 else 0):
         pipe = pipes[i]
         n, o, first = pipe["cells"], pipe["y"], pipe["moving_segment"]
+        # Half for each wave, with opposite signs: the drive changes M = r - l and not m.
         half = 0.5 * pipe["area"] * rho / pipe["dx"]
         for k in range(n if first >= 0 else 0):
             push = half * out[at + first + k]
@@ -207,6 +210,7 @@ def accelerate_pipe_flow(y, dydt, out, tables, k):
     push = 0.5 * length / n / pipe["dx"] * acceleration
     linear = tables.settings[0]["law"] == LAW_LINEAR
     for i in range(n):
+        # Under `linear` the mass that waves add does not slide, as in `fluid_loads.add_pipe_inertia`.
         m = fluid.mass_per_length(tables, pipe, i) + (0.0 if linear else (y[o + i] + y[o + n + i]) / pipe["speed"])
         dydt[o + i] -= m * push
         dydt[o + n + i] += m * push
@@ -224,6 +228,7 @@ def accelerate_network_flow(t, y, dydt, out, handle):
     pipes, columns = tables.pipes, tables.columns
     if dydt.size == 0 or tables.freedoms.size == 0:
         return
+    # Before the rates of flow change, with which these loads were added.
     fluid.add_all_fluid_loads(y, dydt, out, tables, JOINT_LOAD_READ, -1.0, layout.BIAS, layout.SPIN_BIAS)
     for k in range(pipes.size):
         if fluid.free_carrier(tables, pipes[k]["moving_segment"]) >= 0:

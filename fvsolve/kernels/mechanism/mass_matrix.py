@@ -55,6 +55,7 @@ def joint_columns(body, own, s):
     if kind == FREE:
         for k in range(18):
             s[k] = 0.0
+        # For a free body o is its centre of mass, so that these columns are unit vectors of the world.
         s[3] = s[10] = s[17] = 1.0
         first = 18
     if kind == REVOLUTE or kind == PRISMATIC:
@@ -89,6 +90,7 @@ def inertia_about_o(body, own, result):
     ax, ay, az = inertia_row(own, r, inertia)
     bx, by, bz = inertia_row(own, r + 3, inertia)
     cx, cy, cz = inertia_row(own, r + 6, inertia)
+    # Steiner's theorem: the moments of a point mass at the centre are added to those about it.
     result[4] = ax * own[r] + ay * own[r + 1] + az * own[r + 2] + m * (gy * gy + gz * gz)
     result[5] = bx * own[r + 3] + by * own[r + 4] + bz * own[r + 5] + m * (gx * gx + gz * gz)
     result[6] = cx * own[r + 6] + cy * own[r + 7] + cz * own[r + 8] + m * (gx * gx + gy * gy)
@@ -161,6 +163,7 @@ def fill_mass_matrix(y, out, tables):
             joint_columns(bodies[i], own, work[6 * bodies[i]["freedom"] :])
         inertia_about_o(bodies[i], own, inertia)
         bias_load(own, inertia, load)
+    # From the leaves on: inertia and load of a body must contain those of all bodies that it carries.
     for i in range(bodies.size - 1, -1, -1):
         body, at = bodies[i], first + INERTIA_SIZE * i
         inertia, load = work[at : at + INERTIA_SIZE], work[loads + LOAD_SIZE * i :]
@@ -185,6 +188,7 @@ def fill_mass_matrix(y, out, tables):
                 over[k] += inertia[k]
             for k in range(LOAD_SIZE):
                 up[k] += load[k]
+    # After all rows of M are written, to which the inertia of the fluid is added.
     add_basin_inertia(out, tables)
     add_fluid_inertia(y, out, tables)
 
@@ -326,6 +330,7 @@ def add_body_wrench(tables, i, torque, force, at):
     torque, force : torque about the reference point o, and force, in axes of the world
     Nothing is added if no degree of freedom moves the body, or for the world (i < 0).
     """
+    # A body without own degrees of freedom moves with the nearest one that has some, towards the root.
     work, i = tables.scratch, nearest_free_body(tables, i)
     if i < 0:
         return
@@ -380,6 +385,7 @@ def body_rate_limit(out, tables):
         turns = max(turns, dot(own, layout.SPIN, *vector(own, layout.SPIN)))
         if bodies[i]["damping"] > 0.0 or bodies[i]["stiffness"] > 0.0:
             for j in range(bodies[i]["freedom"], bodies[i]["freedom"] + bodies[i]["freedoms"]):
+                # `mobility` has overwritten the column of the joint before.
                 clear_column(tables, at)
                 work[at + j] = 1.0
                 inverse_mass = mobility(tables, at)

@@ -76,6 +76,7 @@ def _lowest(method: Method) -> StabilityFunction:
         uncertainties = _doubts(method)
         pair = (Polynomial(map(short, p.coefficients)) for p in (numerator, denominator))
         numerator, denominator = (chopped(p, uncertainty) for p, uncertainty in zip(pair, uncertainties, strict=True))
+    # A common factor would count as a pole that R does not have.
     common = numerator.gcd(denominator)
     numerator, denominator = numerator // common, denominator // common
     constant = denominator.coefficients[0]

@@ -89,6 +89,7 @@ def _stable_ray(r: StabilityFunction, cosine: Fraction) -> bool:
     """
     if nowhere_negative(chopped(_along(r.denominator, cosine) - _along(r.numerator, cosine), _square_doubt(r))):
         poles = np.roots([float(x) for x in r.denominator.coefficients][::-1])
+        # Rounding must not move a pole on the ray into the sector.
         return not np.any(-poles.real > float(cosine) * np.abs(poles) * (1 + 1e-9))
     return False
 
@@ -135,6 +136,7 @@ def ssp_radius(method: Method) -> float:
     k = _used(method)
     if any(x < 0 for row in k for x in row) or not _has_no_fill_in(k):
         return 0.0
+    # A radius without bound would double for ever below.
     if _monotone(k, LONGEST):
         return math.inf
     low, high = Fraction(0), Fraction(1)
@@ -146,6 +148,7 @@ def ssp_radius(method: Method) -> float:
             low = middle
         else:
             high = middle
+    # Most radii are simple fractions, which bisection only approaches.
     simple = low.limit_denominator(1000)
     return float(simple if abs(simple - low) < Fraction(1, 1 << 40) and _monotone(k, simple) else low)
 

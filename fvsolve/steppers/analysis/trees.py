@@ -23,6 +23,7 @@ def trees(nodes: int) -> tuple[tuple[Tree, ...], ...]:
     def split(rest: int, count: int, branches: tuple) -> None:
         if rest == 0:
             partitions.append(branches)
+        # Branches in one order only, so that each tree is found once.
         for k in reversed(range(count)):
             if smaller[k][0] <= rest:
                 split(rest - smaller[k][0], k + 1, (*branches, smaller[k]))

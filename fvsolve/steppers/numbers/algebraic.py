@@ -57,6 +57,7 @@ class SquareRoot(Field):
         self.refine(BITS)
 
     def refine(self, bits: int) -> None:
+        # The integer square root is exact, so that no bisection is needed.
         root = isqrt(self.d << (2 * bits))
         self.low, self.high = Fraction(root, 1 << bits), Fraction(root + 1, 1 << bits)
 
@@ -109,6 +110,7 @@ class Algebraic:
                 if x and y:
                     product[i + j] += x * y
         tail = self.field.tail
+        # Powers of theta from its degree on are replaced by lower ones, which keeps the form unique.
         while len(product) > len(tail):
             top = product.pop()
             if top:
@@ -148,6 +150,7 @@ class Algebraic:
         """(lower, upper) bound of the number, by interval arithmetic with the bounds of theta."""
         low = high = Fraction(0)
         for value in reversed(self.parts):
+            # The signs are not known, so that any of the four products may be the least or the greatest.
             ends = [low * self.field.low, low * self.field.high, high * self.field.low, high * self.field.high]
             low, high = min(ends) + value, max(ends) + value
         return low, high
@@ -155,6 +158,7 @@ class Algebraic:
     def sign(self) -> int:
         """Exact sign of the number: -1, 0 or 1."""
         low, high = self.bracket()
+        # Zero is decided exactly first, because no refinement would ever exclude it.
         if low <= 0 <= high and self._vanishes():
             return 0
         bits = BITS
@@ -194,6 +198,7 @@ class Algebraic:
         """Float nearest to the number."""
         low, high = self.bracket()
         bits = BITS
+        # Both bounds must round to the same float.
         while float(low) != float(high):
             bits *= 2
             self.field.refine(bits)
@@ -250,6 +255,7 @@ def _isolated(p: Polynomial, near: Fraction, name: str) -> tuple[Fraction, Fract
 
     Raises ValueError if no such interval is found; name : name of the root in the message
     """
+    # From narrow to wide intervals, so that the nearest root is found.
     width = Fraction(1, 1 << 40)
     while width <= 1 << 20:
         low, high = near - width, near + width
@@ -276,6 +282,7 @@ def value_of(text: str, names: Mapping | None = None):
     if len(text) > LETTERS_MOST:
         raise ValueError(f'"{text[:20]}..." has {len(text)} characters; expected at most {LETTERS_MOST}')
     tokens = TOKEN.findall(text)
+    # The search for tokens skips other characters, so they are missing in the joined text.
     if "".join(tokens) != re.sub(r"\s", "", text):
         raise ValueError(f'"{text}" is not a number')
     reader = _Parser(text, tokens, names or {})
@@ -348,12 +355,14 @@ class _Parser:
             raise ValueError(f'"{self.text}": expected an integer power from 0 to {POWER_MOST} after "^"')
         result = Fraction(1)
         for _ in range(int(power)):
+            # Checked after every factor, before a number becomes too large to handle.
             result = self.checked(result * base)
         return result
 
     def atom(self):
         token = self.rest.pop() if self.rest else ""
         if token == "(":
+            # Each bracket is a call of the parser; too many would exhaust the stack of Python.
             self.depth += 1
             if self.depth > NESTED_MOST:
                 raise ValueError(f'"{self.text}" has more than {NESTED_MOST} brackets within each other')

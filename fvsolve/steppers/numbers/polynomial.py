@@ -110,6 +110,7 @@ class Polynomial:
         a, b = self, other
         while b.coefficients:
             a, b = b, a % b
+            # Without this, the fractions of successive remainders grow fast.
             b = b.monic() if b.coefficients else b
         return a.monic() if a.coefficients else a
 
@@ -216,6 +217,7 @@ def odd_part(p: Polynomial) -> Polynomial:
 def first_sign_change(p: Polynomial) -> float | None:
     """Least x > 0 at which p changes sign, accurate to about the last bit; None without sign change there."""
     p = odd_part(p) if p.degree > 0 else p
+    # A root at zero is not one at x > 0.
     while p.degree > 0 and p.coefficients[0] == 0:
         p = Polynomial(p.coefficients[1:])
     if p.degree < 1:
