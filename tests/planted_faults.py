@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 TOP = Path(__file__).parents[1]
-QUICK_NEEDED, ALL_NEEDED = 42, 46
+QUICK_NEEDED, ALL_NEEDED = 45, 49
 WITHOUT_OWN_TEST = (
     "--deselect",
     "tests/repository/test_tools_of_tests.py",
@@ -130,10 +130,13 @@ FAULTS = [
     ),
     Fault("kernels/potential_networks.py", "forward = most - torque", "forward = 1.01 * most - torque"),
     Fault(
-        "kernels/input_histories.py",
+        "features/controls/kernels/input_histories.py",
         "weight *= (time - other) / (histories[here] - other)",
         "weight *= 1.01 * (time - other) / (histories[here] - other)",
     ),
+    Fault("features/controls/balance.py", "-residual[acts] / size[acts], RANK", "residual[acts] / size[acts], RANK"),
+    Fault("features/delay_lines/lower.py", '2.0 * beta * pipe["admittance"] /', '2.02 * beta * pipe["admittance"] /'),
+    Fault("features/scalars/balances.py", "decayed = -float(np.sum(decay", "decayed = float(np.sum(decay"),
     Fault("studies/ports/positive_real.py", "order = n.degree - d.degree", "order = d.degree - n.degree"),
     Fault(
         "output/csv_files.py",

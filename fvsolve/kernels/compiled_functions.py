@@ -27,7 +27,10 @@ class Functions:
 
     def __init__(self, cast: ModelFeatures) -> None:
         self.cast, rates = cast, cast.functions(*PHASES)
-        self.calls = calls.empty_calls(calls.JOBS, len(rates) + 3)
+        # a row for each job, ended by a zero
+        most = max(len(rates), *map(cast.count, ("observe", "record", "events", "stored", "derive_state", "damp")))
+        most = max(most, cast.count("network_power") + cast.count("power"))
+        self.calls = calls.empty_calls(calls.JOBS, most + 1)
         self.hooks = calls.empty_calls(len(cast.laws), len(calls.HOOKS))
         others = "" if all(name.startswith("fvsolve.") for name in cast.packages()) else "import fvsolve.parts; "
         code = f"{others}{READER_IMPORTS}compile_readers({cast!r}); {COMPILE_TIME_LOOP}"

@@ -342,6 +342,10 @@ class ModelFeatures(NamedTuple):
         """Names of the modules of laws, and of the packages with functions of basins, that the model needs."""
         return [*self.laws, *self.further_packages, *(member.package for member in self.basins)]
 
+    def count(self, job: str) -> int:
+        """Number of the functions of a job, which are not loaded."""
+        return sum(bool(getattr(member, job)) for member in dict.fromkeys(self.components()))
+
     def functions(self, *jobs: str) -> list:
         """Functions of the model for these jobs, job by job; modules that the model does not need are not loaded.
 

@@ -86,10 +86,7 @@ class RunLoop:
         self.fused_step = fused_step_function(fused_allowed := fused_step_allowed(model, method))
         ledgers, structure = model.ledgers, structure or (lambda: model.structure)
         self.stepper = stepper = Integrator(method, model.y_size, ledgers, structure, model.scale.copy(), model.damped)
-        sums = [*model.tables.nodes["y"], *model.tables.masses["y"]]  # travel is stored too
-        for feature in model.features:
-            sums += feature.stored_states(model).tolist()
-        stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
+        stepper.stored = stored_states(model)
         stepper.carry = np.zeros(len(stepper.stored))
         stepper.bounded_states, stepper.bounds = state_bounds(model)
         stepper.out, stepper.out_row = model.new_out(), model.new_out()
@@ -411,6 +408,14 @@ class RunLoop:
         verbs = "change their states" if len(names) > 1 else "changes its state"
         remedy = ", or ".join(remedies) or "put a chamber at the node of this part"
         return f"{parts_text} {verbs} without end at {when}; {remedy}"
+
+
+def stored_states(model: Model) -> np.ndarray:
+    """Numbers of the states that are stored amounts, also travel of masses, whose sums are compensated."""
+    sums = [*model.tables.nodes["y"], *model.tables.masses["y"]]
+    for feature in model.features:
+        sums += feature.stored_states(model).tolist()
+    return np.array([at for at in sums if at >= 0], dtype=np.int64)
 
 
 def set_step_mode(control, model: Model) -> None:

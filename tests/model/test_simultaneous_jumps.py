@@ -5,7 +5,7 @@ The truth is a closed form, or characteristics at Courant number 1 in cells of e
 
 import numpy as np
 import pytest
-from model.test_jumps_in_lines import EXACT, WATER, junction, lake, line, scene
+from features.test_jumps_in_lines import EXACT, WATER, junction, lake, line, scene
 
 import fvsolve
 

@@ -14,8 +14,8 @@ from reference.orders import observed_order
 from reference.scenes import RHO, area, junction, pipe, ramp, reservoir, scene, smooth_ramp, smooth_step, step
 
 import fvsolve
+from fvsolve.features.scalars.modes import pipe_scalar_modes
 from fvsolve.parts.pipe.pipe_wall import materials
-from fvsolve.step_limits.growing_modes import pipe_scalar_modes
 
 R = 1.288  # of the steel pipe of Liege
 SLOWER = {"retardation": {"dye": R}}

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from model.test_jumps_in_lines import WATER, junction, lake, line, scene
+from features.test_jumps_in_lines import WATER, junction, lake, line, scene
 
 import fvsolve
 

@@ -6,16 +6,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fvsolve.assembly.features import FeaturePattern
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.state_pairs import pairs_of, unique_states
 
 
-class BlockCouplings:
+class BlockCouplings(FeaturePattern):
     """States of blocks, and states on which their outputs and rates depend. model : `Couplings` of the model"""
 
     def __init__(self, feature, couplings) -> None:
+        super().__init__(feature)
         tables = couplings.model.tables
-        self.feature, self.model, self.tables, self.controls = feature, couplings, tables, feature.table
+        self.model, self.tables, self.controls = couplings, tables, feature.table
         self.sensors, self.floats, self.size = feature.sensor_table, tables.floats, couplings.size
         self.follows = {
             index: int(tables.pieces[row["first"], 2])
