@@ -327,7 +327,10 @@ def positive_real(numerator, denominator) -> Verdict:
     n, d = n // common, d // common
     where = locate_roots(d)
     axis = [*_infinity(n, d), *_origin(n, d, where), *(_pair(n, d, x, order) for x, order in where.pairs)]
-    even, below = _real_part(n, d)
+    # polynomials in x = w^2 with Re H(jw) = even / below, where below = |d(jw)|^2
+    (n_even, n_odd), (d_even, d_odd), x = even_odd_parts(n), even_odd_parts(d), Polynomial([0, 1])
+    even = n_even * d_even + x * n_odd * d_odd
+    below = d_even * d_even + x * d_odd * d_odd
     bands, zeros = _bands(even, below), _zeros(even, below)
     hidden = _root_places(common, locate_roots(common))
     poles = _root_places(d, where)
@@ -416,12 +419,6 @@ def _pair(n: Polynomial, d: Polynomial, x: Root, order: int) -> AxisPole:
 
 
 # the real part on the axis --------------------------------------------------------------------------------------
-
-
-def _real_part(n: Polynomial, d: Polynomial) -> tuple[Polynomial, Polynomial]:
-    """Polynomials E and P in x = w^2 with Re H(jw) = E / P, for H = n / d; P = |d(jw)|^2."""
-    (ne, no), (de, do), x = even_odd_parts(n), even_odd_parts(d), Polynomial([0, 1])
-    return ne * de + x * no * do, de * de + x * do * do
 
 
 def _bands(even: Polynomial, below: Polynomial) -> list[Band]:
