@@ -67,7 +67,11 @@ def run_command() -> None:
         command = COMMANDS.get(sys.argv[1]) if len(sys.argv) > 1 else None
         source = f"{command.source}: " if command and command.source else ""
         reader = " to its authors" if source else ""
-        text = f"internal error in {_location(error)}: {type(error).__name__}: {error}"
+        trace = error.__traceback__
+        while trace.tb_next is not None:
+            trace = trace.tb_next
+        location = f"{trace.tb_frame.f_code.co_filename}, line {trace.tb_lineno}"
+        text = f"internal error in {location}: {type(error).__name__}: {error}"
         _exit_with(f"{source}{text}; please report it{reader}", 1)
     finally:
         gc.enable()
@@ -121,10 +125,3 @@ def help_text(command: Declaration) -> str:
 def _exit_with(message: str, code: int) -> None:
     print(visible(message), file=sys.stderr)
     sys.exit(code)
-
-
-def _location(error: Exception) -> str:
-    trace = error.__traceback__
-    while trace.tb_next is not None:
-        trace = trace.tb_next
-    return f"{trace.tb_frame.f_code.co_filename}, line {trace.tb_lineno}"

@@ -58,7 +58,11 @@ def energy(
     if case is None:
         from fvsolve.studies.passivity import passivity
 
-        refuse_without_case({"--port": port, "--out": out, "--set": set})
+        needs_case = [name for name, value in (("--port", port), ("--out", out), ("--set", set)) if value]
+        if needs_case:
+            raise FvsolveError(f"{', '.join(needs_case)}: valid only with a case; expected fvsolve energy CASE "
+                               f"{needs_case[0]} ...; without a case the passivity of schemes and methods is listed, "
+                               "without files")  # fmt: skip
         with progress_line() as progress, interrupt_message(f"interrupted: no results are saved; {RESTARTS}"):
             result = passivity(schemes, methods, progress)
         present(as_json, result.plain(), passivity_text(result))
@@ -66,17 +70,6 @@ def energy(
         compare_pairs(cli.load_case(case, set), schemes, methods, port, out, as_json)
     else:
         ledger(cli.load_case(case, set), port, out, as_json)
-
-
-def refuse_without_case(options: dict) -> None:
-    """Raise FvsolveError if a command without a case has options that need a case.
-
-    options : name of an option -> its value, which is empty or None if the option is not given
-    """
-    given = [name for name, value in options.items() if value]
-    if given:
-        raise FvsolveError(f"{', '.join(given)}: valid only with a case; expected fvsolve energy CASE {given[0]} ...; "
-                           "without a case the passivity of schemes and methods is listed, without files")  # fmt: skip
 
 
 def ledger(case, port, out, as_json: bool) -> None:
@@ -191,8 +184,12 @@ def _outcome_text(case, rows) -> Iterator:
     for row in ran:
         if ":" in row["reason"]:
             yield f"{_pair(row)}: {row['reason']}", "yellow"
-    for reason, pairs in _by_reason(refused).items():
-        yield f"{', '.join(pairs)}: {reason}", "bold red"
+    groups: dict[str, list] = {}  # a reason that is the same for several methods appears once
+    for row in refused:
+        groups.setdefault(row["reason"].replace(f'method "{row["method"]}"', "each"), []).append(row)
+    for reason, rows_of_reason in groups.items():
+        text = reason if len(rows_of_reason) > 1 else rows_of_reason[0]["reason"]
+        yield f"{', '.join(map(_pair, rows_of_reason))}: {text}", "bold red"
     if case.numerics.step is None and any("estimates no error" in row["reason"] for row in refused):
         span = case.numerics.end - case.numerics.start
         yield f"or set a fixed step for all pairs: --set numerics.step={span / 1000.0:.1g} (s, run time / 1000)"
@@ -203,18 +200,6 @@ def _outcome_text(case, rows) -> Iterator:
         yield f"none of {'the pairs that ran' if refused else 'the pairs'} creates energy in this run"
     else:
         yield "no pair ran, so the creation of energy was not checked"
-
-
-def _by_reason(rows) -> dict[str, list[str]]:
-    """Names of the refused pairs of scheme and method, by the reason : reason -> names.
-
-    A reason that is the same for several methods appears once.
-    """
-    groups: dict[str, list] = {}
-    for row in rows:
-        groups.setdefault(row["reason"].replace(f'method "{row["method"]}"', "each"), []).append(row)
-    return {reason if len(several) > 1 else several[0]["reason"]: [_pair(row) for row in several]
-            for reason, several in groups.items()}  # fmt: skip
 
 
 def _pair(row) -> str:

@@ -1,6 +1,5 @@
 """`fvsolve fmu`: export of a case as a functional mock-up unit."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -21,12 +20,9 @@ def fmu(
     from fvsolve.fmi.export import write_fmu
 
     path, variables = write_fmu(load_case(case, set), out)
-    present(False, {}, fmu_text(path, variables))
-
-
-def fmu_text(path: Path, variables: list) -> Iterator:
-    """Table of the variables of an FMU, and its file."""
-    rows = [[item.name, "input" if item.is_input else "output", item.unit,
-             "" if item.start is None else f"{item.start:.6g}"] for item in variables]  # fmt: skip
-    yield TextTable(["variable", "", "unit", "start"], rows)
-    yield f"{path}: needs fvsolve of this version in the Python of its host"
+    rows = []
+    for item in variables:
+        start = "" if item.start is None else f"{item.start:.6g}"
+        rows.append([item.name, "input" if item.is_input else "output", item.unit, start])
+    last = f"{path}: needs fvsolve of this version in the Python of its host"
+    present(False, {}, [TextTable(["variable", "", "unit", "start"], rows), last])

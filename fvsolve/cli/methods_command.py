@@ -114,8 +114,11 @@ def _tableau_lines(method: Method) -> list[str]:
     rows, width = [], method.stages
     for text in method.text.strip().splitlines():
         left, bar, right = text.partition("|")
-        rows.append([left.strip(), *right.split()] if bar else [])
-    rows = [[_entry(x) for x in row] + [""] * (width + 1 - len(row)) if row else [] for row in rows]
+        row = [left.strip(), *right.split()] if bar else []
+        for k, entry in enumerate(row):
+            if len(entry) > MAX_ENTRY and re.fullmatch(r"-?[\d.]+", entry):
+                row[k] = entry[: SHORT_DIGITS + 2] + "..."
+        rows.append(row + [""] * (width + 1 - len(row)) if row else [])
     wide = [max(len(row[i]) for row in rows if row) for i in range(width + 1)]
     lines = []
     for row in rows:
@@ -124,30 +127,21 @@ def _tableau_lines(method: Method) -> list[str]:
     return lines
 
 
-def _entry(text: str) -> str:
-    if len(text) > MAX_ENTRY and re.fullmatch(r"-?[\d.]+", text):
-        return text[: SHORT_DIGITS + 2] + "..."
-    return text
-
-
 def _polynomial(p: Polynomial) -> str:
     terms = []
     for k, x in enumerate(p.coefficients):
         if x == 0:
             continue
         power = "" if k == 0 else "s" if k == 1 else f"s^{k}"
-        size = _number(abs(x))
+        size = str(abs(x))
+        if len(size) > MAX_COEFFICIENT:
+            size = f"{float(abs(x)):.15g}"
+        elif re.search(r".[-+]", size):
+            size = f"({size})"
         size = "" if size == "1" and power else size
         terms.append((" - " if sign(x) < 0 else " + ") + " ".join(word for word in (size, power) if word))
     text = "".join(terms)
     return text[3:] if text.startswith(" + ") else text.strip()
-
-
-def _number(x) -> str:
-    text = str(x)
-    if len(text) > MAX_COEFFICIENT:
-        return f"{float(x):.15g}"
-    return f"({text})" if re.search(r".[-+]", text) else text
 
 
 def _yes(value: bool) -> str:

@@ -88,7 +88,12 @@ def result_text(run) -> Iterator:
         more = len(summary["events"]) - EVENTS_SHOWN
         yield f"and {more} more event{'s' if more > 1 else ''}; summary.json has all"
     for name, table in summary.get("run_up", {}).items():
-        yield _run_up_text(name, table)
+        along, unit = ("angle", "deg") if "angle" in table else ("distance", "m")
+        if table["greatest"] is None:
+            yield f"run-up {name}: no cell was wet"
+        else:
+            place = f"{along} {_number(table[f'greatest_{along}'])} {unit}"
+            yield f"run-up {name}: {_number(table['greatest'])} m at {place}"
     if "energy_use" in summary:
         yield from energy_use_text(summary["energy_use"])
     for name, ledger in summary["ledgers"].items():
@@ -167,7 +172,11 @@ def check_text(case, facts: dict, every: bool = False) -> Iterator:
     unsteady = {name: part["unsteady"] for name, part in facts["pipes"].items() if "unsteady" in part}
     notes = [f"unsteady friction of {name}: {part['weighting']}, {part['terms']} terms a cell, within "
              f"{part['accuracy']:g} up to {part['frequency']:.3g} Hz" for name, part in unsteady.items()]  # fmt: skip
-    notes += _wall_lines(case, facts["pipes"])
+    walls: dict[str, list[str]] = {}  # pipes with the same text share a line
+    for name, pipe in facts["pipes"].items():
+        if text := _wall_text(case, pipe):
+            walls.setdefault(text, []).append(name)
+    notes += [f"wall of {listing(names)}: {text}" for text, names in walls.items()]
     lines = {name: part for name, part in facts["pipes"].items() if part["line"] == "delay-line"}
     notes += [f"{name} is a delay line, error at most {part['line_bound']:.2g} of the greatest jump: {part['line_why']}"
              for name, part in lines.items()]  # fmt: skip
@@ -212,15 +221,6 @@ def _network_lines(network: dict | None) -> list[str]:
         verdict = "passive" if network["passive"] else "not passive"
         text += f"; {verdict}, greatest eigenvalue of Q A + A' Q {network['greatest']:.6g}"
     return [text, *(f"tied: {name} = {terms}" for name, terms in network["tied"].items())]
-
-
-def _wall_lines(case, pipes: dict) -> list[str]:
-    """Lines on pipe walls and the sources of their data; pipes with the same text share a line."""
-    alike: dict[str, list[str]] = {}
-    for name, pipe in pipes.items():
-        if text := _wall_text(case, pipe):
-            alike.setdefault(text, []).append(name)
-    return [f"wall of {listing(names)}: {text}" for text, names in alike.items()]
 
 
 def _wall_text(case, pipe: dict) -> str:
@@ -341,13 +341,6 @@ def _extremes(run) -> Iterator:
     if len(rows) > ROWS:
         where = f"in {run.directory / 'summary.json'}" if run.directory else "in Result.extremes"
         yield f"... {len(rows) - ROWS} more {where}"
-
-
-def _run_up_text(name: str, table: dict) -> str:
-    along, unit = ("angle", "deg") if "angle" in table else ("distance", "m")
-    if table["greatest"] is None:
-        return f"run-up {name}: no cell was wet"
-    return f"run-up {name}: {_number(table['greatest'])} m at {along} {_number(table[f'greatest_{along}'])} {unit}"
 
 
 def _step_text(case, facts: dict) -> str:

@@ -72,7 +72,13 @@ def _limits_text(limits: list[AdvectionLimit], runs: list[MeasuredLimit], limite
     if len(limits) > SHOWN_ROWS:
         yield from _limit_table(limits)
     for limit in limits if len(limits) <= SHOWN_ROWS else ():
-        yield f"{limit.scheme} with {limit.method}: {_limit_in_words(limit)}", "bold"
+        if math.isinf(limit.limit):
+            words = "stable at every Courant number"
+        elif limit.limit == 0.0:
+            words = f"unstable, a wave grows at every {'small ' if limit.stable else ''}step"
+        else:
+            words = f"stable up to Courant number {limit.limit:.10g}"
+        yield f"{limit.scheme} with {limit.method}: {words}", "bold"
         yield from (f"  {words}" for words in _sentences(limit))
     if runs:
         first = runs[0]
@@ -119,14 +125,6 @@ def _limit(x: float) -> str:
     return "every" if math.isinf(x) else f"{x:.7g}" if x else "none"
 
 
-def _limit_in_words(limit: AdvectionLimit) -> str:
-    if math.isinf(limit.limit):
-        return "stable at every Courant number"
-    if limit.limit == 0.0:
-        return f"unstable, a wave grows at every {'small ' if limit.stable else ''}step"
-    return f"stable up to Courant number {limit.limit:.10g}"
-
-
 def _sentences(limit: AdvectionLimit) -> list[str]:
     sentences = []
     if limit.limit > 0.0 and limit.theta is not None:
@@ -136,9 +134,9 @@ def _sentences(limit: AdvectionLimit) -> list[str]:
         sentences.append(f"set by {words}")
     if limit.steps is not None:
         steps = f"a thousandfold in {limit.steps:.4g} steps"
+        growth = f"1 + {limit.growth:.3e}" if limit.growth < 1e-3 else f"{1 + limit.growth:.6g}"
         sentences.append(
-            f"at Courant number {limit.courant:.6g} the worst wave grows by a factor of "
-            f"{_growth(limit.growth)} a step, {steps}"
+            f"at Courant number {limit.courant:.6g} the worst wave grows by a factor of {growth} a step, {steps}"
         )
     elif limit.growth is not None:
         sentences.append(f"at Courant number {limit.courant:.6g} no wave grows")
@@ -151,10 +149,6 @@ def _sentences(limit: AdvectionLimit) -> list[str]:
     if not limit.proved:
         sentences.append("computed for sampled waves; not proved for waves between them")
     return sentences
-
-
-def _growth(growth: float) -> str:
-    return f"1 + {growth:.3e}" if growth < 1e-3 else f"{1 + growth:.6g}"
 
 
 def _limit_table(limits: list[AdvectionLimit]) -> Iterator:
@@ -224,7 +218,11 @@ def stability(
     """Compute the greatest stable step of a case, predicted and measured, and bounds on it."""
     of_a_case = {"--set": set, "--at": at, "--left-limit": before, "--jobs": None if jobs == 1 else jobs}
     of_a_case |= {"--dask": dask}
-    refuse_options(case, of_a_case, {"--cells": cells, "--courant": courant})
+    unused = of_a_case if case is None else {"--cells": cells, "--courant": courant}
+    useless = [name for name, value in unused.items() if value not in (None, False, [])]
+    if useless:
+        reason = "needs a case: fvsolve stability CASE" if case is None else "not valid with a case, only without"
+        raise FvsolveError(f"{', '.join(useless)}: {reason}")
     if case is None:
         return present(as_json, *without_case(scheme, method, cells, steps, out, courant))
     from fvsolve.studies.stability.growth import STEPS
@@ -243,18 +241,6 @@ def stability(
     if len(result.rows) <= PICTURES:
         files += pictures(result, folder)
     present(as_json, result.plain() | {"directory": str(folder), "files": files}, stability_text(result, folder, files))
-
-
-def refuse_options(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
-    """Raise FvsolveError if options are given that have no effect with a case, or have no effect without a case.
-
-    case : name of the case, or None
-    of_a_case : name -> value of the options that need a case; of_a_grid : name -> value of the options for no case
-    """
-    useless = [name for name, value in (of_a_grid if case else of_a_case).items() if value not in (None, False, [])]
-    if useless:
-        reason = "not valid with a case, only without" if case else "needs a case: fvsolve stability CASE"
-        raise FvsolveError(f"{', '.join(useless)}: {reason}")
 
 
 def pictures(result, folder: Path) -> list[str]:

@@ -60,7 +60,14 @@ def listed(paths: dict[str, Path]) -> tuple[dict, list]:
 
 def result_text(results: list) -> Iterator:
     """Table of all rows, then the reasons, and the data that lack."""
-    rows = [row_cells(result, row) for result in results for row in result.rows]
+    from fvsolve.validation.row_texts import amounts
+
+    rows = []
+    for result in results:
+        for row in result.rows:
+            texts = amounts(row)
+            cells = texts.reference, texts.value, texts.error, texts.others
+            rows.append([result.name, row.row.what, *cells, row.unit, row.verdict])
     if rows:
         yield TextTable(["case", "quantity", "measured", "computed", "error", "others", "unit", "verdict"], rows)
     for result in results:
@@ -78,11 +85,3 @@ def result_text(results: list) -> Iterator:
               dict.fromkeys(result.verdict for result in results)}  # fmt: skip
     seconds = sum(result.seconds for result in results)
     yield f"{len(results)} cases: {', '.join(f'{n} {verdict}' for verdict, n in counts.items())}; {seconds:.1f} s"
-
-
-def row_cells(result, row) -> list[str]:
-    """Texts of a row of the table."""
-    from fvsolve.validation.row_texts import amounts
-
-    texts = amounts(row)
-    return [result.name, row.row.what, texts.reference, texts.value, texts.error, texts.others, row.unit, row.verdict]

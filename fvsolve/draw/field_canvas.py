@@ -249,7 +249,11 @@ def field_extent(scene: DrawnScene) -> tuple[tuple[float, float], np.ndarray, bo
                 values = values[mesh["depth"] > WET_DEPTH * scene.height.factor]  # only wet cells are drawn
             lows.append(float(values.min(initial=math.inf)))
             highs.append(float(values.max(initial=-math.inf)))
-        boxes.append(mesh_box(mesh))
+        box = list(mesh.bounds)
+        if "surface" in mesh.cell_data:  # water may stand above the mesh
+            tops = mesh["depth"] + mesh.points[:, 2].max() if "normal" in mesh.cell_data else mesh["surface"]
+            box[5] = max(box[5], float(tops.max()))
+        boxes.append(box)
         wet |= "depth" in mesh.cell_data
     if not lows:
         sys.exit(f"unknown field {field!r}{did_you_mean(field, known)}; fields are {listing(known)}")
@@ -263,6 +267,7 @@ def read_frame(file: str | Path, scene: DrawnScene) -> Any:
     If the quantity of the scene has no unit, its unit is set to that in the file.
     """
     import pyvista
+    from vtkmodules.vtkCommonCore import vtkDataArray
 
     mesh, quantity = pyvista.read(file), scene.quantity
     if scene.over_run and "max_depth" in mesh.cell_data:  # NaN in cells that were never wet
@@ -272,7 +277,9 @@ def read_frame(file: str | Path, scene: DrawnScene) -> Any:
         mesh = mesh.clean()
     if quantity.name in mesh.cell_data:
         values = np.asarray(mesh.cell_data[quantity.name])
-        quantity.unit = quantity.unit or array_unit(mesh, quantity.name)
+        if not quantity.unit:  # the file stores the unit with the array
+            information = mesh.GetCellData().GetArray(quantity.name).GetInformation()
+            quantity.unit = information.Get(vtkDataArray.UNITS_LABEL()) or "-"
         size = np.linalg.norm(values, axis=1) if values.ndim == 2 else values
         mesh.cell_data[quantity.name] = quantity.factor * size + quantity.shift
     if scene.length.factor != 1.0 or scene.height.factor != 1.0:
@@ -280,22 +287,6 @@ def read_frame(file: str | Path, scene: DrawnScene) -> Any:
         for name in {"depth", "surface"} & set(mesh.cell_data) - {quantity.name}:
             mesh.cell_data[name] = scene.height.factor * mesh.cell_data[name]
     return mesh
-
-
-def array_unit(mesh: Any, field: str) -> str:
-    """Unit that the file stores with the array of a field; "-" without a unit."""
-    from vtkmodules.vtkCommonCore import vtkDataArray
-
-    return mesh.GetCellData().GetArray(field).GetInformation().Get(vtkDataArray.UNITS_LABEL()) or "-"
-
-
-def mesh_box(mesh: Any) -> list[float]:
-    """Bounding box of a frame with its water : least and greatest x, least and greatest y, least and greatest z."""
-    bounds = list(mesh.bounds)
-    if "surface" in mesh.cell_data:
-        bounds[5] = max(bounds[5], float((mesh["depth"] + mesh.points[:, 2].max() if "normal" in mesh.cell_data
-                                        else mesh["surface"]).max()))  # fmt: skip
-    return bounds
 
 
 def tubes(mesh: Any, box) -> Any:

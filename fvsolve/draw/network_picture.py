@@ -165,30 +165,19 @@ def place_labels(at, sizes, gaps, blocks, lines, within) -> list[tuple[float, fl
             low = y + dy * reach - (0.5 - 0.5 * dy) * high
             box = np.array([left, low, left + wide, low + high])
             wider = box + (-PADDING, 0.0, PADDING, 0.0)
-            if _is_outside(box, within) or any(_overlap(wider, other) for other in taken):
-                continue
-            cost = RANK_COST * rank + (_covered_points(box, lines) if len(lines) else 0)
+            if (box[:2] < within[:2]).any() or (box[2:] > within[2:]).any():
+                continue  # not inside
+            if any((wider[:2] < other[2:]).all() and (other[:2] < wider[2:]).all() for other in taken):
+                continue  # covers a name or a block
+            cost = RANK_COST * rank
+            if len(lines):
+                cost += int(((lines > box[:2] - PADDING) & (lines < box[2:] + PADDING)).all(axis=1).sum())
             if cost < least:
                 best, least = box, cost
         places.append(None if best is None else (float(best[0]), float(best[1])))
         if best is not None:
             taken.append(best)
     return places
-
-
-def _overlap(a, b) -> bool:
-    return bool(a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3])
-
-
-def _is_outside(box, within) -> bool:
-    return bool(box[0] < within[0] or box[1] < within[1] or box[2] > within[2] or box[3] > within[3])
-
-
-def _covered_points(box, points) -> int:
-    x, y = points[:, 0], points[:, 1]
-    return int(
-        ((x > box[0] - PADDING) & (x < box[2] + PADDING) & (y > box[1] - PADDING) & (y < box[3] + PADDING)).sum()
-    )
 
 
 def points_along(segments: np.ndarray) -> np.ndarray:

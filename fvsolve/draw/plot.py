@@ -70,7 +70,10 @@ def select_curves(values: np.ndarray, probes, measured=()) -> tuple[list[DrawnPa
     for k, (name, unit) in enumerate(probes):
         if k in still:
             continue
-        place, quantity = _place_and_quantity(name)
+        # `main.pressure@0.5` is the quantity `pressure` of the place `main at 0.5`
+        path, _, spot = name.partition("@")
+        place, _, quantity = path.rpartition(".")
+        place += f" at {spot}" if spot else ""
         line = DrawnLine(k, [place], [])
         if name not in measured and quantity in OF_PRESSURE:
             first = next(
@@ -97,21 +100,15 @@ def _without_doubles(lines: list[DrawnLine], values: np.ndarray, probes, measure
     result: list[DrawnLine] = []
     for line in lines:
         may_join = probes[line.column][0] not in measured and not line.alike
-        drawn = result if may_join else []
         own = values[:, line.column]
-        under = next((other for other in drawn if _coincide(values[:, other.column], own, tolerance)), None)
-        if under is None:
-            result.append(line)
+        for other in result if may_join else ():
+            drawn = values[:, other.column]
+            if np.array_equal(np.isnan(drawn), np.isnan(own)) and not (np.abs(drawn - own) > tolerance).any():
+                other.names += line.names
+                break
         else:
-            under.names += line.names
+            result.append(line)
     return result
-
-
-def _place_and_quantity(probe: str) -> tuple[str, str]:
-    """Place and quantity of a probe: (`main at 0.5`, `pressure`) for `main.pressure@0.5`."""
-    path, _, spot = probe.partition("@")
-    place, _, quantity = path.rpartition(".")
-    return place + (f" at {spot}" if spot else ""), quantity
 
 
 def _range_of(values: np.ndarray) -> float | None:
@@ -119,10 +116,6 @@ def _range_of(values: np.ndarray) -> float | None:
     finite = values[np.isfinite(values)]
     swing = float(np.ptp(finite)) if finite.size else 0.0
     return swing if swing > CONSTANT_TOLERANCE * float(np.abs(finite).max(initial=0.0)) else None
-
-
-def _coincide(a: np.ndarray, b: np.ndarray, tolerance: float) -> bool:
-    return bool(np.array_equal(np.isnan(a), np.isnan(b)) and not (np.abs(a - b) > tolerance).any())
 
 
 def _is_scaled(a: np.ndarray, b: np.ndarray) -> bool:
@@ -337,7 +330,10 @@ def phase_figure(pairs, title=""):
     for axes, (x, y) in zip(grid.flat, pairs, strict=False):
         style.style_axes(axes)
         axes.margins(0.05)
-        axes.plot(*_thin_path(x[2], y[2]), color=style.COLOURS[0], linewidth=1.0)
+        # of a long path only the extremes of both coordinates in bins of consecutive points are drawn
+        rows = np.arange(len(x[2]), dtype=float)
+        kept = np.union1d(thin_series(rows, x[2])[0], thin_series(rows, y[2])[0]).astype(int)
+        axes.plot(x[2][kept], y[2][kept], color=style.COLOURS[0], linewidth=1.0)
         axes.plot(x[2][:1], y[2][:1], "o", color=style.COLOURS[1], markersize=5)
         style.name_axes(axes, f"{x[0]} [{x[1]}]", f"{y[0]} [{y[1]}]")
     for axes in list(grid.flat)[len(pairs) :]:
@@ -349,10 +345,3 @@ def phase_figure(pairs, title=""):
 def short_name(text: str) -> str:
     """Name over a chainage; a text longer than `MAX_NAME_LENGTH` is cut."""
     return text if len(text) <= MAX_NAME_LENGTH else f"{text[: MAX_NAME_LENGTH - 1]}\u2026"
-
-
-def _thin_path(x, y) -> tuple:
-    """Reduce a long path (x, y) to the extremes of both coordinates in bins of consecutive points : (x, y)."""
-    rows = np.arange(len(x), dtype=float)
-    indices = np.union1d(thin_series(rows, x)[0], thin_series(rows, y)[0]).astype(int)
-    return x[indices], y[indices]

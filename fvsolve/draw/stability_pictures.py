@@ -223,7 +223,10 @@ def _panel(axes, result, scheme: str) -> None:
             corner = square.column - 0.5, row - 0.5
             axes.add_patch(Rectangle(corner, 1, 1, facecolor=colour, edgecolor="white", hatch=hatch, lw=1.2))
             ink = "white" if square.verdict in DARK_VERDICTS else style.INK
-            axes.text(square.column, row, _error_text(square), ha="center", va="center", fontsize=6.5, color=ink)
+            error = square.measures.error
+            if math.isfinite(error) and square.verdict not in ("blown up", "refused", "not run"):
+                error_text = f"{100 * error:.2g} %"
+                axes.text(square.column, row, error_text, ha="center", va="center", fontsize=6.5, color=ink)
         place = limit_place(result, squares)
         if place is not None:
             look = "dotted" if scheme in result.limited else "solid"
@@ -238,14 +241,6 @@ def _panel(axes, result, scheme: str) -> None:
         side.set_visible(False)
     if result.wave_rate:
         axes.set_title(scheme, fontsize=9, color=style.INK, loc="left", pad=4)
-
-
-def _error_text(square) -> str:
-    """Text of the error of a run as a percentage; "" if it is not known, and for blown up, refused or missing runs."""
-    error = square.measures.error
-    if not math.isfinite(error) or square.verdict in ("blown up", "refused", "not run"):
-        return ""
-    return f"{100 * error:.2g} %"
 
 
 def limit_place(result, squares) -> float | None:

@@ -36,7 +36,11 @@ def view(scene: DrawnScene, out: Path) -> None:
     if out.suffix == ".html" and scene.pipes:
         raise FvsolveError(f"{out.name}: only basins and bodies are drawn as a page; expected .png, .svg or .pdf")
     if out.suffix == ".mp4" and animated:
-        _need_imageio()
+        try:
+            import imageio  # noqa: F401
+            import imageio_ffmpeg  # noqa: F401
+        except ImportError:
+            raise FvsolveError(f"an .mp4 cannot be written: a package is missing; {ANIMATION_FORMATS}") from None
     if scene.pipes:
         from fvsolve.draw.network_picture import NetworkPicture
         from fvsolve.draw.sheet import write_animation
@@ -63,11 +67,3 @@ def _draw_in_process(scene: DrawnScene, out: Path) -> None:
     if done.returncode:
         last = (output.strip().splitlines() or ["no message"])[-1]
         raise FvsolveError(last if last.startswith("unknown field") else f"{out} could not be drawn: {last}")
-
-
-def _need_imageio() -> None:
-    try:
-        import imageio  # noqa: F401
-        import imageio_ffmpeg  # noqa: F401
-    except ImportError:
-        raise FvsolveError(f"an .mp4 cannot be written: a package is missing; {ANIMATION_FORMATS}") from None

@@ -220,11 +220,6 @@ def _band(a: float, b: float, colour: str, opacity: float) -> dict[str, Any]:
             "opacity": opacity, "line": {"width": 0}, "layer": "below"}  # fmt: skip
 
 
-def _vertical_line(x: float) -> dict[str, Any]:
-    return {"type": "line", "xref": "x", "yref": "paper", "x0": x, "x1": x, "y0": 0, "y1": 1.015,
-            "line": {"color": HAIR, "width": 1}, "layer": "below"}  # fmt: skip
-
-
 def _limits(section: Section, x, k: np.ndarray) -> list[dict[str, Any]]:
     """Curves of the vapour line and of limits for plotly.js; x : drawn chainages, k : their indices in the section."""
     looks = {name: LINE_LOOKS.get(name) or LIMIT_LOOKS[name.rpartition(", ")[2]] for name in section.lines}
@@ -240,7 +235,9 @@ def _section_layout(sections: list[Section], unit: str, along: str) -> dict[str,
     layout, names = _layout(f"head [{unit}]", f"chainage [{along}]", SECTION_HEIGHT), _place_names(first)
     letters = max((len(name["hovertext"][:MAX_NAME_LENGTH]) for name in names), default=0)
     layout["margin"]["t"] = TOOLBAR_HEIGHT + 26 + 6 * letters
-    layout["shapes"] = [_vertical_line(device.chainage) for device in first.devices]
+    look = {"line": {"color": HAIR, "width": 1}, "layer": "below"}
+    upright = {"type": "line", "xref": "x", "yref": "paper", "y0": 0, "y1": 1.015, **look}
+    layout["shapes"] = [{**upright, "x0": device.chainage, "x1": device.chainage} for device in first.devices]
     layout["annotations"] = [*names, *_limit_arrow(seen.above, 1), *_limit_arrow(seen.below, 0)]
     layout["xaxis"]["range"] = list(first.ends)
     layout["yaxis"]["range"] = [seen.low, seen.high]

@@ -7,7 +7,6 @@ A path continues through common nodes and through links other than pipes between
 import heapq
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -65,7 +64,9 @@ def section_paths(result) -> list[SectionPath]:
     paths = list({tuple(leg.pipe for leg in way.legs): way for way in reversed(paths)}.values())[::-1]  # no duplicates
     paths = [way for way in paths if not _is_covered(way, paths)]
     strung = {leg.pipe for way in paths for leg in way.legs}
-    merged = joined_places({name: link for name, link in links.items() if _joins_junctions(link, result.case)})
+    # a section may continue through a link between junctions
+    junctions = {name for name, node in result.case.nodes.items() if node.kind == "junction"}
+    merged = joined_places({name: link for name, link in links.items() if {*link.ports.values()} <= junctions})
     free = [name for name in result.envelope if name in links and name not in strung]
     pipes = {name: (*(merged.get(end, end) for end in (links[name].from_, links[name].to)), links[name].length)
              for name in free}  # fmt: skip
@@ -82,11 +83,6 @@ def _is_covered(way: SectionPath, ways: list[SectionPath]) -> bool:
     """True if a path consists of the pieces of one cut pipe, and all these pieces are on another path."""
     pipes, others = [leg.pipe for leg in way.legs], [other for other in ways if other is not way]
     return is_cut(way.name, pipes) and any(set(pipes) <= {leg.pipe for leg in other.legs} for other in others)
-
-
-def _joins_junctions(link, case) -> bool:
-    """True if a section may continue through a link: all places that it joins are junctions."""
-    return all(getattr(case.nodes.get(place), "kind", "") == "junction" for place in link.ports.values())
 
 
 def _path_of_chain(chain: list[tuple[str, bool, float]], result) -> SectionPath:
@@ -446,8 +442,11 @@ def head_animations(result, ways: Iterable[SectionPath]) -> list[HeadAnimation]:
 
     Raises RunError if a frame cannot be read.
     """
-    ways, frames = list(ways), _pipe_frames(result)
-    if not frames or not ways:
+    ways, index = list(ways), None if result.directory is None else result.directory / "fields.pvd"
+    if not ways or index is None or not index.is_file():
+        return []
+    frames = [(t, path) for t, path in read_series(index) if path.stem.isdecimal()]  # of pipes
+    if not frames:
         return []
     counts = default_cells({name: result.case.links[name] for name in result.envelope}, result.case.properties,
                            result.case.numerics.cell_time)  # fmt: skip
@@ -455,18 +454,15 @@ def head_animations(result, ways: Iterable[SectionPath]) -> list[HeadAnimation]:
     n = sum(len(indices) for _, indices in spots)
     step = -(-len(frames) * n // MAX_NUMBERS)
     frames = [*frames[:-1:step], frames[-1]]
-    heads = np.array([_read_heads(path, sum(counts.values())) for _, path in frames])
-    shown = envelope_column(result, "max_head").from_si(heads)
+    cells, rows = sum(counts.values()), []
+    for _, path in frames:
+        rows.append(read_pipe_lines(path, "head")[2])
+        if len(rows[-1]) != cells:
+            text = f"number of pipe cells {len(rows[-1])}, but {cells} in the case"
+            raise RunError(f"{path}: {text}; run the case again with --force")
+    shown = envelope_column(result, "max_head").from_si(np.array(rows))
     times = np.array([t for t, _ in frames])
     return [HeadAnimation(chainage, times, shown[:, indices]) for chainage, indices in spots]
-
-
-def _pipe_frames(result) -> list[tuple[float, Path]]:
-    """Times [s] and files of the stored frames of pipes : list of (time, path)."""
-    index = None if result.directory is None else result.directory / "fields.pvd"
-    if index is None or not index.is_file():
-        return []
-    return [(t, path) for t, path in read_series(index) if path.stem.isdecimal()]
 
 
 def _cells_along(result, way: SectionPath, counts: dict[str, int]) -> tuple[np.ndarray, np.ndarray]:
@@ -484,12 +480,3 @@ def _cells_along(result, way: SectionPath, counts: dict[str, int]) -> tuple[np.n
     chainage, indices = np.concatenate(chainage), np.concatenate(indices)
     picked = np.unique(np.linspace(0, len(indices) - 1, min(MAX_POINTS, len(indices))).round().astype(int))
     return envelope_column(result, "distance").from_si(chainage[picked]), indices[picked]
-
-
-def _read_heads(path: Path, cells: int) -> np.ndarray:
-    """Heads of all pipe cells in a frame [m]; raises RunError if their number differs from that of the case."""
-    heads = read_pipe_lines(path, "head")[2]
-    if len(heads) != cells:
-        counts = f"number of pipe cells {len(heads)}, but {cells} in the case"
-        raise RunError(f"{path}: {counts}; run the case again with --force")
-    return heads

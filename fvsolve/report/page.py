@@ -43,6 +43,9 @@ def page(result, ways: list[SectionPath]) -> str:
     sections = [section_of(result, way) for way in ways]
     figures: dict[str, Any] = {}
     probes = tables.extremes_of_probes(result)
+    told = [visible(notice.text) for notice in result.warnings if notice.ok]
+    if len(told) > MAX_WARNINGS:
+        told[MAX_WARNINGS:] = [f"{len(told) - MAX_WARNINGS} more in summary.json"]
     places = [*tables.worst_tables(result), *tables.ranked_pipes(result)]
     filled = {
         "invalid": not_valid(result.summary), "title": visible(result.summary["title"] or result.summary["case"]),
@@ -55,7 +58,7 @@ def page(result, ways: list[SectionPath]) -> str:
         "places": [*places, *[probes] * bool(probes and result.envelope)],
         "model": [*filter(None, tables.model_tables(result))],
         "numbers": [*filter(None, tables.numerics_tables(result))],
-        "told": _warning_texts([notice.text for notice in result.warnings if notice.ok]),
+        "told": told,
         "happened": [table for table in (tables.cavities(result), tables.events(result)) if table],
         "versions": tables.versions(result),
     }  # fmt: skip
@@ -72,6 +75,11 @@ def render_page(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> s
     jinja = import_library("jinja2")
     options = {"trim_blocks": True, "lstrip_blocks": True, "undefined": jinja.StrictUndefined}
     environment = jinja.Environment(autoescape=True, **options)  # escapes all values, so that none becomes markup
+    title = filled["title"]
+    if len(title) > MAX_PAPER_TITLE:
+        title = f"{title[: MAX_PAPER_TITLE - 1]}\u2026"
+    # in the CSS string all but ASCII letters and digits are escaped, so that the title cannot end the string
+    letters = [letter if letter.isascii() and letter.isalnum() else f"\\{ord(letter):x} " for letter in title]
     return environment.from_string(texts["table"] + texts["page"]).render(
         filled,
         css=texts["css"],
@@ -79,15 +87,8 @@ def render_page(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> s
         library=import_library("plotly.offline").get_plotlyjs(),  # so that the page needs no network
         figures=script_json(figures),
         dark=json.dumps(plots.DARK_COLOURS),
-        paper=css_string(filled["title"]),
+        paper=f'"{"".join(letters)}"',
     )
-
-
-def css_string(text: str) -> str:
-    """CSS string of a text; all but ASCII letters and digits are escaped, so that the text cannot end the string."""
-    text = text if len(text) <= MAX_PAPER_TITLE else f"{text[: MAX_PAPER_TITLE - 1]}\u2026"
-    letters = [letter if letter.isascii() and letter.isalnum() else f"\\{ord(letter):x} " for letter in text]
-    return f'"{"".join(letters)}"'
 
 
 def script_json(data: Any) -> str:
@@ -127,11 +128,6 @@ def _histories(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
         hidden = sum(not line.seen for line in panel.lines)
         entries.append({"id": f"history-{k}", "name": panel.quantity.replace("_", " "), "hidden": hidden})
     return entries
-
-
-def _warning_texts(texts: list[str]) -> list[str]:
-    more = len(texts) - MAX_WARNINGS
-    return [visible(text) for text in texts[:MAX_WARNINGS]] + ([f"{more} more in summary.json"] if more > 0 else [])
 
 
 def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) -> str:

@@ -210,7 +210,14 @@ def write_pictures(
     result, folder = open_checked_run(Path(directory)), Path(out) if out is not None else Path(directory)
     faults: list[str] = []
     picked = parse_probes(result, probes, faults)
-    pairs = [_phase_pair(result, text, faults) for text in phases]
+    pairs = []
+    for text in phases:
+        names = [name.strip() for name in text.split(":")]
+        pairs.append(names)
+        if len(names) == 2:
+            faults += [_unknown_probe(result, name) for name in names if name not in result.units]
+        else:
+            faults.append(f"--phase {show(text)}: expected two probes, X:Y")
     sections = _chosen_sections(section_paths(result), route, bool(picked or phases), faults)
     if faults:
         raise FvsolveError("\n".join(faults))
@@ -253,14 +260,6 @@ def parse_probes(result, text: str, faults: list[str]) -> list[str]:
         else:
             faults.append(_unknown_probe(result, name))
     return list(dict.fromkeys(names))
-
-
-def _phase_pair(result, text: str, faults: list[str]) -> list[str]:
-    names = [name.strip() for name in text.split(":")]
-    if len(names) != 2:
-        faults.append(f"--phase {show(text)}: expected two probes, X:Y")
-    faults += [_unknown_probe(result, name) for name in names if len(names) == 2 and name not in result.units]
-    return names
 
 
 def _unknown_probe(result, name: str) -> str:

@@ -16,7 +16,6 @@ from fvsolve.case.text import inline
 from fvsolve.errors import visible
 from fvsolve.output.summary_shape import FAILS, HOLDS, IN_WORDS, OPEN
 from fvsolve.output.unit_columns import UnitColumn, column
-from fvsolve.parts.table_model import Table as Keys
 from fvsolve.parts.table_model import plain_value
 from fvsolve.parts.value import Quantity
 from fvsolve.report.long_section import SectionPath, envelope_column
@@ -113,13 +112,11 @@ def aligned_texts(values: Sequence[Any], loose: bool = False) -> list[str]:
     widest = max((len(rest) for point, rest in behind if point), default=-1)
     if widest < 0:
         return words
-    return [_padded(text, widest) if is_number(value) or value is None else text
-            for text, value in zip(words, values, strict=True)]  # fmt: skip
-
-
-def _padded(text: str, widest: int) -> str:
-    _, point, rest = text.partition(".")
-    return text + ("" if point else POINT_SPACE) + FIGURE_SPACE * (widest - len(rest))
+    for k, value in enumerate(values):
+        if is_number(value) or value is None:
+            _, point, rest = words[k].partition(".")
+            words[k] += ("" if point else POINT_SPACE) + FIGURE_SPACE * (widest - len(rest))
+    return words
 
 
 def decimal_places(numbers: Sequence[float]) -> int | None:
@@ -215,8 +212,10 @@ def pipes(result) -> ReportTable | None:
         heights = [case.elevation(end) for end in ends] if link.profile is None else link.profile.elevation[[0, -1]]
         heights = [float(height.from_si(item)) for item in heights] if stated else []
         points = [None if link.profile is None else len(link.profile.chainage)] if profiled else []
-        rows.append([name, *ends, *sizes, float(speed.from_si(case.wave_speed(name))), *heights, *points,
-                     _friction_text(link, case), cells[name]])  # fmt: skip
+        friction = _value_text(type(link).values()["friction"], plain_value(link.friction), case)
+        friction = friction.removeprefix("(model ").removesuffix(")")
+        wave_speed = float(speed.from_si(case.wave_speed(name)))
+        rows.append([name, *ends, *sizes, wave_speed, *heights, *points, friction, cells[name]])
     heads = [*["elevation at from", "at to"] * stated, *["points of profile"] * profiled]
     heads = ("pipe", "from", "to", "length", "diameter", "wave speed", *heads, "friction", "cells")
     units = ("", "", "", length.unit, length.unit, speed.unit, *[height.unit] * (2 * stated))
@@ -245,11 +244,6 @@ def walls(result) -> ReportTable | None:
     return ReportTable("Walls", heads, rows, units, more=FULL_VALUES_NOTE) if rows else None
 
 
-def _friction_text(link, case) -> str:
-    text = _value_text(type(link).values()["friction"], plain_value(link.friction), case)
-    return text.removeprefix("(model ").removesuffix(")")
-
-
 def parts(result) -> ReportTable:
     """Table of all parts but pipes and plain junctions: kind, connected nodes, elevation and keys."""
     case, rows = result.case, []
@@ -260,18 +254,13 @@ def parts(result) -> ReportTable:
         joins = ", ".join(map(str, getattr(part, "ports", {}).values()))
         lies = getattr(part, "elevation", None)
         lies = [None if lies is None else float(height.from_si(lies))] if stated else []
-        rows.append([name, part.kind, joins, *lies, key_text(part, case)])
+        values, texts = type(part).values(), []
+        for key, value in part.table().items():
+            if key not in HIDDEN_KEYS and value is not False and value not in ({}, []):
+                texts.append(f"{key.replace('_', ' ')} {_value_text(values.get(key), value, case)}")
+        rows.append([name, part.kind, joins, *lies, " \u00b7 ".join(texts)])
     heads = ("part", "kind", "connects", *["elevation"] * stated, "keys")
     return ReportTable("Other parts", heads, rows, ("", "", "", *[height.unit] * stated, ""), more=FULL_VALUES_NOTE)
-
-
-def key_text(part: Keys, case) -> str:
-    """Text with the keys of a part and their values, in the units of [output]."""
-    values, texts = type(part).values(), []
-    for key, value in part.table().items():
-        if key not in HIDDEN_KEYS and value is not False and value not in ({}, []):
-            texts.append(f"{key.replace('_', ' ')} {_value_text(values.get(key), value, case)}")
-    return " \u00b7 ".join(texts)
 
 
 def _value_text(value: Any, given: Any, case) -> str:
@@ -357,8 +346,10 @@ def top_sentences(result) -> list[Sentence]:
     for state, level, head in ((FAILS, "bad", "The run does not meet an expected value of the case."),
                                (OPEN, "doubt", "The verdict of an expected value is open.")):  # fmt: skip
         if claims := [item for item in result.expectations if item.state == state]:
+            first = claims[0]
+            text = f"{first.text}: expected {first.claimed:.6g}, computed {value_text(first.found)} {first.unit}"
             more = f"; and {len(claims) - 1} more, under Numerics" if len(claims) > 1 else ""
-            rows.append(Sentence(level, head, claim_text(claims[0]) + more))
+            rows.append(Sentence(level, head, text + more))
     return rows
 
 
@@ -467,11 +458,6 @@ def claim_table(result) -> ReportTable:
     return ReportTable("Expected values of the case", heads, rows, bad=bad, mixed_units=frozenset({1, 2, 3}))
 
 
-def claim_text(item) -> str:
-    """Text that compares an expected value of the case with the computed value."""
-    return f"{item.text}: expected {item.claimed:.6g}, computed {value_text(item.found)} {item.unit}"
-
-
 def extremes_of_pipes(result, ways: list[SectionPath]) -> ReportTable | None:
     """Table of the extremes of each quantity over all pipes: value, pipe, distance, elevation, time.
 
@@ -551,7 +537,9 @@ def settings(result) -> ReportTable:
     span = [value_text(float(time.from_si(item))) for item in (numerics.start, summary["t"])]
     rows = [["time", f"{span[0]} to {span[1]} {time.unit}"]]
     if summary["cells"]:
-        rows += [["scheme", _scheme_text(numerics)], ["cells", summary["cells"]]]
+        limiter = getattr(numerics, "limiter", None)
+        scheme = f"muscl, limiter {limiter}" if limiter and numerics.scheme == "muscl" else numerics.scheme
+        rows += [["scheme", scheme], ["cells", summary["cells"]]]
     rows += [["method", "; ".join(_method_text(item, result.case) for item in summary["methods"])],
              ["step", "; ".join(given) or "by default"],
              ["steps", summary["steps"]], ["repeated steps", summary["rejections"]],
@@ -620,11 +608,6 @@ def comparisons(result) -> ReportTable:
             for row in result.comparisons]  # fmt: skip
     heads = ("probe", "measured", "unit", "rms", "greatest difference", "peak measured", "computed")
     return ReportTable("Against measurements", heads, rows, mixed_units=frozenset({3, 4, 5, 6}))
-
-
-def _scheme_text(numerics) -> str:
-    limiter = getattr(numerics, "limiter", None)
-    return f"{numerics.scheme}, limiter {limiter}" if limiter and numerics.scheme == "muscl" else numerics.scheme
 
 
 def _method_text(row: dict, case) -> str:

@@ -28,24 +28,20 @@ def eigenvalues_of(case, set: dict) -> np.ndarray | None:
     """Eigenvalues of the linearised rates about the initial steady state, in one array [1/s].
 
     They are computed twice, with the schedules at their values at the start and at the end of the run. A limited scheme
-    has its weights in smooth flow (or is replaced by upwind, see `linear_scheme_for`), and waves that arrive from delay
-    lines are constant. Returns None for more than 1200 states. set : changed keys of the case
+    has its weights in smooth flow (or is replaced by upwind), and waves that arrive from delay lines are constant. Returns None for more than 1200 states. set : changed keys of the case
     """
     from fvsolve.studies.outcome import study_model
 
     model = study_model(case, set)
     if (scheme := model.case.numerics.scheme) in LIMITED:
-        model = study_model(case, {**set, "numerics.scheme": linear_scheme_for(model.case, scheme)})
+        twin = SCHEMES[scheme].twin  # the linear scheme that is equal in smooth flow
+        linear = twin if twin in model.case.schemes else "upwind"
+        model = study_model(case, {**set, "numerics.scheme": linear})
     if model.y_size > MAX_STATES:
         return None
     rest = np.zeros(model.y_size)
     times = (model.case.numerics.start, model.case.numerics.end)
     return np.concatenate([np.linalg.eigvals(model.jacobian_without_delays(t, rest)) for t in times])
-
-
-def linear_scheme_for(case, scheme: str) -> str:
-    """Linear scheme in place of a limited one: the one equal in smooth flow or, if the case excludes that, `upwind`."""
-    return SCHEMES[scheme].twin if SCHEMES[scheme].twin in case.schemes else "upwind"
 
 
 def greatest_step(method: str, eigenvalues: np.ndarray, span: float) -> float:

@@ -62,18 +62,15 @@ def line_references(
             return {}
         if progress is not None:
             progress("delay lines with short steps")
-        velocity = max(velocity, greatest_velocity(case, coarse, flows))
+        for name, pipe in pipes(case).items():
+            section = 0.25 * math.pi * pipe.diameter**2
+            for text in flows[name]:  # at both ends
+                velocity = max(velocity, float(np.abs(coarse.si(text)).max()) / section)
         tolerance = cheap_tolerance(case, step, steps, velocity)
         fine = run(load(case, line_keys(case, step, tolerance, velocity)), set=settings, pictures=False)
     except (CaseError, RunError):
         return {}
     return {1: coarse, STEP_RATIO: fine} if fine.reason == "finished" else {}
-
-
-def greatest_velocity(case: Any, coarse: Result, flows: dict[str, list[str]]) -> float:
-    """Greatest velocity in the pipes of a run [m/s]; flows : name of a pipe -> probes of its flow at both ends."""
-    sections = {name: 0.25 * math.pi * pipe.diameter**2 for name, pipe in pipes(case).items()}
-    return max(float(np.abs(coarse.si(text)).max()) / sections[name] for name, texts in flows.items() for text in texts)
 
 
 def line_keys(case: Any, step: float, tolerance: float, velocity: float) -> dict[str, Any]:

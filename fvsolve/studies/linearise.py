@@ -80,13 +80,24 @@ class Linear:
     @property
     def state_units(self) -> list[str]:
         """SI units of the states x."""
-        names, basins = set(self.states), {basin.name: basin.part.physics_type.states for basin in self.at.model.basins}
-        return [
-            basins[part].get(quantity.split("[")[0], "-") if part in basins
-            else block_unit(self.at.model.case, part, quantity) if part.startswith("controls.")
-            else state_unit(name, f"{part}.opening" in names)
-            for name in self.states for part, quantity in [name.rsplit(".", 1)]
-        ]  # fmt: skip
+        names, model = set(self.states), self.at.model
+        basins = {basin.name: basin.part.physics_type.states for basin in model.basins}
+        units = []
+        for name in self.states:
+            part, quantity = name.rsplit(".", 1)
+            plain = quantity.rstrip("0123456789[]")
+            if part in basins:
+                units.append(basins[part].get(quantity.split("[")[0], "-"))
+            elif part.startswith("controls."):
+                # an integral of a block has the unit of its output, other states of blocks that of its input
+                first, output = model.case.controls[part.removeprefix("controls.")].dimensions
+                units.append(DIMENSIONS[output if quantity == "integral" else first].si)
+            elif plain == "speed" and f"{part}.opening" in names:
+                units.append("1/s")  # rate of the opening
+            else:
+                amount = "kg/m" if name.endswith("]") else "kg"  # of a scalar, times its own unit
+                units.append(STATE_UNITS.get(plain, amount))
+        return units
 
     @property
     def sparse(self) -> bool:
@@ -108,22 +119,6 @@ class Linear:
             "A": a, "B": self.b, "C": self.c, "D": self.d, "error": self.error,
             "state": self.at.y, "rate": self.at.rate,
         }  # fmt: skip
-
-
-def block_unit(case, block: str, state: str) -> str:
-    """SI unit of a state of a block: that of its output for an integral, else that of its input."""
-    first, output = case.controls[block.removeprefix("controls.")].dimensions
-    return DIMENSIONS[output if state == "integral" else first].si
-
-
-def state_unit(name: str, opens: bool) -> str:
-    """SI unit of the state `name`.
-
-    opens : True for a part with a state `opening`, whose state `speed` is the rate of the opening [1/s]
-    """
-    quantity = name.rsplit(".", 1)[1].rstrip("0123456789[]")
-    amount = "kg/m" if name.endswith("]") else "kg"  # of a scalar, times its own unit
-    return "1/s" if quantity == "speed" and opens else STATE_UNITS.get(quantity, amount)
 
 
 @declared("study")

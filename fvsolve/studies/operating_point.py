@@ -141,7 +141,7 @@ def with_held_schedules(model, t: float, before: bool = False):
 
     before : True for the values just before a kink or jump at t, otherwise just after it
     Schedules that drive joints and walls continue with their rate of change at this time. Kinks and jumps are removed.
-    In a model without a limited scheme, `without_slope_limits` is applied too.
+    In a model without a limited scheme, slopes of scalars in pipe cells and bounds of scalars are removed too.
     """
     tables = model.tables
     schedules, limit = tables.schedules.copy(), t if before else np.inf
@@ -156,19 +156,12 @@ def with_held_schedules(model, t: float, before: bool = False):
     tables = tables._replace(schedules=schedules, pieces=pieces)
     tables = with_held_velocities(model, tables, t)
     if not has_limiter(model):
-        tables = without_slope_limits(tables)
+        # limited slopes and bounds of scalars are kinks of the right-hand side, which has no derivative there
+        settings, scalars = tables.settings.copy(), tables.scalars.copy()
+        settings["limiter"] = rec.FLAT
+        scalars["least"], scalars["greatest"] = -np.inf, np.inf
+        tables = tables._replace(settings=settings, scalars=scalars)
     return replace(model, tables=tables, breaks=[])
-
-
-def without_slope_limits(tables: rec.Tables) -> rec.Tables:
-    """Tables of a model without slopes of scalars in pipe cells and without bounds of scalars.
-
-    Limited slopes and bounds are kinks of the right-hand side, which has no derivative there.
-    """
-    settings, scalars = tables.settings.copy(), tables.scalars.copy()
-    settings["limiter"] = rec.FLAT
-    scalars["least"], scalars["greatest"] = -np.inf, np.inf
-    return tables._replace(settings=settings, scalars=scalars)
 
 
 def with_held_velocities(model, tables: rec.Tables, t: float) -> rec.Tables:
@@ -205,16 +198,13 @@ def with_weights(at: OperatingPoint, weights: tuple[float, ...], degree: int) ->
 
 
 def has_limiter(model) -> bool:
-    """True if a model uses a limited scheme, in pipes with cells or in basins, see `basin_has_limiter`."""
+    """True if a model uses a limited scheme, in pipes with cells or in basins."""
     scheme = model.case.numerics.scheme
-    if any(basin_has_limiter(basin, scheme) for basin in model.basins):
-        return True
+    for basin in model.basins:
+        # basins limit their slopes with all schemes except `upwind`, basin grids not with `upwind5` either
+        if scheme != "upwind" and not (scheme == "upwind5" and basin.is_grid):
+            return True
     return model.cells > 0 and scheme in LIMITED
-
-
-def basin_has_limiter(basin, scheme: str) -> bool:
-    """True if a basin limits its slopes: with all schemes except `upwind`, and except `upwind5` on basin grids."""
-    return scheme != "upwind" and not (scheme == "upwind5" and basin.is_grid)
 
 
 STEPS = 2.0 ** -np.arange(8.0, 25.0, 4.0)  # in units of the small deviation: 1/256 to 6e-8

@@ -263,7 +263,10 @@ def courant_limit(scheme: str, method: str) -> float | None:
         return math.inf
 
     def gains(courant: float) -> bool:
-        return not step_gain(scheme, method, courant) <= 1.0 + NORM_TOLERANCE
+        # greatest growth of the square root of the energy in a step: norm of R(courant A), R the stability function
+        b = courant * pipe_operator(scheme)
+        numerator, denominator = (matrix_polynomial(coefficients, b) for coefficients in polynomials(method))
+        return not np.linalg.norm(np.linalg.solve(denominator, numerator), 2) <= 1.0 + NORM_TOLERANCE
 
     samples = np.geomspace(LEAST, MOST, 120)
     failed = next((k for k, x in enumerate(samples) if gains(x)), None)
@@ -272,16 +275,6 @@ def courant_limit(scheme: str, method: str) -> float | None:
     if failed == 0:
         return 0.0
     return float(bisect(gains, samples[failed - 1], samples[failed], 1e-9).step)
-
-
-def step_gain(scheme: str, method: str, courant: float) -> float:
-    """Greatest growth factor of the square root of the energy of a closed pipe in a step.
-
-    It is the norm of R(courant A), with the stability function R of the method and the matrix A of `pipe_operator`.
-    """
-    b = courant * pipe_operator(scheme)
-    numerator, denominator = (matrix_polynomial(coefficients, b) for coefficients in polynomials(method))
-    return float(np.linalg.norm(np.linalg.solve(denominator, numerator), 2))
 
 
 @functools.cache

@@ -98,14 +98,6 @@ def short_pipes(case: Any) -> dict[str, tuple[str, int]]:
     return short
 
 
-def brief_pulses(case: Any) -> list[str]:
-    """Keys of schedules with a pulse that is shorter than the longest time in which a wave crosses a cell."""
-    pipes = pipes_with_cells(case)
-    cell = max((pipe.length / pipe.cells / case.wave_speed(name) for name, pipe in pipes.items()), default=0.0)
-    return [f"{group}.{name}.{key}" for group in ("nodes", "links") for name, part in getattr(case, group).items()
-            for key, info in type(part).model_fields.items() if pulse_width(getattr(part, key)) < cell]  # fmt: skip
-
-
 def pulse_width(value: Any) -> float:
     """Shortest time in which a scheduled value rises and falls, or falls and rises [s]; inf if it never does.
 
@@ -243,11 +235,18 @@ def reference_text(case: Any, own: Any, difference: float, times: float, unit: s
 def unknown_parts(case: Any) -> dict[Part, str]:
     """Parts with unknown errors of their peaks : (group, name) of a part -> reason.
 
-    With a short pulse in a schedule (`brief_pulses`) these are all parts. Otherwise they are the pipes of `short_pipes`
-    and those with a single cell, and their end nodes.
+    With a pulse in a schedule that is shorter than the longest time in which a wave crosses a cell, these are all
+    parts. Otherwise they are the pipes of `short_pipes` and those with a single cell, and their end nodes.
     """
     reasons: dict[Part, str] = {}
-    if pulses := brief_pulses(case):
+    lengths = {name: pipe.length / pipe.cells for name, pipe in pipes_with_cells(case).items()}
+    crossing = max((length / case.wave_speed(name) for name, length in lengths.items()), default=0.0)
+    pulses = []
+    for group in ("nodes", "links"):
+        for name, part in getattr(case, group).items():
+            keys = type(part).model_fields
+            pulses += [f"{group}.{name}.{key}" for key in keys if pulse_width(getattr(part, key)) < crossing]
+    if pulses:
         text = (
             f"{listing(pulses, MAX_NAMES)} {'change' if len(pulses) > 1 else 'changes'} in both directions within the "
             "travel time of a cell; use more cells"
@@ -445,7 +444,10 @@ def peak_rows(
     summary, largest, rows = result.summary, {"rad": 1.0}, {}
     parts = {probe.text: (probe.part, probe.name) for probe in unresolved.case.probes}
     flows = {probe.text for probe in unresolved.case.probes if probe.quantity == "flow"}
-    flow_floor = least_flow_error(unresolved.case)
+    # where water is at rest, its flow is the remainder of the steady start, compared with a wave of 1 bar
+    admittances = (0.25 * math.pi * pipe.diameter**2 / unresolved.case.wave_speed(name)
+                   for name, pipe in pipes(unresolved.case).items())  # fmt: skip
+    flow_floor = RELATIVE_FLOOR * 1e5 * max(admittances, default=0.0) / unresolved.case.properties.density
     for extreme in summary["extremes"].values():
         values = [abs(extreme[side] or 0.0) for side in SIDES]
         largest[extreme["unit"]] = max(largest.get(extreme["unit"], 0.0), *values)
@@ -475,15 +477,6 @@ def peak_rows(
             if references and not is_pair(references):
                 rows[name][side]["first"] = first_of(places[0](references), sign, ceiling)
     return rows
-
-
-def least_flow_error(case: Any) -> float:
-    """Least error of a flow [m3/s]: `RELATIVE_FLOOR` of the flow of a wave of 1 bar in the widest pipe.
-
-    Where water is at rest, its flow is the remainder of the steady start.
-    """
-    wide = (0.25 * math.pi * pipe.diameter**2 / case.wave_speed(name) for name, pipe in pipes(case).items())
-    return RELATIVE_FLOOR * 1e5 * max(wide, default=0.0) / case.properties.density
 
 
 def extreme_of(run: Result, name: str, side: str) -> float | None:

@@ -212,22 +212,18 @@ def reference_of_solution(solution: room.Solution, kind: str, words: str) -> Ref
         return {pipe.name: cells[pipe.name, pipe.cells] for pipe in model.pipes}
 
     def rows_of(run: Outcome) -> np.ndarray:
-        t, probes = split_jump_times(run.rows[:, 0]), run.model.case.probes
+        t, probes = run.rows[:, 0].copy(), run.model.case.probes
+        # two equal times, before and after a jump, are moved apart
+        offset = 1e-12 * max(1e-300, float(np.ptp(t)))
+        repeated = np.flatnonzero(np.diff(t) == 0.0)
+        t[repeated] -= offset
+        t[repeated + 1] += offset
         at = t.tobytes(), run.probes
         if at not in times:
             times[at] = np.column_stack([solution.probe(probe, t) for probe in probes] or [[]])
         return times[at]
 
     return Reference(kind, words, fields_of, rows_of)
-
-
-def split_jump_times(t: np.ndarray) -> np.ndarray:
-    """Times t of rows, in which two equal times, before and after a jump, are moved apart by a small offset."""
-    shifted, offset = t.copy(), 1e-12 * max(1e-300, float(np.ptp(t)))
-    repeated = np.flatnonzero(np.diff(t) == 0.0)
-    shifted[repeated] -= offset
-    shifted[repeated + 1] += offset
-    return shifted
 
 
 def initial_values(model) -> room.ExactStart:

@@ -47,15 +47,10 @@ class RowMaker:
         if self.case is None:
             self.case = load(self.source, {**self.base, **values, **NO_FIELDS})
             return self.case
-        return load(self.case, {**self.base_for(values), **values})
-
-    def base_for(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Overrides of `base` in those tables of the case in which `values` change a key, and in the table [exact].
-
-        They are set again together with `values`, because keys of a table may conflict.
-        """
+        # keys of a table may conflict: overrides of `base` in the tables that change, and in [exact], are set again
         tables = {("exact",), *(split_key(key)[:2] for key in values)}
-        return {key: value for key, value in self.base.items() if {split_key(key)[:1], split_key(key)[:2]} & tables}
+        base = {key: value for key, value in self.base.items() if {split_key(key)[:1], split_key(key)[:2]} & tables}
+        return load(self.case, {**base, **values})
 
     def __getstate__(self) -> dict[str, Any]:
         """State for pickling; the other process reads the case again."""

@@ -424,13 +424,6 @@ def refine_richest(
     return runs[1:], differences[-1] * ratio / (1.0 - ratio) if differences else None
 
 
-def load_case(case, keys: Mapping):
-    """Case with changed keys."""
-    from fvsolve.case import load
-
-    return load(case, keys)
-
-
 def line_bound(case, runs: dict[tuple[str, str], Outcome], law_error: float) -> float:
     """Bound of the error of the level "delay lines" without a reference of cells; inf if it is not known.
 
@@ -438,11 +431,14 @@ def line_bound(case, runs: dict[tuple[str, str], Outcome], law_error: float) -> 
     of the laws. Cells smear jumps, so a reference of cells may have a greater error than this level.
     runs : (level, law) -> run; law_error : difference of the linear law from the law of the reference
     """
+    from fvsolve.case import load
+
     own = runs.get(LINES)
     if own is None or not own.ok:
         return math.inf
     keys = {**level_keys(case, LINES[0]), "fluid.law": LINES[1]}
-    finer = outcome(case, keys | refined_keys(load_case(case, keys), LINE_REFINEMENT), run=capped(LEVEL_CPU_LIMIT))
+    finer_keys = keys | refined_keys(load(case, keys), LINE_REFINEMENT)
+    finer = outcome(case, finer_keys, run=capped(LEVEL_CPU_LIMIT))
     if not finer.ok:
         return math.inf
     gaps = moving_probes(own, reference_of_run(finer)).values()
@@ -558,7 +554,13 @@ def change_time(model) -> float:
         return 0.0
     times = np.unique([*np.linspace(numerics.start, numerics.end, SCHEDULE_SAMPLES), *(t for t, _ in model.breaks)])
     trips = {name: link.trip for name, link in model.case.links.items() if getattr(link, "trip", None) is not None}
-    quickest = min((run_down_time(model, name, t) for name, t in trips.items()), default=math.inf)
+    quickest = math.inf
+    for name, t in trips.items():
+        # time in which the pump would stop under the torque that it has at its trip
+        speed = float(model.case.links[name].speed.value[0])
+        rate = model.rhs(t, np.zeros(model.y_size))[model.state_names.index(f"{name}.speed")]
+        if rate != 0.0:
+            quickest = min(quickest, speed / abs(rate))
     for index in range(len(model.tables.schedules)):
         if any(np.ptp(schedule_values(model, index, [math.nextafter(t, -math.inf), t])) for t in trips.values()):
             continue  # a jump at the trip of a pump, whose run-down time counts instead
@@ -572,12 +574,6 @@ def change_time(model) -> float:
 def schedule_values(model, index: int, times) -> np.ndarray:
     """Values [SI] of the schedule with this index at the given times [s]."""
     return np.array([value_at(model.tables, index, t, np.inf) for t in times])
-
-
-def run_down_time(model, name: str, t: float) -> float:
-    """Time in which the pump `name`, tripped at the time t, would stop under constant torque [s]."""
-    rate = model.rhs(t, np.zeros(model.y_size))[model.state_names.index(f"{name}.speed")]
-    return float(model.case.links[name].speed.value[0]) / abs(rate) if rate != 0.0 else math.inf
 
 
 def probe_pressures(run: Outcome) -> list[np.ndarray]:

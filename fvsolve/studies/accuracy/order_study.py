@@ -249,8 +249,10 @@ class OrderStudy:
                 progress(total - len(new) + count - 1, total, reference.words)
         for k, level in enumerate(levels):
             progress(k + 1, total, level_text(self.plan, level))
-            row_data = cached(k, lambda level=level: self.row(level).plain())
-            rows.append(row_of_data(level, row_data))
+            data = cached(k, lambda level=level: self.row(level).plain())
+            seconds = np.nan if data["seconds"] is None else data["seconds"]
+            work = data["rhs"], data["cell_updates"], data["steps"]
+            rows.append(OrderRow(level, error_numbers(data["errors"]), seconds, *work, data["reason"]))
         own, sizes = error_numbers(reference_data["own"]), reference_data["sizes"]
         return self.fitted_order(rows, reference_data["kind"], reference_data["words"], own, sizes)
 
@@ -517,13 +519,6 @@ def row_of_run(level: Level, run: Outcome, errors: dict) -> OrderRow:
     updates = run.cell_updates if run.model is not None else 0
     return OrderRow(level, errors, run.seconds, counts.get("rhs", 0), updates, counts.get("steps", 0),
                "" if run.ok else run.reason)  # fmt: skip
-
-
-def row_of_data(level: Level, data: Mapping) -> OrderRow:
-    """`OrderRow` of a refinement level, from plain data of the cache."""
-    seconds = np.nan if data["seconds"] is None else data["seconds"]
-    return OrderRow(level, error_numbers(data["errors"]), seconds, data["rhs"], data["cell_updates"], data["steps"],
-               data["reason"])  # fmt: skip
 
 
 def error_numbers(errors: Mapping) -> dict:

@@ -327,7 +327,10 @@ def positive_real(numerator, denominator) -> Verdict:
     n, d = n // common, d // common
     where = locate_roots(d)
     axis = [*_infinity(n, d), *_origin(n, d, where), *(_pair(n, d, x, order) for x, order in where.pairs)]
-    even, below = _real_part(n, d)
+    # polynomials E (even) and P (below) in x = w^2 with Re H(jw) = E / P, where P = |d(jw)|^2
+    (n_even, n_odd), (d_even, d_odd), x = even_odd_parts(n), even_odd_parts(d), Polynomial([0, 1])
+    even = n_even * d_even + x * n_odd * d_odd
+    below = d_even * d_even + x * d_odd * d_odd
     bands, zeros = _bands(even, below), _zeros(even, below)
     hidden = _root_places(common, locate_roots(common))
     poles = _root_places(d, where)
@@ -418,14 +421,8 @@ def _pair(n: Polynomial, d: Polynomial, x: Root, order: int) -> AxisPole:
 # the real part on the axis --------------------------------------------------------------------------------------
 
 
-def _real_part(n: Polynomial, d: Polynomial) -> tuple[Polynomial, Polynomial]:
-    """Polynomials E and P in x = w^2 with Re H(jw) = E / P, for H = n / d; P = |d(jw)|^2."""
-    (ne, no), (de, do), x = even_odd_parts(n), even_odd_parts(d), Polynomial([0, 1])
-    return ne * de + x * no * do, de * de + x * do * do
-
-
 def _bands(even: Polynomial, below: Polynomial) -> list[Band]:
-    """Bands with Re H = E / P < 0 (see `_real_part`), between the roots x = w^2 > 0 at which E changes sign."""
+    """Bands with Re H = E / P < 0 (see `positive_real`), between the roots x = w^2 > 0 at which E changes sign."""
     if even.degree < 0:
         return []
     edges = positive_roots(odd_part(even)) if even.degree > 0 else []
@@ -452,7 +449,7 @@ def _band(even: Polynomial, below: Polynomial, low: Root | None, high: Root | No
 def _least(even: Polynomial, below: Polynomial, left: Fraction, right: Fraction | None) -> tuple[float, float]:
     """Frequency [rad/s] and value of the infimum of E / P between x = left and x = right, x the squared frequency.
 
-    even, below : polynomials E and P from `_real_part`; right : None for infinity
+    even, below : polynomials E and P as in `positive_real`; right : None for infinity
     """
     common = even.gcd(below)
     top, below = even // common, below // common

@@ -250,8 +250,11 @@ class SchemeRows:
         runs = RealRuns(side.at, method.name, side.form, worst, self.steps, self.threshold, a=side.linear.a)
         row = self.bound_columns(side, method) | {"predicted": limit.step}
         if greatest:
-            where, share = dominant_part(side.form, greatest.end)
-            row |= {"growth": greatest.size, "after": greatest.steps, "where": where, "share": share}
+            shares: dict[str, float] = {}  # of the energy of the deviation, by part
+            for part, root in zip(side.form.parts, side.form.rows @ (side.form.back @ greatest.end), strict=True):
+                shares[part] = shares.get(part, 0.0) + float(root**2)
+            where = max(shares, key=shares.get)
+            row |= {"growth": greatest.size, "after": greatest.steps, "where": where, "share": shares[where]}
         row |= measure_limit(runs, limit.step, growth.size, row["left_out"])
         result = StabilityRow(**row)
         notes = bound_notes(result, side, growth)
@@ -323,12 +326,3 @@ def von_neumann_limit(scheme: str, method) -> float:
     from fvsolve.step_limits.advection_limit import advection_limit
 
     return advection_limit(scheme, method.name).limit
-
-
-def dominant_part(form: EnergyForm, end: np.ndarray) -> tuple[str, float]:
-    """(part with most of the energy of a deviation, its share); end : float64[r]  in the energy norm, with norm 1."""
-    shares: dict[str, float] = {}
-    for part, root in zip(form.parts, form.rows @ (form.back @ end), strict=True):
-        shares[part] = shares.get(part, 0.0) + float(root**2)
-    part = max(shares, key=shares.get)
-    return part, shares[part]

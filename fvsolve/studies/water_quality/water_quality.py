@@ -93,7 +93,12 @@ def water_quality(
     if not result.ok:
         raise FvsolveError(f"{loaded.name}: the run is not ok: {result.reason}. Correct the case before its quality")
     times = np.linspace(loaded.numerics.start, loaded.numerics.end, steps + 1)
-    flows = mean_flows(np.asarray(result.t), np.column_stack([result[probe] for probe in probes]), times)
+    # mean flows in each step, from the volume that passed: float64[steps, links]; two rows at a jump
+    t, flow = np.asarray(result.t), np.column_stack([result[probe] for probe in probes])
+    volume = np.cumsum(0.5 * np.diff(t)[:, None] * (flow[1:] + flow[:-1]), axis=0)
+    volume = np.concatenate([np.zeros((1, flow.shape[1])), volume])
+    passed = np.column_stack([np.interp(times, t, column) for column in volume.T])
+    flows = np.diff(passed, axis=0) / np.diff(times)[:, None]
     return carried(loaded, nodes, links, times, flows, trace)
 
 
@@ -113,17 +118,6 @@ def network_of(case: Case) -> tuple[list[str], dict[str, Any]]:
         raise FvsolveError(f"{listing([*other, *wrong])}: not supported; expected a network of junctions, reservoirs, "
                            'tanks, valves, pumps and pipes with pipe_model = "quasi-steady"')  # fmt: skip
     return list(case.nodes), links
-
-
-def mean_flows(t: np.ndarray, flow: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Mean flows in each of the steps between `times` : float64[steps, links].
-
-    t, flow : times of the output rows [s], two at a jump, and flows in the rows : float64[rows, links] [m3/s]
-    """
-    volume = np.concatenate([np.zeros((1, flow.shape[1])), np.cumsum(
-        0.5 * np.diff(t)[:, None] * (flow[1:] + flow[:-1]), axis=0)])  # fmt: skip
-    at = np.column_stack([np.interp(times, t, column) for column in volume.T])
-    return np.diff(at, axis=0) / np.diff(times)[:, None]
 
 
 def carried(case: Case, nodes: list[str], links: dict[str, Any], times, flows, trace: Sequence[str]) -> WaterQuality:
