@@ -52,6 +52,7 @@ class RunData:
         self.maxima, self.accepted = self.written.maxima, self.written.accepted
         self.features = [feature.run(self) for feature in model.features]
         self.kept: list = []  # arrays behind handles
+        self.replaced = 0  # number of arrays that have been replaced since the start, because they have grown
         self.clock["limit"], self.marks[:] = np.inf, np.nan
         self.armed[:] = model.flags
         self.network_mode: tuple[bool, ...] | None = None
@@ -133,6 +134,7 @@ class RunData:
         """Set one of `arrays`; the handle is made again only if the size is new."""
         own = next(owner for owner in self.features if name in owner.arrays())
         if own.store(name, values):
+            self.replaced += 1
             self.__dict__.pop("handle", None)
 
     def restore_history(self, state) -> None:

@@ -86,7 +86,8 @@ class BandWorker:
         stepper.bounded_states, stepper.bounds = np.ascontiguousarray(at.reshape(-1, 3)[owned]).ravel(), bounds[owned]
 
     def open(self) -> None:
-        """Make the handle of the arrays that the run writes; repeated when the wave history has grown."""
+        """Make the handle of the arrays that the run writes; repeated when an array of a feature has grown."""
+        self.opened = self.run_data.replaced
         self.written = self.run_data.written._replace(**self.own_arrays)
         self.handle = self.run_data.linked_handle(self.written, self.call_tables)
 
@@ -112,7 +113,7 @@ class BandWorker:
     def run_steps(self, functions: tuple, where: int) -> int:
         """Run the time loop on this band; returns a code of `steppers.loop_records`; arguments as `ThreadTeam.call`."""
         stepper = self.stepper
-        if "handle" not in self.run_data.__dict__:
+        if self.opened != self.run_data.replaced:
             self.open()
         return stepper.call(*functions, self.handle, where, self.run_data.armed)
 

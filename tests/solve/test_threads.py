@@ -254,6 +254,19 @@ def test_bands_that_do_not_wait_for_each_other_are_seen():
     assert any(stepped(case, 2, race) != whole for _ in range(5))
 
 
+def test_handles_of_threads_are_made_again_only_where_an_array_has_grown():
+    """A run pauses many times; a handle for each pause would fill the memory."""
+    model = fvsolve.build(fvsolve.load(water(end=1.0)))
+    loop = RunLoop(model, threads=2)
+    loop.now[:] = model.start
+    loop.begin(1.0, np.inf)
+    loop.run(4.0)
+    kept = [len(worker.run_data.kept) for worker in loop.team.members]
+    for _ in range(5):
+        loop.run(4.0)
+    assert [len(worker.run_data.kept) for worker in loop.team.members] == kept
+
+
 def test_a_run_is_resumed_by_another_number_of_threads_to_the_same_bits(tmp_path, monkeypatch):
     case = with_maxima(water(end=0.2, step=1e-3), "pool")
     whole = fvsolve.run(case, out=tmp_path / "whole", pictures=False)
