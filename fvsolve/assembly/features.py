@@ -9,6 +9,7 @@ and calls the methods below in the order of slots. Every method has a default, w
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -17,7 +18,6 @@ import numpy as np
 from fvsolve.declarations import Declaration, Declarations
 from fvsolve.errors import FvsolveError
 
-SECTIONS = ("controls", "scalars", "reactions")  # sections of a case that may wake features
 HEADER = re.compile(r'\nclass (?P<attribute>\w+)\(Feature, slot=(?P<slot>\d+), wakes="(?P<wakes>[^"]+)"\)')
 FEATURES = Declarations("feature", "features", ("features/*/feature.py",), HEADER)
 
@@ -30,13 +30,21 @@ class Header(NamedTuple):
     declaration: Declaration
 
 
-def header_of(declaration: Declaration) -> Header:
-    """Header of a feature. One of an entry point has no text in the index, so its class is imported."""
-    found = declaration.options
-    if not found:
-        of_class = declaration.load()
-        return Header(of_class.slot, of_class.wakes, declaration)
-    return Header(int(found["slot"]), words_in(found["wakes"]), declaration)
+def headers() -> Iterator[Header]:
+    """Yield the headers of all features. One of an entry point has no text in the index, so its class is imported.
+
+    A feature of another package that cannot be imported causes a warning; cases run without it.
+    """
+    for declaration in FEATURES.values():
+        if found := declaration.options:
+            yield Header(int(found["slot"]), words_in(found["wakes"]), declaration)
+            continue
+        try:
+            loaded = declaration.load()
+        except FvsolveError as error:
+            warnings.warn(str(error), RuntimeWarning, stacklevel=2)
+        else:
+            yield Header(loaded.slot, loaded.wakes, declaration)
 
 
 def words_in(text: str) -> frozenset[str]:
@@ -44,12 +52,17 @@ def words_in(text: str) -> frozenset[str]:
     return frozenset(word.strip() for word in text.split(","))
 
 
+def wakes(header: Header, case, words: set[str]) -> bool:
+    """True if a case has one of the words of a header; words : result of `words_of`"""
+    sections = [word.removeprefix("section ") for word in header.wakes if word.startswith("section ")]
+    return bool(header.wakes & words) or any(getattr(case, name, None) for name in sections)
+
+
 def words_of(case) -> set[str]:
-    """Words of a case that may wake features: "pipe_model NAME" of pipes, "section NAME", and "kind NAME" of parts."""
+    """Words of a case that may wake features: "pipe_model NAME" for pipes, and "kind NAME" for each type of part."""
     common = case.numerics.pipe_model
     models = {f"pipe_model {link.pipe_model or common}" for link in case.links.values() if link.kind == "pipe"}
-    kinds = {f"kind {part.kind}" for part in (*case.nodes.values(), *case.links.values())}
-    return models | kinds | {f"section {name}" for name in SECTIONS if getattr(case, name)}
+    return models | {f"kind {part.kind}" for part in (*case.nodes.values(), *case.links.values())}
 
 
 def features_of(case, given_up: Collection[str] = ()) -> list[Feature]:
@@ -58,8 +71,8 @@ def features_of(case, given_up: Collection[str] = ()) -> list[Feature]:
     Raises FvsolveError if two of them have the same slot.
     """
     words, awake = words_of(case), {}
-    for header in map(header_of, FEATURES.values()):
-        if header.wakes & words:
+    for header in headers():
+        if wakes(header, case, words):
             name = header.declaration.name
             if header.slot in awake:
                 other = awake[header.slot].declaration.name
@@ -97,7 +110,7 @@ class Feature:
     def __init_subclass__(cls, slot: int, wakes: str) -> None:
         cls.slot, cls.wakes = slot, words_in(wakes)
 
-    # build ----------
+    # build, in the order of the calls ----------
 
     def begin(self, draft) -> None:
         """Continue before all tables are filled."""
@@ -112,12 +125,11 @@ class Feature:
     def grouped(self, draft, group: np.ndarray) -> None:
         """Continue when nodes are grouped; group : label of the group of each node."""
 
-    def placed(self, draft) -> None:
-        """Read the offsets of stretches of `out`, in `draft.sizes.offsets`."""
+    def lower_behind_basins(self, draft) -> None:
+        """Fill the tables of the feature, after those of basins and before those of networks; add faults."""
 
-    def balanced(self, draft, start: Callable[[Any], Any]):
-        """Draft whose start the feature has balanced; start : function of a draft -> model with its steady start."""
-        return draft
+    def lower_last(self, draft) -> None:
+        """Fill the tables of the feature, after all others; add faults."""
 
     def probe(self, draft, probe, row) -> bool:
         """Fill the row of a probe that the feature computes; False for others."""
@@ -126,16 +138,6 @@ class Feature:
     def probe_rows(self) -> tuple[np.ndarray, list]:
         """Rows of probes that the feature reads itself, and these probes."""
         return np.zeros(0), []
-
-    def settle(self, draft) -> list[str]:
-        """Continue after the steady start; names of parts to be given up, after which the tables are made again."""
-        return []
-
-    def lower_behind_basins(self, draft) -> None:
-        """Fill the tables of the feature, after those of basins and before those of networks; add faults."""
-
-    def lower_last(self, draft) -> None:
-        """Fill the tables of the feature, after all others; add faults."""
 
     def rate(self, draft) -> float:
         """Greatest constant rate of its states [1/s]."""
@@ -146,6 +148,17 @@ class Feature:
 
     def reserve(self, draft) -> None:
         """Reserve stretches of `out`, and work arrays, see `assembly.array_sizes`."""
+
+    def placed(self, draft) -> None:
+        """Read the offsets of stretches of `out`, in `draft.sizes.offsets`."""
+
+    def balanced(self, draft, start: Callable[[Any], Any]):
+        """Draft whose start the feature has balanced; start : function of a draft -> model with its steady start."""
+        return draft
+
+    def settle(self, draft) -> list[str]:
+        """Continue after the steady start; names of parts to be given up, after which the tables are made again."""
+        return []
 
     def start(self, draft, y: np.ndarray) -> None:
         """Write the states of the feature at the start; those that it leaves are 0."""

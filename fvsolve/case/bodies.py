@@ -81,20 +81,17 @@ def bodies_of(nodes: dict[str, Any]) -> dict[str, Body]:
     waiting, result = {name: node for name, node in nodes.items() if is_kind(node, "body")}, {}
     frames = [name for name, node in nodes.items() if node.kind == "frame"]
     while waiting:
-        ready = {name: body for name, body in waiting.items()
-                 if carrier_of(body)[0] not in waiting and carrier_exists(nodes, body)
-                 and carrier_of(body)[0] in (WORLD, *result, *frames)}  # fmt: skip
+        ready = {}
+        for name, body in waiting.items():
+            on, point = carrier_of(body)
+            exists = on == WORLD or (hasattr(nodes.get(on), "points") and (not point or point in nodes[on].points))
+            if exists and on not in waiting and on in (WORLD, *result, *frames):
+                ready[name] = body
         if not ready:
             return result
         result |= ready
         waiting = {name: body for name, body in waiting.items() if name not in ready}
     return result
-
-
-def carrier_exists(nodes: dict[str, Any], body: Body) -> bool:
-    """True if the node and the point to which the joint of a body is fixed exist."""
-    name, point = carrier_of(body)
-    return name == WORLD or (hasattr(nodes.get(name), "points") and (not point or point in nodes[name].points))
 
 
 def carrier_of(body: Body) -> tuple[str, str]:
@@ -251,7 +248,11 @@ def find_faults(nodes: dict[str, Any], named: Any) -> Faults:
         elif not point and on not in bodies:
             text = f"{show(on)} is a frame; expected a point of this frame (FRAME.POINT)"
             yield keys, f"{text}; for a joint to the world leave out `on`"
-    loop = set(bodies) - set(bodies_of(nodes)) - {name for name in bodies if not ends_in_loop(nodes, bodies, name)}
+    loop = set()
+    for name in set(bodies) - set(bodies_of(nodes)):
+        last = [*carriers(name, bodies)][-1]
+        if carrier_of(bodies[last])[0] in bodies:  # not the world, a frame or a missing node
+            loop.add(name)
     while loop:
         name = min(loop, key=list(bodies).index)
         ring = [name]
@@ -279,11 +280,6 @@ def carriers(on: str, nodes: dict[str, Any]) -> Iterator[str]:
         seen.add(on)
         yield on
         on = carrier_of(nodes[on])[0]
-
-
-def ends_in_loop(nodes: dict[str, Any], bodies: dict[str, Body], name: str) -> bool:
-    """True if the carriers of a body form a loop; False if they end at the world, a frame or a missing node."""
-    return carrier_of(bodies[[*carriers(name, bodies)][-1]])[0] in bodies
 
 
 USE_PIPE = "expected a pipe there, or a chamber"

@@ -126,7 +126,10 @@ def _beyond(declared: Any, value: Any, given: Any) -> tuple[float, float, str] |
     if isinstance(value, float):
         declared = getattr(declared, "number", declared)  # a key that is a number or a table
     usual = getattr(declared, "usual", None)
-    for x in _numbers(value) if usual else ():
+    if not usual:
+        return None
+    numbers = getattr(value, "area", getattr(value, "value", value))  # of a table of areas, a schedule, a quantity
+    for x in map(float, numbers if hasattr(numbers, "__len__") else [numbers]):
         if x == 0.0 or not math.isfinite(x) or usual.least <= x <= usual.greatest:
             continue
         shown = SHOWN.get(declared.dimension, DIMENSIONS[declared.dimension].si)
@@ -138,12 +141,6 @@ def _beyond(declared: Any, value: Any, given: Any) -> tuple[float, float, str] |
         hint = units.likely(given, declared.dimension, usual.least, usual.greatest)
         return x, usual.least if x < usual.least else usual.greatest, f"{given} is outside {span}{hint}"
     return None
-
-
-def _numbers(value: Any) -> list[float]:
-    """Numbers in the value of a key: a quantity, a schedule or a table of areas."""
-    value = getattr(value, "area", getattr(value, "value", value))
-    return [float(x) for x in (value if hasattr(value, "__len__") else [value])]
 
 
 def _raw_value(raw: Any, keys: tuple[Any, ...]) -> Any:

@@ -373,7 +373,9 @@ def write_pieces(
             piece["profile"] = part.given
             piece["length"] = part.length
         own = f"{name}-{k + 1}"
-        links[own] = piece | dict(keys_of_piece(given, own))
+        pieces = given.get("pieces")
+        keys = pieces.get(own) if isinstance(pieces, dict) else None
+        links[own] = piece | (keys if isinstance(keys, dict) else {})
         result.origin["links", own] = ("links", name)
     heights = [stated_elevation(nodes.get(end)) for end in (whole.from_, whole.to)]
     for item, at, (first, last) in zip(parts, edges[1:-1].tolist(), joins, strict=True):
@@ -386,13 +388,6 @@ def write_pieces(
             else:
                 nodes[place] = {"type": "junction", **z}
                 result.origin["nodes", place] = ("links", item.name)
-
-
-def keys_of_piece(given: dict, piece: str) -> Any:
-    """Keys for one piece, from the table `pieces` of the cut pipe with the keys `given`; empty without such a table."""
-    own = given.get("pieces")
-    values = own.get(piece) if isinstance(own, dict) else None
-    return values if isinstance(values, dict) else {}
 
 
 def stated_elevation(node: Any) -> float | None:

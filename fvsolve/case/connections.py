@@ -99,7 +99,13 @@ def _island_faults(groups: list[list[str]], nodes: dict[str, Any], places: dict[
     Islands with a basin may be separate: a reach has its own boundaries.
     places : names that links can join -> domain; held : places at which a link fixes the pressure
     """
-    groups = [island for island in groups if not is_apart({places[name] for name in island})]
+    networks = {*NETWORK_DOMAINS}  # without fluid; they may be separate, also with masses that they move
+    connected = []
+    for island in groups:
+        domains = {places[name] for name in island}
+        if not domains & networks or not domains <= networks | {"translational"}:
+            connected.append(island)
+    groups = connected
     in_basins = {place for name, node in nodes.items() for place in own_places(name, node) or ()}
     if len(groups) > 1 and sum(in_basins.isdisjoint(island) for island in groups) > 1:
         sizes = " | ".join(listing(island, 6) for island in groups)
@@ -111,11 +117,6 @@ def _island_faults(groups: list[list[str]], nodes: dict[str, Any], places: dict[
         if held.isdisjoint(wet) and kinds and all(kind is not None and not kind.fixes_pressure for kind in kinds):
             where = "" if len(groups) == 1 else f" of {listing(island, 6)}"
             yield ("nodes",), f"nothing fixes the pressure{where}; expected a reservoir, tank or chamber"
-
-
-def is_apart(domains: set[str | None]) -> bool:
-    """True if an island of these domains may be separate: a network without fluid, which may move masses."""
-    return bool(domains & {*NETWORK_DOMAINS}) and domains <= {*NETWORK_DOMAINS, "translational"}
 
 
 def _dict(value: Any) -> dict[str, Any]:

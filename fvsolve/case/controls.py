@@ -160,14 +160,6 @@ class Blocks:
             return own
         return UNKNOWN if name in self.followed else "number"
 
-    def find_dimensions(self) -> None:
-        """Find the dimensions of all outputs from the keys that they drive."""
-        for _ in range(len(self.given) + 1):
-            outputs = {name: self.output_dimension(name) for name in self.given}
-            if outputs == self.outputs:
-                return
-            self.outputs = outputs
-
     @cached_property
     def followed(self) -> set[str]:
         """Names of the blocks that a key outside `[controls]` follows."""
@@ -176,7 +168,11 @@ class Blocks:
 
     def read(self) -> dict[str, Block | None]:
         """Blocks by name, in the order of the file; None for a faulty block."""
-        self.find_dimensions()
+        for _ in range(len(self.given) + 1):  # dimensions of outputs follow from the keys that they drive
+            outputs = {name: self.output_dimension(name) for name in self.given}
+            if outputs == self.outputs:
+                break
+            self.outputs = outputs
         blocks: dict[str, Block | None] = dict.fromkeys(self.given)
         for name, item in self.given.items():
             before = len(self.reading.faults)

@@ -28,7 +28,12 @@ def interior_patches(basin: Any, mesh: Mesh) -> dict[str, np.ndarray]:
     result, points = {}, MeshPoints(mesh)
     for name, patch in named.items():
         x, y = patch.at or np.mean(patch.polygon, axis=0)
-        cells = np.flatnonzero(in_square(mesh, patch) if patch.at else in_polygon(mesh.centre, np.array(patch.polygon)))
+        if patch.at:  # a square
+            half = 0.5 * np.sqrt(patch.area) * (1.0 + EDGE)
+            inside = (np.abs(mesh.centre - np.array(patch.at)) <= half).all(axis=1)
+        else:
+            inside = in_polygon(mesh.centre, np.array(patch.polygon))
+        cells = np.flatnonzero(inside)
         middle = points.cell(x, y)
         if middle < 0 and (patch.at or not cells.size):
             near = ", ".join(f"{value:.6g}" for value in points.nearest(x, y))
@@ -54,12 +59,6 @@ def name_faults(basin: Any, mesh: Mesh, name: str) -> Iterator[str]:
     elif basin.on is not None or any(patch.moves for patch in basin.patches.values()):
         where = "on a body" if basin.on is not None else "with a moving wall"
         yield f"lies inside a basin {where}; expected a patch on the boundary"
-
-
-def in_square(mesh: Mesh, patch: Any) -> np.ndarray:
-    """True for the cells whose centre lies in the square of a patch : bool[n]."""
-    half = 0.5 * np.sqrt(patch.area) * (1.0 + EDGE)
-    return (np.abs(mesh.centre - np.array(patch.at)) <= half).all(axis=1)
 
 
 def in_polygon(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:

@@ -76,15 +76,6 @@ def find_source(source: Any) -> Any:
     return source
 
 
-def shortest_cell_time(links: Mapping[str, Any], meshes: Mapping[str, Any], fluid: Any) -> float:
-    """Shortest travel time of a wave through a cell of a pipe or basin [s]; inf without cells.
-
-    In basins a wave speed of 1 m/s is assumed. meshes : meshes of basins; fluid : properties of the fluid
-    """
-    times = [link.length / link.cells / wave_speed(link, fluid) for link in links.values() if link.kind == "pipe"]
-    return min([*times, *(float(mesh.area.min()) ** 0.5 for mesh in meshes.values())], default=math.inf)
-
-
 def alternatives_of(table: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Groups of alternative keys of the tables of a case; a table may have at most one key of a group."""
     models, groups = [Numerics, Friction], dict(KINDS)
@@ -449,7 +440,10 @@ def size_faults(numerics: Any, output: Any, links: dict, meshes: dict, state: An
     numerics, output : tables as read; meshes : meshes of basins; state : properties of the fluid
     """
     yield from resource_checks.find_faults(numerics, output, links, meshes)
-    yield from resource_checks.rounding_faults(numerics, shortest_cell_time(links, meshes, state))
+    # travel times of a wave through a cell; in basins a wave speed of 1 m/s is assumed
+    times = [link.length / link.cells / wave_speed(link, state) for link in links.values() if link.kind == "pipe"]
+    times += [float(mesh.area.min()) ** 0.5 for mesh in meshes.values()]
+    yield from resource_checks.rounding_faults(numerics, min(times, default=math.inf))
 
 
 def with_exact(reading: Reading, case: Case) -> Case:

@@ -180,16 +180,13 @@ def place_kinds(network: chainage.CutTable, parts: Parts, scalars: dict[str, Any
 
         nodes |= basins.probe_kinds(name, parts.nodes[name], parts.meshes.get(name), parts.lumped.get(name), scalars)
     pipes = {name: link for name, link in parts.links.items() if getattr(link, "along", None)}
-    uncut = dict.fromkeys(_uncounted(table) if faulty else ())
-    return {"nodes": nodes, "links": links, "scalars": scalars, "uncut": uncut, "pipes": pipes}
-
-
-def _uncounted(table: dict[str, Any]) -> list[str]:
-    """Names of faulty parts with unknown points, patches or chambers, and of pipes with unknown pieces."""
-    nodes, links = table.get("nodes", {}), table.get("links", {})
-    pipes = [name for name, link in links.items()
-             if chainage.is_pipe(link) and not isinstance(link.get("bends", []), list)]  # fmt: skip
-    return pipes + [name for name in (*nodes, *links) if connections.has_unknown_places(name, nodes, links)]
+    uncut: list[str] = []
+    if faulty:  # pipes with unknown pieces, and parts with unknown points, patches or chambers
+        groups = table.get("nodes", {}), table.get("links", {})
+        uncut += [name for name, link in groups[1].items()
+                  if chainage.is_pipe(link) and not isinstance(link.get("bends", []), list)]  # fmt: skip
+        uncut += [name for group in groups for name in group if connections.has_unknown_places(name, *groups)]
+    return {"nodes": nodes, "links": links, "scalars": scalars, "uncut": dict.fromkeys(uncut), "pipes": pipes}
 
 
 def network_table(network: chainage.CutTable, parts: Parts) -> dict[str, Any]:

@@ -83,13 +83,11 @@ def stretch_notes(basin: Any, mesh: Any, setting: ReadContext) -> tuple[str, ...
 
 def fields_of(table: Table) -> Iterator[SpatialField]:
     """Yield the fields over the plane in a table and in the tables below it."""
-    for value in [value for key in type(table).model_fields for value in _entries(getattr(table, key, None))]:
-        if isinstance(value, SpatialField):
-            yield value
-        elif isinstance(value, Table):
-            yield from fields_of(value)
-
-
-def _entries(value: Any) -> list[Any]:
-    """Values of a dict; for others a list of the value itself, or of the field of least values of a series."""
-    return [*value.values()] if isinstance(value, dict) else [getattr(value, "least", value)]
+    for key in type(table).model_fields:
+        value = getattr(table, key, None)
+        # a series of fields stands for the field of its least values
+        for entry in [*value.values()] if isinstance(value, dict) else [getattr(value, "least", value)]:
+            if isinstance(entry, SpatialField):
+                yield entry
+            elif isinstance(entry, Table):
+                yield from fields_of(entry)

@@ -393,21 +393,18 @@ def _faults_of_keys(kind: str, given: dict[str, Any], setting: ReadContext) -> I
         yield from exclusive_key_faults(given, group)
     for key, value in given.items():
         if key in known:
-            if key not in COMPLETED:
-                yield from _faults_of_value(key, known[key], value, setting)
+            if key in COMPLETED:
+                continue
+            try:
+                known[key].read(value, setting)
+            except ValueError as error:
+                yield from faults_of(error, key)
         elif key in (*NOT_DEFAULT, "type"):
             yield (key,), f"cannot be a default; each {kind} states its own value"
         else:
             hint = WITH_DEFAULTS[kind].synonyms.get(key)
             near = f"; use {hint}" if hint else did_you_mean(key, known) or f"; keys are {listing(list(known))}"
             yield (key,), f"unknown key{near}"
-
-
-def _faults_of_value(key: str, value: Value, given: Any, setting: ReadContext) -> Iterator[tuple[tuple, str]]:
-    try:
-        value.read(given, setting)
-    except ValueError as error:
-        yield from faults_of(error, key)
 
 
 GROUPS = {

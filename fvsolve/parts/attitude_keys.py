@@ -80,7 +80,11 @@ class Attitude(Table):
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
         """Return the table unchanged. Raises ValueFault if a form is not a rotation, or differs from the first form."""
         values = valid_values(cls, given, setting)
-        faults = dict([*_zero_length_faults(values), *_rotation_faults(values)])
+        faults = {}
+        for key, example in (("axis", "[0, 0, 1]"), ("euler_parameters", "[1, 0, 0, 0], the identity")):
+            if is_zero_vector(values.get(key)):
+                faults[key] = f"has zero length; expected a length of 1, for example {example}"
+        faults |= dict(_rotation_faults(values))
         complete = [
             keys for keys in cls.forms if all(item in values and item not in faults for item in keys if item in given)
         ]
@@ -157,12 +161,6 @@ def length_notices(key: str, given: tuple[float, ...] | None) -> Iterator[tuple[
 def is_zero_vector(given: tuple[float, ...] | None) -> bool:
     """True if a vector is given and its length is zero, or too small to be squared."""
     return given is not None and math.hypot(*given) < SHORTEST
-
-
-def _zero_length_faults(values: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    for key, example in (("axis", "[0, 0, 1]"), ("euler_parameters", "[1, 0, 0, 0], the identity")):
-        if is_zero_vector(values.get(key)):
-            yield key, f"has zero length; expected a length of 1, for example {example}"
 
 
 def _rotation_faults(values: dict[str, Any]) -> Iterator[tuple[str, str]]:

@@ -619,13 +619,10 @@ class PatchRows(Lowering, kind="patch"):
         elif probe.quantity != "flow":
             super().probe(draft, name, probe, row)
         else:
-            self.probe_flow(draft, name, row)
-
-    def probe_flow(self, draft, name, row) -> None:
-        """Fill the row of a probe for the flow through a patch into the basin."""
-        row["index"], row["kind"], row["scale"] = draft.node_index[name], rec.PATCH_FLOW, 1.0 / draft.fluid.density
-        if not draft.case.nodes[draft.case.places[name].basin].physics_type.joined:
-            row["index"], row["kind"] = draft.patch_table["node"].tolist().index(row["index"]), rec.GIVEN_FLOW
+            node = draft.node_index[name]
+            row["index"], row["kind"], row["scale"] = node, rec.PATCH_FLOW, 1.0 / draft.fluid.density
+            if not draft.case.nodes[draft.case.places[name].basin].physics_type.joined:
+                row["index"], row["kind"] = draft.patch_table["node"].tolist().index(node), rec.GIVEN_FLOW
 
 
 class PatchJunctionRows(Lowering, kind="patch-junction"):

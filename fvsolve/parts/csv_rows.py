@@ -151,9 +151,11 @@ def read_rows(path: Path) -> CsvRows:
     readings = {mark: split_lines(path, lines, mark) for mark in SEPARATORS if mark in lines[0][1]} or {
         ",": split_lines(path, lines)
     }
-    header, *rows = next(
-        (reading for reading in readings.values() if is_uniform(reading)), next(iter(readings.values()))
-    )
+    header, *rows = next(iter(readings.values()))
+    for reading in readings.values():  # the first with at least two cells in each row, as many in all rows
+        if len(reading[0]) > 1 and {len(row) for row in reading} == {len(reading[0])}:
+            header, *rows = reading
+            break
     if len(header) > MOST_COLUMNS:
         raise ValueError(f"{path.name} has {len(header)} columns; expected at most {MOST_COLUMNS}")
     if all(number(name) is not None for name in header):
@@ -168,11 +170,6 @@ def read_rows(path: Path) -> CsvRows:
         if nameless is not None:
             raise CsvError(path.name, f"{show(nameless)} has no header{COMMA_HINT}", line)
     return CsvRows(path.name, header, [line for line, _ in lines[1:]], rows)
-
-
-def is_uniform(rows: list[list[str]]) -> bool:
-    """True if all rows have the same number of cells, at least two."""
-    return {len(row) for row in rows} == {len(rows[0])} and len(rows[0]) > 1
 
 
 def split_lines(path: Path, lines: list[tuple[int, str]], mark: str = ",") -> list[list[str]]:
@@ -216,7 +213,8 @@ def find_file(name: str, setting: ReadContext) -> Path:
         path = (setting.folder or Path.cwd()) / path
     try:
         if not path.is_file():
-            near = did_you_mean(path.name, _neighbours(path))
+            others = [other.name for other in path.parent.iterdir()] if path.parent.is_dir() else []
+            near = did_you_mean(path.name, others)
             state = "is a directory, not a file" if path.is_dir() else "there is no such file"
             raise ValueError(
                 f"{show(name)}: {state}{near}; a relative path starts at the folder of the case file, {path.parent}"
@@ -249,7 +247,3 @@ def read_columns(
     time_column, value_column = rows.column(time, 0), rows.column(value, 1)
     t, v = rows.numbers(time_column, "time"), rows.numbers(value_column, dimension, setting.ambient, unit)
     return t, v, rows.header[time_column], rows.header[value_column]
-
-
-def _neighbours(path: Path) -> list[str]:
-    return [other.name for other in path.parent.iterdir()] if path.parent.is_dir() else []

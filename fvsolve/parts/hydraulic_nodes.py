@@ -201,12 +201,6 @@ class Chamber(PlaceOnBody, kind="chamber"):
             yield from around.boiling_faults("nodes", name, "initial_pressure", [self.initial_pressure])
 
 
-def joins_masses(case, cylinder) -> bool:
-    """True if both ends of a cylinder are masses or frames on one axis, not points of bodies."""
-    ends = [cylinder.ports[port] for port in ("case", "rod")]
-    return all(getattr(case.nodes.get(end), "domain", "") == "translational" for end in ends)
-
-
 class ChamberRows(Lowering, kind="chamber"):
     """Conversion to table rows of chambers: nodes whose pressure follows from the mass of the fluid in them."""
 
@@ -214,7 +208,11 @@ class ChamberRows(Lowering, kind="chamber"):
         moving, air = name in draft.owned, draft.fluid.air
         row["kind"], row["volume"] = rec.MOVING if moving else rec.CHAMBER, node.volume
         row["stiffness"] = draft.fluid.bulk_modulus / (draft.fluid.density * node.volume)
-        swept = moving and joins_masses(draft.case, draft.case.links[name.rpartition(".")[0]])
+        swept = False  # by a piston whose both ends are masses or frames on one axis, not points of bodies
+        if moving:
+            cylinder = draft.case.links[name.rpartition(".")[0]]
+            ends = [draft.case.nodes.get(cylinder.ports[port]) for port in ("case", "rod")]
+            swept = all(getattr(end, "domain", "") == "translational" for end in ends)
         row["y"] = draft.states([f"{name}.{'excess' if swept else 'mass'}"], 1e5 / row["stiffness"])
         if moving or (air is not None and air.fraction > 0.0):  # air makes the stiffness depend on pressure
             row["row"] = draft.stiff()

@@ -98,7 +98,11 @@ def limiter(phi: Callable, values: np.ndarray, data: str) -> Limiter:
     steepest = float(max(1.0, high.max(), (high / POSITIVE).max()))
     slopes = dict.fromkeys(tangent(phi, r, side) for r, side in TANGENTS)
     digest = hashlib.sha256(data.encode()).hexdigest()[:16]
-    costs = [*order_cost(phi), *(lost := asymmetry(phi))]
+    costs, value = [], phi(1.0)
+    if not abs(value - 1.0) <= ROUNDING:
+        costs.append(f"phi(1) = {value:.3g} is not 1, so the order is 1 in smooth flow")
+    lost = asymmetry(phi)
+    costs += lost
     own = OwnLimiter(phi, not lost, digest, tuple(departures(values)), tuple(costs), Fraction(steepest))
     return Limiter(tuple(slopes), min(steepest, 2.0), own)
 
@@ -124,12 +128,6 @@ def departures(values: np.ndarray) -> Iterator[str]:
             limit = upper[at] if bound == "above" else 0.0
             yield f"phi is {bound} it from r = {span[0]:.3g} to {span[-1]:.3g}; phi({RATIOS[at]:.3g}) = " \
                   f"{values[at]:.3g}, bound {limit:.3g}"  # fmt: skip
-
-
-def order_cost(phi: Callable) -> list[str]:
-    """Text about a limiter with phi(1) other than 1; an empty list if phi(1) = 1."""
-    value = phi(1.0)
-    return [] if abs(value - 1.0) <= ROUNDING else [f"phi(1) = {value:.3g} is not 1, so the order is 1 in smooth flow"]
 
 
 def asymmetry(phi: Callable) -> list[str]:

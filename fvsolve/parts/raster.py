@@ -179,15 +179,15 @@ class ClassValues(Value):
     def read(self, given: Any, setting: ReadContext) -> dict[float, float]:
         if not isinstance(given, dict) or not given:
             raise ValueError(f"{show(given)} is not a table of classes; expected for example {{ 1 = 0.03, 2 = 0.06 }}")
-        return {class_number(key): self.value.read(item, setting) for key, item in given.items()}
-
-
-def class_number(text: str) -> float:
-    """Number of a class from its key. Raises ValueError if the key is not a number."""
-    try:
-        return float(text)
-    except ValueError:
-        raise ValueError(f"{show(text)} is not the number of a class; expected for example 1 = 0.03") from None
+        values = {}
+        for key, item in given.items():
+            try:
+                number = float(key)
+            except ValueError:
+                text = f"{show(key)} is not the number of a class; expected for example 1 = 0.03"
+                raise ValueError(text) from None
+            values[number] = self.value.read(item, setting)
+        return values
 
 
 def raster_keys(value: Quantity | None = None) -> dict[str, tuple[Value, Any]]:

@@ -244,19 +244,18 @@ class Scheduled(Value):
                 [(("signal",), f"signal {show(name)} refers to another signal; expected a signal with values")]
             )
         try:
-            schedule = self.read(shared, setting) if factor is None else self._numbers_of(name, shared, setting)
+            if factor is None:
+                schedule = self.read(shared, setting)
+            else:  # its numbers, which many parts may scale, are read once
+                if name not in setting.scaled:
+                    setting.scaled[name] = Scheduled("number").read(shared, setting)
+                schedule = setting.scaled[name]
         except ValueError as error:
             raise ValueFault(val.faults_of(error, val.ROOT, "signals", name)) from None
         setting.used[name] = schedule.table()
         if factor is None:
             return replace(schedule, origin={"signal": name})
         return self._scaled(schedule, factor, name)
-
-    def _numbers_of(self, name: str, shared: Any, setting: ReadContext) -> Schedule:
-        """Schedule of the numbers of a signal, which many parts may scale; shared : its value in the file"""
-        if name not in setting.scaled:
-            setting.scaled[name] = Scheduled("number").read(shared, setting)
-        return setting.scaled[name]
 
     def _scaled(self, schedule: Schedule, factor: float, name: str) -> Schedule:
         """Schedule of the numbers of a signal times `factor` [SI]; name : name of the signal"""

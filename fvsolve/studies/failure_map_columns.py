@@ -28,7 +28,8 @@ def eigenvalues_of(case, set: dict) -> np.ndarray | None:
     """Eigenvalues of the linearised rates about the initial steady state, in one array [1/s].
 
     They are computed twice, with the schedules at their values at the start and at the end of the run. A limited scheme
-    has its weights in smooth flow (or is replaced by upwind), and waves that arrive from delay lines are constant. Returns None for more than 1200 states. set : changed keys of the case
+    has its weights in smooth flow (or is replaced by upwind), and waves that arrive from delay lines are constant.
+    Returns None for more than 1200 states. set : changed keys of the case
     """
     from fvsolve.studies.outcome import study_model
 

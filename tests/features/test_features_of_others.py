@@ -50,10 +50,19 @@ print((highest[0] <= highest[1]).all(), abs(highest[1] - highest[2]).max() < 1e-
 
 
 def test_built_in_features_have_slots_of_their_own():
-    headers = [features.header_of(found) for found in features.FEATURES.own().values()]
-    assert len({header.slot for header in headers}) == len(headers) == 3
+    headers = list(features.headers())
+    assert len({header.slot for header in headers}) == len(headers) == len(features.FEATURES.own()) == 3
     assert all(header.declaration.load().slot == header.slot for header in headers)
     assert all(header.declaration.load().wakes == header.wakes for header in headers)
+
+
+def test_a_feature_that_cannot_be_imported_is_named_and_left_out(tmp_path):
+    """Every case asks the class of an entry point for its words; a fault there must not end the run."""
+    home = install(tmp_path, "broken", {"broken.py": "import no_such_module\n"}, {
+        "fvsolve.features": {"lost": "broken:Lost"}})  # fmt: skip
+    done = python(home, "-m", "fvsolve", "check", "two-tanks")
+    assert "lost of the entry points fvsolve.features of broken" in done.stderr
+    assert "broken:Lost cannot be read: No module named 'no_such_module'; correct or remove it" in done.stderr
 
 
 SAME_SLOT = """

@@ -71,7 +71,10 @@ class MachineRows(Device, kind="displacement-pump"):
 
     def restriction(self, draft, name, link, row) -> None:
         row["schedule"] = draft.schedules.add(link.setting)
-        flow = draft.fluid.density * link.displacement * usual_speed(link)
+        speeds = [link.rated_speed or 0.0]
+        if link.speed is not None:
+            speeds += np.abs(link.speed.value[np.isfinite(link.speed.value)]).tolist()
+        flow = draft.fluid.density * link.displacement * (max(speeds) or SPEED)  # its usual size
         row["conductance"] = flow**2 / PRESSURE
 
     def numbers(self, draft, name, part) -> list[float]:
@@ -247,10 +250,3 @@ COMPENSATED = CompensatedRows()
 def compensator_of(part):
     """Compensator of a machine; None without one."""
     return getattr(part, "compensator", None)
-
-
-def usual_speed(part) -> float:
-    """Typical speed of a machine [rad/s], for the size of its flow."""
-    given = [] if part.speed is None else np.abs(part.speed.value[np.isfinite(part.speed.value)])
-    speed = max([*given, part.rated_speed or 0.0])
-    return float(speed) if speed > 0.0 else SPEED

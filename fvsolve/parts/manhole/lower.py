@@ -20,10 +20,6 @@ class ManholeRows(StructureRows, kind="manhole"):
 
     def numbers(self, draft, name, part) -> list[float]:
         drop = weir_size(draft, part.perimeter, part.weir_coefficient)
-        return [part.crest, drop, self.size(draft, part), float(not is_reversed(draft.case, part))]
-
-
-def is_reversed(case, part) -> bool:
-    """True if the street is at the end `to`: a patch of a basin, while the end `from` is none."""
-    ends = (case.places[end].kind.startswith("patch") for end in (part.from_, part.to))
-    return tuple(ends) == (False, True)
+        # the street is at the end `to` if only that end is a patch of a basin
+        from_basin, to_basin = (draft.case.places[end].kind.startswith("patch") for end in (part.from_, part.to))
+        return [part.crest, drop, self.size(draft, part), float(from_basin or not to_basin)]

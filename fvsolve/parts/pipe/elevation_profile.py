@@ -43,10 +43,6 @@ class Profile:
         """Elevation [m] at given distances from the first point [m]."""
         return np.interp(distance, self.distance, self.elevation)
 
-    def plan_at(self, distance: np.ndarray) -> np.ndarray:
-        """Plan coordinates x and y [m] at given distances from the first point [m] : float64[distances, 2]."""
-        return np.column_stack([np.interp(distance, self.distance, axis) for axis in self.plan.T])
-
     def part(self, begin: float, end: float) -> Profile:
         """Part of the profile between two distances from the first point [m]; its chainages are unchanged."""
         d = self.distance
@@ -54,7 +50,8 @@ class Profile:
         cut = np.concatenate([[begin], d[inside], [end]])
         chainage, elevation = cut + self.chainage[0], self.at(cut)
         table = {"chainage": chainage.tolist(), "elevation": elevation.tolist()}
-        return Profile(chainage, elevation, table, None if self.plan is None else self.plan_at(cut))
+        plan = None if self.plan is None else np.column_stack([np.interp(cut, d, axis) for axis in self.plan.T])
+        return Profile(chainage, elevation, table, plan)
 
     def table(self) -> dict[str, Any]:
         """Profile as a table of a case file."""

@@ -113,7 +113,14 @@ class LiftedValve(Device, kind=""):
         k = int(row["valve"])
         valve, name = start.valves[k], start.draft.valve_names[k]
         lifts = k not in start.shut and start.valve_modes[k] == LIFTING
-        x = 0.0 if k in start.shut else self.lift_at_start(start, k) if lifts else 1.0
+        if k in start.shut:
+            x = 0.0
+        elif not lifts:
+            x = 1.0
+        elif start.valve_flows()[k] <= 0.0:  # the flow determines no lift, the lifting pressure does
+            x = min(max(self.lifting_pressure(start, k) / self.part(start, k).overpressure, 0.0), 1.0)
+        else:
+            x = opening_of(start, k)
         self.store_lift(start, row, x, x if lifts else self.lifting_pressure(start, k) / part.overpressure)
         valve["open"] = valve["conductance"] * x * x if self.states or x == 0.0 else valve["conductance"]
         if self.states and x > 0.0 and valve["transition"] == 0.0:
@@ -123,15 +130,6 @@ class LiftedValve(Device, kind=""):
         target = self.lifting_pressure(start, k) / part.overpressure
         text = f"{name}: the valve is shut at the start, although the pressure there would open the valve"
         return [text] if start.rest and target > SMALL_LIFT else []
-
-    def lift_at_start(self, start, k: int) -> float:
-        """Lift of the partly lifted valve k at the start, with which it passes its steady flow.
-
-        A reversed flow, or none, does not determine the lift; it then follows from the lifting pressure.
-        """
-        if start.valve_flows()[k] <= 0.0:
-            return min(max(self.lifting_pressure(start, k) / self.part(start, k).overpressure, 0.0), 1.0)
-        return opening_of(start, k)
 
     def store_lift(self, start, row, x: float, target: float) -> None:
         """Store the lift x and the target lift at the start in the parameters of the disc.

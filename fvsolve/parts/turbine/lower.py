@@ -125,17 +125,11 @@ def pump_nodes(angle: float, root: float, torque: float, torque_scale: float, di
     for tilt in np.linspace(first_tilt, STANDING, count + 1)[1:]:
         ratio = min(math.tan(tilt), STEEPEST)
         shaft_torque = direction * (PUMP_RATIO * torque_scale * ratio + max(excess, 0.0))
-        nodes.append((tilt, root_on_line(first_tilt, root, tilt), shaft_torque))
+        # the root lies on the line from the first ray to -1 at standstill
+        share = math.cos(tilt) / math.cos(first_tilt)
+        root_there = share * root - (math.sin(tilt) - share * math.sin(first_tilt))
+        nodes.append((tilt, root_there, shaft_torque))
     return [(-tilt if direction < 0.0 else BACKWARD + tilt, value, shaft_torque) for tilt, value, shaft_torque in nodes]
-
-
-def root_on_line(first_tilt: float, root: float, tilt: float) -> float:
-    """Root of head on a ray in the quadrants of reverse flow, on the line from the first ray to -1 at standstill.
-
-    first_tilt, tilt : angles of the first ray and of this ray below the axis of speed [rad]; root : on the first ray
-    """
-    share = math.cos(tilt) / math.cos(first_tilt)
-    return share * root - (math.sin(tilt) - share * math.sin(first_tilt))
 
 
 def merge_angles(angles: np.ndarray) -> np.ndarray:
