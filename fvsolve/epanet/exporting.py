@@ -59,12 +59,17 @@ class _Export:
         self.minor = GRAVITY / case.gravity  # EPANET divides minor losses by its own gravity
         self.exponents: set[float] = set()
         self.pressures: set[tuple[float, float, float]] = set()
+        writers = {"junction": self.junction, "reservoir": self.reservoir, "tank": self.tank, "inflow": self.inflow}
         for name, node in case.nodes.items():
             self.check_name(name, "nodes")
-            self.part(name, "nodes", node, self.node_writers())
+            self.part(name, "nodes", node, writers)
+        writers = {"pipe": self.pipe, "valve": self.valve, "orifice": self.valve, "altitude-valve": self.altitude_valve}
+        writers |= {"check-valve": self.check_valve, "loss-curve": self.loss_curve}
+        writers |= dict.fromkeys(REGULATING, self.regulating)
+        writers |= {"pump": self.pump, "leak": self.leak}
         for name, link in case.links.items():
             self.check_name(name, "links")
-            self.part(name, "links", link, self.link_writers())
+            self.part(name, "links", link, writers)
         for name, block in case.controls.items():
             self.control(name, block)
         if len(self.exponents) > 1:
@@ -75,15 +80,6 @@ class _Export:
             self.faults.append(
                 "nodes: demands depend on pressure by different keys; EPANET has one set for all junctions"
             )
-
-    def node_writers(self) -> dict[str, Callable]:
-        return {"junction": self.junction, "reservoir": self.reservoir, "tank": self.tank, "inflow": self.inflow}
-
-    def link_writers(self) -> dict[str, Callable]:
-        regulating = dict.fromkeys(REGULATING, self.regulating)
-        own = {"pipe": self.pipe, "valve": self.valve, "orifice": self.valve, "altitude-valve": self.altitude_valve}
-        own |= {"check-valve": self.check_valve, "loss-curve": self.loss_curve}
-        return own | regulating | {"pump": self.pump, "leak": self.leak}
 
     def part(self, name: str, group: str, part: Any, writers: dict[str, Callable]) -> None:
         """Write a part, or report that EPANET has none of its kind."""
@@ -108,16 +104,16 @@ class _Export:
 
     def pattern_step(self) -> float:
         """Longest step [s] at which all step schedules of the case change; 1 h without any."""
-        times = {float(t) for schedule in self.step_schedules() for t in schedule.time if t > 0.0}
+        times = set()
+        for part in (*self.case.nodes.values(), *self.case.links.values()):
+            for key in ("demand", "head", "flow", "speed"):
+                schedule = getattr(part, key, None)
+                if getattr(schedule, "kind", "") == "step":
+                    times |= {float(t) for t in schedule.time if t > 0.0}
         if not times:
             return 3600.0
         seconds = [round(t) for t in times]
         return float(math.gcd(*seconds)) if all(abs(t - round(t)) < 1e-6 for t in times) else 60.0
-
-    def step_schedules(self) -> list[Any]:
-        parts = [*self.case.nodes.values(), *self.case.links.values()]
-        found = [getattr(part, key, None) for part in parts for key in ("demand", "head", "flow", "speed")]
-        return [item for item in found if item is not None and getattr(item, "kind", "") == "step"]
 
     def scheduled(self, where: str, schedule: Any, factor: float) -> tuple[float, str]:
         """(base value in the unit of the file, name of its pattern or "") of a schedule; factor : to that unit"""
