@@ -43,10 +43,10 @@ class Limit(NamedTuple):
 # 53 characters, 1 circle.
 LIMITS = {
     "files imported by run valve-closure": Limit(limit=240, goal=130, slack=7),
-    "lines of these files": Limit(limit=55_900, goal=35_000, slack=1500),
+    "lines of these files": Limit(limit=52_900, goal=35_000, slack=1500),
     "files of features among them": Limit(limit=0, goal=0, slack=0),
-    "cells of the hub matrix": Limit(limit=225, goal=70, slack=6),
-    "cells of the hub matrix, code alone": Limit(limit=199, goal=70, slack=6),
+    "cells of the hub matrix": Limit(limit=204, goal=70, slack=6),
+    "cells of the hub matrix, code alone": Limit(limit=176, goal=70, slack=6),
     "functions per 1000 code lines": Limit(limit=96, goal=75, slack=2),
     "characters of the mean code line": Limit(limit=53.5, goal=46, slack=1),
     "comment lines per 100 code lines of kernels and steppers": Limit(limit=1.1, goal=4, slack=0.2),
