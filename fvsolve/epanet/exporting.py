@@ -59,12 +59,17 @@ class _Export:
         self.minor = GRAVITY / case.gravity  # EPANET divides minor losses by its own gravity
         self.exponents: set[float] = set()
         self.pressures: set[tuple[float, float, float]] = set()
+        writers = {"junction": self.junction, "reservoir": self.reservoir, "tank": self.tank, "inflow": self.inflow}
         for name, node in case.nodes.items():
             self.check_name(name, "nodes")
-            self.part(name, "nodes", node, self.node_writers())
+            self.part(name, "nodes", node, writers)
+        writers = {"pipe": self.pipe, "valve": self.valve, "orifice": self.valve, "altitude-valve": self.altitude_valve}
+        writers |= {"check-valve": self.check_valve, "loss-curve": self.loss_curve}
+        writers |= dict.fromkeys(REGULATING, self.regulating)
+        writers |= {"pump": self.pump, "leak": self.leak}
         for name, link in case.links.items():
             self.check_name(name, "links")
-            self.part(name, "links", link, self.link_writers())
+            self.part(name, "links", link, writers)
         for name, block in case.controls.items():
             self.control(name, block)
         if len(self.exponents) > 1:
@@ -75,15 +80,6 @@ class _Export:
             self.faults.append(
                 "nodes: demands depend on pressure by different keys; EPANET has one set for all junctions"
             )
-
-    def node_writers(self) -> dict[str, Callable]:
-        return {"junction": self.junction, "reservoir": self.reservoir, "tank": self.tank, "inflow": self.inflow}
-
-    def link_writers(self) -> dict[str, Callable]:
-        regulating = dict.fromkeys(REGULATING, self.regulating)
-        own = {"pipe": self.pipe, "valve": self.valve, "orifice": self.valve, "altitude-valve": self.altitude_valve}
-        own |= {"check-valve": self.check_valve, "loss-curve": self.loss_curve}
-        return own | regulating | {"pump": self.pump, "leak": self.leak}
 
     def part(self, name: str, group: str, part: Any, writers: dict[str, Callable]) -> None:
         """Write a part, or report that EPANET has none of its kind."""
@@ -108,16 +104,16 @@ class _Export:
 
     def pattern_step(self) -> float:
         """Longest step [s] at which all step schedules of the case change; 1 h without any."""
-        times = {float(t) for schedule in self.step_schedules() for t in schedule.time if t > 0.0}
+        times = set()
+        for part in (*self.case.nodes.values(), *self.case.links.values()):
+            for key in ("demand", "head", "flow", "speed"):
+                schedule = getattr(part, key, None)
+                if getattr(schedule, "kind", "") == "step":
+                    times |= {float(t) for t in schedule.time if t > 0.0}
         if not times:
             return 3600.0
         seconds = [round(t) for t in times]
         return float(math.gcd(*seconds)) if all(abs(t - round(t)) < 1e-6 for t in times) else 60.0
-
-    def step_schedules(self) -> list[Any]:
-        parts = [*self.case.nodes.values(), *self.case.links.values()]
-        found = [getattr(part, key, None) for part in parts for key in ("demand", "head", "flow", "speed")]
-        return [item for item in found if item is not None and getattr(item, "kind", "") == "step"]
 
     def scheduled(self, where: str, schedule: Any, factor: float) -> tuple[float, str]:
         """(base value in the unit of the file, name of its pattern or "") of a schedule; factor : to that unit"""
@@ -174,21 +170,17 @@ class _Export:
         least = max((valve.empty_level for valve in valves if valve.empty_level is not None), default=0.0)
         full, curve = full or HIGH_LEVEL, ""
         if hasattr(node.area, "area"):
-            curve = self.volume_curve(node.area, full)
+            level, area = np.asarray(node.area.level), np.asarray(node.area.area)
+            volume = np.concatenate(([0.0], np.cumsum(0.5 * np.diff(level) * (area[1:] + area[:-1]))))
+            points = [*zip(level.tolist(), volume.tolist(), strict=True)]
+            if level[-1] < full:
+                points.append((full, float(volume[-1] + area[-1] * (full - level[-1]))))
+            curve = self.curve(points)
         diameter = math.sqrt(4.0 / math.pi * float(np.min(getattr(node.area, "area", node.area))))
         spills = ["YES"] if node.height is not None and not valves else []
         tail = [curve or "*", *spills] if curve or spills else []
         self.add("TANKS", name, self.elevation(name), node.level, least, full, diameter, 0.0, *tail)
         self.position(name, node)
-
-    def volume_curve(self, table: Any, full: float) -> str:
-        """Name of the volume curve of an area that depends on the level."""
-        level, area = np.asarray(table.level), np.asarray(table.area)
-        volume = np.concatenate(([0.0], np.cumsum(0.5 * np.diff(level) * (area[1:] + area[:-1]))))
-        points = [*zip(level.tolist(), volume.tolist(), strict=True)]
-        if level[-1] < full:
-            points.append((full, float(volume[-1] + area[-1] * (full - level[-1]))))
-        return self.curve(points)
 
     def curve(self, points: list[tuple[float, float]]) -> str:
         return self.curves.setdefault(tuple(points), f"curve{len(self.curves) + 1}")
@@ -322,7 +314,12 @@ class _Export:
 
     def control(self, name: str, block: Any) -> None:
         """Write a relay on the level of a tank as two controls; note other blocks that drive a valve or pump."""
-        driven = self.driven_by(name)
+        driven, keys = [], {"valve": "opening", "pump": "speed"}
+        for own, link in self.case.links.items():
+            if link.kind in keys:
+                schedule = getattr(link, keys[link.kind])
+                if schedule.kind == "control" and schedule.origin == {"control": name}:
+                    driven.append(own)
         negated = block.control.kind == "function" and block.control.formula == NEGATION and len(block.blocks_read) == 1
         relay = self.case.controls[block.blocks_read[0]] if negated else block
         probe = relay.inputs[0] if relay.inputs else None
@@ -347,15 +344,6 @@ class _Export:
         if value == 0.0:
             return "CLOSED"
         return value if link.kind == "pump" else self.throttled(self.size(link)[1], value)
-
-    def driven_by(self, name: str) -> list[str]:
-        """Names of valves and pumps whose opening or speed follows a block."""
-        links = self.case.links.items()
-        keys = {"valve": "opening", "pump": "speed"}
-        schedules = [(own, getattr(link, keys[link.kind])) for own, link in links if link.kind in keys]
-        return [
-            own for own, schedule in schedules if schedule.kind == "control" and schedule.origin == {"control": name}
-        ]
 
     # text -----------------------------------------------------------------------------------------------------
 

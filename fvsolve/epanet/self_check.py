@@ -101,16 +101,11 @@ def check_start(imported: Imported, case: Case) -> SelfCheck:
     solution = imported.solution
     compared = [_compared("heads", "m", heads, solution.head, MOST_HEAD, left_out(imported.network, solution))]
     if flows:
-        compared.append(_flows(flows, solution.flow))
+        largest = max((abs(value) for value in solution.flow.values()), default=0.0)
+        ours, known = ({name: 1e3 * flow for name, flow in table.items()} for table in (flows, solution.flow))
+        compared.append(_compared("flows", "l/s", ours, known, 1e3 * max(MOST_FLOW * largest, LEAST_FLOW), {}))
     causes = imported.causes + imported.start_causes
     return SelfCheck(compared, causes + extreme_heads(imported.network, [solution]))
-
-
-def _flows(flows: dict[str, float], known: dict[str, float], time: float | None = None) -> Compared:
-    """Comparison of flows [m3/s], in l/s."""
-    largest = max((abs(value) for value in known.values()), default=0.0)
-    ours, theirs = ({name: 1e3 * value for name, value in table.items()} for table in (flows, known))
-    return _compared("flows", "l/s", ours, theirs, 1e3 * max(MOST_FLOW * largest, LEAST_FLOW), {}, time)
 
 
 def _unsolved(imported: Imported, text: str) -> str:

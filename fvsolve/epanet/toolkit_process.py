@@ -7,6 +7,7 @@ is installed. All values are
 in SI: m, m3/s, W, s; pressures and settings of pressure are heads of water [m].
 """
 
+import contextlib
 import json
 import os
 import re
@@ -118,13 +119,6 @@ def _curve(tk: Any, project: Any, index: int) -> dict[str, Any]:
     return {"name": tk.getcurveid(project, index), "points": points}
 
 
-def _coordinates(tk: Any, project: Any, index: int) -> list[float] | None:
-    try:
-        return list(tk.getcoord(project, index))
-    except Exception:  # the toolkit raises Exception for a node without coordinates
-        return None
-
-
 def _points(tk: Any, project: Any, curve: int, x: float, y: float) -> list[list[float]] | None:
     """Points of a curve in SI; x, y : factors from the units of the file; None for the index 0"""
     return [[x * p, y * q] for p, q in _curve(tk, project, curve)["points"]] if curve > 0 else None
@@ -139,8 +133,10 @@ def _node(tk: Any, project: Any, index: int, unit: Units) -> dict[str, Any]:
         "name": tk.getnodeid(project, index),
         "kind": kind,
         "elevation": unit.length * value("ELEVATION"),
-        "position": _coordinates(tk, project, index),
+        "position": None,
     }
+    with contextlib.suppress(Exception):  # the toolkit raises Exception for a node without coordinates
+        node["position"] = list(tk.getcoord(project, index))
     if kind == "junction":
         amounts = range(1, tk.getnumdemands(project, index) + 1)
         node["demands"] = [[unit.flow * tk.getbasedemand(project, index, k), tk.getdemandpattern(project, index, k)]

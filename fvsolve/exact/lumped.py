@@ -110,7 +110,8 @@ def column_solution(case, start: ExactStart) -> Solution:
 
     result = Solution(case, flow={name: lambda t: mass_flow(t) / rho})
     if valve is not None:
-        result.flow[valves[0][0]] = lambda t: mass_flow(t) / rho * orientation(column, valve)
+        same = valve.from_ == column.to or valve.to == column.from_  # positive flow directions of valve and column
+        result.flow[valves[0][0]] = lambda t: mass_flow(t) / rho * (1.0 if same else -1.0)
         node = valve.from_ if valve.from_ in ends else valve.to
         sign = 1.0 if node == column.to else -1.0
         base = potential[reservoir_beyond(case, node, valve)] - rho * case.gravity * case.elevation(node)
@@ -123,11 +124,6 @@ def reservoir_beyond(case, end: str, valve) -> str:
     if case.nodes[end].kind == "reservoir":
         return end
     return valve.to if valve.from_ == end else valve.from_
-
-
-def orientation(column, valve) -> float:
-    """Factor 1 if valve and column have the same positive flow direction, else -1."""
-    return 1.0 if valve.from_ == column.to or valve.to == column.from_ else -1.0
 
 
 def _piecewise(pieces, t, law):

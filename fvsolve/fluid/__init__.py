@@ -92,7 +92,12 @@ def properties(
     values = _look_up(name, law, **state)
     boiling = max(values["vapor_pressure"], given.get("vapor_pressure", 0.0))
     if state["pressure"] <= boiling:
-        raise FluidError("pressure", _not_liquid(name, boiling, **state))
+        raise FluidError(
+            "pressure",
+            f"{state['pressure']:.6g} Pa is not above the vapour pressure of {name} at "
+            f"{celsius(state['temperature'])}, {boiling:.6g} Pa; expected a liquid, at a higher pressure (absolute) or "
+            "a lower temperature",
+        )
     mixed = dict(air_fraction=air_fraction, gas_exponent=gas_exponent)
     mixed |= dict(saturation_pressure=saturation_pressure, cavitation=cavitation)
     air = LAWS[law].air({key: value for key, value in mixed.items() if value is not None})
@@ -100,8 +105,12 @@ def properties(
         values = values | {"source": f"{values['source']}; {', '.join(given)} given"}
     fluid = Fluid(name=name, law=law, air=air, **(values | state | given))
     for key in ("density", "bulk_modulus"):
-        if getattr(fluid, key) is None:
-            raise FluidError(key, _missing(name, key))
+        if getattr(fluid, key) is not None:
+            continue
+        text = f'CoolProp has no compressibility for "{name}"; give the key `{key}`, for example "1.5 GPa"'
+        if name == "user":
+            text = f'a "user" fluid needs the keys `density` [kg/m3] and `bulk_modulus` [Pa]; `{key}` is missing'
+        raise FluidError(key, text)
     check_cavities(fluid)
     return fluid
 
@@ -148,16 +157,3 @@ def _check_numbers(numbers: dict[str, float], law: str) -> None:
         if not math.isfinite(value) or value < 0.0 or (value == 0.0 and key != "vapor_pressure"):
             least = "of 0 or more" if key == "vapor_pressure" else "above 0"
             raise FluidError(key, f"{value:g} is out of range; expected a finite number {least}")
-
-
-def _missing(name: str, key: str) -> str:
-    if name == "user":
-        return f'a "user" fluid needs the keys `density` [kg/m3] and `bulk_modulus` [Pa]; `{key}` is missing'
-    return f'CoolProp has no compressibility for "{name}"; give the key `{key}`, for example "1.5 GPa"'
-
-
-def _not_liquid(name: str, boiling: float, temperature: float, pressure: float) -> str:
-    return (
-        f"{pressure:.6g} Pa is not above the vapour pressure of {name} at {celsius(temperature)}, "
-        f"{boiling:.6g} Pa; expected a liquid, at a higher pressure (absolute) or a lower temperature"
-    )

@@ -392,18 +392,15 @@ def _incompressible_properties(name: str, temperature: float, pressure: float) -
         density = PropsSI("D", "T", temperature, "P", pressure, name)
     except ValueError as error:
         reason = str(error).split(" : PropsSI")[0]
-        raise FluidError(_error_text(reason), f"{name}: {reason}") from None
+        key = "pressure" if "ressure" in reason else "temperature"
+        if "composition" in reason or "fraction" in reason:
+            key = "name"
+        raise FluidError(key, f"{name}: {reason}") from None
     viscosity = value_or_none(lambda: PropsSI("V", "T", temperature, "P", pressure, name))
     vapor_pressure = value_or_none(lambda: PropsSI("P", "T", temperature, "Q", 0, name))
     values = dict(density=density, bulk_modulus=None, vapor_pressure=vapor_pressure or 0.0, table=None)
     # CoolProp returns exactly 1 Pa s, exp(0), for fluids without viscosity data, such as LiBr.
     return values | dict(viscosity=None if viscosity == 1.0 else viscosity)
-
-
-def _error_text(reason: str) -> str:
-    if "composition" in reason or "fraction" in reason:
-        return "name"
-    return "pressure" if "ressure" in reason else "temperature"
 
 
 def celsius(temperature: float) -> str:

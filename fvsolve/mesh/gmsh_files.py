@@ -54,13 +54,12 @@ class Numbers:
 
     def __init__(self, name: str, data: bytes, size: int):
         self.name, self.size, self.at = name, size, 0
-        self.data: Any = data if size else self.from_text(data)
-
-    def from_text(self, data: bytes) -> np.ndarray:
-        try:
-            return plain_numbers(data.decode(errors="replace"))
-        except ValueError as error:
-            raise ValueError(f"section ${self.name}, {error}") from None
+        self.data: Any = data
+        if not size:
+            try:
+                self.data = plain_numbers(data.decode(errors="replace"))
+            except ValueError as error:
+                raise ValueError(f"section ${name}, {error}") from None
 
     def take(self, kind: str, count: int) -> np.ndarray:
         """Next numbers. kind : "i" for int, "u" for a count or the number of a point or element, "f" for a double

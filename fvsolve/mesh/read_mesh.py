@@ -316,7 +316,10 @@ def read(path: str | Path, unit: str = "m", walls: Collection[str] = ()) -> Mesh
     its boundary are checked in this order; MeshError is raised with all faults of the first of these checks that fails.
     """
     path = Path(path)
-    factor = _factor(unit, path)
+    try:
+        factor = find(unit, "length").read("1")
+    except ValueError as error:
+        raise MeshError([Fault("unit", str(error))], path.name) from None
     content = load_file(path)
     faults = _place_faults(content, unit)
     if faults:
@@ -361,14 +364,6 @@ def read(path: str | Path, unit: str = "m", walls: Collection[str] = ()) -> Mesh
     mesh = assemble(factor * sketch.points, cells, edges, names, patch, notes=notes)
     between = key_of(mesh.ends[: mesh.inner], len(sketch.points))
     return replace(mesh, groups={name: np.flatnonzero(np.isin(between, keys)) for name, keys in chains.items()})
-
-
-def _factor(unit: str, path: Path) -> float:
-    """Length of `unit` [m]; raises MeshError for an unknown unit."""
-    try:
-        return find(unit, "length").read("1")
-    except ValueError as error:
-        raise MeshError([Fault("unit", str(error))], path.name) from None
 
 
 def _place_faults(content: Content, unit: str) -> list[Fault]:

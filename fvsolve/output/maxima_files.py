@@ -37,18 +37,13 @@ def read_maxima(folder: Path) -> dict[str, dict[str, np.ndarray]]:
     return maxima
 
 
-def run_up_columns(table, case) -> list[UnitColumn]:
-    """Columns of run_up-NAME.csv: angle in degrees or distance, run-up, and position of the cell.
+def write_run_up(path: Path, table, case) -> None:
+    """Write run_up-NAME.csv with a row for each sector: its angle or distance, its run-up, the position of the cell.
 
     table : `RunUpTable`
     """
     first = UnitColumn("angle", "number", "deg") if table.along == "angle" else column("distance", "length", case)
-    return [first, column("run_up", "length", case), column("x", "position", case), column("y", "position", case)]
-
-
-def write_run_up(path: Path, table, case) -> None:
-    """Write run_up-NAME.csv with a row for each sector. table : `RunUpTable`"""
-    columns = run_up_columns(table, case)
+    columns = [first, column("run_up", "length", case), column("x", "position", case), column("y", "position", case)]
     rows = to_column_units(columns, np.column_stack([table.places, table.run_up, table.points])).tolist()
     lines = [",".join(csv_quoted(item.header) for item in columns), *(",".join(map(repr, row)) for row in rows)]
     write_file(path, "\n".join(lines) + "\n")

@@ -70,14 +70,13 @@ def part_extremes(model, summary, extent) -> list[PartExtremes]:
             extremes = summary.watched[f"{group}.{name}.{quantity}"]
             parts.append(PartExtremes(group, name, np.array([np.nan]), np.array([z]), *np.array([extremes]).T))
     isolated = model.isolated if is_pressure else ()
-    known = [part for part in parts if f"{part.group}.{part.part}" not in isolated and has_extremes(part)]
+    known = []
+    for part in parts:
+        recorded = not np.all(part.minimum == np.inf)  # if something determined the pressure of an isolated node
+        if recorded and f"{part.group}.{part.part}" not in isolated:
+            known.append(part)
     parts = known or parts
     return parts if np.isinf(summary.invalid_from) else [valid(probe, summary.invalid_from) for probe in parts]
-
-
-def has_extremes(part: PartExtremes) -> bool:
-    """True unless no value was recorded: nothing determined the pressure of an isolated node."""
-    return not np.all(part.minimum == np.inf)
 
 
 def valid(part: PartExtremes, until: float) -> PartExtremes:
