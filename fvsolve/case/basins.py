@@ -239,13 +239,18 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
             name, places = Path(basin.mesh.file).name, [item.place == "unit" for item in error.faults]
             raise ValueFault([(("mesh", "unit"), item.message) if key else (("mesh",), f"{name}: {item}")
                           for key, item in zip(places, error.faults, strict=True)]) from None  # fmt: skip
-        from fvsolve.parts.basin import Basin
+        raise ValueFault([(fault_keys(fault.place), fault.message) for fault in error.faults]) from None
 
-        faults = []
-        for fault in error.faults:  # at places such as "patches.east" or "holes[0]"
-            path = [int(word) if word.isdigit() else word for word in re.split(r"[.\[\]]", fault.place) if word]
-            faults.append((tuple(path) if path and path[0] in Basin.keys() else (), fault.message))
-        raise ValueFault(faults) from None
+
+def fault_keys(place: str) -> tuple:
+    """Key path from the place of a mesh fault, such as "patches.east" or "holes[0]".
+
+    It is () if the place does not begin with a key of a basin.
+    """
+    from fvsolve.parts.basin import Basin
+
+    path = [int(word) if word.isdigit() else word for word in re.split(r"[.\[\]]", place) if word]
+    return tuple(path) if path and path[0] in Basin.keys() else ()
 
 
 def output_faults(output: Output, nodes: dict[str, Any]) -> Faults:

@@ -479,11 +479,8 @@ def update_values(reading: Reading, previous: Case) -> Case | None:
                 return None
             if known[0] is not given:
                 try:
-                    before, part = known
-                    # unchanged schedules are those of the earlier case
-                    same = {key: value for key, value in vars(part).items() if isinstance(value, Schedule)
-                            and isinstance(given.get(key), dict) and before.get(key) is given[key]}  # fmt: skip
-                    known = given, part_reading.read_part(reading, raw.table, type(part), given | same)
+                    part = part_reading.read_part(reading, raw.table, type(known[1]), read_before(given, *known))
+                    known = given, part
                 except ValueError:
                     return None
                 reading.read[group, name] = known
@@ -499,6 +496,17 @@ def update_values(reading: Reading, previous: Case) -> Case | None:
         return None
     case = replace(previous, nodes=nodes, links=links, raw=raw.table, read=reading.read)
     return case if previous.exact is None else with_exact(reading, case)
+
+
+def read_before(given: dict[str, Any], before: dict[str, Any], part: Any) -> dict[str, Any]:
+    """Keys of a part (`given`) in which unchanged schedules are replaced by the schedules read for the earlier case.
+
+    given, before : keys of the part as in the file, now and earlier; part : part as read earlier
+    """
+    values = vars(part)
+    same = {key: schedule for key, value in given.items() if isinstance(schedule := values.get(key), Schedule)
+            and isinstance(value, dict) and before.get(key) is value}  # fmt: skip
+    return {**given, **same}
 
 
 def is_self_contained(case: Case) -> bool:

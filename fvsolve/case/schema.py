@@ -114,23 +114,19 @@ def share_definitions(full: dict[str, Any]) -> dict[str, Any]:
                 count(inner, key if word in SCHEMA_WORDS else word)
 
     count(full, "case")
-    shared: dict[str, str] = {}
-    counts: Counter[str] = Counter()
-    for text, times_used in times.items():
-        if times_used > 1 and len(text) > SHARED_LENGTH:
-            name = names[text]
-            counts[name] += 1
-            shared[text] = f"{name}-{counts[name]}" if counts[name] > 1 else name
+    names = _numbered(
+        {text: names[text] for text, times_used in times.items() if times_used > 1 and len(text) > SHARED_LENGTH}
+    )
 
     def replaced(part: Any, whole: bool = False) -> Any:
         if isinstance(part, dict):
-            if not whole and (name := shared.get(dumps(_without_siblings(part), sort_keys=True))):
+            if not whole and (name := names.get(dumps(_without_siblings(part), sort_keys=True))):
                 return {"$ref": f"#/$defs/{name}", **{key: part[key] for key in SIBLING_WORDS if key in part}}
             return {key: replaced(inner) for key, inner in part.items()}
         return [replaced(inner) for inner in part] if isinstance(part, list) else part
 
     result = replaced(full)
-    result["$defs"] |= {name: replaced(loads(text), whole=True) for text, name in shared.items()}
+    result["$defs"] |= {name: replaced(loads(text), whole=True) for text, name in names.items()}
     return result
 
 
@@ -141,6 +137,15 @@ def _without_siblings(part: dict[str, Any]) -> dict[str, Any]:
 def _is_schema(part: dict[str, Any]) -> bool:
     """True if a dict is the schema of a value; False if it is a table of schemas by key."""
     return any(isinstance(part.get(word), (str, list)) for word in ("type", "anyOf", "enum"))
+
+
+def _numbered(names: dict[str, str]) -> dict[str, str]:
+    """Add numbers to names that occur several times, so that each is unique; names : schema text -> name."""
+    counts: Counter[str] = Counter()
+    for text, name in names.items():
+        counts[name] += 1
+        names[text] = f"{name}-{counts[name]}" if counts[name] > 1 else name
+    return names
 
 
 def _name(part: dict[str, Any]) -> str:

@@ -125,12 +125,7 @@ def response_figure(w, h, labels: tuple[str, str], dips=(), poles=(), tolerance=
     axes[0].set_xscale("log")
     _logarithmic(axes[0], np.abs(values))
     style.name_axes(axes[0], y=f"|{name}|  [{unit}]")
-    for level in (-90.0, 90.0):  # limits for a passive port
-        axes[1].axhline(level, color=style.MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
-    lowest, highest = min(-100.0, np.nanmin(phase) - 10.0), max(100.0, np.nanmax(phase) + 10.0)
-    axes[1].set_ylim(lowest, highest)
-    axes[1].set_yticks([x for x in range(-180, 181, 45) if lowest <= x <= highest])
-    style.name_axes(axes[1], y="phase [deg]")
+    _phase(axes[1], phase)
     _real(axes[2], real)
     style.name_axes(axes[2], "frequency [Hz]", f"Re {name}  [{unit}]")
     axes[2].set_title(note, fontsize=8.5, color=style.INK, loc="left", wrap=True)
@@ -146,6 +141,16 @@ def _logarithmic(axes, size) -> None:
     axes.set_yscale("log")
     axes.set_ylim(max(0.8 * least, 1e-6 * top), 1.25 * top)
     axes.tick_params(axis="y", which="minor", labelsize=6.5, colors=style.MUTED, labelcolor=style.MUTED)
+
+
+def _phase(axes, phase) -> None:
+    """Set the axis of the phase [deg] and draw lines at -90 and 90, the limits for a passive port."""
+    for level in (-90.0, 90.0):
+        axes.axhline(level, color=style.MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
+    least, greatest = np.nanmin(phase), np.nanmax(phase)
+    axes.set_ylim(min(-100.0, least - 10.0), max(100.0, greatest + 10.0))
+    axes.set_yticks([x for x in range(-180, 181, 45) if axes.get_ylim()[0] <= x <= axes.get_ylim()[1]])
+    style.name_axes(axes, y="phase [deg]")
 
 
 def _real(axes, real) -> None:

@@ -170,17 +170,21 @@ class _Export:
         least = max((valve.empty_level for valve in valves if valve.empty_level is not None), default=0.0)
         full, curve = full or HIGH_LEVEL, ""
         if hasattr(node.area, "area"):
-            level, area = np.asarray(node.area.level), np.asarray(node.area.area)
-            volume = np.concatenate(([0.0], np.cumsum(0.5 * np.diff(level) * (area[1:] + area[:-1]))))
-            points = [*zip(level.tolist(), volume.tolist(), strict=True)]
-            if level[-1] < full:
-                points.append((full, float(volume[-1] + area[-1] * (full - level[-1]))))
-            curve = self.curve(points)
+            curve = self.volume_curve(node.area, full)
         diameter = math.sqrt(4.0 / math.pi * float(np.min(getattr(node.area, "area", node.area))))
         spills = ["YES"] if node.height is not None and not valves else []
         tail = [curve or "*", *spills] if curve or spills else []
         self.add("TANKS", name, self.elevation(name), node.level, least, full, diameter, 0.0, *tail)
         self.position(name, node)
+
+    def volume_curve(self, table: Any, full: float) -> str:
+        """Name of the volume curve of an area that depends on the level."""
+        level, area = np.asarray(table.level), np.asarray(table.area)
+        volume = np.concatenate(([0.0], np.cumsum(0.5 * np.diff(level) * (area[1:] + area[:-1]))))
+        points = [*zip(level.tolist(), volume.tolist(), strict=True)]
+        if level[-1] < full:
+            points.append((full, float(volume[-1] + area[-1] * (full - level[-1]))))
+        return self.curve(points)
 
     def curve(self, points: list[tuple[float, float]]) -> str:
         return self.curves.setdefault(tuple(points), f"curve{len(self.curves) + 1}")
@@ -314,12 +318,7 @@ class _Export:
 
     def control(self, name: str, block: Any) -> None:
         """Write a relay on the level of a tank as two controls; note other blocks that drive a valve or pump."""
-        driven, keys = [], {"valve": "opening", "pump": "speed"}
-        for own, link in self.case.links.items():
-            if link.kind in keys:
-                schedule = getattr(link, keys[link.kind])
-                if schedule.kind == "control" and schedule.origin == {"control": name}:
-                    driven.append(own)
+        driven = self.driven_by(name)
         negated = block.control.kind == "function" and block.control.formula == NEGATION and len(block.blocks_read) == 1
         relay = self.case.controls[block.blocks_read[0]] if negated else block
         probe = relay.inputs[0] if relay.inputs else None
@@ -344,6 +343,15 @@ class _Export:
         if value == 0.0:
             return "CLOSED"
         return value if link.kind == "pump" else self.throttled(self.size(link)[1], value)
+
+    def driven_by(self, name: str) -> list[str]:
+        """Names of valves and pumps whose opening or speed follows a block."""
+        links = self.case.links.items()
+        keys = {"valve": "opening", "pump": "speed"}
+        schedules = [(own, getattr(link, keys[link.kind])) for own, link in links if link.kind in keys]
+        return [
+            own for own, schedule in schedules if schedule.kind == "control" and schedule.origin == {"control": name}
+        ]
 
     # text -----------------------------------------------------------------------------------------------------
 

@@ -115,18 +115,12 @@ def _text(path: Path, network: EpanetNetwork, translation: Translation, title: s
 
 def _hour_lines(translation: Translation, time: float, short: list[str]) -> list[str]:
     """Lines of numerics and output for a run of seconds; time : of a cell [s]; short : pipes shorter than a cell"""
-    comment = ""
-    if short:
-        first = translation.link_names.given[short[0]]
-        pipes = f"{first} is" if len(short) == 1 else f"{len(short)} pipes are"
-        length = f"{translation.lengths[short[0]]:.4g} m"
-        comment = f"  # {pipes} shorter than a cell; with cells, {first} of {length} would limit the steps"
     return [
         "",
         "[numerics]",
         f'end = "{END}"',
         f'cell_time = "{1e3 * time:.10g} ms"  # pipes with a shorter travel time get one cell',
-        f'pipe_model = "auto"{comment}',
+        'pipe_model = "auto"' + (f"  # {_short_pipes_comment(translation, short)}" if short else ""),
         "", "[output]", f"probes = {text.inline(_probes(translation))}", 'units = { flow = "l/s", pressure = "barg" }',
     ]  # fmt: skip
 
@@ -143,6 +137,14 @@ def _day_lines(translation: DayTranslation) -> list[str]:
     probes = f"probes = {text.inline(_probes(translation))}"
     output = [f'every = "{DAY_ROWS}"', probes, 'units = { flow = "l/s", pressure = "barg", time = "h" }']
     return [*lines, "", "[numerics]", *numerics, "", "[output]", *output]
+
+
+def _short_pipes_comment(translation: Translation, short: list[str]) -> str:
+    """Comment for the case file on the pipes that are shorter than a cell; short : their names in EPANET"""
+    first = translation.link_names.given[short[0]]
+    pipes = f"{first} is" if len(short) == 1 else f"{len(short)} pipes are"
+    length = f"{translation.lengths[short[0]]:.4g} m"
+    return f"{pipes} shorter than a cell; with cells, {first} of {length} would limit the steps"
 
 
 def _probes(translation: Translation) -> list[str]:

@@ -401,6 +401,10 @@ def _fault(path: Path, reported: str, places: dict[str, int]) -> str:
 
 def readable(text: str) -> str:
     """Text in which bytes that are not UTF-8 are read as Windows text (code page 1252)."""
+    return text.encode("utf-8", "surrogateescape").decode("utf-8") if text.isascii() else _decoded(text)
+
+
+def _decoded(text: str) -> str:
     data = text.encode("utf-8", "surrogateescape")
     try:
         return data.decode("utf-8")

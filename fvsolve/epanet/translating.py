@@ -352,13 +352,10 @@ class Translation:
             if kind == "PRV":
                 return part_tables.check_valve(ends, diameter, link.minor_loss)
             return part_tables.valve(ends, diameter, 0.0, opening=0.0)
-        if kind == "PSV":
-            head = setting / self.gravity + self.network.nodes[link.start].elevation
-            below = self.solution.head[link.start] < head - SUSTAIN_TOLERANCE
-            if below and self.solution.flow[link.name] > STALL_FLOW:
-                text = "PSV cannot sustain its pressure, and EPANET lets flow pass (its warning 5)"
-                self.note(f"{text}: imported as a check valve", link.name)
-                return part_tables.check_valve(ends, diameter, link.minor_loss)
+        if kind == "PSV" and self.cannot_sustain(link, setting):
+            text = "PSV cannot sustain its pressure, and EPANET lets flow pass (its warning 5)"
+            self.note(f"{text}: imported as a check valve", link.name)
+            return part_tables.check_valve(ends, diameter, link.minor_loss)
         if kind in part_tables.REGULATING:
             return self.regulating(link, ends, diameter, setting)
         if kind == "TCV":  # its setting replaces the minor loss, and may be below it
@@ -448,6 +445,12 @@ class Translation:
     def may_run(self, link: EpanetLink) -> bool:
         """True if a pump runs in the case; others become shut valves."""
         return not self.is_shut(link)
+
+    def cannot_sustain(self, link: EpanetLink, setting: float) -> bool:
+        """True if a PSV passes flow in EPANET although the head before it is below its set head."""
+        head = setting / self.gravity + self.network.nodes[link.start].elevation
+        below = self.solution.head[link.start] < head - SUSTAIN_TOLERANCE
+        return below and self.solution.flow[link.name] > STALL_FLOW
 
     def set_point(self, link: EpanetLink, setting: float) -> float:
         """Set point of a valve: head of water above the controlled end [m], or flow [m3/s] of an FCV.

@@ -67,16 +67,19 @@ def write_summary(path: Path, summary: dict) -> None:
 AGAIN = "run the case again with --force"
 
 
+def _similar_run(path: Path) -> str:
+    """Hint for a message: run directory beside a missing summary, or in `runs`, with a similar name; "" without one."""
+    found = {other.parent.name: other.parent for folder in (path.parent.parent, Path("runs"))
+             for other in folder.glob(f"*/{path.name}")}  # fmt: skip
+    close = nearest(path.parent.name, found)
+    return f'; did you mean "{found[close]}"?' if close else ""
+
+
 def read_summary(path: Path) -> dict:
     """Read summary.json; raises RunError if it is missing, damaged, or an entry is missing or has a wrong type."""
     if not path.is_file():
         text = f"does not hold a finished run (no {path.name}); check the path, or finish the run"
-        # a run directory beside it, or in `runs`, may have a similar name
-        folders = path.parent.parent, Path("runs")
-        found = {other.parent.name: other.parent for folder in folders for other in folder.glob(f"*/{path.name}")}
-        close = nearest(path.parent.name, found)
-        hint = f'; did you mean "{found[close]}"?' if close else ""
-        raise RunError(f"{path.parent} {text}{hint}")
+        raise RunError(f"{path.parent} {text}{_similar_run(path)}")
     summary = read_json(path, AGAIN)
     missing = ["a JSON object"] if not isinstance(summary, dict) else [k for k in REQUIRED_KEYS if k not in summary]
     if len(missing) > MOST_MISSING or not isinstance(summary, dict):

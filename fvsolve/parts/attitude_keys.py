@@ -79,10 +79,7 @@ class Attitude(Table):
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
         """Return the table unchanged. Raises ValueFault if a form is not a rotation, or differs from the first form."""
-        values = {}  # without faulty values, which the table itself reports
-        for key, value in cls.values().items():
-            with suppress(KeyError, ValueError):
-                values[key] = value.read(given[key], setting)
+        values = valid_values(cls, given, setting)
         faults = {}
         for key, example in (("axis", "[0, 0, 1]"), ("euler_parameters", "[1, 0, 0, 0], the identity")):
             if is_zero_vector(values.get(key)):
@@ -137,6 +134,18 @@ class Attitude(Table):
                 f"is {math.degrees(angle):.3g} deg from the attitude that {name} give{'' if first == 'roll' else 's'}"
             )
             yield (key, text, angle)
+
+
+def valid_values(table: type[Table], given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
+    """Read the keys that have valid values : key -> value.
+
+    Other keys are left out; the table itself reports their faults.
+    """
+    result = {}
+    for key, value in table.values().items():
+        with suppress(KeyError, ValueError):
+            result[key] = value.read(given[key], setting)
+    return result
 
 
 def length_notices(key: str, given: tuple[float, ...] | None) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:

@@ -264,12 +264,7 @@ def _pixels_of(file: str, known: dict[str, NetcdfVariable], name: str, series: b
         text = f"has no variable {show(name)}{did_you_mean(name, planes)}" if name else f"has {len(planes)} variables"
         raise ValueError(f"{file} {text}; expected `variable`, of {listing(planes) or 'a file with a plane of values'}")
     item = known[name or planes[0]]
-    turned = False
-    if len(item.dimensions) > 1:  # the last may be along y, by its name or the attributes of CF of its coordinates
-        last = item.dimensions[-1]
-        attributes = known[last].attributes if last in known else {}
-        texts = last, attributes.get("axis"), attributes.get("standard_name")
-        turned = any(NORTH.fullmatch(str(text)) for text in texts)
+    turned = len(item.dimensions) > 1 and _is_northward(item.dimensions[-1], known)
     across, along = item.dimensions[-2:] if not turned else item.dimensions[:-3:-1]
     if not {across, along} <= known.keys():
         raise ValueError(f"{file} has no georeference: no variables {across} and {along} with coordinates; {REFERENCE}")
@@ -291,6 +286,13 @@ def _pixels_of(file: str, known: dict[str, NetcdfVariable], name: str, series: b
         raise ValueError(f"{file} {error}") from None
     metric = text.strip() != "" or "units" in known[along].attributes
     return Pixels(values, x, y, abs(dx), abs(dy), str(item.attributes.get("units", "")), crs, times, metric)
+
+
+def _is_northward(dimension: str, known: dict[str, NetcdfVariable]) -> bool:
+    """True for a dimension along y, by its name or the attributes of CF of its coordinates."""
+    attributes = known[dimension].attributes if dimension in known else {}
+    texts = dimension, attributes.get("axis"), attributes.get("standard_name")
+    return any(NORTH.fullmatch(str(text)) for text in texts)
 
 
 def _frame_times(file: str, name: str, known: dict[str, NetcdfVariable]) -> np.ndarray:

@@ -312,14 +312,20 @@ class Scheduled(Value):
             state = f"is {found[k]:.6g}, out of range; expected a value {self.range}"
             state = "is not a finite number" if not np.isfinite(found[k]) else state
             raise ValueFault([(place, f"{show(values['formula'])} at t = {times[k]:.6g} s {state}")])
-        # between the samples there may be a pole or a value out of range
+        self._check_between(program, times, place)
+        reach = float(found.min()), float(found.max())
+        return Schedule("formula", (-np.inf, np.inf), reach, origin=origin, program=program)
+
+    def _check_between(self, program: Program, times: np.ndarray, place: tuple[str, ...]) -> None:
+        """Raise ValueFault for a pole of a formula, or a value out of range, between samples at the given times.
+
+        place : keys of the formula
+        """
         if text := program.pole_fault(float(times[0]), float(times[-1])):
             raise ValueFault([(place, text)])
         if (t := find_outside(program.bounds, times, self.range.least, self.range.greatest)) is not None:
             text = f"is {program.value(t):.6g}, out of range; expected a value {self.range}"
             raise ValueFault([(place, f"{show(program.text)} at t = {t:.9g} s {text}")])
-        reach = float(found.min()), float(found.max())
-        return Schedule("formula", (-np.inf, np.inf), reach, origin=origin, program=program)
 
     def _read_control(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
         setting.lookups += 1

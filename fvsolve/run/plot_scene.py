@@ -45,22 +45,13 @@ def scene_of(case, title: str, field: str, frames: list[tuple[float, list[Path]]
         if field not in known:
             raise FvsolveError(f"unknown field {field!r}{did_you_mean(field, known)}; fields are {listing(known)}")
         scene.pipes = [read_pipe_lines(files[0], field) for _, files in frames]
-        if scene.plan == "given":
-            # stated positions are to scale if their distances roughly agree with the lengths of pipes
-            points, lines, _, owner = scene.pipes[0]
-            drawn = np.bincount(owner, np.linalg.norm(points[lines[:, 1]] - points[lines[:, 0]], axis=1), len(lengths))
-            share = float(np.median(drawn / np.array(list(lengths.values()))))
-            if not PLAUSIBLE_SCALE[0] <= share <= PLAUSIBLE_SCALE[1]:
-                scene.plan = "own scale"
+        if scene.plan == "given" and not _to_scale(scene, lengths):
+            scene.plan = "own scale"
     scene.bodies = list(case.poses) if bodies else []
     if not bodies:
         plan = network_layout.plan_positions(case, lengths) if pipes or not frames else _about_basins(case)
-        scene.parts, scene.walls = parts_of(case, plan), _walls(case, plan)
-        for name, mesh in case.meshes.items():  # midpoints of patches
-            for patch in patch_names(mesh):
-                middle = plan[name] + mesh.middle[mesh.faces(patch).index].mean(axis=0)
-                key = f"{name}.{patch}"
-                scene.anchors[key] = (*map(float, middle), case.elevations.get(key, 0.0))
+        scene.parts, scene.anchors = parts_of(case, plan), _anchors(case, plan)
+        scene.walls = _walls(case, plan)
     return scene
 
 
@@ -125,6 +116,24 @@ def _key(port: str, case) -> str:
 def _kinds(part) -> tuple[str, ...]:
     """Type names of a part and of its base classes."""
     return tuple(dict.fromkeys(kind for base in type(part).__mro__ if (kind := base.__dict__.get("kind"))))
+
+
+def _to_scale(scene: DrawnScene, lengths: dict[str, float]) -> bool:
+    """True if the distances between stated positions roughly agree with the lengths of pipes."""
+    points, lines, _, owner = scene.pipes[0]
+    drawn = np.bincount(owner, np.linalg.norm(points[lines[:, 1]] - points[lines[:, 0]], axis=1), len(lengths))
+    share = float(np.median(drawn / np.array(list(lengths.values()))))
+    return PLAUSIBLE_SCALE[0] <= share <= PLAUSIBLE_SCALE[1]
+
+
+def _anchors(case, plan: dict[str, np.ndarray]) -> dict[str, tuple[float, float, float]]:
+    """Midpoints of the patches of basins in the drawing: BASIN.PATCH -> x, y, elevation [m]."""
+    anchors = {}
+    for name, mesh in case.meshes.items():
+        for patch in patch_names(mesh):
+            middle = plan[name] + mesh.middle[mesh.faces(patch).index].mean(axis=0)
+            anchors[f"{name}.{patch}"] = (*map(float, middle), case.elevations.get(f"{name}.{patch}", 0.0))
+    return anchors
 
 
 def _walls(case, plan: dict[str, np.ndarray]) -> list[np.ndarray]:

@@ -202,13 +202,9 @@ class Result(Displayable):
             return {}
         marks = [(self._time.from_si(item.time), f"{item.place} {item.what}") for item in self.marks]
         marks += [(self.t[0], f"{item.place} {item.kind}") for item in self.warnings if not item.ok and len(self.t)]
-        measured = {}
-        for series in self.case.compare.values() if self.comparisons else ():
-            name = series.probe.text
-            measured[name] = self._time.from_si(series.t + series.shift), self.column(name).from_si(series.v)
         return {
             "t": self.t, "values": self._table[:, 1:], "probes": list(self.units.items()),
-            "time_unit": self._time.unit, "marks": marks, "measured": measured, "title": self.summary["title"],
+            "time_unit": self._time.unit, "marks": marks, "measured": self._measured(), "title": self.summary["title"],
         }  # fmt: skip
 
     @validated(path=PATH)
@@ -300,6 +296,14 @@ class Result(Displayable):
         drawn = [(t, [file for at, file in frames if at == t]) for t in times]
         view(scene_of(self.case, self.summary["title"], field, drawn, contours), out)
         return out
+
+    def _measured(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        compared = self.case.compare if self.comparisons else {}
+        measured = {}
+        for series in compared.values():
+            name = series.probe.text
+            measured[name] = self._time.from_si(series.t + series.shift), self.column(name).from_si(series.v)
+        return measured
 
     def column(self, probe: str) -> UnitColumn:
         """Name, dimension and unit of a probe, with conversions to and from SI.

@@ -33,11 +33,7 @@ def chart_numbers(part, weight: float) -> list[float]:
     flow = max(q for entry in chart.curves for q in entry.flow) * d * d
     torque_scale = weight * flow / speed
     curves = [nodes_of(entry, part, speed, flow, torque_scale, weight) for entry in chart.curves]
-    # rays of all curves, close ones merged, from reverse flow at standstill (-pi / 2) over a full turn to 3 pi / 2
-    angles = np.concatenate([own for _, own, *_ in curves])
-    inner = np.sort(angles[(angles > -STANDING + ANGLE_TOLERANCE) & (angles < 3.0 * STANDING - ANGLE_TOLERANCE)])
-    distinct = inner[np.concatenate([[True], np.diff(inner) > ANGLE_TOLERANCE])]
-    rays = np.concatenate([[-STANDING], distinct, [3.0 * STANDING]])
+    rays = merge_angles(np.concatenate([angles for _, angles, *_ in curves]))
     directions = np.column_stack([np.cos(rays), np.sin(rays)])
     tables = [curve_at_rays(directions, rays, *entry[1:5]) for entry in curves]
     shut_torque = 0.0
@@ -134,6 +130,17 @@ def pump_nodes(angle: float, root: float, torque: float, torque_scale: float, di
         root_there = share * root - (math.sin(tilt) - share * math.sin(first_tilt))
         nodes.append((tilt, root_there, shaft_torque))
     return [(-tilt if direction < 0.0 else BACKWARD + tilt, value, shaft_torque) for tilt, value, shaft_torque in nodes]
+
+
+def merge_angles(angles: np.ndarray) -> np.ndarray:
+    """Angles [rad] of the rays of all curves, ascending, with those closer than ANGLE_TOLERANCE merged.
+
+    They go from reverse flow at standstill (-pi / 2) over a full turn to 3 pi / 2, both included. The angle of a point
+    is atan2(u, n), with its relative flow u and relative speed n.
+    """
+    inner = np.sort(angles[(angles > -STANDING + ANGLE_TOLERANCE) & (angles < 3.0 * STANDING - ANGLE_TOLERANCE)])
+    distinct = inner[np.concatenate([[True], np.diff(inner) > ANGLE_TOLERANCE])]
+    return np.concatenate([[-STANDING], distinct, [3.0 * STANDING]])
 
 
 def curve_at_rays(
