@@ -64,10 +64,7 @@ class Solution:
         if probe.fraction is not None and self.pipe is not None:
             return self._along(probe, t)
         if quantity == "force" and self.pipe is not None:
-            # unbalanced axial force on a frictionless pipe: area times change of p(to) - p(from) since the start
-            pipe, start = self.case.links[name], np.array([self.case.numerics.start])
-            rise, first = (self.pressure[pipe.to](at) - self.pressure[pipe.from_](at) for at in (t, start))
-            return 0.25 * np.pi * pipe.diameter**2 * (rise - first)
+            return self._force(self.case.links[name], t)
         laws = getattr(self, quantity if quantity in ("level", "flow", "position", "velocity") else "pressure")
         if name not in laws and quantity in ("pressure", "gauge_pressure", "head"):
             laws = reservoirs(self.case)
@@ -84,6 +81,12 @@ class Solution:
         inner = self.kinks(name, t) if self.kinks is not None else np.zeros(0)
         cuts = np.unique(np.concatenate([edges, inner[(inner > edges[0]) & (inner < edges[-1])]]))
         return averages(lambda x: self.pipe(name, x, t), edges, cuts)
+
+    def _force(self, pipe, t):
+        """Unbalanced axial force on a frictionless pipe [N]: area times change of p(to) - p(from) since the start."""
+        start = np.array([self.case.numerics.start])
+        rise, first = (self.pressure[pipe.to](at) - self.pressure[pipe.from_](at) for at in (t, start))
+        return 0.25 * np.pi * pipe.diameter**2 * (rise - first)
 
     def _along(self, probe, t):
         link = self.case.links[probe.name]

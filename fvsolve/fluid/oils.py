@@ -62,10 +62,7 @@ def oil_properties(name: str, temperature: float, pressure: float) -> dict[str, 
     if pressure > MAX_PRESSURE:
         raise FluidError("pressure", f"{pressure:g} Pa is above the range of {name}, up to {MAX_PRESSURE:g} Pa")
     oil, p = OILS[name], pressure / 1e5
-    # at 1 atm, ASTM D1250: rho = rho_15 exp(-a dt (1 + 0.8 a dt)), a the thermal expansion at 15 degC
-    a, dt = EXPANSION / oil.density_15, temperature - ZERO - 15.0
-    expansion = a * (1.0 + 1.6 * a * dt)
-    rho = oil.density_15 * math.exp(-a * dt * (1.0 + 0.8 * a * dt))
+    expansion, rho = density_1atm(oil, temperature)
     c, b = TAIT_COEFFICIENTS[0], TAIT_COEFFICIENTS[1] + TAIT_COEFFICIENTS[2] * temperature
     rho /= 1.0 - c * math.log((b + p) / (b + ATMOSPHERE))
     isothermal = 1e5 * (b + p) / c * (1.0 - c * math.log((b + p) / b))
@@ -104,6 +101,15 @@ def walther_viscosity(numbers: tuple[float, float], temperature: float) -> float
 def oil_specific_heat(temperature: float) -> float:
     """Specific heat of all oils at a temperature [K]: cp [J/kg/K], linear between 25 and 80 degC and beyond."""
     return HEAT_CAPACITY[0] + (HEAT_CAPACITY[1] - HEAT_CAPACITY[0]) * (temperature - ZERO - 25.0) / 55.0
+
+
+def density_1atm(oil: Oil, temperature: float) -> tuple[float, float]:
+    """(thermal expansion [1/K], density [kg/m3]) at 1 atm: rho = rho_15 exp(-a dt (1 + 0.8 a dt)), ASTM D1250.
+
+    rho_15, a : density and thermal expansion at 15 degC; dt : temperature above 15 degC [K]
+    """
+    a, dt = EXPANSION / oil.density_15, temperature - ZERO - 15.0
+    return a * (1.0 + 1.6 * a * dt), oil.density_15 * math.exp(-a * dt * (1.0 + 0.8 * a * dt))
 
 
 def walther(oil: Oil, temperature: float) -> float:

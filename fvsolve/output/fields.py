@@ -286,17 +286,20 @@ def array_xml(name: str, values: np.ndarray, units: dict[str, str]) -> str:
     values : float64[n], int32[n] or int64[n], or with a second axis for components
     """
     values = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
-    data = values.tobytes()
-    # buffers no larger than the data need: clearing those of 268 kB takes longer
-    window = min(max(len(data).bit_length(), MIN_WINDOW), zlib.MAX_WBITS)
-    stream = zlib.compressobj(ZLIB_LEVEL, zlib.DEFLATED, window, min(window - 6, zlib.DEF_MEM_LEVEL))
-    block = stream.compress(data) + stream.flush()
+    block = compressed(values.tobytes())
     sizes = np.array([1, values.nbytes, 0, len(block)] if values.nbytes else [0, 0, 0], dtype="<u8").tobytes()
     content = base64.b64encode(sizes) + base64.b64encode(block if values.nbytes else b"")
     kind = f"{VTK_TYPES[values.dtype.kind]}{8 * values.itemsize}"
     shape = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""
     head = f'<DataArray type="{kind}" Name="{html.escape(name)}"{shape} format="binary">'
     return f"{head}{content.decode()}\n{unit_xml(units, name)}</DataArray>\n"
+
+
+def compressed(data: bytes) -> bytes:
+    """Data compressed by zlib, with buffers no larger than the data need: clearing those of 268 kB takes longer."""
+    window = min(max(len(data).bit_length(), MIN_WINDOW), zlib.MAX_WBITS)
+    stream = zlib.compressobj(ZLIB_LEVEL, zlib.DEFLATED, window, min(window - 6, zlib.DEF_MEM_LEVEL))
+    return stream.compress(data) + stream.flush()
 
 
 def unit_xml(units: dict[str, str], name: str) -> str:
