@@ -214,5 +214,5 @@ def test_an_ordinary_run_loads_its_balance_for_the_watch_and_nothing_of_the_comm
     code = f"import sys, fvsolve; fvsolve.run({case!r}); print(sorted({found}))"
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     watch = ["kernels.energy_rows", "kernels.energy_supply", "kernels.network_energy", "kernels.pipe_energy",
-             "model.energy_accounts", "parts.pump.energy_use"]  # fmt: skip
+             "model.energy_accounts"]  # fmt: skip
     assert said.stdout.strip() == str([f"fvsolve.{name}" for name in [*watch, "solve.energy_watch"]])

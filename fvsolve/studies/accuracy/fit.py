@@ -81,14 +81,8 @@ def fit(sizes, errors, floor: float = 0.0) -> Fit:
     result = (
         rows.fit_all() or rows.fit_without_outlier() or rows.fit_all(strict=False) or rows.no_fit(rows.failure_reason())
     )
-    if result.spread < result.order:
-        return result
-    # an order whose spread is as large as itself may drift to zero or double
-    last_orders = ", ".join(f"{x:.2f}" for x in pair_orders(rows.h[rows.good], rows.e[rows.good])[-3:])
-    count = rows.good.size
-    return rows.no_fit(
-        f"no order: orders between rows still drift ({last_orders}) after {count} rows. Try {count + 2} rows"
-    )
+    # False for a fit without an order, whose spread and order are NaN
+    return rows.no_fit(rows.drift_reason()) if result.spread >= result.order else result
 
 
 class FitRows:
@@ -177,6 +171,12 @@ class FitRows:
             return "no order: the errors reach a floor before three rows show one order. Try a coarser first row"
         last_orders = ", ".join(f"{x:.2f}" for x in p[-3:])
         return f"no order: the last orders between rows differ ({last_orders}). Try more levels, or fewer"
+
+    def drift_reason(self) -> str:
+        """Reason why there is no order if the spread is as large as the order, which may drift to zero or double."""
+        last_orders = ", ".join(f"{x:.2f}" for x in pair_orders(self.h[self.good], self.e[self.good])[-3:])
+        rows = self.good.size
+        return f"no order: orders between rows still drift ({last_orders}) after {rows} rows. Try {rows + 2} rows"
 
 
 def pair_orders(h: np.ndarray, e: np.ndarray) -> np.ndarray:
