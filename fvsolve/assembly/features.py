@@ -232,8 +232,8 @@ class Feature:
         """Remedy if an event of a part follows itself without end; "" for parts of others. event : name of the part"""
         return ""
 
-    def step_notices(self, model, method, h: float, span: float) -> list:
-        """Notices of steps that are too long; h : step [s]; span : duration of the run [s]"""
+    def step_notices(self, model, method) -> list:
+        """Notices of steps that are too long for the method."""
         return []
 
 

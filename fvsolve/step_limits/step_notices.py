@@ -106,7 +106,7 @@ def step_limits(
         return []
     lines: list[Notice] = []
     for feature in model.features:
-        lines += feature.step_notices(model, method, given_step(model), span(model))
+        lines += feature.step_notices(model, method)
     if not method.explicit:
         return lines
     try:

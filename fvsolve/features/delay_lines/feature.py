@@ -118,12 +118,13 @@ class DelayLines(Feature, slot=0, wakes="pipe_model delay-line, pipe_model auto"
     def run(self, run_data) -> LineRun:
         return LineRun(self, run_data)
 
-    def step_notices(self, model, method, h: float, span: float) -> list:
+    def step_notices(self, model, method) -> list:
         if not len(self.delays):
             return []
         from fvsolve.features.delay_lines.growth import line_growth_notices
+        from fvsolve.step_limits.step_notices import given_step, span
 
-        return line_growth_notices(model, method, h, span)
+        return line_growth_notices(model, method, given_step(model), span(model))
 
     def seen_by_jumps(self) -> DelayLines:
         """Copy of the feature with the lines as a jump passes them."""
