@@ -401,3 +401,15 @@ def test_what_cannot_be_is_refused(keys, value, said):
         table = table[key]
     table[keys[-1]] = value
     assert said in str(refused(case))
+
+
+@pytest.mark.parametrize("method", ["bogacki-shampine", "radau-iia-5", "rodas-4"])
+@pytest.mark.parametrize("given", [{"courant": 0.5}, {"step": 0.25}, {"rtol": 1e-4}], ids=["courant", "step", "rtol"])
+def test_still_water_with_a_scalar_keeps_it(given, method):
+    """Nothing moves, so no wave sets a step: the rate of waves is zero, and no feature may divide by it."""
+    pool = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [4, 4],
+            "velocity": {"u": 0, "v": 0}, "scalars": {"dye": 1.0}}  # fmt: skip
+    case = scene({"pool": pool}, {}, 1.0, given | {"method": method}, ["pool.dye@0.5,0.5"], 0.5, scalars={"dye": {}})
+    result = fvsolve.run(case)
+    assert result.ok
+    assert np.abs(result["pool.dye@0.5,0.5"] - 1.0).max() < 1e-14
