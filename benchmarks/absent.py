@@ -13,8 +13,8 @@ import numpy as np
 from measure import agree, parser
 
 from fvsolve import build, load
-from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
-from fvsolve.steppers import integrate
+from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.core.steppers import integrate
 
 STEP = 1e-3  # [s]
 HIGH, LOW, AREA, GRAVITY, CD = 3.0, 1.5, 50e-4, 9.80665, 0.61

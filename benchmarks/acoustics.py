@@ -13,8 +13,8 @@ from scipy.sparse import csc_array, hstack
 from scipy.sparse.linalg import expm_multiply
 
 from fvsolve.case import load
-from fvsolve.model import RunData, State, build
-from fvsolve.steppers.run_handle import addresses, call_rhs
+from fvsolve.core.model import RunData, State, build
+from fvsolve.core.steppers.run_handle import addresses, call_rhs
 
 LENGTH = SPEED = 1000.0  # [m, m/s]
 END = 2.0  # twice the travel time of the pipe [s]

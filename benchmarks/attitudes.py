@@ -13,7 +13,7 @@ from measure import agree, parser
 from scipy.integrate import solve_ivp
 
 from fvsolve import attitude, integrate
-from fvsolve.steppers import METHODS
+from fvsolve.core.steppers import METHODS
 
 INERTIA = np.array([1.0, 2.0, 3.0])  # [kg m2]
 START = attitude.euler_parameters(attitude.of_axis([0.6, 0.8, 0.0], 0.6))

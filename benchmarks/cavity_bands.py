@@ -16,7 +16,7 @@ import numpy as np
 from measure import agree, parser
 
 from fvsolve.case import load
-from fvsolve.run import run
+from fvsolve.core.run import run
 from fvsolve.studies.outcome import NO_FIELDS
 from fvsolve.studies.peak_error import SIGNS, peak_errors
 from fvsolve.studies.resolution import refined_keys

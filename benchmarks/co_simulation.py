@@ -16,8 +16,8 @@ from pathlib import Path
 from measure import parser, peer_module
 
 from fvsolve import advance, build, initial_state, load
-from fvsolve.solve.reused_loop import ReusedLoop
-from fvsolve.solve.run_loop import NO_LIMIT
+from fvsolve.core.solve.reused_loop import ReusedLoop
+from fvsolve.core.solve.run_loop import NO_LIMIT
 
 STEP = 1e-3  # [s]
 GOAL = 100.0  # of a step of an FMU beside the solver [us]
@@ -68,7 +68,7 @@ def hosted(case, held, folder: Path):
     import fmpy
     from fmpy.fmi2 import FMU2Slave
 
-    from fvsolve.fmi.export import write_fmu
+    from fvsolve.exchange.fmi.export import write_fmu
 
     path, variables = write_fmu(case, folder / f"{case.name}.fmu")
     about, unpacked = fmpy.read_model_description(str(path)), fmpy.extract(str(path), str(folder / case.name))

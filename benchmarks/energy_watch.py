@@ -15,7 +15,7 @@ from unittest import mock
 import measure
 
 from fvsolve import build, load, run
-from fvsolve.solve.energy_watch import EnergyWatch
+from fvsolve.core.solve.energy_watch import EnergyWatch
 
 CASES = Path(__file__).parents[1] / "cases"
 NAMES = (

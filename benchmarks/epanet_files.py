@@ -236,7 +236,7 @@ def examine(path: Path, options: Any, record: Record) -> None:
 
 def imported_network(path: Path, **options: Any) -> Any:
     """Import a network by fvsolve."""
-    from fvsolve.epanet import import_network
+    from fvsolve.exchange.epanet import import_network
 
     return import_network(path, **options)
 
@@ -300,8 +300,8 @@ def closure(case: dict, limit: float) -> str:
 def examine_day(path: Path, options: Any, record: Record) -> None:
     """Run a day by EPANET and by fvsolve, and compare levels and heads."""
     import fvsolve
-    from fvsolve.epanet.self_check import cycling_tanks, late_switches, switches_at_limits
     from fvsolve.errors import FvsolveError
+    from fvsolve.exchange.epanet.self_check import cycling_tanks, late_switches, switches_at_limits
 
     day = record.row["day"] = {"ok": False}
     record.stage("EPANET day")

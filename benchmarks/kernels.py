@@ -22,9 +22,9 @@ from measure import parser
 from planes_pyclaw import pyclaw, riemann
 
 from fvsolve.case import load
-from fvsolve.model import build
-from fvsolve.solve import initial_state
-from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.core.model import build
+from fvsolve.core.solve import initial_state
+from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)  # [cells]
 TRIAD_BYTES = 24  # per element: two reads, one write (the line fetched before writing is not counted)

@@ -15,7 +15,7 @@ import time
 import numpy as np
 from measure import agree, parser
 
-from fvsolve.run import model_of, run
+from fvsolve.core.run import model_of, run
 from fvsolve.studies.peak_error import SIDES, peak_errors
 from fvsolve.studies.resolution import refined_keys
 

@@ -20,7 +20,7 @@ from numba import njit
 from scipy.integrate import solve_ivp
 
 from fvsolve import build, load
-from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from reference import servo_axis as axis  # noqa: E402

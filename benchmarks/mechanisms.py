@@ -64,7 +64,7 @@ def rates(bodies: dict):
     from reference.bodies import bodies as scene_of
 
     import fvsolve
-    from fvsolve.steppers.run_handle import addresses, call_rhs
+    from fvsolve.core.steppers.run_handle import addresses, call_rhs
 
     model = fvsolve.build(fvsolve.load(scene_of(bodies, 1.0)))
     y, dydt, out = model.start.copy(), np.zeros(model.y_size), model.new_out()
@@ -108,8 +108,8 @@ def speed() -> None:
 def solved(case: dict) -> tuple[np.ndarray, float]:
     """Rows of the probes of a run, and CPU time of its steps [s]."""
     import fvsolve
-    from fvsolve.output.memory_sink import MemorySink
-    from fvsolve.solve.solve import initial_state, solve
+    from fvsolve.core.output.memory_sink import MemorySink
+    from fvsolve.core.solve.solve import initial_state, solve
 
     model = fvsolve.build(fvsolve.load(case))
     sink = MemorySink(model)

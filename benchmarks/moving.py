@@ -14,8 +14,8 @@ from measure import agree, machine, parser
 from planes_scenes import of_triangles
 
 from fvsolve.case import load
-from fvsolve.model import build
-from fvsolve.solve import initial_state
+from fvsolve.core.model import build
+from fvsolve.core.solve import initial_state
 
 GOAL = 1.2
 BODY = {"type": "body", "mass": 1e5, "inertia": [1e5, 1e5, 1e5]}

@@ -22,8 +22,8 @@ from exact_networks import Network, Solution, case_of, node_name, probes_of, ran
 from measure import agree, parser
 
 from fvsolve.case import load
+from fvsolve.core.run import run
 from fvsolve.errors import FvsolveError
-from fvsolve.run import run
 from fvsolve.studies.peak_error import RELATIVE_FLOOR, SIDES, peak_errors
 
 MODELS = ("finite-volume", "delay-line", "auto")

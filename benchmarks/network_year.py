@@ -14,7 +14,7 @@ import wntr
 from measure import parser
 
 import fvsolve
-from fvsolve.epanet import import_network, toolkit_run
+from fvsolve.exchange.epanet import import_network, toolkit_run
 
 DAY, STEP = 86400, 10
 NET = Path(wntr.__file__).parent / "library" / "networks" / "Net3.inp"

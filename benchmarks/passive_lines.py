@@ -14,10 +14,10 @@ from measure import agree, machine, parser
 
 import fvsolve
 from fvsolve.case import load
+from fvsolve.core.model.build import build
+from fvsolve.core.output.memory_sink import MemorySink
+from fvsolve.core.solve.solve import Run
 from fvsolve.features.delay_lines.feature import lines_of
-from fvsolve.model.build import build
-from fvsolve.output.memory_sink import MemorySink
-from fvsolve.solve.solve import Run
 
 LAKE, FLOW, BEGIN, END = 6e6, 0.05, 1.0, 12.0
 METHODS = ("euler", "rk4", "ssp-rk2", "trapezoid")

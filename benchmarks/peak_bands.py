@@ -20,8 +20,8 @@ from measure import agree, parser
 from random_mains import limits_near, random_main
 
 from fvsolve.case import load, shipped
+from fvsolve.core.run import run
 from fvsolve.errors import FvsolveError
-from fvsolve.run import run
 from fvsolve.studies.peak_error import RELATIVE_FLOOR, SIDES, peak_errors
 from fvsolve.studies.resolution import refined_keys
 

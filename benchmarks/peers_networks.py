@@ -17,8 +17,8 @@ from measure import agree, parser, peer_module
 
 import fvsolve
 from fvsolve.case import load
-from fvsolve.epanet import import_network
-from fvsolve.model.build import build
+from fvsolve.core.model.build import build
+from fvsolve.exchange.epanet import import_network
 
 rthym_moc, wntr = peer_module("rthym_moc", "rthym-moc"), peer_module("wntr", "wntr")
 NET = Path(wntr.__file__).parent / "library" / "networks" / "Net3.inp" if wntr else None

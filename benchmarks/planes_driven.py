@@ -15,9 +15,9 @@ from planes_scenes import BED, SIZE, scene, square
 from planes_speed import END, rate
 
 from fvsolve.case import load
-from fvsolve.model import build
-from fvsolve.solve import initial_state
-from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.core.model import build
+from fvsolve.core.solve import initial_state
+from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
 
 ROUNDS = 15  # in turns
 FLOOD = {"up": {"side": "west", "discharge": {"formula": "5 + sin(t)"}}, "down": {"side": "east", "stage": 1.0}}

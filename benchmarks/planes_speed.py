@@ -14,9 +14,9 @@ from measure import against
 from planes_scenes import BASINS, SIZE, of_triangles, scene, square
 
 from fvsolve.case import load
-from fvsolve.model import Model, build
-from fvsolve.solve import initial_state
-from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.core.model import Model, build
+from fvsolve.core.solve import initial_state
+from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
 
 SIZES = (64, 128, 256, 512, 1024)  # cells along a side
 LARGEST = {"triangles": 256, "PyClaw": 512}

@@ -90,7 +90,7 @@ def spent(command: list[str], cache: Path) -> tuple[float, float]:
 def memory(kind: str, cells: int, folder: Path) -> str:
     """Bytes per cell of the tables, of the time loop, and of the peak of the process above a small run, as text."""
     import fvsolve
-    from fvsolve.solve.run_loop import RunLoop
+    from fvsolve.core.solve.run_loop import RunLoop
 
     def arrays(owner) -> int:
         return sum(one.nbytes for one in owner if hasattr(one, "nbytes"))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.schemes import SCHEMES
+from fvsolve.core.schemes import SCHEMES
 
 FLUID = {"name": "user", "density": 1000.0, "bulk_modulus": "2.2 GPa", "viscosity": "1 mPa s",
          "vapor_pressure": "2.3 kPa", "law": "linear"}  # fmt: skip

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from measure import agree, parser
 
+from fvsolve.core.run import run
 from fvsolve.errors import FvsolveError
-from fvsolve.run import run
 
 FLUID = {"name": "user", "density": 1000.0, "bulk_modulus": "2.2 GPa", "viscosity": "1 mPa s", "law": "linear"}
 SCHEMES = ("muscl", "upwind", "muscl", "weno5")

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from measure import agree, machine, parser
 
-from fvsolve.mesh import rectangle
+from fvsolve.core.mesh import rectangle
 from fvsolve.parts.formula import Samples, read_points
 from fvsolve.parts.raster import Raster
 from fvsolve.parts.raster_files import read_pixels

@@ -22,12 +22,12 @@ from measure import agree, machine, parser, peer_module
 from planes_scenes import SIZE, scene, square
 
 from fvsolve.case import load
-from fvsolve.model import State, build
-from fvsolve.output.memory_sink import MemorySink
-from fvsolve.run import mpi_run
-from fvsolve.solve import initial_state
-from fvsolve.solve.run_loop import RunLoop
-from fvsolve.solve.solve import Run
+from fvsolve.core.model import State, build
+from fvsolve.core.output.memory_sink import MemorySink
+from fvsolve.core.run import mpi_run
+from fvsolve.core.solve import initial_state
+from fvsolve.core.solve.run_loop import RunLoop
+from fvsolve.core.solve.solve import Run
 
 STEPS, STOP = 6, 3  # number of steps in total and before the stop
 

@@ -14,8 +14,8 @@ import math
 import numpy as np
 from measure import agree, parser
 
-from fvsolve.schemes import LINEAR
-from fvsolve.steppers import METHODS
+from fvsolve.core.schemes import LINEAR
+from fvsolve.core.steppers import METHODS
 from fvsolve.studies.stability.stability import stability
 
 RHO, AMBIENT = 1000.0, 101325.0

@@ -17,11 +17,11 @@ import numpy as np
 from measure import parser
 
 import fvsolve
+from fvsolve.core.run import model_of
+from fvsolve.core.step_limits.growing_modes import excess_growth, modes_outside_cells
+from fvsolve.core.step_limits.step_notices import exceeded_checks, first_step, steps_of
+from fvsolve.core.steppers.analysis.stability_function import stability_function
 from fvsolve.errors import FvsolveError
-from fvsolve.run import model_of
-from fvsolve.step_limits.growing_modes import excess_growth, modes_outside_cells
-from fvsolve.step_limits.step_notices import exceeded_checks, first_step, steps_of
-from fvsolve.steppers.analysis.stability_function import stability_function
 
 CASES = {  # case -> changes that make it short and keep its physics
     "valve-closure": {"links.main.cells": 40, "numerics.end": 4.0},

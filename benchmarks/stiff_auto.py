@@ -9,8 +9,8 @@ from measure import agree
 from price import front, price
 
 from fvsolve.case import load
-from fvsolve.solve.solve import Run
-from fvsolve.steppers.tableau import METHODS
+from fvsolve.core.solve.solve import Run
+from fvsolve.core.steppers.tableau import METHODS
 from fvsolve.studies.outcome import CappedRun, Outcome, outcome, study_model
 
 HERE = Path(__file__).resolve().parent

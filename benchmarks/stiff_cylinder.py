@@ -12,8 +12,8 @@ from peers_ode import Problem, explicit_reference, peers
 from price import front, price
 
 import fvsolve
-from fvsolve.steppers.tableau import METHODS
-from fvsolve.validation import valve_controlled_cylinder as cylinder
+from fvsolve.core.steppers.tableau import METHODS
+from fvsolve.studies.validation import valve_controlled_cylinder as cylinder
 
 TARGETS = (1e-3, 1e-5, 1e-6, 1e-7, 1e-9)
 DEFAULT = "radau-iia-5"
@@ -90,7 +90,7 @@ def verdict(charts: dict[str, list[Run]], target: float) -> None:
 
 def draw(charts: dict[str, list[Run]], picture: Path) -> None:
     """Draw wall time against error of all solvers."""
-    from fvsolve.draw import style
+    from fvsolve.report.draw import style
 
     made = style.figure(4.6)
     axes = made.subplots()

@@ -12,13 +12,13 @@ from scipy.sparse.linalg import splu
 
 import fvsolve
 from fvsolve.case import load
+from fvsolve.core.model import RunData, build
+from fvsolve.core.model.jacobian_pattern import jacobian_pattern
+from fvsolve.core.steppers.integrator import Integrator
+from fvsolve.core.steppers.run_handle import RHS_CALL, addresses, call_rhs, evaluate, open_run
+from fvsolve.core.steppers.structure import Structure, differences
+from fvsolve.core.steppers.tableau import method_named
 from fvsolve.jit import njit
-from fvsolve.model import RunData, build
-from fvsolve.model.jacobian_pattern import jacobian_pattern
-from fvsolve.steppers.integrator import Integrator
-from fvsolve.steppers.run_handle import RHS_CALL, addresses, call_rhs, evaluate, open_run
-from fvsolve.steppers.structure import Structure, differences
-from fvsolve.steppers.tableau import method_named
 
 SIZES = ((10, 100), (50, 200))  # (pipes, cells of each)
 SCHEMES = ("upwind", "upwind5")

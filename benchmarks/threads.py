@@ -20,15 +20,15 @@ import numpy as np
 from measure import against, agree, machine, parser, peer_module
 from planes_scenes import BASINS, of_triangles, scene, square
 
-from fvsolve.assembly.model_draft import aligned_zeros
 from fvsolve.case import load
+from fvsolve.core.assembly.model_draft import aligned_zeros
+from fvsolve.core.kernels import band_exchange
+from fvsolve.core.model import build
+from fvsolve.core.run import mpi_run
+from fvsolve.core.solve import initial_state
+from fvsolve.core.solve.parallel_bands import yield_address
+from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
 from fvsolve.jit import njit
-from fvsolve.kernels import band_exchange
-from fvsolve.model import build
-from fvsolve.run import mpi_run
-from fvsolve.solve import initial_state
-from fvsolve.solve.parallel_bands import yield_address
-from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 
 END = 1e6  # end that no run here reaches [s]
 WATER = "free surface with bed"

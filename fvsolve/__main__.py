@@ -1,6 +1,6 @@
 """Entry point of `python -m fvsolve`."""
 
-from fvsolve.child_process import forget_present_folder
+from fvsolve.compile.child_process import forget_present_folder
 
 forget_present_folder()
 

@@ -18,7 +18,7 @@ from hypothesis_profiles import NEW, fix_constants
 from reference.pairs import is_in_turn
 from tally import Tally, unknown_names
 
-from fvsolve.steppers.tableau import METHODS
+from fvsolve.core.steppers.tableau import METHODS
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs of a shell ignore the signal
@@ -137,8 +137,8 @@ def cluster():
 @pytest.fixture
 def own_limiters_removed(monkeypatch):
     """Limiters that a test registers are removed at its end."""
+    from fvsolve.core.schemes import LIMITERS
     from fvsolve.parts import own_limiters
-    from fvsolve.schemes import LIMITERS
 
     before = dict(LIMITERS)
     monkeypatch.setenv(own_limiters.VARIABLE, "")

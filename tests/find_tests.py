@@ -1,7 +1,7 @@
 """Find the tests that run a module of the package.
 
-    python tests/find_tests.py fvsolve/steady.py              tests, and how many lines of the module each runs
-    python tests/find_tests.py fvsolve/steady.py --line 120   tests that run a line
+    python tests/find_tests.py fvsolve/core/steady.py              tests, and how many lines of the module each runs
+    python tests/find_tests.py fvsolve/core/steady.py --line 120   tests that run a line
     python tests/find_tests.py --record                       make a new recording: ten minutes on two cores
 
 The recording by coverage.py has two parts: the quick tests, for Python, and the quick tests of `UNCOMPILED` without

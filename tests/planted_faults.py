@@ -47,31 +47,35 @@ class Fault:
 
 FAULTS = [
     Fault(
-        "kernels/steady_edges.py",
+        "core/kernels/steady_edges.py",
         "potential[k, i] - potential[k, j]",
         "potential[k, j] - potential[k, i]",
     ),
-    Fault("step_limits/grid_limits.py", "face[:-1] - face[1:]", "1.01 * face[:-1] - face[1:]"),
+    Fault("core/step_limits/grid_limits.py", "face[:-1] - face[1:]", "1.01 * face[:-1] - face[1:]"),
     Fault(
-        "model/mechanics_tables.py",
+        "core/model/mechanics_tables.py",
         'row["sweep_a"] = a["mass"] / a["volume"] * row["area_a"]',
         'row["sweep_a"] = 1.01 * a["mass"] / a["volume"] * row["area_a"]',
     ),
     Fault(
-        "assembly/model_draft.py", "reynolds * math.pi / 4.0 * diameter", "1.01 * reynolds * math.pi / 4.0 * diameter"
+        "core/assembly/model_draft.py",
+        "reynolds * math.pi / 4.0 * diameter",
+        "1.01 * reynolds * math.pi / 4.0 * diameter",
     ),
     Fault("compile/cache_folders.py", 'digest.update(path.read_bytes() + b"\\0")', 'digest.update(b"\\0")'),
-    Fault("draw/plot.py", "np.argmin(values[a:b])", "np.argmax(values[a:b])"),
-    Fault("mesh/mesh.py", "angle=float(angle[sharpest])", "angle=float(1.01 * angle[sharpest])"),
-    Fault("steppers/ros.py", "1.0 / (later - t) if later > t", "-1.0 / (later - t) if later > t"),
-    Fault("steppers/analysis/trees.py", "return nodes * math.prod(", "return (nodes + 1) * math.prod("),
-    Fault("steppers/numbers/polynomial.py", "x - ratio * y for x, y", "x + ratio * y for x, y"),
+    Fault("report/draw/plot.py", "np.argmin(values[a:b])", "np.argmax(values[a:b])"),
+    Fault("core/mesh/mesh.py", "angle=float(angle[sharpest])", "angle=float(1.01 * angle[sharpest])"),
+    Fault("core/steppers/ros.py", "1.0 / (later - t) if later > t", "-1.0 / (later - t) if later > t"),
+    Fault("core/steppers/analysis/trees.py", "return nodes * math.prod(", "return (nodes + 1) * math.prod("),
+    Fault("core/steppers/numbers/polynomial.py", "x - ratio * y for x, y", "x + ratio * y for x, y"),
     Fault("report/cycles.py", "return self.cycles * (", "return 1.01 * self.cycles * ("),
-    Fault("validation/row_verdicts.py", "max(pair[0] - value, value - pair[1], 0.0)", "max(pair[0] - value, 0.0)"),
-    Fault("kernels/pipes.py", "dl[i] = k * (fl[i + 1] - fl[i])", "dl[i] = 1.01 * k * (fl[i + 1] - fl[i])"),
-    Fault("kernels/steady_friction.py", "force = loss * (size * flow)", "force = 1.01 * loss * (size * flow)"),
     Fault(
-        "kernels/density/log_law.py",
+        "studies/validation/row_verdicts.py", "max(pair[0] - value, value - pair[1], 0.0)", "max(pair[0] - value, 0.0)"
+    ),
+    Fault("core/kernels/pipes.py", "dl[i] = k * (fl[i + 1] - fl[i])", "dl[i] = 1.01 * k * (fl[i + 1] - fl[i])"),
+    Fault("core/kernels/steady_friction.py", "force = loss * (size * flow)", "force = 1.01 * loss * (size * flow)"),
+    Fault(
+        "core/kernels/density/log_law.py",
         'st["reference"] + q / (1.0 / st["beta"] + compliance)',
         'st["reference"] + q / (1.0 / st["beta"] - compliance)',
     ),
@@ -81,19 +85,19 @@ FAULTS = [
         "per = 1.0 / (1.0 + beta * beta)",
     ),
     Fault(
-        "kernels/relaxation.py",
+        "core/kernels/relaxation.py",
         "reference * (0.5 * u - flow / m0)",
         "reference * (0.505 * u - flow / m0)",
     ),
-    Fault("kernels/mechanism/body_layout.py", "rz * fx - rx * fz", "rz * fx + rx * fz"),
+    Fault("core/kernels/mechanism/body_layout.py", "rz * fx - rx * fz", "rz * fx + rx * fz"),
     Fault(
-        "kernels/relaxation.py",
+        "core/kernels/relaxation.py",
         "return per * taken, per * rate",
         "return per * taken, 1.01 * per * rate",
     ),
     Fault("units.py", "value_si - ambient", "value_si + ambient"),
     Fault("case/sloshing.py", "return 0.25 * np.pi * a * a if", "return 0.2525 * np.pi * a * a if"),
-    Fault("fluid/oils.py", "(hot - cold)) - 0.7)", "(hot - cold)) - 0.707)"),
+    Fault("core/fluid/oils.py", "(hot - cold)) - 0.7)", "(hot - cold)) - 0.707)"),
     Fault(
         "studies/peak_error.py",
         "v[position - 1] - 2.0 * v[position] + v[position + 1]",
@@ -117,18 +121,18 @@ FAULTS = [
     Fault("studies/water_quality/moving_segments.py", "entered += goes * supply", "entered -= goes * supply"),
     Fault("studies/stability/growth.py", "scaled @ result + x * v", "scaled @ result - x * v"),
     Fault(
-        "solve/held_inputs.py",
+        "core/solve/held_inputs.py",
         "value_at(model.tables, target.schedule, t, np.inf) / target.scale",
         "value_at(model.tables, target.schedule, t, np.inf) * target.scale",
     ),
-    Fault("fmi/variables.py", "inputs + list({variable.name", "inputs[:-1] + list({variable.name"),
+    Fault("exchange/fmi/variables.py", "inputs + list({variable.name", "inputs[:-1] + list({variable.name"),
     Fault("studies/loops/sampled.py", "self.drive * (1.0 + z[place])", "self.drive * (1.0 - z[place])"),
     Fault(
-        "model/network_elimination.py",
+        "core/model/network_elimination.py",
         "scale = (1.0, -1.0, -item.value, item.value)",
         "scale = (1.0, -1.0, item.value, -item.value)",
     ),
-    Fault("kernels/potential_networks.py", "forward = most - torque", "forward = 1.01 * most - torque"),
+    Fault("core/kernels/potential_networks.py", "forward = most - torque", "forward = 1.01 * most - torque"),
     Fault(
         "features/controls/kernels/input_histories.py",
         "weight *= (time - other) / (histories[here] - other)",
@@ -139,7 +143,7 @@ FAULTS = [
     Fault("features/scalars/balances.py", "decayed = -float(np.sum(decay", "decayed = float(np.sum(decay"),
     Fault("studies/ports/positive_real.py", "order = n.degree - d.degree", "order = d.degree - n.degree"),
     Fault(
-        "output/csv_files.py",
+        "core/output/csv_files.py",
         'self.along("u", fields), self.along("v", fields)',
         'self.along("u", fields), self.along("u", fields)',
     ),
@@ -148,20 +152,20 @@ FAULTS = [
         "gain = richest.seconds / cheapest.seconds",
         "gain = cheapest.seconds / richest.seconds",
     ),
-    Fault("basins/conduit/conduit_cells.py", "rough[0] * hydraulic_radius_power", "2.0 * hydraulic_radius_power"),
-    Fault("basins/frame_forces.py", "spin + f1 - p1 * z", "spin + f1 + p1 * z"),
+    Fault("core/basins/conduit/conduit_cells.py", "rough[0] * hydraulic_radius_power", "2.0 * hydraulic_radius_power"),
+    Fault("core/basins/frame_forces.py", "spin + f1 - p1 * z", "spin + f1 + p1 * z"),
     Fault(
-        "basins/liquid/liquid_mesh.py",
+        "core/basins/liquid/liquid_mesh.py",
         "m, pressure = forward - backward, c0 * (forward + backward)\n        mass",
         "m, pressure = forward - backward, 1.01 * c0 * (forward + backward)\n        mass",
     ),
     Fault(
-        "basins/transport/lower.py",
+        "core/basins/transport/lower.py",
         "return speed * size / np.pi * np.sin(x) ** 2",
         "return 1.01 * speed * size / np.pi * np.sin(x) ** 2",
     ),
     Fault(
-        "basins/free_surface/surface_patches.py",
+        "core/basins/free_surface/surface_patches.py",
         "dydt[o + i] += flow * near.flow_weight(",
         "dydt[o + i] -= flow * near.flow_weight(",
     ),
@@ -173,9 +177,15 @@ FAULTS = [
     ),
     Fault("parts/tank.py", "0.5 * s * (area[k + 1] - area[k])", "0.505 * s * (area[k + 1] - area[k])"),
     Fault("parts/pump/law.py", "residual = drop + weight * head", "residual = drop + 1.01 * weight * head"),
-    Fault("run/verdicts.py", "compare.t + compare.shift", "compare.t - compare.shift"),
-    Fault("epanet/part_tables.py", "2.0 * GRAVITY * drop / velocity**2", "2.02 * GRAVITY * drop / velocity**2"),
-    Fault("solve/run_summary.py", 'row["inflow"] - row["outflow"] for name', 'row["inflow"] + row["outflow"] for name'),
+    Fault("core/run/verdicts.py", "compare.t + compare.shift", "compare.t - compare.shift"),
+    Fault(
+        "exchange/epanet/part_tables.py", "2.0 * GRAVITY * drop / velocity**2", "2.02 * GRAVITY * drop / velocity**2"
+    ),
+    Fault(
+        "core/solve/run_summary.py",
+        'row["inflow"] - row["outflow"] for name',
+        'row["inflow"] + row["outflow"] for name',
+    ),
     Fault("exact/laminar_line.py", "self.length - places if self.reversed", "places if self.reversed"),
 ]
 

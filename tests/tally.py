@@ -16,8 +16,8 @@ class Tally:
     def start(self) -> None:
         """Record each run, each stepper and each command of this process."""
         from fvsolve import cli
-        from fvsolve.solve.solve import Run
-        from fvsolve.steppers.integrator import Integrator
+        from fvsolve.core.solve.solve import Run
+        from fvsolve.core.steppers.integrator import Integrator
 
         Run.go = self._after(Run.go, self._run)
         Integrator.__init__ = self._after(
@@ -78,9 +78,9 @@ def unknown_names(listed, collected: list[str]) -> set[str]:
 def expected() -> dict[str, set[str]]:
     """Every part, scheme, method, law, command and shipped case, by kind."""
     from fvsolve import cli
-    from fvsolve.fluid.laws import LAWS
-    from fvsolve.schemes import SCHEMES
-    from fvsolve.steppers.tableau import METHODS
+    from fvsolve.core.fluid.laws import LAWS
+    from fvsolve.core.schemes import SCHEMES
+    from fvsolve.core.steppers.tableau import METHODS
 
     return {
         "part": set(parts()),

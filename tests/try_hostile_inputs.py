@@ -20,8 +20,8 @@ from reference import hostile_inputs  # noqa: E402
 
 import fvsolve  # noqa: E402
 from fvsolve.case.reading import Raw  # noqa: E402
+from fvsolve.core.solve import initial_state  # noqa: E402
 from fvsolve.errors import FvsolveError  # noqa: E402
-from fvsolve.solve import initial_state  # noqa: E402
 
 SECONDS, MEMORY, MESSAGE = 5.0, 1e9, 20_000  # most CPU time [s], memory [B] and length of a message
 MOST_CELLS = 20_000  # cells of a case that is built

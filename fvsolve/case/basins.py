@@ -20,8 +20,8 @@ from fvsolve.case.output_grids import grid_faults
 from fvsolve.case.raster_meshes import raster_extent, rasters_with_holes, stretch_notes, terrace_notes
 from fvsolve.case.resource_checks import BASIN_CELL, byte_text, free_memory, name_faults
 from fvsolve.case.sections import Output
+from fvsolve.core.fluid.laws import law_names
 from fvsolve.errors import MeshError, did_you_mean, listing
-from fvsolve.fluid.laws import law_names
 from fvsolve.parts.formula import means, samples
 from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.value import ReadContext, ValueFault
@@ -127,8 +127,8 @@ def crest_faults(links: dict[str, Any], pools: dict[str, Any], meshes: dict) -> 
 
 
 if TYPE_CHECKING:
-    from fvsolve.mesh import Mesh
-    from fvsolve.mesh.mesh import MeshPoints
+    from fvsolve.core.mesh import Mesh
+    from fvsolve.core.mesh.mesh import MeshPoints
     from fvsolve.parts.basin import Basin, PatchNode
 
 Faults = Iterator[tuple[tuple, str]]
@@ -187,7 +187,7 @@ class BasinFields:
     @cached_property
     def points(self) -> MeshPoints:
         """Locator that finds the cell of a point."""
-        from fvsolve.mesh.mesh import MeshPoints
+        from fvsolve.core.mesh.mesh import MeshPoints
 
         return MeshPoints(self.mesh)
 
@@ -211,7 +211,7 @@ def probe_kinds(name: str, basin: Basin, mesh: Mesh | None, lumped: Mesh | None,
 
 def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
     """Mesh of a basin, from its keys or its mesh file. Raises ValueFault with all faults of the mesh."""
-    from fvsolve.mesh import read, rectangle
+    from fvsolve.core.mesh import read, rectangle
 
     try:
         if basin.is_rectangle:

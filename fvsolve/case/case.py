@@ -17,15 +17,15 @@ from fvsolve.case.pipe_routes import Route
 from fvsolve.case.probe import Probe, of_profiles
 from fvsolve.case.reading import followers
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
+from fvsolve.core.fluid import LAWS, Fluid
+from fvsolve.core.fluid.laws import Law
+from fvsolve.core.schemes import SCHEMES
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
-from fvsolve.fluid import LAWS, Fluid
-from fvsolve.fluid.laws import Law
 from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.parts.pipe.pipe_wall import OF_WALL, elastic_compliance, heat_retardation
 from fvsolve.parts.table_model import plain_value
-from fvsolve.schemes import SCHEMES
 from fvsolve.units import show
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class Case(Displayable):
     equilibrium_nodes: dict[str, Node] = field(default_factory=dict, repr=False)  # bodies and masses in equilibrium
     validation: Any = None  # `Validation`, or None
 
-    picture = "fvsolve.draw.object_pictures:case_figure"
+    picture = "fvsolve.report.draw.object_pictures:case_figure"
 
     def summary_line(self) -> str:
         basins = f", {len(self.meshes)} basins" if self.meshes else ""

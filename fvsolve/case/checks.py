@@ -12,6 +12,8 @@ from fvsolve.case.claims import Expect
 from fvsolve.case.reading import Raw
 from fvsolve.case.resource_checks import name_faults
 from fvsolve.case.sections import CAVITY_SCHEMES, FluidSpec, Numerics
+from fvsolve.core.steppers.loop_records import LEAST_STEP, LEAST_TOLERANCE
+from fvsolve.core.steppers.tableau import AUTO, METHODS
 from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts import KINDS
 from fvsolve.parts.carried_scalar import ZEROS
@@ -21,8 +23,6 @@ from fvsolve.parts.pipe.pipe_wall import OF_WALL
 from fvsolve.parts.table_model import CaseContext
 from fvsolve.parts.tolerances import is_shorter_than_rise
 from fvsolve.parts.value import ROOT
-from fvsolve.steppers.loop_records import LEAST_STEP, LEAST_TOLERANCE
-from fvsolve.steppers.tableau import AUTO, METHODS
 from fvsolve.units import show
 
 Faults = Iterator[tuple[tuple, str]]

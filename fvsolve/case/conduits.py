@@ -90,7 +90,7 @@ def water_of_conduits(
     conduits = {name: link for name, link in links.items() if is_kind(link, "conduit")}
     if not conduits:
         return {}, {}
-    from fvsolve.mesh.rectangles import rectangle
+    from fvsolve.core.mesh.rectangles import rectangle
     from fvsolve.parts.conduit.part import ConduitWater
 
     places = {place for link in conduits.values() for place in link.ports.values()}

@@ -11,7 +11,7 @@ from fvsolve.errors import listing
 from fvsolve.parts.value import ValueFault
 
 if TYPE_CHECKING:
-    from fvsolve.mesh import Mesh
+    from fvsolve.core.mesh import Mesh
 
 EDGE = 1e-9  # of the size: distance from the edge of a patch within which a centre counts as inside
 
@@ -21,7 +21,7 @@ def interior_patches(basin: Any, mesh: Mesh) -> dict[str, np.ndarray]:
     named = {name: patch for name, patch in basin.patches.items() if patch.is_interior}
     if not named:
         return {}
-    from fvsolve.mesh.mesh import MeshPoints
+    from fvsolve.core.mesh.mesh import MeshPoints
 
     faults: list[tuple[tuple, str]] = []
     faults += [(("patches", name), text) for name in named for text in name_faults(basin, mesh, name)]

@@ -18,8 +18,8 @@ from fvsolve.case.pipe_routes import legs, read_routes
 from fvsolve.case.probe import default_probes, read_probe
 from fvsolve.case.reading import Raw, Reading, copy_paths, default_faults, defaults_of, override, read_raw, split_key
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output, ViscosityLaw
+from fvsolve.core.fluid import follow_temperature, properties, specific_heat
 from fvsolve.errors import FluidError, did_you_mean
-from fvsolve.fluid import follow_temperature, properties, specific_heat
 from fvsolve.parts import KINDS, Friction, Pipe, Scalar
 from fvsolve.parts import value as val
 from fvsolve.parts.carried_scalar import ZEROS

@@ -9,8 +9,8 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from fvsolve.steppers.loop_records import LEAST_STEP
-from fvsolve.steppers.tableau import METHODS
+from fvsolve.core.steppers.loop_records import LEAST_STEP
+from fvsolve.core.steppers.tableau import METHODS
 from fvsolve.units import show
 
 LONGEST_NAME = 60  # letters; names are parts of file names, which may have 255 bytes

@@ -9,20 +9,20 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from fvsolve import units
+from fvsolve.core.fluid import LAWS
+from fvsolve.core.fluid.coolprop import OIL_WORDS
+from fvsolve.core.fluid.oils import ASTM_D341
+from fvsolve.core.schemes import LIMITERS, SCHEMES
+from fvsolve.core.steppers.structure import KINDS
+from fvsolve.core.steppers.tableau import AUTO, BUILT_IN, METHODS, method_of_file
 from fvsolve.declarations import Declarations
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.exact import NAMES
-from fvsolve.fluid import LAWS
-from fvsolve.fluid.coolprop import OIL_WORDS
-from fvsolve.fluid.oils import ASTM_D341
 from fvsolve.parts import value as val
 from fvsolve.parts.csv_rows import CsvError, copy_name, find_file, read_rows
 from fvsolve.parts.pipe.part import LINES
 from fvsolve.parts.table_model import NamedTables, Table, check_table, read_keys
 from fvsolve.parts.value import BY_CELLS, SHAPE, VALUE, Choice, Number, Quantity, ReadContext, positive
-from fvsolve.schemes import LIMITERS, SCHEMES
-from fvsolve.steppers.structure import KINDS
-from fvsolve.steppers.tableau import AUTO, BUILT_IN, METHODS, method_of_file
 from fvsolve.units import show
 
 STARTS = ("steady", "equilibrium", "rest")
@@ -40,7 +40,7 @@ DEFAULT_CELLS = 100  # in the pipe with the longest travel time; other pipes get
 DEFAULT_ROWS, DEFAULT_FRAMES = 1000, 50
 DEFAULT_ACCURACY = 1e-2  # fraction of the largest jump
 
-SINKS = Declarations("sink", "sinks", ("output/*_sink.py",))  # names in the case file
+SINKS = Declarations("sink", "sinks", ("core/output/*_sink.py",))  # names in the case file
 
 
 # Ranges of liquids, after CoolProp and the CRC Handbook: liquid hydrogen to mercury, light liquids to cold heavy oil.
@@ -471,7 +471,7 @@ class OutputSection(Table):
 
     def chain(self, mesh: Any) -> Any:
         """`FaceChain` of the section in a mesh."""
-        from fvsolve.mesh.face_chains import chain_along
+        from fvsolve.core.mesh.face_chains import chain_along
 
         return chain_along(mesh, (self.from_, self.to))
 

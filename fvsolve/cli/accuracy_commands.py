@@ -7,8 +7,8 @@ from typer import Option
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.terminal import TextTable, present, progress_line
+from fvsolve.core.output.summary_file import plain
 from fvsolve.errors import FvsolveError
-from fvsolve.output.summary_file import plain
 from fvsolve.studies.accuracy.fit import NO_ERROR
 from fvsolve.studies.accuracy.order_study import NORMS, SHOWN_VARIABLES, study_title, variable_unit
 from fvsolve.studies.result_table import Column, ResultTable, columns

@@ -200,7 +200,7 @@ def method_names(text: str | None) -> list[str] | None:
 
 def method_name(word: str) -> str:
     """Name of a method. If the word is the path of a tableau file, register it as a method named after the file."""
-    from fvsolve.steppers.tableau import METHODS, method_of_file
+    from fvsolve.core.steppers.tableau import METHODS, method_of_file
 
     path = Path(word)
     return word if word in METHODS or not path.is_file() else method_of_file(path).name

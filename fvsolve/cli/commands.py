@@ -29,12 +29,12 @@ def run(
     as_json: Json = False,
 ) -> None:  # fmt: skip
     """Solve cases and write their run directories."""
-    from fvsolve.draw.plot_process import PlotProcess
+    from fvsolve.report.draw.plot_process import PlotProcess
 
     results = []
     with PlotProcess(second_process=not no_pictures) as painter:  # its process starts before other modules are imported
         from fvsolve.cli import printing
-        from fvsolve.run import model_of, mpi_run
+        from fvsolve.core.run import model_of, mpi_run
 
         if not gc.get_freeze_count():  # once in a process, since it keeps unused objects too
             gc.freeze()
@@ -68,7 +68,7 @@ def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, q
     """
     from fvsolve.cli import printing
     from fvsolve.cli.terminal import run_progress
-    from fvsolve.run import draw, sink_of, solved
+    from fvsolve.core.run import draw, sink_of, solved
 
     if text := printing.cost_estimate(model):
         print(visible(text), file=sys.stderr, flush=True)
@@ -76,7 +76,7 @@ def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, q
         with run_progress(model.case) as progress:
             result = solved(model, sink, progress, threads)
         if error:
-            from fvsolve.output.summary_file import write_summary
+            from fvsolve.core.output.summary_file import write_summary
             from fvsolve.studies.peak_error import peak_errors
 
             name = model.case.name
@@ -100,9 +100,9 @@ def check(
 ) -> None:  # fmt: skip
     """Print the contents of a case as read, its initial state and its expected cost."""
     from fvsolve.cli import printing
-    from fvsolve.run import model_of
-    from fvsolve.solve.partition import divisible_rows
-    from fvsolve.step_limits.step_notices import step_limits
+    from fvsolve.core.run import model_of
+    from fvsolve.core.solve.partition import divisible_rows
+    from fvsolve.core.step_limits.step_notices import step_limits
 
     model = model_of(load_case(case, set))
     report_data = model.checks
@@ -149,8 +149,8 @@ def compare(
 ) -> None:
     """Compare two runs: greatest and rms difference (RUN_B minus RUN_A) of each common probe."""
     from fvsolve.cli import printing
-    from fvsolve.run import open_run
-    from fvsolve.run.verdicts import differences
+    from fvsolve.core.run import open_run
+    from fvsolve.core.run.verdicts import differences
 
     first = open_run(run_a)
     result = differences(first, open_run(run_b))
@@ -172,7 +172,7 @@ def view(
         "turned (default RUN/view-FIELD.png, with the name of the field)")] = None,
 ) -> None:  # fmt: skip
     """Draw a quantity in all parts at one time, or an animation of all stored times, into a file."""
-    from fvsolve.run import open_run
+    from fvsolve.core.run import open_run
 
     when = quantity_of(time, "time", "--time")
     if animate is not None and not time is out is None:

@@ -119,7 +119,7 @@ def optimise(
 
 def schedule_text(result, case) -> Iterator:
     """Linear and best schedule of an optimisation, and their peaks."""
-    from fvsolve.output.unit_columns import column, time_column
+    from fvsolve.core.output.unit_columns import column, time_column
     from fvsolve.studies.sampling import key_quantity
 
     clock = time_column(case)
@@ -156,7 +156,7 @@ def study(
 def study_text(result) -> Iterator:
     """Margins of all limits in all runs of a study, failed and open limits, and protections that hold all limits."""
     from fvsolve.cli import printing
-    from fvsolve.output.summary_shape import FAILS, OPEN, LimitVerdict
+    from fvsolve.core.output.summary_shape import FAILS, OPEN, LimitVerdict
     from fvsolve.studies.scenarios import row_name
 
     if result.design.title:
@@ -197,8 +197,8 @@ def _margin_table(result) -> TextTable:
 
     The status is "FAILS" if the run or a limit fails, else "open" or "holds"; "-" for a good run without limits.
     """
-    from fvsolve.output.summary_shape import FAILS, HOLDS, IN_WORDS, OPEN
-    from fvsolve.run.result import not_valid
+    from fvsolve.core.output.summary_shape import FAILS, HOLDS, IN_WORDS, OPEN
+    from fvsolve.core.run.result import not_valid
     from fvsolve.studies.scenarios import row_name
     from fvsolve.units import span
 

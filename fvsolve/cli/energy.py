@@ -78,8 +78,8 @@ def ledger(case, port, out, as_json: bool) -> None:
     It ends the program, with exit code 130 if interrupted, 1 if the run is not ok, else 0.
     port : name of a node, or None for no verdict; out : folder of the files, or None for runs/NAME.energy
     """
-    from fvsolve.draw.accuracy_pictures import energy_figure
-    from fvsolve.output.unit_columns import column, time_column
+    from fvsolve.core.output.unit_columns import column, time_column
+    from fvsolve.report.draw.accuracy_pictures import energy_figure
     from fvsolve.studies.energy_balance import energy as study
     from fvsolve.studies.energy_balance import write_table
 
@@ -103,7 +103,7 @@ def ledger(case, port, out, as_json: bool) -> None:
 
 def ledger_text(result, case, folder) -> Iterator:
     """Energy balance of a run by part, its remainder, the passivity verdict at a port, and the files."""
-    from fvsolve.output.unit_columns import column
+    from fvsolve.core.output.unit_columns import column
 
     rows, joules = [], column("energy", "energy", case)
 
@@ -165,7 +165,7 @@ def compare_pairs(case, schemes, methods, port, out, as_json: bool) -> None:
 
 def _in_unit(heading: Column, case) -> Column:
     """Convert a column of energies from J to the unit of `[output]`, and return any other column unchanged."""
-    from fvsolve.output.unit_columns import column
+    from fvsolve.core.output.unit_columns import column
 
     if not heading.head.endswith(" [J]"):
         return heading

@@ -71,7 +71,7 @@ def _key(text: str | None) -> tuple[str, list] | None:
 
 
 def _write_files(result, folder: Path, head: str) -> list[Path]:
-    from fvsolve.draw.stability_pictures import failure_map_figure
+    from fvsolve.report.draw.stability_pictures import failure_map_figure
 
     rows = [{"value": result.values[row["column"]]} | row for row in result.plain()["squares"]]
     table = ResultTable([Column(key) for key in rows[0]], rows).write(
@@ -86,7 +86,7 @@ def _write_files(result, folder: Path, head: str) -> list[Path]:
 
 def map_text(result, files: list[Path], head: str) -> Iterator:
     """Verdict of each run of a failure map, meaning of the verdicts, reference and files; head : label of columns"""
-    from fvsolve.draw.stability_pictures import column_labels
+    from fvsolve.report.draw.stability_pictures import column_labels
     from fvsolve.studies.failure_map import VERDICT_TEXTS
 
     for scheme in result.schemes:
@@ -136,7 +136,7 @@ def _by_courant(result) -> bool:
 
 
 def _limit_text(result, row) -> str:
-    from fvsolve.draw.stability_pictures import time_text
+    from fvsolve.report.draw.stability_pictures import time_text
 
     limits = {square.limit for square in row}
     if len(limits) > 1:

@@ -16,7 +16,7 @@ from fvsolve.errors import FvsolveError, listing
 from fvsolve.file_replacement import replacing, write_file
 
 if TYPE_CHECKING:
-    from fvsolve.epanet import Imported
+    from fvsolve.exchange.epanet import Imported
 
 DAY = 86400.0  # [s]
 SHORT = (
@@ -73,8 +73,8 @@ def fatigue(
     as_json: Json = False,
 ) -> None:  # fmt: skip
     """Count pressure cycles of a run by rainflow counting, and estimate the fatigue life of its parts."""
+    from fvsolve.core.run import open_run
     from fvsolve.report import cycles as counting
-    from fvsolve.run import open_run
 
     given = [entry for entry in (range, allowable_range, slope) if entry is not None]
     if len(given) not in (0, 3) or any(not entry > 0.0 for entry in given) or not per_day > 0.0:
@@ -126,8 +126,8 @@ def import_(
     )] = None,
 ) -> None:  # fmt: skip
     """Import an EPANET network: write its case file, print all differences from EPANET and compare both."""
-    from fvsolve.epanet import import_network
-    from fvsolve.epanet.part_tables import WEIGHT
+    from fvsolve.exchange.epanet import import_network
+    from fvsolve.exchange.epanet.part_tables import WEIGHT
 
     to = case or Path(f"{source.stem}.toml")
     if to.is_dir():
@@ -170,7 +170,7 @@ def export(
     set: Set = [],  # noqa: B006
 ) -> None:  # fmt: skip
     """Export a case as an EPANET network: pipes, pumps, valves, tanks, patterns and controls of levels."""
-    from fvsolve.epanet import network_text
+    from fvsolve.exchange.epanet import network_text
 
     if epanet is None:
         raise FvsolveError("--epanet FILE is missing; expected the EPANET network to write, for example town.inp")
@@ -190,7 +190,7 @@ MOST_NODES = 2000  # of a network whose day is compared with EPANET without --ch
 def _compare(network: "Imported", case: Path, day: bool) -> None:
     """Print the comparison of a case with EPANET on the original file; exit with 1 for a difference without cause."""
     from fvsolve.case import load
-    from fvsolve.epanet.self_check import check_day, check_start
+    from fvsolve.exchange.epanet.self_check import check_day, check_start
 
     found = [check_start(network, load(case))]
     if day and not found[0].fault:
@@ -221,7 +221,7 @@ def precompile(
     """Compile the functions that cases need on this machine, so that later runs start at once."""
     from fvsolve.case import load, shipped
     from fvsolve.cli.terminal import progress_bar
-    from fvsolve.run.precompilation import warm as warmed
+    from fvsolve.core.run.precompilation import warm as warmed
 
     paths = [shipped.find(name) for name in cases or shipped.names()]
     for path in paths:  # report faults of a case before compiling

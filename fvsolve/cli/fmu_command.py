@@ -17,7 +17,7 @@ def fmu(
     set: Set = [],  # noqa: B006
 ) -> None:  # fmt: skip
     """Export a case as an FMU (FMI 2.0, co-simulation): schedules and setpoints as inputs, probes as outputs."""
-    from fvsolve.fmi.export import write_fmu
+    from fvsolve.exchange.fmi.export import write_fmu
 
     path, variables = write_fmu(load_case(case, set), out)
     rows = []

@@ -9,10 +9,10 @@ from typer import Option
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.terminal import present
+from fvsolve.core.output.unit_columns import column
 from fvsolve.display import save
 from fvsolve.errors import FvsolveError
 from fvsolve.file_replacement import replacing
-from fvsolve.output.unit_columns import column
 from fvsolve.studies.result_table import Column, ResultTable, write_csv
 
 POLES_SHOWN = 24  # greatest number of poles on the terminal; poles.csv has all
@@ -31,7 +31,7 @@ def linearise(
     as_json: cli.Json = False,
 ) -> None:  # fmt: skip
     """Linearise a case about a state: matrices A, B, C, D and poles."""
-    from fvsolve.model.energy_norm import energy_form
+    from fvsolve.core.model.energy_norm import energy_form
     from fvsolve.studies.linearise import POLES, poles_of
     from fvsolve.studies.linearise import linearise as ask
 
@@ -151,7 +151,7 @@ def response(
 
 def respond(case, port, input, output, at, before, scheme, out, as_json: bool) -> None:
     """Compute and write the transfer function from an input to a probe; arguments as for `response`."""
-    from fvsolve.draw.stability_pictures import response_figure
+    from fvsolve.report.draw.stability_pictures import response_figure
     from fvsolve.studies.loops.input_response import input_response
 
     if port is not None or input is None or output is None:
@@ -210,7 +210,7 @@ def output_unit(case, result) -> tuple[float, str]:
 
 def draw(result, path: Path, size: float, unit: str) -> None:
     """Write PNG and SVG pictures of the transfer function H; size : factor from SI to `unit`."""
-    from fvsolve.draw.stability_pictures import response_figure
+    from fvsolve.report.draw.stability_pictures import response_figure
 
     verdict = result.verdict
     dips, poles = [(dip.low, dip.high) for dip in verdict.dips], {abs(s.imag) for s in verdict.axis} - {0.0}

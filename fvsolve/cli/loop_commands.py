@@ -44,7 +44,7 @@ def loop(
 
 def draw(result, folder: Path, stem: str) -> None:
     """Write the pictures of a loop, STEM.bode.png and so on."""
-    from fvsolve.draw.loop_pictures import bode_figure, locus_figure, nyquist_figure, step_figure
+    from fvsolve.report.draw.loop_pictures import bode_figure, locus_figure, nyquist_figure, step_figure
     from fvsolve.studies.loops.loop import locus, step_response
 
     title = f"{result.case} at {result.when}: loop of {result.control}"

@@ -10,11 +10,11 @@ from typer import Argument, Option
 
 from fvsolve.cli.app import Json, command, method_name
 from fvsolve.cli.terminal import TextTable, present
+from fvsolve.core.steppers import METHODS, Facts, Method, analyse, method_named
+from fvsolve.core.steppers.numbers.polynomial import Polynomial, sign
+from fvsolve.core.steppers.tableau import rounding_text
 from fvsolve.display import save
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers import METHODS, Facts, Method, analyse, method_named
-from fvsolve.steppers.numbers.polynomial import Polynomial, sign
-from fvsolve.steppers.tableau import rounding_text
 
 PICTURES = (".png", ".svg", ".pdf")
 MAX_ENTRY = 28  # greatest length of a tableau entry that is printed in full, in characters
@@ -27,7 +27,7 @@ def single_method(name: str, out: Path | None) -> tuple[dict, Iterator]:
 
     It writes a picture of the stability region to the file `out`, by default NAME.png.
     """
-    from fvsolve.draw.stability_pictures import region_figure
+    from fvsolve.report.draw.stability_pictures import region_figure
 
     name = method_name(name)
     method = method_named(name)

@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterator
 
 from fvsolve.case.resource_checks import byte_text, disk_size
 from fvsolve.cli.terminal import TextTable
+from fvsolve.core.output.directory import existing_pictures
+from fvsolve.core.output.summary_shape import IN_WORDS, OPEN, LimitVerdict
+from fvsolve.core.output.unit_columns import UnitColumn, column
+from fvsolve.core.run.result import not_valid
 from fvsolve.errors import listing
-from fvsolve.output.directory import existing_pictures
-from fvsolve.output.summary_shape import IN_WORDS, OPEN, LimitVerdict
-from fvsolve.output.unit_columns import UnitColumn, column
-from fvsolve.run.result import not_valid
 from fvsolve.units import span
 
 ROWS = 20  # greatest number of rows of a table of probes; summary.json has all

@@ -10,10 +10,10 @@ from typer import Argument, Option
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.terminal import TextTable, present, progress_line
+from fvsolve.core.step_limits.advection_limit import AdvectionLimit, advection_limits
+from fvsolve.core.step_limits.symbol import WEIGHTS
 from fvsolve.display import save
 from fvsolve.errors import FvsolveError
-from fvsolve.step_limits.advection_limit import AdvectionLimit, advection_limits
-from fvsolve.step_limits.symbol import WEIGHTS
 from fvsolve.studies.result_table import Column, ResultTable, cell_text, columns
 from fvsolve.studies.stability.periodic_limits import (
     LIMITED,
@@ -250,8 +250,8 @@ def pictures(result, folder: Path) -> list[str]:
     not positive and finite, the step is 1 / (greatest magnitude of an eigenvalue). Pairs on a case with delay lines
     have no picture. result : as from `stability`
     """
-    from fvsolve.draw.stability_pictures import spectrum_figure
-    from fvsolve.steppers import analyse
+    from fvsolve.core.steppers import analyse
+    from fvsolve.report.draw.stability_pictures import spectrum_figure
 
     names = []
     for row in result.rows:

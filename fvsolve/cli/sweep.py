@@ -90,7 +90,7 @@ def write_charts(result, quantities: list[str], folder: Path, heads: dict[str, s
 
     Pictures of earlier sweeps in this folder are deleted. heads : key -> heading of the key with its unit
     """
-    from fvsolve.draw.object_pictures import quantity_figure
+    from fvsolve.report.draw.object_pictures import quantity_figure
 
     names = [result.quantity(name) for name in quantities]
     names = names or [column for column in result.quantities if column.startswith(("max(", "min("))]
@@ -204,7 +204,7 @@ def calibrate(
 
 def calibration_text(case, result) -> Iterator:
     """Calibrated values of the keys, differences from the measured series, and doubts."""
-    from fvsolve.output.unit_columns import column
+    from fvsolve.core.output.unit_columns import column
     from fvsolve.studies.sampling import si_unit_of
 
     probes = {series.probe.text: series.probe for series in case.compare.values() if series.probe is not None}

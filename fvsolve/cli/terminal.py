@@ -38,7 +38,7 @@ def present(as_json: bool, data: Any, items: Iterable, code: int = 0) -> None:
 
 def print_json(data: Any) -> None:
     """Print one JSON object on standard output, with unrounded numbers."""
-    from fvsolve.output.summary_file import plain
+    from fvsolve.core.output.summary_file import plain
 
     print(json.dumps(plain(data), allow_nan=False))
 

@@ -27,8 +27,8 @@ def validate(
     as_json: Json = False,
 ) -> None:  # fmt: skip
     """Compare cases with measurements, published results and exact solutions."""
-    from fvsolve.validation import library
-    from fvsolve.validation.page import write_page
+    from fvsolve.studies.validation import library
+    from fvsolve.studies.validation.page import write_page
 
     if list_names:
         return present(as_json, *listed(library.find(names or [])))
@@ -48,7 +48,7 @@ def validate(
 def listed(paths: dict[str, Path]) -> tuple[dict, list]:
     """Validations with title and files, as plain data and as a table."""
     from fvsolve.case.reading import read_raw
-    from fvsolve.validation import library
+    from fvsolve.studies.validation import library
 
     raws = {name: read_raw(path) for name, path in paths.items()}
     tables = {name: library.read_table(raw) for name, raw in raws.items()}
@@ -60,7 +60,7 @@ def listed(paths: dict[str, Path]) -> tuple[dict, list]:
 
 def result_text(results: list) -> Iterator:
     """Table of all rows, then the reasons, and the data that lack."""
-    from fvsolve.validation.row_texts import amounts
+    from fvsolve.studies.validation.row_texts import amounts
 
     rows = []
     for result in results:

@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.child_process import python_command, python_environment
 from fvsolve.compile import cache_folders as folders
 from fvsolve.compile import store
+from fvsolve.compile.child_process import python_command, python_environment
 from fvsolve.compile.numba_internals import LOADED_CODE, code_of, dispatcher_class, numba_module
 from fvsolve.compile.store import Code
 

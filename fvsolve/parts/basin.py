@@ -9,9 +9,9 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic.fields import FieldInfo
 
-from fvsolve.assembly.lowering import FLOW, STAGE, Input, Lowering
+from fvsolve.core.assembly.lowering import FLOW, STAGE, Input, Lowering
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.errors import FvsolveError, listing
-from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.carried_scalar import ScalarValues
 from fvsolve.parts.csv_rows import copy_name, find_file

@@ -6,8 +6,8 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.assembly.lowering import Lowering
-from fvsolve.kernels import dtypes as rec
+from fvsolve.core.assembly.lowering import Lowering
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import Attitude, is_zero_vector, length_notices
 from fvsolve.parts.nodes_and_links import Node
 from fvsolve.parts.schedule import Schedule, Scheduled
@@ -345,7 +345,7 @@ class BodyRows(Lowering, kind="body"):
     """Conversion to table rows of the probes of rigid bodies in space."""
 
     def probe(self, draft, name, probe, row) -> None:
-        from fvsolve.kernels.mechanism.body_values import BODY_QUANTITIES  # not loaded by models without bodies
+        from fvsolve.core.kernels.mechanism.body_values import BODY_QUANTITIES  # not loaded by models without bodies
 
         quantity = "angle" if probe.quantity == "travel" else probe.quantity
         row["kind"], row["side"] = rec.BODY_VALUE, BODY_QUANTITIES.index(quantity)

@@ -6,10 +6,10 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from fvsolve.assembly.lowering import TORQUE, Input, Lowering, lowering_of
-from fvsolve.assembly.mechanics import PushLowering, join_ports, point_row, pose_of
-from fvsolve.assembly.network_elements import FLOW, Element
-from fvsolve.kernels import dtypes as rec
+from fvsolve.core.assembly.lowering import TORQUE, Input, Lowering, lowering_of
+from fvsolve.core.assembly.mechanics import PushLowering, join_ports, point_row, pose_of
+from fvsolve.core.assembly.network_elements import FLOW, Element
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
 from fvsolve.parts.nodes_and_links import Link, TwoPort
 from fvsolve.parts.pump.law import OWN_NUMBERS

@@ -3,7 +3,7 @@
 import math
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.assembly.lowering import Restriction, opening_input
+from fvsolve.core.assembly.lowering import Restriction, opening_input
 from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import SHAPE, Number, Quantity, ReadContext, UsualRange, Value, positive

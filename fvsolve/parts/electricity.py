@@ -5,9 +5,9 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.assembly.lowering import VALUE as ANY_VALUE
-from fvsolve.assembly.lowering import InputKind
-from fvsolve.assembly.network_elements import (
+from fvsolve.core.assembly.lowering import VALUE as ANY_VALUE
+from fvsolve.core.assembly.lowering import InputKind
+from fvsolve.core.assembly.network_elements import (
     CAPACITY,
     FLOW,
     GAUGE,
@@ -21,7 +21,7 @@ from fvsolve.assembly.network_elements import (
     fill_network_probe,
     node_or_reference,
 )
-from fvsolve.kernels import dtypes as rec
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.network_parts import (
     HEAT_TO,
     GivenPotential,

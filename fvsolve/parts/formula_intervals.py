@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.kernels import formula_programs as code
+from fvsolve.core.kernels import formula_programs as code
 
 ROUNDS = 80  # greatest number of bisections: enough for neighbouring floating-point numbers
 RANGE_ROUNDS = 24  # the same in a search for values out of range, which a smooth maximum at the limit never ends

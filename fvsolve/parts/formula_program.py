@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve import units
-from fvsolve.kernels import formula_programs as code
+from fvsolve.core.kernels import formula_programs as code
 from fvsolve.parts.formula import FUNCTIONS, TIME_NAMES, Arithmetic
 from fvsolve.parts.formula_intervals import Enclosure, enclose, find_pole, find_pulses, in_unit
 from fvsolve.parts.value import ValueFault

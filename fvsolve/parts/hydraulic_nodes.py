@@ -5,8 +5,8 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.assembly.lowering import FLOW, HEAD, PRESSURE, Input, Lowering, scalar_inputs
-from fvsolve.kernels import dtypes as rec
+from fvsolve.core.assembly.lowering import FLOW, HEAD, PRESSURE, Input, Lowering, scalar_inputs
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.nodes_and_links import PlaceOnBody
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table_model import CaseContext, Faults

@@ -3,8 +3,16 @@
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from fvsolve.assembly.network_elements import FLOW, LOCK, POTENTIAL, Element, NetworkRows, Switch, node_or_reference
-from fvsolve.kernels import dtypes as rec
+from fvsolve.core.assembly.network_elements import (
+    FLOW,
+    LOCK,
+    POTENTIAL,
+    Element,
+    NetworkRows,
+    Switch,
+    node_or_reference,
+)
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.nodes_and_links import Node
 from fvsolve.parts.schedule import Schedule
 from fvsolve.parts.value import Text

@@ -16,8 +16,8 @@ from types import CellType, FunctionType, ModuleType
 import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, TEXT, validated
+from fvsolve.core.schemes import LIMITERS, Limiter, OwnLimiter
 from fvsolve.errors import FvsolveError
-from fvsolve.schemes import LIMITERS, Limiter, OwnLimiter
 from fvsolve.units import show
 
 VARIABLE = "FVSOLVE_LIMITERS"  # environment variable with the limiters of users, for other processes

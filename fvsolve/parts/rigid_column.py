@@ -3,8 +3,8 @@
 import math
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.assembly.lowering import Lowering
-from fvsolve.kernels import dtypes as rec
+from fvsolve.core.assembly.lowering import Lowering
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.full_pipe import FullPipe
 from fvsolve.parts.value import ReadContext, Rows, Value, ValueFault
 from fvsolve.units import show

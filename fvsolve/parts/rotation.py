@@ -5,8 +5,8 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.assembly.lowering import ANGULAR_SPEED, InputKind
-from fvsolve.assembly.network_elements import (
+from fvsolve.core.assembly.lowering import ANGULAR_SPEED, InputKind
+from fvsolve.core.assembly.network_elements import (
     CAPACITY,
     INERTANCE,
     RESISTANCE,

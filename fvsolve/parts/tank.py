@@ -5,8 +5,8 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.assembly.lowering import Lowering
-from fvsolve.kernels import dtypes as rec
+from fvsolve.core.assembly.lowering import Lowering
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.connection import Connection, ConnectionTable, with_connection
 from fvsolve.parts.hydraulic_nodes import Junction
 from fvsolve.parts.nodes_and_links import PlaceOnBody

@@ -6,10 +6,10 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from fvsolve.assembly.lowering import FORCE, Input, rows_in
-from fvsolve.assembly.mechanics import AxisLowering, PushLowering, join_ports
-from fvsolve.assembly.network_elements import CAPACITY, FLOW, Element
-from fvsolve.kernels import dtypes as rec
+from fvsolve.core.assembly.lowering import FORCE, Input, rows_in
+from fvsolve.core.assembly.mechanics import AxisLowering, PushLowering, join_ports
+from fvsolve.core.assembly.network_elements import CAPACITY, FLOW, Element
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
 from fvsolve.parts.body import NamedPoints
 from fvsolve.parts.nodes_and_links import Coupling, Node
@@ -169,7 +169,7 @@ class EndStopRows(PushLowering, kind="end-stop"):
     table = "stop"
 
     def fill(self, draft, name, link, rows) -> None:
-        from fvsolve.kernels.mass_dynamics import contact_force  # not loaded by models without bodies
+        from fvsolve.core.kernels.mass_dynamics import contact_force  # not loaded by models without bodies
 
         (row,) = rows
         x, speed = join_ports(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))

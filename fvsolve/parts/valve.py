@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from fvsolve.assembly.lowering import LAMINAR_REYNOLDS, Restriction, opening_input
+from fvsolve.core.assembly.lowering import LAMINAR_REYNOLDS, Restriction, opening_input
 from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table_model import ListTable, Table, keys_json, read_lists

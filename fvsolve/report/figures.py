@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fvsolve.draw.plot import MAX_NAME_LENGTH, probe_quantity, short_name, thin_series
-from fvsolve.draw.style import COLOURS, DOUBT, HAIR, INK, MUTED
 from fvsolve.errors import visible
+from fvsolve.report.draw.plot import MAX_NAME_LENGTH, probe_quantity, short_name, thin_series
+from fvsolve.report.draw.style import COLOURS, DOUBT, HAIR, INK, MUTED
 from fvsolve.report.long_section import VAPOUR_LINE as VAPOUR_LINE
 from fvsolve.report.long_section import HeadAnimation, Section, head_window
 

@@ -15,13 +15,13 @@ from fvsolve.case.case import default_cells
 from fvsolve.case.pipe_routes import Leg, is_cut, joined_places, pipe_leg
 from fvsolve.case.pipe_routes import legs as legs_of
 from fvsolve.case.probe import OF_PRESSURE
+from fvsolve.core.output.csv_files import ENVELOPE_QUANTITIES, joined_envelopes
+from fvsolve.core.output.fields import read_pipe_lines, read_series
+from fvsolve.core.output.summary_shape import FAILS
+from fvsolve.core.output.unit_columns import UnitColumn
+from fvsolve.core.run.result import not_valid
+from fvsolve.core.run.verdicts import NEAR, Chainages
 from fvsolve.errors import RunError
-from fvsolve.output.csv_files import ENVELOPE_QUANTITIES, joined_envelopes
-from fvsolve.output.fields import read_pipe_lines, read_series
-from fvsolve.output.summary_shape import FAILS
-from fvsolve.output.unit_columns import UnitColumn
-from fvsolve.run.result import not_valid
-from fvsolve.run.verdicts import NEAR, Chainages
 
 MAX_SECTIONS = 6  # greatest number of sections of a run, unless it has more routes
 

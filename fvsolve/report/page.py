@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.case.text import inline
-from fvsolve.draw.plot import probe_quantity, thin_series
+from fvsolve.core.output.summary_shape import FAILS, HOLDS, IN_WORDS, OPEN
+from fvsolve.core.output.unit_columns import column
+from fvsolve.core.run.result import not_valid
 from fvsolve.errors import visible
-from fvsolve.output.summary_shape import FAILS, HOLDS, IN_WORDS, OPEN
-from fvsolve.output.unit_columns import column
 from fvsolve.report import figures as plots
 from fvsolve.report import import_library, tables
+from fvsolve.report.draw.plot import probe_quantity, thin_series
 from fvsolve.report.long_section import (
     MAX_BINS,
     Section,
@@ -25,7 +26,6 @@ from fvsolve.report.long_section import (
     section_paths,
 )
 from fvsolve.report.tables import ERROR_HEADER, ReportTable, Sentence, in_unit, open_reason, value_text
-from fvsolve.run.result import not_valid
 from fvsolve.units import span
 
 TEMPLATE_FOLDER = Path(__file__).parent

@@ -12,16 +12,16 @@ from urllib.parse import quote
 
 import numpy as np
 
+from fvsolve.core.output.csv_files import ENVELOPE_QUANTITIES
+from fvsolve.core.run import open_run
+from fvsolve.core.run.result import not_valid
 from fvsolve.display import save_if_path
-from fvsolve.draw.plot import history_figure, phase_figure, section_figure
 from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing, visible
 from fvsolve.file_replacement import replacing, write_file
-from fvsolve.output.csv_files import ENVELOPE_QUANTITIES
 from fvsolve.report import import_library, page, tables
+from fvsolve.report.draw.plot import history_figure, phase_figure, section_figure
 from fvsolve.report.long_section import Section, SectionPath, envelope_column, head_window, section_of, section_paths
 from fvsolve.report.tables import ReportTable, is_number
-from fvsolve.run import open_run
-from fvsolve.run.result import not_valid
 from fvsolve.studies.scenarios import STUDY, open_study
 from fvsolve.units import show
 

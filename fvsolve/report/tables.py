@@ -13,13 +13,13 @@ import numpy as np
 
 from fvsolve.case.case import default_cells
 from fvsolve.case.text import inline
+from fvsolve.core.output.summary_shape import FAILS, HOLDS, IN_WORDS, OPEN
+from fvsolve.core.output.unit_columns import UnitColumn, column
+from fvsolve.core.run.result import not_valid
 from fvsolve.errors import visible
-from fvsolve.output.summary_shape import FAILS, HOLDS, IN_WORDS, OPEN
-from fvsolve.output.unit_columns import UnitColumn, column
 from fvsolve.parts.table_model import plain_value
 from fvsolve.parts.value import Quantity
 from fvsolve.report.long_section import SectionPath, envelope_column
-from fvsolve.run.result import not_valid
 from fvsolve.units import DIMENSIONS, span
 
 DIGITS = 5  # significant digits of the greatest number of a column

@@ -8,9 +8,9 @@ import numpy as np
 
 from fvsolve.argument_checks import COUNT, COUNT_FROM_ZERO, FUNCTION, TABLE, TEXT, validated
 from fvsolve.case import Case, load
+from fvsolve.core.run.verdicts import interpolated
 from fvsolve.declarations import declared
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.run.verdicts import interpolated
 from fvsolve.studies.outcome import end_if_interrupted, refusal_text
 from fvsolve.studies.parallel import TaskPool
 from fvsolve.studies.result_table import Column, PlainData, ResultTable
@@ -63,7 +63,7 @@ class Residuals(RowMaker):
 
     def __call__(self, values: Mapping[str, Any]) -> list[np.ndarray] | str:
         """Run with values of keys; differences float64[times in the run] of each series, or the reason of a failure."""
-        from fvsolve.run import run
+        from fvsolve.core.run import run
 
         try:
             case = self.read(values)

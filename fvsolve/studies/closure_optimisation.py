@@ -8,10 +8,10 @@ import numpy as np
 
 from fvsolve.case import Case, load
 from fvsolve.case.text import path
+from fvsolve.core.run import run
 from fvsolve.declarations import declared
 from fvsolve.errors import Fault, FvsolveError, collect_faults, did_you_mean, listing
 from fvsolve.parts.schedule import Schedule
-from fvsolve.run import run
 from fvsolve.studies.outcome import NO_FIELDS, checked_case, end_if_interrupted
 from fvsolve.studies.result_table import PlainData
 from fvsolve.units import show

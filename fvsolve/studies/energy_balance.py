@@ -7,18 +7,18 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, TABLE, TEXT, validated
+from fvsolve.core.model.energy_accounts import Account, Accounts, available_energy, datum_of
+from fvsolve.core.schemes import SCHEMES
+from fvsolve.core.solve import initial_state
+from fvsolve.core.solve.run_loop import RunLoop
+from fvsolve.core.solve.solve import Run
+from fvsolve.core.steppers import automatic, loop_records
 from fvsolve.declarations import declared
 from fvsolve.errors import CaseError, FvsolveError, did_you_mean
 from fvsolve.features.delay_lines.feature import history_of, lines_of
 from fvsolve.features.delay_lines.history import jump_times
 from fvsolve.features.delay_lines.kernels.wave_history import JUMPS_TRAVELLING, time_tolerance
 from fvsolve.file_replacement import write_file
-from fvsolve.model.energy_accounts import Account, Accounts, available_energy, datum_of
-from fvsolve.schemes import SCHEMES
-from fvsolve.solve import initial_state
-from fvsolve.solve.run_loop import RunLoop
-from fvsolve.solve.solve import Run
-from fvsolve.steppers import automatic, loop_records
 from fvsolve.studies.outcome import RowSink, end_if_interrupted, refusal_text, study_model
 from fvsolve.studies.passivity import AUTO, check_names, method_names
 from fvsolve.studies.result_cache import ResultCache

@@ -11,12 +11,12 @@ import numpy as np
 
 from fvsolve.argument_checks import NAMES, NUMBER, NUMBERS, ROW, TEXT, Kind, is_row, validated
 from fvsolve.case import load
+from fvsolve.core.model.build import build
+from fvsolve.core.model.step_division import dividing_rate
+from fvsolve.core.schemes import LIMITED
+from fvsolve.core.steppers.tableau import METHODS as KNOWN_METHODS
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean
-from fvsolve.model.build import build
-from fvsolve.model.step_division import dividing_rate
-from fvsolve.schemes import LIMITED
-from fvsolve.steppers.tableau import METHODS as KNOWN_METHODS
 from fvsolve.studies.distance import Deviation, column_ranges, time_weights
 from fvsolve.studies.failure_map_columns import (
     Columns,
@@ -527,7 +527,7 @@ def _shorter_steps(case, trial: dict, ratio: int) -> dict:
 def _check_names(*given: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Given schemes and given methods, both without repetition. Raises FvsolveError for an unknown name."""
     from fvsolve.case.sections import MethodNames
-    from fvsolve.schemes import SCHEMES
+    from fvsolve.core.schemes import SCHEMES
 
     for kind, requested, known in zip(("scheme", "method"), given, (tuple(SCHEMES), tuple(MethodNames())), strict=True):
         for name in requested:

@@ -13,10 +13,10 @@ import numpy as np
 
 from fvsolve.case import load
 from fvsolve.case.sections import DEFAULT_CELLS
+from fvsolve.core.schemes import LIMITED, SCHEMES
+from fvsolve.core.steppers.tableau import method_named
 from fvsolve.errors import FvsolveError
 from fvsolve.features.delay_lines.growth import storing_nodes, wave_growth
-from fvsolve.schemes import LIMITED, SCHEMES
-from fvsolve.steppers.tableau import method_named
 from fvsolve.studies.outcome import study_model
 from fvsolve.studies.resolution import cells_for_lines, delay_lines
 
@@ -52,7 +52,7 @@ def greatest_step(method: str, eigenvalues: np.ndarray, span: float) -> float:
     Steps h are searched for which h times the greatest modulus of an eigenvalue is between 0.01 and 1000. Returns inf
     if no mode grows at these steps, and 0 if a mode grows at the shortest of them.
     """
-    from fvsolve.steppers import method_named, stability_function
+    from fvsolve.core.steppers import method_named, stability_function
 
     r = stability_function(method_named(method))
     fastest = float(np.abs(eigenvalues).max(initial=0.0))

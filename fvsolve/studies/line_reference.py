@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case import load
+from fvsolve.core.run import Result, model_of, run
 from fvsolve.errors import CaseError, RunError
 from fvsolve.features.delay_lines.choice import reason_for_cells
 from fvsolve.features.delay_lines.feature import lines_of
-from fvsolve.run import Result, model_of, run
 from fvsolve.studies.resolution import pipe_model_keys, pipes
 
 FIRST_STEPS, FEWEST_STEPS = 4, 4000  # steps of the first reference: for each step of the run, and at least

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from fvsolve.argument_checks import FLAG, NAMES, NUMBER, TABLE, TEXT, validated
-from fvsolve.assembly.lowering import PRESSURE, Input
+from fvsolve.core.assembly.lowering import PRESSURE, Input
+from fvsolve.core.model.energy_norm import EnergyForm
+from fvsolve.core.model.model import inputs_of
+from fvsolve.core.schemes import SCHEMES
+from fvsolve.core.solve.held_inputs import hold, input_value
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.features.controls.feature import blocks_of
-from fvsolve.model.energy_norm import EnergyForm
-from fvsolve.model.model import inputs_of
-from fvsolve.schemes import SCHEMES
-from fvsolve.solve.held_inputs import hold, input_value
 from fvsolve.studies.operating_point import (
     COARSE_STEPS,
     SLOPE_TOLERANCE,

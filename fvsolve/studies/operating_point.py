@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.assembly.schedule_tables import slope_at, value_at
+from fvsolve.core.assembly.schedule_tables import slope_at, value_at
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.kernels.ghost_cells import difference_rows
+from fvsolve.core.kernels.schedule_pieces import POLYNOMIAL
+from fvsolve.core.schemes import LIMITED, SCHEMES
+from fvsolve.core.step_limits.symbol import symbol
 from fvsolve.errors import FvsolveError
 from fvsolve.features.controls.feature import blocks_of, numbers_of, with_blocks
-from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.ghost_cells import difference_rows
-from fvsolve.kernels.schedule_pieces import POLYNOMIAL
-from fvsolve.schemes import LIMITED, SCHEMES
-from fvsolve.step_limits.symbol import symbol
 from fvsolve.studies.outcome import outcome, study_model
 from fvsolve.studies.resolution import as_cells, delay_lines
 

@@ -7,9 +7,9 @@ from time import perf_counter
 import numpy as np
 
 from fvsolve.argument_checks import COUNT, FUNCTION, TABLE, TEXT
+from fvsolve.core.run import model_of
+from fvsolve.core.solve.solve import Run
 from fvsolve.errors import CaseError, FvsolveError, collect_faults, listing
-from fvsolve.run import model_of
-from fvsolve.solve.solve import Run
 
 # Overrides: no output of cell values, which no study needs.
 NO_FIELDS: dict = {"output.fields": 0, "output.lines": {}, "output.grids": {}}
@@ -149,8 +149,8 @@ def refusal_text(error: CaseError) -> str:
 
 
 def _single_run(model, y, run) -> Outcome:
-    from fvsolve.solve import initial_state
-    from fvsolve.solve.solve import Run
+    from fvsolve.core.solve import initial_state
+    from fvsolve.core.solve.solve import Run
 
     state, sink = initial_state(model), RowSink()
     if y is not None:

@@ -16,10 +16,10 @@ from typing import Any, ClassVar, NamedTuple, Self
 from fvsolve.case import Case, load
 from fvsolve.case.load import find_source
 from fvsolve.case.reading import Raw, read_raw
+from fvsolve.core.output.restart import program_versions
+from fvsolve.core.run.process_pool import ProcessPool, compute, results_of
+from fvsolve.core.steppers.tableau import BUILT_IN, METHODS
 from fvsolve.errors import FvsolveError, RunError, listing
-from fvsolve.output.restart import program_versions
-from fvsolve.run.process_pool import ProcessPool, compute, results_of
-from fvsolve.steppers.tableau import BUILT_IN, METHODS
 from fvsolve.studies.outcome import Outcome, study_model
 
 CHUNK_TIME = 1.0  # intended time of a chunk [s]

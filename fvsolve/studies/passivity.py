@@ -18,10 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, NAMES, validated
+from fvsolve.core.schemes import SCHEMES
+from fvsolve.core.steppers.automatic import AUTO, EXPLICIT, IMPLICIT, TIGHT_BELOW, TIGHT_IMPLICIT
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean
-from fvsolve.schemes import SCHEMES
-from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT, TIGHT_BELOW, TIGHT_IMPLICIT
 from fvsolve.studies.outcome import name_list
 from fvsolve.studies.result_table import PlainData
 from fvsolve.studies.stability.growth import bisect
@@ -145,7 +145,7 @@ def check_names(given, known: list[str], kind: str) -> list[str]:
 
 def method_claim(name: str) -> MethodClaim:
     """Passivity of a method from its tableau."""
-    from fvsolve.steppers import analyse, method_named
+    from fvsolve.core.steppers import analyse, method_named
 
     facts, method = analyse(name), method_named(name)
     if method.kind == "linear":
@@ -198,7 +198,7 @@ def energy_matrix(settings, n: int) -> np.ndarray:
 
     c : averages of the quantity over the cells; settings : settings of a model, which contain the scheme
     """
-    from fvsolve.kernels.pipe_energy import GAUSS_WEIGHTS, POINTS, polynomial_width
+    from fvsolve.core.kernels.pipe_energy import GAUSS_WEIGHTS, POINTS, polynomial_width
 
     width = int(polynomial_width(settings, n))
     points = np.zeros((3 * n, n))
@@ -251,7 +251,7 @@ def courant_limit(scheme: str, method: str) -> float | None:
     120 Courant numbers from LEAST (0.01) to MOST (8) are tested: the limit is inf if none of them creates energy, and 0
     if the least one does.
     """
-    from fvsolve.steppers import analyse
+    from fvsolve.core.steppers import analyse
 
     claim = scheme_claim(scheme)
     if claim.passive is None:
@@ -280,7 +280,7 @@ def courant_limit(scheme: str, method: str) -> float | None:
 @functools.cache
 def polynomials(method: str) -> tuple[list[float], list[float]]:
     """Coefficients (of the numerator, of the denominator) of the stability function, lowest power first."""
-    from fvsolve.steppers import method_named, stability_function
+    from fvsolve.core.steppers import method_named, stability_function
 
     r = stability_function(method_named(method))
     return [float(x) for x in r.numerator.coefficients], [float(x) for x in r.denominator.coefficients]
@@ -296,6 +296,6 @@ def matrix_polynomial(coefficients: list[float], b: np.ndarray) -> np.ndarray:
 
 def method_names() -> list[str]:
     """Names of all methods of time integration."""
-    from fvsolve.steppers import METHODS
+    from fvsolve.core.steppers import METHODS
 
     return list(METHODS)

@@ -34,13 +34,13 @@ import numpy as np
 
 from fvsolve.case import load
 from fvsolve.case.probe import OF_PRESSURE
+from fvsolve.core.model.start_notices import LEAST_CELLS, answering_parts
+from fvsolve.core.output.summary_shape import OPEN
+from fvsolve.core.output.unit_columns import probe_columns
+from fvsolve.core.run import Result, run
+from fvsolve.core.run.verdicts import MAGNITUDES, PLACES_KEY, PlaceMargins, in_quantity, verdict
 from fvsolve.errors import CaseError, listing
-from fvsolve.model.start_notices import LEAST_CELLS, answering_parts
-from fvsolve.output.summary_shape import OPEN
-from fvsolve.output.unit_columns import probe_columns
 from fvsolve.parts.schedule import Schedule
-from fvsolve.run import Result, run
-from fvsolve.run.verdicts import MAGNITUDES, PLACES_KEY, PlaceMargins, in_quantity, verdict
 from fvsolve.studies.line_reference import line_references
 from fvsolve.studies.outcome import NO_FIELDS, study_model
 from fvsolve.studies.resolution import (

@@ -12,8 +12,8 @@ from dataclasses import asdict, dataclass, field, replace
 import numpy as np
 
 from fvsolve import exact as room
+from fvsolve.core.steppers.tableau import METHODS
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.tableau import METHODS
 from fvsolve.studies.distance import (
     Distance,
     cell_averages,
@@ -191,7 +191,7 @@ def _uncertainty(reference: Reference) -> float:
 
 def exact_reference(case) -> Reference:
     """Reference from the solution named in [exact] of a case. Raises FvsolveError if its values overflow."""
-    from fvsolve.run import model_of
+    from fvsolve.core.run import model_of
 
     model = model_of(case)
     try:

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.core.schemes import SCHEMES
 from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.features.delay_lines.choice import line_methods, slowest_pipe
 from fvsolve.parts import Basin, Pipe
 from fvsolve.parts.formula import is_grid
-from fvsolve.schemes import SCHEMES
 from fvsolve.studies.outcome import study_model
 
 READING_ORDER = 6.0  # order of the interpolation in the history of a line
@@ -42,7 +42,7 @@ def fixed_choices(case) -> dict[str, str]:
     With these overrides the changes of a study do not alter the choice. Pipes with "auto" that cannot be delay lines
     are left out.
     """
-    from fvsolve.run import model_of
+    from fvsolve.core.run import model_of
 
     own = case.numerics.pipe_model
     undecided = [name for name in delay_lines(case) if (case.links[name].pipe_model or own) == "auto"]

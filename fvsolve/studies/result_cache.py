@@ -12,12 +12,12 @@ from typing import Any
 
 from fvsolve.argument_checks import PATH, Kind
 from fvsolve.compile.cache_folders import EXTRA_FOLDERS, PACKAGE
+from fvsolve.core.output.directory import lock_folder, release
+from fvsolve.core.output.restart import identity
+from fvsolve.core.output.summary_file import plain
+from fvsolve.core.schemes import LIMITERS
+from fvsolve.core.steppers.tableau import BUILT_IN, METHODS
 from fvsolve.errors import RunError
-from fvsolve.output.directory import lock_folder, release
-from fvsolve.output.restart import identity
-from fvsolve.output.summary_file import plain
-from fvsolve.schemes import LIMITERS
-from fvsolve.steppers.tableau import BUILT_IN, METHODS
 
 
 class ResultCache:

@@ -10,8 +10,8 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, ClassVar
 
+from fvsolve.core.output.summary_file import plain
 from fvsolve.file_replacement import replacing
-from fvsolve.output.summary_file import plain
 
 
 class PlainData:

@@ -12,13 +12,13 @@ from typing import Any, TypedDict
 from fvsolve.case import Case, load, shipped
 from fvsolve.case.reading import read_toml, split_key
 from fvsolve.case.text import key_lines
+from fvsolve.core.output.directory import clear_reports
+from fvsolve.core.output.json_files import faults_of, read_json, refuse_faults
+from fvsolve.core.output.summary_file import plain, write_summary
+from fvsolve.core.run import run
 from fvsolve.declarations import declared
 from fvsolve.errors import CaseError, Fault, FvsolveError, RunError, did_you_mean
 from fvsolve.file_replacement import replacing, write_file
-from fvsolve.output.directory import clear_reports
-from fvsolve.output.json_files import faults_of, read_json, refuse_faults
-from fvsolve.output.summary_file import plain, write_summary
-from fvsolve.run import run
 from fvsolve.studies.parallel import PickledCase, TaskPool, Work
 from fvsolve.units import show
 

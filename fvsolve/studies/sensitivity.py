@@ -49,7 +49,7 @@ class Sensitivity(Displayable, PlainData):
     mu: list[float]
     sigma: list[float]
 
-    picture = "fvsolve.draw.object_pictures:sensitivity_figure"
+    picture = "fvsolve.report.draw.object_pictures:sensitivity_figure"
 
     def summary_line(self) -> str:
         strongest = max(range(len(self.keys)), key=lambda k: self.ST[k])

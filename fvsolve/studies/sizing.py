@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case import Case, load
+from fvsolve.core.output.summary_shape import FAILS, OPEN
+from fvsolve.core.run import run
+from fvsolve.core.run.verdicts import SIZES
 from fvsolve.declarations import declared
 from fvsolve.errors import CaseError, Fault, FvsolveError, collect_faults, did_you_mean
-from fvsolve.output.summary_shape import FAILS, OPEN
 from fvsolve.parts.formula import Arithmetic
-from fvsolve.run import run
-from fvsolve.run.verdicts import SIZES
 from fvsolve.studies.outcome import NO_FIELDS, checked_case, end_if_interrupted
 from fvsolve.studies.peak_error import peak_errors
 from fvsolve.studies.result_table import PlainData

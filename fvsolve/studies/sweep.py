@@ -13,12 +13,12 @@ from fvsolve.case import Case, load
 from fvsolve.case.load import find_source
 from fvsolve.case.reading import read_raw
 from fvsolve.case.text import inline
+from fvsolve.core.fluid.coolprop import coolprop_version
+from fvsolve.core.output.restart import program_versions
 from fvsolve.declarations import declared
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing
 from fvsolve.file_replacement import replacing
-from fvsolve.fluid.coolprop import coolprop_version
-from fvsolve.output.restart import program_versions
 from fvsolve.studies.outcome import STUDY_ARGUMENTS
 from fvsolve.studies.parallel import TaskPool
 from fvsolve.studies.result_cache import ResultCache, digest_of, write_errors
@@ -55,7 +55,7 @@ class Sweep(Displayable):
     rows: list[dict[str, Any]]
     reused: int
 
-    picture = "fvsolve.draw.object_pictures:sweep_figure"
+    picture = "fvsolve.report.draw.object_pictures:sweep_figure"
 
     def summary_line(self) -> str:
         failed = sum(not row["ok"] for row in self.rows)

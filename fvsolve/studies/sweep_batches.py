@@ -15,18 +15,18 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.assembly.model_draft import ModelDraft
-from fvsolve.assembly.schedule_tables import break_times
 from fvsolve.case import Case
+from fvsolve.core.assembly.model_draft import ModelDraft
+from fvsolve.core.assembly.schedule_tables import break_times
+from fvsolve.core.model.build import CHANGING_FIELDS, model_of, tables_before_start, tables_with_start, with_new_sizes
+from fvsolve.core.model.start_notices import start_notices
+from fvsolve.core.output.memory_sink import MemorySink
+from fvsolve.core.solve import initial_state, solve
+from fvsolve.core.step_limits.growing_modes import states_outside_cells
+from fvsolve.core.steppers.tableau import method_named
 from fvsolve.errors import CaseError, Notice
-from fvsolve.model.build import CHANGING_FIELDS, model_of, tables_before_start, tables_with_start, with_new_sizes
-from fvsolve.model.start_notices import start_notices
-from fvsolve.output.memory_sink import MemorySink
 from fvsolve.parts.schedule import Schedule
 from fvsolve.parts.table_model import Table
-from fvsolve.solve import initial_state, solve
-from fvsolve.step_limits.growing_modes import states_outside_cells
-from fvsolve.steppers.tableau import method_named
 from fvsolve.studies.outcome import end_if_interrupted
 from fvsolve.studies.sweep_row import RowMaker, row_of
 

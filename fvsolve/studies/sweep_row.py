@@ -6,8 +6,8 @@ from typing import Any
 
 from fvsolve.case import Case, load
 from fvsolve.case.reading import split_key
+from fvsolve.core.output.summary_file import plain
 from fvsolve.errors import CaseError
-from fvsolve.output.summary_file import plain
 from fvsolve.studies.outcome import NO_FIELDS, end_if_interrupted, has_diverged, refusal_text
 from fvsolve.studies.parallel import PickledCase
 
@@ -29,9 +29,9 @@ class RowMaker:
 
     def __call__(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Row of the run with these values of keys; a refused case gives a row with its reason."""
-        from fvsolve.output.memory_sink import MemorySink
-        from fvsolve.run import model_of
-        from fvsolve.solve import initial_state, solve
+        from fvsolve.core.output.memory_sink import MemorySink
+        from fvsolve.core.run import model_of
+        from fvsolve.core.solve import initial_state, solve
 
         try:
             model = model_of(self.read(values), like=self.model)
@@ -70,7 +70,7 @@ def row_of(model, summary, sink) -> dict[str, Any]:
     None replaces values that are not finite, and all values of probes if the run diverged.
     sink : `MemorySink` with the output of the run
     """
-    from fvsolve.run.verdicts import verdicts
+    from fvsolve.core.run.verdicts import verdicts
 
     row = {"ok": bool(summary.ok), "reason": summary.reason, "t [s]": plain(float(summary.t))}
     row["marks"] = min(summary.marks, key=lambda mark: mark.time).text if summary.marks else ""
@@ -92,8 +92,8 @@ def row_of(model, summary, sink) -> dict[str, Any]:
 
 def expectations_of(model, summary, sink) -> list[dict[str, Any]]:
     """Expectations of the case with their results, as in the summary of a run; sink : output of the run."""
-    from fvsolve.run import Result
-    from fvsolve.run.verdicts import expectations
+    from fvsolve.core.run import Result
+    from fvsolve.core.run.verdicts import expectations
 
     columns = {column.name: column for column in sink.columns}
     probes = {name: {"dimension": column.dimension, "unit": column.unit} for name, column in columns.items()}

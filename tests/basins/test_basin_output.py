@@ -16,17 +16,17 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.spatial import Delaunay
 
 import fvsolve
-from fvsolve.basins.basin_output import observe_dense_flows, observe_flows
-from fvsolve.basins.liquid.liquid_patches import observe_liquid
-from fvsolve.draw import field_canvas as of_view
-from fvsolve.draw.scene import DrawnScene
-from fvsolve.draw.sheet import PictureSheet, colour_range
+from fvsolve.core.basins.basin_output import observe_dense_flows, observe_flows
+from fvsolve.core.basins.liquid.liquid_patches import observe_liquid
+from fvsolve.core.mesh import read, rectangle
+from fvsolve.core.mesh.mesh import MeshPoints
+from fvsolve.core.model import RunData
+from fvsolve.core.output.fields import basin_geometry, grid_xml, split_blocks, write_frame
+from fvsolve.core.run.plot_scene import lengths_of, unit_of
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.mesh import read, rectangle
-from fvsolve.mesh.mesh import MeshPoints
-from fvsolve.model import RunData
-from fvsolve.output.fields import basin_geometry, grid_xml, split_blocks, write_frame
-from fvsolve.run.plot_scene import lengths_of, unit_of
+from fvsolve.report.draw import field_canvas as of_view
+from fvsolve.report.draw.scene import DrawnScene
+from fvsolve.report.draw.sheet import PictureSheet, colour_range
 
 FIELDS = ("depth", "surface", "bed", "u", "v", "speed")
 SIZE, CELLS = (10.0, 4.0), (20, 8)
@@ -277,7 +277,7 @@ def test_a_line_that_lies_in_no_basin_is_refused():
 
 
 def test_a_line_across_a_hole_has_nothing_there(tmp_path):
-    from fvsolve.output.csv_files import LineSampler
+    from fvsolve.core.output.csv_files import LineSampler
 
     case = fvsolve.load(liquid([], size=[4.0, 4.0], cells=[16, 16], holes=[[1.0, 1.0, 2.0, 2.5]]) | {
         "output": {"every": 1e-4, "lines": {"cut": {"basin": "block", "from": [0, 2], "to": [4, 2], "points": 9}}}

@@ -11,12 +11,12 @@ from reference.folders import CASES
 from reference.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.basins.free_surface.lower import FreeSurfaceRows
-from fvsolve.basins.free_surface.lower_error_checks import on_grid, on_mesh, surface_waves
+from fvsolve.core.basins.free_surface.lower import FreeSurfaceRows
+from fvsolve.core.basins.free_surface.lower_error_checks import on_grid, on_mesh, surface_waves
+from fvsolve.core.model import RunData
+from fvsolve.core.model.energy_accounts import Accounts
+from fvsolve.core.model.jacobian_pattern import jacobian_pattern
 from fvsolve.errors import FvsolveError
-from fvsolve.model import RunData
-from fvsolve.model.energy_accounts import Accounts
-from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.studies.accuracy.chart import chart
 from fvsolve.studies.accuracy.order import order
 from fvsolve.studies.accuracy.refine import refinement_plan, resolutions

@@ -13,7 +13,7 @@ from reference.scenes import scene
 from scipy.integrate import solve_ivp
 
 import fvsolve
-from fvsolve.mesh.rectangles import rectangle
+from fvsolve.core.mesh.rectangles import rectangle
 
 DEEP, LONG, PERIOD = 1.0, 30.0, 4.0
 NUMERICS = {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.9}

@@ -12,8 +12,8 @@ from reference.scenes import GRAVITY as G
 from reference.scenes import scene
 
 import fvsolve
-from fvsolve.mesh import read, rectangle
-from fvsolve.mesh.face_chains import chain_along
+from fvsolve.core.mesh import read, rectangle
+from fvsolve.core.mesh.face_chains import chain_along
 
 SIZE, CREST, C = (24.0, 6.0), 1.5, 0.577
 ACROSS = [[12.05, 0.0], [12.05, 6.0]]  # the nearest grid line is x = 12

@@ -9,10 +9,10 @@ from reference.basins import HEAVY, ended, model_of, sliding, slowing, straight,
 from reference.scenes import GRAVITY, scene
 
 from fvsolve import advance, load, run
-from fvsolve.basins import frame_forces
-from fvsolve.basins.basin_frames import CELL_POSITIONS, REST_LEVEL, REST_SURFACE
+from fvsolve.core.basins import frame_forces
+from fvsolve.core.basins.basin_frames import CELL_POSITIONS, REST_LEVEL, REST_SURFACE
+from fvsolve.core.model.model import State
 from fvsolve.errors import CaseError
-from fvsolve.model.model import State
 
 METHODS = ("ssp-rk3", "gauss-4", "rodas-4")
 

@@ -9,7 +9,7 @@ from reference.scenes import GRAVITY, RHO, scene
 from scipy.optimize import brentq
 
 from fvsolve import advance, run
-from fvsolve.model.model import State
+from fvsolve.core.model.model import State
 from fvsolve.studies.energy_balance import energy
 
 LENGTH, DEPTH = 2.0, 0.1

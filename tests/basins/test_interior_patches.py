@@ -122,7 +122,7 @@ def test_a_restated_pond_gives_the_same(path, tmp_path, monkeypatch):
     here = fvsolve.run(pond(bed=bed))
     if path == "resumed":
         for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):  # checkpoints after 1000, 1250, ... steps
-            monkeypatch.setattr(import_module("fvsolve.solve.solve"), name, 0.0)
+            monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), name, 0.0)
         run_in_two_parts(pond(bed=bed, numerics={"step": 5e-3, "courant": None}), tmp_path, 8.0)
         assert_equal_files(tmp_path, ["history.csv"])
     elif path == "threads":

@@ -16,7 +16,7 @@ from reference.scenes import lake, scene
 from scipy.integrate import solve_ivp
 
 import fvsolve
-from fvsolve.kernels.dtypes import OK, STATUS
+from fvsolve.core.kernels.dtypes import OK, STATUS
 
 DEEP, WIDE, LONG = 2.0, 2.0, 60.0
 NUMERICS = {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.9}
@@ -175,7 +175,7 @@ def test_a_restated_channel_gives_the_same(path, tmp_path, monkeypatch):
     here = fvsolve.run(channel(head))
     if path == "resumed":
         for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):  # checkpoints after 1000, 1250, ... steps
-            monkeypatch.setattr(import_module("fvsolve.solve.solve"), name, 0.0)
+            monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), name, 0.0)
         run_in_two_parts(channel(head, numerics={"step": 2e-3, "courant": None}), tmp_path, 2.5)
         assert_equal_files(tmp_path, ["history.csv"])
         return
@@ -299,7 +299,7 @@ def test_a_restated_demand_beyond_critical_outflow_is_held_equally(path, tmp_pat
     probes = ["reach.end.flow"]
     if path == "resumed":
         for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):  # checkpoints after 1000, 1250, ... steps
-            monkeypatch.setattr(import_module("fvsolve.solve.solve"), name, 0.0)
+            monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), name, 0.0)
         run_in_two_parts(drawn(numerics={"step": 2e-3, "courant": None}, probes=probes), tmp_path, 2.5, ok=False)
         assert_equal_files(tmp_path, ["history.csv"])
         whole, resumed = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("whole", "run"))

@@ -11,12 +11,12 @@ from reference.meshes import boundary, triangles, write
 from reference.scenes import NO_FRICTION, junction, ramp, reservoir, scene, stiff_pipe, valve
 
 import fvsolve
-from fvsolve.basins.liquid import riemann_invariants
-from fvsolve.basins.liquid.lower import RiemannInvariants
+from fvsolve.core.basins.liquid import riemann_invariants
+from fvsolve.core.basins.liquid.lower import RiemannInvariants
+from fvsolve.core.fluid import Fluid, FluidTable
+from fvsolve.core.kernels import density as law
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.errors import CaseError
-from fvsolve.fluid import Fluid, FluidTable
-from fvsolve.kernels import density as law
-from fvsolve.kernels import dtypes as rec
 
 REST = 6e6
 FLUID = {"name": "CO2", "temperature": 280.0, "pressure": REST, "law": "table"}  # 519 m/s, at 300 bar 697 m/s

@@ -143,7 +143,7 @@ def test_a_wall_that_moves_in_raises_the_greatest_depth(tmp_path):
 
 def test_a_resumed_run_has_the_same_files_of_greatest_values(tmp_path, monkeypatch):
     for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):  # checkpoints after 1000, 1250, ... steps
-        monkeypatch.setattr(import_module("fvsolve.solve.solve"), name, 0.0)
+        monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), name, 0.0)
     case = slope()
     case["numerics"] = {"end": 3.0, "scheme": "muscl", "method": "ssp-rk2", "step": 2e-3}
     run_in_two_parts(case, tmp_path, 2.0)

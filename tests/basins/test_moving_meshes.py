@@ -11,10 +11,10 @@ from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 
 from fvsolve import load, run
-from fvsolve.basins.lower_motion import lower_mesh
+from fvsolve.core.basins.lower_motion import lower_mesh
+from fvsolve.core.mesh import rectangle
+from fvsolve.core.mesh.mesh import assemble, edges_of
 from fvsolve.errors import CaseError
-from fvsolve.mesh import rectangle
-from fvsolve.mesh.mesh import assemble, edges_of
 from fvsolve.studies.energy_balance import energy
 
 STEPPED = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2"}

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from fvsolve import advance, run
-from fvsolve.model.model import State
+from fvsolve.core.model.model import State
 from fvsolve.studies.energy_balance import energy
 
 STEPPED = {"scheme": "muscl", "limiter": "minmod", "method": "ssp-rk2"}

@@ -244,6 +244,6 @@ def test_threads_and_a_resumed_run_give_the_same_bits(place, tmp_path, monkeypat
         assert (one[name] == three[name]).all()
     assert three.summary["threads"] == 3
     for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):  # checkpoints after 1000, 1250, ... steps
-        monkeypatch.setattr(import_module("fvsolve.solve.solve"), name, 0.0)
+        monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), name, 0.0)
     run_in_two_parts(pond(PLACES[place], numerics={"step": 5e-3, "courant": None}), tmp_path, 8.0)
     assert_equal_files(tmp_path, ["history.csv"])

@@ -12,8 +12,8 @@ from pytest import approx
 from reference.scenes import WATER
 
 import fvsolve
-from fvsolve.basins.lower import rows_class
-from fvsolve.basins.lower_basin import BasinRows
+from fvsolve.core.basins.lower import rows_class
+from fvsolve.core.basins.lower_basin import BasinRows
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import Basin
 from fvsolve.parts.basin import BasinStart, Physics
@@ -44,10 +44,10 @@ class Belt(Physics, name="belt"):
 ''',
     "rates.py": '''
 """Rates of the cells of a belt, and what probes read there."""
-from fvsolve.basins.basin_patches import physics_code
+from fvsolve.core.basins.basin_patches import physics_code
 from fvsolve.jit import njit
-from fvsolve.kernels.table_handle import open_tables
-from fvsolve.kernels.dtypes import CELL_FIELD, RATE
+from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.core.kernels.dtypes import CELL_FIELD, RATE
 
 OWN_CODE = physics_code(__package__)
 
@@ -79,8 +79,8 @@ def read(t, y, out, handle, values):
     "lower.py": '''
 """A belt lowered to rows of tables."""
 import numpy as np
-from fvsolve.basins.lower_basin import BasinRows
-from fvsolve.kernels.rhs_assembly import RhsTerms
+from fvsolve.core.basins.lower_basin import BasinRows
+from fvsolve.core.kernels.rhs_assembly import RhsTerms
 
 class BeltRows(BasinRows):
     """One state a cell."""
@@ -113,7 +113,7 @@ import json, sys
 import numpy as np
 import fvsolve
 from fvsolve.case.schema import schema
-from fvsolve.model.jacobian_pattern import jacobian_pattern as sparsity
+from fvsolve.core.model.jacobian_pattern import jacobian_pattern as sparsity
 
 case = json.loads(sys.argv[2])
 
@@ -181,7 +181,7 @@ def test_it_is_checked_by_its_own_declaration(said):
 
 def test_every_physics_is_a_folder_that_lowers_itself():
     """Each physics has a folder of basins with `part.py` and `lower.py`, and a basin has all its keys."""
-    folders = {path.parent.name for path in (Path(fvsolve.__file__).parent / "basins").glob("*/part.py")}
+    folders = {path.parent.name for path in (Path(fvsolve.__file__).parent / "core" / "basins").glob("*/part.py")}
     assert {one.__module__.split(".")[2] for one in Physics.kinds.values()} == folders
     for one in Physics.kinds.values():
         assert set(one.model_fields) <= set(Basin.model_fields)

@@ -11,8 +11,8 @@ from reference.meshes import boundary, triangles, write
 from reference.scenes import AMBIENT, RHO, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
+from fvsolve.core.mesh import rectangle
 from fvsolve.errors import CaseError
-from fvsolve.mesh import rectangle
 
 STEPS = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.8}
 HOLE = [[3.0, 0.0, 4.0, 1.0]]

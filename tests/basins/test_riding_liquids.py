@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 from scipy.special import j0
 
 from fvsolve import advance, load, run
+from fvsolve.core.model.model import State
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.model.model import State
 from fvsolve.studies.energy_balance import energy
 
 TILT = {"roll": "30 deg", "pitch": "-70 deg", "yaw": "25 deg"}

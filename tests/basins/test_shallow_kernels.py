@@ -7,12 +7,22 @@ import pytest
 from pytest import approx
 from scipy.optimize import brentq
 
-from fvsolve.basins.free_surface.bed_friction import add_capped_friction
-from fvsolve.basins.free_surface.surface_grid import PLANS, WORK, FaceFlows, WaterGrid, grid_rates, kerbs_of
-from fvsolve.basins.free_surface.surface_rows import SURFACE, put_push
+from fvsolve.core.basins.free_surface.bed_friction import add_capped_friction
+from fvsolve.core.basins.free_surface.surface_grid import PLANS, WORK, FaceFlows, WaterGrid, grid_rates, kerbs_of
+from fvsolve.core.basins.free_surface.surface_rows import SURFACE, put_push
+from fvsolve.core.kernels.cube_root import cube_root_reciprocal, estimate
+from fvsolve.core.kernels.dtypes import (
+    DARCY,
+    LINEAR,
+    MANNING,
+    MINMOD,
+    MONOTONIZED_CENTRAL,
+    MUSCL,
+    UPWIND,
+    VAN_LEER,
+    WENO5,
+)
 from fvsolve.jit import njit
-from fvsolve.kernels.cube_root import cube_root_reciprocal, estimate
-from fvsolve.kernels.dtypes import DARCY, LINEAR, MANNING, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
 
 G = 9.80665
 SCHEMES = {"upwind": UPWIND, "muscl": MUSCL, "upwind5": LINEAR, "weno5": WENO5}

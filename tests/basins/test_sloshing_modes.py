@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 
 from fvsolve import advance, load, run
 from fvsolve.case import sloshing
+from fvsolve.core.model.model import State
 from fvsolve.errors import CaseError
-from fvsolve.model.model import State
 from fvsolve.studies import linearise
 from fvsolve.studies.energy_balance import energy
 
@@ -173,8 +173,8 @@ def test_a_free_tank_on_rails_keeps_its_momentum():
 
     def momentum(state):
         out = model.evaluate(state.t, state.y)[1]
-        from fvsolve.kernels.mechanism.body_kinematics import centre_of
-        from fvsolve.kernels.mechanism.body_layout import body_row
+        from fvsolve.core.kernels.mechanism.body_kinematics import centre_of
+        from fvsolve.core.kernels.mechanism.body_layout import body_row
 
         return sum(row["mass"] * centre_of(row, out, body_row(model.tables, k))[3] for k, row in enumerate(bodies))
 

@@ -10,9 +10,9 @@ from reference.meshes import shaken, triangles, write, write_msh
 from reference.scenes import scene
 
 import fvsolve
-from fvsolve.basins.transport.lower import EXPRESSIONS, face_flows, grid_flows
+from fvsolve.core.basins.transport.lower import EXPRESSIONS, face_flows, grid_flows
+from fvsolve.core.mesh import read, rectangle
 from fvsolve.errors import CaseError, MeshError
-from fvsolve.mesh import read, rectangle
 
 PI = np.pi
 BUMP = "exp(-50*((x - 0.4)**2 + (y - 0.5)**2))"

@@ -30,15 +30,15 @@ from reference.scenes import (
 
 import fvsolve
 from fvsolve.case.text import write
+from fvsolve.core.output.memory_sink import MemorySink
+from fvsolve.core.run import model_of
+from fvsolve.core.run.verdicts import nearest, part_extremes, verdict
+from fvsolve.core.solve import initial_state, solve
 from fvsolve.errors import FvsolveError
-from fvsolve.output.memory_sink import MemorySink
 from fvsolve.report.cycles import cycles
 from fvsolve.report.figures import section_figure
 from fvsolve.report.long_section import head_window, section_of, section_paths
 from fvsolve.report.report_files import write_report
-from fvsolve.run import model_of
-from fvsolve.run.verdicts import nearest, part_extremes, verdict
-from fvsolve.solve import initial_state, solve
 from fvsolve.studies.calibrate import calibrate
 from fvsolve.studies.closure_optimisation import optimise
 from fvsolve.studies.sizing import size

@@ -14,9 +14,9 @@ from fvsolve import run
 from fvsolve.case import load
 from fvsolve.case.case_notices import range_notices
 from fvsolve.case.sections import FluidSpec
+from fvsolve.core.run import model_of
 from fvsolve.errors import listing
 from fvsolve.parts import KINDS
-from fvsolve.run import model_of
 
 CASES = sorted(folders.CASES.glob("*.toml"))
 EXAMPLES = {  # TOML blocks in the docs

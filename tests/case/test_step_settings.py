@@ -15,8 +15,8 @@ from reference.scenes import chamber, lake, pipe, scene, tank, valve
 import fvsolve
 from fvsolve import build, load
 from fvsolve.case.text import write
+from fvsolve.core.steppers import METHODS, integrate
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers import METHODS, integrate
 
 ABLE = list(dict.fromkeys(method.name for method in METHODS.values() if method.adaptive))
 

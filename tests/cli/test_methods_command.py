@@ -7,7 +7,7 @@ import re
 import pytest
 from reference import folders
 
-from fvsolve.steppers import METHODS, Facts, analyse
+from fvsolve.core.steppers import METHODS, Facts, analyse
 
 DOCS = folders.page("choosing-a-method")
 NAMES = [name for name, method in METHODS.items() if name == method.name]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fvsolve.draw.plot import select_curves, thin_series
+from fvsolve.report.draw.plot import select_curves, thin_series
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

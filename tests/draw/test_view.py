@@ -9,12 +9,12 @@ from pytest import approx
 from reference.scenes import lake, pipe, scene, valve
 
 import fvsolve
-from fvsolve.draw import field_canvas
-from fvsolve.draw.network_picture import NetworkPicture, place_labels
-from fvsolve.draw.scene import Projection, choose_projection, round_scale
-from fvsolve.draw.sheet import OTHER_LINK, OTHER_NODE, SYMBOLS, strokes, symbol_of
+from fvsolve.core.run.plot_scene import scene_of
 from fvsolve.parts.nodes_and_links import Link, Node
-from fvsolve.run.plot_scene import scene_of
+from fvsolve.report.draw import field_canvas
+from fvsolve.report.draw.network_picture import NetworkPicture, place_labels
+from fvsolve.report.draw.scene import Projection, choose_projection, round_scale
+from fvsolve.report.draw.sheet import OTHER_LINK, OTHER_NODE, SYMBOLS, strokes, symbol_of
 
 TOWN = {"works": (0, 0, 30), "market": (900, 0, 10), "mill": (1200, -300, 5), "tower": (1800, 400, 45)}
 

@@ -11,8 +11,8 @@ import fvsolve
 
 wntr = pytest.importorskip("wntr", reason="WNTR, the extra `epanet`, is not installed")
 
-from fvsolve.epanet import import_network, toolkit_run  # noqa: E402
-from fvsolve.epanet.self_check import check_start  # noqa: E402
+from fvsolve.exchange.epanet import import_network, toolkit_run  # noqa: E402
+from fvsolve.exchange.epanet.self_check import check_start  # noqa: E402
 
 SHIPPED = Path(wntr.__file__).parent / "library" / "networks"
 SAME, SOON = 1e-3, 2.0  # levels [m] and times of switches [s] agree to within these

@@ -8,12 +8,12 @@ import pytest
 
 import fvsolve
 from fvsolve.case import load
-from fvsolve.model.build import build
+from fvsolve.core.model.build import build
 
 wntr = pytest.importorskip("wntr", reason="WNTR, the extra `epanet`, is not installed")
 
-from fvsolve.epanet import import_network, network_file  # noqa: E402
-from fvsolve.epanet.importing import cell_time  # noqa: E402
+from fvsolve.exchange.epanet import import_network, network_file  # noqa: E402
+from fvsolve.exchange.epanet.importing import cell_time  # noqa: E402
 
 PACKAGE = Path(wntr.__file__).parent
 SHIPPED, BROKEN = PACKAGE / "library" / "networks", PACKAGE / "tests" / "networks_for_testing"

@@ -11,10 +11,10 @@ wntr = pytest.importorskip("wntr", reason="WNTR, the extra `epanet`, is not inst
 pytest.importorskip("epanet", reason="EPANET's toolkit, the extra `epanet`, is not installed")
 
 from fvsolve.case import load  # noqa: E402
-from fvsolve.epanet import import_network, network_text  # noqa: E402
-from fvsolve.epanet.network_file import read_network, run_epanet, solution_at  # noqa: E402
+from fvsolve.core.model.build import build  # noqa: E402
 from fvsolve.errors import FvsolveError  # noqa: E402
-from fvsolve.model.build import build  # noqa: E402
+from fvsolve.exchange.epanet import import_network, network_text  # noqa: E402
+from fvsolve.exchange.epanet.network_file import read_network, run_epanet, solution_at  # noqa: E402
 
 SHIPPED = Path(wntr.__file__).parent / "library" / "networks"
 NETWORKS = [("Net1", False), ("Net1", True), ("Net2", True), ("Net3", False), ("Net3", True), ("ky4", False)]

@@ -9,9 +9,9 @@ import pytest
 pytest.importorskip("epanet", reason="EPANET's toolkit, the extra `epanet`, is not installed")
 
 from fvsolve.case import load  # noqa: E402
-from fvsolve.epanet import import_network, network_text, part_tables, self_check  # noqa: E402
-from fvsolve.epanet.network_file import read_network, solution_at  # noqa: E402
-from fvsolve.model.build import build  # noqa: E402
+from fvsolve.core.model.build import build  # noqa: E402
+from fvsolve.exchange.epanet import import_network, network_text, part_tables, self_check  # noqa: E402
+from fvsolve.exchange.epanet.network_file import read_network, solution_at  # noqa: E402
 
 SAME = 1e-3  # heads [m]
 TOWN = """[TITLE]

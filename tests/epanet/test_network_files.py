@@ -12,9 +12,9 @@ import fvsolve
 pytest.importorskip("epanet", reason="EPANET's toolkit, the extra `epanet`, is not installed")
 
 from fvsolve.case import load  # noqa: E402
-from fvsolve.epanet import import_network, network_file, self_check, switching, toolkit_process  # noqa: E402
+from fvsolve.core.model.build import build  # noqa: E402
 from fvsolve.errors import FvsolveError  # noqa: E402
-from fvsolve.model.build import build  # noqa: E402
+from fvsolve.exchange.epanet import import_network, network_file, self_check, switching, toolkit_process  # noqa: E402
 
 OPTIONS = "[OPTIONS]\nUNITS LPS\nHEADLOSS H-W\n[END]\n"
 PUMPED = """[JUNCTIONS]

@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from fvsolve.epanet import switching
+from fvsolve.exchange.epanet import switching
 
 END = 100.0
 TIMES = (0.0, 2.5, 5.0, 37.5, 60.0, 99.9)

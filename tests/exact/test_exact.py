@@ -9,10 +9,10 @@ from scipy.integrate import quad, solve_ivp
 
 from fvsolve import exact
 from fvsolve.case import load
+from fvsolve.core.kernels.schedule_pieces import value_with_limit
+from fvsolve.core.run import model_of
 from fvsolve.errors import CaseError
 from fvsolve.exact.solution import averages
-from fvsolve.kernels.schedule_pieces import value_with_limit
-from fvsolve.run import model_of
 from fvsolve.studies.outcome import outcome
 from fvsolve.studies.reference import initial_values
 

@@ -26,13 +26,13 @@ from reference.scenes import RHO, junction, lake, ramp, scene, valve
 
 import fvsolve
 from fvsolve import studies
-from fvsolve.assembly.features import with_slot
 from fvsolve.case.text import write
+from fvsolve.core.assembly.features import with_slot
+from fvsolve.core.output.memory_sink import MemorySink
+from fvsolve.core.solve.solve import Run
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.features.delay_lines import history
 from fvsolve.features.delay_lines.kernels.tables import SLOT
-from fvsolve.output.memory_sink import MemorySink
-from fvsolve.solve.solve import Run
 
 METHODS = {
     "euler": {"step": 0.04}, "rk4": {"step": 0.037}, "ssp-rk3": {"step": 0.7}, "implicit-midpoint": {"step": 0.1},

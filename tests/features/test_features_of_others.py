@@ -9,8 +9,8 @@ from reference.folders import page
 from reference.outside_packages import install, python
 
 import fvsolve
-from fvsolve.assembly import features
 from fvsolve.compile import cache_folders
+from fvsolve.core.assembly import features
 
 TEXT = page("features")
 FILES = dict(re.findall(r"`([\w./]+\.\w+)`:\n\n```\w+\n(.*?)```", TEXT, re.DOTALL))
@@ -66,7 +66,7 @@ def test_a_feature_that_cannot_be_imported_is_named_and_left_out(tmp_path):
 
 
 SAME_SLOT = """
-from fvsolve.assembly.features import Feature
+from fvsolve.core.assembly.features import Feature
 
 class Twin(Feature, slot=0, wakes="pipe_model auto"):
     pass

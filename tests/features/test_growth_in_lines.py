@@ -5,11 +5,11 @@ import pytest
 from features.test_delay_lines import vessel
 
 import fvsolve
+from fvsolve.core.output.memory_sink import MemorySink
+from fvsolve.core.solve.solve import Run
+from fvsolve.core.steppers.tableau import method_named
 from fvsolve.features.delay_lines.feature import lines_of
 from fvsolve.features.delay_lines.growth import ANGLES, interpolation_factor, reflection_factor
-from fvsolve.output.memory_sink import MemorySink
-from fvsolve.solve.solve import Run
-from fvsolve.steppers.tableau import method_named
 
 
 def test_the_trapezoidal_rule_gives_back_what_comes():

@@ -24,13 +24,13 @@ from reference.scenes import (
 from scipy.integrate import solve_ivp
 
 import fvsolve
+from fvsolve.core.solve import initial_state
+from fvsolve.core.solve.solve import Run
 from fvsolve.features.delay_lines.feature import history_of, lines_of
 from fvsolve.features.delay_lines.kernels import wave_bounds
 from fvsolve.features.delay_lines.kernels import wave_history as history
 from fvsolve.features.delay_lines.kernels.history_update import earliest_arrival, write_arrival
 from fvsolve.features.delay_lines.kernels.line_rates import smooth_wave_linear
-from fvsolve.solve import initial_state
-from fvsolve.solve.solve import Run
 from fvsolve.studies.outcome import RowSink
 
 SPEED = 1000.0

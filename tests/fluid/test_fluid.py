@@ -14,9 +14,9 @@ from pytest import approx
 from scipy.optimize import brentq
 
 from fvsolve import jit
+from fvsolve.core.fluid import properties
+from fvsolve.core.fluid.oils import OILS, Oil, oil_name, walther
 from fvsolve.errors import FluidError
-from fvsolve.fluid import properties
-from fvsolve.fluid.oils import OILS, Oil, oil_name, walther
 
 ATM = 101325.0
 ROOM = 293.15
@@ -200,7 +200,7 @@ def test_a_table_too_near_the_critical_point_is_refused_not_coarse():
 def test_a_second_process_imports_neither_coolprop_nor_scipy(empty_cache):
     code = """
 import json, sys
-from fvsolve.fluid import properties
+from fvsolve.core.fluid import properties
 water = properties("Water", 293.15, 101325.0, law="table")
 numbers = [water.density, *water.table.log_density.tolist()]
 print(json.dumps([numbers, "CoolProp" in sys.modules, "scipy" in sys.modules]))
@@ -239,7 +239,7 @@ def test_a_damaged_cache_file_is_asked_again(empty_cache, damage):
 
 def test_a_new_coolprop_asks_again(empty_cache, monkeypatch):
     properties("Water", ROOM, ATM)
-    monkeypatch.setattr("fvsolve.fluid.coolprop.coolprop_version", lambda: "99.0")
+    monkeypatch.setattr("fvsolve.core.fluid.coolprop.coolprop_version", lambda: "99.0")
     assert properties("Water", ROOM, ATM).source == "CoolProp 99.0"
     assert len(list(empty_cache.iterdir())) == 2
 

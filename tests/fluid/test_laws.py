@@ -10,10 +10,10 @@ from pytest import approx
 from scipy.integrate import quad
 
 from fvsolve.case.sections import FluidSpec
-from fvsolve.fluid import LAWS, properties
-from fvsolve.fluid.laws import DenseLaw, LinearLaw
-from fvsolve.kernels import density as kernels
-from fvsolve.kernels import dtypes as rec
+from fvsolve.core.fluid import LAWS, properties
+from fvsolve.core.fluid.laws import DenseLaw, LinearLaw
+from fvsolve.core.kernels import density as kernels
+from fvsolve.core.kernels import dtypes as rec
 
 AMBIENT, GRAVITY, REFERENCE = 98000.0, 9.81, 2e5
 GIVEN = {"mixture": {"air_fraction": 0.004}}  # further keys of a law

@@ -11,10 +11,10 @@ from reference.scenes import chamber, junction, pipe, ramp, reservoir, scene, va
 from scipy.integrate import quad
 
 import fvsolve
-from fvsolve.fluid import properties
-from fvsolve.fluid.laws import MixtureLaw
-from fvsolve.kernels import density as law
-from fvsolve.kernels import dtypes as rec
+from fvsolve.core.fluid import properties
+from fvsolve.core.fluid.laws import MixtureLaw
+from fvsolve.core.kernels import density as law
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.studies.energy_balance import energy
 
 OIL = {"name": "user", "density": 870.0, "bulk_modulus": 1.6e9, "viscosity": 0.04}

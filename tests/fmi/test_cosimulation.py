@@ -12,11 +12,11 @@ from reference.scenes import lake, scene, tank, valve
 
 import fvsolve
 from fvsolve import CaseError, FvsolveError, advance, initial_state
-from fvsolve.fmi.cosimulation import CoSimulation
-from fvsolve.fmi.export import case_files, write_fmu
-from fvsolve.fmi.model_description import base_exponents, model_description
-from fvsolve.fmi.variables import variables_of
-from fvsolve.solve.held_inputs import hold
+from fvsolve.core.solve.held_inputs import hold
+from fvsolve.exchange.fmi.cosimulation import CoSimulation
+from fvsolve.exchange.fmi.export import case_files, write_fmu
+from fvsolve.exchange.fmi.model_description import base_exponents, model_description
+from fvsolve.exchange.fmi.variables import variables_of
 
 
 class Slave(CoSimulation):

@@ -10,8 +10,8 @@ from reference.folders import page, python_of
 
 import fvsolve
 from fvsolve import advance, initial_state
-from fvsolve.fmi.export import write_fmu
-from fvsolve.solve.held_inputs import hold
+from fvsolve.core.solve.held_inputs import hold
+from fvsolve.exchange.fmi.export import write_fmu
 
 pytest.importorskip("pythonfmu", reason="PythonFMU is in the extra fmi")
 fmpy = pytest.importorskip("fmpy", reason="FMPy is in the extra fmi")

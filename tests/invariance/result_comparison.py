@@ -8,9 +8,9 @@ import numpy as np
 from hypothesis import reject
 
 import fvsolve
-from fvsolve.model.model_facts import cost_notices
-from fvsolve.output.memory_sink import MemorySink
-from fvsolve.solve.solve import Run
+from fvsolve.core.model.model_facts import cost_notices
+from fvsolve.core.output.memory_sink import MemorySink
+from fvsolve.core.solve.solve import Run
 
 
 @dataclass

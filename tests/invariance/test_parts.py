@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from hypothesis_profiles import examples
 from reference.scenes import junction, lake, pipe, ramp, scene, valve
 
+from fvsolve.core.steppers import METHODS
 from fvsolve.parts import KINDS
-from fvsolve.steppers import METHODS
 from invariance.random_scenes import FRICTIONS, between, numerics, probes
 from invariance.result_comparison import told
 

@@ -7,9 +7,9 @@ import pytest
 from reference.folders import CASES
 
 import fvsolve
-from fvsolve.kernels.rhs_assembly import PHASES
-from fvsolve.kernels.table_handle import make_handle
-from fvsolve.model import RunData
+from fvsolve.core.kernels.rhs_assembly import PHASES
+from fvsolve.core.kernels.table_handle import make_handle
+from fvsolve.core.model import RunData
 
 BANDED = ("answer", "rates")  # phases in which no pipe writes values that another pipe reads
 ENDS = 4  # numbers of a pipe in `out` for its ends

@@ -12,13 +12,13 @@ from reference.orders import observed_order
 from reference.scenes import AMBIENT, junction, lake, pipe, reservoir, scene, stiff_pipe, valve
 
 import fvsolve
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.kernels.riemann import face_flux, star_state, state_at
+from fvsolve.core.model.jacobian_pattern import jacobian_pattern
 from fvsolve.errors import CaseError
 from fvsolve.exact.mixture_riemann import Mixture, RiemannProblem
-from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.riemann import face_flux, star_state, state_at
-from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.studies.energy_balance import energy
-from fvsolve.validation import riemann_problems
+from fvsolve.studies.validation import riemann_problems
 
 CASE = CASES / "adelaide.toml"
 WATER = {**scenes.WATER, "law": "mixture", "air_fraction": 1e-7, "cavitation": True}

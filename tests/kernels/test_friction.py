@@ -8,9 +8,9 @@ import pytest
 from fluids.friction import Swamee_Jain_1976
 from scipy.integrate import quad
 
-from fvsolve.kernels.dtypes import FRICTION_HAZEN
-from fvsolve.kernels.pipes import subtract_friction_hazen
-from fvsolve.kernels.steady_friction import drag, factor_times_reynolds, power_of_square, signed_roughness
+from fvsolve.core.kernels.dtypes import FRICTION_HAZEN
+from fvsolve.core.kernels.pipes import subtract_friction_hazen
+from fvsolve.core.kernels.steady_friction import drag, factor_times_reynolds, power_of_square, signed_roughness
 
 FLOWS = [*2.0 ** np.random.default_rng(5).uniform(-490.0, 490.0, 300), *np.linspace(0.99, 2.01, 103), 1e-150, 1e150]
 

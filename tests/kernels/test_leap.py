@@ -10,10 +10,10 @@ from reference.scenes import AMBIENT, SHARP, junction, lake, pipe, ramp, reservo
 
 import fvsolve
 from fvsolve.case import load
-from fvsolve.model import RunData, build
-from fvsolve.steppers.tableau import method_named
+from fvsolve.core.model import RunData, build
+from fvsolve.core.steppers.tableau import method_named
 
-LOOP, SOLVE = import_module("fvsolve.solve.run_loop"), import_module("fvsolve.solve.solve")
+LOOP, SOLVE = import_module("fvsolve.core.solve.run_loop"), import_module("fvsolve.core.solve.solve")
 RUBBED = {"friction": {"model": "steady", "factor": 0.018}}
 CLOCK = ("ended", "seconds", "seconds_setup", "seconds_total", "cost")
 

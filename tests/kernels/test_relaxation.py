@@ -6,7 +6,7 @@ from reference.scenes import junction, lake, pipe, scene
 from scipy.integrate import quad
 
 import fvsolve
-from fvsolve.kernels.relaxation import creep_energy, creep_power, velocity_change
+from fvsolve.core.kernels.relaxation import creep_energy, creep_power, velocity_change
 
 CELLS, SPEED, FLOW, REFERENCE = 7, 1100.0, 12.0, 31.0
 PIPE = {"speed": SPEED, "flow": FLOW, "center": 0, "area": 1.0}

@@ -16,8 +16,8 @@ from reference.meshes import SQUARE, TWO, write
 from reference.scenes import scene
 
 import fvsolve
+from fvsolve.core.mesh import read
 from fvsolve.errors import MeshError
-from fvsolve.mesh import read
 
 GMSH = Path(__file__).parent / "gmsh"
 FORMS = ("2.2-a", "2.2-b", "4.0-a", "4.1-a", "4.1-b")

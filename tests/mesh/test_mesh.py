@@ -9,9 +9,9 @@ from pytest import approx
 from reference.meshes import MSH4, SQUARE, TWO, corner_lists, delaunay, sets, shaken, write
 from scipy.spatial import ConvexHull
 
+from fvsolve.core.mesh import quality, read, read_mesh, rectangle
+from fvsolve.core.mesh.mesh import MeshPoints
 from fvsolve.errors import CaseError, MeshError
-from fvsolve.mesh import quality, read, read_mesh, rectangle
-from fvsolve.mesh.mesh import MeshPoints
 
 EPS = np.finfo(float).eps
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from reference.scenes import scene
 
-from fvsolve.model.energy_norm import energy_form, form_of
-from fvsolve.steppers import method_named, stability_function
+from fvsolve.core.model.energy_norm import energy_form, form_of
+from fvsolve.core.steppers import method_named, stability_function
 from fvsolve.studies.linearise import linearise_at
 from fvsolve.studies.operating_point import operating_point
 from fvsolve.studies.stability.growth import DenseGrowth, predicted_limit

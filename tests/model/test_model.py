@@ -16,9 +16,9 @@ import pytest
 from reference.scenes import WATER, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.assembly.scheme_codes import cells_around
+from fvsolve.core.assembly.scheme_codes import cells_around
+from fvsolve.core.schemes import SCHEMES
 from fvsolve.errors import FvsolveError
-from fvsolve.schemes import SCHEMES
 
 
 def every_kind(law: str = "linear", scheme: str = "muscl", **numerics) -> dict:

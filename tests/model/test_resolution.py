@@ -8,8 +8,8 @@ from reference.scenes import junction, lake, pipe, ramp, reservoir, scene, step,
 
 import fvsolve
 from fvsolve.case import load, shipped
-from fvsolve.model.start_notices import OTHER_CELLS, SCHEME_CELLS
-from fvsolve.run import model_of
+from fvsolve.core.model.start_notices import OTHER_CELLS, SCHEME_CELLS
+from fvsolve.core.run import model_of
 
 CLOSURE = {"output.fields": 0}
 KINDS = ("upwind", "muscl", "upwind3", "upwind5", "weno5")

@@ -10,14 +10,14 @@ from reference.scenes import NO_FRICTION, SHARP, chamber, junction, lake, pipe, 
 from scipy.sparse import csc_array
 
 import fvsolve
+from fvsolve.core.kernels.calls import compile_as
+from fvsolve.core.model import RunData
+from fvsolve.core.model.jacobian_pattern import jacobian_pattern
+from fvsolve.core.steppers import METHODS
+from fvsolve.core.steppers.integrator import Integrator
+from fvsolve.core.steppers.run_handle import RHS_CALL, addresses, evaluate, open_run
+from fvsolve.core.steppers.structure import KINDS, Structure, differences, multiply
 from fvsolve.jit import njit
-from fvsolve.kernels.calls import compile_as
-from fvsolve.model import RunData
-from fvsolve.model.jacobian_pattern import jacobian_pattern
-from fvsolve.steppers import METHODS
-from fvsolve.steppers.integrator import Integrator
-from fvsolve.steppers.run_handle import RHS_CALL, addresses, evaluate, open_run
-from fvsolve.steppers.structure import KINDS, Structure, differences, multiply
 
 CASES = sorted(folders.CASES.glob("*.toml"))
 SCHEMES = ["upwind", "linear-upwind", "fromm", "central", "upwind3", "upwind5", "muscl", "weno5"]

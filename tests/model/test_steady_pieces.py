@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.steady_edges import FRICTION, LEAK, RESTRICTION, friction_drop, law_of
-from fvsolve.steady import Edge, solve_steady
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.kernels.steady_edges import FRICTION, LEAK, RESTRICTION, friction_drop, law_of
+from fvsolve.core.steady import Edge, solve_steady
 
 NAN = float("nan")
 

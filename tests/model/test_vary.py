@@ -19,10 +19,10 @@ from reference.folders import CASES
 
 import fvsolve
 from fvsolve.case.changes import declaration_of
+from fvsolve.core.model import Model, RunData
+from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.core.steppers import loop_records
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.model import Model, RunData
-from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
-from fvsolve.steppers import loop_records
 from fvsolve.studies.outcome import outcome
 
 NAMES = [name for name in EVERY if name not in LARGE]
@@ -156,7 +156,7 @@ def test_sizes_of_restrictions_are_written_into_the_tables_that_were_there(monke
     table["nodes"]["sump"] = {"type": "reservoir", "pressure": "0 barg"}
     table["links"]["hole"] = {"type": "orifice", "from": "gate", "to": "sump", "diameter": "1 mm"}
     table["links"]["bleed"] = {"type": "orifice", "from": "lake", "to": "sump", "diameter": "2 mm"}
-    model, room = fvsolve.build(fvsolve.load(table, SMALL)), sys.modules["fvsolve.model.build"]
+    model, room = fvsolve.build(fvsolve.load(table, SMALL)), sys.modules["fvsolve.core.model.build"]
     before, found = said(model), []
     taken = room.with_new_sizes
     monkeypatch.setattr(room, "with_new_sizes", lambda *given: found.append(taken(*given)) or found[-1])

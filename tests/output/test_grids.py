@@ -12,9 +12,9 @@ from reference.scenes import scene
 from scipy.io import netcdf_file
 
 import fvsolve
-from fvsolve.mesh import read, rectangle
-from fvsolve.mesh.mesh import MeshPoints
-from fvsolve.output.grid_files import cells_of_pixels
+from fvsolve.core.mesh import read, rectangle
+from fvsolve.core.mesh.mesh import MeshPoints
+from fvsolve.core.output.grid_files import cells_of_pixels
 from fvsolve.parts.raster_files import read_pixels
 
 EAST, NORTH, UTM = 412000.0, 5650000.0, "EPSG:32633"

@@ -20,11 +20,11 @@ from reference.scenes import AMBIENT, BRANCHED_PROBES, branched, scene, still
 
 import fvsolve
 from fvsolve import run
+from fvsolve.core.output import network_layout
+from fvsolve.core.output.csv_files import HistoryFile, read_headers, read_table
+from fvsolve.core.output.fields import FieldSeries, read_series
+from fvsolve.core.output.unit_columns import UnitColumn
 from fvsolve.errors import RunError
-from fvsolve.output import network_layout
-from fvsolve.output.csv_files import HistoryFile, read_headers, read_table
-from fvsolve.output.fields import FieldSeries, read_series
-from fvsolve.output.unit_columns import UnitColumn
 from fvsolve.studies import sweep
 from fvsolve.studies.result_cache import ResultCache
 

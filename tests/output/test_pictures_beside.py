@@ -9,12 +9,12 @@ import pytest
 from reference.scenes import branched
 
 import fvsolve
-from fvsolve.draw.plot_process import processor_count
+from fvsolve.report.draw.plot_process import processor_count
 
 BEGIN = """
 import sys
 from pathlib import Path
-from fvsolve.draw.plot_process import PlotProcess, Picture
+from fvsolve.report.draw.plot_process import PlotProcess, Picture
 t = [0.0, 1.0]
 arguments = {"t": t, "values": __import__("numpy").array([t, t]).T, "probes": [("a.level", "m"), ("b.level", "m")]}
 wanted = [Picture(Path(name), "history_figure", arguments) for name in ("one.png", "two.png")]

@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.model.jacobian_pattern import jacobian_pattern
-from fvsolve.output.memory_sink import MemorySink
-from fvsolve.solve.solve import Run
+from fvsolve.core.model.jacobian_pattern import jacobian_pattern
+from fvsolve.core.output.memory_sink import MemorySink
+from fvsolve.core.solve.solve import Run
 from fvsolve.studies.energy_balance import energy
 
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
@@ -154,7 +154,7 @@ def test_its_energy_closes_and_it_gives_no_more_than_it_had(law):
 
 def test_its_energy_at_the_start_is_what_it_can_give():
     """Available energy of isothermal gas: p0 V0 ln(p0 / pa) minus the work against ambient pressure."""
-    from fvsolve.model.energy_accounts import available_energy
+    from fvsolve.core.model.energy_accounts import available_energy
 
     model = model_of(swing(0.0, 1.0, exponent=1.0, volume=1.0))
     volume = GAS * P0 / AMBIENT

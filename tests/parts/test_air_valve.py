@@ -10,8 +10,8 @@ from reference.scenes import AMBIENT, RHO, WATER, area, junction, lake, pipe, re
 from scipy.integrate import solve_ivp
 
 import fvsolve
-from fvsolve.model import RunData
-from fvsolve.model.jacobian_pattern import jacobian_pattern
+from fvsolve.core.model import RunData
+from fvsolve.core.model.jacobian_pattern import jacobian_pattern
 from fvsolve.studies.energy_balance import energy
 
 LENGTH, DIAMETER = 200.0, 0.3
@@ -153,7 +153,7 @@ def test_its_energy_closes_and_its_bores_only_dissipate(law):
 
 
 def test_its_norm_is_its_energy_to_second_order_and_its_pattern_holds():
-    from fvsolve.model.energy_accounts import Accounts
+    from fvsolve.core.model.energy_accounts import Accounts
 
     model = fvsolve.build(fvsolve.load(drained(flow=0.0, low=2e5)))
     accounts, y = Accounts(RunData(model)), np.zeros(model.y_size)

@@ -25,7 +25,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.model import State
+from fvsolve.core.model import State
 from fvsolve.studies.energy_balance import energy
 
 DIAMETER, FACTOR, HEIGHT, BORE, LOW = 0.2, 0.02, 5.0, 0.05, 1.6e5
@@ -266,7 +266,7 @@ class Kept:
 
 
 def test_resumed_while_it_is_open_it_is_the_unbroken_run_bit_for_bit(monkeypatch):
-    at = import_module("fvsolve.solve.solve")
+    at = import_module("fvsolve.core.solve.solve")
     monkeypatch.setattr(at, "CHECKPOINT_SECONDS", 0.0)
     case = fvsolve.load(summit({"method": "dormand-prince", "rtol": 1e-7}))
     whole, rest, model = Kept(), Kept(), fvsolve.build(case)

@@ -613,7 +613,7 @@ def test_the_ledger_of_energy_closes_to_the_order_of_its_method():
 
 @pytest.mark.parametrize("kind, place", [("joint", "arm"), ("drive", "cart"), ("bushing", "rubber")])
 def test_what_the_ledger_of_bodies_forgets_is_what_remains(kind, place, monkeypatch):
-    from fvsolve.model import energy_accounts
+    from fvsolve.core.model import energy_accounts
 
     honest, plain = energy(machine()), energy_accounts.Accounts.bodies
     lost = honest.supplied[place][-1] if kind == "drive" else honest.dissipated[f"{place} {kind}"][-1]
@@ -714,7 +714,7 @@ def test_no_rate_depends_on_a_state_that_the_pattern_has_not():
 
 @pytest.mark.parametrize("method, step", [("rk4", 2e-6), ("implicit-midpoint", 2e-6)])
 def test_a_run_broken_off_and_resumed_is_the_unbroken_one(method, step, tmp_path, monkeypatch):
-    monkeypatch.setattr(import_module("fvsolve.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
+    monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
     case = Crane().case(0.1, ["boom.angle", "lift.A.pressure"], "log", joint={"rate": 0.05}, method=method, step=step)
     calls = []
 

@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.kernels.dtypes import OK, STATUS
+from fvsolve.core.kernels.dtypes import OK, STATUS
 from fvsolve.parts.conduit.law_section import depth_of, riemann_function, section_at_depth, section_of
 from fvsolve.studies.accuracy.order import order
 from fvsolve.studies.energy_balance import energy

@@ -16,11 +16,11 @@ from solve.test_implicit_runs import killed_and_resumed
 from solve.test_resume import same_files
 
 import fvsolve
-from fvsolve.assembly.schedule_tables import period_of
+from fvsolve.core.assembly.schedule_tables import period_of
+from fvsolve.core.model.jacobian_pattern import jacobian_pattern
 from fvsolve.errors import CaseError
 from fvsolve.features.controls.balance import Balance
 from fvsolve.features.controls.feature import blocks_of
-from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.parts.formula_program import Program
 from fvsolve.studies.linearise import linearise
 

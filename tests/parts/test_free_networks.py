@@ -9,10 +9,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, least_squares
 
 import fvsolve as fv
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.model.build import build
+from fvsolve.core.solve import initial_state
 from fvsolve.errors import CaseError
-from fvsolve.kernels import dtypes as rec
-from fvsolve.model.build import build
-from fvsolve.solve import initial_state
 from fvsolve.studies.energy_balance import energy
 
 MASS, LOW, TURN = 60e3, 0.8, 4e5  # hull: mass [kg], depth of its centre [m], inertia about it [kg m2]

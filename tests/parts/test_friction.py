@@ -34,7 +34,7 @@ from scipy.optimize import brentq
 
 import fvsolve
 from fvsolve import exact
-from fvsolve.assembly import pipe_terms as unsteady_terms
+from fvsolve.core.assembly import pipe_terms as unsteady_terms
 from fvsolve.errors import CaseError
 from fvsolve.studies.accuracy.model_hierarchy import rigid_column
 from fvsolve.studies.energy_balance import energy

@@ -12,7 +12,7 @@ from reference.scenes import AMBIENT, GRAVITY, RHO, area, chamber, junction, pip
 from scipy.linalg import expm
 
 import fvsolve
-from fvsolve.fluid import specific_heat
+from fvsolve.core.fluid import specific_heat
 from fvsolve.studies.energy_balance import energy
 
 CP, ZERO = 1900.0, 273.15

@@ -253,7 +253,7 @@ def test_a_spool_opens_one_pair_of_edges_on_each_side_of_zero(kind):
     for key in ("ports", "position"):
         del plain[key]
     schedule = model.case.links["spool"].position
-    from fvsolve.assembly.schedule_tables import piece_value, schedule_pieces
+    from fvsolve.core.assembly.schedule_tables import piece_value, schedule_pieces
 
     pieces = schedule_pieces(schedule)
     jumps = [t for t, jump in model.breaks if jump]
@@ -384,7 +384,7 @@ def test_a_controller_may_hold_spool_and_force():
 
 
 def test_a_run_with_bodies_broken_off_and_resumed_is_the_unbroken_one(tmp_path, monkeypatch):
-    monkeypatch.setattr(import_module("fvsolve.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
+    monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
     jack = Jack(pressures=(60e5, 80e5), leakage=2e-13)
     links = {**jack.links(), "spool": spool(1e-5, 0.6)}
     case = scene({**jack.nodes(), **SUPPLY}, links, 0.05, {"method": "rk4", "step": 1e-6}, PROBES, 1e-3,

@@ -12,8 +12,8 @@ from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.cli.printing import exit_code
+from fvsolve.core.model.energy_norm import energy_form
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.model.energy_norm import energy_form
 from fvsolve.parts.self_acting.law_check_valve import PRESSURE_MARGIN
 from fvsolve.studies import stability
 from fvsolve.studies.energy_balance import energy

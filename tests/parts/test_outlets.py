@@ -525,7 +525,7 @@ def epanet_heads(path, folder, node, flow):
 def test_fire_flows_of_net1_are_those_of_epanet(tmp_path):
     """Residual heads with 50 l/s within 1 mm, and flows that leave 14 m within 0.01 %, for five nodes."""
     wntr = pytest.importorskip("wntr", reason="WNTR, the extra `epanet`, is not installed")
-    from fvsolve.epanet import import_network
+    from fvsolve.exchange.epanet import import_network
 
     source = Path(wntr.__file__).parent / "library" / "networks" / "Net1.inp"
     text = source.read_text().replace("[OPTIONS]", "[OPTIONS]\n Demand Multiplier 1.0").replace("0.001", "1e-6")

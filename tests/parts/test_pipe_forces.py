@@ -7,8 +7,8 @@ from reference.refusals import refused
 from reference.scenes import AMBIENT, RHO, area, junction, lake, pipe, ramp, reservoir, scene, step, valve
 
 import fvsolve
-from fvsolve.model.build import build
-from fvsolve.solve import initial_state
+from fvsolve.core.model.build import build
+from fvsolve.core.solve import initial_state
 
 DIAMETER, SPEED, VELOCITY, SHUT = 0.3, 1200.0, 0.7, 0.1
 FORCE = RHO * SPEED * VELOCITY * area(DIAMETER)

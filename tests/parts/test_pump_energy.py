@@ -10,8 +10,8 @@ from parts.test_controls import METHODS
 from reference.scenes import GRAVITY, RHO, junction, lake, scene, tank
 
 import fvsolve
+from fvsolve.core.model.jacobian_pattern import jacobian_pattern
 from fvsolve.errors import CaseError
-from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.studies import energy
 
 KWH = 3.6e6
@@ -259,7 +259,7 @@ def test_energy_and_cost_are_those_of_the_report_of_epanet(tmp_path):
 @pytest.mark.parametrize("name", ["Net1", "Net3"])
 def test_the_energy_of_the_networks_of_epanet_is_that_of_its_report(name, tmp_path):
     wntr = pytest.importorskip("wntr", reason="WNTR, the extra `epanet`, is not installed")
-    from fvsolve.epanet import import_network
+    from fvsolve.exchange.epanet import import_network
 
     path = Path(wntr.__file__).parent / "library" / "networks" / f"{name}.inp"
     text = re.sub(r"(?im)^\s*(hydraulic timestep|duration|energy|status|summary)\s.*$", "", path.read_text())

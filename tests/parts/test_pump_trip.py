@@ -237,7 +237,7 @@ def test_torque_is_an_input():
 
 def test_every_dependence_of_a_tripped_pump_is_in_the_pattern():
     """Differences of the rates after the trip are zero outside the Jacobian pattern."""
-    from fvsolve.model.jacobian_pattern import jacobian_pattern
+    from fvsolve.core.model.jacobian_pattern import jacobian_pattern
 
     model = fvsolve.build(fvsolve.load(line(40.0, 3.0, {}, ["pump.flow"], 6, **SHAFT, trip=0.0)))
     rng = np.random.default_rng(1)

@@ -13,8 +13,8 @@ from solve.test_implicit_runs import killed_and_resumed
 from solve.test_resume import same_files
 
 import fvsolve
+from fvsolve.core.fluid import LAWS
 from fvsolve.errors import CaseError
-from fvsolve.fluid import LAWS
 from fvsolve.studies import energy
 
 CLOSE = 1e-9

@@ -16,7 +16,7 @@ from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.case.changes import changes
-from fvsolve.step_limits.step_notices import step_limits
+from fvsolve.core.step_limits.step_notices import step_limits
 
 MOLES = {"unit": "mol/m3"}
 METHODS = ("dormand-prince", "radau-iia-5", "rodas-5p", "auto")

@@ -27,7 +27,7 @@ from reference.scenes import (
 from scipy.integrate import solve_ivp
 
 import fvsolve
-from fvsolve.steady import union
+from fvsolve.core.steady import union
 from fvsolve.studies.energy_balance import energy
 
 BETA, TIME, BAND, SET = 2e7, 0.5, 1e5, 5e5

@@ -244,7 +244,7 @@ def test_the_limit_of_steps_by_transport_is_r_times_as_long():
 
 
 def test_a_run_interrupted_and_resumed_is_the_unbroken_one(tmp_path, monkeypatch):
-    monkeypatch.setattr(import_module("fvsolve.solve.solve"), "CHUNK_SECONDS", 0.0)
+    monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), "CHUNK_SECONDS", 0.0)
     nodes = {"lake": given(dye=step(1.0, 0.0, 1.0)), "tap": junction(FLOW)}
     case = case_of(nodes, {"a": line("lake", "tap", 4.0, 100, **SLOWER)}, 4.0, decay=0.1)
 

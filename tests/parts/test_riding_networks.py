@@ -8,8 +8,8 @@ from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, scene
 from scipy.integrate import simpson, solve_ivp
 
 import fvsolve as fv
+from fvsolve.core.output.fields import read_series
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.output.fields import read_series
 from fvsolve.studies.energy_balance import energy
 
 HALF, DEPTH, LEVEL = 4.0, 1.5, 0.8  # half distance of arms, depth of the duct, level above the duct [m]

@@ -327,7 +327,7 @@ def test_results_name_it_and_the_written_case_says_it_again(tmp_path):
 
 
 def test_a_run_interrupted_and_resumed_is_the_unbroken_one_ledger_too(tmp_path, monkeypatch):
-    monkeypatch.setattr(import_module("fvsolve.solve.solve"), "CHUNK_SECONDS", 0.0)
+    monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), "CHUNK_SECONDS", 0.0)
     nodes = {"lake": given(dye=step(1.0, 0.0, 1.0)), "tap": junction(FLOW)}
     case = case_of(nodes, {"a": line("lake", "tap", 4.0, 200)}, 4.0, decay=0.1)
 

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.model.jacobian_pattern import jacobian_pattern
+from fvsolve.core.model.jacobian_pattern import jacobian_pattern
 from fvsolve.studies.energy_balance import energy
 
 CLOSE = {"method": "dormand-prince", "rtol": 1e-9}

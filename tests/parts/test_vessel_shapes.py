@@ -9,7 +9,7 @@ from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, reservoir, scen
 from scipy.integrate import quad, solve_ivp
 
 import fvsolve
-from fvsolve.model.jacobian_pattern import jacobian_pattern
+from fvsolve.core.model.jacobian_pattern import jacobian_pattern
 from fvsolve.parts.accumulator import law_vessel
 from fvsolve.studies.energy_balance import energy
 

@@ -13,11 +13,11 @@ from reference.scenes import AMBIENT, RHO, SHARP, WATER, junction, pipe, ramp, r
 
 import fvsolve
 from fvsolve import run
-from fvsolve.assembly.schedule_tables import Schedules
 from fvsolve.case.load import load
+from fvsolve.core.assembly.schedule_tables import Schedules
+from fvsolve.core.kernels.schedule_pieces import piece_slopes, piece_value
 from fvsolve.errors import CaseError
 from fvsolve.exact.solution import value
-from fvsolve.kernels.schedule_pieces import piece_slopes, piece_value
 from fvsolve.parts.schedule import Schedule
 
 LENGTH, DIAMETER, SPEED, CELLS = 914.4, 0.3048, 1219.2, 40
@@ -294,7 +294,7 @@ def test_a_spool_that_swings_opens_each_way_by_the_positive_part_and_steps_end_w
 
 
 def breaks_of(case):
-    from fvsolve.model.build import build
+    from fvsolve.core.model.build import build
 
     return build(load(case)).breaks
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 import fvsolve
-from fvsolve.mesh import rectangle
-from fvsolve.model.model import Model, State
+from fvsolve.core.mesh import rectangle
+from fvsolve.core.model.model import Model, State
 
 PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
 HEAVY = {"type": "body", "mass": 10.0, "inertia": [1.0, 1.0, 1.0]}

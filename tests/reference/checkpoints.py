@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fvsolve.output.restart import SEAL, digest_of
+from fvsolve.core.output.restart import SEAL, digest_of
 
 
 def write_sealed(path, arrays) -> None:

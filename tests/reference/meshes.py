@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 from scipy.spatial import Delaunay
 
-from fvsolve.mesh import rectangle
+from fvsolve.core.mesh import rectangle
 
 SQUARE = [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (2, 1)]  # two unit squares side by side
 TWO = [[0, 1, 4, 3], [1, 2, 5, 4]]

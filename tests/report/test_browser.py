@@ -8,7 +8,7 @@ from reference import browser
 from reference.scenes import junction, lake, pipe, ramp, scene, valve
 
 import fvsolve
-from fvsolve.draw.style import COLOURS
+from fvsolve.report.draw.style import COLOURS
 from fvsolve.report.figures import DARK_COLOURS, escape_markup
 from fvsolve.report.report_files import write_report
 

@@ -22,13 +22,13 @@ from studies.test_design import STUDY, throttled
 
 import fvsolve
 from fvsolve.case.text import write
+from fvsolve.core.output.summary_shape import Expectation, LimitVerdict
+from fvsolve.core.run.result import Result
 from fvsolve.errors import Notice
-from fvsolve.output.summary_shape import Expectation, LimitVerdict
 from fvsolve.report.figures import escape_markup
 from fvsolve.report.long_section import section_paths
 from fvsolve.report.page import page, script_json
 from fvsolve.report.report_files import write_report
-from fvsolve.run.result import Result
 from fvsolve.studies import scenarios
 
 WICKED = "</script><script>alert('x')</script> & \"quoted\" $5 {{ 7 * 7 }} <!-- \u2028 </style><b>bold"

@@ -10,7 +10,7 @@ import pytest
 from reference.scenes import GRAVITY, RHO, junction, lake, pipe, ramp, scene, step, valve
 
 import fvsolve
-from fvsolve.draw.plot import LIMIT_LOOKS, LINE_LOOKS
+from fvsolve.report.draw.plot import LIMIT_LOOKS, LINE_LOOKS
 from fvsolve.report.figures import section_figure
 from fvsolve.report.long_section import head_animations, head_window, section_of, section_paths
 from fvsolve.report.report_files import parse_probes, write_pictures

@@ -55,12 +55,14 @@ LIMITS = {
 
 # Files of the core that each stage of a run needs. A hub that moved or was divided is stated by its new paths.
 HUBS = """
-model/build.py model/model.py model/jacobian_pattern.py model/run_data.py model/energy_accounts.py model/energy_norm.py
-model/probe_tables.py model/model_facts.py model/start_notices.py model/state_bounds.py assembly/model_draft.py
-solve/run_loop.py solve/run_summary.py solve/run_checks.py solve/solve.py solve/partition.py case/case.py case/load.py
-case/checks.py case/connections.py case/part_reading.py case/probe.py output/fields.py kernels/rhs_assembly.py
-kernels/dtypes.py kernels/energy_rows.py kernels/observation.py step_limits/growing_modes.py studies/resolution.py
-studies/linearise.py studies/operating_point.py draw/scene.py run/plot_scene.py cli/printing.py
+core/model/build.py core/model/model.py core/model/jacobian_pattern.py core/model/run_data.py
+core/model/energy_accounts.py core/model/energy_norm.py core/model/probe_tables.py core/model/model_facts.py
+core/model/start_notices.py core/model/state_bounds.py core/assembly/model_draft.py core/solve/run_loop.py
+core/solve/run_summary.py core/solve/run_checks.py core/solve/solve.py core/solve/partition.py case/case.py
+case/load.py case/checks.py case/connections.py case/part_reading.py case/probe.py core/output/fields.py
+core/kernels/rhs_assembly.py core/kernels/dtypes.py core/kernels/energy_rows.py core/kernels/observation.py
+core/step_limits/growing_modes.py studies/resolution.py studies/linearise.py studies/operating_point.py
+report/draw/scene.py core/run/plot_scene.py cli/printing.py
 """.split()
 # Feature -> regular expression for the names of its tables
 FEATURES = {
@@ -262,7 +264,7 @@ MEASURES: dict[str, Callable[[], float]] = {
     "functions per 1000 code lines": lambda: functions_per_1000_lines(PACKAGE),
     "characters of the mean code line": lambda: mean_line(PACKAGE),
     "comment lines per 100 code lines of kernels and steppers": lambda: comments_per_100_lines(
-        PACKAGE / "kernels", PACKAGE / "steppers"
+        PACKAGE / "core" / "kernels", PACKAGE / "core" / "steppers"
     ),
     "circles of imports": lambda: len(circles(imports("fvsolve"))),
 }

@@ -10,11 +10,11 @@ from reference.folders import CASES
 from reference.scenes import WATER, chamber, junction, pipe, reservoir, scene, tank, valve
 
 import fvsolve
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.kernels.rhs_assembly import PHASES
+from fvsolve.core.model import RunData
+from fvsolve.core.solve.run_loop import RunLoop
 from fvsolve.jit import COMPILING
-from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.rhs_assembly import PHASES
-from fvsolve.model import RunData
-from fvsolve.solve.run_loop import RunLoop
 
 PIPES = {"pipes", "ghost_cells", "reconstruction", "fused_step"}
 MASSES = {"mass_dynamics"}

@@ -13,7 +13,7 @@ from reference.air import ATM, AirOil, follow
 from reference.folders import CASES
 
 import fvsolve
-from fvsolve.fluid import properties
+from fvsolve.core.fluid import properties
 from fvsolve.studies.energy_balance import energy
 
 PATHS = sorted(CASES.glob("*.toml"))

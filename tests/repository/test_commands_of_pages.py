@@ -13,8 +13,8 @@ import typer
 from reference.folders import DOCS
 
 from fvsolve.cli import COMMANDS, application
-from fvsolve.schemes import SCHEMES
-from fvsolve.steppers import METHODS
+from fvsolve.core.schemes import SCHEMES
+from fvsolve.core.steppers import METHODS
 from fvsolve.studies.accuracy.order import REFERENCE_KINDS
 from fvsolve.studies.accuracy.refine import WAYS
 from fvsolve.studies.sizing import GOALS

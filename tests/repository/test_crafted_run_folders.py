@@ -17,11 +17,11 @@ from hypothesis_profiles import examples
 from reference.scenes import branched
 
 import fvsolve
+from fvsolve.core.output.json_files import read_json
+from fvsolve.core.output.restart import digest_of, read_arrays
+from fvsolve.core.output.summary_file import read_summary
+from fvsolve.core.output.summary_shape import SummaryShape
 from fvsolve.errors import RunError
-from fvsolve.output.json_files import read_json
-from fvsolve.output.restart import digest_of, read_arrays
-from fvsolve.output.summary_file import read_summary
-from fvsolve.output.summary_shape import SummaryShape
 from fvsolve.studies import scenarios, sweep
 from fvsolve.studies.peak_error import peak_errors
 

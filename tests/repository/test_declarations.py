@@ -158,7 +158,7 @@ def test_unreadable_parts_and_limiters_cause_warnings_and_break_nothing(tmp_path
     entries = {"fvsolve.parts": {"mill": "mill.lost"}, "fvsolve.limiters": {"steep": "mill:steep", "flat": "mill:flat"}}
     text = "def steep(r):\n    return 1 / 0\n\ndef flat(r):\n    return 0.0\n"
     home = install(tmp_path, "mill", {"mill/__init__.py": text}, entries)
-    code = "import fvsolve.parts, fvsolve.schemes; print('flat' in fvsolve.schemes.LIMITERS)"
+    code = "import fvsolve.parts, fvsolve.core.schemes; print('flat' in fvsolve.core.schemes.LIMITERS)"
     done = python(home, "-c", code, FVSOLVE_PARTS=str(tmp_path / "absent"))
     assert done.stdout == "True\n"
     for text in (

@@ -42,7 +42,7 @@ def trapped(tmp_path_factory):
     """Folder with a file named as each module that a run imports, and a case; each file records its execution."""
     code = (
         "import sys, fvsolve, multiprocessing.spawn, multiprocessing.resource_tracker, multiprocessing.context, runpy;"
-        "fvsolve.run('two-tanks'); import fvsolve.draw.plot, fvsolve.draw.field_canvas, pyvista;"
+        "fvsolve.run('two-tanks'); import fvsolve.report.draw.plot, fvsolve.report.draw.field_canvas, pyvista;"
         "print(*sorted({name.partition('.')[0] for name in sys.modules}))"
     )
     loaded = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True).stdout
@@ -216,7 +216,7 @@ def test_a_read_only_cache_of_the_same_user_or_of_root_is_read(tmp_path):
     code = (
         "import sys; from pathlib import Path; from fvsolve.compile import cache_folders as c\n"
         "writable = c._writable; c._writable = lambda folder: 'shared' not in folder.name and writable(folder)\n"
-        "{}from fvsolve.steppers.run_handle import no_algebra; no_algebra()\n"
+        "{}from fvsolve.core.steppers.run_handle import no_algebra; no_algebra()\n"
         "print('numba' in sys.modules, c.cache_folder().name, len(c.code_folders()), c.is_cold())"
     )
     stated = {"FVSOLVE_CACHE": str(tmp_path / "shared"), "TMPDIR": str(tmp_path)}

@@ -43,7 +43,7 @@ def test_all_public_names_are_there_with_the_first_line_of_their_docstrings():
     text = generated_pages.names()
     listed = re.findall(r"\{py:(?:function|class|exception)\} ([\w.]+)", text)
     assert {f"fvsolve.{name}" for name in fvsolve.__all__} <= {*listed} and len(listed) == len({*listed})
-    assert {"fvsolve.studies.order", "fvsolve.studies.sweep", "fvsolve.steppers.analyse"} <= {*listed}
+    assert {"fvsolve.studies.order", "fvsolve.studies.sweep", "fvsolve.core.steppers.analyse"} <= {*listed}
     for name in fvsolve.__all__:
         assert generated_pages.escaped(getattr(fvsolve, name).__doc__.splitlines()[0]) in text
     assert "{py:method} rhs(t, y=None)" in text and "{py:property} envelope" in text

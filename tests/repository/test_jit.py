@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 import fvsolve
-from fvsolve import child_process, errors, jit
-from fvsolve.compile import cache_folders, store
-from fvsolve.steppers.run_handle import no_algebra
+from fvsolve import errors, jit
+from fvsolve.compile import cache_folders, child_process, store
+from fvsolve.core.steppers.run_handle import no_algebra
 
 LAW = """from fvsolve.jit import njit
 
@@ -25,7 +25,7 @@ def law(x):
     return {factor} * x
 """
 LOOP = """from fvsolve.jit import njit
-from fvsolve.kernels.law import law
+from fvsolve.core.kernels.law import law
 
 @njit
 def loop(n):
@@ -36,7 +36,7 @@ def loop(n):
 """
 PROBE = """
 import sys
-from fvsolve.steppers.loop import loop
+from fvsolve.core.steppers.loop import loop
 value = loop(4)
 print(value, 'numba' in sys.modules, 'numba' in sys.modules and sum(loop.numba.stats.cache_misses.values()))
 """
@@ -66,8 +66,8 @@ sum_of_cubes = specialise(_sums, "sum_of_cubes", POWER=cube, ADDED=0.5)
 """
 SPECIALISED = """
 import pickle, sys
-from fvsolve.kernels import powers
-from fvsolve.kernels.powers import sum_of_cubes, sum_of_squares
+from fvsolve.core.kernels import powers
+from fvsolve.core.kernels.powers import sum_of_cubes, sum_of_squares
 print(sum_of_squares(4), sum_of_cubes(4), 'numba' in sys.modules)
 for function in (sum_of_squares, sum_of_cubes):
     plain = getattr(function, "py_func", function)
@@ -136,10 +136,10 @@ def test_without_the_store_all_code_comes_from_numba(package):
 def test_a_template_is_compiled_once_under_a_name(package, copy, told):
     """The copy of the second module ran the code of the first, loaded from the cache."""
     (package / "kernels" / "powers.py").write_text(POWERS)
-    line = "from fvsolve.jit import specialise\nfrom fvsolve.kernels.powers import _sums, cube\n"
+    line = "from fvsolve.jit import specialise\nfrom fvsolve.core.kernels.powers import _sums, cube\n"
     (package / "steppers" / "more.py").write_text(f"{line}other = specialise(_sums, {copy})\n")
-    code = "try:\n    import fvsolve.steppers.more\nexcept ValueError as fault:\n    print(fault)"
-    assert f"fvsolve.steppers.more: {told}" in " ".join(python(package, code)).replace("fvsolve.kernels.", "")
+    code = "try:\n    import fvsolve.core.steppers.more\nexcept ValueError as fault:\n    print(fault)"
+    assert f"fvsolve.core.steppers.more: {told}" in " ".join(python(package, code)).replace("fvsolve.kernels.", "")
 
 
 def test_a_run_without_the_store_has_the_same_results():
@@ -170,7 +170,7 @@ def test_only_one_folder_depends_on_private_names_of_numba():
 def test_python_and_compiled_code_may_call_the_same_function(package):
     """A function that only compiled code has called gets an entry point for Python at its first call from Python."""
     code = """
-from fvsolve.steppers.loop import law, loop
+from fvsolve.core.steppers.loop import law, loop
 print(loop(4), len(law.numba.overloads), len(law.numba.within.overloads), law(1.0), len(law.numba.overloads))
 """
     assert python(package, code) == ["12.0", "0", "1", "2.0", "1"]
@@ -182,7 +182,7 @@ def test_two_signatures_of_the_same_types_for_numba_may_both_come_from_its_cache
     code = """
 import sys
 import numpy as np
-from fvsolve.kernels.corner import corner
+from fvsolve.core.kernels.corner import corner
 for rows in (1, 2):
     table = np.full((rows, 3), 7.0)
     table.flags.writeable = False
@@ -274,11 +274,11 @@ def test_code_of_other_sources_is_named(package):
         ),
         "a helper that is gone": (
             {"wanted": ["numba_gone"]},
-            r"code of fvsolve.steppers.loop.loop cannot be loaded: numba \S+ has no numba_gone",
+            r"code of fvsolve.core.steppers.loop.loop cannot be loaded: numba \S+ has no numba_gone",
         ),
         "a helper not declared": (
             {"wanted": []},
-            r"not found: \[ numba_\w+[^$]*code of fvsolve.steppers.loop.loop cannot be loaded: it calls",
+            r"not found: \[ numba_\w+[^$]*code of fvsolve.core.steppers.loop.loop cannot be loaded: it calls",
         ),
     }.values(),
     ids=["another machine", "a helper that is gone", "a helper not declared"],
@@ -299,7 +299,7 @@ def test_old_generations_are_deleted_and_the_newest_few_kept(package):
 
 
 def test_without_jit_the_plain_function_comes_back_and_numba_stays_away(package):
-    code = "import sys; from fvsolve.steppers.loop import loop; print(loop(4), 'numba' in sys.modules)"
+    code = "import sys; from fvsolve.core.steppers.loop import loop; print(loop(4), 'numba' in sys.modules)"
     assert python(package, code, NUMBA_DISABLE_JIT="1") == ["12.0", "False"]
 
 
@@ -354,7 +354,7 @@ def test_only_rooms_that_are_hashed_compile():
 def test_what_declares_or_lowers_compiles_nothing():
     """Of parts only laws are hashed, of basins only compiled files; edits elsewhere keep the compiled code."""
     hashed = {path.relative_to(cache_folders.PACKAGE) for path in cache_folders.compiled_sources()}
-    assert Path("basins/liquid/grid_linear.py") in hashed and Path("basins/basin_scalars.py") in hashed
+    assert Path("core/basins/liquid/grid_linear.py") in hashed and Path("core/basins/basin_scalars.py") in hashed
     assert {path.name[:3] for path in hashed if path.parts[0] == "parts"} == {"law"}
     assert not any(path.name.startswith(("part", "lower")) for path in hashed if path.parts[0] == "basins")
 
@@ -376,8 +376,8 @@ def test_a_compiled_function_of_declared_arguments_takes_no_others():
 
 def test_the_second_process_compiles_what_is_then_taken_from_the_store(monkeypatch):
     """The code for the second process runs, and the name that decides to skip it is that of a function in the store."""
-    from fvsolve.kernels import compiled_functions
-    from fvsolve.steppers import integrator
+    from fvsolve.core.kernels import compiled_functions
+    from fvsolve.core.steppers import integrator
 
     asked = {}
 

@@ -8,7 +8,7 @@ import pytest
 from reference.scenes import branched
 
 import fvsolve
-from fvsolve.solve import advance, initial_state
+from fvsolve.core.solve import advance, initial_state
 from fvsolve.studies import sweep
 
 

@@ -10,7 +10,7 @@ from reference.scenes import branched, still
 
 import fvsolve
 from fvsolve import FvsolveError, State, advance, initial_state, integrate, steppers, studies
-from fvsolve.output.memory_sink import MemorySink
+from fvsolve.core.output.memory_sink import MemorySink
 from fvsolve.studies import LineImpedance, Transfer, sweep
 
 

@@ -13,15 +13,15 @@ from numba.core.targetconfig import TargetConfig
 from repository.test_jit import package, python  # noqa: F401
 
 from fvsolve.compile.numba_internals import numba_module
-from fvsolve.kernels import network_balance, schedule_pieces
-from fvsolve.steppers import erk
+from fvsolve.core.kernels import network_balance, schedule_pieces
+from fvsolve.core.steppers import erk
 
 CHAIN = """
 from fvsolve.compile import shorter_compilation
 from fvsolve.compile.numba_internals import numba_module
 numba_module()
 shorter_compilation.LARGE = {large}
-from fvsolve.kernels.chain import above, both, top
+from fvsolve.core.kernels.chain import above, both, top
 import numpy as np
 values, counts = np.array([1.0, 2.0, 4.0]), np.array([1, 2])
 found = above(values, 3), both(values), top(values, counts)

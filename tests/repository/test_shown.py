@@ -14,8 +14,8 @@ import pytest
 
 import fvsolve
 from fvsolve import advance, build, initial_state, load, run, tableau
+from fvsolve.core.steppers import METHODS
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers import METHODS
 from fvsolve.studies import advection_limits, chart, order, response, sweep
 
 CASE = "two-tanks"

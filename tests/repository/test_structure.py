@@ -99,8 +99,8 @@ def test_lines_and_features_of_imported_files_are_counted(tmp_path):
 
 def test_a_simple_run_imports_the_command_line_and_no_pictures():
     files = structure.imported_files()
-    assert {"cli/__init__.py", "kernels/dtypes.py", "solve/run_loop.py"} <= set(files)
-    assert "draw/scene.py" not in files
+    assert {"cli/__init__.py", "core/kernels/dtypes.py", "core/solve/run_loop.py"} <= set(files)
+    assert "report/draw/scene.py" not in files
 
 
 HUB = '''"""Text with basins."""

@@ -14,8 +14,8 @@ from matplotlib.image import imread
 from reference.scenes import branched, scene, still
 
 import fvsolve
-from fvsolve.draw.plot import history_figure
-from fvsolve.output.fields import read_series
+from fvsolve.core.output.fields import read_series
+from fvsolve.report.draw.plot import history_figure
 
 TITLE = r"a $\nothing_{$ b, $5 and $6 [bold] [/red] <image> & 100 % \o/"
 STEERS = "a\x1b[31mb\u202ec\x07"
@@ -45,7 +45,7 @@ def test_dollars_are_drawn_as_dollars():
 def test_powers_of_ten_stay_powers():
     from matplotlib.text import Text
 
-    from fvsolve.draw.accuracy_pictures import order_figure
+    from fvsolve.report.draw.accuracy_pictures import order_figure
     from fvsolve.studies.accuracy.fit import Fit
 
     none = Fit((1.0, 1.0), 1.0, 0.1, ("", "", ""), 1.0)

@@ -15,9 +15,9 @@ from reference.scenes import lake, pipe, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.case import load
+from fvsolve.core.kernels.own_limiters import LOOPS
+from fvsolve.core.schemes import LIMITERS
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.kernels.own_limiters import LOOPS
-from fvsolve.schemes import LIMITERS
 from fvsolve.studies import order, sweep
 from fvsolve.studies.stability.periodic_limits import limited_limit, monotone_limit
 
@@ -227,7 +227,7 @@ def test_other_processes_of_a_sweep_have_it():
 
 def test_a_file_can_be_named_for_the_command_line(tmp_path):
     (tmp_path / "mine.py").write_text("def phi(r):\n    return max(0.0, min(1.0, r))\n")
-    code = "import fvsolve.parts; from fvsolve.schemes import LIMITERS; print(*LIMITERS)"
+    code = "import fvsolve.parts; from fvsolve.core.schemes import LIMITERS; print(*LIMITERS)"
     assert run_python(tmp_path, code, FVSOLVE_LIMITERS="sharp=mine.py:phi").split()[-1] == "sharp"
     code = "import warnings; warnings.simplefilter('error'); import fvsolve.parts"
     with pytest.raises(AssertionError, match=r"sharp=none\.py:phi cannot be read"):
@@ -240,7 +240,7 @@ def test_an_installed_package_can_offer_one(tmp_path):
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1\n")
     (info / "entry_points.txt").write_text("[fvsolve.limiters]\nsharp = mine:phi\n")
-    code = "import fvsolve.parts; from fvsolve.schemes import LIMITERS; print(*LIMITERS)"
+    code = "import fvsolve.parts; from fvsolve.core.schemes import LIMITERS; print(*LIMITERS)"
     assert run_python(tmp_path, code).split()[-1] == "sharp"
 
 

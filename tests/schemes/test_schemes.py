@@ -10,10 +10,10 @@ from reference.scenes import NO_FRICTION, RHO, WATER, chamber, junction, pipe, r
 from scipy.integrate import solve_ivp
 
 import fvsolve
-from fvsolve.assembly.scheme_codes import CODES, FAMILIES, family
-from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.reconstruction import limited
-from fvsolve.schemes import LEAST_CELLS, LIMITED, LINEAR, SCHEMES, Scheme
+from fvsolve.core.assembly.scheme_codes import CODES, FAMILIES, family
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.kernels.reconstruction import limited
+from fvsolve.core.schemes import LEAST_CELLS, LIMITED, LINEAR, SCHEMES, Scheme
 
 KNOWN = {  # order, reach, scheme on grids of basins, True if it computes cavities
     "upwind": (1, (1, 0, 0, 1), "upwind", True),

@@ -4,7 +4,7 @@ import numpy as np
 from reference.scenes import reservoir, scene, tank, valve
 
 import fvsolve
-from fvsolve.run.verdicts import common_rows, differences
+from fvsolve.core.run.verdicts import common_rows, differences
 
 
 def drained(every):

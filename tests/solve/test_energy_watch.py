@@ -8,14 +8,14 @@ import pytest
 from reference.scenes import NO_FRICTION, area, chamber, junction, lake, pipe, reservoir, scene, tank, valve
 
 import fvsolve
-from fvsolve.kernels.energy_supply import ERROR, RELEASED, STATES
-from fvsolve.model import RunData
-from fvsolve.model.energy_accounts import Accounts
-from fvsolve.run import model_of
-from fvsolve.solve import initial_state
-from fvsolve.solve.energy_watch import EnergyWatch
-from fvsolve.solve.run_loop import RunLoop
-from fvsolve.solve.solve import Run
+from fvsolve.core.kernels.energy_supply import ERROR, RELEASED, STATES
+from fvsolve.core.model import RunData
+from fvsolve.core.model.energy_accounts import Accounts
+from fvsolve.core.run import model_of
+from fvsolve.core.solve import initial_state
+from fvsolve.core.solve.energy_watch import EnergyWatch
+from fvsolve.core.solve.run_loop import RunLoop
+from fvsolve.core.solve.solve import Run
 from fvsolve.studies.outcome import RowSink
 
 CASES = Path(__file__).parents[2] / "cases"

@@ -154,7 +154,7 @@ DYING = """
 import itertools, os, sys
 from importlib import import_module
 import fvsolve
-rooms = import_module("fvsolve.solve.solve")
+rooms = import_module("fvsolve.core.solve.solve")
 rooms.CHECKPOINT_SECONDS = rooms.CHUNK_SECONDS = 0.0
 save, pauses = rooms.Run.save, itertools.count(1)
 def save_and_die(run):
@@ -349,7 +349,7 @@ def test_a_pool_between_a_tank_and_a_pipe_needs_steps_as_its_tolerance_asks():
 
 def test_a_run_whose_steps_no_longer_advance_ends_with_the_reason(monkeypatch):
     """With the whole run as the least advance of 20 attempts every run counts as stalled; given steps never do."""
-    module = import_module("fvsolve.solve.solve")
+    module = import_module("fvsolve.core.solve.solve")
     for name, value in {"STALLED_ATTEMPTS": 20, "STALLED_ADVANCE": 1.0, "CHUNK_SECONDS": 0.0, "FIRST_CHUNK": 1}.items():
         monkeypatch.setattr(module, name, value)
     stalled = fvsolve.run(harbour(method="rodas-5p", rtol=1e-7))

@@ -13,13 +13,13 @@ from scipy.optimize import brentq
 from scipy.sparse import csc_array
 
 import fvsolve
+from fvsolve.core.kernels.node_clusters import solve_in_order
+from fvsolve.core.model.cluster_tables import SparseMatrix
+from fvsolve.core.output.memory_sink import MemorySink
+from fvsolve.core.solve.solve import Run, initial_state
+from fvsolve.core.steppers import loop_records
+from fvsolve.core.steppers.step_control import store_next
 from fvsolve.features.controls.feature import blocks_of
-from fvsolve.kernels.node_clusters import solve_in_order
-from fvsolve.model.cluster_tables import SparseMatrix
-from fvsolve.output.memory_sink import MemorySink
-from fvsolve.solve.solve import Run, initial_state
-from fvsolve.steppers import loop_records
-from fvsolve.steppers.step_control import store_next
 
 FACTOR, DIAMETER, LENGTH = 0.02, 0.2, 500.0
 LOSS = 8.0 * FACTOR * LENGTH / (math.pi**2 * G * DIAMETER**5)  # head per flow squared [s2/m5]
@@ -178,7 +178,7 @@ def latches(count):
 @pytest.mark.parametrize("count", [1, 10])
 def test_constant_blocks_cost_no_steady_states_at_the_start(count, monkeypatch):
     """The number of steady states that the start needs does not grow with blocks that no key follows at once."""
-    build = import_module("fvsolve.model.build")
+    build = import_module("fvsolve.core.model.build")
     solved, own = [], build.steady_profile
     monkeypatch.setattr(build, "steady_profile", lambda draft: solved.append(1) or own(draft))
     case = town(reducing())

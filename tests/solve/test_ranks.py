@@ -13,9 +13,9 @@ import pytest
 from solve.test_threads import SCENES, liquid, water, with_maxima
 
 import fvsolve
-from fvsolve.draw.field_canvas import read_frame
-from fvsolve.draw.scene import DrawnScene, DrawnUnit
-from fvsolve.output.fields import read_series
+from fvsolve.core.output.fields import read_series
+from fvsolve.report.draw.field_canvas import read_frame
+from fvsolve.report.draw.scene import DrawnScene, DrawnUnit
 
 pytest.importorskip("mpi4py", reason="the extra mpi is not there")
 MPIEXEC = Path(sys.executable).with_name("mpiexec")
@@ -24,7 +24,7 @@ if not MPIEXEC.exists():
 SCRIPT = """
 import json, sys
 import fvsolve
-from fvsolve.run import mpi_run as ranks
+from fvsolve.core.run import mpi_run as ranks
 cases, out = json.loads(sys.argv[1]), sys.argv[2]
 for name, case in cases.items():
     fvsolve.run(case, out=f"{out}/{name}", pictures=False)
@@ -125,7 +125,7 @@ def test_a_run_of_three_ranks_is_resumed_by_two_and_by_one(tmp_path):
     whole = fvsolve.run(case, out=tmp_path / "whole", pictures=False)
     stopping = SCRIPT.replace("pictures=False", "progress=stop, pictures=False").replace("import json", """
 import importlib
-solve = importlib.import_module("fvsolve.solve.solve")
+solve = importlib.import_module("fvsolve.core.solve.solve")
 solve.CHECKPOINT_SECONDS, solve.CHUNK_SECONDS, solve.FIRST_CHUNK = 0.0, 0.0, 80.0  # after 80, 100, 110, ... steps
 def stop(t, *given):
     if t > 0.11:
@@ -163,7 +163,7 @@ for name""", 1)  # fmt: skip
 def test_a_rank_that_fails_in_the_middle_ends_all_with_its_message(tmp_path):
     failing = SCRIPT.replace("for name", """
 from mpi4py import MPI
-from fvsolve.solve.parallel_bands import MpiRanks as Ranks
+from fvsolve.core.solve.parallel_bands import MpiRanks as Ranks
 def fails(self, name, at):
     raise MemoryError("planted")
 if MPI.COMM_WORLD.rank == 1:

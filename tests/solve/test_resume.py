@@ -17,16 +17,16 @@ from reference.scenes import branched
 from solve.test_networks_without_waves import FALLING, reducing, town
 
 import fvsolve
-from fvsolve.output.memory_sink import MemorySink
-from fvsolve.solve.solve import Run
+from fvsolve.core.output.memory_sink import MemorySink
+from fvsolve.core.solve.solve import Run
 
 OFTEN = """
 import sys
 from importlib import import_module
 import fvsolve
-from fvsolve.output.memory_sink import MemorySink
-from fvsolve.solve.solve import Run
-import_module("fvsolve.solve.solve").CHECKPOINT_SECONDS = 0.02
+from fvsolve.core.output.memory_sink import MemorySink
+from fvsolve.core.solve.solve import Run
+import_module("fvsolve.core.solve.solve").CHECKPOINT_SECONDS = 0.02
 print(fvsolve.run(sys.argv[1], out=sys.argv[2], resume=True, pictures=False).reason)
 """
 WORK = ("rhs", "ended", "seconds", "seconds_setup", "seconds_total", "cost")  # work of the run, not its results
@@ -160,7 +160,7 @@ def ends_at(end: float, **numerics) -> dict:
 def often(monkeypatch) -> None:
     """Runs of this process pause every 10 steps, and write a checkpoint at each pause."""
     for name, value in (("FIRST_CHUNK", 10.0), ("CHUNK_SECONDS", 1e-9), ("CHECKPOINT_SECONDS", 0.0)):
-        monkeypatch.setattr(import_module("fvsolve.solve.solve"), name, value)
+        monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), name, value)
 
 
 @pytest.mark.parametrize(
@@ -297,7 +297,7 @@ class Keeping(MemorySink):
     ids=["a frame at each step", "two frames in each step", "more rows in a step than are held"],
 )
 def test_a_run_whose_steps_all_write_pauses_and_goes_on_from_there(output, monkeypatch):
-    monkeypatch.setattr(import_module("fvsolve.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
+    monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
     case = branched()
     case["numerics"] = {"end": 2.0, "scheme": "upwind", "method": "implicit-midpoint", "step": 0.05}
     case["output"] |= output

@@ -8,10 +8,10 @@ from reference.scenes import scene, tank, valve
 
 import fvsolve
 from fvsolve import FvsolveError, advance, initial_state
-from fvsolve.assembly.features import with_slot
+from fvsolve.core.assembly.features import with_slot
+from fvsolve.core.solve.advance import observe
+from fvsolve.core.solve.held_inputs import hold
 from fvsolve.features.controls.kernels.tables import SLOT
-from fvsolve.solve.advance import observe
-from fvsolve.solve.held_inputs import hold
 
 ADAPTIVE = {"numerics.rtol": 1e-6}
 CASES = {

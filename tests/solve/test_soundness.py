@@ -18,14 +18,14 @@ from solve.test_threads import liquid
 
 import fvsolve
 from fvsolve.case.text import write
-from fvsolve.model import RunData
-from fvsolve.run import model_of
-from fvsolve.solve.run_checks import GROWTH_LIMIT, LEDGER_TOLERANCE, RunChecks, ledger_notices
-from fvsolve.solve.run_loop import MOST_EVENTS_IN_SPAN, SPAN, RunLoop
-from fvsolve.step_limits.advection_limit import advection_limit
-from fvsolve.step_limits.grid_limits import pipe_limit, plane_limit
-from fvsolve.step_limits.step_notices import step_limits
-from fvsolve.steppers.loop_records import GROWTH_CHECK_STEPS
+from fvsolve.core.model import RunData
+from fvsolve.core.run import model_of
+from fvsolve.core.solve.run_checks import GROWTH_LIMIT, LEDGER_TOLERANCE, RunChecks, ledger_notices
+from fvsolve.core.solve.run_loop import MOST_EVENTS_IN_SPAN, SPAN, RunLoop
+from fvsolve.core.step_limits.advection_limit import advection_limit
+from fvsolve.core.step_limits.grid_limits import pipe_limit, plane_limit
+from fvsolve.core.step_limits.step_notices import step_limits
+from fvsolve.core.steppers.loop_records import GROWTH_CHECK_STEPS
 from fvsolve.studies import scenarios, sweep
 
 MAIN = "cases/valve-closure.toml"

@@ -5,9 +5,9 @@ import pytest
 from reference.scenes import junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.run import model_of
-from fvsolve.step_limits.grid_limits import pipe_limit
-from fvsolve.step_limits.step_notices import first_step, steps_of
+from fvsolve.core.run import model_of
+from fvsolve.core.step_limits.grid_limits import pipe_limit
+from fvsolve.core.step_limits.step_notices import first_step, steps_of
 
 STEADY = {"model": "steady", "roughness": 0.26e-3}
 SPEED, LENGTH, CELLS = 1200.0, 900.0, 10

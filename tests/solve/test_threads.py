@@ -10,13 +10,13 @@ import pytest
 from reference.scenes import reservoir, scene
 
 import fvsolve
+from fvsolve.core.kernels import band_exchange
+from fvsolve.core.output.memory_sink import MemorySink
+from fvsolve.core.solve import initial_state
+from fvsolve.core.solve.partition import divisible_rows, single_thread_reason
+from fvsolve.core.solve.run_loop import RunLoop
+from fvsolve.core.solve.solve import Run
 from fvsolve.errors import FvsolveError
-from fvsolve.kernels import band_exchange
-from fvsolve.output.memory_sink import MemorySink
-from fvsolve.solve import initial_state
-from fvsolve.solve.partition import divisible_rows, single_thread_reason
-from fvsolve.solve.run_loop import RunLoop
-from fvsolve.solve.solve import Run
 
 VALVE = {"type": "valve", "from": "pool.near", "to": "river", "area": 0.05}
 PIPE = {"type": "pipe", "from": "pool.near", "to": "river", "length": 10.0, "diameter": 0.3, "cells": 5,
@@ -179,7 +179,7 @@ FORMED = ("muscl, ssp-rk2", "muscl, a limiter of its own, rk4", "upwind5, ssp-rk
 def test_stages_formed_beside_rates_have_the_bits_of_those_formed_after_all(name, cells, monkeypatch):
     """Blocked stages have the bits of whole stages, for several block sizes and numbers of threads."""
     bits, _ = told(SCENES[name], 1)
-    here = importlib.import_module("fvsolve.solve.partition")
+    here = importlib.import_module("fvsolve.core.solve.partition")
     monkeypatch.setattr(here, "LEAST_STATES", 0)
     monkeypatch.setattr(here, "CACHED_CELLS", cells)
     model = fvsolve.build(fvsolve.load(SCENES[name]))
@@ -272,7 +272,7 @@ def test_a_run_is_resumed_by_another_number_of_threads_to_the_same_bits(tmp_path
     whole = fvsolve.run(case, out=tmp_path / "whole", pictures=False)
     settings = {"CHECKPOINT_SECONDS": 0.0, "CHUNK_SECONDS": 0.0, "FIRST_CHUNK": 80.0}
     for name, value in settings.items():  # checkpoints after 80, 100, 110, ... steps
-        monkeypatch.setattr(importlib.import_module("fvsolve.solve.solve"), name, value)
+        monkeypatch.setattr(importlib.import_module("fvsolve.core.solve.solve"), name, value)
 
     def stop(t, seconds, steps):
         if t > 0.11:

@@ -7,11 +7,11 @@ import pytest
 from reference.scenes import NO_FRICTION, junction, lake, pipe, scene
 
 import fvsolve
-from fvsolve.schemes import SCHEMES, end_rate_factor
-from fvsolve.step_limits.advection_limit import advection_limit
-from fvsolve.step_limits.grid_limits import pipe_limit
-from fvsolve.step_limits.step_notices import step_limits
-from fvsolve.step_limits.symbol import WEIGHTS
+from fvsolve.core.schemes import SCHEMES, end_rate_factor
+from fvsolve.core.step_limits.advection_limit import advection_limit
+from fvsolve.core.step_limits.grid_limits import pipe_limit
+from fvsolve.core.step_limits.step_notices import step_limits
+from fvsolve.core.step_limits.symbol import WEIGHTS
 
 STAGES = {"ssp-rk3": 3, "rk4": 4}
 LENGTH, SPEED = 100.0, 1000.0

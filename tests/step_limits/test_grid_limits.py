@@ -13,8 +13,7 @@ from hypothesis_profiles import examples
 from reference import folders
 
 from fvsolve.cli import main
-from fvsolve.errors import FvsolveError
-from fvsolve.step_limits.advection_limit import (
+from fvsolve.core.step_limits.advection_limit import (
     advection_limit,
     advection_limits,
     growth_of,
@@ -22,9 +21,10 @@ from fvsolve.step_limits.advection_limit import (
     negative_point,
     polynomial_value,
 )
-from fvsolve.step_limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
-from fvsolve.steppers import METHODS, analyse, method_named
-from fvsolve.steppers.tableau import tableau
+from fvsolve.core.step_limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
+from fvsolve.core.steppers import METHODS, analyse, method_named
+from fvsolve.core.steppers.tableau import tableau
+from fvsolve.errors import FvsolveError
 
 EXPLICIT = [name for name, one in METHODS.items() if name == one.name and one.explicit]
 IMPLICIT = [name for name, one in METHODS.items() if name == one.name and not one.explicit]

@@ -14,11 +14,11 @@ from reference.scenes import AMBIENT, WATER, chamber, junction, lake, pipe, ramp
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.run import model_of
-from fvsolve.step_limits.growing_modes import lumped_modes
-from fvsolve.step_limits.step_notices import step_limits
-from fvsolve.steppers.analysis.stability_function import stability_function
-from fvsolve.steppers.tableau import method_named
+from fvsolve.core.run import model_of
+from fvsolve.core.step_limits.growing_modes import lumped_modes
+from fvsolve.core.step_limits.step_notices import step_limits
+from fvsolve.core.steppers.analysis.stability_function import stability_function
+from fvsolve.core.steppers.tableau import method_named
 
 EXACT = {"method": "rodas-5p", "rtol": 1e-8, "scheme": "upwind"}
 
@@ -339,7 +339,7 @@ def drawn(rng) -> tuple[dict, dict[str, float]]:
 def test_a_resumed_run_remembers_what_was_seen(tmp_path, monkeypatch):
     case = SWINGS["moved at the start"](method="rk4", step=2.0 / 20000, volume=0.002)
     unbroken = fvsolve.run(case)
-    monkeypatch.setattr(import_module("fvsolve.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
+    monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
 
     def enough(t, seconds, steps):
         if steps > 1000:  # after the first checkpoint

@@ -17,7 +17,7 @@ PROBE = f"""
 import json, sys, fvsolve
 result = fvsolve.run(json.load(sys.stdin))
 print(result.reason, [row["method"] for row in result.summary["methods"]])
-print([name for name in {IMPLICIT} if "fvsolve.steppers." + name in sys.modules])
+print([name for name in {IMPLICIT} if "fvsolve.core.steppers." + name in sys.modules])
 """
 
 

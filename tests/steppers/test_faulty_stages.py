@@ -8,12 +8,12 @@ import pytest
 from reference.scenes import junction, lake, scene, tank, valve
 
 import fvsolve
-from fvsolve.steppers import loop_records as rec
-from fvsolve.steppers import ode
-from fvsolve.steppers.coefficients import nodes_of
-from fvsolve.steppers.integrator import Integrator
-from fvsolve.steppers.run_handle import RHS
-from fvsolve.steppers.tableau import method_named
+from fvsolve.core.steppers import loop_records as rec
+from fvsolve.core.steppers import ode
+from fvsolve.core.steppers.coefficients import nodes_of
+from fvsolve.core.steppers.integrator import Integrator
+from fvsolve.core.steppers.run_handle import RHS
+from fvsolve.core.steppers.tableau import method_named
 
 FAULT_AT, FAULT, PLACE = 0.1, 2.0, 5.0  # time at which rates are not valid, their status and its place
 EXPLICIT = ["bogacki-shampine", "dormand-prince", "tsitouras", "verner-7"]

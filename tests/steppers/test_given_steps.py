@@ -6,7 +6,7 @@ from numba import njit
 from reference.scenes import WATER, junction, lake, pipe, ramp, reservoir, scene, step, tank, valve
 
 import fvsolve
-from fvsolve.steppers import integrate
+from fvsolve.core.steppers import integrate
 
 TABLE = {"name": "Water", "temperature": 293.15, "law": "table"}
 MIXTURE = {**WATER, "law": "mixture", "air_fraction": 1e-3}

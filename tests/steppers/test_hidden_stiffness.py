@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fvsolve.steppers import loop_records
-from fvsolve.steppers.hidden_stiffness import WINDOW, has_returned
+from fvsolve.core.steppers import loop_records
+from fvsolve.core.steppers.hidden_stiffness import WINDOW, has_returned
 
 A = np.array([
     [0, 0, 0, 0, 0, 0], [1 / 5, 0, 0, 0, 0, 0], [3 / 40, 9 / 40, 0, 0, 0, 0], [44 / 45, -56 / 15, 32 / 9, 0, 0, 0],

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array
 
+from fvsolve.core.steppers.linear_sparse import pairs
+from fvsolve.core.steppers.structure import Structure, differences, multiply
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.linear_sparse import pairs
-from fvsolve.steppers.structure import Structure, differences, multiply
 
 KINDS = ("dense", "banded", "sparse")
 

@@ -9,10 +9,10 @@ from reference.folders import CASES
 from reference.scenes import WATER, chamber, scene, valve
 
 import fvsolve
+from fvsolve.core.solve.run_loop import RunLoop
+from fvsolve.core.steppers import METHODS, integrate, loop_records
 from fvsolve.errors import FvsolveError
-from fvsolve.solve.run_loop import RunLoop
-from fvsolve.steppers import METHODS, integrate, loop_records
-from fvsolve.validation import valve_controlled_cylinder as cylinder
+from fvsolve.studies.validation import valve_controlled_cylinder as cylinder
 
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 IMPLICIT = [name for name in NAMES if not METHODS[name].explicit]

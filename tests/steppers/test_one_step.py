@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 
-from fvsolve.steppers import METHODS, analyse, integrate, method_named
-from fvsolve.steppers.implicit import Rosenbrock
+from fvsolve.core.steppers import METHODS, analyse, integrate, method_named
+from fvsolve.core.steppers.implicit import Rosenbrock
 
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 EXPLICIT = [name for name in NAMES if METHODS[name].explicit]

@@ -7,9 +7,9 @@ import pytest
 from reference.scenes import GRAVITY, area, chamber, reservoir, scene, tank, valve
 
 import fvsolve
+from fvsolve.core.steppers import METHODS, loop_records, ode
+from fvsolve.core.steppers.integrator import Integrator
 from fvsolve.jit import njit
-from fvsolve.steppers import METHODS, loop_records, ode
-from fvsolve.steppers.integrator import Integrator
 
 END, EVERY = 10.0, 0.0137  # no step divides the interval [s]
 WORSE = 10.0  # allowed error of rows over that of ends of steps

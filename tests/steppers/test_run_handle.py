@@ -7,10 +7,10 @@ import pytest
 from reference.folders import CASES
 
 import fvsolve
+from fvsolve.core.kernels.dtypes import RATE_UNWANTED
+from fvsolve.core.steppers import METHODS, loop_records, ode
+from fvsolve.core.steppers.integrator import Integrator
 from fvsolve.jit import COMPILING
-from fvsolve.kernels.dtypes import RATE_UNWANTED
-from fvsolve.steppers import METHODS, loop_records, ode
-from fvsolve.steppers.integrator import Integrator
 
 
 def decay(t, y):

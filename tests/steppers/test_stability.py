@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis_profiles import examples
 
+from fvsolve.core.steppers import METHODS, analyse, global_error, local_error, pade, seen_frequency, stability_function
+from fvsolve.core.steppers.analysis.stability_function import by_determinants, by_resolvent
+from fvsolve.core.steppers.numbers.polynomial import Polynomial, count_roots, first_sign_change, odd_part, roots_right
+from fvsolve.core.steppers.tableau import Method
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers import METHODS, analyse, global_error, local_error, pade, seen_frequency, stability_function
-from fvsolve.steppers.analysis.stability_function import by_determinants, by_resolvent
-from fvsolve.steppers.numbers.polynomial import Polynomial, count_roots, first_sign_change, odd_part, roots_right
-from fvsolve.steppers.tableau import Method
 
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 L_STABLE = {

@@ -7,8 +7,8 @@ import pytest
 from numba import njit
 
 import fvsolve
+from fvsolve.core.steppers import METHODS, analyse, integrate, seen_frequency
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers import METHODS, analyse, integrate, seen_frequency
 
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 ADAPTIVE = [name for name in NAMES if METHODS[name].adaptive]

@@ -8,9 +8,9 @@ import pytest
 from numba import njit
 from reference import folders
 
+from fvsolve.core.steppers import METHODS, analyse, integrate, ode
+from fvsolve.core.steppers.coefficients import coefficients, start_slope_correction
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers import METHODS, analyse, integrate, ode
-from fvsolve.steppers.coefficients import coefficients, start_slope_correction
 
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 EXPLICIT = [name for name in NAMES if METHODS[name].explicit]

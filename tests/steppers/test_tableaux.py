@@ -8,9 +8,9 @@ from math import cos, pi, sqrt
 import numpy as np
 import pytest
 
+from fvsolve.core.steppers.analysis.trees import Conditions, density, trees
+from fvsolve.core.steppers.tableau import METHODS, estimate_faults, method_named, tableau
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.analysis.trees import Conditions, density, trees
-from fvsolve.steppers.tableau import METHODS, estimate_faults, method_named, tableau
 
 # stages, order, order of the embedded solution and stage order of the sources
 PUBLISHED = {

@@ -7,7 +7,7 @@ from reference import scenes
 from reference.scenes import chamber, lake, reservoir, scene, tank, valve
 
 import fvsolve
-from fvsolve.steppers import integrate
+from fvsolve.core.steppers import integrate
 
 FULL = ["radau-iia-5", "radau-iia-9", "radau-iia-3", "lobatto-iiic-4"]
 DAMPING = ["implicit-euler", "alexander-3", "tr-bdf2", "esdirk-4", *FULL]  # L-stable methods

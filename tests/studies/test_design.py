@@ -13,8 +13,8 @@ from reference.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, 
 
 import fvsolve
 from fvsolve.case.text import write
+from fvsolve.core.output.summary_shape import HOLDS, OPEN, LimitVerdict
 from fvsolve.errors import CaseError, FvsolveError, RunError
-from fvsolve.output.summary_shape import HOLDS, OPEN, LimitVerdict
 from fvsolve.studies import optimise, scenarios
 from fvsolve.studies.sizing import SizeRun, SizeSearch, parse_range, parse_ties, size, size_run
 

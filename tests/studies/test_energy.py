@@ -26,8 +26,8 @@ from reference.scenes import (
 from scipy.stats import binom
 
 import fvsolve
+from fvsolve.core.steppers import METHODS
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers import METHODS
 from fvsolve.studies.energy_balance import energy, measure_pairs
 
 BETA = WATER["bulk_modulus"]
@@ -213,7 +213,7 @@ def test_a_shaped_tank_stores_the_moment_of_its_areas():
 
 def test_a_leak_planted_in_the_ledger_is_found(monkeypatch):
     """The energy of a valve that is missing in the accounts is the remainder."""
-    from fvsolve.model import energy_accounts
+    from fvsolve.core.model import energy_accounts
 
     case = slope_scene({"scheme": "upwind5", "method": "rk4", "courant": 0.8})
     honest = energy(case).dissipated["tap"][-1]

@@ -25,11 +25,11 @@ from reference.scenes import (
 from scipy.linalg import expm, matrix_balance
 
 import fvsolve
+from fvsolve.core.model.energy_norm import energy_form
+from fvsolve.core.solve import initial_state
+from fvsolve.core.solve.advance import advance
+from fvsolve.core.solve.held_inputs import hold
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.model.energy_norm import energy_form
-from fvsolve.solve import initial_state
-from fvsolve.solve.advance import advance
-from fvsolve.solve.held_inputs import hold
 from fvsolve.studies import operating_point, work_limit
 from fvsolve.studies.linearise import eigenvalues_near, find_eigenvalues, linearise, linearise_at, poles_of
 from fvsolve.studies.ports.response import response
@@ -463,7 +463,7 @@ def test_a_sparse_matrix_goes_to_a_file_of_its_own_name(tmp_path):
 
 
 def test_a_train_too_long_for_its_energy_norm_is_refused(monkeypatch):
-    from fvsolve.model import energy_norm
+    from fvsolve.core.model import energy_norm
 
     monkeypatch.setattr(energy_norm, "MAX_GROUP", 1)
     with pytest.raises(FvsolveError, match="2 positions are joined by springs"):

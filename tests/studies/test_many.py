@@ -14,9 +14,9 @@ import pytest
 from reference.scenes import NO_FRICTION, junction, pipe, reservoir, scene, valve
 
 from fvsolve.case.text import write
+from fvsolve.core.output.summary_file import plain
+from fvsolve.core.steppers.tableau import tableau
 from fvsolve.errors import FvsolveError, RunError
-from fvsolve.output.summary_file import plain
-from fvsolve.steppers.tableau import tableau
 from fvsolve.studies import chart, failure_map, order, stability
 from fvsolve.studies import parallel as engine
 from fvsolve.studies.parallel import TaskPool, next_chunk_size

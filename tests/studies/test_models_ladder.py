@@ -216,7 +216,7 @@ def test_ctrl_c_during_a_rung_ends_the_ladder(tmp_path):
     script = """if True:
         import os, signal, sys
         from fvsolve.cli import main
-        from fvsolve.solve.solve import Run
+        from fvsolve.core.solve.solve import Run
         Run.pause = lambda self: os.kill(os.getpid(), signal.SIGINT)  # after 1000 steps
         main()"""
     command = [sys.executable, "-c", script, "chart", "line.toml", "--models"]

@@ -9,8 +9,8 @@ from pytest import approx
 from reference import pulses, scenes
 
 from fvsolve.case import load
+from fvsolve.core.output.summary_file import plain
 from fvsolve.errors import FvsolveError
-from fvsolve.output.summary_file import plain
 from fvsolve.studies import fit, order
 from fvsolve.studies.distance import cell_averages, end_probes, error_norms, recording_keys
 from fvsolve.studies.outcome import outcome

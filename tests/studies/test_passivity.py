@@ -52,7 +52,7 @@ def test_algebraically_stable_methods_are_passive_in_any_network(name):
 @pytest.mark.parametrize("name", NEVER)
 def test_other_methods_create_energy_in_a_chamber_by_some_flow(name):
     """The worst eigenvector is the flow q at the stage times, and the method integrates y' = q(t)."""
-    from fvsolve.steppers import method_named
+    from fvsolve.core.steppers import method_named
 
     claim, method = method_claim(name), method_named(name)
     assert not claim.any_network
@@ -131,7 +131,7 @@ def pipe_model(scheme: str, method: str, courant: float, steps: int = 1):
 
 def worst_state(scheme: str, method: str, courant: float) -> np.ndarray:
     """State whose energy a step increases most."""
-    from fvsolve.steppers import method_named, stability_function
+    from fvsolve.core.steppers import method_named, stability_function
 
     a, s = closed_pipe(scheme)
     b = courant * study.pipe_operator(scheme)

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from fvsolve.assembly.scheme_codes import CODES
-from fvsolve.kernels.reconstruction import limited
-from fvsolve.schemes import LIMITERS, branches
-from fvsolve.step_limits.advection_limit import advection_limit
-from fvsolve.step_limits.symbol import WEIGHTS, weights_of
-from fvsolve.steppers import METHODS
+from fvsolve.core.assembly.scheme_codes import CODES
+from fvsolve.core.kernels.reconstruction import limited
+from fvsolve.core.schemes import LIMITERS, branches
+from fvsolve.core.step_limits.advection_limit import advection_limit
+from fvsolve.core.step_limits.symbol import WEIGHTS, weights_of
+from fvsolve.core.steppers import METHODS
 from fvsolve.studies.stability.periodic_limits import (
     PeriodicPipe,
     limited_limit,

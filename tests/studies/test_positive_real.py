@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from hypothesis_profiles import examples
 from pytest import approx
 
+from fvsolve.core.steppers.numbers.polynomial import Polynomial
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.numbers.polynomial import Polynomial
 from fvsolve.studies import positive_real
 from fvsolve.studies.ports.positive_real import locate_roots
 

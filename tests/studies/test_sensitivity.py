@@ -72,7 +72,7 @@ def test_of_joukowskys_rise_speed_and_opening_have_the_shares_that_a_product_has
 
 def test_no_label_of_its_picture_covers_another_or_leaves_it():
     """Long keys with equal ends, and numbers of six digits."""
-    from fvsolve.draw.object_pictures import sensitivity_figure
+    from fvsolve.report.draw.object_pictures import sensitivity_figure
 
     keys = tuple(f"links.a-rather-long-name-{k}.opening.duration" for k in range(4))
     shares, effects = [0.1] * 4, [3e5, 2.96e5, 6e4, 4e3]

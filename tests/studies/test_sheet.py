@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.output.summary_file import plain
+from fvsolve.core.output.summary_file import plain
 from fvsolve.studies.result_table import Column, PlainData, ResultTable, cell_text, columns
 
 COLUMNS = (Column("name"), Column("step", "step [s]", ".3g"), Column("whole", words=lambda row: f"<{row['name']}>"))

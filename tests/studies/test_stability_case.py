@@ -13,10 +13,10 @@ from scipy.optimize import brentq
 
 import fvsolve
 from fvsolve import build, load, studies
+from fvsolve.core.model.energy_norm import energy_form
+from fvsolve.core.steppers import METHODS, method_named, stability_function
 from fvsolve.errors import FvsolveError
 from fvsolve.features.delay_lines.feature import history_of
-from fvsolve.model.energy_norm import energy_form
-from fvsolve.steppers import METHODS, method_named, stability_function
 from fvsolve.studies import work_limit
 from fvsolve.studies.linearise import linearise, linearise_at
 from fvsolve.studies.operating_point import operating_point, with_held_schedules

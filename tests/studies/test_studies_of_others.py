@@ -59,7 +59,7 @@ def test_each_header_of_the_package_is_a_public_name_of_its_module():
     assert count == len(found) == 32
 
 
-PATTERNS = ("studies/**/*.py", "step_limits/*.py")
+PATTERNS = ("studies/**/*.py", "core/step_limits/*.py")
 
 
 def test_a_study_is_imported_alone():

@@ -18,8 +18,8 @@ import fvsolve
 from fvsolve.case.text import write
 from fvsolve.cli.app import value_of
 from fvsolve.cli.sweep import split_list
-from fvsolve.draw.object_pictures import quantity_figure
 from fvsolve.errors import CaseError, FvsolveError, RunError
+from fvsolve.report.draw.object_pictures import quantity_figure
 from fvsolve.studies import sweep
 from fvsolve.studies.sampling import key_ranges, points_from_file, sample_points
 from fvsolve.studies.sweep import Sweep, as_option_text
@@ -98,7 +98,7 @@ def test_ctrl_c_during_a_run_keeps_the_rows_that_are_finished(line, tmp_path):
     script = """if True:
         import os, signal, sys
         from fvsolve.cli import main
-        from fvsolve.solve.solve import Run
+        from fvsolve.core.solve.solve import Run
         Run.pause = lambda self: os.kill(os.getpid(), signal.SIGINT)  # after 1000 steps
         main()"""
     command = [sys.executable, "-c", script, "sweep", "line.toml", "--set", "numerics.end=0.5,2000,0.4", "--out", "o"]

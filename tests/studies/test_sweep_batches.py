@@ -8,8 +8,8 @@ import pytest
 from reference.scenes import junction, pipe, reservoir, scene, valve
 
 from fvsolve.case import load
+from fvsolve.core.run import model_of
 from fvsolve.errors import Notice
-from fvsolve.run import model_of
 from fvsolve.studies import sweep, sweep_batches
 from fvsolve.studies.sweep_batches import BatchedRows
 from fvsolve.studies.sweep_row import RowMaker

@@ -140,7 +140,7 @@ def epanet_quality(text: str, kind: str, folder: Path):
 def test_age_and_trace_of_net1_are_those_of_epanet(kind, source, unit, tmp_path):
     """Over a day: means over time within 0.02 h and 0.3 %; a front may pass a step earlier or later."""
     wntr = pytest.importorskip("wntr", reason="WNTR, the extra `epanet`, is not installed")
-    from fvsolve.epanet import import_network
+    from fvsolve.exchange.epanet import import_network
 
     path = Path(wntr.__file__).parent / "library" / "networks" / "Net1.inp"
     (tmp_path / "day.toml").write_text(import_network(path, day=True).text)

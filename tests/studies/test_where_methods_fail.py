@@ -21,8 +21,8 @@ from studies.test_where_methods_fail_in_pipes import LENGTH, SPEED, courant_limi
 import fvsolve
 from fvsolve.case import load
 from fvsolve.cli.app import load_case
+from fvsolve.core.steppers import analyse, method_named, seen_frequency, stability_function
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers import analyse, method_named, seen_frequency, stability_function
 from fvsolve.studies.failure_map import run_recorded
 from fvsolve.studies.outcome import outcome, study_model
 

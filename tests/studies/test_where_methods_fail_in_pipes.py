@@ -23,12 +23,12 @@ from reference.scenes import (
 )  # fmt: skip
 
 import fvsolve
-from fvsolve.assembly.scheme_codes import CODES
 from fvsolve.case import load
-from fvsolve.kernels.reconstruction import limited
-from fvsolve.model.energy_norm import energy_weights
-from fvsolve.step_limits.step_notices import step_limits
-from fvsolve.steppers import analyse, method_named, stability_function
+from fvsolve.core.assembly.scheme_codes import CODES
+from fvsolve.core.kernels.reconstruction import limited
+from fvsolve.core.model.energy_norm import energy_weights
+from fvsolve.core.step_limits.step_notices import step_limits
+from fvsolve.core.steppers import analyse, method_named, stability_function
 from fvsolve.studies.outcome import outcome, study_model
 
 LENGTH, DIAMETER, SPEED = 100.0, 0.3, 1000.0

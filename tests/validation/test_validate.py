@@ -14,9 +14,9 @@ import fvsolve
 from fvsolve.case.reading import read_raw
 from fvsolve.cli import main
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.validation import data_files, library
-from fvsolve.validation.row_texts import limits_of
-from fvsolve.validation.row_verdicts import DIFFERS, OUTSIDE, WITHIN
+from fvsolve.studies.validation import data_files, library
+from fvsolve.studies.validation.row_texts import limits_of
+from fvsolve.studies.validation.row_verdicts import DIFFERS, OUTSIDE, WITHIN
 
 DATA = Path(os.environ.get("FVSOLVE_DATA") or Path(__file__).parents[3] / "shared" / "data")  # measured data, if here
 LEVEL = 1.0 + 0.2 / math.pi  # of the tank after 10 s: 0.02 m3/s sin(pi t / 10 s) over 2 m2, with a mean of 2 / pi

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from fvsolve.assembly.features import with_slot
-from fvsolve.assembly.schedule_tables import value_at
 from fvsolve.case.case_notices import unread_text
+from fvsolve.core.assembly.features import with_slot
+from fvsolve.core.assembly.schedule_tables import value_at
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.errors import Notice, listing
 from fvsolve.features.controls.kernels.tables import SLOT
 from fvsolve.features.controls.rows import BlockStart, StaticRows, control_rows_of, small_change
-from fvsolve.kernels import dtypes as rec
 from fvsolve.units import show
 
 TURNS = 30  # Newton iterations of the balance
@@ -339,7 +339,9 @@ def sensor_values(model, t: float, with_rates: bool = True) -> tuple[np.ndarray,
     The rate is the sum over the states that a sensor reads of slope times rate, so that it is exactly zero at rest. It
     is left at zero for a sensor of many states, which the steady start determines, and without `with_rates`.
     """
-    from fvsolve.model.jacobian_pattern import Couplings  # it imports SciPy, which a run without controls does not need
+    from fvsolve.core.model.jacobian_pattern import (
+        Couplings,  # it imports SciPy, which a run without controls does not need
+    )
 
     sensors = with_slot(model.features, SLOT).sensor_table
     with model.run_data() as data:

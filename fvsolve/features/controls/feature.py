@@ -9,16 +9,16 @@ from importlib import import_module
 
 import numpy as np
 
-from fvsolve.assembly.features import Feature, FeatureRun, with_slot
-from fvsolve.assembly.lowering import Input, InputKind
 from fvsolve.case.controls import decision_order
+from fvsolve.core.assembly.features import Feature, FeatureRun, with_slot
+from fvsolve.core.assembly.lowering import Input, InputKind
+from fvsolve.core.kernels import calls
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.kernels.rhs_assembly import RhsTerms
 from fvsolve.features.controls import histories, lower
 from fvsolve.features.controls.kernels import input_histories, tables
 from fvsolve.features.controls.kernels.tables import BLOCK_SETTINGS, BLOCK_VALUE, CONTROL, DRIVEN, HOOKS, SLOT
 from fvsolve.features.controls.rows import small_change
-from fvsolve.kernels import calls
-from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.rhs_assembly import RhsTerms
 from fvsolve.parts.schedule import BLOCK_PREFIX
 from fvsolve.units import DIMENSIONS
 
@@ -208,7 +208,7 @@ class ControlRun(FeatureRun):
         self.histories = np.zeros(histories.histories_size(feature.table))
         self.readings, self.sensing = np.zeros(len(feature.sensor_table)), np.zeros(0, dtype=np.int64)
         if self.readings.size:
-            from fvsolve.kernels.table_handle import empty_handle
+            from fvsolve.core.kernels.table_handle import empty_handle
 
             self.sensing = empty_handle()
         histories.reset_histories(self.histories, feature.table)

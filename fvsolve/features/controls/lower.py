@@ -13,10 +13,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from fvsolve.case.controls import Block
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.model.probe_tables import fill_probes
 from fvsolve.features.controls.kernels.tables import CONTROL, DRIVEN, DRIVEN_DEVICE, DRIVEN_NODE, DRIVEN_VALVE
 from fvsolve.features.controls.rows import control_rows_of, small_change
-from fvsolve.kernels import dtypes as rec
-from fvsolve.model.probe_tables import fill_probes
 
 STATE_KINDS = (rec.LEVEL, rec.POSITION, rec.VELOCITY, rec.PISTON_POSITION, rec.PISTON_VELOCITY)
 STORED = (rec.FIXED, rec.TANK, rec.CHAMBER, rec.MOVING, rec.VESSEL)

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fvsolve.assembly.features import FeaturePattern
-from fvsolve.kernels import dtypes as rec
-from fvsolve.model.state_pairs import pairs_of, unique_states
+from fvsolve.core.assembly.features import FeaturePattern
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.model.state_pairs import pairs_of, unique_states
 
 
 class BlockCouplings(FeaturePattern):

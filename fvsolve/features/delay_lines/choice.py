@@ -4,8 +4,8 @@ import math
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from fvsolve.steppers import automatic
-from fvsolve.steppers.tableau import AUTO, method_named
+from fvsolve.core.steppers import automatic
+from fvsolve.core.steppers.tableau import AUTO, method_named
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from fvsolve.assembly.features import Feature, FeatureRun, with_slot
+from fvsolve.core.assembly.features import Feature, FeatureRun, with_slot
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.kernels.rhs_assembly import RhsTerms
+from fvsolve.core.steppers import automatic
+from fvsolve.core.steppers.tableau import method_named
 from fvsolve.features.delay_lines import choice, history, lower
 from fvsolve.features.delay_lines.kernels import wave_history
 from fvsolve.features.delay_lines.kernels.tables import DELAY, LINE_SETTINGS, SLOT, LineTables
-from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.rhs_assembly import RhsTerms
-from fvsolve.steppers import automatic
-from fvsolve.steppers.tableau import method_named
 
 TERMS = RhsTerms(
     outgoing_waves="line_rates: outgoing_line_waves",
@@ -121,8 +121,8 @@ class DelayLines(Feature, slot=0, wakes="pipe_model delay-line, pipe_model auto"
     def step_notices(self, model, method) -> list:
         if not len(self.delays):
             return []
+        from fvsolve.core.step_limits.step_notices import given_step, span
         from fvsolve.features.delay_lines.growth import line_growth_notices
-        from fvsolve.step_limits.step_notices import given_step, span
 
         return line_growth_notices(model, method, given_step(model), span(model))
 
@@ -145,7 +145,7 @@ class LineRun(FeatureRun):
         self.past = np.zeros(history.history_size(self.delays))
         self.sharp = np.zeros(0, dtype=np.int64)
         if len(self.delays):
-            from fvsolve.kernels.table_handle import empty_handle
+            from fvsolve.core.kernels.table_handle import empty_handle
 
             self.sharp = empty_handle()
         history.begin_history(self.past, self.delays)

@@ -10,14 +10,14 @@ of the step: there waves grow, unless friction or the interpolation between step
 
 import numpy as np
 
-from fvsolve.assembly.features import with_slot
+from fvsolve.core.assembly.features import with_slot
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.step_limits.growing_modes import LEAST_GROWTH, growth_factor
+from fvsolve.core.steppers.tableau import Method
 from fvsolve.errors import Notice
 from fvsolve.features.delay_lines.kernels.line_rates import drag_and_slope
 from fvsolve.features.delay_lines.kernels.tables import SLOT
 from fvsolve.features.delay_lines.kernels.wave_history import lagrange_four, lagrange_six, lagrange_three
-from fvsolve.kernels import dtypes as rec
-from fvsolve.step_limits.growing_modes import LEAST_GROWTH, growth_factor
-from fvsolve.steppers.tableau import Method
 
 REFLECTION_BOUND = 4.0  # times a: upper bound of what a method adds to a wave in a single reflection
 RK4_BOUND = 1.5  # value of a up to which rk4 does not amplify reflected waves

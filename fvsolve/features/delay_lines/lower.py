@@ -11,13 +11,13 @@ import math
 
 import numpy as np
 
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.kernels.schedule_pieces import POWER, WAVE
+from fvsolve.core.model.cluster_tables import classify_nodes
 from fvsolve.errors import Notice
 from fvsolve.features.delay_lines.history import set_rings
 from fvsolve.features.delay_lines.kernels.line_rates import drag_and_slope
 from fvsolve.features.delay_lines.kernels.tables import DELAY
-from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.schedule_pieces import POWER, WAVE
-from fvsolve.model.cluster_tables import classify_nodes
 
 FRICTION_PRESSURE = 0.02 * 1e5  # pressure [Pa] whose flow is added to that of the start to evaluate friction
 UNBALANCED_SHARE = 1e-9  # relative to the wave of 1 bar: pressure drop that friction does not balance

@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.features.scalars.lower import STORES, wall_masses
 from fvsolve.features.scalars.reactions import reacting
-from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.heat import exchanger_names
 
 

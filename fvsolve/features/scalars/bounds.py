@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from fvsolve.core.model.state_bounds import NO_STATE, bound_rows
 from fvsolve.features.scalars.lower import STORES, wall_masses
-from fvsolve.model.state_bounds import NO_STATE, bound_rows
 
 
 def scalar_bounds(model, q: int):

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fvsolve.assembly.features import Feature, FeatureRun
-from fvsolve.assembly.lowering import lowering_of
-from fvsolve.assembly.scheme_codes import lower_position
+from fvsolve.core.assembly.features import Feature, FeatureRun
+from fvsolve.core.assembly.lowering import lowering_of
+from fvsolve.core.assembly.scheme_codes import lower_position
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.kernels.rhs_assembly import MIXED, RhsTerms
+from fvsolve.core.model.probe_tables import cells_at_point, fill_probes
 from fvsolve.features.scalars import lower, reactions
-from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.rhs_assembly import MIXED, RhsTerms
-from fvsolve.model.probe_tables import cells_at_point, fill_probes
 from fvsolve.parts.nodes_and_links import is_in_network
 
 REACTION_QUANTITIES = ("rate", "power", "affinity")  # in the order of `kernels.dtypes`

@@ -5,16 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.assembly.lowering import rows_in
 from fvsolve.case.chainage import pieces_of
+from fvsolve.core.assembly.lowering import rows_in
+from fvsolve.core.kernels import calls
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.steppers.tableau import METHODS
 from fvsolve.errors import Notice
 from fvsolve.features.scalars.reactions import reacting
-from fvsolve.kernels import calls
-from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.carried_scalar import molar_factor
 from fvsolve.parts.formula import means, samples
 from fvsolve.parts.heat import exchanger_names
-from fvsolve.steppers.tableau import METHODS
 from fvsolve.units import show
 
 STORES = (rec.TANK, rec.CHAMBER)

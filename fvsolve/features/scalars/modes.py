@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fvsolve.step_limits.growing_modes import PHASES, Modes
+from fvsolve.core.step_limits.growing_modes import PHASES, Modes
 
 DIFFUSION = 1.0 - np.cos(PHASES)  # diffusion rate of a wave, relative to 2 D / dx^2
 LEAST_DIFFUSION_CELLS = 3  # least number of cells of a basin for diffusion modes

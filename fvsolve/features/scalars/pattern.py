@@ -5,15 +5,15 @@ from functools import cached_property
 
 import numpy as np
 
-from fvsolve.assembly.features import FeaturePattern
-from fvsolve.basins import lower_pattern as pattern
+from fvsolve.core.assembly.features import FeaturePattern
+from fvsolve.core.basins import lower_pattern as pattern
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.kernels.pipe_energy import MAX_WIDTH
+from fvsolve.core.model.jacobian_pattern import Pairs, ends_of
+from fvsolve.core.model.state_pairs import pairs_of, unique_states
+from fvsolve.core.steady import union
 from fvsolve.features.scalars.lower import STORES
 from fvsolve.features.scalars.reactions import names_read
-from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.pipe_energy import MAX_WIDTH
-from fvsolve.model.jacobian_pattern import Pairs, ends_of
-from fvsolve.model.state_pairs import pairs_of, unique_states
-from fvsolve.steady import union
 
 LIMITER_CELLS = 2  # cells that a limited value at a face reads on each side; at an end of a pipe, 1 more
 

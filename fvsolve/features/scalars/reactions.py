@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.kernels.formula_programs import INPUT
+from fvsolve.core.steppers.tableau import AUTO, METHODS
 from fvsolve.errors import listing
-from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.formula_programs import INPUT
 from fvsolve.parts.carried_scalar import molar_factor
 from fvsolve.parts.formula import means, samples
-from fvsolve.steppers.tableau import AUTO, METHODS
 
 if TYPE_CHECKING:
     from fvsolve.parts.reaction import Reaction

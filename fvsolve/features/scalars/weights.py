@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.model.energy_norm import SCALAR_WEIGHT
 from fvsolve.features.scalars.lower import typical_value
-from fvsolve.kernels import dtypes as rec
-from fvsolve.model.energy_norm import SCALAR_WEIGHT
 
 
 def weigh_scalars(model, weights: np.ndarray) -> None:

@@ -10,10 +10,10 @@ is that of a small chamber.
 
 from math import exp, expm1, log, log1p
 
+from fvsolve.core.kernels.density import density, log_density, pressure_of_log
+from fvsolve.core.kernels.dtypes import LAW_LINEAR
+from fvsolve.core.kernels.network_energy import height_pressure, vessel_energy, vessel_power
 from fvsolve.jit import njit
-from fvsolve.kernels.density import density, log_density, pressure_of_log
-from fvsolve.kernels.dtypes import LAW_LINEAR
-from fvsolve.kernels.network_energy import height_pressure, vessel_energy, vessel_power
 
 # Indices into the numbers of an accumulator
 EXPONENT, GAS_VOLUME, TOTAL_VOLUME, NECK_STIFFNESS, EMPTY_MASS, EMPTY_PRESSURE = 0, 1, 2, 3, 4, 5

@@ -17,12 +17,12 @@ integral over d. Then the volume is V = R^3 cot(slope) (T(d) - T(d')), and dV/dz
 
 from math import acos, cos, exp, expm1, log, log1p, pi, sin, sqrt
 
+from fvsolve.core.kernels.density import density, enthalpy, log_density, pressure_of_enthalpy
+from fvsolve.core.kernels.dtypes import LAW_LINEAR
+from fvsolve.core.kernels.network_energy import height_pressure, level_moment, vessel_energy, vessel_power
+from fvsolve.core.kernels.self_acting_valves import event_pair
+from fvsolve.core.kernels.tanks import level_of_volume
 from fvsolve.jit import njit
-from fvsolve.kernels.density import density, enthalpy, log_density, pressure_of_enthalpy
-from fvsolve.kernels.dtypes import LAW_LINEAR
-from fvsolve.kernels.network_energy import height_pressure, level_moment, vessel_energy, vessel_power
-from fvsolve.kernels.self_acting_valves import event_pair
-from fvsolve.kernels.tanks import level_of_volume
 from fvsolve.parts.accumulator.law import EMPTY_MASS, EXPONENT, GAS_VOLUME, TOTAL_VOLUME, gas_energy
 from fvsolve.parts.accumulator.law import NUMBER_COUNT as SHAPED
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from fvsolve.assembly.lowering import Device
+from fvsolve.core.assembly.lowering import Device
 from fvsolve.errors import Notice
 from fvsolve.parts.accumulator import law, law_vessel
 from fvsolve.parts.accumulator.part import UPRIGHT, height_of, length_of
@@ -159,7 +159,7 @@ class AccumulatorRows(Device, kind="accumulator"):
         It is the stored energy at the start minus the least stored energy. In the state of least energy, the energy per
         mass of the fluid at the node (`energy_head`) is 0, or no fluid is left.
         """
-        from fvsolve.kernels.network_energy import energy_head
+        from fvsolve.core.kernels.network_energy import energy_head
 
         st, floats = model.tables.settings[0], model.tables.floats
         node, at = model.tables.nodes[row["node"]], int(row["data"])

@@ -17,12 +17,12 @@ square of the mass flow is linear in the pressure difference, as in an orifice; 
 
 from math import expm1, log1p, sqrt
 
+from fvsolve.core.kernels.density import enthalpy, pressure_of_enthalpy
+from fvsolve.core.kernels.dtypes import LAW_LINEAR, RATE, RATE_UNWANTED
+from fvsolve.core.kernels.network_energy import vessel_power
+from fvsolve.core.kernels.restrictions import flow_at_drop, restriction_slope
+from fvsolve.core.kernels.self_acting_valves import event_pair
 from fvsolve.jit import njit
-from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
-from fvsolve.kernels.dtypes import LAW_LINEAR, RATE, RATE_UNWANTED
-from fvsolve.kernels.network_energy import vessel_power
-from fvsolve.kernels.restrictions import flow_at_drop, restriction_slope
-from fvsolve.kernels.self_acting_valves import event_pair
 
 VOLUME, AIR_MASS, RT, INLET_AREA, OUTLET_AREA, SWITCH_PRESSURE, THROTTLED_AREA, SWITCH_FLOW = 0, 1, 2, 3, 4, 5, 6, 7
 INLET_TABLE, OUTLET_TABLE, THROTTLED_TABLE, OWN_NUMBERS = 8, 9, 10, 11

@@ -2,7 +2,7 @@
 
 import math
 
-from fvsolve.assembly.lowering import Device
+from fvsolve.core.assembly.lowering import Device
 from fvsolve.errors import Notice
 from fvsolve.parts.air_valve import law
 from fvsolve.parts.air_valve.part import AirFlow

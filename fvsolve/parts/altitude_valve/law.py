@@ -6,11 +6,11 @@ only. `floats` holds both levels of the tank, and the differential between shutt
 
 from math import sqrt
 
+from fvsolve.core.kernels.dtypes import LAW_LINEAR
+from fvsolve.core.kernels.restrictions import head_drop
+from fvsolve.core.kernels.self_acting_valves import event_pair
+from fvsolve.core.kernels.tanks import tank_level
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import LAW_LINEAR
-from fvsolve.kernels.restrictions import head_drop
-from fvsolve.kernels.self_acting_valves import event_pair
-from fvsolve.kernels.tanks import tank_level
 
 FULL, EMPTY = 0, 2  # offsets of event flags
 MARGIN = 1.0  # drop in the allowed direction at which it opens, so that rounding does not [Pa]

@@ -1,6 +1,6 @@
 """Altitude valves in the tables of a model."""
 
-from fvsolve.assembly.lowering import Device
+from fvsolve.core.assembly.lowering import Device
 
 from . import law
 

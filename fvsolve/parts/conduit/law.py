@@ -11,10 +11,10 @@ and the row of its patch.
 
 from math import sqrt
 
+from fvsolve.core.kernels.dtypes import FIRM
+from fvsolve.core.kernels.isolated_nodes import inner_row
+from fvsolve.core.kernels.structures import FACE_SHARE, least_slope
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import FIRM
-from fvsolve.kernels.isolated_nodes import inner_row
-from fvsolve.kernels.structures import FACE_SHARE, least_slope
 from fvsolve.parts.conduit.law_section import SlottedSection, celerity, riemann_function, section_at_depth
 
 NUMBERS = len(SlottedSection._fields)  # of a section

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fvsolve.core.kernels.cube_root import cube_root_reciprocal
 from fvsolve.jit import njit
-from fvsolve.kernels.cube_root import cube_root_reciprocal
 
 TERMS = 24  # of each polynomial, with an error of rounding
 HALF_SQUARE = 0.5 ** (2.0 / 3.0)  # s^2 of the half full section

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from fvsolve.assembly.lowering import Lowering, Restriction
-from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.structures import FACE_SHARE
+from fvsolve.core.assembly.lowering import Lowering, Restriction
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.kernels.structures import FACE_SHARE
 
 from . import law
 from .law_section import section_of

@@ -13,10 +13,10 @@ both headwaters the flow is interpolated.
 
 from math import acos, sin, sqrt
 
+from fvsolve.core.kernels import structures
+from fvsolve.core.kernels.restrictions import head_drop
+from fvsolve.core.kernels.structures import DROWNED, FREE, LINEAR_FALL, NONE, higher_level
 from fvsolve.jit import njit, specialise
-from fvsolve.kernels import structures
-from fvsolve.kernels.restrictions import head_drop
-from fvsolve.kernels.structures import DROWNED, FREE, LINEAR_FALL, NONE, higher_level
 
 # Numbers: constants of the inlet, with Ks; width (0 for a circle) and height of the barrel, its full area; gravity;
 # sum of loss coefficients; 19.63 n^2 L [m^(4/3)]; number of open barrels; length; inverts at `from` and `to`; flows at

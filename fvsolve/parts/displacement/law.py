@@ -10,14 +10,14 @@ margin.
 
 from math import copysign, sqrt
 
+from fvsolve.core.kernels.density import density
+from fvsolve.core.kernels.dtypes import LAW_LINEAR, RATE, RATE_UNWANTED
+from fvsolve.core.kernels.network_balance import node_impedance, stiffness_of
+from fvsolve.core.kernels.potential_networks import known_potential
+from fvsolve.core.kernels.restrictions import head_drop, valve_driving_pressure
+from fvsolve.core.kernels.schedule_pieces import schedule_value
+from fvsolve.core.kernels.self_acting_valves import event_pair
 from fvsolve.jit import njit
-from fvsolve.kernels.density import density
-from fvsolve.kernels.dtypes import LAW_LINEAR, RATE, RATE_UNWANTED
-from fvsolve.kernels.network_balance import node_impedance, stiffness_of
-from fvsolve.kernels.potential_networks import known_potential
-from fvsolve.kernels.restrictions import head_drop, valve_driving_pressure
-from fvsolve.kernels.schedule_pieces import schedule_value
-from fvsolve.kernels.self_acting_valves import event_pair
 
 # Numbers: displacement [m3/rad], leakage [m3/s/Pa], viscous friction [N m s/rad], dry friction [N m]; row of the speed
 # in the network, -1 for a scheduled speed; rate of the shaft per torque [1/kg/m2]; lag of the setting [s], 0 for none;

@@ -5,14 +5,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from fvsolve.assembly.lowering import ANGULAR_SPEED, POSITION, Device, Input
-from fvsolve.assembly.network_elements import FLOW, Element, fill_network_probe, node_or_reference
-from fvsolve.kernels import dtypes as rec
+from fvsolve.core.assembly.lowering import ANGULAR_SPEED, POSITION, Device, Input
+from fvsolve.core.assembly.network_elements import FLOW, Element, fill_network_probe, node_or_reference
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.steady import Edge
 from fvsolve.parts.displacement import law
 from fvsolve.parts.displacement.part import LAG
 from fvsolve.parts.network_parts import dry_friction
 from fvsolve.parts.rotation import resistances
-from fvsolve.steady import Edge
 
 SPEED, PRESSURE = 100.0, 1e5  # sizes of speeds [rad/s], where nothing states one, and of pressure drops [Pa]
 FULL, REGULATING, NONE = "full", "regulating", "none"  # modes of a compensator in the steady start

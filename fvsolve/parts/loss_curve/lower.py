@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fvsolve.assembly.lowering import Restriction
+from fvsolve.core.assembly.lowering import Restriction
 
 from . import law
 

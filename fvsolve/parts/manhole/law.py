@@ -6,9 +6,9 @@ Sources: Rubinato, Lee, Martins, Shucksmith 2018 (doi 10.1007/s11269-018-1971-z)
 
 from math import sqrt
 
+from fvsolve.core.kernels import structures
+from fvsolve.core.kernels.structures import DROWNED, FREE, LINEAR_FALL, NONE, weir_flow
 from fvsolve.jit import njit, specialise
-from fvsolve.kernels import structures
-from fvsolve.kernels.structures import DROWNED, FREE, LINEAR_FALL, NONE, weir_flow
 
 # Numbers: height [m], 2/3 Cw P sqrt(2 g) [m^1.5/s], Co A sqrt(2 g) [m^2.5/s], 1 if the street is at `from`, else 0
 CREST, WEIR, ORIFICE, STREET_FIRST = range(4)

@@ -10,8 +10,8 @@ demand (FULL), the flow stays at its limit until x is half of its value at full 
 
 from math import sqrt
 
+from fvsolve.core.kernels.self_acting_valves import event_pair
 from fvsolve.jit import njit
-from fvsolve.kernels.self_acting_valves import event_pair
 
 LEAST_DROP = 10.0  # drop above `least` below which the cubic applies [Pa]
 EVENT_COUNT = 4  # of an outlet: it shuts, opens, supplies all of its demand, or less

@@ -4,8 +4,8 @@ Flag armed[event]: the disc has burst; it changes on accepted states only, and o
 is the count of the parameters, and of the event flags, of an outlet that precede those of the disc.
 """
 
+from fvsolve.core.kernels.restrictions import head_drop
 from fvsolve.jit import njit
-from fvsolve.kernels.restrictions import head_drop
 
 BURST = 0  # number: drop at which it bursts [Pa]
 

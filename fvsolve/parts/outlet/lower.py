@@ -1,8 +1,8 @@
 """Outlets, rupture discs and surge-anticipating valves in the tables of a model."""
 
-from fvsolve.assembly.lowering import Device, Lowering, Restriction, opening_input
+from fvsolve.core.assembly.lowering import Device, Lowering, Restriction, opening_input
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.errors import Notice
-from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.outlet import (
     law_outlet,
     law_rupture_disc,

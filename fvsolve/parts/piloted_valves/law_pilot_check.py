@@ -7,9 +7,9 @@ armed[event] is above 0 while it is shut; it changes on accepted states only.
 
 from math import sqrt
 
+from fvsolve.core.kernels.restrictions import head_drop
+from fvsolve.core.kernels.self_acting_valves import event_pair
 from fvsolve.jit import njit
-from fvsolve.kernels.restrictions import head_drop
-from fvsolve.kernels.self_acting_valves import event_pair
 from fvsolve.parts.self_acting.law_check_valve import joins_junction
 
 CRACKING_PRESSURE, PILOT_RATIO, DROP, PILOT_EXCESS = 0, 1, 2, 3  # numbers; the last two at the start

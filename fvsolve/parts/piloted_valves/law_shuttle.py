@@ -3,10 +3,10 @@
 The flag armed[event] is above 0 while B is open; it changes on accepted states only.
 """
 
+from fvsolve.core.kernels.dtypes import LAW_LINEAR
+from fvsolve.core.kernels.restrictions import valve_driving_pressure
+from fvsolve.core.kernels.self_acting_valves import event_pair
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import LAW_LINEAR
-from fvsolve.kernels.restrictions import valve_driving_pressure
-from fvsolve.kernels.self_acting_valves import event_pair
 
 DIFFERENCE = 0  # its number: pressure at A minus that at B at the start [Pa]
 FLOW_A, FLOW_B, FLOW_OUT, POSITION = 0, 1, 2, 3  # quantities

@@ -1,6 +1,6 @@
 """Piloted valves in the tables of a model, and their states at the steady start."""
 
-from fvsolve.assembly.lowering import Device
+from fvsolve.core.assembly.lowering import Device
 from fvsolve.errors import Notice
 from fvsolve.parts.self_acting import law_relief_valve
 from fvsolve.parts.self_acting.law_disc import FREE_BACK, SENSED

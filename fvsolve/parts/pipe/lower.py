@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 
-from fvsolve.assembly.lowering import Lowering
-from fvsolve.assembly.model_draft import PipeMesh
-from fvsolve.assembly.pipe_terms import add_creep, reserve_terms
-from fvsolve.assembly.scheme_codes import lower_position
-from fvsolve.kernels import dtypes as rec
-from fvsolve.schemes import end_rate_factor
+from fvsolve.core.assembly.lowering import Lowering
+from fvsolve.core.assembly.model_draft import PipeMesh
+from fvsolve.core.assembly.pipe_terms import add_creep, reserve_terms
+from fvsolve.core.assembly.scheme_codes import lower_position
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.schemes import end_rate_factor
 
 
 class PipeRows(Lowering, kind="pipe"):

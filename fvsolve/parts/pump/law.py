@@ -19,12 +19,12 @@ zero at standstill: at x = pi/2 (already in the values of the table) and at x = 
 
 from math import atan2, pi, sqrt
 
+from fvsolve.core.kernels.devices import TEMPORARY
+from fvsolve.core.kernels.dtypes import RATE, RATE_UNWANTED
+from fvsolve.core.kernels.restrictions import LEAST, head_drop
+from fvsolve.core.kernels.schedule_pieces import schedule_value
+from fvsolve.core.kernels.self_acting_valves import event_pair
 from fvsolve.jit import njit
-from fvsolve.kernels.devices import TEMPORARY
-from fvsolve.kernels.dtypes import RATE, RATE_UNWANTED
-from fvsolve.kernels.restrictions import LEAST, head_drop
-from fvsolve.kernels.schedule_pieces import schedule_value
-from fvsolve.kernels.self_acting_valves import event_pair
 from fvsolve.parts.pump import law_energy
 from fvsolve.parts.self_acting.law_check_valve import PRESSURE_MARGIN
 

@@ -5,9 +5,10 @@ import math
 import numpy as np
 
 from fvsolve import units
-from fvsolve.assembly.lowering import SPEED, Device
+from fvsolve.core.assembly.lowering import SPEED, Device
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.steady import Edge
 from fvsolve.errors import Notice
-from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.pump import law, law_energy
 from fvsolve.parts.pump.energy_use import STATES, energy_numbers, energy_scales
 from fvsolve.parts.pump.lower_shaft import (
@@ -22,7 +23,6 @@ from fvsolve.parts.pump.lower_shaft import (
     specific_speed,
     usual_inertia,
 )
-from fvsolve.steady import Edge
 
 SPEED_TOLERANCE = 1e-6  # difference of heads regarded as rounding [m]
 MAX_VELOCITY = 15.0  # velocity in adjacent pipes at the rated flow, above which a notice is given [m/s]

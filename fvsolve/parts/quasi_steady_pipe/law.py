@@ -8,9 +8,9 @@ cubic with equal value and slope at that flow, so that the slope of the flow is 
 
 from math import sqrt
 
+from fvsolve.core.kernels.dtypes import FRICTION_ROUGH
+from fvsolve.core.kernels.steady_friction import drag, drag_slope
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import FRICTION_ROUGH
-from fvsolve.kernels.steady_friction import drag, drag_slope
 
 DRAG = ("friction", "loss", "rough", "roughness", "reynolds")  # columns of a pipe, its first numbers
 KIND, LOSS, ROUGH, ROUGHNESS, REYNOLDS, PER, LEAST = range(7)  # PER : L / A [1/m]; LEAST : [kg/s]

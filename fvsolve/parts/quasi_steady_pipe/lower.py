@@ -4,9 +4,9 @@ import math
 
 from scipy.optimize import brentq
 
-from fvsolve.assembly.lowering import LAMINAR_REYNOLDS, Restriction
-from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.steady_friction import drag
+from fvsolve.core.assembly.lowering import LAMINAR_REYNOLDS, Restriction
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.kernels.steady_friction import drag
 
 from . import law
 

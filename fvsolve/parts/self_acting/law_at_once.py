@@ -5,11 +5,11 @@ follows from the balance of its node (`node_clusters.hold_pressures`). Flags: ar
 or because the pressure at its end is given; armed[event + FULL], fully open. They change on accepted states only.
 """
 
+from fvsolve.core.kernels.dtypes import NOT_HELD
+from fvsolve.core.kernels.restrictions import flow_at_drop, head_drop, transition_of
+from fvsolve.core.kernels.schedule_pieces import schedule_value
+from fvsolve.core.kernels.self_acting_valves import event_pair
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import NOT_HELD
-from fvsolve.kernels.restrictions import flow_at_drop, head_drop, transition_of
-from fvsolve.kernels.schedule_pieces import schedule_value
-from fvsolve.kernels.self_acting_valves import event_pair
 
 REDUCING, SUSTAINING, FLOW_CONTROL = 0, 1, 2  # modes
 OPENING, ERROR, SET = 0, 1, 2  # numbers of a device at the start

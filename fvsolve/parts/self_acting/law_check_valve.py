@@ -5,10 +5,10 @@ opens when the pressure drop exceeds its cracking pressure. The flag armed[event
 changes on accepted states only.
 """
 
+from fvsolve.core.kernels.dtypes import JUNCTION
+from fvsolve.core.kernels.restrictions import head_drop
+from fvsolve.core.kernels.self_acting_valves import event_pair
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import JUNCTION
-from fvsolve.kernels.restrictions import head_drop
-from fvsolve.kernels.self_acting_valves import event_pair
 
 PRESSURE_MARGIN = 1.0  # excess over the cracking pressure at which it opens, so that rounding does not [Pa]
 

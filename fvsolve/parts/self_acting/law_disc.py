@@ -12,10 +12,9 @@ A disc that alone joins a rigid column controls its flow near the seat (armed[ev
 
 from math import sqrt
 
-from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import CLOSING, RATE, RATE_UNWANTED
-from fvsolve.kernels.restrictions import head_drop
-from fvsolve.kernels.self_acting_valves import (
+from fvsolve.core.kernels.dtypes import CLOSING, RATE, RATE_UNWANTED
+from fvsolve.core.kernels.restrictions import head_drop
+from fvsolve.core.kernels.self_acting_valves import (
     control_events,
     controls_column,
     event_pair,
@@ -23,6 +22,7 @@ from fvsolve.kernels.self_acting_valves import (
     sensed_pressure,
     sensed_rate,
 )
+from fvsolve.jit import njit
 
 RELIEF, CHECK, SENSED, FREE_BACK = 0, 1, 2, 3  # modes
 # indices into its numbers: lift, target and lifting pressure at the start, then the keys

@@ -8,11 +8,11 @@ controls the flow of the column near its seat (armed[event + 6]).
 
 from math import sqrt
 
+from fvsolve.core.kernels.dtypes import RATE, RATE_UNWANTED
+from fvsolve.core.kernels.restrictions import head_drop
+from fvsolve.core.kernels.schedule_pieces import schedule_value
+from fvsolve.core.kernels.self_acting_valves import control_events, controls_column, event_pair, loop_rate
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import RATE, RATE_UNWANTED
-from fvsolve.kernels.restrictions import head_drop
-from fvsolve.kernels.schedule_pieces import schedule_value
-from fvsolve.kernels.self_acting_valves import control_events, controls_column, event_pair, loop_rate
 
 REDUCING, SUSTAINING, FLOW_CONTROL = 0, 1, 2  # modes
 OPENING, ERROR, SET, BAND, TIME = 0, 1, 2, 3, 4  # numbers of a device: three at the start, then its keys

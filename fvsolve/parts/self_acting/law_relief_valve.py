@@ -8,8 +8,7 @@ FREE_BACK the valve is also fully open while its flow is reversed.
 
 from math import sqrt
 
-from fvsolve.jit import njit
-from fvsolve.kernels.restrictions import (
+from fvsolve.core.kernels.restrictions import (
     LEAST,
     flow_at_drop,
     flow_slope,
@@ -19,7 +18,8 @@ from fvsolve.kernels.restrictions import (
     root_step,
     transition_of,
 )
-from fvsolve.kernels.self_acting_valves import event_pair, sensed_pressure
+from fvsolve.core.kernels.self_acting_valves import event_pair, sensed_pressure
+from fvsolve.jit import njit
 
 FREE_BACK = 1  # mode
 RELUCTANCE = 1e-10  # margin at events of the lift, and of a flow over that at a drop of the span, against rounding

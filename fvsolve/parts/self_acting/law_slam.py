@@ -5,8 +5,8 @@ armed[event + 2] mark the mode and change on accepted states only. While it is R
 velocity at which the valve shuts [m/s] and the deceleration of the flow at the reversal [m/s2]; otherwise they are 0.
 """
 
+from fvsolve.core.kernels.restrictions import head_drop
 from fvsolve.jit import njit
-from fvsolve.kernels.restrictions import head_drop
 from fvsolve.parts.self_acting.law_check_valve import PRESSURE_MARGIN, joins_junction
 
 REVERSED, SHUT, OPEN, BEYOND_CURVE = 0, 1, 2, 3  # flags; the last: the deceleration exceeds the curve

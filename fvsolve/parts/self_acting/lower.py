@@ -5,14 +5,14 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from fvsolve.assembly.lowering import FLOW, SET_PRESSURE, Device, Input, opening_of
+from fvsolve.core.assembly.lowering import FLOW, SET_PRESSURE, Device, Input, opening_of
+from fvsolve.core.kernels.dtypes import NOT_HELD
+from fvsolve.core.kernels.restrictions import LEAST, flow_at_drop, flow_slope, transition_of
+from fvsolve.core.steady import Edge
 from fvsolve.errors import Notice
-from fvsolve.kernels.dtypes import NOT_HELD
-from fvsolve.kernels.restrictions import LEAST, flow_at_drop, flow_slope, transition_of
 from fvsolve.parts.self_acting import law_at_once, law_check_valve, law_disc, law_regulating, law_relief_valve, law_slam
 from fvsolve.parts.self_acting.law_disc import CHECK, RELIEF
 from fvsolve.parts.tolerances import is_head_above
-from fvsolve.steady import Edge
 
 LIFTING, OPEN = "lifting", "open"  # modes of a valve; shut valves are in `start.shut`
 SEAT_DEPTH = 1e-12  # lift below the seat of a disc that has slammed, so that rounding does not open it

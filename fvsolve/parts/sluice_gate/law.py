@@ -9,9 +9,9 @@ are above the sill. The scheduled setting is the opening a.
 
 from math import sqrt
 
+from fvsolve.core.kernels import structures
+from fvsolve.core.kernels.structures import DROWNED, FREE, weir_flow
 from fvsolve.jit import njit, specialise
-from fvsolve.kernels import structures
-from fvsolve.kernels.structures import DROWNED, FREE, weir_flow
 
 # Numbers: width [m], sill [m], contraction Cc, 2/3 C sqrt(2 g) b of the weir [m^1.5/s], gravity [m/s2]
 WIDTH, SILL, CONTRACTION, WEIR, GRAVITY = range(5)

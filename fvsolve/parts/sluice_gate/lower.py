@@ -1,6 +1,6 @@
 """Sluice gates in the tables of a model."""
 
-from fvsolve.assembly.lowering import GATE_OPENING
+from fvsolve.core.assembly.lowering import GATE_OPENING
 from fvsolve.errors import Notice
 from fvsolve.parts.weir.lower import StructureRows, weir_size
 from fvsolve.parts.weir.part import COEFFICIENTS

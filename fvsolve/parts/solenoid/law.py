@@ -1,7 +1,7 @@
 """Current, force and stored energy of a solenoid; the network integrates the voltage of its coil to flux linkage."""
 
+from fvsolve.core.kernels.mass_dynamics import motion
 from fvsolve.jit import njit
-from fvsolve.kernels.mass_dynamics import motion
 
 TURNS, CORE, SATURATION, PER_GAP, CLOSED, FLUX = range(6)
 """Numbers: turns; reluctance of the core [1/H]; 1 / saturation_flux^2, 0 without saturation [1/Wb2]; reluctance per

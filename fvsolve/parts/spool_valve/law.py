@@ -9,10 +9,10 @@ its stop (UPPER, LOWER) or moves at its greatest speed (FORWARD, BACKWARD); the 
 (RISE, FALL); the command does not exceed the dead band (ABOVE, BELOW); x is below the position of an edge (EDGE).
 """
 
+from fvsolve.core.kernels.dtypes import RATE, RATE_UNWANTED
+from fvsolve.core.kernels.schedule_pieces import schedule_value
+from fvsolve.core.kernels.self_acting_valves import event_pair
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import RATE, RATE_UNWANTED
-from fvsolve.kernels.schedule_pieces import schedule_value
-from fvsolve.kernels.self_acting_valves import event_pair
 
 # indices into its numbers; each edge has a, b and the flag of its position, then follow these positions
 START, LEAST, ANGULAR_FREQUENCY, DAMPING, FASTEST, HALF_WIDTH, DEAD_BAND, EDGES, POSITIONS, FIRST_EDGE = range(10)

@@ -2,9 +2,9 @@
 
 import math
 
-from fvsolve.assembly.lowering import POSITION, Device, Input, Restriction
+from fvsolve.core.assembly.lowering import POSITION, Device, Input, Restriction
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.errors import Notice
-from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.spool_valve import law
 from fvsolve.parts.spool_valve.part import EDGES, PORTS
 

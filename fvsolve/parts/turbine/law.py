@@ -15,10 +15,10 @@ tends to the torque behind shut vanes.
 
 from math import atan2, copysign, pi, sqrt
 
+from fvsolve.core.kernels.devices import TEMPORARY
+from fvsolve.core.kernels.dtypes import JUNCTION, RATE, RATE_UNWANTED
+from fvsolve.core.kernels.restrictions import LEAST, head_drop, valve_conductance
 from fvsolve.jit import njit
-from fvsolve.kernels.devices import TEMPORARY
-from fvsolve.kernels.dtypes import JUNCTION, RATE, RATE_UNWANTED
-from fvsolve.kernels.restrictions import LEAST, head_drop, valve_conductance
 from fvsolve.parts.pump.law import (
     HELD_SPEED,
     INERTIA,

@@ -10,14 +10,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from fvsolve.assembly.lowering import ANGULAR_SPEED, Device, opening_input
+from fvsolve.core.assembly.lowering import ANGULAR_SPEED, Device, opening_input
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.steady import Edge
 from fvsolve.errors import Notice
-from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.pump.law import INERTIA, RATED
 from fvsolve.parts.pump.lower import unusual_inertia
 from fvsolve.parts.pump.lower_shaft import ShaftLowering, numbers_of
 from fvsolve.parts.turbine import law
-from fvsolve.steady import Edge
 
 ANGLE_TOLERANCE = 1e-7  # angle below which two rays are merged [rad]
 SPACING = math.pi / 24.0  # angle between rays outside the chart where a turning runner pumps in reverse [rad]

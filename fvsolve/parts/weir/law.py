@@ -5,9 +5,9 @@ The scheduled setting is the crest. Its only number is 2/3 C sqrt(2 g) b [m^1.5/
 Source: Villemonte 1947, Submerged-weir discharge studies, Engineering News-Record 139.
 """
 
+from fvsolve.core.kernels import structures
+from fvsolve.core.kernels.structures import weir_flow
 from fvsolve.jit import njit, specialise
-from fvsolve.kernels import structures
-from fvsolve.kernels.structures import weir_flow
 
 SIZE = 0  # index of its number
 

@@ -3,11 +3,11 @@
 import math
 from collections.abc import Callable
 
-from fvsolve.assembly.lowering import CREST, TYPICAL_DROP, Device, Input
+from fvsolve.core.assembly.lowering import CREST, TYPICAL_DROP, Device, Input
+from fvsolve.core.kernels.dtypes import FIRM_SLOPE
+from fvsolve.core.kernels.structures import LINEAR_FALL
+from fvsolve.core.steady import Edge
 from fvsolve.errors import Notice
-from fvsolve.kernels.dtypes import FIRM_SLOPE
-from fvsolve.kernels.structures import LINEAR_FALL
-from fvsolve.steady import Edge
 
 from . import law
 

@@ -14,9 +14,9 @@ from pathlib import Path
 from fvsolve.argument_checks import NAMES, NUMBER, NUMBERS, PATH, validated
 from fvsolve.case import load
 from fvsolve.case.case import Case
+from fvsolve.core.steppers.tableau import AUTO, BUILT_IN, METHODS
 from fvsolve.declarations import declared
 from fvsolve.errors import CaseError, FvsolveError, listing
-from fvsolve.steppers.tableau import AUTO, BUILT_IN, METHODS
 from fvsolve.studies.accuracy.chart_settings import (
     CoarseRun,
     MethodSetting,

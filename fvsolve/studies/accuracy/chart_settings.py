@@ -17,11 +17,11 @@ from fvsolve.case.sections import (
     DEFAULT_SCHEME,
     uses_error_control,
 )
+from fvsolve.core.model.model_facts import rhs_seconds
+from fvsolve.core.schemes import SCHEMES
+from fvsolve.core.steppers.tableau import AUTO, METHODS
 from fvsolve.errors import CaseError, FvsolveError, did_you_mean, listing
 from fvsolve.features.delay_lines.choice import slowest_pipe
-from fvsolve.model.model_facts import rhs_seconds
-from fvsolve.schemes import SCHEMES
-from fvsolve.steppers.tableau import AUTO, METHODS
 from fvsolve.studies.outcome import best_run, compile_seconds, study_model
 from fvsolve.studies.resolution import (
     basins,

@@ -14,17 +14,17 @@ from typing import Any
 import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, NUMBER, TABLE, validated
-from fvsolve.assembly.schedule_tables import value_at
 from fvsolve.case.chainage import add_bends, placed
 from fvsolve.case.reading import raw_link
 from fvsolve.case.sloshing import slowest
+from fvsolve.core.assembly.schedule_tables import value_at
+from fvsolve.core.fluid import LAWS
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.kernels.steady_friction import drag
+from fvsolve.core.model.model_facts import velocities
 from fvsolve.declarations import declared
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.features.delay_lines.choice import reason_for_cells
-from fvsolve.fluid import LAWS
-from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.steady_friction import drag
-from fvsolve.model.model_facts import velocities
 from fvsolve.studies.distance import Deviation, moving_probes
 from fvsolve.studies.outcome import GIVEN_UP, Outcome, capped, outcome, refuse_basins, study_model
 from fvsolve.studies.reference import reference_of_run

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.argument_checks import COUNT, FUNCTION, NAMES, TEXT, validated
+from fvsolve.core.model import RunData
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.exact.solution import Solution, averages
-from fvsolve.model import RunData
 from fvsolve.studies.accuracy.order_study import Order, OrderStudy
 from fvsolve.studies.accuracy.refine import affordable_plan
 from fvsolve.studies.distance import recording_keys
@@ -224,7 +224,7 @@ class RunWithSource:
 
         Raises FvsolveError if the source function fails or returns unusable values.
         """
-        from fvsolve.steppers.ode import integrate
+        from fvsolve.core.steppers.ode import integrate
 
         model, numerics, every = self.model, self.model.case.numerics, self.model.case.output.every
         bounds = [numerics.start, *(t for t, _ in model.breaks if numerics.start < t < numerics.end), numerics.end]

@@ -11,11 +11,11 @@ from functools import cached_property
 
 import numpy as np
 
-from fvsolve.assembly.scheme_codes import limiter_notices
+from fvsolve.core.assembly.scheme_codes import limiter_notices
+from fvsolve.core.steppers.tableau import METHODS
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
-from fvsolve.steppers.tableau import METHODS
 from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
 from fvsolve.studies.accuracy.refine import Level, Plan
 from fvsolve.studies.distance import NORMS, error_norms, recording_keys, variable_size
@@ -122,7 +122,7 @@ CELLS = "cell size [m]"  # measure that is printed in the units of the case; ste
 
 def order_picture(study):
     """matplotlib Figure of an `Order`: errors over size, a panel for each first variable, a line for each norm."""
-    from fvsolve.draw.accuracy_pictures import order_figure
+    from fvsolve.report.draw.accuracy_pictures import order_figure
 
     length_factor, length = study.shown.get("length", (1.0, "m")) if study.plan.measure == CELLS else (1.0, "")
     measure = CELLS.replace("[m]", f"[{length}]") if length else study.plan.measure
@@ -170,7 +170,7 @@ def variable_dimension(variable: str, case=None) -> str:
 
 def error_scale(case, variable: str) -> tuple[float, str]:
     """(factor from SI, unit) of errors of a variable in the units of `[output]`, or of lengths for "length"."""
-    from fvsolve.output.unit_columns import column
+    from fvsolve.core.output.unit_columns import column
 
     result = column("", variable if variable == "length" else variable_dimension(variable, case), case)
     return result.span_from_si(1.0), result.span_unit

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fvsolve.case.reading import raw_link
+from fvsolve.core.model.model_facts import rhs_seconds
+from fvsolve.core.steppers import automatic
+from fvsolve.core.steppers.tableau import AUTO, METHODS, method_named
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.features.delay_lines.feature import lines_of
-from fvsolve.model.model_facts import rhs_seconds
-from fvsolve.steppers import automatic
-from fvsolve.steppers.tableau import AUTO, METHODS, method_named
 from fvsolve.studies.outcome import study_model
 from fvsolve.studies.resolution import (
     Counts,

@@ -322,7 +322,7 @@ ERROR_LABELS = ("mean error over the run [fraction of the range]", "error at the
 
 def write_chart(chart: Chart, folder: Path, title: str = "", dpi: float | None = None) -> list[Path]:
     """Write the table and both pictures of a chart; returns their paths."""
-    from fvsolve.draw.accuracy_pictures import save_picture
+    from fvsolve.report.draw.accuracy_pictures import save_picture
 
     paths = [folder / f"chart.{ending}" for ending in ("csv", "png", "svg")]
     for path in paths:
@@ -350,7 +350,7 @@ def write_chart_csv(chart: Chart, path: Path) -> None:
 
 def chart_picture(chart: Chart, title: str = ""):
     """matplotlib Figure of a chart: errors over the trajectory and at the end, against CPU time and cell updates."""
-    from fvsolve.draw.accuracy_pictures import Curve, chart_figure
+    from fvsolve.report.draw.accuracy_pictures import Curve, chart_figure
 
     curves = []
     for name, points in chart.curves().items():

@@ -10,13 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from fvsolve.core.solve.held_inputs import hold
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.features.controls.feature import blocks_of
 from fvsolve.features.controls.rows import small_change
 from fvsolve.features.delay_lines.feature import history_of, lines_of, seen_by_jumps
 from fvsolve.features.delay_lines.kernels import wave_history as history
 from fvsolve.parts.schedule import BLOCK_PREFIX
-from fvsolve.solve.held_inputs import hold
 from fvsolve.studies.linearise import Linear, linearise_at
 from fvsolve.studies.loops.delay_system import DelaySystem
 from fvsolve.studies.operating_point import OperatingPoint, operating_point

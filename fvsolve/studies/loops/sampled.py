@@ -17,12 +17,12 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.solve.held_inputs import hold
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.features.controls.feature import blocks_of, numbers_of, with_blocks
 from fvsolve.features.controls.rows import control_rows_of
-from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.schedule import BLOCK_PREFIX
-from fvsolve.solve.held_inputs import hold
 from fvsolve.studies.loops.delay_system import EIGENVALUE_OPERATIONS, DelaySystem
 from fvsolve.studies.loops.open_loop import (
     ANOTHER_POINT,

@@ -399,7 +399,7 @@ def response(
     more than 800 states.
     """
     from fvsolve.case import load
-    from fvsolve.model.energy_norm import energy_form
+    from fvsolve.core.model.energy_norm import energy_form
 
     case = load(case, dict(set or {}))
     if not any(node.domain == "hydraulic" for node in case.places.values()):

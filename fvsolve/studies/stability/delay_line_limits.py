@@ -16,16 +16,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fvsolve.core.model.energy_norm import energy_form
+from fvsolve.core.schemes import LIMITED
+from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.core.steppers import loop_records
+from fvsolve.core.steppers.tableau import Method
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.features.delay_lines.feature import history_of, lines_of
 from fvsolve.features.delay_lines.growth import REFLECTION_BOUND, lines_at, storing_nodes
 from fvsolve.features.delay_lines.kernels import wave_history as at
 from fvsolve.features.delay_lines.kernels.line_rates import drag_and_slope
-from fvsolve.model.energy_norm import energy_form
-from fvsolve.schemes import LIMITED
-from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
-from fvsolve.steppers import loop_records
-from fvsolve.steppers.tableau import Method
 from fvsolve.studies.operating_point import with_held_schedules
 from fvsolve.studies.outcome import study_model
 from fvsolve.studies.stability.growth import STEP_RATIO, StepLimit, bisect, bisect_limit, prediction_limit

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fvsolve.steppers import stability_function
-from fvsolve.steppers.tableau import Method
+from fvsolve.core.steppers import stability_function
+from fvsolve.core.steppers.tableau import Method
 from fvsolve.studies.work_limit import CALL_TIME, DENSE_RATE, FEWER_CELLS, SPARSE_RATE, WorkLimit
 
 POWER_OPERATIONS = 4.0  # over n^3, of a power of a matrix and the check of its norm

@@ -20,20 +20,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.argument_checks import COUNT, FUNCTION, NAMES, validated
-from fvsolve.assembly.scheme_codes import scheme_settings
+from fvsolve.core.assembly.scheme_codes import scheme_settings
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.kernels.table_handle import make_handle
+from fvsolve.core.schemes import LIMITED, LIMITERS, branches
+from fvsolve.core.step_limits.advection_limit import AdvectionLimit, limit_of
+from fvsolve.core.step_limits.symbol import WEIGHTS, symbol, weights_of
+from fvsolve.core.steppers import loop_records
+from fvsolve.core.steppers.analysis.stability_properties import analyse
+from fvsolve.core.steppers.integrator import Integrator
+from fvsolve.core.steppers.ode import observers
+from fvsolve.core.steppers.structure import Structure
+from fvsolve.core.steppers.tableau import METHODS, method_named
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean
-from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.table_handle import make_handle
-from fvsolve.schemes import LIMITED, LIMITERS, branches
-from fvsolve.step_limits.advection_limit import AdvectionLimit, limit_of
-from fvsolve.step_limits.symbol import WEIGHTS, symbol, weights_of
-from fvsolve.steppers import loop_records
-from fvsolve.steppers.analysis.stability_properties import analyse
-from fvsolve.steppers.integrator import Integrator
-from fvsolve.steppers.ode import observers
-from fvsolve.steppers.structure import Structure
-from fvsolve.steppers.tableau import METHODS, method_named
 from fvsolve.studies.outcome import Progress, name_list
 from fvsolve.studies.result_table import PlainData
 from fvsolve.studies.stability.growth import bisect
@@ -70,9 +70,9 @@ class PeriodicPipe:
     """Linear advection on a periodic grid by one scheme and one method; a run is one call of compiled code."""
 
     def __init__(self, scheme: str, method: str, cells: int, limiter: str = "minmod") -> None:
-        from fvsolve.kernels.calls import compile_as
-        from fvsolve.kernels.reconstruction import rhs_periodic
-        from fvsolve.steppers.run_handle import RHS
+        from fvsolve.core.kernels.calls import compile_as
+        from fvsolve.core.kernels.reconstruction import rhs_periodic
+        from fvsolve.core.steppers.run_handle import RHS
 
         names = (*rec.Tables._fields, *rec.RunArrays._fields)
         tables = {name: np.zeros(1, rec.RECORDS.get(name, float)) for name in names}

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from fvsolve.model.energy_norm import EnergyForm
-from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
-from fvsolve.steppers import loop_records
+from fvsolve.core.model.energy_norm import EnergyForm
+from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.core.steppers import loop_records
 from fvsolve.studies.operating_point import OperatingPoint
 from fvsolve.studies.stability.growth import STEP_RATIO, STEPS, THRESHOLD, StepLimit, bisect, checked_powers
 

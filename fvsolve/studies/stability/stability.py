@@ -16,12 +16,12 @@ import numpy as np
 
 from fvsolve.argument_checks import COUNT, FLAG, NAMES, NUMBER, PATH, validated
 from fvsolve.case import load
+from fvsolve.core.model.energy_norm import EnergyForm, energy_form
+from fvsolve.core.schemes import SCHEMES, branches
+from fvsolve.core.steppers import automatic, method_named
+from fvsolve.core.steppers.tableau import AUTO
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError
-from fvsolve.model.energy_norm import EnergyForm, energy_form
-from fvsolve.schemes import SCHEMES, branches
-from fvsolve.steppers import automatic, method_named
-from fvsolve.steppers.tableau import AUTO
 from fvsolve.studies.linearise import Linear, Spectrum, find_eigenvalues, linearise_at
 from fvsolve.studies.operating_point import OperatingPoint, has_limiter, operating_point, with_weights
 from fvsolve.studies.outcome import STUDY_ARGUMENTS, Progress, name_list
@@ -323,6 +323,6 @@ class SchemeRows:
 
 def von_neumann_limit(scheme: str, method) -> float:
     """Von Neumann's limit of the Courant number, for a linear scheme on a uniform grid."""
-    from fvsolve.step_limits.advection_limit import advection_limit
+    from fvsolve.core.step_limits.advection_limit import advection_limit
 
     return advection_limit(scheme, method.name).limit

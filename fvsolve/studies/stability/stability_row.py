@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
+from fvsolve.core.steppers import analyse
+from fvsolve.core.steppers.tableau import Method
 from fvsolve.errors import listing
-from fvsolve.steppers import analyse
-from fvsolve.steppers.tableau import Method
 from fvsolve.studies.linearise import ZERO_TOLERANCE
 from fvsolve.studies.operating_point import has_limiter
 from fvsolve.studies.stability.growth import bisect_limit

@@ -1,8 +1,8 @@
 """Block with the value of a formula of its inputs and of the time."""
 
+from fvsolve.core.kernels.formula_programs import run_program
 from fvsolve.features.controls.kernels.blocks import flag_count, input_change
 from fvsolve.jit import njit
-from fvsolve.kernels.formula_programs import run_program
 
 START, VALUE, PROGRAM, FLAG = range(4)
 """Numbers of a block: output and value of the formula at the start; header row of its steps in `pieces`; first event

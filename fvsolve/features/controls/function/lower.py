@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from fvsolve.core.kernels.formula_programs import run_program
 from fvsolve.features.controls.function import law
 from fvsolve.features.controls.rows import StaticRows
-from fvsolve.kernels.formula_programs import run_program
 from fvsolve.parts.formula_program import NO_FLAGS
 
 

@@ -9,6 +9,14 @@ has the outputs before their limits, then number + 1 of the last block whose out
 
 from math import inf, nan
 
+from fvsolve.core.kernels import calls
+from fvsolve.core.kernels.barotropic_nodes import head_pressure
+from fvsolve.core.kernels.devices import SET
+from fvsolve.core.kernels.dtypes import ARRIVED, ARRIVES, FIXED, NEVER, STATUS
+from fvsolve.core.kernels.formula_programs import is_low
+from fvsolve.core.kernels.restrictions import valve_conductance
+from fvsolve.core.kernels.schedule_pieces import schedule_value
+from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.controls.kernels.input_histories import (
     JUMP,
     admit_breaks,
@@ -33,14 +41,6 @@ from fvsolve.features.controls.kernels.tables import (
     open_blocks,
 )
 from fvsolve.jit import njit, specialise
-from fvsolve.kernels import calls
-from fvsolve.kernels.barotropic_nodes import head_pressure
-from fvsolve.kernels.devices import SET
-from fvsolve.kernels.dtypes import ARRIVED, ARRIVES, FIXED, NEVER, STATUS
-from fvsolve.kernels.formula_programs import is_low
-from fvsolve.kernels.restrictions import valve_conductance
-from fvsolve.kernels.schedule_pieces import schedule_value
-from fvsolve.kernels.table_handle import open_tables
 
 OUTPUT, INPUT, ERROR = 0, 1, 2  # quantities of a block
 SAMPLE_ROUNDING = 1e-12  # of times, relative to the time and the period

@@ -11,8 +11,8 @@ The array `histories` contains a header, then for each block a head and its entr
 Arguments: histories : this array; at : offset of the head of a block; k : number of an entry, counted from the start.
 """
 
+from fvsolve.core.kernels.dtypes import LONGEST, OK, STATUS
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import LONGEST, OK, STATUS
 
 CAPACITY, FLAGS, BEGINS, BREAK_TIME, POINTS = range(5)
 """Header: entries of a block for which there is space; event flags of the last entry as one number; 1 if the next entry

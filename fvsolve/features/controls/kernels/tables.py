@@ -3,9 +3,9 @@
 import functools
 from collections import namedtuple
 
+from fvsolve.core.kernels import calls, table_handle
+from fvsolve.core.kernels.dtypes import FEATURE_VALUE, PROBE, f8, i8, record, table_types
 from fvsolve.jit import COMPILING, Intrinsic
-from fvsolve.kernels import calls, table_handle
-from fvsolve.kernels.dtypes import FEATURE_VALUE, PROBE, f8, i8, record, table_types
 
 SLOT = 1
 BLOCK_VALUE = FEATURE_VALUE + SLOT  # probe kind; `side` is 0 for the output, 1 for the input, 2 for the error

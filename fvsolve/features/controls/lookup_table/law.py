@@ -3,9 +3,9 @@
 Two pairs of event functions locate the kinks at both ends; their flags select the piece within a step.
 """
 
+from fvsolve.core.kernels.formula_programs import is_low
 from fvsolve.features.controls.kernels.blocks import flag_count, input_change
 from fvsolve.jit import njit
-from fvsolve.kernels.formula_programs import is_low
 
 START, VALUE, FLAG, COUNT, OWN = range(5)
 """Numbers of a block: output and value of the table at the start; first event flag; number n of points; then their n

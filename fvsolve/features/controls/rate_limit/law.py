@@ -1,8 +1,8 @@
 """Rate limit: dv/dt = (x - v) / T between -falling and rising. Event flags select the part of this law."""
 
+from fvsolve.core.kernels.formula_programs import is_low
 from fvsolve.features.controls.kernels.blocks import input_change
 from fvsolve.jit import njit
-from fvsolve.kernels.formula_programs import is_low
 
 START, FLAG, RISING, FALLING, RATE = range(5)
 """Numbers of a block: v at the start; first event flag; greatest rates of rise and of fall; 1 / T [1/s]."""

@@ -4,9 +4,9 @@ The event function of a flag is above zero while it is off, and below while it i
 A timer has a flag for its input, then one for its state; `discrete` has the time at which its input last changed.
 """
 
+from fvsolve.core.kernels.formula_programs import TIE
 from fvsolve.features.controls.kernels.blocks import input_change
 from fvsolve.jit import njit
-from fvsolve.kernels.formula_programs import TIE
 
 MODE, FLAG, LOW, HIGH, ON, OFF = range(6)
 """Numbers of a block: mode; first event flag; output while off and while on; thresholds of a relay, or delays of

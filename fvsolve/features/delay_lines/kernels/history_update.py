@@ -18,6 +18,10 @@ state : values of the right-hand side at the end of the step, with the jumps tha
 are those of `wave_history`.
 """
 
+from fvsolve.core.kernels.calls import CLOSE, observe_in_turn, run_job
+from fvsolve.core.kernels.dtypes import ALONE, AMENDED, ARRIVES, JUNCTION, NEVER, PIPE_FLOW, PIPE_PRESSURE, STATUS
+from fvsolve.core.kernels.dtypes import ARRIVED as LET_ARRIVE
+from fvsolve.core.kernels.observation import update_extremes
 from fvsolve.features.delay_lines.kernels import jumps
 from fvsolve.features.delay_lines.kernels import wave_history as history
 from fvsolve.features.delay_lines.kernels.jumps import (
@@ -31,10 +35,6 @@ from fvsolve.features.delay_lines.kernels.line_envelopes import update_line_enve
 from fvsolve.features.delay_lines.kernels.line_rates import has_friction
 from fvsolve.features.delay_lines.kernels.tables import open_lines
 from fvsolve.jit import njit
-from fvsolve.kernels.calls import CLOSE, observe_in_turn, run_job
-from fvsolve.kernels.dtypes import ALONE, AMENDED, ARRIVES, JUNCTION, NEVER, PIPE_FLOW, PIPE_PRESSURE, STATUS
-from fvsolve.kernels.dtypes import ARRIVED as LET_ARRIVE
-from fvsolve.kernels.observation import update_extremes
 
 
 @njit(forceinline=True)

@@ -13,6 +13,10 @@ corrected, nor is the mass in delay lines, except for the mass that they give to
 
 from math import exp, expm1
 
+from fvsolve.core.kernels.calls import CLOSE, run_job
+from fvsolve.core.kernels.dtypes import AMENDED, FIXED, JUNCTION, PATCH, STATUS, TANK
+from fvsolve.core.kernels.network_balance import stiffness_of
+from fvsolve.core.kernels.tanks import BOTTOM, EVENTS, RIM
 from fvsolve.features.delay_lines.kernels import wave_history as history
 from fvsolve.features.delay_lines.kernels.line_rates import (
     friction_loss,
@@ -21,10 +25,6 @@ from fvsolve.features.delay_lines.kernels.line_rates import (
     write_arrivals,
 )
 from fvsolve.jit import njit
-from fvsolve.kernels.calls import CLOSE, run_job
-from fvsolve.kernels.dtypes import AMENDED, FIXED, JUNCTION, PATCH, STATUS, TANK
-from fvsolve.kernels.network_balance import stiffness_of
-from fvsolve.kernels.tanks import BOTTOM, EVENTS, RIM
 
 NOISE = 1e-13  # fraction of a wave of half a bar below which a change is rounding
 

@@ -16,13 +16,13 @@ A line shorter than a step h stores the fraction 1 - beta of the waves sent in h
 beta (1 - beta) c (s - s_h)^2 of each wave s; s_h is the wave sent h before.
 """
 
+from fvsolve.core.kernels.network_energy import NODE, PIPE
+from fvsolve.core.kernels.pipe_energy import GAUSS_POINTS, GAUSS_WEIGHTS
+from fvsolve.core.kernels.steady_friction import drag
 from fvsolve.features.delay_lines.kernels import wave_history as history
 from fvsolve.features.delay_lines.kernels.line_rates import friction_loss, sent_wave
 from fvsolve.features.delay_lines.kernels.tables import open_lines
 from fvsolve.jit import njit
-from fvsolve.kernels.network_energy import NODE, PIPE
-from fvsolve.kernels.pipe_energy import GAUSS_POINTS, GAUSS_WEIGHTS
-from fvsolve.kernels.steady_friction import drag
 
 
 @njit

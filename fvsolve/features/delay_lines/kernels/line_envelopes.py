@@ -7,13 +7,13 @@ before, t : begin and end of a step [s]; span : (before, t); known : range of th
 changes; waves : bounds of both waves; other arguments are those of `wave_history`.
 """
 
+from fvsolve.core.kernels.dtypes import PIPE_FLOW, PIPE_PRESSURE
+from fvsolve.core.kernels.observation import update_envelope, update_extremes
 from fvsolve.features.delay_lines.kernels import wave_bounds
 from fvsolve.features.delay_lines.kernels import wave_history as history
 from fvsolve.features.delay_lines.kernels.line_rates import joint_at, smooth_wave_linear, waves_in_stretch
 from fvsolve.features.delay_lines.kernels.wave_bounds import BOUND_ROUNDING, GRID_ROUNDING, wave_at_jump
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import PIPE_FLOW, PIPE_PRESSURE
-from fvsolve.kernels.observation import update_envelope, update_extremes
 
 SLACK = 1e-9  # by which cells count as longer, as fraction of a stretch
 

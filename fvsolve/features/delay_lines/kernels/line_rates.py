@@ -16,11 +16,11 @@ the forward wave at x passed the middle, for x < 1/2 when the backward wave at x
 give the arriving waves. Arguments are those of `wave_history`.
 """
 
+from fvsolve.core.kernels.dtypes import FRICTION_HAZEN, FRICTION_NONE, FRICTION_ROUGH, PIPE_FLOW, PIPE_PRESSURE
+from fvsolve.core.kernels.steady_friction import EXPONENT, drag, power_of_square
 from fvsolve.features.delay_lines.kernels import wave_history as history
 from fvsolve.features.delay_lines.kernels.tables import open_lines
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import FRICTION_HAZEN, FRICTION_NONE, FRICTION_ROUGH, PIPE_FLOW, PIPE_PRESSURE
-from fvsolve.kernels.steady_friction import EXPONENT, drag, power_of_square
 
 FLOW_TOLERANCE = 1e-6  # relative error of the flow at which Newton stops
 SLOPE_ERROR = 0.2  # relative error of the slope where the friction factor depends on the flow

@@ -3,9 +3,9 @@
 import functools
 from collections import namedtuple
 
+from fvsolve.core.kernels import table_handle
+from fvsolve.core.kernels.dtypes import f8, i8, record
 from fvsolve.jit import COMPILING, Intrinsic
-from fvsolve.kernels import table_handle
-from fvsolve.kernels.dtypes import f8, i8, record
 
 SLOT = 0
 DELAY = record(  # delay line: stretches of equal travel time, friction in the middle of each

@@ -1,0 +1,62 @@
+"""Tables of a model for basins; loaded for models that contain a basin."""
+
+from importlib import import_module
+
+import numpy as np
+
+from fvsolve.core.kernels import dtypes as rec
+
+
+def lower_basins(draft) -> None:
+    """Fill the tables of basins, moving walls and patches in a draft of a model, and add the states of basins to it."""
+    case = draft.case
+    draft.basins = [rows_class(case.nodes[name].physics_type)(case, name) for name in case.meshes]
+    draft.basin_table = np.zeros(len(draft.basins), rec.BASIN)
+    for basin, row in zip(draft.basins, draft.basin_table, strict=True):
+        basin.lower_common(draft, row)
+    if any(basin.moves for basin in draft.basins):
+        from fvsolve.core.basins.lower_motion import lower_walls
+
+        lower_walls(draft)
+    patches = [(name, place) for name, place in case.places.items() if place.kind == "patch"]
+    draft.patch_table, names = np.zeros(len(patches), rec.PATCHES), list(case.meshes)
+    for row, (name, place) in zip(draft.patch_table, patches, strict=True):
+        row["basin"], row["node"] = names.index(place.basin), draft.node_index[name]
+        draft.basins[row["basin"]].lower_patch(draft, place.patch, row)
+
+
+def reserve_basins(draft) -> None:
+    """Reserve the arrays of basins and moving walls; rows of the ledger: rain, and negative infiltration."""
+    sizes, basins, walls = draft.sizes, len(draft.basin_table), len(draft.wall_table)
+    sizes.ledger("source", draft.sources)
+    sizes.out("wall", walls)
+    sizes.out("tank", rec.TANK_OUT * basins if len(draft.body_table) else 0)
+    sizes.run_array("seen", draft.size if walls else 0)
+    sizes.run_array("bands", 2 * basins)
+    sizes.run_array("maxima", draft.maxima_size)
+
+
+def rows_class(physics: type) -> type:
+    """Subclass of `BasinRows` that fills the tables of a type of basin.
+
+    It is in the module `lower` of the package that declares the type. physics : class with the keys of the type
+    """
+    home = physics.package or physics.__module__.rpartition(".")[0]
+    import_module(f"{home}.lower")
+    return import_module("fvsolve.core.basins.lower_basin").BasinRows.physics[home]
+
+
+def basin_start(basins: list, size: int, attitudes: dict[str, np.ndarray] | None = None) -> np.ndarray:
+    """States at the start as deviations from the initial steady state : float64[size]; 0 outside basins.
+
+    basins : `BasinRows` of all basins, with their stated start and values of scalars; size : number of states of a
+    model
+    attitudes : rotation matrices of bodies by name, in place of those at the start
+    """
+    states = np.zeros(size)
+    for basin in basins:
+        on = basin.part.on if attitudes else None
+        basin.states_of(states)[:] = basin.start() if on is None else basin.start(attitudes[on])
+        if basin.scalars:
+            basin.start_scalars(states)
+    return states

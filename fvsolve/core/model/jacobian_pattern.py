@@ -1,0 +1,546 @@
+"""Sparsity pattern of the Jacobian of a model: the states on which the rate of each state can depend.
+
+Cells of a pipe depend on their neighbours within the reach of the scheme. A node depends on the edge cells of all its
+pipes, and cells whose stencil crosses a pipe end depend on the same cells. Tanks, chambers and given pressures separate
+groups of nodes: their pressure follows from their own states, except that chambers of cylinders also depend on their
+masses. Cells of a basin depend on the cells around them (`basins.lower_pattern`). A patch is a node whose pressure is
+set by the cells behind it.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.sparse import coo_array, csc_array
+
+from fvsolve.core.basins import lower_pattern as pattern
+from fvsolve.core.basins.lower_pattern import all_states
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.model.state_pairs import pairs_of, unique_states
+from fvsolve.core.schemes import SCHEMES, Reach
+from fvsolve.core.steady import union
+
+Pairs = tuple[np.ndarray, np.ndarray]  # rows, and the state that each depends on
+
+
+def reach_of(scheme: str, settings) -> Reach:
+    """Numbers of cells that a scheme reads in a model; with cavities both waves read cells on both sides."""
+    reach = SCHEMES[scheme].reach
+    if settings["floor"] > 0.0:  # cavities: both waves depend on both sides
+        return Reach(reach.behind, reach.behind, 2 * reach.behind - 1, 3)
+    return reach
+
+
+class Couplings:
+    """Couplings of a model: pairs (rate, state on which it depends), both by index.
+
+    Rates with an index from the number of states on are flows in the stepper's ledger.
+    """
+
+    def __init__(self, model) -> None:
+        tables = model.tables
+        self.size, self.model = model.y_size, model
+        self.nodes, self.pipes = tables.nodes, tables.pipes
+        self.valves, self.columns = tables.valves, tables.columns
+        self.couplings = tables.couplings
+        settings = tables.settings[0]
+        self.linear = model.case.law.linear
+        self.own_friction = settings["scheme"] == rec.UPWIND and not settings["from_arriving"]
+        self.reach = reach_of(model.case.numerics.scheme, settings)
+        self.inner = self.nodes["kind"] == rec.JUNCTION
+        self.masses, self.pistons = tables.masses["y"], tables.pistons
+        self.braces = [*tables.braces, *tables.stops]
+        self.bodies, self.lines, self.points = tables.bodies, tables.lines, tables.points
+        self.moving_segments = tables.moving_segments
+        self.bushings = tables.bushings
+        joined = [[self.points[pin[end]]["body"] for end in ("from_point", "to_point")] for pin in tables.pins]
+        joined = [[int(self.bodies[i]["root"]) for i in pair] for pair in joined if min(pair) >= 0]
+        self.ties = union(len(self.bodies), joined)
+        self.devices, self.parts, self.floats = tables.devices, model.devices, tables.floats
+        self.model, self.basins, self.integers, self.walls = model, model.basins, tables.integers, tables.walls
+        self.patches = {int(row["node"]): row for row in tables.patches}
+        self.network, self.inputs, self.switches = model.network, tables.network_inputs, tables.network_switches
+        self.features = [feature.pattern(self) for feature in model.features]
+        self.sets: list[np.ndarray] = []
+        self.sets = self.pressures()  # for each node, the states that set its pressure
+
+    def pairs(self) -> Iterator[Pairs]:
+        """Yield all couplings of the model, except some of a state with itself."""
+        for pipe in self.pipes:
+            if pipe["cells"] == 0:
+                yield pairs_of(unique_states(pipe["y"]), unique_states(*(self.sets[i] for i in ends_of(pipe))))
+                continue
+            yield from self.inside(pipe)
+            yield from self.beyond(pipe)
+            yield from self.friction_memory_pairs(pipe)
+            yield from self.creep_pairs(pipe)
+        for basin in self.basins:
+            yield pattern.interior_pattern(basin)
+            if basin.soil is not None:
+                yield pattern.source_pattern(basin)
+        yield from self.boundary_pairs()
+        yield from self.stored()
+        for column in self.columns:
+            yield pairs_of(unique_states(column["y"]), unique_states(*(self.sets[i] for i in ends_of(column))))
+        yield from self.moving()
+        yield from self.device_pairs()
+        yield from self.wall_pairs()
+        yield from self.moving_fluid_pairs()
+        if self.network is not None:
+            yield from self.network_pairs()
+        for own in self.features:
+            yield from own.pairs()
+
+    def boundary_pairs(self) -> Iterator[Pairs]:
+        """Yield couplings of the flow through open patches of basins with the cells there."""
+        for i, row in self.patches.items():
+            basin, behind = self.basins[row["basin"]], row["ring"] + row["faces"]
+            if row["open"]:
+                cells = pattern.cells_read(pattern.neighbours(basin), self.integers[behind : behind + row["faces"]])
+                yield pairs_of(unique_states(self.size + i), pattern.cell_states(basin, cells))
+            joint = rec.DISCHARGE, rec.RATING, *pattern.THROUGH_FACES  # one level for all faces
+            if row["closure"] in joint or (row["closure"] == rec.STAGE and row["neighbours"] >= 0):
+                read = unique_states(
+                    self.behind(i), pattern.cell_states(basin, pattern.cells_at_faces(self.integers, row))
+                )
+                yield pairs_of(self.behind(i), read)
+
+    # nodes ------------------------------------------------------------------------------------------------------
+
+    def schedule(self, *indices: int) -> np.ndarray:
+        """States on which schedules with these numbers depend, because features set them."""
+        return unique_states(*(own.schedule(*indices) for own in self.features))
+
+    def joints(self) -> list:
+        """Links whose end nodes are solved together: valves, short delay lines, columns that valves can control."""
+        return [*self.valves, *self.couplings, *(column for column in self.columns if self.is_controlled(column))]
+
+    def is_controlled(self, column) -> bool:
+        """True if the flow of a rigid column follows the valves at its end at some openings."""
+        return any(self.nodes["gates"][i] >= 0 for i in ends_of(column))
+
+    def own(self, i: int) -> np.ndarray:
+        """Index of the state of the mass stored in node i; empty if it stores none."""
+        y = self.nodes["y"][i]
+        return np.array([y] if y >= 0 else [], dtype=np.int64)
+
+    def behind(self, i: int, quantities: int | None = None) -> np.ndarray:
+        """States of the cells behind patch i; empty for other nodes.
+
+        quantities : number of quantities of the basin that are included, from the first on; None for all
+        """
+        if i not in self.patches:
+            return unique_states()
+        row = self.patches[i]
+        cells = self.integers[row["first"] : row["first"] + row["count"]]
+        return pattern.cell_states(self.basins[row["basin"]], cells, quantities)
+
+    def pressure_states(self, i: int) -> np.ndarray:
+        """Indices of the states that set the pressure of a storing node or a patch.
+
+        For a node they are its mass, positions of pistons and states of its device. For a patch they are the first
+        quantity of the cells behind it, and the travels of walls of its basin.
+        """
+        if i in self.patches and self.patches[i]["closure"] in pattern.THROUGH_FACES:
+            row = self.patches[i]
+            read = pattern.cells_at_faces(self.integers, row)
+            return unique_states(self.behind(i), pattern.cell_states(self.basins[row["basin"]], read))
+        if i in self.patches:
+            return unique_states(self.behind(i, 1), *(self.walls["y"][self.walls["basin"] == self.patches[i]["basin"]]))
+        given = self.schedule(self.nodes["schedule"][i])
+        of_devices = (self.device_states(row) for row in self.devices if row["row"] >= 0 and row["node"] == i)
+        of_pistons = (self.places(row, 0) for row in self.pistons if i in (row["a"], row["b"]))
+        return unique_states(self.own(i), given, *of_pistons, *of_devices)
+
+    def device_states(self, device) -> np.ndarray:
+        """Indices of the states of a device."""
+        return device["y"] + np.arange(device["states"] if device["y"] >= 0 else 0)
+
+    def acting_states(self, k: int) -> np.ndarray:
+        """Indices of the states of device k on which its flow and rates depend: all but its integrals over time."""
+        states, (_, _, rows) = self.device_states(self.devices[k]), self.parts[k]
+        return states[: states.size - rows.integrals(self.devices[k])]
+
+    def opening_states(self, link) -> np.ndarray:
+        """Indices of the states of the device and of the blocks that open and close a link; empty if it has none."""
+        if "device" not in link.dtype.names:
+            return unique_states()
+        if link["device"] < 0:
+            return self.schedule(link["schedule"])
+        device = self.devices[link["device"]]
+        _, part, rows = self.parts[link["device"]]
+        shaft, network, turned = rows.turns_with(part), self.network, unique_states()
+        if shaft is not None:
+            turned = self.network_states(network.columns_of_rows[network.node_row(shaft)])
+        lifting = [self.sets[i] if self.sets else self.pressure_states(i) for i in self.lifting_nodes(link)]
+        schedules = self.schedule(*rows.schedules_at_once(device, self.valves, self.floats))
+        return unique_states(self.acting_states(link["device"]), schedules, turned, *lifting)
+
+    def lifting_nodes(self, link) -> list[int]:
+        """Nodes whose pressures open a link at once, besides its ends; empty for links without such a device."""
+        if "device" not in link.dtype.names or link["device"] < 0:
+            return []
+        row = self.devices[link["device"]]
+        at_once = row["second"] >= 0 and row["states"] == 0
+        return [int(row[column]) for column in ("node", "second")] if at_once else []
+
+    def places(self, row, order: int) -> np.ndarray:
+        """States of the positions (`order` 0) or velocities (1) of the masses or bodies that a row joins."""
+        if row["line"] >= 0:
+            return unique_states(*(self.chain_states(i, order) for i in self.bodies_at(self.ends_of_line(row))))
+        ends = ("case", "rod") if "rod" in row.dtype.names else ("from_mass", "to_mass")
+        return np.array([self.masses[row[end]] + order for end in ends if self.masses[row[end]] >= 0], dtype=np.int64)
+
+    def ends_of_line(self, row) -> tuple[int, int]:
+        """Rows of the two points of a force element's line of action; -1 for the world instead of a first point."""
+        line = self.lines[row["line"]]
+        return int(line["from_point"]), int(line["to_point"])
+
+    def bodies_at(self, points) -> list[int]:
+        """Bodies to which points belong; points of the world, and -1 in place of a point, are left out."""
+        bodies = (int(self.points[k]["body"]) for k in points if k >= 0)
+        return [i for i in bodies if i >= 0]
+
+    def chain_states(self, i: int, order: int) -> np.ndarray:
+        """States of the coordinates (`order` 0) or velocities (1) of body i and of all bodies that carry it."""
+        parts = [unique_states()]
+        while i >= 0:
+            parts.append(self.joint_states(self.bodies[i], order))
+            i = self.bodies[i]["parent"]
+        return unique_states(*parts)
+
+    def joint_states(self, body, order: int) -> np.ndarray:
+        """States of the coordinates (`order` 0) or velocities (1) of a joint.
+
+        A joint with three or more freedoms has one coordinate more, because four Euler parameters describe its
+        rotation.
+        """
+        count = int(body["freedoms"])
+        if not count:
+            return unique_states()
+        return body["rate"] + np.arange(count) if order else body["y"] + np.arange(count + (count >= 3))
+
+    def tree_states(self, root: int, order: int) -> np.ndarray:
+        """States of the coordinates (`order` 0) or velocities (1) of a tree of bodies and trees that pins tie to it."""
+        bodies = [body for body in self.bodies if self.tree_root(body["root"]) == root]
+        return unique_states(*(self.joint_states(body, order) for body in bodies))
+
+    def tree_root(self, root: int) -> int:
+        """Root body that stands for all trees that pins tie to the tree of the body `root`."""
+        return self.ties[root]
+
+    def tree_velocities(self, points) -> np.ndarray:
+        """States of the velocities of all trees of bodies to which points belong."""
+        roots = {self.tree_root(self.bodies[i]["root"]) for i in self.bodies_at(points)}
+        return unique_states(*(self.tree_states(root, 1) for root in roots))
+
+    def pressures(self) -> list[np.ndarray]:
+        """For each node, the states that set its pressure.
+
+        In a group of nodes without storage these are the states of all flows into the group.
+        """
+        joined_nodes = [(*ends_of(link), *self.lifting_nodes(link)) for link in self.joints()]
+        inner = [[i for i in places if self.inner[i]] for places in joined_nodes]
+        group = union(len(self.nodes), [(i, j) for places in inner for i, j in zip(places, places[1:], strict=False)])
+        enter: list[list] = [[] for _ in group]
+        for pipe in self.pipes:
+            for right, i in enumerate(ends_of(pipe)):
+                enter[group[i]].append(self.edge_cells(pipe, right))
+        for column in self.columns:
+            for i in ends_of(column):
+                enter[group[i]].append(column["y"])
+        for link in self.joints():
+            i, j = ends_of(link)
+            enter[group[i]] += [self.pressure_states(j), self.opening_states(link)]
+            enter[group[j]] += [self.pressure_states(i), self.opening_states(link)]
+        for i in np.flatnonzero(self.inner):
+            enter[group[i]].append(self.schedule(self.nodes["schedule"][i]))
+        joined = [unique_states(*parts) for parts in enter]
+        return [joined[group[i]] if self.inner[i] else self.pressure_states(i) for i in range(len(group))]
+
+    def stored(self) -> Iterator[Pairs]:
+        """Yield pairs (rates, states) of the masses in tanks, chambers and patches, and of the mass ledger.
+
+        The states are those that determine the flows into them.
+        """
+        into = [[self.pressure_states(i)] for i in range(len(self.nodes))]
+        for pipe in self.pipes:
+            for right, i in enumerate(ends_of(pipe)):
+                into[i].append(self.edge_cells(pipe, right))
+        for link in self.joints():
+            i, j = ends_of(link)
+            into[i] += [self.sets[j], self.opening_states(link)]
+            into[j] += [self.sets[i], self.opening_states(link)]
+        for column in self.columns:
+            for i in ends_of(column):
+                into[i].append(column["y"])
+        for row in self.pistons:
+            swept = unique_states() if row["line"] >= 0 else self.places(row, 1)
+            for i, other in ((row["a"], row["b"]), (row["b"], row["a"])):
+                into[i] += [swept, *([self.pressure_states(other)] if row["leakage"] > 0.0 else [])]
+        for i in np.flatnonzero(~self.inner):
+            yield pairs_of(unique_states(self.own(i), self.behind(i), self.size + i), unique_states(*into[i]))
+
+    def moving(self) -> Iterator[Pairs]:
+        """Yield couplings of positions of masses with their velocities, and of these with adjacent masses and chambers.
+
+        Bodies are coupled with all bodies of their tree, and with the trees and chambers that push them.
+        """
+        at = self.masses[self.masses >= 0]
+        yield at, at + 1
+        for root in np.unique([self.tree_root(root) for root in self.bodies["root"]]):
+            own = unique_states(*(self.tree_states(root, order) for order in (0, 1)))
+            yield pairs_of(own, own)
+        for row in self.bushings:
+            points = row["from_point"], row["to_point"]
+            read = [self.chain_states(i, order) for i in self.bodies_at(points) for order in (0, 1)]
+            yield pairs_of(self.tree_velocities(points), unique_states(*read))
+        for row in [*self.braces, *self.pistons]:
+            read = [self.places(row, 0), self.places(row, 1)]
+            read += [self.schedule(row["schedule"])] if "schedule" in row.dtype.names else []
+            if "rod" in row.dtype.names:
+                read += [self.own(row["a"]), self.own(row["b"])]
+            pushed = self.places(row, 1) if row["line"] < 0 else self.tree_velocities(self.ends_of_line(row))
+            yield pairs_of(pushed, unique_states(*read))
+
+    def device_pairs(self) -> Iterator[Pairs]:
+        """Yield couplings of the states of each device with each other, and with pressures.
+
+        The pressures are those at its ends and at the nodes that it senses.
+        """
+        for k, (row, (_, _, rows)) in enumerate(zip(self.devices, self.parts, strict=True)):
+            ends = ends_of(self.valves[row["valve"]]) if row["valve"] >= 0 else ()
+            read = [self.sets[i] for i in (*ends, row["node"], row["second"]) if i >= 0]
+            read.append(self.schedule(row["schedule"], *rows.schedules_of_rates(row, self.valves, self.floats)))
+            yield pairs_of(self.device_states(row), unique_states(self.acting_states(k), *read))
+
+    def network_pairs(self) -> Iterator[Pairs]:
+        """Yield couplings of the stores of networks with each other, and with what their sources follow."""
+        network = self.network
+        for r, place in enumerate([*network.states.values(), *network.integrals.values()]):
+            yield pairs_of(unique_states(place), self.network_states(network.columns_of_rows[r]))
+
+    def network_states(self, columns: set[int]) -> np.ndarray:
+        """States on which a linear function of stores and sources of a network depends."""
+        network = self.network
+        own = [network.states[column] for column in columns if column in network.states]
+        return unique_states(*own, *(self.source_states(j) for j in network.inputs_of_columns(columns)))
+
+    def network_potential(self, row: int) -> np.ndarray:
+        """States on which a row of a network depends."""
+        return self.network_states(self.network.columns_of_rows[row])
+
+    def probe_states(self, row) -> np.ndarray:
+        """States on which a probe of a network depends."""
+        network, r = self.network, int(row["index"])
+        if row["side"] == rec.LOCKED:
+            return unique_states()
+        if r >= network.rows.integrals:
+            return unique_states(list(network.integrals.values())[r - network.rows.integrals])
+        rows = [r, *([int(row["cell"])] if row["side"] in (rec.POWER, rec.ENTROPY) else [])]
+        return self.network_states(set().union(*(network.columns_of_rows[r] for r in rows)))
+
+    def source_states(self, j: int) -> np.ndarray:
+        """States on which a source of a network depends."""
+        row, network = self.inputs[j], self.network
+        i = int(row["index"])
+        if row["kind"] == rec.SCHEDULE_INPUT:
+            return self.schedule(i)
+        if row["kind"] == rec.DEVICE_INPUT:
+            return self.device_reading(self.devices[i])
+        if row["kind"] == rec.FORCE_INPUT:
+            return unique_states(*self.pushing_states(i))
+        for own in self.features:
+            if (states := own.source(row)) is not None:
+                return states
+        stores = {column for column in network.columns_followed(j) if column in network.states}
+        switch = int(self.switches[i]["schedule"]) if row["kind"] == rec.FRICTION_FLOW else -1
+        return unique_states(*(network.states[column] for column in stores), self.schedule(switch))
+
+    def device_reading(self, device) -> np.ndarray:
+        """States on which a quantity of a device can depend."""
+        ends = self.valves[device["valve"]] if device["valve"] >= 0 else None
+        nodes = [device["node"], device["second"], *(() if ends is None else ends_of(ends))]
+        opening = unique_states() if ends is None else self.opening_states(ends)
+        mass = self.masses[device["mass"]] if device["mass"] >= 0 else -1
+        masses = unique_states(*([mass, mass + 1] if mass >= 0 else []))
+        return unique_states(self.device_states(device), opening, masses, *(self.sets[n] for n in nodes if n >= 0))
+
+    def pushing_states(self, mass: int) -> Iterator[np.ndarray]:
+        """Yield states of all force elements that act on a mass."""
+        for row in [*self.braces, *self.pistons]:
+            ends = ("case", "rod") if "rod" in row.dtype.names else ("from_mass", "to_mass")
+            if mass in (row[ends[0]], row[ends[1]]):
+                yield from (self.places(row, 0), self.places(row, 1))
+                if "schedule" in row.dtype.names:
+                    yield self.schedule(row["schedule"])
+                if "rod" in row.dtype.names:
+                    yield from (self.own(row["a"]), self.own(row["b"]))
+
+    def wall_pairs(self) -> Iterator[Pairs]:
+        """Yield couplings of basin cells with the travel of moving walls, and of this travel with masses and bodies.
+
+        The masses and bodies are those that move the walls; their couplings with the cells at the walls are included.
+        """
+        for wall in self.walls:
+            basin, mass = self.basins[wall["basin"]], self.masses[wall["mass"]] if wall["mass"] >= 0 else -1
+            speed = unique_states(mass + 1) if mass >= 0 else unique_states()
+            if wall["body"] >= 0:
+                speed = self.joint_states(self.bodies[wall["body"]], 1)
+            yield pairs_of(pattern.all_states(basin), unique_states(wall["y"], speed))
+            yield pairs_of(unique_states(wall["y"]), speed)
+            behind = self.integers[wall["faces"] + wall["count"] :][: wall["count"]]
+            cells = pattern.cells_read(pattern.neighbours(basin), behind)
+            yield pairs_of(speed, unique_states(wall["y"], pattern.cell_states(basin, cells)))
+
+    def moving_fluid_pairs(self) -> Iterator[Pairs]:
+        """Yield couplings of fluid on bodies and of the bodies that it moves.
+
+        They depend on each other, and on chambers that push the bodies.
+        """
+        trees: dict[int, list] = {}
+        for basin in self.basins:
+            if basin.row["body"] >= 0:
+                trees.setdefault(self.tree_root(self.bodies[basin.row["body"]]["root"]), []).append(
+                    pattern.all_states(basin)
+                )
+        for index, cells in self.moving_fluid_states() if len(self.moving_segments) else ():
+            trees.setdefault(self.tree_root(self.bodies[self.moving_segments[index]["body"]]["root"]), []).append(cells)
+        for root, cells in trees.items():
+            own = [self.tree_states(root, order) for order in (0, 1)]
+            if own[0].size == 0:
+                continue
+            both = unique_states(*cells, own[1])
+            pushing = [self.own(row[side]) for row in self.pistons if row["line"] >= 0 for side in ("a", "b")]
+            yield pairs_of(both, unique_states(*cells, *own, *pushing))
+
+    def moving_fluid_states(self) -> Iterator[tuple[int, np.ndarray]]:
+        """Yield (row of `moving_segments`, its states and those that set its pressures) for the fluid on bodies."""
+        for i, node in enumerate(self.nodes):
+            if node["moving_segment"] >= 0:
+                yield node["moving_segment"], unique_states(self.own(i), self.sets[i])
+        for row in (*self.pipes, *self.columns):
+            if row["moving_segment"] >= 0:
+                own = row["y"] + np.arange(2 * row["cells"]) if "cells" in row.dtype.names else row["y"]
+                at_ends = (self.sets[row[end]] for end in ("from_node", "to_node"))
+                yield row["moving_segment"], unique_states(own, *at_ends)
+
+    # pipes ------------------------------------------------------------------------------------------------------
+
+    def coupled(self, pipe) -> bool:
+        """True if the rate of each wave depends on all states that the rate of either wave reads."""
+        rough = pipe["friction"] in (rec.FRICTION_ROUGH, rec.FRICTION_HAZEN)
+        return bool(not self.linear or rough or (pipe["loss"] != 0.0 and not self.own_friction))
+
+    def inside(self, pipe) -> Iterator[Pairs]:
+        """Yield couplings of the waves in cells of a pipe with the waves in neighbouring cells."""
+        cells = np.arange(pipe["cells"])
+        stencil = np.arange(-self.reach.behind, self.reach.ahead + 1)
+        local = [0] if pipe["loss"] != 0.0 else []
+        for wave, stencils in ((0, (stencil, -stencil)), (1, (-stencil, stencil))):
+            other = stencils[1] if self.coupled(pipe) else local
+            for source, offsets in ((wave, stencils[0]), (1 - wave, other)):
+                for offset in offsets:
+                    here = cells[(cells + offset >= 0) & (cells + offset < cells.size)]
+                    first = pipe["y"] + source * cells.size
+                    yield pipe["y"] + wave * cells.size + here, first + here + offset
+
+    def friction_memory_pairs(self, pipe) -> Iterator[Pairs]:
+        """Yield pairs (rates, states) of unsteady friction: waves with memory states, and memory states with waves.
+
+        Both are those of the same cell.
+
+        Under density laws other than `linear` the memory is that of the velocity, which depends on neighbouring cells
+        too.
+        """
+        n = int(pipe["cells"])
+        cells = np.arange(n)
+        offsets = [0] if self.linear else [-1, 0, 1]
+        for wave in (pipe["y"], pipe["y"] + n) if pipe["terms"] > 0 else ():
+            for k in range(pipe["terms"]):
+                yield wave + cells, pipe["memory"] + k * n + cells
+            for offset in offsets:
+                here = cells[(cells + offset >= 0) & (cells + offset < n)]
+                for other in (pipe["y"], pipe["y"] + n):
+                    yield wave + here, other + here + offset
+                for k in range(pipe["terms"]):
+                    yield pipe["memory"] + k * n + here, wave + here + offset
+
+    def creep_pairs(self, pipe) -> Iterator[Pairs]:
+        """Yield couplings of wall creep: waves and creep states of a cell with each other.
+
+        Creep states also depend on the waves that set the mean pressure of their cell.
+        """
+        n = int(pipe["cells"])
+        cells, waves = np.arange(n), (pipe["y"], pipe["y"] + n)
+        strains = [pipe["strain"] + k * n for k in range(pipe["elements"])]
+        for offset in [0] if self.linear else [-1, 0, 1]:
+            here = cells[(cells + offset >= 0) & (cells + offset < n)]
+            for row in (*waves, *strains) if strains else ():
+                for other in waves:
+                    yield row + here, other + here + offset
+        for wave in waves:
+            for strain in strains:
+                yield wave + cells, strain + cells
+
+    def sides(self, pipe, right: int) -> tuple[np.ndarray, np.ndarray]:
+        """States of the waves in cells at an end of a pipe, nearest cell first : (entering wave, leaving wave).
+
+        right : 1 for the `to` end of the pipe
+        """
+        forward = pipe["y"] + np.arange(pipe["cells"])
+        backward = forward + pipe["cells"]
+        return (backward[::-1], forward[::-1]) if right else (forward, backward)
+
+    def edge_cells(self, pipe, right: int) -> np.ndarray:
+        """States of the edge cells that a node reads at an end of a pipe."""
+        enters, leaves = self.sides(pipe, right)
+        edge = slice(self.reach.leaving)
+        return leaves[edge] if self.linear else unique_states(leaves[edge], enters[edge])
+
+    def beyond(self, pipe) -> Iterator[Pairs]:
+        """Yield couplings of cells whose stencil crosses a pipe end.
+
+        They depend on the polynomial that continues the waves there and, where a wave enters, on the node.
+        """
+        for right, i in enumerate(ends_of(pipe)):
+            enters, leaves = self.sides(pipe, right)
+            near, last = slice(self.reach.behind), slice(max(self.reach.ahead, 1))
+            read = unique_states(self.sets[i], self.edge_cells(pipe, right), enters[: self.reach.entering])
+            yield pairs_of(enters[near], read)
+            yield pairs_of(leaves[last], leaves[: self.reach.leaving])
+            if self.coupled(pipe):
+                yield pairs_of(leaves[near], read)
+                yield pairs_of(enters[last], leaves[: self.reach.leaving])
+
+
+def ends_of(link) -> tuple[int, int]:
+    """Indices of the nodes at both ends of a link."""
+    return int(link["from_node"]), int(link["to_node"])
+
+
+def jacobian_pattern(model) -> csc_array:
+    """Sparsity pattern : bool[n + m, n], True where a derivative may differ from zero in any state of the model.
+
+    Rows are the rates of the n states, then the m flows in the stepper's ledger (`Model.ledgers`); columns are the
+    states.
+    """
+    n, couplings = model.y_size, Couplings(model)
+    pairs = [(np.arange(n), np.arange(n)), *couplings.pairs()]
+    rows, states = (np.concatenate(side) for side in zip(*pairs, strict=True))
+    entries = np.ones(rows.size, dtype=bool), (rows, states)
+    return csc_array(coo_array(entries, shape=(n + model.ledgers, n)), dtype=bool)
+
+
+def lumped_states(model) -> np.ndarray:
+    """Indices of all states except waves in cells of pipes, states of basins and travels of their walls : int64[q].
+
+    Most are states of lumped parts such as tanks, chambers and masses. Their pressures are hundreds of bars, while the
+    flow of restrictions bends within a few pascals. The result is empty under density laws whose pressures come from
+    iterations.
+    """
+    if model.case.law.name not in ("linear", "log"):  # pressures come from iterations, rougher than rounding
+        return np.zeros(0, dtype=np.int64)
+    pipes = model.tables.pipes[model.tables.pipes["cells"] > 0]
+    cells = [pipe["y"] + np.arange(2 * pipe["cells"]) for pipe in pipes] + [all_states(basin) for basin in model.basins]
+    walls = [[at for at, _, _ in basin.stretches] for basin in model.basins]  # every cell's volume follows these
+    return np.setdiff1d(np.arange(model.y_size), np.concatenate([[], *cells, *walls]))

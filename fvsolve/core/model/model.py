@@ -1,0 +1,544 @@
+"""Model of a case, the state that a run advances, and the inputs of a model."""
+
+from __future__ import annotations
+
+import functools
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fvsolve.case.controls import decision_order
+from fvsolve.core.assembly.lowering import Input, lowering_of
+from fvsolve.core.assembly.pipe_terms import mass_in_creep
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.model.run_data import RunData
+from fvsolve.display import Displayable
+from fvsolve.errors import FvsolveError, Notice
+from fvsolve.units import show
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from fvsolve.case import Case
+    from fvsolve.case.probe import Probe
+    from fvsolve.core.assembly.model_draft import PipeMesh
+    from fvsolve.core.assembly.state_names import StateNames
+    from fvsolve.core.basins.lower_basin import BasinRows
+    from fvsolve.core.kernels.compiled_functions import Functions
+    from fvsolve.core.steppers.structure import Structure
+
+
+@dataclass(repr=False)
+class State(Displayable):
+    """Time [s], flat state vector y, and memory of the run as arrays by name (empty at a fresh start).
+
+    memory : data of step control, event flags, and with delay lines the history of their waves
+    """
+
+    t: float
+    y: np.ndarray
+    memory: dict[str, np.ndarray] = field(default_factory=dict)
+
+    picture = "fvsolve.report.draw.object_pictures:state_figure"
+
+    def __post_init__(self) -> None:
+        self.t = as_time(self.t)
+        self.y = as_numbers("y", self.y)
+        if self.y.ndim != 1:
+            raise FvsolveError(f"y has shape {self.y.shape}; expected a one-dimensional array of numbers")
+        if not isinstance(self.memory, dict):
+            raise FvsolveError(f"memory is of type {type(self.memory).__name__}; expected a dict of arrays by name")
+
+    def summary_line(self) -> str:
+        return f"at t = {self.t:g} s: {self.y.size} numbers"
+
+    def table_columns(self) -> dict[str, np.ndarray]:
+        return {"y": self.y}
+
+
+def flags_of(state: State, model: Model) -> np.ndarray:
+    """Event flags (as `RunData.armed`) of a state that `advance` returned; those of a start for any other state."""
+    flags = state.memory["armed"] if "step" in state.memory else None
+    return flags if flags is not None and flags.size == model.shapes.armed else model.flags
+
+
+def as_numbers(name: str, values: Any) -> np.ndarray:
+    """Convert to a writable, C-contiguous float64[...], without a copy where possible; a number gets the shape ().
+
+    Raises FvsolveError if the values are not real numbers. name : name of the values in its message
+    """
+    if type(values) is float:
+        return np.float64(values)
+    if type(values) is np.ndarray and values.dtype == np.float64 and values.flags.carray and values.ndim:
+        return values
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind not in "fiu":
+            raise TypeError
+        return np.require(array, np.float64, ("C", "W")) if array.ndim else array.astype(np.float64)
+    except (TypeError, ValueError):
+        text = f"{name} = {show(values)} does not consist of real numbers"
+        raise FvsolveError(f"{text}; expected a number or an array of numbers") from None
+
+
+def as_limit(limit: Any) -> float:
+    """Time from which on schedules keep their left limit, as a float [s]; may be infinite.
+
+    Raises FvsolveError if the argument is not a time.
+    """
+    value = as_numbers("limit", limit)
+    if value.ndim or np.isnan(value):
+        raise FvsolveError(f"limit = {show(value)} is not a time; expected a number of seconds, or infinity")
+    return float(value)
+
+
+def as_time(t: Any) -> float:
+    """Time as a float [s]. Raises FvsolveError if the argument is not a finite number."""
+    value = as_numbers("t", t)
+    if value.ndim or not np.isfinite(value):
+        raise FvsolveError(f"t = {show(t)} is not a time; expected a finite number of seconds")
+    return float(value)
+
+
+def once_per_model(function: Callable) -> Callable:
+    """Decorate a function of a model and further arguments, so that a model keeps its results.
+
+    The results depend on the model only and must not be changed; arrays become read-only.
+    """
+
+    @functools.wraps(function)
+    def once(model: Model, *arguments: Any) -> Any:
+        key = function, arguments
+        if key not in model.computed:
+            result = model.computed[key] = function(model, *arguments)
+            if isinstance(result, np.ndarray):
+                result.flags.writeable = False
+        return model.computed[key]
+
+    return once
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Model(Displayable):
+    """Compiled case. It is frozen, so that several runs can share it: each run writes to its own `RunData`.
+
+    tables : arrays that kernels read, by name; shapes : shapes of the arrays that a run writes, see `RunData`
+    scale : float64[n]  size of a small deviation of each state, for relative measures
+    breaks : times within the run at which steps must end, increasing : (time [s], True if a schedule's value jumps)
+    step_max : greatest step under error control, which resolves periods and samples of schedules [s]
+    """
+
+    case: Case
+    tables: rec.Tables
+    shapes: rec.RunArrays
+    state_names: StateNames
+    scale: np.ndarray
+    breaks: list[tuple[float, bool]]
+    step_max: float
+    pipes: list[PipeMesh]
+    node_names: list[str]
+    link_names: list[str]
+    valve_names: list[str]
+    column_names: list[str]
+    piston_names: list[str]
+    mass_names: list[str]
+    body_names: list[str]
+    bushing_names: list[str]
+    elevation: dict[str, float]
+    probes: list[Any]
+    warnings: list[Notice]
+    steady: dict[str, Any]  # facts about the start, for `fvsolve check`
+    profiles: dict[int, np.ndarray]  # pipe -> pressure of the profile at cell centres [Pa]
+    devices: list[tuple]  # (name, part, lowering), in the order of their table
+    laws: list[str]  # modules of compiled laws of parts, in the order of the rows of `hooks`
+    start: np.ndarray  # state at the start: zero except scalar amounts and basins that deviate from the steady state
+    events: list[tuple[str, str]]  # of devices and valves: (name, meaning of a zero of its event function)
+    basins: list[BasinRows]  # in the order of their table
+    watched: list[Probe]  # read in addition to the probes, for their extremes only
+    watched_start: np.ndarray  # pressures of `watched` along pipes in the profile [Pa], nan for others
+    features: list[Any]  # see `assembly.features`
+    flags: np.ndarray  # event flags before a run
+    network: Any  # `network.Network` of rotation, electricity and heat; None without one
+    # idle run data for evaluating single states; tables before the start is solved, reused by `vary`
+    idle_run_data: deque[RunData] = field(default_factory=deque, init=False)
+    tables_before_start: list = field(default_factory=list, init=False)
+    idle_loops: deque = field(default_factory=deque, init=False)  # loops of `advance` that no call uses
+    computed: dict = field(default_factory=dict, init=False)  # results of functions, see `once_per_model`
+
+    picture = "fvsolve.report.draw.object_pictures:model_figure"
+
+    def __post_init__(self) -> None:
+        for array in (*self.tables, self.scale, self.start, *self.profiles.values()):
+            array.flags.writeable = False
+
+    def summary_line(self) -> str:
+        cells = f", {self.all_cells} cells" if self.all_cells else ""
+        return f"of {self.case.name!r}: {self.y_size} states{cells}, {len(self.probes)} probes"
+
+    def table_columns(self) -> dict[str, Any]:
+        return {"state": self.state_names, "start": self.start, "scale": self.scale}
+
+    @property
+    def block_names(self) -> list[str]:
+        """Names of blocks of `controls`, in the order of their table."""
+        return decision_order(self.case.controls)
+
+    @property
+    def y_size(self) -> int:
+        """Number of states."""
+        return len(self.state_names)
+
+    @property
+    def sources(self) -> list[str]:
+        """Names of the rows of the ledger of rain and infiltration, such as "street.rain"."""
+        return [f"{basin.name}.{name}" for basin in self.basins for name in basin.source_names]
+
+    @property
+    def ledger_names(self) -> list[str]:
+        """Names of nodes in the ledger; the cells at a patch have the name of the patch."""
+        kinds = zip(self.node_names, self.tables.nodes["kind"], strict=True)
+        return [name.removesuffix(".inside") if kind == rec.PATCH else name for name, kind in kinds]
+
+    @property
+    def ledgers(self) -> int:
+        """Number of rows of the ledger: supply of nodes; inflow of scalars, decay, heat, reactions; rain and soil."""
+        return int(self.layout["net"] - self.layout["supply"])
+
+    @property
+    def cells(self) -> int:
+        """Number of cells of all pipes, see `PipeMesh`."""
+        return sum(pipe.cells for pipe in self.pipes)
+
+    @property
+    def all_cells(self) -> int:
+        """Number of cells of all pipes (see `PipeMesh`) and basins."""
+        return self.cells + sum(basin.n for basin in self.basins)
+
+    @functools.cached_property
+    def wave_rates(self) -> np.ndarray:
+        """Cells that a wave crosses per second in each pipe : float64[pipes] [1/s].
+
+        For each delay line it is the value of the delay line with the longest travel time.
+        """
+        pipes = self.tables.pipes
+        rates = pipes["speed"] / pipes["dx"] * np.where(pipes["cells"] == 0, pipes["rate_factor"], 1.0)
+        rates.flags.writeable = False
+        return rates
+
+    @property
+    def wave_rate(self) -> float:
+        """Greatest of `wave_rates` [1/s]; with basins at least the step-limiting rate of all parts at the start."""
+        rate = float(self.wave_rates.max(initial=0.0))
+        if not self.basins:
+            return rate
+        return max(rate, float(self.evaluate(self.case.numerics.start, self.start)[1][rec.RATE]))
+
+    @property
+    def unsteady(self) -> bool:
+        """True if any pipe has unsteady friction."""
+        return bool(self.tables.pipes["terms"].any())
+
+    @property
+    def creeps(self) -> bool:
+        """True if the wall of any pipe creeps."""
+        return bool(self.tables.pipes["elements"].any())
+
+    @functools.cached_property
+    def isolated(self) -> frozenset[str]:
+        """Key paths of nodes and links whose pressure no flow determines during a run, see `shut_off`."""
+        from fvsolve.core.model.shut_off import isolated_parts
+
+        return isolated_parts(self)
+
+    @functools.cached_property
+    def places(self) -> tuple:
+        """Memory addresses of the tables, by which compiled functions read them."""
+        from fvsolve.core.kernels.table_handle import addresses_of
+
+        return addresses_of(self.tables)
+
+    @functools.cached_property
+    def functions(self) -> Functions:
+        """Compiled functions (`kernels.compiled_functions.Functions`) for the density law and parts of this model."""
+        from fvsolve.core.basins.basin_terms import terms_of_basins, terms_of_scalars
+        from fvsolve.core.kernels.compiled_functions import functions
+        from fvsolve.core.kernels.rhs_assembly import ModelFeatures
+
+        has = rec.Tables(*(len(table) > 0 for table in self.tables))
+        mechanics = [has.clusters, has.columns, has.masses, has.bodies, has.lines, has.pins, has.bushings]
+        mechanics.append(has.moving_segments)
+        basins, carried, valves = terms_of_basins(self.basins, has.valves), terms_of_scalars(self.basins), has.valves
+        alone = bool(self.basins) and not (self.pipes or valves or has.devices or any(mechanics))
+        alone = alone and bool((self.tables.nodes["kind"] == rec.PATCH).all())
+        cells = bool((self.tables.pipes["cells"] > 0).any())
+        cast = ModelFeatures(self.case.law.family, cells, *mechanics, self.unsteady, self.creeps, has.devices,
+                    tuple(self.laws), basins, carried, valves, (), (), has.couplings, alone,
+                    forces=bool(self.layout["forces"] >= 0), formulas=bool((self.tables.schedules["pieces"] < 0).any()),
+                    networks=self.network is not None,
+                    device_heat=bool((self.tables.heat_sources["device"] >= 0).any()))  # fmt: skip
+        terms = tuple(pair for feature in self.features for pair in feature.terms(self, cast))
+        packages = tuple(name for feature in self.features for name in feature.packages)
+        cast = cast._replace(features=terms, further_packages=packages)
+        return functions(cast)
+
+    @property
+    def damped(self) -> bool:
+        """True if explicit steps divide the rates of basins by a factor for friction, see `steppers.erk`."""
+        return bool(self.tables.basins["damped"].any())
+
+    @property
+    def layout(self) -> np.void:
+        """Record of offsets in `out`, the array that the right-hand side writes in addition to dydt."""
+        return self.tables.layout[0]
+
+    @functools.cached_property
+    def structure(self) -> Structure:
+        """Sparsity pattern of the Jacobian, with the linear algebra chosen for it or by `numerics.linear_algebra`."""
+        from fvsolve.core.model.jacobian_pattern import jacobian_pattern, lumped_states
+        from fvsolve.core.steppers.structure import Structure
+
+        return Structure(jacobian_pattern(self), self.case.numerics.linear_algebra, lumped_states(self))
+
+    def new_out(self) -> np.ndarray:
+        """New array for the values that the right-hand side writes in addition to dydt."""
+        out = np.zeros(int(self.layout["size"]))
+        out[rec.ARRIVES] = rec.NEVER
+        return out
+
+    def checked(self, t: Any, y: Any) -> tuple[float, np.ndarray]:
+        """Time and state in the form that kernels read : (t [s], y : float64[n]).
+
+        Raises FvsolveError if the state does not fit this model, or if the time or a state is not a finite number.
+        """
+        state = self.checked_size(y)
+        if not np.isfinite(state).all():
+            k = int(np.argmax(~np.isfinite(state)))
+            raise FvsolveError(f"y[{k}] = {state[k]}, {self.state_names[k]}; expected a finite number for every state")
+        return as_time(t), state
+
+    def checked_size(self, y: Any) -> np.ndarray:
+        """State as float64[n]. Raises FvsolveError if its size does not fit this model."""
+        state = as_numbers("y", y)
+        if state.shape != (self.y_size,):
+            raise FvsolveError(f"y has shape {state.shape}; expected a number for each of the {self.y_size} states "
+                               "that Model.state_names lists")  # fmt: skip
+        return state
+
+    def rhs(self, t: float | State, y: np.ndarray | None = None) -> np.ndarray:
+        """Right-hand side dy/dt = f(t, y) : float64[n].
+
+        Schedules take their right limit at t; devices are in the position in which a run would start at (t, y).
+        With delay lines the argument must be a `State`, whose memory contains their history (without memory no waves
+        arrive); otherwise FvsolveError is raised.
+        """
+        if isinstance(t, State) and y is None:
+            with self.run_data() as run_data:
+                run_data.restore_history(t)
+                return run_data.evaluate(t.t, t.y, np.inf)[0]
+        self.refuse_histories("rhs")
+        return self.evaluate(t, y)[0]
+
+    def refuse_histories(self, function: str) -> None:
+        """Raise FvsolveError if the model has delay lines or blocks with a delay: their history is not part of y."""
+        for feature in self.features:
+            if text := feature.refusal(function):
+                raise FvsolveError(text)
+
+    def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
+        """Right-hand side and further values at (t, y), see `rhs` : (dydt, out).
+
+        From time `limit` [s] on, schedules keep their left limit at `limit`. Delay lines are allowed, but no waves
+        arrive from them.
+        """
+        limit = as_limit(limit)
+        with self.run_data() as run_data:
+            return run_data.evaluate(t, y, limit)
+
+    @contextmanager
+    def run_data(self, armed: np.ndarray | None = None) -> Iterator[RunData]:
+        """Context with run data for evaluating single states, which later calls use again.
+
+        armed : event flags; None for those of a start. First occurrences and extremes in these data have no meaning.
+        """
+        try:
+            run_data = self.idle_run_data.pop()  # atomic: no other thread gets the same object
+        except IndexError:
+            run_data = RunData(self)
+        run_data.reset(armed)
+        yield run_data
+        self.idle_run_data.append(run_data)
+
+    def jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Jacobian df/dy : float64[n, n], by central differences with steps of 1e-6 (scale + |y|).
+
+        Raises FvsolveError if the model has delay lines.
+        """
+        self.refuse_histories("jacobian")
+        return self.jacobian_without_delays(t, y)
+
+    def jacobian_without_delays(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Jacobian as `jacobian`, where delay lines are allowed, but no waves arrive from them."""
+        (t, y), n = self.checked(t, y), self.y_size
+        jacobian = np.empty((n, n))
+        for j in range(n):
+            step = 1e-6 * (self.scale[j] + abs(y[j]))
+            high, low = y.copy(), y.copy()
+            high[j] += step
+            low[j] -= step
+            jacobian[:, j] = (self.evaluate(t, high)[0] - self.evaluate(t, low)[0]) / (high[j] - low[j])
+        return jacobian
+
+    def observe(self, t: float | State, y: np.ndarray | None = None, limit: float = np.inf) -> np.ndarray:
+        """Values of all probes, in the order of `.probes`, at a `State` or at (t, y) : float64[probes] [SI].
+
+        Devices are in the position of a start at (t, y), or as stored in a state that `advance` returned. Delay lines
+        contain the waves in the memory of the `State`; at (t, y) they are empty. From time `limit` [s] on, schedules
+        keep their left limit at `limit`.
+        """
+        armed, limit, past = None, as_limit(limit), None
+        if isinstance(t, State) and y is None:
+            t, y, armed, past = t.t, t.y, flags_of(t, self), t
+        t, y = self.checked(t, y)
+        with self.run_data(armed) as run_data:
+            run_data.restore_history(past)
+            return run_data.observe(t, y, run_data.evaluate(t, y, limit)[1])
+
+    # physical meaning of states --------------------------------------------------------------------------------
+
+    def cell_pressure(self, k: int, waves: np.ndarray) -> np.ndarray:
+        """Pressure [Pa] in the cells of pipe k from the sum of both waves [kg/s] : float64[cells].
+
+        Raises FvsolveError if there is no such pipe, or if `waves` does not have a number for each of its cells.
+        """
+        waves = as_numbers("waves", waves)
+        known = isinstance(k, (int, np.integer)) and 0 <= k < len(self.pipes)
+        if not known or waves.shape != (self.pipes[k].cells,):
+            raise FvsolveError(f"waves has shape {waves.shape} for pipe {k}; expected a number for each cell of "
+                               f"the pipe, and a pipe number less than {len(self.pipes)}")  # fmt: skip
+        return self.case.law.cell_pressure(self.tables.pipes[k], self.profiles[k], self.tables.profile, waves)
+
+    def cell_pressures(self, waves: np.ndarray) -> np.ndarray:
+        """Pressure [Pa] in the cells of all pipes from the sum of both waves [kg/s] : float64[cells].
+
+        Raises FvsolveError if `waves` does not have a number for each cell.
+        """
+        waves = as_numbers("waves", waves)
+        if waves.shape != (self.cells,):
+            raise FvsolveError(f"waves has shape {waves.shape}; expected a number for each of the {self.cells} cells")
+        starts = list(self.profiles.values())
+        return self.case.law.cell_pressures(self.tables.pipes, starts, self.tables.profile, waves)
+
+    @functools.cached_property
+    def cell_elevations(self) -> np.ndarray:
+        """Elevation of the centres of the cells of all pipes : float64[cells] [m]."""
+        elevations = np.concatenate([np.zeros(0), *(pipe.elevation for pipe in self.pipes)])
+        elevations.flags.writeable = False
+        return elevations
+
+    def head(self, pressure: ArrayLike, elevation: ArrayLike) -> np.ndarray:
+        """Head [m] of the case's fluid above datum: 0 at ambient pressure and datum level."""
+        pressure, elevation = as_numbers("pressure", pressure), as_numbers("elevation", elevation)
+        return self.case.law.head(pressure, elevation)
+
+    @property
+    def cavitates(self) -> bool:
+        """True if the density law includes cavities."""
+        return self.case.law.cavitates
+
+    def fields(self, y: np.ndarray, out: np.ndarray, lines: dict[int, tuple] | None = None) -> dict[str, Any]:
+        """Values along pipes, in basins and at nodes in a state [SI] : pipe or basin -> quantity -> values of cells.
+
+        Further keys: "nodes" : node -> quantity -> float; "points" : basin that moves or is on a body -> corners of its
+        cells.
+        out : array that `evaluate` returns; lines : pipe -> both waves of a delay line, as returned by `RunData.along`,
+        zero if left out
+        """
+        y = self.checked_size(y)
+        if np.shape(out) != (int(self.layout["size"]),):
+            raise FvsolveError(f"out has shape {np.shape(out)}; expected the second array that Model.evaluate returns")
+        fields, law = {}, self.case.law
+        for k, pipe in enumerate(self.pipes):
+            row = self.tables.pipes[k]
+            n, o = pipe.cells, row["y"]
+            r, l = y[o : o + n], y[o + n : o + 2 * n]  # noqa: E741
+            if row["cells"] == 0:
+                r, l = (lines or {}).get(k, (np.zeros(n), np.zeros(n)))  # noqa: E741
+            pressure, mass_flow = self.cell_pressure(k, r + l), row["flow"] + (r - l)
+            flow = mass_flow / law.density(pressure)
+            fields[pipe.name] = {
+                "pressure": pressure, "head": self.head(pressure, pipe.elevation),
+                "velocity": flow / law.area(row, pressure), "flow": flow,
+                "min_pressure": pressure, "max_pressure": pressure,
+            }  # fmt: skip
+        nodes, at = self.tables.nodes, int(self.layout["pressure"])
+        for basin in self.basins:
+            fields[basin.name] = basin.fields(basin.deviations(y)) | (basin.values(y) if basin.scalars else {})
+        fields["points"] = {basin.name: basin.points_at(y, out, self.layout) for basin in self.basins
+                           if basin.moves or basin.part.on is not None}  # fmt: skip
+        fields["nodes"] = {}
+        for i, name in enumerate(self.node_names):
+            pressure = float(nodes[i]["pressure"] + out[at + i])
+            head = float(self.head(pressure, self.elevation[name]))
+            fields["nodes"][name] = {"pressure": pressure, "head": head}
+        for feature in self.features:
+            feature.add_fields(fields, self, y, out)
+        return fields
+
+    def contents(self, y: np.ndarray) -> tuple[float, float]:
+        """Mass stored at the start, and its change from the start to state y [kg]."""
+        y = self.checked_size(y)
+        initial, change = self.initial_mass, 0.0
+        pipes = self.tables.pipes
+        columns = (pipes[name].tolist() for name in ("y", "cells", "dx", "speed", "elements"))
+        for row, o, n, dx, speed, elements in zip(pipes, *columns, strict=True):
+            change += float(np.sum(y[o : o + 2 * n])) * dx / speed if n else float(y[o])
+            change += mass_in_creep(self.tables.floats, row, y) if elements else 0.0
+        for at in self.tables.nodes["y"].tolist():
+            change += float(y[at]) if at >= 0 else 0.0
+        for basin in self.basins:
+            rest, per = basin.mass()
+            for own, start in zip(basin.states_of(y)[:1], basin.states_of(self.start)[:1], strict=True):
+                initial += rest + float(np.sum(per * start))
+                change += float(np.sum(per * (own - start)))
+        for row in self.tables.pistons:  # mass of chambers on an axis: state plus swept mass
+            if row["line"] >= 0:
+                continue
+            places = self.tables.masses[[row["case"], row["rod"]]]["y"]
+            back, forth = (float(y[place]) if place >= 0 else 0.0 for place in places)
+            change += float(row["sweep_a"] + row["sweep_b"]) * (forth - back)
+        return initial, change
+
+    @functools.cached_property
+    def initial_mass(self) -> float:
+        """Mass stored in pipes and nodes at the start [kg], without basins."""
+        mass, nodes = 0.0, self.tables.nodes
+        for k, row in enumerate(self.tables.pipes):
+            mass += self.case.law.mass_in_pipe(row, self.profiles[k], self.tables.profile)
+        for stored in nodes["mass"][nodes["y"] >= 0].tolist():
+            mass += stored
+        return mass
+
+    @property
+    def checks(self) -> dict[str, Any]:
+        """Facts about the compiled case, for `fvsolve check`."""
+        from fvsolve.core.model.model_facts import checks
+
+        return checks(self)
+
+
+def inputs_of(model: Model) -> dict[str, Input]:
+    """Inputs of all parts : name `PART.KEY` -> input."""
+    case = model.case
+    parts = {**case.places, **{name: case.conduits[name] for name in model.valve_names}}
+    parts |= {name: link for name, link in case.links.items() if name not in parts}
+    inputs: dict[str, Input] = {}
+    for name, part in parts.items():
+        own = lowering_of(type(part)).of(part).inputs(model, name, part)
+        inputs |= {f"{name}.{key}": value for key, value in own.items()}
+    for feature in model.features:
+        inputs |= feature.inputs(model)
+    return inputs
