@@ -18,7 +18,8 @@ from measure import parser
 
 import fvsolve
 from fvsolve.core.run import model_of
-from fvsolve.core.step_limits.growing_modes import excess_growth, modes_outside_cells
+from fvsolve.core.step_limits.greatest_step import excess_growth
+from fvsolve.core.step_limits.growing_modes import modes_outside_cells
 from fvsolve.core.step_limits.step_notices import exceeded_checks, first_step, steps_of
 from fvsolve.core.steppers.analysis.stability_function import stability_function
 from fvsolve.errors import FvsolveError

@@ -24,8 +24,8 @@ from fvsolve.studies.failure_map_columns import (
     cells_for_delay_lines,
     default_schemes,
     eigenvalues_of,
-    greatest_step,
     map_columns,
+    modes_step,
 )
 from fvsolve.studies.outcome import (
     GIVEN_UP,
@@ -409,7 +409,7 @@ class MapRuns:
             self._spectra[at] = eigenvalues_of(self.case, keys)
         eigenvalues = self._spectra[at]
         if (method, *at) not in self._limits:
-            of_modes = None if eigenvalues is None else greatest_step(method, eigenvalues, self.span)
+            of_modes = None if eigenvalues is None else modes_step(method, eigenvalues, self.span)
             both = of_modes, self.lines_limit(method, *at)
             self._limits[method, *at] = None if None in both else min(both)
         return self._limits[method, *at]

@@ -6,7 +6,6 @@ The columns are steps around the predicted limits, or values of a key. The limit
 
 import functools
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from fvsolve.case import load
 from fvsolve.case.sections import DEFAULT_CELLS
 from fvsolve.core.schemes import LIMITED, SCHEMES
+from fvsolve.core.step_limits.greatest_step import greatest_step, modes_limit
 from fvsolve.core.steppers.tableau import method_named
 from fvsolve.errors import FvsolveError
 from fvsolve.features.delay_lines.growth import storing_nodes, wave_growth
@@ -45,7 +45,7 @@ def eigenvalues_of(case, set: dict) -> np.ndarray | None:
     return np.concatenate([np.linalg.eigvals(model.jacobian_without_delays(t, rest)) for t in times])
 
 
-def greatest_step(method: str, eigenvalues: np.ndarray, span: float) -> float:
+def modes_step(method: str, eigenvalues: np.ndarray, span: float) -> float:
     """Greatest step [s] up to which no mode grows 1000 times more than the exact solution in a run of `span` [s].
 
     eigenvalues : complex128[n]  eigenvalues of the modes [1/s]
@@ -58,29 +58,8 @@ def greatest_step(method: str, eigenvalues: np.ndarray, span: float) -> float:
     fastest = float(np.abs(eigenvalues).max(initial=0.0))
     if fastest == 0.0:
         return math.inf
-    exact_growth = span * max(0.0, float(eigenvalues.real.max()))
-
-    def grows(h: float) -> bool:
-        with np.errstate(all="ignore"):
-            growth = span / h * math.log(max(np.abs(r(h * eigenvalues)).max(), 1e-300))
-        return growth - exact_growth > math.log(VISIBLE_GROWTH)
-
-    return last_step(grows, np.geomspace(1e-2, 1e3, 1201) / fastest, 50, lambda low, high: 0.5 * (low + high))
-
-
-def last_step(grows: Callable[[float], bool], steps: Sequence[float], halvings: int, mean: Callable) -> float:
-    """Greatest step h up to which grows(h) is false: inf if it is false at all `steps`, 0 if it is true at the first.
-
-    Between two steps it is refined by a number of bisections; mean : mean(low, high), the next step to try
-    """
-    first = next((k for k, h in enumerate(steps) if grows(h)), None)
-    if first is None or first == 0:
-        return math.inf if first is None else 0.0
-    low, high = steps[first - 1], steps[first]
-    for _ in range(halvings):
-        middle = mean(low, high)
-        low, high = (low, middle) if grows(middle) else (middle, high)
-    return float(low)
+    steps = np.geomspace(1e-2, 1e3, 1201) / fastest
+    return modes_limit(r, eigenvalues, span, VISIBLE_GROWTH, steps, halvings=50).step
 
 
 STEP_COUNT, HALVINGS = 33, 12  # number of steps tried, and of bisections between two of them
@@ -121,7 +100,12 @@ class WaveGrowthLimit:
         if method_named(method).kind == "linear" and any(storing_nodes(self.model(self.steps[0]), 1.0)):
             return None
         grows = functools.partial(self.grows, method)
-        return last_step(grows, self.steps, HALVINGS, lambda low, high: math.sqrt(low * high))
+        return greatest_step(grows, self.steps, width=0.0, halvings=HALVINGS, mean=geometric_mean).step
+
+
+def geometric_mean(low: float, high: float) -> float:
+    """Geometric mean of two positive numbers."""
+    return math.sqrt(low * high)
 
 
 COURANTS = (0.25, 0.5, 0.75, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0)

@@ -19,12 +19,12 @@ import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, NAMES, validated
 from fvsolve.core.schemes import SCHEMES
+from fvsolve.core.step_limits.greatest_step import greatest_step
 from fvsolve.core.steppers.automatic import AUTO, EXPLICIT, IMPLICIT, TIGHT_BELOW, TIGHT_IMPLICIT
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.studies.outcome import name_list
 from fvsolve.studies.result_table import PlainData
-from fvsolve.studies.stability.growth import bisect
 
 CELLS = 20  # cells of the closed pipe
 NORM_TOLERANCE = 1e-10  # excess of a norm over 1 that counts as rounding
@@ -268,13 +268,7 @@ def courant_limit(scheme: str, method: str) -> float | None:
         numerator, denominator = (matrix_polynomial(coefficients, b) for coefficients in polynomials(method))
         return not np.linalg.norm(np.linalg.solve(denominator, numerator), 2) <= 1.0 + NORM_TOLERANCE
 
-    samples = np.geomspace(LEAST, MOST, 120)
-    failed = next((k for k, x in enumerate(samples) if gains(x)), None)
-    if failed is None:
-        return math.inf
-    if failed == 0:
-        return 0.0
-    return float(bisect(gains, samples[failed - 1], samples[failed], 1e-9).step)
+    return greatest_step(gains, np.geomspace(LEAST, MOST, 120), width=1e-9).step
 
 
 @functools.cache

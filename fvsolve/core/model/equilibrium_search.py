@@ -41,7 +41,7 @@ from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.schedule import constant
 
 DIFFERENCE_STEP = 1e-6  # step of finite differences [rad], [m]
-CHAMBERS, PUSHES = "kernels.mass_dynamics: piston_chambers", "kernels.mass_dynamics: mass_rates"
+CHAMBERS, PUSHES = "core.kernels.mass_dynamics: piston_chambers", "core.kernels.mass_dynamics: mass_rates"
 
 
 class Configuration(StaticForces):

@@ -21,11 +21,13 @@ two shut ends, -1 between an open and a shut end, 0 without reflection.
 """
 
 import functools
+from collections.abc import Callable
 
 import numpy as np
 
 from fvsolve.core.kernels.ghost_cells import END_ENTERING, END_LEAVING, END_VALUE, GHOSTS
 from fvsolve.core.schemes import LEAST_CELLS, SCHEMES
+from fvsolve.core.step_limits.greatest_step import greatest_step, multiples
 from fvsolve.core.step_limits.symbol import symbol, weights_of
 from fvsolve.core.steppers.analysis.stability_function import stability_function
 
@@ -39,23 +41,12 @@ WORST = (0.0, 1.0, -1.0)  # products of reflection factors of both ends that red
 RISE = 1.02  # ratio of trial Courant numbers for a pipe of few cells
 
 
-def greatest(holds, ratio: float) -> float:
-    """Greatest trial Courant number up to which `holds` is True; 0 if it is False for the lowest one.
+def greatest_courant(fails: Callable[[float], bool], ratio: float) -> float:
+    """Greatest trial Courant number up to which `fails` is False; 0 if the lowest one fails, inf if none does.
 
-    holds : function of a Courant number; ratio : ratio of the trial numbers before bisection
+    fails : function of a Courant number; ratio : ratio of the trial numbers before bisection
     """
-    low, high = 0.0, LOWEST
-    while high <= HIGHEST and holds(high):
-        low, high = high, ratio * high
-    return bisected(holds, low, high) if low > 0.0 else 0.0
-
-
-def bisected(holds, low: float, high: float) -> float:
-    """Greatest number for which `holds` is True, between `low`, where it is True, and `high`, where it is False."""
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    return low
+    return greatest_step(fails, multiples(LOWEST, ratio, HIGHEST), width=0.0, halvings=HALVINGS).step
 
 
 @functools.lru_cache(maxsize=64)
@@ -67,7 +58,7 @@ def plane_limit(scheme: str, method: str, share: float, waves: bool = True) -> f
     Raises FvsolveError for a nonlinear scheme.
     """
     z = plane_eigenvalues(scheme, share, waves)
-    return greatest(lambda courant: not is_unstable(z, method, courant), 2.0)
+    return greatest_courant(lambda courant: is_unstable(z, method, courant), 2.0)
 
 
 @functools.lru_cache(maxsize=1024)
@@ -115,7 +106,7 @@ def pipe_limit(scheme: str, method: str, cells: int, returned: tuple[float, ...]
 
     returned : products of the pressure reflection factors at both ends; the limit holds for all of these products
     """
-    return greatest(lambda courant: pipe_growth(scheme, method, cells, courant, returned) <= GROWTH, RISE)
+    return greatest_courant(lambda courant: pipe_growth(scheme, method, cells, courant, returned) > GROWTH, RISE)
 
 
 @functools.lru_cache(maxsize=4096)

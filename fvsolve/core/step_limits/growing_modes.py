@@ -25,7 +25,7 @@ from fvsolve.core.assembly.pipe_terms import elements
 from fvsolve.core.kernels.steady_friction import drag_slope
 from fvsolve.core.model.model import once_per_model
 from fvsolve.core.schemes import SCHEMES
-from fvsolve.core.step_limits.grid_limits import bisected
+from fvsolve.core.step_limits.greatest_step import excess_growth, growth_in_run, modes_limit, multiples
 from fvsolve.core.step_limits.symbol import symbol
 from fvsolve.core.steppers.analysis.stability_function import stability_function
 from fvsolve.core.steppers.analysis.stability_properties import imaginary_interval
@@ -112,6 +112,7 @@ SHARE = 0.01  # fraction of the forcing range over which slopes are taken
 MOST = 300  # number of states above which no prediction is made
 LEAST_GROWTH = 10.0  # growth factor in a run below which no notice is given: some growth is unavoidable
 LEAST = 1e-15  # least step in the search for the limit, relative to the given step
+HALVINGS = 40  # number of bisections in this search
 RESOLVED = 1.0  # |h s| up to which a mode is resolved by the steps, and grows as predicted at the start
 PHASES = np.linspace(0.0, np.pi, 65)
 NOTICE_GROWTH = 1.01  # growth of an undamped oscillation in a run above which a notice is given
@@ -166,35 +167,16 @@ def fastest_growing(r, modes: Modes, step: float, span: float, own: bool, enough
     if not modes:
         return None
     s = np.concatenate([values for _, values in modes])
-
-    def grown(h: float) -> float:
-        return growth_factor(float(excess_growth(r, s, h).max()), span / h)
-
-    if grown(step) < enough:
+    shorter = multiples(0.5 * step, 0.5, LEAST * step)
+    limit = modes_limit(r, s, span, enough, [step], shorter, halvings=HALVINGS)
+    if limit.step == math.inf:
         return None
-    high, low = step, 0.5 * step
-    while grown(low) >= enough and low > LEAST * step:
-        high, low = low, 0.5 * low
-    low = bisected(lambda h: grown(h) < enough, low, high)
     worst = int(np.argmax(excess_growth(r, s, step)))
     at = int(np.searchsorted(np.cumsum([values.size for _, values in modes]), worst, side="right"))
     frequency = abs(float(s[worst].imag)) / (2.0 * math.pi)
-    return Mode(modes[at][0], grown(step), low, own, bool(abs(step * s[worst]) <= RESOLVED), frequency)
-
-
-def excess_growth(r, s: np.ndarray, h: float) -> np.ndarray:
-    """Growth factor of each mode in a step, divided by the exact growth factor (at least 1), minus 1.
-
-    r : stability function of the method; s : eigenvalues of the modes [1/s]; h : time step [s]
-    """
-    with np.errstate(over="ignore", invalid="ignore"):
-        ratio = np.abs(r(h * s)) / np.exp(np.maximum(h * s.real, 0.0))
-        return (ratio if np.isfinite(ratio).all() else np.nan_to_num(ratio, nan=np.inf)) - 1.0
-
-
-def growth_factor(excess: float, steps: float) -> float:
-    """Growth factor (1 + excess)^steps over a number of steps, at most exp(700); 1 for a negative excess."""
-    return math.exp(min(700.0, steps * math.log1p(max(excess, 0.0))))
+    grown = growth_in_run(r, s, step, span)
+    resolved = bool(abs(step * s[worst]) <= RESOLVED)
+    return Mode(modes[at][0], grown, limit.step or limit.fails, own, resolved, frequency)
 
 
 def modes_outside_cells(model) -> Modes:

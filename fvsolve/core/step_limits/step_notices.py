@@ -15,7 +15,7 @@ from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.run_data import RunData
 from fvsolve.core.model.step_division import step_at_start
 from fvsolve.core.schemes import LEAST_CELLS, SCHEMES
-from fvsolve.core.step_limits.advection_limit import advection_limit, growth_of
+from fvsolve.core.step_limits.greatest_step import growth_factor
 from fvsolve.core.step_limits.grid_limits import (
     GROWTH,
     LONG,
@@ -24,7 +24,7 @@ from fvsolve.core.step_limits.grid_limits import (
     pipe_limit,
     plane_limit,
 )
-from fvsolve.core.step_limits.growing_modes import LEAST_GROWTH, Mode, growth_factor, lumped_modes, undamped_notices
+from fvsolve.core.step_limits.growing_modes import LEAST_GROWTH, Mode, lumped_modes, undamped_notices
 from fvsolve.core.step_limits.symbol import weights_of
 from fvsolve.core.steppers import automatic
 from fvsolve.core.steppers.tableau import method_named
@@ -267,6 +267,8 @@ def long_pipe(model, method: str, k: int, courant: float, steps: Steps) -> list[
     scheme = smooth_scheme(model.case.numerics.scheme)[0]
     if is_stable_with_margin(scheme, method, courant):
         return []
+    from fvsolve.core.step_limits.advection_limit import advection_limit  # loaded only near a limit
+
     result = advection_limit(scheme, method)
     grows = math.inf if result.limit > 0.0 else growth(scheme, method, courant, steps.count)
     sure = result.proved and proved(model)
@@ -364,6 +366,8 @@ def basin_checks(model, method: str, rates: dict[str, float], steps: Steps) -> l
         if basin.is_grid:
             limit = plane_limit(scheme, method, share, basin.has_waves)
         else:
+            from fvsolve.core.step_limits.advection_limit import advection_limit
+
             limit = advection_limit(scheme, method).limit
         fixed = basin.is_grid and basin.has_constant_speed
         grows = math.inf if limit > 0.0 else growth(scheme, method, courant / parts, steps.count)
@@ -418,6 +422,8 @@ def courant_notice(model, check: CourantCheck, method: str, wrong: bool) -> Noti
 
 def growth(scheme: str, method: str, courant: float, count: float) -> float:
     """Growth factor of the fastest growing wave on a uniform grid in `count` steps with a Courant number."""
+    from fvsolve.core.step_limits.advection_limit import growth_of
+
     return growth_factor(growth_of(weights_of(scheme), method, courant)[0], count)
 
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from fvsolve.core.assembly.features import with_slot
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.step_limits.growing_modes import LEAST_GROWTH, growth_factor
+from fvsolve.core.step_limits.greatest_step import growth_factor
+from fvsolve.core.step_limits.growing_modes import LEAST_GROWTH
 from fvsolve.core.steppers.tableau import Method
 from fvsolve.errors import Notice
 from fvsolve.features.delay_lines.kernels.line_rates import drag_and_slope

@@ -19,6 +19,14 @@ import numpy as np
 from fvsolve.core.model.energy_norm import energy_form
 from fvsolve.core.schemes import LIMITED
 from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.core.step_limits.greatest_step import (
+    STEP_RATIO,
+    StepLimit,
+    bisect,
+    greatest_step,
+    limit_from,
+    multiples,
+)
 from fvsolve.core.steppers import loop_records
 from fvsolve.core.steppers.tableau import Method
 from fvsolve.errors import CaseError, FvsolveError
@@ -28,7 +36,7 @@ from fvsolve.features.delay_lines.kernels import wave_history as at
 from fvsolve.features.delay_lines.kernels.line_rates import drag_and_slope
 from fvsolve.studies.operating_point import with_held_schedules
 from fvsolve.studies.outcome import study_model
-from fvsolve.studies.stability.growth import STEP_RATIO, StepLimit, bisect, bisect_limit, prediction_limit
+from fvsolve.studies.stability.growth import prediction_limit
 from fvsolve.studies.stability.real_runs import SAFE_PARTS, RealRuns, fixed_step_loop, measure_limit
 from fvsolve.studies.stability.stability_row import StabilityRow
 from fvsolve.studies.work_limit import WorkLimit
@@ -337,7 +345,7 @@ class DelayLineRuns(RealRuns):
         close because steps that do not divide the delay of a line may be safe above the limit.
         """
         if not np.isfinite(guess):
-            return bisect_limit(self.fails, self.first, self.far, STEP_RATIO if np.isnan(guess) else STEP_RATIO_UP)
+            return limit_from(self.fails, self.first, self.far, STEP_RATIO if np.isnan(guess) else STEP_RATIO_UP)
         if any(self.fails(part * guess) for part in SAFE_PARTS) or not self.fails(self.failing_step):
             return super().limit(guess)
         low = (SAFE_PARTS[-1] if self.fails(NEAR_PREDICTION * guess) else NEAR_PREDICTION) * guess
@@ -472,7 +480,7 @@ class DelayLineLimits:
         """Predicted limit of the step, below which no step is found to fail; nan for Rosenbrock methods."""
         if self.method.kind == "linear":
             return StepLimit(np.nan, np.nan)
-        rough = bisect_limit(self.fails, self.first, self.far, RISE, FINE)
+        rough = limit_from(self.fails, self.first, self.far, RISE, FINE)
         limits = [rough, *(self.limit_at_parts(d, rough.fails) for d in self.delays_at_stores(rough))]
         return min(limits, key=lambda limit: limit.fails)
 
@@ -492,17 +500,20 @@ class DelayLineLimits:
         delay : delay of a line [s]; fails : a failing step [s], below which the search starts
         The limit is inf if the greatest of these steps below `fails` does not fail.
         """
-        low = int(np.ceil(delay / fails))
-        if low < 1 or not self.fails(delay / low):
+        least = int(np.ceil(delay / fails))
+        if least < 1:
             return StepLimit(np.inf, np.inf)
-        high = 2 * low
-        while self.fails(delay / high):
-            low, high = high, 2 * high
-        while high - low > 1:
-            middle = (low + high) // 2
-            low, high = (middle, high) if self.fails(delay / middle) else (low, middle)
-        between = delay / (low + 0.5)
-        return bisect(self.fails, delay / high if self.fails(between) else between, delay / low, FINE)
+        # The search is for the number n: steps delay / n fail for small n.
+        n = greatest_step(
+            lambda n: not self.fails(delay / n),
+            multiples(least, 2, np.inf),
+            width=0.0,
+            mean=lambda low, high: (low + high) // 2,
+        )
+        if n.step == 0.0:
+            return StepLimit(np.inf, np.inf)
+        between = delay / (n.step + 0.5)
+        return bisect(self.fails, delay / n.fails if self.fails(between) else between, delay / n.step, FINE)
 
 
 def delayed_row(case, scheme: str, method, steps: int, threshold: float) -> StabilityRow:

@@ -14,67 +14,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fvsolve.core.step_limits.greatest_step import StepLimit, limit_from, multiples, step_below
 from fvsolve.core.steppers import stability_function
 from fvsolve.core.steppers.tableau import Method
 from fvsolve.studies.work_limit import CALL_TIME, DENSE_RATE, FEWER_CELLS, SPARSE_RATE, WorkLimit
 
 POWER_OPERATIONS = 4.0  # over n^3, of a power of a matrix and the check of its norm
 NORM_TURNS, NORM_ACCURACY = 20, 1.0 + 1e-6  # of a power iteration for a norm; greatest norm over its result
-BRACKET_WIDTH = 1e-4  # relative width of the final bracket
-STEP_RATIO = 1.3  # ratio of consecutive steps of the search upwards
 
 
 def prediction_limit(states: int, steps: int, remedy: str = FEWER_CELLS) -> WorkLimit:
     """Limit of the time of a prediction of growth for this number of states over this number of steps."""
     return WorkLimit(f"predictions for {states} states and {steps} steps", f"{remedy}, or use fewer --steps")
-
-
-class StepLimit(NamedTuple):
-    """Result of a search: greatest step found safe, `step` [s], and least step found to fail, `fails` [s].
-
-    Both are inf if no failure was found, and nan if nothing was computed; `step` is 0 or nan if no safe step was found.
-    """
-
-    step: float
-    fails: float
-
-
-def bisect_limit(
-    fails: Callable[[float], bool], first: float, far: float, rise: float = STEP_RATIO, fine: float = BRACKET_WIDTH
-) -> StepLimit:
-    """Find the least step h [s] at which fails(h) is true, by a search upwards and bisection.
-
-    The search starts at `first` and multiplies the step by `rise`. Bisection ends at the relative width `fine`. If
-    `first` fails, it is halved down to 1e-9 of its value; if all these steps fail, the limit `StepLimit.step` is 0. If
-    no step up to `far` fails, the limit is inf.
-    """
-    low, high = 0.0, first
-    if fails(high):
-        while high > 1e-9 * first:
-            low, high = 0.5 * high, high
-            if not fails(low):
-                break
-            high = low
-        else:
-            return StepLimit(0.0, high)
-    else:
-        while not fails(rise * high):
-            high *= rise
-            if high > far:
-                return StepLimit(np.inf, np.inf)
-        low, high = high, rise * high
-    return bisect(fails, low, high, fine)
-
-
-def bisect(fails: Callable[[float], bool], low: float, high: float, fine: float = BRACKET_WIDTH) -> StepLimit:
-    """Bisect between a safe step `low` [s] and a failing step `high` [s], to the relative width `fine`."""
-    while high - low > fine * high:
-        middle = 0.5 * (low + high)
-        if fails(middle):
-            high = middle
-        else:
-            low = middle
-    return StepLimit(low, high)
 
 
 # powers of the step matrix ----------------------------------------------------------------------------------------
@@ -274,18 +225,15 @@ class DenseGrowth:
 
     def limit(self) -> StepLimit:
         """Limit of the step: first from few powers, which give an upper bound, then from all checked powers."""
-        rough = bisect_limit(lambda h: self.fails(h, few=True), 0.1 / self.size, MAX_HJ / self.size)
+        rough = limit_from(lambda h: self.fails(h, few=True), 0.1 / self.size, MAX_HJ / self.size)
         if rough.step == 0.0:
             return rough
         if np.isinf(rough.step):
             fails_somewhere = any(self.fails(h) for h in np.geomspace(0.1, MAX_HJ, CHECKED_STEPS) / self.size)
-            return bisect_limit(self.fails, 0.1 / self.size, MAX_HJ / self.size) if fails_somewhere else rough
+            return limit_from(self.fails, 0.1 / self.size, MAX_HJ / self.size) if fails_somewhere else rough
         if not self.fails(rough.step):
             return rough
-        low, high = 0.97 * rough.step, rough.step
-        while self.fails(low):
-            low, high = 0.9 * low, low
-        return bisect(self.fails, low, high)
+        return step_below(self.fails, rough.step, multiples(0.97 * rough.step, 0.9, 0.0))
 
     def failing_after(self, h: float) -> int:
         """First number of steps of h [s] in `matrix_powers` after which growth exceeds the threshold; 0 for none."""
@@ -338,7 +286,7 @@ class VectorGrowth:
 
     def limit(self) -> StepLimit:
         """Limit of the step [s], below which no step is found to fail."""
-        return bisect_limit(self.fails, 0.1 / self.size, MAX_HJ / self.size)
+        return limit_from(self.fails, 0.1 / self.size, MAX_HJ / self.size)
 
     def fails(self, h: float) -> bool:
         """True if growth above the threshold is found with steps of h [s]."""

@@ -25,6 +25,7 @@ from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.table_handle import make_handle
 from fvsolve.core.schemes import LIMITED, LIMITERS, branches
 from fvsolve.core.step_limits.advection_limit import AdvectionLimit, limit_of
+from fvsolve.core.step_limits.greatest_step import greatest_step, multiples
 from fvsolve.core.step_limits.symbol import WEIGHTS, symbol, weights_of
 from fvsolve.core.steppers import loop_records
 from fvsolve.core.steppers.analysis.stability_properties import analyse
@@ -36,7 +37,6 @@ from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.studies.outcome import Progress, name_list
 from fvsolve.studies.result_table import PlainData
-from fvsolve.studies.stability.growth import bisect
 
 THRESHOLD = 1e3
 CELLS, STEPS = 100, 1000
@@ -152,12 +152,13 @@ def first_failure(
     growth : function of the Courant number, log10 of the growth
     The search goes upwards from `smallest` by factors `ratio`; bisection ends at the relative width `width`.
     """
-    low, high = 0.0, smallest
-    while growth(high) <= math.log10(THRESHOLD):
-        low, high = high, high * ratio
-        if high > LARGEST_COURANT:
-            return None
-    return bisect(lambda courant: not growth(courant) <= math.log10(THRESHOLD), low, high, width).fails
+
+    def fails(courant: float) -> bool:
+        return not growth(courant) <= math.log10(THRESHOLD)
+
+    rising = multiples(smallest, ratio, LARGEST_COURANT / ratio)
+    limit = greatest_step(fails, rising, multiples(0.5 * smallest, 0.5, 0.0), width=width)
+    return limit.fails if limit.fails < math.inf else None
 
 
 def check_size(cells: int, steps: int) -> None:

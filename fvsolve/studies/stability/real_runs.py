@@ -1,16 +1,17 @@
 """Growth of small deviations in real runs of the compiled program, and the measured limit of the step."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from fvsolve.core.model.energy_norm import EnergyForm
 from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.core.step_limits.greatest_step import STEP_RATIO, StepLimit, bisect, step_below
 from fvsolve.core.steppers import loop_records
 from fvsolve.studies.operating_point import OperatingPoint
-from fvsolve.studies.stability.growth import STEP_RATIO, STEPS, THRESHOLD, StepLimit, bisect, checked_powers
+from fvsolve.studies.stability.growth import STEPS, THRESHOLD, checked_powers
 
 SMALL_DEVIATIONS = 10.0 ** -np.arange(6.0, 16.0)  # greatest at the start, in units of the small deviation of states
 CLEAR_DEVIATION = 1e-6  # a deviation of this size at the start is above round-off and Newton residuals
@@ -192,11 +193,8 @@ class RealRuns:
 
     def limit_below(self, high: float) -> StepLimit:
         """Limit of the step below a step `high` [s] that fails; nan if no safe step is found."""
-        for _ in range(MAX_REDUCTIONS):
-            if not self.fails(high / STEP_RATIO):
-                return bisect(self.fails, high / STEP_RATIO, high)
-            high /= STEP_RATIO
-        return StepLimit(np.nan, high)
+        found = step_below(self.fails, high, shorter_steps(high))
+        return found if found.step else StepLimit(np.nan, found.fails)
 
     def columns(self, guess: float, size: float) -> dict[str, float]:
         """Columns of a stability row: limit of real runs, `measured` [s], and a step above it, `measured_up_to` [s].
@@ -226,6 +224,13 @@ class RealRuns:
         limit = self.limit(guess)
         fails = limit.fails if np.isfinite(limit.fails) else self.longest_tried
         return {"measured": limit.step, "measured_up_to": fails}
+
+
+def shorter_steps(h: float) -> Iterator[float]:
+    """Yield 40 steps below a step h [s], each shorter than the one before by the factor 1.3."""
+    for _ in range(MAX_REDUCTIONS):
+        h /= STEP_RATIO
+        yield h
 
 
 def measure_limit(

@@ -8,12 +8,12 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
+from fvsolve.core.step_limits.greatest_step import limit_from
 from fvsolve.core.steppers import analyse
 from fvsolve.core.steppers.tableau import Method
 from fvsolve.errors import listing
 from fvsolve.studies.linearise import ZERO_TOLERANCE
 from fvsolve.studies.operating_point import has_limiter
-from fvsolve.studies.stability.growth import bisect_limit
 from fvsolve.studies.work_limit import TooLarge
 
 
@@ -135,7 +135,7 @@ def region_limit(method: Method, points: np.ndarray) -> float:
         with np.errstate(all="ignore"):
             return not bool(np.all(np.abs(r(h * points)) <= 1.0 + MODULUS_MARGIN))
 
-    return bisect_limit(outside, 0.05 / size, MAX_HS / size, rise=1.02, fine=1e-7).step
+    return limit_from(outside, 0.05 / size, MAX_HS / size, ratio=1.02, width=1e-7).step
 
 
 def field_of_values(e: np.ndarray) -> np.ndarray:
