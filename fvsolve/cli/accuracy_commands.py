@@ -6,12 +6,12 @@ from typing import Annotated
 from typer import Option
 
 from fvsolve.cli import app as cli
-from fvsolve.cli.terminal import TextTable, present, progress_line
+from fvsolve.cli.terminal import present, progress_line
+from fvsolve.core.output.result_table import Column, ResultTable, columns
 from fvsolve.core.output.summary_file import plain
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.accuracy.fit import NO_ERROR
 from fvsolve.studies.accuracy.order_study import NORMS, SHOWN_VARIABLES, study_title, variable_unit
-from fvsolve.studies.result_table import Column, ResultTable, columns
 
 STEP_KEYS = {f"numerics.{key}" for key in ("courant", "rtol", "step", "cell_time")}  # set by a chart itself
 ORDER_FILE = columns(
@@ -268,7 +268,7 @@ def study_text(result) -> Iterator:
         yield rows_of(result, variable)
     yield ""
     orders = [[f"{name}", *(fit_text(fits[norm]) for norm in NORMS)] for name, fits in result.fits.items()]
-    yield TextTable(["fitted order of", "L1", "L2", "max"], orders)
+    yield ResultTable.of("", ["fitted order of", "L1", "L2", "max"], orders)
     yield from dict.fromkeys([*reason_lines(result), *result.notes])
     yield ""
 

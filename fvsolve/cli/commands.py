@@ -10,7 +10,8 @@ from typing import Annotated
 from typer import Argument, Option
 
 from fvsolve.cli.app import Cases, Json, RunDirectory, Set, SingleCase, command, load_case, quantity_of
-from fvsolve.cli.terminal import TextTable, present, print_json, show
+from fvsolve.cli.terminal import present, print_json, show
+from fvsolve.core.output.result_table import ResultTable
 from fvsolve.errors import FvsolveError, visible
 
 
@@ -117,7 +118,7 @@ def list_cases(as_json: Json = False) -> None:
     from fvsolve.case import shipped
 
     titles = shipped.titles()
-    present(as_json, titles, [TextTable(["case", "title"], [*titles.items()])])
+    present(as_json, titles, [ResultTable.of("", ["case", "title"], [*titles.items()])])
 
 
 @command("new", order=40)

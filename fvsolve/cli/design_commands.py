@@ -8,7 +8,8 @@ from typer import Argument, Option
 
 from fvsolve.cli.app import Dask, Jobs, Json, Set, SingleCase, command, load_case
 from fvsolve.cli.sweep import RANGE_FORMAT, key_and_values
-from fvsolve.cli.terminal import TextTable, present, progress_line
+from fvsolve.cli.terminal import present, progress_line
+from fvsolve.core.output.result_table import ResultTable
 from fvsolve.errors import CaseError, FvsolveError, collect_faults
 
 
@@ -58,7 +59,7 @@ def size_text(result) -> Iterator:
              run.limit if run.reason == "finished" else run.reason] for run in result.runs]  # fmt: skip
     unit = f" {result.unit}" if result.unit else ""
     key = f"{result.key} [{result.unit}]" if unit else result.key
-    yield TextTable([key, "", "least margin over limit", "of"], rows)
+    yield ResultTable.of("", [key, "", "least margin over limit", "of"], rows)
     for text in result.ties:
         yield f"with {text}"
     for text in dict.fromkeys(run.open for run in result.runs if run.open):
@@ -129,7 +130,7 @@ def schedule_text(result, case) -> Iterator:
     rows = [[f"{clock.from_si(t):.6g}", *(format(own.from_si(value), spec) for value in pair)]
             for t, *pair in zip(result.best.time, result.linear.value, result.best.value, strict=True)]  # fmt: skip
     heads = [name if bare else f"{name} [{own.unit}]" for name in ("linear", "best")]
-    yield TextTable([clock.header, *heads], rows)
+    yield ResultTable.of("", [clock.header, *heads], rows)
     peaks = ["-" if value.peak is None else f"{value.peak:.6g} {result.unit}" for value in (result.linear, result.best)]
     yield f"{result.minimise}: linear {peaks[0]}, best {peaks[1]}; {result.runs} runs", "green"
     yield result.schedule
@@ -192,7 +193,7 @@ def study_text(result) -> Iterator:
     yield f"{result.folder}: study.json, study.csv and a directory for each run"
 
 
-def _margin_table(result) -> TextTable:
+def _margin_table(result) -> ResultTable:
     """Table of the status of each run of a study, and of the margin of each limit in it.
 
     The status is "FAILS" if the run or a limit fails, else "open" or "holds"; "-" for a good run without limits.
@@ -214,4 +215,4 @@ def _margin_table(result) -> TextTable:
             known = verdict["margin"] is not None
             margins[verdict["name"]] = f"{verdict['margin']:.5g}{error}" if known else not_valid(row) or "-"
         rows.append([row_name(row), status, *margins.values()])
-    return TextTable(["run", "", *(f"margin of {name}" for name in limits.values())], rows)
+    return ResultTable.of("", ["run", "", *(f"margin of {name}" for name in limits.values())], rows)

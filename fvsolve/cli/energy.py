@@ -8,10 +8,10 @@ from typing import Annotated
 from typer import Argument, Option
 
 from fvsolve.cli import app as cli
-from fvsolve.cli.terminal import TextTable, interrupt_message, present, progress_line, run_progress
+from fvsolve.cli.terminal import interrupt_message, present, progress_line, run_progress
+from fvsolve.core.output.result_table import Column, ResultTable, cell_text
 from fvsolve.display import save
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.result_table import Column, ResultTable, cell_text
 
 EFFECTS = {  # verdict of the JSON file -> text of the terminal
     "rounding": "rounding only",
@@ -119,7 +119,7 @@ def ledger_text(result, case, folder) -> Iterator:
             rest = sum(lines[name][-1] for name in order[LINES:])
             rows.append([kind, f"{len(order) - LINES} others", *amount(rest)])
     rows += [["numerical", name, *amount(values[-1])] for name, values in result.numerical().items()]
-    yield TextTable(["kind", "part", joules.header, "share [%]"], rows)
+    yield ResultTable.of("", ["kind", "part", joules.header, "share [%]"], rows)
     if result.energy_use:
         from fvsolve.cli.printing import energy_use_text
 

@@ -7,10 +7,10 @@ from typing import Annotated
 from typer import Option
 
 from fvsolve.cli import app as cli
-from fvsolve.cli.terminal import TextTable, present, progress_line
+from fvsolve.cli.terminal import present, progress_line
+from fvsolve.core.output.result_table import Column, ResultTable
 from fvsolve.display import save
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.result_table import Column, ResultTable
 
 
 @cli.command("failure-map", order=110)
@@ -100,7 +100,7 @@ def map_text(result, files: list[Path], head: str) -> Iterator:
         squares = {method: result.row(scheme, method) for method in result.methods}
         rows = [[method, *(square.verdict for square in row), _limit_text(result, row)]
                 for method, row in squares.items()]  # fmt: skip
-        yield TextTable(heads, rows)
+        yield ResultTable.of("", heads, rows)
         yield ""
     present = {square.verdict: None for square in result.squares}
     for word in VERDICT_TEXTS:

@@ -11,7 +11,8 @@ from typer import Argument, Exit, Option
 
 from fvsolve.case import shipped
 from fvsolve.cli.app import Json, RunDirectory, Set, SingleCase, command, load_case, quantity_of
-from fvsolve.cli.terminal import TextTable, present
+from fvsolve.cli.terminal import present
+from fvsolve.core.output.result_table import ResultTable
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.file_replacement import replacing, write_file
 
@@ -94,7 +95,7 @@ def cycle_text(results: list[dict], per_day: float) -> Iterator:
     """
     rows = [[entry["probe"], entry["unit"], f"{size:.5g}", f"{count:g}"]
             for entry in results for size, count in entry["cycles"]]  # fmt: skip
-    yield TextTable(["probe", "unit", "range up to", "cycles"], rows)
+    yield ResultTable.of("", ["probe", "unit", "range up to", "cycles"], rows)
     for entry in [entry for entry in results if "share" in entry]:
         years = 1.0 / (entry["share"] * per_day * 365.25) if entry["share"] > 0.0 else float("inf")
         life = "unlimited" if years == float("inf") else f"{years:.4g} years"

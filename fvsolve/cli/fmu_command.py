@@ -6,7 +6,8 @@ from typing import Annotated
 from typer import Option
 
 from fvsolve.cli.app import Set, SingleCase, command, load_case
-from fvsolve.cli.terminal import TextTable, present
+from fvsolve.cli.terminal import present
+from fvsolve.core.output.result_table import ResultTable
 
 
 @command("fmu", order=120)
@@ -25,4 +26,4 @@ def fmu(
         start = "" if item.start is None else f"{item.start:.6g}"
         rows.append([item.name, "input" if item.is_input else "output", item.unit, start])
     last = f"{path}: needs fvsolve of this version in the Python of its host"
-    present(False, {}, [TextTable(["variable", "", "unit", "start"], rows), last])
+    present(False, {}, [ResultTable.of("", ["variable", "", "unit", "start"], rows), last])

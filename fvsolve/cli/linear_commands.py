@@ -9,11 +9,11 @@ from typer import Option
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.terminal import present
+from fvsolve.core.output.result_table import Column, ResultTable, write_csv
 from fvsolve.core.output.unit_columns import column
 from fvsolve.display import save
 from fvsolve.errors import FvsolveError
 from fvsolve.file_replacement import replacing
-from fvsolve.studies.result_table import Column, ResultTable, write_csv
 
 POLES_SHOWN = 24  # greatest number of poles on the terminal; poles.csv has all
 SYMBOLS = {"admittance": "Y", "impedance": "Z"}

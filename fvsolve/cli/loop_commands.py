@@ -9,8 +9,8 @@ from typer import Argument
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.terminal import present, progress_line
+from fvsolve.core.output.result_table import ResultTable, columns, write_csv
 from fvsolve.display import save
-from fvsolve.studies.result_table import ResultTable, columns, write_csv
 
 POLES_SHOWN = 12  # greatest number of poles on the terminal
 PICTURES = ("bode", "nyquist", "step", "locus")

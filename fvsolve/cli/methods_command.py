@@ -9,7 +9,8 @@ from typing import Annotated
 from typer import Argument, Option
 
 from fvsolve.cli.app import Json, command, method_name
-from fvsolve.cli.terminal import TextTable, present
+from fvsolve.cli.terminal import present
+from fvsolve.core.output.result_table import ResultTable
 from fvsolve.core.steppers import METHODS, Facts, Method, analyse, method_named
 from fvsolve.core.steppers.numbers.polynomial import Polynomial, sign
 from fvsolve.core.steppers.tableau import rounding_text
@@ -53,7 +54,7 @@ def _table_text(all_facts: dict[str, Facts]) -> Iterator:
         ]
         for name, facts in first.items()
     ]  # fmt: skip
-    yield TextTable(heads, rows)
+    yield ResultTable.of("", heads, rows)
     yield ""
     for name, facts in all_facts.items():
         if name != facts.name:

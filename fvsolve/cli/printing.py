@@ -7,8 +7,8 @@ columns to (title, dimension).
 from collections.abc import Callable, Iterator
 
 from fvsolve.case.resource_checks import byte_text, disk_size
-from fvsolve.cli.terminal import TextTable
 from fvsolve.core.output.directory import existing_pictures
+from fvsolve.core.output.result_table import ResultTable
 from fvsolve.core.output.summary_shape import IN_WORDS, OPEN, LimitVerdict
 from fvsolve.core.output.unit_columns import UnitColumn, column
 from fvsolve.core.run.result import not_valid
@@ -119,7 +119,7 @@ def energy_use_text(use: dict) -> Iterator:
     from fvsolve.parts.pump.energy_use import HEADS, UNITS, table_rows
 
     heads = [f"{head} [{unit}]" if unit else head for head, unit in zip(HEADS, UNITS, strict=True)]
-    yield TextTable(heads, [[row[0], *map(_number, row[1:])] for row in table_rows(use)])
+    yield ResultTable.of("", heads, [[row[0], *map(_number, row[1:])] for row in table_rows(use)])
     if use["total"]["demand_charge"]:
         yield f"demand charge for the greatest power of all pumps together: {_number(use['total']['demand_charge'])}"
 
@@ -204,7 +204,8 @@ def _parts_table(case, word: str, parts: dict, keys: dict, every: bool = True, o
     names = list(parts) if every or len(parts) <= MANY_ROWS else _notable_rows(parts, keys, odd)
     rows = [[name, *(_number(_in_unit(unit, parts[name].get(key))) for key, unit in zip(keys, columns, strict=True))]
             for name in names]  # fmt: skip
-    yield TextTable([word, *(unit.name if unit.dimension == "number" else unit.header for unit in columns)], rows)
+    heads = [word, *(unit.name if unit.dimension == "number" else unit.header for unit in columns)]
+    yield ResultTable.of("", heads, rows)
     if len(names) < len(parts):
         yield (f"... {len(parts) - len(names)} more of {len(parts)}; the table has only parts with the least "
                "or greatest value of a column or with a notice, --all prints all")  # fmt: skip
@@ -316,7 +317,7 @@ def difference_text(results: dict, summary: dict) -> Iterator:
     for name, probe in results["probes"].items():
         time = None if probe["t_greatest"] is None else clock.from_si(probe["t_greatest"])
         rows.append([name, span(probe["unit"]), *map(_number, (probe["greatest"], time, probe["rms"]))])
-    yield TextTable(["probe", "unit", "greatest difference", f"at [{clock.unit}]", "rms"], rows)
+    yield ResultTable.of("", ["probe", "unit", "greatest difference", f"at [{clock.unit}]", "rms"], rows)
     if results["note"]:
         yield results["note"]
     for key in ("only_a", "only_b"):
@@ -337,7 +338,7 @@ def _extremes(run) -> Iterator:
             row[3:3] = [_error_text(peak["minimum"])]
             row[6:6] = [_error_text(peak["maximum"])]
     if rows:
-        yield TextTable(heads, rows[:ROWS])
+        yield ResultTable.of("", heads, rows[:ROWS])
     if len(rows) > ROWS:
         where = f"in {run.directory / 'summary.json'}" if run.directory else "in Result.extremes"
         yield f"... {len(rows) - ROWS} more {where}"

@@ -7,7 +7,8 @@ from typing import Annotated
 from typer import Option
 
 from fvsolve.cli import app as cli
-from fvsolve.cli.terminal import TextTable, present, run_progress
+from fvsolve.cli.terminal import present, run_progress
+from fvsolve.core.output.result_table import ResultTable
 
 NODES_SHOWN = 40  # greatest number of nodes on a terminal; the files have all
 
@@ -41,7 +42,7 @@ def quality_text(result, folder: Path, paths: list[Path]) -> Iterator:
     rows = [[node, f"{result.age[-1, k] / 3600.0:.4g}", f"{result.age[:, k].max() / 3600.0:.4g}",
              *(f"{100.0 * values[-1, k]:.4g}" for values in result.trace.values())]
             for k, node in enumerate(result.nodes[:NODES_SHOWN])]  # fmt: skip
-    yield TextTable(heads, rows)
+    yield ResultTable.of("", heads, rows)
     if len(result.nodes) > NODES_SHOWN:
         yield f"... {len(result.nodes) - NODES_SHOWN} more nodes in the files"
     yield f"balance of the carried values: remainder {result.error:.3g} of their contents"

@@ -9,12 +9,12 @@ import numpy as np
 from typer import Argument, Option
 
 from fvsolve.cli import app as cli
-from fvsolve.cli.terminal import TextTable, present, progress_line
+from fvsolve.cli.terminal import present, progress_line
+from fvsolve.core.output.result_table import Column, ResultTable, cell_text, columns
 from fvsolve.core.step_limits.advection_limit import AdvectionLimit, advection_limits
 from fvsolve.core.step_limits.symbol import WEIGHTS
 from fvsolve.display import save
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.result_table import Column, ResultTable, cell_text, columns
 from fvsolve.studies.stability.periodic_limits import (
     LIMITED,
     THRESHOLD,
@@ -118,7 +118,7 @@ def _limited_text(limited: LimitedLimit) -> Iterator:
         [f"  {n}", *(cell_text(row[i], ".3g") for row in limited.measured.values())]
         for i, n in enumerate(limited.steps)
     ]
-    yield TextTable(["  steps", *limited.measured], rows)
+    yield ResultTable.of("", ["  steps", *limited.measured], rows)
 
 
 def _limit(x: float) -> str:
@@ -167,7 +167,7 @@ def _limit_table(limits: list[AdvectionLimit]) -> Iterator:
         else:
             shown.append([name, *(_cell(row[scheme]) for scheme in schemes)])
     yield "Courant limits of linear advection on a uniform periodic grid (von Neumann)", "bold"
-    yield TextTable(["method", *schemes], shown)
+    yield ResultTable.of("", ["method", *schemes], shown)
     yield LEGEND
     small = "none: a wave grows at every step, however small"
     yield f"{small}; every: stable at every step; +: stable again at larger steps"

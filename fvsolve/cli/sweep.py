@@ -8,7 +8,8 @@ from typing import Annotated
 from typer import Option
 
 from fvsolve.cli import app as cli
-from fvsolve.cli.terminal import TextTable, present, progress_line
+from fvsolve.cli.terminal import present, progress_line
+from fvsolve.core.output.result_table import ResultTable
 from fvsolve.display import save
 from fvsolve.errors import FvsolveError
 
@@ -142,7 +143,7 @@ def sweep_text(result, folder: Path, heads: dict[str, str]) -> Iterator:
         [*(as_option_text(row[key]) for key in result.keys), *(_text(row.get(name)) for name in shown)]
         for row in first_rows
     ]
-    yield TextTable([*heads.values(), *shown], rows)
+    yield ResultTable.of("", [*heads.values(), *shown], rows)
     for row in first_rows:
         values = ", ".join(f"{key} = {as_option_text(row[key])}" for key in result.keys)
         if not row["ok"]:
@@ -219,7 +220,7 @@ def calibration_text(case, result) -> Iterator:
     yield from ((doubt, "yellow") for doubt in result.doubts)
 
 
-def _key_table(result, units: dict[str, str] = {}) -> TextTable:  # noqa: B006
+def _key_table(result, units: dict[str, str] = {}) -> ResultTable:  # noqa: B006
     """Table of the keys of a sensitivity study or a calibration; units : key -> its heading with unit, if it has one"""
     heads, rows = result.sheet.words()
-    return TextTable(heads, [[units.get(key, key), *row] for key, *row in rows])
+    return ResultTable.of("", heads, [[units.get(key, key), *row] for key, *row in rows])

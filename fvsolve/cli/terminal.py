@@ -5,22 +5,14 @@ import math
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass
 from typing import Any
 
+from fvsolve.core.output.result_table import ResultTable
 from fvsolve.errors import visible
 
 WIDTH = 160  # line width of output that does not go to a terminal
-
-
-@dataclass(frozen=True)
-class TextTable:
-    """Table for the terminal; columns that contain a number or "-" are right-aligned."""
-
-    headers: Sequence[str]
-    rows: Sequence[Sequence[str]]
 
 
 def present(as_json: bool, data: Any, items: Iterable, code: int = 0) -> None:
@@ -44,7 +36,7 @@ def print_json(data: Any) -> None:
 
 
 def show(items: Iterable) -> None:
-    """Print lines and tables on standard output: texts, pairs (text, style), and objects `TextTable` or `ResultTable`.
+    """Print lines and tables on standard output: texts, pairs (text, style), and objects `ResultTable`.
 
     Texts are printed literally: markup and control characters have no effect. Output that does not go to a terminal is
     wide and without color, and needs rich only for tables that are too wide or contain other characters than ASCII.
@@ -58,10 +50,9 @@ def show(items: Iterable) -> None:
             else:
                 print(visible(text))
         else:
-            table = item if isinstance(item, TextTable) else TextTable(*item.words())
-            lines = None if console else table_lines(table)
+            lines = None if console else table_lines(item)
             if lines is None:
-                (console or _console()).print(_grid(table))
+                (console or _console()).print(_grid(item))
             else:
                 print("\n".join(lines))
 
@@ -72,32 +63,37 @@ def _console():
     return Console() if sys.stdout.isatty() else Console(width=WIDTH, no_color=True)
 
 
-def table_lines(table: TextTable) -> list[str] | None:
-    """Lines of a table, as rich prints them without color; None if it is too wide or not of printable ASCII."""
-    rows = [table.headers, *table.rows]
+def table_lines(table: ResultTable) -> list[str] | None:
+    """Lines of a table, as rich prints them without color; None if it is too wide or not of printable ASCII.
+
+    Columns that contain a number or "-" are aligned to the right.
+    """
+    heads, texts = table.words()
+    rows = [heads, *texts]
     widths = [max(1, *map(len, column)) for column in zip(*rows, strict=True)]
     text = "".join(cell for row in rows for cell in row)
     if sum(widths) + 2 * len(widths) - 2 > WIDTH or not (text.isascii() and text.isprintable()):
         return None
-    left = _text_columns(table)
+    left = _text_columns(heads, texts)
     cells = [[x.ljust(w) if is_left else x.rstrip().rjust(w) for x, w, is_left in zip(row, widths, left, strict=True)]
              for row in rows]  # fmt: skip
     return ["  ".join(row) for row in cells]
 
 
-def _text_columns(table: TextTable) -> list[bool]:
+def _text_columns(heads: list[str], rows: list[list[str]]) -> list[bool]:
     """For each column True if none of its cells is a number."""
-    return [not any(_is_numeric(row[i]) for row in table.rows) for i in range(len(table.headers))]
+    return [not any(_is_numeric(row[i]) for row in rows) for i in range(len(heads))]
 
 
-def _grid(table: TextTable):
+def _grid(table: ResultTable):
     from rich.table import Table as Grid
     from rich.text import Text
 
     grid = Grid(box=None, pad_edge=False, header_style="bold", show_edge=False)
-    for header, is_left in zip(table.headers, _text_columns(table), strict=True):
+    heads, rows = table.words()
+    for header, is_left in zip(heads, _text_columns(heads, rows), strict=True):
         grid.add_column(Text(visible(header)), justify="left" if is_left else "right", overflow="fold")
-    for row in table.rows:
+    for row in rows:
         grid.add_row(*(Text(visible(cell)) for cell in row))
     return grid
 

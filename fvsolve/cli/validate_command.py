@@ -8,7 +8,8 @@ from typing import Annotated
 from typer import Argument, Option
 
 from fvsolve.cli.app import Jobs, Json, announce_compilation, command
-from fvsolve.cli.terminal import TextTable, present
+from fvsolve.cli.terminal import present
+from fvsolve.core.output.result_table import ResultTable
 
 STYLES = {"within": "green", "outside": "bold red"}
 
@@ -55,7 +56,7 @@ def listed(paths: dict[str, Path]) -> tuple[dict, list]:
     plain = {name: {"title": raws[name].table.get("title", ""), "source": table.source, "licence": table.licence,
                     "files": table.files, "get": table.get} for name, table in tables.items()}  # fmt: skip
     rows = [[name, item["title"], ", ".join(item["files"]) or "-"] for name, item in plain.items()]
-    return plain, [TextTable(["validation", "title", "files of --data"], rows)]
+    return plain, [ResultTable.of("", ["validation", "title", "files of --data"], rows)]
 
 
 def result_text(results: list) -> Iterator:
@@ -69,7 +70,9 @@ def result_text(results: list) -> Iterator:
             cells = texts.reference, texts.value, texts.error, texts.others
             rows.append([result.name, row.row.what, *cells, row.unit, row.verdict])
     if rows:
-        yield TextTable(["case", "quantity", "measured", "computed", "error", "others", "unit", "verdict"], rows)
+        yield ResultTable.of(
+            "", ["case", "quantity", "measured", "computed", "error", "others", "unit", "verdict"], rows
+        )
     for result in results:
         for row in result.rows:
             if row.text:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.case.text import inline
+from fvsolve.core.output.result_table import ResultTable
 from fvsolve.core.output.summary_shape import FAILS, HOLDS, IN_WORDS, OPEN
 from fvsolve.core.output.unit_columns import column
 from fvsolve.core.run.result import not_valid
@@ -25,7 +26,7 @@ from fvsolve.report.long_section import (
     section_of,
     section_paths,
 )
-from fvsolve.report.tables import ERROR_HEADER, ReportTable, Sentence, in_unit, open_reason, value_text
+from fvsolve.report.tables import ERROR_HEADER, Sentence, in_unit, open_reason, value_text
 from fvsolve.units import span
 
 TEMPLATE_FOLDER = Path(__file__).parent
@@ -75,6 +76,8 @@ def render_page(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> s
     jinja = import_library("jinja2")
     options = {"trim_blocks": True, "lstrip_blocks": True, "undefined": jinja.StrictUndefined}
     environment = jinja.Environment(autoescape=True, **options)  # escapes all values, so that none becomes markup
+    for function in (tables.page_rows, tables.numeric_columns, tables.left_out):
+        environment.filters[function.__name__] = function
     title = filled["title"]
     if len(title) > MAX_PAPER_TITLE:
         title = f"{title[: MAX_PAPER_TITLE - 1]}\u2026"
@@ -197,7 +200,7 @@ def run_links(runs: list) -> tuple[tuple[str, str], ...]:
     return tuple((run_name(row), row["page"]) for row, _ in runs)
 
 
-def run_matrix(runs: list) -> ReportTable:
+def run_matrix(runs: list) -> ResultTable:
     """Table with a row for each run: verdict and the margin of each limit, with a link to its report."""
     names = {verdict.name: verdict.unit for _, result in runs for verdict in result.verdicts}
     with_error = any(verdict.error is not None for _, result in runs for verdict in result.verdicts)
@@ -213,10 +216,10 @@ def run_matrix(runs: list) -> ReportTable:
     heads += [word for name in names for word in (f"margin of {name}", *[ERROR_HEADER] * with_error)]
     units = ["", ""] + [span(unit) for unit in names.values() for _ in range(1 + with_error)]
     bad = frozenset(k for k, (_, result) in enumerate(runs) if run_state(result) == FAILS)
-    return ReportTable("Runs", heads, rows, units, bad, links=[row["page"] for row, _ in runs])
+    return ResultTable.of("Runs", heads, rows, units, bad, links=[row["page"] for row, _ in runs])
 
 
-def failing_limits(runs: list) -> ReportTable:
+def failing_limits(runs: list) -> ResultTable:
     """Table of the limits that fail or are open in each run, with position and time."""
     length, time = (column("", dimension, runs[0][1].case) for dimension in ("length", "time"))
     pages = [row["page"] for row, result in runs for item in result.verdicts if not item.ok]
@@ -225,16 +228,16 @@ def failing_limits(runs: list) -> ReportTable:
             for row, result in runs for item in result.verdicts if not item.ok]  # fmt: skip
     heads = ("run", "limit", "verdict", "value", "allowed", "unit", "margin", "unit", "worst place", "chainage", "time")
     units = ("",) * 9 + (length.unit, time.unit)
-    return ReportTable("", heads, rows, units, mixed_units=frozenset({3, 4, 6}), most=MAX_FAILED_ROWS, links=pages)
+    return ResultTable.of("", heads, rows, units, mixed=frozenset({3, 4, 6}), most=MAX_FAILED_ROWS, links=pages)
 
 
-def change_tables(study: dict[str, Any]) -> list[ReportTable]:
+def change_tables(study: dict[str, Any]) -> list[ResultTable]:
     """Tables of the keys that events and protections set, with their values in TOML."""
     tables = []
     for group in ("events", "protections"):
         rows = [[name, key, inline(value)]
                 for name, keys in study["changes"][group].items() for key, value in keys.items()]  # fmt: skip
-        tables += [ReportTable(group.capitalize(), (group[:-1], "key", "value"), rows)] if rows else []
+        tables += [ResultTable.of(group.capitalize(), (group[:-1], "key", "value"), rows)] if rows else []
     return tables
 
 

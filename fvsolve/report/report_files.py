@@ -13,6 +13,7 @@ from urllib.parse import quote
 import numpy as np
 
 from fvsolve.core.output.csv_files import ENVELOPE_QUANTITIES
+from fvsolve.core.output.result_table import Column, ResultTable
 from fvsolve.core.run import open_run
 from fvsolve.core.run.result import not_valid
 from fvsolve.display import save_if_path
@@ -21,7 +22,7 @@ from fvsolve.file_replacement import replacing, write_file
 from fvsolve.report import import_library, page, tables
 from fvsolve.report.draw.plot import history_figure, phase_figure, section_figure
 from fvsolve.report.long_section import Section, SectionPath, envelope_column, head_window, section_of, section_paths
-from fvsolve.report.tables import ReportTable, is_number
+from fvsolve.report.tables import is_number
 from fvsolve.studies.scenarios import STUDY, open_study
 from fvsolve.units import show
 
@@ -98,7 +99,7 @@ def open_checked_run(directory: Path):
     return result
 
 
-def write_tables(report_tables: list[ReportTable], path: Path) -> Path:
+def write_tables(report_tables: list[ResultTable], path: Path) -> Path:
     """Write tables, one sheet each; returns the path. Raises FvsolveError if it cannot be written.
 
     Text is stored as text, never as a formula, link or number.
@@ -118,12 +119,11 @@ def write_tables(report_tables: list[ReportTable], path: Path) -> Path:
     return path
 
 
-def workbook_tables(result, sections: list[SectionPath]) -> list[ReportTable]:
+def workbook_tables(result, sections: list[SectionPath]) -> list[ResultTable]:
     """All tables of a run for a workbook; a table of a section has a row for each point."""
-    words = ReportTable("Summary", ("", ""), [[item.head, item.text] for item in tables.top_sentences(result)])
+    words = ResultTable.of("Summary", ("", ""), [[item.head, item.text] for item in tables.top_sentences(result)])
     warnings = [[item.kind, item.place, item.text] for item in result.warnings]
-    notes = ReportTable("Warnings", ("kind", "place", "text"), warnings)
-    versions = tables.versions(result)
+    notes = ResultTable.of("Warnings", ("kind", "place", "text"), warnings)
     contents = [
         words,
         tables.verdict_table(result),
@@ -137,12 +137,12 @@ def workbook_tables(result, sections: list[SectionPath]) -> list[ReportTable]:
         *tables.model_tables(result),
         *tables.numerics_tables(result),
         notes,
-        ReportTable("Versions", versions.headers, versions.rows),
+        replace(tables.versions(result), title="Versions"),
     ]
     return [table for table in contents if table]
 
 
-def study_tables(runs: list) -> list[ReportTable]:
+def study_tables(runs: list) -> list[ResultTable]:
     """Tables of a study with the long sections of all runs; runs : (row of study.json, `Result`) of each run."""
     contents, failing = [page.run_matrix(runs)], page.failing_limits(runs)
     contents += [failing] if failing else []
@@ -151,12 +151,11 @@ def study_tables(runs: list) -> list[ReportTable]:
             along = _section_table(result, section_of(result, way))
             title = f"{Path(row['directory']).name} {way.name}"
             rows = [[page.run_name(row), *cells] for cells in along.rows]
-            heads = {"headers": ["run", *along.headers], "units": ["", *along.units]}
-            contents.append(replace(along, title=title, rows=rows, **heads))
+            contents.append(replace(along, title=title, rows=rows, columns=[Column(header="run"), *along.columns]))
     return contents
 
 
-def _section_table(result, sec: Section) -> ReportTable:
+def _section_table(result, sec: Section) -> ResultTable:
     """Table of a long section, with a row for each point."""
     head = envelope_column(result, "min_head").unit
     columns = [sec.chainage, sec.pipe, *(sec.along[name] for name in SECTION_HEADERS), *sec.lines.values()]
@@ -164,17 +163,17 @@ def _section_table(result, sec: Section) -> ReportTable:
     units = [envelope_column(result, "distance").unit, ""]
     units += [envelope_column(result, name).unit for name in SECTION_HEADERS]
     rows = [list(row) for row in zip(*(column.tolist() for column in columns), strict=True)]
-    return ReportTable(f"Section {sec.way.name}", heads, rows, [*units, *[head] * len(sec.lines)])
+    return ResultTable.of(f"Section {sec.way.name}", heads, rows, [*units, *[head] * len(sec.lines)])
 
 
-def _write_sheet(book, table: ReportTable, name: str, bold) -> None:
+def _write_sheet(book, table: ResultTable, name: str, bold) -> None:
     sheet = book.add_worksheet(name)
-    heads = [f"{head} [{unit}]" if unit else head for head, unit in table.heads]
-    for k, head in enumerate(heads):
+    rows = table.values
+    for k, head in enumerate(column.title for column in table.columns):
         sheet.write_string(0, k, visible(head), bold)
-        letters = max([len(head), *(len(str(row[k])) for row in table.rows[:200])])
+        letters = max([len(head), *(len(str(row[k])) for row in rows[:200])])
         sheet.set_column(k, k, min(letters + 2, MAX_COLUMN_WIDTH))
-    for i, row in enumerate(table.rows, 1):
+    for i, row in enumerate(rows, 1):
         for k, value in enumerate(row):
             if value is None or is_number(value) and not math.isfinite(value):
                 continue

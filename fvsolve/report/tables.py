@@ -6,13 +6,13 @@ run are verdicts, extremes, method, ledgers, events and versions.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fvsolve.case.case import default_cells
 from fvsolve.case.text import inline
+from fvsolve.core.output.result_table import ResultTable
 from fvsolve.core.output.summary_shape import FAILS, HOLDS, IN_WORDS, OPEN
 from fvsolve.core.output.unit_columns import UnitColumn, column
 from fvsolve.core.run.result import not_valid
@@ -25,7 +25,6 @@ from fvsolve.units import DIMENSIONS, span
 DIGITS = 5  # significant digits of the greatest number of a column
 DECIMALS = 6  # greatest number of decimals, unless the least number of the column needs more
 MAX_SHARED_DIGITS = 7  # greatest number of digits after the first if all numbers of a column have the same decimals
-MAX_ROWS = 60  # greatest number of rows of a table on the page, unless the table states `most`
 ERROR_HEADER = "\u00b1"  # header of columns of errors, shown with two digits
 # Spaces: between thousands, as wide as a digit, as wide as a point.
 NARROW_SPACE, FIGURE_SPACE, POINT_SPACE = "\u202f", "\u2007", "\u2008"
@@ -36,65 +35,29 @@ def in_unit(unit_column, value: float | None) -> float | None:
     return None if value is None else float(unit_column.from_si(value))
 
 
-@dataclass(frozen=True)
-class ReportTable:
-    """Table of a report with headers; cells are words, numbers, truth values or None.
+def page_rows(table: ResultTable) -> list[list[str]]:
+    """Texts of the cells in the rows of a table that a page shows, aligned by column."""
+    columns = []
+    values = table.values[: table.most]
+    for k, entry in enumerate(table.columns):
+        shown = [row[k] for row in values]
+        if entry.name == ERROR_HEADER:
+            shown = [float(f"{value:.2g}") if is_number(value) else value for value in shown]
+        columns.append(aligned_texts(shown, entry.mixed))
+    return [list(row) for row in zip(*columns, strict=True)]
 
-    units : unit of each column, "" for words and numbers without unit
-    bad : indices of highlighted rows
-    mixed_units : indices of columns whose rows have different units
-    most : greatest number of rows on the page
-    more : text that states where the rows are that the page leaves out
-    links : address of a page for each row, to which the first cell links
-    """
 
-    title: str
-    headers: Sequence[str]
-    rows: Sequence[Sequence[Any]]
-    units: Sequence[str] = ()
-    bad: frozenset[int] = frozenset()
-    mixed_units: frozenset[int] = frozenset()
-    most: int = MAX_ROWS
-    more: str = ""
-    links: Sequence[str] = ()
+def numeric_columns(table: ResultTable) -> list[bool]:
+    """List with True for each column that contains numbers and no words; it is then aligned to the right."""
+    columns = [*zip(*table.values, strict=True)] or [()] * len(table.columns)
+    return [any(map(is_number, cells)) and not any(isinstance(value, str) for value in cells) for cells in columns]
 
-    def __bool__(self) -> bool:
-        """True if the table has rows; a table without rows is left out."""
-        return bool(self.rows)
 
-    @property
-    def heads(self) -> list[tuple[str, str]]:
-        """Pairs (header, unit) of all columns."""
-        return list(zip(self.headers, [*self.units, *[""] * (len(self.headers) - len(self.units))], strict=True))
-
-    @property
-    def named(self) -> bool:
-        """True if any column has a header."""
-        return any(self.headers)
-
-    @property
-    def numeric(self) -> list[bool]:
-        """List with True for each column that contains numbers and no words; it is then aligned to the right."""
-        columns = [[row[k] for row in self.rows] for k in range(len(self.headers))]
-        return [any(is_number(value) for value in column) and not any(isinstance(value, str) for value in column)
-                for column in columns]  # fmt: skip
-
-    @property
-    def words(self) -> list[list[str]]:
-        """Texts of the cells in the rows that the page shows, aligned by column."""
-        shown = self.rows[: self.most]
-        rough = [k for k, head in enumerate(self.headers) if head == ERROR_HEADER]
-        shown = [[float(f"{value:.2g}") if k in rough and is_number(value) else value for k, value in enumerate(row)]
-                 for row in shown]  # fmt: skip
-        columns = [aligned_texts([row[k] for row in shown], k in self.mixed_units) for k in range(len(self.headers))]
-        return [list(row) for row in zip(*columns, strict=True)]
-
-    @property
-    def left_out(self) -> str:
-        """Note below a table that has more rows than the page shows; "" if all rows are shown."""
-        hidden = len(self.rows) - self.most
-        text = f"{hidden} more row{'' if hidden == 1 else 's'}: {self.more or 'in the workbook (--xlsx)'}"
-        return text if hidden > 0 else ""
+def left_out(table: ResultTable) -> str:
+    """Note below a table that has more rows than the page shows; "" if all rows are shown."""
+    hidden = len(table.rows) - table.most
+    text = f"{hidden} more row{'' if hidden == 1 else 's'}: {table.more or 'in the workbook (--xlsx)'}"
+    return text if hidden > 0 else ""
 
 
 def is_number(value: Any) -> bool:
@@ -174,12 +137,12 @@ FLUID_ROWS = (
 HIDDEN_KEYS = ("position", "elevation", "type", "from", "to", "ports", "scalars")
 
 
-def model_tables(result) -> list[ReportTable | None]:
+def model_tables(result) -> list[ResultTable | None]:
     """Tables of the fluid, pipes, walls and other parts; None instead of pipes or walls that the case lacks."""
     return [fluid(result), pipes(result), walls(result), parts(result)]
 
 
-def fluid(result) -> ReportTable:
+def fluid(result) -> ResultTable:
     """Table of the fluid: properties at the reference state, ambient pressure, gravity, density law and source."""
     case, liquid = result.case, result.summary["fluid"]
     rows = []
@@ -192,10 +155,10 @@ def fluid(result) -> ReportTable:
     gravity = column("", "acceleration", case)
     rows.append(["gravity", value_text(float(gravity.from_si(case.gravity))), gravity.unit])
     rows += [["density law", case.fluid.law, ""], ["source", liquid["source"], ""]]
-    return ReportTable(f"Fluid: {liquid['name']}", ("", "", ""), rows)
+    return ResultTable.of(f"Fluid: {liquid['name']}", ("", "", ""), rows)
 
 
-def pipes(result) -> ReportTable | None:
+def pipes(result) -> ResultTable | None:
     """Table of pipes: ends, sizes, wave speed, friction and cells; None without pipes."""
     case = result.case
     links = {name: link for name, link in case.links.items() if link.kind == "pipe"}
@@ -219,10 +182,10 @@ def pipes(result) -> ReportTable | None:
     heads = [*["elevation at from", "at to"] * stated, *["points of profile"] * profiled]
     heads = ("pipe", "from", "to", "length", "diameter", "wave speed", *heads, "friction", "cells")
     units = ("", "", "", length.unit, length.unit, speed.unit, *[height.unit] * (2 * stated))
-    return ReportTable("Pipes", heads, rows, units, more=FULL_VALUES_NOTE)
+    return ResultTable.of("Pipes", heads, rows, units, more=FULL_VALUES_NOTE)
 
 
-def walls(result) -> ReportTable | None:
+def walls(result) -> ResultTable | None:
     """Table of pipe walls: allowable pressure, thickness, modulus and source.
 
     The result is None if no pipe has an elastic wall or an allowable pressure.
@@ -241,10 +204,10 @@ def walls(result) -> ReportTable | None:
         rows.append(row)
     heads = ("pipe", "allowable", "wall", "modulus", "source")
     units = ("", allowable.span_unit, thick.unit, modulus.unit)
-    return ReportTable("Walls", heads, rows, units, more=FULL_VALUES_NOTE) if rows else None
+    return ResultTable.of("Walls", heads, rows, units, more=FULL_VALUES_NOTE) if rows else None
 
 
-def parts(result) -> ReportTable:
+def parts(result) -> ResultTable:
     """Table of all parts but pipes and plain junctions: kind, connected nodes, elevation and keys."""
     case, rows = result.case, []
     height, stated = column("", "head", case), case.elevations_stated
@@ -260,7 +223,7 @@ def parts(result) -> ReportTable:
                 texts.append(f"{key.replace('_', ' ')} {_value_text(values.get(key), value, case)}")
         rows.append([name, part.kind, joins, *lies, " \u00b7 ".join(texts)])
     heads = ("part", "kind", "connects", *["elevation"] * stated, "keys")
-    return ReportTable("Other parts", heads, rows, ("", "", "", *[height.unit] * stated, ""), more=FULL_VALUES_NOTE)
+    return ResultTable.of("Other parts", heads, rows, ("", "", "", *[height.unit] * stated, ""), more=FULL_VALUES_NOTE)
 
 
 def _value_text(value: Any, given: Any, case) -> str:
@@ -406,7 +369,7 @@ def open_reason(result) -> str:
     return "margins are smaller than the numerical errors"
 
 
-def verdict_table(result) -> ReportTable:
+def verdict_table(result) -> ResultTable:
     """Table of the verdicts on limits, violated limits first."""
     order = (FAILS, OPEN, HOLDS)
     ordered = sorted(result.verdicts, key=lambda check: order.index(check.state))
@@ -426,10 +389,10 @@ def verdict_table(result) -> ReportTable:
     heads += ("chainage", "elevation", "time")
     bad = frozenset(k for k, check in enumerate(ordered) if check.state == FAILS)
     units = ("",) * (7 + errors) + (length.unit, height.unit, time.unit)
-    return ReportTable("Limits", heads, rows, units, bad, frozenset({3, 4, *[5] * errors}))
+    return ResultTable.of("Limits", heads, rows, units, bad, frozenset({3, 4, *[5] * errors}))
 
 
-def worst_tables(result) -> list[ReportTable]:
+def worst_tables(result) -> list[ResultTable]:
     """Tables of the positions with the least margins, for each limit with more than one part or bound."""
     length, height, time = (column("", dimension, result.case) for dimension in ("length", "head", "time"))
     tables = []
@@ -445,20 +408,21 @@ def worst_tables(result) -> list[ReportTable]:
                  margin_unit, "")  # fmt: skip
         heads = ("place", "chainage", "elevation", "time", check.quantity.replace("_", " "), *[ERROR_HEADER] * errors)
         heads += ("", "limit", "margin", "verdict")
-        tables += [ReportTable(f"Limit {check.name}: worst places", heads, rows, units, bad)] if len(rows) > 1 else []
+        if len(rows) > 1:
+            tables.append(ResultTable.of(f"Limit {check.name}: worst places", heads, rows, units, bad))
     return tables
 
 
-def claim_table(result) -> ReportTable:
+def claim_table(result) -> ResultTable:
     """Table of the expected values of the case and of the computed values."""
     rows = [[item.text, item.claimed, item.found, item.tolerance, item.unit, IN_WORDS[item.state]]
             for item in result.expectations]  # fmt: skip
     bad = frozenset(k for k, item in enumerate(result.expectations) if item.state == FAILS)
     heads = ("expectation", "expected", "computed", "tolerance", "unit", "verdict")
-    return ReportTable("Expected values of the case", heads, rows, bad=bad, mixed_units=frozenset({1, 2, 3}))
+    return ResultTable.of("Expected values of the case", heads, rows, bad=bad, mixed=frozenset({1, 2, 3}))
 
 
-def extremes_of_pipes(result, ways: list[SectionPath]) -> ReportTable | None:
+def extremes_of_pipes(result, ways: list[SectionPath]) -> ResultTable | None:
     """Table of the extremes of each quantity over all pipes: value, pipe, distance, elevation, time.
 
     It is None without pipes, or if the run diverged. The chainage is added if the run has a single section, and if the
@@ -484,17 +448,17 @@ def extremes_of_pipes(result, ways: list[SectionPath]) -> ReportTable | None:
     keys = ("distance", *["distance"] * bool(legs), "elevation", "t_max")
     units = [envelope_column(result, key).unit for key in keys]
     heads = ("", "value", "unit", "pipe", "from its start", *["chainage"] * bool(legs), "elevation", "time")
-    return ReportTable("Worst of all pipes", heads, rows, ("",) * 4 + tuple(units), mixed_units=frozenset({1}))
+    return ResultTable.of("Worst of all pipes", heads, rows, ("",) * 4 + tuple(units), mixed=frozenset({1}))
 
 
-def ranked_pipes(result) -> list[ReportTable]:
+def ranked_pipes(result) -> list[ResultTable]:
     """Tables of pipes ranked by greatest and by least pressure, worst first; [] for a single pipe or a diverged run."""
     if len(result.envelope) < 2 or not_valid(result.summary):
         return []
     return [_ranking(result, name, words, most, when) for name, words, most, when in EXTREMES[:2]]
 
 
-def _ranking(result, name: str, words: str, most, when: str) -> ReportTable:
+def _ranking(result, name: str, words: str, most, when: str) -> ResultTable:
     rows = []
     for pipe, arrays in result.envelope.items():
         k = int(most(arrays[name]))
@@ -502,11 +466,11 @@ def _ranking(result, name: str, words: str, most, when: str) -> ReportTable:
     rows.sort(key=lambda row: row[1], reverse=most is np.argmax)
     units = ["", *(envelope_column(result, key).unit for key in (name, "distance", "elevation", when))]
     heads = ("pipe", words, "from its start", "elevation", "time")
-    return ReportTable(f"{words.capitalize()} by pipe", heads, rows, units, most=MAX_RANKED,
+    return ResultTable.of(f"{words.capitalize()} by pipe", heads, rows, units, most=MAX_RANKED,
                  more="in envelope.csv and in the workbook (--xlsx)")  # fmt: skip
 
 
-def extremes_of_probes(result) -> ReportTable:
+def extremes_of_probes(result) -> ResultTable:
     """Table of the extremes of each probe over all accepted steps, with times and errors."""
     peaks, rows, invalid = result.summary.get("peaks", {}), [], not_valid(result.summary) or None
     clock = UnitColumn("t", "time", result.summary["time_unit"])
@@ -518,16 +482,16 @@ def extremes_of_probes(result) -> ReportTable:
     heads = [column for side in ("minimum", "maximum") for column in (side, *[ERROR_HEADER] * bool(peaks), "time")]
     units = [clock.unit if column == "time" else "" for column in heads]
     loose = frozenset(2 + k for k, column in enumerate(heads) if column != "time")
-    return ReportTable("Probes", ("probe", "unit", *heads), rows, ("", "", *units), mixed_units=loose,
+    return ResultTable.of("Probes", ("probe", "unit", *heads), rows, ("", "", *units), mixed=loose,
                  more="in summary.json and in the workbook (--xlsx)")  # fmt: skip
 
 
-def numerics_tables(result) -> list[ReportTable | None]:
+def numerics_tables(result) -> list[ResultTable | None]:
     """Tables of electric energy, settings, ledgers, expected values and measured series; None for absent tables."""
     return [energy_use(result), settings(result), ledgers(result), claim_table(result), comparisons(result)]
 
 
-def settings(result) -> ReportTable:
+def settings(result) -> ResultTable:
     """Table of scheme, method, time step, number of steps, and computing time of a run."""
     summary, numerics = result.summary, result.case.numerics
     steps = {"courant": "Courant number", "step": "given, s", "rtol": "by error, rtol"}
@@ -547,10 +511,10 @@ def settings(result) -> ReportTable:
     if "resolution" in summary:
         words, reasons = summary["resolution"]["words"], summary["resolution"]["reasons"]
         rows.append(["errors of peaks (\u00b1)", "; ".join([words, *reasons])])
-    return ReportTable("Method", ("", ""), [[key, value_text(value)] for key, value in rows])
+    return ResultTable.of("Method", ("", ""), [[key, value_text(value)] for key, value in rows])
 
 
-def ledgers(result) -> ReportTable | None:
+def ledgers(result) -> ResultTable | None:
     """Table of the balances of mass, energy and scalars: inflow, outflow, storage, remainder; None without balances."""
     balances = {name: row for name, row in result.summary["ledgers"].items() if "remainder" in row}
     if not balances:
@@ -559,7 +523,7 @@ def ledgers(result) -> ReportTable | None:
     rows = [[name, LEDGER_UNITS.get(name, ""), *(row.get(term) for term in terms), _shortened(row["remainder"], ".2e"),
              _shortened(row.get("relative"), ".1e")] for name, row in balances.items()]  # fmt: skip
     heads = ("ledger", "unit", *(term.replace("_", " ") for term in terms), "remainder", "of the largest term")
-    return ReportTable("Ledgers", heads, rows)
+    return ResultTable.of("Ledgers", heads, rows)
 
 
 def _shortened(value: float | None, form: str) -> str | None:
@@ -567,7 +531,7 @@ def _shortened(value: float | None, form: str) -> str | None:
     return None if value is None else format(value, form)
 
 
-def energy_use(result) -> ReportTable | None:
+def energy_use(result) -> ResultTable | None:
     """Table of the electric energy of pumps and its cost; None for a case without `[energy]`."""
     from fvsolve.parts.pump.energy_use import HEADS, UNITS, table_rows
 
@@ -576,38 +540,38 @@ def energy_use(result) -> ReportTable | None:
         return None
     charge = use["total"]["demand_charge"]
     rows = [*table_rows(use), *([["demand charge", *[None] * 6, charge, None]] if charge else [])]
-    return ReportTable("Electric energy of pumps", HEADS, rows, UNITS)
+    return ResultTable.of("Electric energy of pumps", HEADS, rows, UNITS)
 
 
-def versions(result) -> ReportTable:
+def versions(result) -> ResultTable:
     """Table of versions of programs and data, hash of the case, and date of the run."""
     rows = [["run ended", result.summary.get("ended", "not recorded")]]
     words = {"case": "hash of the case", "sources": "hash of compiled sources", "fluid": "fluid properties",
              "target": "machine"}  # fmt: skip
     rows += [[words.get(key, key), version] for key, version in result.summary["versions"].items()]
-    return ReportTable("", ("", ""), rows)
+    return ResultTable.of("", ("", ""), rows)
 
 
-def events(result) -> ReportTable:
+def events(result) -> ResultTable:
     """Table of events of self-acting parts with their times."""
     rows = [[event["time"], event["name"], event["what"]] for event in result.summary["events"]]
-    return ReportTable("Events", ("time", "part", "event"), rows, ("s",), more="in summary.json")
+    return ResultTable.of("Events", ("time", "part", "event"), rows, ("s",), more="in summary.json")
 
 
-def cavities(result) -> ReportTable:
+def cavities(result) -> ResultTable:
     """Table of cavities in pipes: first position and time, greatest volume and its time."""
     rows = [[row["place"].removeprefix("links."), row["distance"], row["time"], row["volume"], row["t_volume"]]
             for row in result.summary["cavities"]]  # fmt: skip
     heads = ("pipe", "first at", "time", "greatest volume", "time")
-    return ReportTable("Cavities", heads, rows, ("", "m", "s", "m3", "s"))
+    return ResultTable.of("Cavities", heads, rows, ("", "m", "s", "m3", "s"))
 
 
-def comparisons(result) -> ReportTable:
+def comparisons(result) -> ResultTable:
     """Table that compares probes with measured series."""
     rows = [[row.probe, row.file, row.unit, row.rms, row.greatest_difference, row.measured_peak, row.computed_peak]
             for row in result.comparisons]  # fmt: skip
     heads = ("probe", "measured", "unit", "rms", "greatest difference", "peak measured", "computed")
-    return ReportTable("Against measurements", heads, rows, mixed_units=frozenset({3, 4, 5, 6}))
+    return ResultTable.of("Against measurements", heads, rows, mixed=frozenset({3, 4, 5, 6}))
 
 
 def _method_text(row: dict, case) -> str:

@@ -8,12 +8,12 @@ import numpy as np
 
 from fvsolve.argument_checks import COUNT, COUNT_FROM_ZERO, FUNCTION, TABLE, TEXT, validated
 from fvsolve.case import Case, load
+from fvsolve.core.output.result_table import Column, PlainData, ResultTable
 from fvsolve.core.run.verdicts import interpolated
 from fvsolve.declarations import declared
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.studies.outcome import end_if_interrupted, refusal_text
 from fvsolve.studies.parallel import TaskPool
-from fvsolve.studies.result_table import Column, PlainData, ResultTable
 from fvsolve.studies.sampling import key_ranges, sample_points
 from fvsolve.studies.sweep import VARY
 from fvsolve.studies.sweep_row import RowMaker

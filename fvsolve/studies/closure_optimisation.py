@@ -8,12 +8,12 @@ import numpy as np
 
 from fvsolve.case import Case, load
 from fvsolve.case.text import path
+from fvsolve.core.output.result_table import PlainData
 from fvsolve.core.run import run
 from fvsolve.declarations import declared
 from fvsolve.errors import Fault, FvsolveError, collect_faults, did_you_mean, listing
 from fvsolve.parts.schedule import Schedule
 from fvsolve.studies.outcome import NO_FIELDS, checked_case, end_if_interrupted
-from fvsolve.studies.result_table import PlainData
 from fvsolve.units import show
 
 START_SHAPES = 0.0, 1.0, -1.0  # half the log ratio of the first slope to the last, of schedules at the start

@@ -8,6 +8,7 @@ import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, TABLE, TEXT, validated
 from fvsolve.core.model.energy_accounts import Account, Accounts, available_energy, datum_of
+from fvsolve.core.output.result_table import Column
 from fvsolve.core.schemes import SCHEMES
 from fvsolve.core.solve import initial_state
 from fvsolve.core.solve.run_loop import RunLoop
@@ -22,7 +23,6 @@ from fvsolve.file_replacement import write_file
 from fvsolve.studies.outcome import RowSink, end_if_interrupted, refusal_text, study_model
 from fvsolve.studies.passivity import AUTO, check_names, method_names
 from fvsolve.studies.result_cache import ResultCache
-from fvsolve.studies.result_table import Column
 
 TABLE_ROWS = 1000  # approximate number of rows of the table
 QUADRATURE_TOLERANCE = 1e-3  # allowed quadrature error of the dissipated energy in a step, relative to its total

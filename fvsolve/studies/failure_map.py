@@ -13,6 +13,7 @@ from fvsolve.argument_checks import NAMES, NUMBER, NUMBERS, ROW, TEXT, Kind, is_
 from fvsolve.case import load
 from fvsolve.core.model.build import build
 from fvsolve.core.model.step_division import dividing_rate
+from fvsolve.core.output.result_table import PlainData
 from fvsolve.core.schemes import LIMITED
 from fvsolve.core.steppers.tableau import METHODS as KNOWN_METHODS
 from fvsolve.declarations import declared
@@ -42,7 +43,6 @@ from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.reference import Reference, find_reference
 from fvsolve.studies.resolution import delay_lines, fixed_choices
 from fvsolve.studies.result_cache import OUT, ResultCache, cache_in
-from fvsolve.studies.result_table import PlainData
 
 STABLE, RINGING, COARSE, WRONG, BLOWN_UP, REFUSED, NOT_RUN = (
     "stable", "ringing", "coarse", "wrong", "blown up", "refused", "not run",

@@ -10,6 +10,7 @@ from fvsolve.argument_checks import FLAG, NAMES, NUMBER, TABLE, TEXT, validated
 from fvsolve.core.assembly.lowering import PRESSURE, Input
 from fvsolve.core.model.energy_norm import EnergyForm
 from fvsolve.core.model.model import inputs_of
+from fvsolve.core.output.result_table import Column
 from fvsolve.core.schemes import SCHEMES
 from fvsolve.core.solve.held_inputs import hold, input_value
 from fvsolve.declarations import declared
@@ -28,7 +29,6 @@ from fvsolve.studies.operating_point import (
     state_matrix,
     two_sided_differences,
 )
-from fvsolve.studies.result_table import Column
 from fvsolve.units import DIMENSIONS
 
 STATE_UNITS = {

@@ -18,13 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, NAMES, validated
+from fvsolve.core.output.result_table import PlainData
 from fvsolve.core.schemes import SCHEMES
 from fvsolve.core.step_limits.greatest_step import greatest_step
 from fvsolve.core.steppers.automatic import AUTO, EXPLICIT, IMPLICIT, TIGHT_BELOW, TIGHT_IMPLICIT
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.studies.outcome import name_list
-from fvsolve.studies.result_table import PlainData
 
 CELLS = 20  # cells of the closed pipe
 NORM_TOLERANCE = 1e-10  # excess of a norm over 1 that counts as rounding

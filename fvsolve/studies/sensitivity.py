@@ -10,11 +10,11 @@ import numpy as np
 
 from fvsolve.argument_checks import COUNT, COUNT_FROM_ZERO, PATH, TEXT, validated
 from fvsolve.case import load
+from fvsolve.core.output.result_table import Column, PlainData, ResultTable
 from fvsolve.declarations import declared
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.outcome import STUDY_ARGUMENTS
-from fvsolve.studies.result_table import Column, PlainData, ResultTable
 from fvsolve.studies.sampling import key_ranges
 from fvsolve.studies.sweep import VARY, sweep
 from fvsolve.units import show

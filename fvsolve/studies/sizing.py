@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case import Case, load
+from fvsolve.core.output.result_table import PlainData
 from fvsolve.core.output.summary_shape import FAILS, OPEN
 from fvsolve.core.run import run
 from fvsolve.core.run.verdicts import SIZES
@@ -17,7 +18,6 @@ from fvsolve.errors import CaseError, Fault, FvsolveError, collect_faults, did_y
 from fvsolve.parts.formula import Arithmetic
 from fvsolve.studies.outcome import NO_FIELDS, checked_case, end_if_interrupted
 from fvsolve.studies.peak_error import peak_errors
-from fvsolve.studies.result_table import PlainData
 from fvsolve.studies.sampling import is_known, key_quantity, si_unit_of
 from fvsolve.units import show, unit_of
 

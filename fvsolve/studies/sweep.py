@@ -15,6 +15,7 @@ from fvsolve.case.reading import read_raw
 from fvsolve.case.text import inline
 from fvsolve.core.fluid.coolprop import coolprop_version
 from fvsolve.core.output.restart import program_versions
+from fvsolve.core.output.result_table import Column, ResultTable
 from fvsolve.declarations import declared
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing
@@ -22,7 +23,6 @@ from fvsolve.file_replacement import replacing
 from fvsolve.studies.outcome import STUDY_ARGUMENTS
 from fvsolve.studies.parallel import TaskPool
 from fvsolve.studies.result_cache import ResultCache, digest_of, write_errors
-from fvsolve.studies.result_table import Column, ResultTable
 from fvsolve.studies.sampling import grid, points_from_file, refuse_unknown, sample_points
 from fvsolve.studies.sweep_batches import BatchedRows
 from fvsolve.studies.sweep_row import RowMaker

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from fvsolve import cli
 from fvsolve.cli import terminal
-from fvsolve.cli.terminal import TextTable
+from fvsolve.core.output.result_table import ResultTable
 
 
 def imported(*words: str) -> set[str]:
@@ -72,7 +72,7 @@ def test_the_overview_is_the_help_of_all_commands(monkeypatch):
     assert texts[0] == texts[1] and all(f"\n  {command} " in texts[0] for command in cli.COMMANDS)
 
 
-def by_rich(table: TextTable) -> str:
+def by_rich(table: ResultTable) -> str:
     """Lines of a table as rich prints them."""
     with contextlib.redirect_stdout(io.StringIO()) as out:
         Console(width=terminal.WIDTH, no_color=True).print(terminal._grid(table))
@@ -90,13 +90,13 @@ def by_rich(table: TextTable) -> str:
     ],
 )
 def test_lines_of_a_table_are_those_of_rich(headers, rows):
-    table = TextTable(headers, rows)
+    table = ResultTable.of("", headers, rows)
     assert "\n".join(terminal.table_lines(table)) + "\n" == by_rich(table)
 
 
 @pytest.mark.parametrize("cell", ["w" * 160, "Padé", "a\tb"])
 def test_rich_prints_tables_that_are_too_wide_or_not_of_printable_ascii(cell, capsys):
-    table = TextTable(["a", "b"], [[cell, "1"]])
+    table = ResultTable.of("", ["a", "b"], [[cell, "1"]])
     assert terminal.table_lines(table) is None
     terminal.show([table])
     assert capsys.readouterr().out == by_rich(table)

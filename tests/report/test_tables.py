@@ -13,11 +13,12 @@ from reference.scenes import junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.case.text import write
+from fvsolve.core.output.result_table import ResultTable
 from fvsolve.errors import FvsolveError
 from fvsolve.report.cycles import FatigueStrength, count_cycles, cycles
 from fvsolve.report.long_section import section_of, section_paths
 from fvsolve.report.report_files import write_report
-from fvsolve.report.tables import ReportTable, aligned_texts, value_text, walls
+from fvsolve.report.tables import aligned_texts, numeric_columns, value_text, walls
 
 ASTM = np.array([-2, 1, -3, 5, -1, 3, -4, 4, -2], float)  # ASTM E1049-85, figure 6
 RANGES = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}  # its table
@@ -127,13 +128,14 @@ def test_numbers_of_a_column_are_aligned_on_their_points():
     assert len({len(text.partition(".")[2]) for text in aligned_texts([0.001, 12.0, 5.5])}) == 1
     assert value_text(12345.678) == "12\u202f346" and value_text(-0.0) == "0" and value_text(1e-12) == "1e\u221212"
     assert value_text(float("nan")) == value_text(None) == "\u2013" and value_text(True) == "yes"
-    assert ReportTable("", ("name", "length"), [["a", 1.0], ["b", None]]).numeric == [False, True]
+    assert numeric_columns(ResultTable.of("", ("name", "length"), [["a", 1.0], ["b", None]])) == [False, True]
 
 
 def test_what_pipes_bear_and_whose_figures_these_are_stands_in_a_table_of_its_own(tmp_path):
     units = {"output.units": {"pressure": "barg", "length": "mm"}, "numerics.end": 0.1, "expect": {}}
     found = walls(fvsolve.run("plastic-main", set=units, out=tmp_path / "run", pictures=False))
-    assert found.units[:3] == ("", "bar", "mm") and [row[0] for row in found.rows] == ["upper", "lower"]
+    assert [column.unit for column in found.columns[:3]] == ["", "bar", "mm"]
+    assert [row[0] for row in found.rows] == ["upper", "lower"]
     assert [row[1] for row in found.rows] == pytest.approx([16.0, 16.0])  # PE100, SDR 11, C = 1.25
     assert [row[2] for row in found.rows] == pytest.approx([200.0 / 11.0, 160.0 / 11.0])
     assert "ISO 4427" in found.rows[0][4]

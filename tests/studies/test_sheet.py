@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fvsolve.core.output.result_table import Column, PlainData, ResultTable, cell_text, columns
 from fvsolve.core.output.summary_file import plain
-from fvsolve.studies.result_table import Column, PlainData, ResultTable, cell_text, columns
 
 COLUMNS = (Column("name"), Column("step", "step [s]", ".3g"), Column("whole", words=lambda row: f"<{row['name']}>"))
 ROWS = [{"name": "a, b", "step": np.float64(1.0 / 3.0), "whole": 1}, {"name": "c", "step": math.nan, "whole": None}]

@@ -26,8 +26,15 @@ from fvsolve.core.kernels.calls import compile_as
 from fvsolve.core.kernels.compiled_functions import functions
 from fvsolve.core.model import RunData
 from fvsolve.core.model.state_bounds import state_bounds
-from fvsolve.core.solve.partition import Partition, blocked_sums
-from fvsolve.core.solve.requests import CLOSE, CLOSE_MESSAGE, RUN_LOOP, SEND_STATES, postponed_interrupts
+from fvsolve.core.solve.partition import (
+    CLOSE,
+    CLOSE_MESSAGE,
+    RUN_LOOP,
+    SEND_STATES,
+    Partition,
+    blocked_sums,
+    postponed_interrupts,
+)
 from fvsolve.core.steppers import loop_records
 from fvsolve.core.steppers.integrator import Integrator
 from fvsolve.core.steppers.run_handle import JOIN

@@ -5,6 +5,9 @@ neighbouring rows come from the band that owns them. In large basins a band form
 in blocks of rows that fit into the processor cache.
 """
 
+import signal
+import threading
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -331,3 +334,25 @@ def cells_at(model, b: int, q: int, first: int, stop: int) -> list[tuple[int, in
         return []
     new = np.flatnonzero(np.diff(cells) != 1) + 1
     return [(int(cell_run[0]), int(cell_run[-1]) + 1) for cell_run in np.split(cells, new)]
+
+
+# ranks ----------
+
+RUN_LOOP, SEND_STATES, CLOSE = range(3)  # requests of rank 0: run the time loop, send states, end
+CLOSE_MESSAGE = CLOSE, None
+
+
+@contextmanager
+def postponed_interrupts():
+    """Postpone Ctrl-C until all workers have returned, because they wait for each other."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    signals, before = [], signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, lambda *arguments: signals.append(arguments))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if signals and callable(before):
+        before(*signals[0])

@@ -8,8 +8,7 @@ import numpy as np
 
 from fvsolve.core.model import Model, State
 from fvsolve.core.solve import run_summary as found
-from fvsolve.core.solve.partition import threads_of
-from fvsolve.core.solve.requests import CLOSE_MESSAGE, postponed_interrupts
+from fvsolve.core.solve.partition import CLOSE_MESSAGE, postponed_interrupts, threads_of
 from fvsolve.core.solve.run_checks import RunChecks, split_step_notices
 from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
 from fvsolve.core.solve.run_summary import Event, Summary, mass_ledger

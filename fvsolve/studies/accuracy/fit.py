@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.argument_checks import NUMBER, SERIES, Kind, is_array, validated
+from fvsolve.core.output.result_table import PlainData
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.result_table import PlainData
 
 LEAST_ROWS = 3
 FLOOR_MARGIN = 10.0  # an error below this multiple of the floor is not used

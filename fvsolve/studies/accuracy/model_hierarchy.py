@@ -22,6 +22,7 @@ from fvsolve.core.fluid import LAWS
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.steady_friction import drag
 from fvsolve.core.model.model_facts import velocities
+from fvsolve.core.output.result_table import PlainData
 from fvsolve.declarations import declared
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.features.delay_lines.choice import reason_for_cells
@@ -29,7 +30,6 @@ from fvsolve.studies.distance import Deviation, moving_probes
 from fvsolve.studies.outcome import GIVEN_UP, Outcome, capped, outcome, refuse_basins, study_model
 from fvsolve.studies.reference import reference_of_run
 from fvsolve.studies.resolution import refined_keys
-from fvsolve.studies.result_table import PlainData
 
 SLOSHING = ("frozen", "modes", "cells")
 MIN_REFINED_CELLS = 4  # sides of a tank with at most so many cells are not refined

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from fvsolve.core.assembly.scheme_codes import limiter_notices
+from fvsolve.core.output.result_table import PlainData
 from fvsolve.core.steppers.tableau import METHODS
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError
@@ -37,7 +38,6 @@ from fvsolve.studies.resolution import (
     unit_of,
 )
 from fvsolve.studies.result_cache import ResultCache
-from fvsolve.studies.result_table import PlainData
 
 
 @dataclass(frozen=True)

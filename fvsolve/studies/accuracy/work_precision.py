@@ -13,9 +13,9 @@ import numpy as np
 
 from fvsolve.case.case import Case
 from fvsolve.case.sections import DEFAULT_CELLS, DEFAULT_RTOL
+from fvsolve.core.output.result_table import Column, ResultTable, columns
 from fvsolve.display import Displayable
 from fvsolve.studies.accuracy.chart_settings import MethodSetting, cells_setting, lumped_setting
-from fvsolve.studies.result_table import Column, ResultTable, columns
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,13 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, NUMBER, TABLE, TEXT, validated
+from fvsolve.core.output.result_table import PlainData, plain
 from fvsolve.declarations import declared
 from fvsolve.studies.loops.delay_system import EIGENVALUE_OPERATIONS, DelaySystem, sorted_poles
 from fvsolve.studies.loops.margins import Margins, find_margins
 from fvsolve.studies.loops.open_loop import block_of, open_loop, open_loop_error
 from fvsolve.studies.loops.sampled import STABLE, SampledLoop, gain_within, nearest_range
 from fvsolve.studies.outcome import Progress
-from fvsolve.studies.result_table import PlainData, plain
 from fvsolve.studies.work_limit import DENSE_RATE
 
 PER_DECADE = 200  # frequencies of the table

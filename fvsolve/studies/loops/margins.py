@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.studies.result_table import PlainData
+from fvsolve.core.output.result_table import PlainData
 
 ReturnRatio = Callable[[np.ndarray], np.ndarray]  # frequencies [rad/s] -> L(j w)
 POLE = 1e6  # of |L| at the frequencies beside it: a greater |L| is a pole of L, at which its sign changes too

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.argument_checks import COMPLEX, FUNCTION, NUMBER, POSITIVE, Kind, instance_of, is_number, validated
+from fvsolve.core.output.result_table import PlainData
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.result_table import PlainData
 from fvsolve.units import show
 
 MAX_SAMPLES = 200_000  # greatest number of samples of a sweep

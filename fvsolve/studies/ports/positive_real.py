@@ -11,10 +11,10 @@ from numbers import Integral, Rational, Real
 
 import numpy as np
 
+from fvsolve.core.output.result_table import PlainData
 from fvsolve.core.steppers.numbers.polynomial import Polynomial, chain, odd_part, sign
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.result_table import PlainData
 
 BITS = 200  # relative precision of a bracketed root in bits, before values are computed from it
 

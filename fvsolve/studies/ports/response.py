@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.argument_checks import COMPLEX, FLAG, MATRIX, NUMBER, POSITIVE, SERIES, TABLE, TEXT, instance_of, validated
+from fvsolve.core.output.result_table import PlainData
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.studies.result_table import PlainData
 
 TOLERANCE = 1e-9  # values of Re H / |H| closer to zero are undecided, because of differences and rounding
 DECADES = 1.0  # searched below the slowest and above the fastest pole; more if Re H changes sign beyond

@@ -23,6 +23,7 @@ from fvsolve.argument_checks import COUNT, FUNCTION, NAMES, validated
 from fvsolve.core.assembly.scheme_codes import scheme_settings
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.table_handle import make_handle
+from fvsolve.core.output.result_table import PlainData
 from fvsolve.core.schemes import LIMITED, LIMITERS, branches
 from fvsolve.core.step_limits.advection_limit import AdvectionLimit, limit_of
 from fvsolve.core.step_limits.greatest_step import greatest_step, multiples
@@ -36,7 +37,6 @@ from fvsolve.core.steppers.tableau import METHODS, method_named
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.studies.outcome import Progress, name_list
-from fvsolve.studies.result_table import PlainData
 
 THRESHOLD = 1e3
 CELLS, STEPS = 100, 1000

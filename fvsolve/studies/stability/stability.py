@@ -17,6 +17,7 @@ import numpy as np
 from fvsolve.argument_checks import COUNT, FLAG, NAMES, NUMBER, PATH, validated
 from fvsolve.case import load
 from fvsolve.core.model.energy_norm import EnergyForm, energy_form
+from fvsolve.core.output.result_table import PlainData
 from fvsolve.core.schemes import SCHEMES, branches
 from fvsolve.core.steppers import automatic, method_named
 from fvsolve.core.steppers.tableau import AUTO
@@ -28,7 +29,6 @@ from fvsolve.studies.outcome import STUDY_ARGUMENTS, Progress, name_list
 from fvsolve.studies.parallel import PickledCase, TaskPool, Work
 from fvsolve.studies.resolution import delay_lines, fixed_choices
 from fvsolve.studies.result_cache import ResultCache, case_key
-from fvsolve.studies.result_table import PlainData
 from fvsolve.studies.stability.delay_line_limits import delayed_row
 from fvsolve.studies.stability.growth import (
     DENSE,

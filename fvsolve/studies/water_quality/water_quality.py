@@ -9,11 +9,11 @@ import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, TABLE, validated
 from fvsolve.case import Case, load
+from fvsolve.core.output.result_table import write_csv
 from fvsolve.core.run import run
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.studies.outcome import NO_FIELDS, end_if_interrupted
-from fvsolve.studies.result_table import write_csv
 from fvsolve.studies.water_quality.moving_segments import Segments
 from fvsolve.units import show
 
