@@ -250,7 +250,7 @@ def scalar_faults(
                     if scalar not in scalars:
                         yield place, _unknown_scalar(scalar, scalars)
                     elif part.physics_type.joined and not (patch_options.passes or basins.is_source(patch_options)):
-                        text = "is not valid here, because the joined links give the value. Remove this key, or set "
+                        text = "is not valid here, because the joined links give the value; remove this key, or set "
                         yield place, text + 'boundary = "open"'
             if scalars and part.no_scalars:
                 yield (group, name), f"is {article(part.kind)}; {part.no_scalars}"

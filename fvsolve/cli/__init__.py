@@ -62,7 +62,7 @@ def run_command() -> None:
     except OSError as error:
         _exit_with(f"{error.filename or 'fvsolve'}: {error.strerror or error}", 2)
     except MemoryError:
-        _exit_with("out of memory. Try fewer cells, fewer probes, or a longer output interval ([output] every)", 1)
+        _exit_with("out of memory; try fewer cells, fewer probes, or a longer output interval ([output] every)", 1)
     except Exception as error:  # a defect of fvsolve: print its location, so that it can be reported
         command = COMMANDS.get(sys.argv[1]) if len(sys.argv) > 1 else None
         source = f"{command.source}: " if command and command.source else ""

@@ -51,7 +51,7 @@ def chart(
     keys_of_the_chart = STEP_KEYS - {"numerics.step"} if models else STEP_KEYS
     for key in sorted({text.partition("=")[0].strip() for text in set} & keys_of_the_chart):
         text = f"--set {key} has no effect, because a chart sets the steps: Courant number 0.9, or --rtol, or --step"
-        raise FvsolveError(f"{text}. Remove it")
+        raise FvsolveError(f"{text}; remove it")
     if target is not None and not 0.0 < target < 1.0:
         text = f"--target: {target:g} is not a valid error"
         raise FvsolveError(f"{text}; expected a fraction of the range, between 0 and 1")
@@ -85,7 +85,7 @@ def _refuse(**options) -> None:
     if names:
         raise FvsolveError(
             f"{', '.join(names)}: not valid with --models, which compares models of the case with the settings of "
-            f"[numerics] and writes no files. Remove {'these options' if len(names) > 1 else 'this option'}; "
+            f"[numerics] and writes no files; remove {'these options' if len(names) > 1 else 'this option'}; "
             "keys of [numerics] can be changed with --set"
         )
 

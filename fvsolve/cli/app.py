@@ -230,7 +230,7 @@ def writable_folder(folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         text = f"{folder}: cannot be written: {error.strerror or error}"
-        raise FvsolveError(f"{text}. Use another directory with --out DIR") from None
+        raise FvsolveError(f"{text}; use another directory with --out DIR") from None
     if not os.access(folder, os.W_OK):
-        raise FvsolveError(f"{folder}: cannot be written: permission denied. Use another directory with --out DIR")
+        raise FvsolveError(f"{folder}: cannot be written: permission denied; use another directory with --out DIR")
     return folder

@@ -177,7 +177,7 @@ def view(
 
     when = quantity_of(time, "time", "--time")
     if animate is not None and not time is out is None:
-        raise FvsolveError("--animate draws all times into its own file. Remove --time and --out")
+        raise FvsolveError("--animate draws all times into its own file; remove --time and --out")
     run = open_run(directory)
     print(run.view(when, field, out, contours) if animate is None else run.animate(animate, field, contours))
 
@@ -197,9 +197,9 @@ def _places(cases: list[str], out: Path | None) -> dict[str, Path]:
         other = taken.setdefault(os.path.normcase(place), name)
         if name in paths or other != name:
             if other == name:
-                raise FvsolveError(f"{name} is named twice. Name each case once")
+                raise FvsolveError(f"{name} is named twice; name each case once")
             raise FvsolveError(
-                f"{other} and {name} would both write {place}. Run each case in a command of its own with its own "
+                f"{other} and {name} would both write {place}; run each case in a command of its own with its own "
                 "--out DIR, or rename a case"
             )
         paths[name] = place

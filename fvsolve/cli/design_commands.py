@@ -86,7 +86,7 @@ def _no_value_text(result) -> str:
     text += f", with a margin of {nearest.margin:.3g} of the limit {nearest.limit}"
     beyond = {values[0]: "below", values[-1]: "above"}.get(nearest.value)
     return (
-        f"{text}; margins increase towards this value. Try values {beyond} it or change another key" if beyond else text
+        f"{text}; margins increase towards this value; try values {beyond} it or change another key" if beyond else text
     )
 
 

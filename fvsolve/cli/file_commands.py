@@ -136,7 +136,7 @@ def import_(
     if not to.suffix:
         to = to.with_suffix(".toml")
     if to.exists():
-        raise FvsolveError(f"{to} exists. Give another file: fvsolve import {source} CASE")
+        raise FvsolveError(f"{to} exists; give another file: fvsolve import {source} CASE")
     speed = _positive("--wave-speed", wave_speed, "velocity")
     shortest = _positive("--min-pipe-length", min_pipe_length, "length") if min_pipe_length else 0.0
     if duration and not day:
@@ -176,7 +176,7 @@ def export(
     if epanet is None:
         raise FvsolveError("--epanet FILE is missing; expected the EPANET network to write, for example town.inp")
     if epanet.exists():
-        raise FvsolveError(f"{epanet} exists. Give another file: --epanet FILE")
+        raise FvsolveError(f"{epanet} exists; give another file: --epanet FILE")
     text, notes = network_text(load_case(case, set))
     epanet.parent.mkdir(parents=True, exist_ok=True)
     write_file(epanet, text)

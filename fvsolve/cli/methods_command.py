@@ -163,7 +163,7 @@ def methods(
 ) -> None:  # fmt: skip
     """List Runge-Kutta methods: order, stability, cost. With NAME show its tableau, R(s) and stability region."""
     if name is None and out is not None:
-        raise FvsolveError("--out is valid for a single method only. Add the NAME of the method")
+        raise FvsolveError("--out is valid for a single method only; add the NAME of the method")
     if name is not None:
         return present(as_json, *single_method(name, out))
     all_facts = {name: analyse(method) for name, method in METHODS.items()}

@@ -82,7 +82,7 @@ def ranges(texts: list[str], option: str) -> dict[str, list]:
     pairs = [key_and_values(text, option, RANGE_FORMAT) for text in texts]
     duplicates = [key for key, _ in pairs if [name for name, _ in pairs].count(key) > 1]
     if duplicates:
-        raise FvsolveError(f"{option} {duplicates[0]} is given twice. Give it once")
+        raise FvsolveError(f"{option} {duplicates[0]} is given twice; give it once")
     return dict(pairs)
 
 

@@ -159,7 +159,7 @@ def vessel_faults(case, since: float):
         if part.kind == "tank" and hasattr(part.area, "area"):
             yield fault(case, ("nodes", node, "area"), "needs a constant area")
         if getattr(part, "connection", None) is not None:
-            text = "does not support `connection`. Remove this key"
+            text = "does not support `connection`; remove this key"
             yield fault(case, ("nodes", node, "connection"), text)
         if part.kind == "chamber" and part.initial_pressure is None:
             yield fault(case, ("nodes", node), "needs the key `initial_pressure`")

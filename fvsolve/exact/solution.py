@@ -223,7 +223,7 @@ def valve_faults(case, name: str):
     if part.characteristic != "linear":
         yield fault(case, ("links", name, "characteristic"), 'supports only characteristic = "linear"')
     if part.laminar_reynolds is not None:
-        yield fault(case, ("links", name, "laminar_reynolds"), "supports no laminar flow. Remove this key")
+        yield fault(case, ("links", name, "laminar_reynolds"), "supports no laminar flow; remove this key")
 
 
 def level_faults(exact: Solution):

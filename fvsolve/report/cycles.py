@@ -84,7 +84,7 @@ def cycles(result, probes: list[str] | None = None, strength: FatigueStrength | 
     rows = []
     for name in probes or known:
         if not len(result[name]):
-            raise FvsolveError(f"{name} has no rows, so its cycles cannot be counted. Run the case to a later time")
+            raise FvsolveError(f"{name} has no rows, so its cycles cannot be counted; run the case to a later time")
         if not np.isfinite(result[name]).all():
             raise FvsolveError(f"{name} has values that are not finite, so its cycles cannot be counted")
         check_rows(result, name)

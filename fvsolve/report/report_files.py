@@ -237,7 +237,7 @@ def write_pictures(
         drawn["phase.png"] = phase_figure([[(n, result.units[n], result[n]) for n in pair] for pair in pairs], title)
     if not drawn:
         reason = f"run is {text}" if (text := not_valid(result.summary)) else "case has no pipes"
-        raise FvsolveError(f"{directory}: the {reason}, so it has no long section. Choose --probes or --phase X:Y")
+        raise FvsolveError(f"{directory}: the {reason}, so it has no long section; choose --probes or --phase X:Y")
     folder.mkdir(parents=True, exist_ok=True)
     for name, figure in drawn.items():
         save_if_path(figure, folder / name)

@@ -112,7 +112,7 @@ def calibrate(
     """
     loaded = load(case, set)
     if not vary:
-        raise FvsolveError("no key to fit. Give at least one key and its range: links.main.wave_speed=900,1300")
+        raise FvsolveError("no key to fit; give at least one key and its range: links.main.wave_speed=900,1300")
     if not loaded.compare:
         raise FvsolveError("no measured series to fit to; expected a series under [compare] in the case")
     bounds = key_ranges(loaded, vary)

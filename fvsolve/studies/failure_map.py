@@ -389,7 +389,7 @@ class MapRuns:
             if uncertainty > self.tolerance / 2:
                 raise FvsolveError(
                     f"the reference is not accurate enough: its error may be {uncertainty:.2g} of the range of "
-                    f"{reference.uncertainty.worst or 'a probe'}, but the tolerance is {self.tolerance:g}. Try "
+                    f"{reference.uncertainty.worst or 'a probe'}, but the tolerance is {self.tolerance:g}; try "
                     f"--tolerance {4 * uncertainty:.1g}, or more cells if the case has cells; if this probe shows only "
                     "rounding, remove this probe from output.probes"
                 )

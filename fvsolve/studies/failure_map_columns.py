@@ -165,7 +165,7 @@ def map_columns(case, base: dict, courants, steps, key) -> Columns:
         return Columns(name, list(values), sets, rates, span, _wave_rate(case, {**base, name: values[0]}))
     rates, waves = _fastest_and_wave_rate(case, base), _wave_rate(case, base)
     if courants is not None and waves is None:
-        raise FvsolveError("Courant numbers need pipes with cells, but this case has no such pipe. Use --step")
+        raise FvsolveError("Courant numbers need pipes with cells, but this case has no such pipe; use --step")
     chosen = [c / waves for c in courants] if courants is not None else steps
     chosen = list(chosen if chosen is not None else _default_steps(case, rates, waves))
     return Columns("step", chosen, [{"numerics.step": h} for h in chosen], [rates], span, waves)

@@ -315,7 +315,7 @@ def check_versions(client: Any, address: str) -> None:
     try:
         client.wait_for_workers(1, timeout=TIMEOUT)
     except TimeoutError:
-        text = f"the Dask scheduler at {address} has no workers. Start workers: dask worker {address}"
+        text = f"the Dask scheduler at {address} has no workers; start workers: dask worker {address}"
         raise FvsolveError(text) from None
     reported = client.get_versions(check=False)
     ends = {"the scheduler": reported["scheduler"]}
@@ -329,7 +329,7 @@ def check_versions(client: Any, address: str) -> None:
         faults = [f"worker {name} has {item}" for name, text in programs.items() for item in program_differences(text)]
     if faults:
         raise FvsolveError(f"the Dask cluster at {address} has other versions, so its results could differ: "
-                           f"{listing(faults)}. Install the same versions there and here")  # fmt: skip
+                           f"{listing(faults)}; install the same versions there and here")  # fmt: skip
 
 
 def program_differences(reported: Any) -> list[str]:

@@ -145,7 +145,7 @@ def find_reference(
         references.insert(0, replace(exact_result, spans=nearest_run.spans, run=nearest_run.run))
     if len(references) < min(2, opinions or 2):
         text = f"the reference run failed, so no error is known ({'; '.join(failures)})"
-        raise FvsolveError(f"{text}. Try another method, an earlier end of the run, or [exact] in the case")
+        raise FvsolveError(f"{text}; try another method, an earlier end of the run, or [exact] in the case")
     return best_reference(references, tuple(failures))
 
 
@@ -348,7 +348,7 @@ def reference_of_run(run: Outcome, words: str = "") -> Reference:
     def rows_of(other: Outcome) -> np.ndarray:
         t = run.rows[:, 0]
         if other.rows.shape[0] != t.size or not np.allclose(other.rows[:, 0], t, rtol=1e-12, atol=1e-300):
-            raise FvsolveError("rows of two runs are at different times. Set the key output.every in the case")
+            raise FvsolveError("rows of two runs are at different times; set the key output.every in the case")
         by_probe = {name: run.rows[:, 1 + k] for k, name in enumerate(run.probes)}
         missing = np.full(t.size, np.nan)
         return np.column_stack([by_probe.get(name, missing) for name in other.probes] or [np.zeros((t.size, 0))])

@@ -73,7 +73,7 @@ def range_of(case: Case, key: str, given: Sequence[Any]) -> tuple[float, float]:
         raise ValueError(f"{show(list(given))} is not a range; expected two values, LOW,HIGH")
     quantity, setting = key_quantity(case.raw, key), ReadContext(ambient=case.ambient_pressure)
     if quantity is None:
-        raise ValueError("is not a continuous quantity, so it has no range. Use a grid: --set KEY=a,b,c")
+        raise ValueError("is not a continuous quantity, so it has no range; use a grid: --set KEY=a,b,c")
     low, high = (quantity.read(parsed(end), setting) for end in given)
     if isinstance(low, units.Kinematic) or isinstance(high, units.Kinematic):
         raise ValueError(f"{show(list(given))} is a kinematic viscosity; expected dynamic viscosities in Pa s or mPa s")

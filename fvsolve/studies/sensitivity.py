@@ -87,7 +87,7 @@ def sensitivity(
     else:
         bounds = key_ranges(load(case, set), vary)
     if not bounds:
-        raise FvsolveError("no key varies. Give at least one key and its range: links.main.length=900,1000")
+        raise FvsolveError("no key varies; give at least one key and its range: links.main.length=900,1000")
     sobol, morris = sample_points(bounds, samples, seed)
     points = [dict(zip(bounds, row, strict=True)) for row in np.concatenate([sobol, morris]).tolist()]
     if callable(case):

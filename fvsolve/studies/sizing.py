@@ -103,7 +103,7 @@ def parse_range(low: Any, high: Any) -> tuple[float, float, str]:
         first, second = unit_of(unit_a), unit_of(unit_b)
         if first is None or second is None or first.dimension != second.dimension or first.gauge != second.gauge:
             text = f"{show(low)} and {show(high)} have different kinds of units"
-            raise FvsolveError(f"{text}. Use the same unit for both")
+            raise FvsolveError(f"{text}; use the same unit for both")
         a = float(second.number(first.si(a)))
     if not a < b:
         raise FvsolveError(f"{show(low)} is not below {show(high)}; expected LOW,HIGH")
@@ -300,7 +300,7 @@ def find_faults(
     with collect_faults(faults, f"--vary {key}"):
         low, high, unit = parse_range(*span) if span else (0.0, 1.0, "")
         if case is not None and is_known(case.raw, key) and key_quantity(case.raw, key) is None:
-            raise ValueError("has words or whole numbers as values, so it has no range. Use `fvsolve sweep`")
+            raise ValueError("has words or whole numbers as values, so it has no range; use `fvsolve sweep`")
     for name, text in ties.items():
         with collect_faults(faults, f"--dependent {name}"):
             Arithmetic(text)
@@ -330,7 +330,7 @@ def parse_ties(texts: Sequence[str]) -> dict[str, str]:
             example = '"nodes.vessel.gas_volume = x / 2"'
             faults.append(Fault(f"--dependent {text}", f'expected "KEY = formula of x", for example {example}'))
         elif key in ties:
-            faults.append(Fault(f"--dependent {text}", f"{key} is given before as {ties[key]}. Give each key once"))
+            faults.append(Fault(f"--dependent {text}", f"{key} is given before as {ties[key]}; give each key once"))
         ties.setdefault(key, rule)
     if faults:
         raise CaseError(faults)

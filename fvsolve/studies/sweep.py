@@ -179,10 +179,10 @@ def planned_values(
         return runs
     if sample is not None:
         if not vary:
-            raise FvsolveError("no key varies. Give at least one key and its range: links.main.length=900,1000")
+            raise FvsolveError("no key varies; give at least one key and its range: links.main.length=900,1000")
         return sample_points(load(source, base), vary, sample, seed)
     if not vary or all(len(values) < 2 for values in vary.values()):
-        raise FvsolveError("no key varies. Give at least two values of a key, for example links.main.cells=100,200")
+        raise FvsolveError("no key varies; give at least two values of a key, for example links.main.cells=100,200")
     empty = [key for key, values in vary.items() if not len(values)]
     if empty:
         raise FvsolveError(f"{', '.join(empty)}: no values; expected at least one value")

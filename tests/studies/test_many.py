@@ -143,7 +143,7 @@ def test_a_scheduler_without_workers_is_named(monkeypatch):
 
     monkeypatch.setattr(room, "TIMEOUT", 0.5)
     with distributed.LocalCluster(n_workers=0, dashboard_address=":0") as empty:
-        with pytest.raises(FvsolveError, match="has no workers. Start workers: dask worker tcp"):
+        with pytest.raises(FvsolveError, match="has no workers; start workers: dask worker tcp"):
             dict(run_tasks(Work(), [1, 2, 3], dask=empty.scheduler_address))
 
 
@@ -166,7 +166,7 @@ def test_another_version_is_named_with_both_numbers(cluster, monkeypatch):
     monkeypatch.setattr(room, "version_numbers", versions)
     said = (
         r"has other versions, .*: the scheduler has distributed 2019.1 \(here .*worker .*"
-        r"\. Install the same versions there"
+        r"; install the same versions there"
     )
     with pytest.raises(FvsolveError, match=said):
         dict(run_tasks(Work(), [1, 2, 3], dask=cluster.scheduler_address))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import math
 from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -117,6 +118,12 @@ class Lowering:
     def of(self, part: Any) -> Lowering:
         """Conversion of this part; a different object if keys of the part need other states."""
         return self
+
+    def varied(self, **data: Any) -> Self:
+        """Copy of this conversion with other data, such as other states."""
+        other = copy.copy(self)
+        vars(other).update(data)
+        return other
 
     def numbers(self, draft, name: str, part: Any) -> list[float]:
         """Numbers of a part, in the order in which its law reads them from offset `data` of its row."""

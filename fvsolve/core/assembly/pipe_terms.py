@@ -163,7 +163,7 @@ def add_terms(draft) -> dict[str, dict]:
         try:
             m, n, highest = terms(weighting, reynolds, (law.roughness or 0.0) / mesh.diameter, cell, span, accuracy)
         except ArithmeticError as error:
-            text = f"{error}. Try a greater number for `accuracy`, or more cells"
+            text = f"{error}; try a greater number for `accuracy`, or more cells"
             draft.fault(f"links.{name}.friction.accuracy", text)
             continue
         gain, rate = 4.0 * unit * m, unit * n

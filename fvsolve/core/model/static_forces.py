@@ -291,7 +291,7 @@ def start_pins(draft, at: StaticForces) -> np.ndarray:
     names = [name for name, row in zip(draft.pin_names, draft.pin_table, strict=True) for _ in range(row["rows"])]
     for name in dict.fromkeys(redundant_pins(rows, names)):
         text = "this pin is redundant: in some direction joints or other pins already hold its two points together"
-        draft.fault(f"links.{name}", f"{text}. Give the key `axis` for a loop in a plane, else remove one pin")
+        draft.fault(f"links.{name}", f"{text}; give the key `axis` for a loop in a plane, else remove one pin")
     slips: dict[str, float] = {}
     for name, slip in zip(names, rows @ at.rates(), strict=True):
         slips[name] = float(np.hypot(slips.get(name, 0.0), slip))

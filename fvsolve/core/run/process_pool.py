@@ -1,4 +1,8 @@
-"""Pool of worker processes on this machine, with the interface of concurrent.futures; a lost process is replaced."""
+"""Pool of worker processes on this machine, with the interface of concurrent.futures; a lost process is replaced.
+
+Executors of concurrent.futures and loky cannot replace it: after the kill of one process of three they end all six
+chunks (`BrokenProcessPool`, `TerminatedWorkerError`) instead of one, and their processes survive a kill of the parent.
+"""
 
 import os
 import signal

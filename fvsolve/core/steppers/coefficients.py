@@ -95,7 +95,7 @@ def error_of(coefficients, s):
 
 
 def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
-    """Matrices T, T^-1, L, T L, P, C, T^-1 A^-1 a0, A^-1 a0 by rows in one flat array, for `irk` and `irk`.
+    """Matrices T, T^-1, L, T L, P, C, T^-1 A^-1 a0, A^-1 a0 by rows in one flat array, for `irk`.
 
     a : float64[q, q]  coefficients A of the implicit stages; c : their times
     a0 : float64[q]  weights of the explicit first stage in these stages

@@ -216,7 +216,7 @@ def tableau(
     """
     if name in BUILT_IN or name == "auto" or not name.strip() or name != name.strip():
         raise FvsolveError(f'method name "{name}" is not free: it is empty, has blanks at an end or names a built-in '
-                           "method. Choose another name")  # fmt: skip
+                           "method; choose another name")  # fmt: skip
     if (text is None) == (A is None):
         raise FvsolveError(f'method "{name}": expected either text or A, as in tableau(name, A=A, b=b)')
     text = A if text is None else text

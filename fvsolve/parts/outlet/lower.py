@@ -102,7 +102,10 @@ class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
     events = ("bursts",)
 
     def of(self, part) -> Device:
-        return DiscToAmbient() if part.outward else self
+        if not part.outward:
+            return self
+        events = ("",) * EVENT_COUNT + self.events
+        return self.varied(law=law_rupture_disc_outside, mode=EVENT_COUNT, events=events)
 
     def own_numbers(self, draft, name, part) -> list[float]:
         return [part.burst_pressure]
@@ -117,13 +120,6 @@ class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
         return []
 
 
-class DiscToAmbient(RuptureDiscRows, kind=""):
-    """Conversion to table rows of rupture discs that open to ambient."""
-
-    law, mode = law_rupture_disc_outside, EVENT_COUNT
-    events = ("",) * EVENT_COUNT + ("bursts",)
-
-
 class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
     """Conversion to table rows of surge-anticipating valves between two nodes."""
 
@@ -133,7 +129,10 @@ class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
     remedy = "give the surge-anticipating valve a longer closing_time"
 
     def of(self, part) -> Device:
-        return AnticipatingToAmbient() if part.outward else self
+        if not part.outward:
+            return self
+        events = ("",) * EVENT_COUNT + self.events
+        return self.varied(law=law_surge_anticipating_outside, mode=EVENT_COUNT, events=events)
 
     def own_numbers(self, draft, name, part) -> list[float]:
         if part.trip is not None and part.trip < draft.case.numerics.start:
@@ -171,10 +170,3 @@ class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
             f"{name}: opens at the start, because the pressure at {part.sensed}, {amount(p, 'pressure', 6)}, is not "
             f"below high_set, {amount(part.high_set, 'pressure', 6)}"
         ]
-
-
-class AnticipatingToAmbient(SurgeAnticipatingRows, kind=""):
-    """Conversion to table rows of surge-anticipating valves that open to ambient."""
-
-    law, mode = law_surge_anticipating_outside, EVENT_COUNT
-    events = ("",) * EVENT_COUNT + SurgeAnticipatingRows.events

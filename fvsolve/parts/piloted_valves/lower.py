@@ -74,18 +74,6 @@ class CounterbalanceDisc(PilotedDisc, kind=""):
         super().store_lift(start, row, min(max(target, 0.0), 1.0) if x == 1.0 else x, target)
 
 
-class CounterbalanceSwing(CounterbalanceDisc, kind=""):
-    """Conversion to table rows of counterbalance valves with an oscillating disc (mass, spring, damper)."""
-
-    states = ("opening", "speed")
-
-
-class CounterbalanceLag(CounterbalanceDisc, kind=""):
-    """Conversion to table rows of counterbalance valves whose disc has a first-order lag."""
-
-    states = ("opening",)
-
-
 class CounterbalanceRows(CounterbalanceDisc, kind="counterbalance"):
     """Conversion to table rows of counterbalance valves whose lift follows the pressures at once."""
 
@@ -93,9 +81,7 @@ class CounterbalanceRows(CounterbalanceDisc, kind="counterbalance"):
     events, numbers, store_lift = Relief.events, Relief.numbers, Relief.store_lift
 
     def of(self, part) -> Device:
-        if not part.has_dynamics:
-            return self
-        return CounterbalanceLag() if part.natural_frequency is None else CounterbalanceSwing()
+        return CounterbalanceDisc().moved_as(part) if part.has_dynamics else self
 
 
 class CompensatorDisc(PilotedDisc, kind=""):
@@ -130,18 +116,6 @@ class CompensatorDisc(PilotedDisc, kind=""):
         """Add no notice: the valve is open at rest."""
 
 
-class CompensatorSwing(CompensatorDisc, kind=""):
-    """Conversion to table rows of pressure compensators with an oscillating spool (mass, spring, damper)."""
-
-    states = ("opening", "speed")
-
-
-class CompensatorLag(CompensatorDisc, kind=""):
-    """Conversion to table rows of pressure compensators whose spool has a first-order lag."""
-
-    states = ("opening",)
-
-
 class CompensatorRows(CompensatorDisc, kind="pressure-compensator"):
     """Conversion to table rows of pressure compensators whose opening follows the pressures at once."""
 
@@ -149,9 +123,7 @@ class CompensatorRows(CompensatorDisc, kind="pressure-compensator"):
     events, numbers, store_lift = Relief.events, Relief.numbers, Relief.store_lift
 
     def of(self, part) -> Device:
-        if not part.has_dynamics:
-            return self
-        return CompensatorLag() if part.natural_frequency is None else CompensatorSwing()
+        return CompensatorDisc().moved_as(part) if part.has_dynamics else self
 
 
 class PilotCheckRows(Device, kind="pilot-check"):

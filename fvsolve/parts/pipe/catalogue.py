@@ -147,7 +147,7 @@ def _add_wall(table: dict[str, Any], sources: list[str], material: Material) -> 
     if "wave_speed" in table or not isinstance(wall, dict):
         return
     if "thickness" not in wall:
-        text = (f'wall thickness of {material.name} is missing. Give `nominal` together with `class` or `schedule`, '
+        text = (f'wall thickness of {material.name} is missing; give `nominal` together with `class` or `schedule`, '
                 'or wall = { thickness = "8 mm" }, or wave_speed')  # fmt: skip
         raise ValueFault([(("material",), text)])
     table["wall"] = {**wall}

@@ -177,7 +177,7 @@ class Pipe(FullPipe, kind="pipe"):
             return
         if abs(self.profile.length - self.length) > LENGTH_TOLERANCE * self.length:
             text = f"the axis is {self.profile.length:.10g} m long, and `length` is {self.length:.10g} m"
-            yield ("profile",), f"{text}; expected equal lengths. Leave `length` out"
+            yield ("profile",), f"{text}; expected equal lengths; leave `length` out"
         for place, end, z in zip(("from", "to"), (self.from_, self.to), self.profile.elevation[[0, -1]], strict=True):
             node = around.nodes.get(end)
             if getattr(node, "on", None) is not None:

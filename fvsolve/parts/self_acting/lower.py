@@ -32,6 +32,10 @@ class LiftedValve(Device, kind=""):
     events = STOP_EVENTS
     remedy = "give the disc a greater overpressure"
 
+    def moved_as(self, part) -> Device:
+        """Conversion with the states of the disc of a part: it follows with a first-order lag, or it has inertia."""
+        return self.varied(states=("opening",) if part.natural_frequency is None else ("opening", "speed"))
+
     def numbers(self, draft, name, part) -> list[float]:
         """Parameters of the disc in the order of `law_disc`: three values at the start, then its keys."""
         frequency = part.natural_frequency or 0.0
@@ -181,18 +185,6 @@ class CheckDisc(LiftedValve, kind=""):
         return "shut" if back and now != "shut" else super().next_mode(x, back, now)
 
 
-class InertialCheckDisc(CheckDisc, kind=""):
-    """Conversion to table rows of check valves whose disc has inertia."""
-
-    states = ("opening", "speed")
-
-
-class LaggedCheckDisc(CheckDisc, kind=""):
-    """Conversion to table rows of check valves whose disc has a first-order lag, without inertia."""
-
-    states = ("opening",)
-
-
 class CheckValveRows(Device, kind="check-valve"):
     """Conversion to table rows of check valves that are either open or shut.
 
@@ -208,7 +200,7 @@ class CheckValveRows(Device, kind="check-valve"):
             return SlamCurveRows()
         if not part.has_dynamics:
             return self
-        return LaggedCheckDisc() if part.natural_frequency is None else InertialCheckDisc()
+        return CheckDisc().moved_as(part)
 
     def numbers(self, draft, name, part) -> list[float]:
         return [part.cracking_pressure]
@@ -308,18 +300,6 @@ class ReliefDisc(LiftedValve, kind=""):
             start.draft.warnings.append(Notice("start", f"links.{name}", text, "lift", float(x)))
 
 
-class ReliefSwing(ReliefDisc, kind=""):
-    """Conversion to table rows of relief valves with an oscillating disc (mass, spring, damper)."""
-
-    states = ("opening", "speed")
-
-
-class ReliefLag(ReliefDisc, kind=""):
-    """Conversion to table rows of relief valves whose disc has a first-order lag."""
-
-    states = ("opening",)
-
-
 class Relief(ReliefDisc, kind="relief-valve"):
     """Conversion to table rows of relief valves whose lift follows the pressure at once."""
 
@@ -327,7 +307,7 @@ class Relief(ReliefDisc, kind="relief-valve"):
     events = ("is shut", "opens", "is fully open", "leaves full opening")
 
     def of(self, part) -> Device:
-        return self if not part.has_dynamics else ReliefLag() if part.natural_frequency is None else ReliefSwing()
+        return ReliefDisc().moved_as(part) if part.has_dynamics else self
 
     def numbers(self, draft, name, part) -> list[float]:
         return [0.0, part.overpressure, 0.0]

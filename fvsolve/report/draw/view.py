@@ -15,7 +15,7 @@ REMEDY = (
     "run `apt install libegl1 libgl1-mesa-dri`, or `apt install libosmesa6`"
 )
 NO_PYVISTA = (
-    "PyVista draws basins and bodies, and it cannot be imported ({}). Install it: pip install pyvista. "
+    "PyVista draws basins and bodies, and it cannot be imported ({}); install it: pip install pyvista. "
     "The run directory is complete without it; ParaView opens its fields.pvd"
 )
 ANIMATION_FORMATS = "a .gif needs no extra package; .mp4 needs imageio with ffmpeg: pip install imageio imageio-ffmpeg"

@@ -98,7 +98,7 @@ class _ChartStudy:
         self.case, self.queue = case, queue
         if basins_from_files(self.case):
             reason = f"chart refines cells, but the mesh of {listing(basins_from_files(self.case))} is a file"
-            raise FvsolveError(f"{reason}. Try order --refine time, which keeps the cells")
+            raise FvsolveError(f"{reason}; try order --refine time, which keeps the cells")
         self.points, self.progress = points, progress
         self.case_in_cells = load(case, as_cells(delay_lines(case))) if delay_lines(case) else case
         self.default, self.compiling = default_curve(self.case), 0.0
@@ -150,7 +150,7 @@ class _ChartStudy:
         )  # fmt: skip
         if not moving_probes(reference.run, reference):
             reason = "all probes are constant, so errors relative to their ranges do not exist"
-            raise FvsolveError(f"{self.case.name}: {reason}. Try a probe that changes, or a longer run")
+            raise FvsolveError(f"{self.case.name}: {reason}; try a probe that changes, or a longer run")
         return reference
 
     def finest_keys(self) -> dict | None:
@@ -260,14 +260,14 @@ class _ChartStudy:
         if not target >= floor["trajectory"]:
             raise FvsolveError(
                 f"a target of {target:g} is below the floor: the two references ({floor['reference']}; "
-                f"{floor['second']}) disagree by {floor['trajectory']:.2g}. Try a larger target, or more cells "
+                f"{floor['second']}) disagree by {floor['trajectory']:.2g}; try a larger target, or more cells "
                 "if the case has cells"
             )
         best = cheapest_curve(points, target, floor["trajectory"], "seconds")
         if best is None:
             remedy = "more cells" if self.finest else "shorter steps" if self.coarse else "a smaller rtol"
             least = f"{min(good_errors(points)):.2g}"
-            raise FvsolveError(f"no setting reaches an error of {target:g}; the least error is {least}. Try {remedy}")
+            raise FvsolveError(f"no setting reaches an error of {target:g}; the least error is {least}; try {remedy}")
         name, crossing = best
         curve = curves_by_name(points)[name]
         for share in (crossing.share, 0.5 * (1.0 + crossing.share)) if crossing.within else ():
@@ -320,4 +320,4 @@ def _useless_text(case: Case, points: list[Point], floor: dict) -> str:
     elif delay_lines(case):
         remedy = "a larger --step (if delay lines are exact, any step is accurate)"
     return (f"{case.name}: the two references ({floor['reference']}; {floor['second']}) disagree by "
-            f"{floor['trajectory']:.2g}, more than {errors}. Try {remedy}, or an earlier end of the run")  # fmt: skip
+            f"{floor['trajectory']:.2g}, more than {errors}; try {remedy}, or an earlier end of the run")  # fmt: skip

@@ -265,7 +265,7 @@ def chart_settings(
         return _lumped_settings(case, schemes, methods, cells, rtol, step)
     if rtol or step:
         text = f"{case.name} has cells, so its resolution is the number of cells"
-        raise FvsolveError(f"{text}. Use --cells instead of --rtol and --step")
+        raise FvsolveError(f"{text}; use --cells instead of --rtol and --step")
     pairs = scheme_method_pairs(case, schemes, methods, coarse_run.stiff)
     levels = sorted({*(cells or coarse_run.levels)})
     return [cells_setting(case, *pair, level) for pair in pairs for level in levels]
@@ -275,7 +275,7 @@ def _lumped_settings(case: Case, schemes, methods, cells, rtol, step) -> list[Me
     if schemes or cells:
         option = "scheme" if schemes else "cells"
         text = f"{case.name} has no pipe, so the option {option} does not apply"
-        raise FvsolveError(f"{text}. Use rtol or step for its resolution")
+        raise FvsolveError(f"{text}; use rtol or step for its resolution")
     span = case.numerics.end - case.numerics.start
     steps = sorted(step or [span / n for n in STEP_COUNTS], reverse=True)
     settings_of_methods = []
@@ -290,7 +290,7 @@ def _delay_line_settings(case: Case, schemes, methods, cells, rtol, step) -> lis
     if schemes or cells or rtol:
         option = "scheme" if schemes else "cells" if cells else "rtol"
         text = f"{case.name} has only delay lines, so the option {option} does not apply"
-        raise FvsolveError(f"{text}. Use step for their resolution")
+        raise FvsolveError(f"{text}; use step for their resolution")
     travel = max(pipe.length / case.wave_speed(name) for name, pipe in pipes(case).items())
     steps = sorted(step or [float(f"{travel / n:.2g}") for n in TRAVEL_PARTS], reverse=True)
     chosen = dict.fromkeys([*(methods or DELAY_LINE_METHODS), DEFAULT_METHOD])

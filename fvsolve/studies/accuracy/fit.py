@@ -74,7 +74,7 @@ def fit(sizes, errors, floor: float = 0.0) -> Fit:
     if np.any(~np.isfinite(h)) or np.any(h <= 0.0) or np.any(np.diff(h) >= 0.0):
         raise FvsolveError("sizes must be positive and fall from row to row")
     if np.any(e < 0.0):
-        raise FvsolveError("errors must not be negative. Try their absolute values")
+        raise FvsolveError("errors must not be negative; try their absolute values")
     rows = FitRows(h, e, floor)
     if rows.good.size < LEAST_ROWS:
         return rows.no_fit(rows.too_few_reason())
@@ -168,15 +168,15 @@ class FitRows:
         if np.all(p < LEAST_ORDER):
             return f"no order: the errors hardly fall; orders between rows are below {LEAST_ORDER:g}"
         if p[-1] < LEAST_ORDER:
-            return "no order: the errors reach a floor before three rows show one order. Try a coarser first row"
+            return "no order: the errors reach a floor before three rows show one order; try a coarser first row"
         last_orders = ", ".join(f"{x:.2f}" for x in p[-3:])
-        return f"no order: the last orders between rows differ ({last_orders}). Try more levels, or fewer"
+        return f"no order: the last orders between rows differ ({last_orders}); try more levels, or fewer"
 
     def drift_reason(self) -> str:
         """Reason why there is no order if the spread is as large as the order, which may drift to zero or double."""
         last_orders = ", ".join(f"{x:.2f}" for x in pair_orders(self.h[self.good], self.e[self.good])[-3:])
         rows = self.good.size
-        return f"no order: orders between rows still drift ({last_orders}) after {rows} rows. Try {rows + 2} rows"
+        return f"no order: orders between rows still drift ({last_orders}) after {rows} rows; try {rows + 2} rows"
 
 
 def pair_orders(h: np.ndarray, e: np.ndarray) -> np.ndarray:

@@ -284,8 +284,8 @@ class Hierarchy(PlainData):
         text = f"{self.richest.name} itself has an error of about {self.own_error:.2g} from its cells"
         if self.own_error <= self.target:
             return text
-        return (f"{text}, more than the target, so all errors of the table have at least this uncertainty. "
-                "Try `fvsolve order` to see how this error falls with more cells")  # fmt: skip
+        return (f"{text}, more than the target, so all errors of the table have at least this uncertainty; "
+                "try `fvsolve order` to see how this error falls with more cells")  # fmt: skip
 
     @property
     def rules(self) -> list[str]:
@@ -376,7 +376,7 @@ def ladder(
     levels = [_level_of(*names, entry, richest) for names, entry in zip(models, runs, strict=True)]
     if all(entry.error is None for entry in levels):
         reason = "no probe changes, so models have no errors"
-        raise FvsolveError(f"{reason}. Try a probe that changes, or an input that does")
+        raise FvsolveError(f"{reason}; try a probe that changes, or an input that does")
     top = levels[-1] if finer_runs else levels[at]
     accurate = [*within(levels, target, own or 0.0), *(entry for entry in levels if is_sure(entry, target, sure)), top]
     cheapest = min(accurate, key=lambda level: level.seconds)

@@ -86,7 +86,7 @@ def _order_of_pair(case, settings: Mapping, rows: tuple, against, given, points,
         return OrderStudy(case, refinement, against, queue, settings).study(points, progress)
     refuse_basins(case, "order by functions of pipes")
     if delayed := delay_lines(case):
-        raise FvsolveError(f"functions along pipes need cells, but {listing(delayed)} would be delay lines. Set "
+        raise FvsolveError(f"functions along pipes need cells, but {listing(delayed)} would be delay lines; set "
                            'numerics.pipe_model = "finite-volume", and remove `pipe_model` from all pipes')  # fmt: skip
     return ManufacturedStudy(case, refinement, against, *given).study(points, progress)
 
@@ -113,8 +113,8 @@ class ManufacturedStudy(OrderStudy):
             raise FvsolveError("initial, source and exact are functions along pipes, but this case has no pipes")
         if not case.law.linear:
             raise FvsolveError(
-                f'initial, source and exact need the law "linear", but this case has "{case.fluid.law}". '
-                'Set fluid.law = "linear", without cavitation'
+                f'initial, source and exact need the law "linear", but this case has "{case.fluid.law}"; '
+                'set fluid.law = "linear", without cavitation'
             )
         t0 = case.numerics.start
         self.source, self.exact = source and UserFunction("source", source), exact and UserFunction("exact", exact)

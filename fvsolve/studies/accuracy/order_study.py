@@ -352,7 +352,7 @@ class OrderStudy:
         ]  # fmt: skip
         if uncertain and all(uncertain):
             raise FvsolveError(
-                f"the reference is not more accurate than the rows ({words}). Name an exact solution under [exact], "
+                f"the reference is not more accurate than the rows ({words}); name an exact solution under [exact], "
                 'or try against = "richardson", or coarser rows'
             )
 
@@ -466,7 +466,7 @@ def check_three_differences(fitted: Fit, theory: float) -> Fit:
     if fitted.reason or fitted.marks.count("") > LEAST_ROWS or not abs(fitted.order - theory) > tolerance:
         return fitted
     reason = (f"no order: three differences show {fitted.order:.2f}, but {theory:.2g} is expected; they are too few to "
-              "decide if rows are still too coarse. Try more levels, or finer rows")  # fmt: skip
+              "decide if rows are still too coarse; try more levels, or finer rows")  # fmt: skip
     return replace(fitted, order=np.nan, spread=np.nan, constant=np.nan, reason=reason, note="")
 
 
@@ -543,6 +543,6 @@ def row_notes(rows, doubtful: list[str]) -> list[str]:
         names = ", ".join(dict.fromkeys(doubtful))
         notes.append(
             f'errors of rows marked "{UNCERTAIN}" are less than {REFERENCE_MARGIN:g} times the error of the reference '
-            f"({names}), so they are not reliable. Name an exact solution under [exact], or try fewer levels"
+            f"({names}), so they are not reliable; name an exact solution under [exact], or try fewer levels"
         )
     return notes

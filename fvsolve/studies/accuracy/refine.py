@@ -121,18 +121,18 @@ def refinement_plan(
         refinable_counts(case)
     if key is not None and (known[key] == "time") != (refine == "time"):
         way = "time" if known[key] == "time" else "space"
-        raise FvsolveError(f'{key} refines {way}, so refine = "{refine}" is impossible. Leave `refine` out')
+        raise FvsolveError(f'{key} refines {way}, so refine = "{refine}" is impossible; leave `refine` out')
     levels = DEFAULT_LEVELS[refine] if levels is None else levels
     if levels < 2:
         raise FvsolveError(f"levels = {levels} is too few; expected at least 2, and at least 3 for a fitted order")
     if refine == "time" and cells is not None:
-        text = "only steps are refined here. Leave `cells` out, or set the cells of the case"
+        text = "only steps are refined here; leave `cells` out, or set the cells of the case"
         raise FvsolveError(f"cells = {cells}: {text}")
     if refine == "time":
         return time_plan(case, key, levels)
     if delay_lines(case) and (key == "numerics.delay_tolerance" or not cell_counts(case)):
         if cells is not None:
-            raise FvsolveError(f"cells = {cells}: cells of delay lines are only for output. Leave `cells` out")
+            raise FvsolveError(f"cells = {cells}: cells of delay lines are only for output; leave `cells` out")
         return delay_line_plan(case, refine, levels)
     return space_plan(case, refine, key, levels, cells)
 

@@ -178,7 +178,7 @@ def _sampled(h: Callable, shift: float, w: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         value = _value_per_point("H", h(shift + 1j * w), w.shape, complex)
     if not np.all(np.isfinite(value)):
-        raise FvsolveError(f"H is not finite on Re s = {shift:g} 1/s. Use a shift to the right of its poles")
+        raise FvsolveError(f"H is not finite on Re s = {shift:g} 1/s; use a shift to the right of its poles")
     return value
 
 

@@ -478,6 +478,6 @@ def _dense(a) -> np.ndarray:
     """Matrix A as a full array; raises FvsolveError for more than 800 states."""
     if a.shape[0] > MAX_STATES:
         percent = math.floor(100 * MAX_STATES / a.shape[0])
-        raise FvsolveError(f"the case has {a.shape[0]} states; expected {MAX_STATES} or fewer. Reduce the cells of its "
+        raise FvsolveError(f"the case has {a.shape[0]} states; expected {MAX_STATES} or fewer; reduce the cells of its "
                            f"pipes to {percent} %: --set links.NAME.cells=...")  # fmt: skip
     return a if isinstance(a, np.ndarray) else a.toarray()

@@ -143,7 +143,7 @@ def find(names: Iterable[str]) -> dict[str, Path]:
         if path is None:
             unknown.append(f"{name}{did_you_mean(name, known)}")
         elif path.stem in chosen:
-            raise FvsolveError(f"{chosen[path.stem]} and {path} have the same name. Run each in a command of its own")
+            raise FvsolveError(f"{chosen[path.stem]} and {path} have the same name; run each in a command of its own")
         else:
             chosen[path.stem] = path
     if unknown:
