@@ -74,7 +74,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/parts": (19412, 52),
     "tests/reference": (5267, 65),
     "tests/report": (863, 4),
-    "tests/repository": (5685, 31),
+    "tests/repository": (5688, 31),
     "tests/schemes": (569, 2),
     "tests/solve": (2816, 14),
     "tests/step_limits": (1039, 4),
