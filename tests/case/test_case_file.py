@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from case.test_faults import SCENE as PLAIN
 from pytest import approx
 from reference import folders
+from reference.case_texts import DETAILED, two_tanks
 from reference.refusals import refused
 
 from fvsolve.case import Case, FluidSpec, Numerics, Output, load, schema
@@ -23,33 +23,15 @@ from fvsolve.errors import CaseError
 from fvsolve.parts import KINDS, Friction, Wall
 from fvsolve.parts.control import Control
 
-# Example of the design, with a user fluid.
-SCENE = "\n" + PLAIN
-for plain, full in {
-    'title = "A valve shuts"': 'title = "A valve shuts at the end of a 914 m main"',
-    "density = 998": "density = 1000",
-    "viscosity = 1e-3": 'viscosity = "1 cSt"',
-    "vapor_pressure = 2339": 'vapor_pressure = "2339 Pa"',
-    "courant = 0.9": 'scheme = "muscl"\nlimiter = "van-leer"\nmethod = "ssp-rk3"\ncourant = 0.9',
-    'probes = ["gate.pressure"]': """\
-every = "10 ms"
-fields = 50
-probes = ["gate.pressure", "gate.head", "valve.flow", "main.pressure@0.5"]
-
-[expect]
-"max(gate.pressure)" = { value = "1.0751 MPa", rtol = 1e-2 }""",
-}.items():
-    SCENE = SCENE.replace(plain, full)
-
 
 @pytest.fixture
 def scene(tmp_path):
     path = tmp_path / "scene.toml"
-    path.write_text(SCENE)
+    path.write_text(DETAILED)
     return path
 
 
-def test_what_the_design_says_is_what_the_case_holds(scene):
+def test_the_text_of_the_design_is_read_into_the_case(scene):
     case = load(scene)
     assert (case.name, case.path, case.schema) == ("scene", scene, 1)
     assert (case.ambient_pressure, case.gravity) == (101325.0, 9.80665)
@@ -205,7 +187,7 @@ def test_wave_speed_and_cells(tmp_path):
     assert (alike.links["main"].cells, alike.links["stiff"].cells) == (100, 8)  # equal travel times of cells
 
 
-def test_the_resolved_case_says_the_same(tmp_path):
+def test_the_resolved_case_describes_the_same_case(tmp_path):
     case = load(dressed(tmp_path))
     there = tmp_path / "run"
     there.mkdir()
@@ -218,8 +200,8 @@ def test_the_resolved_case_says_the_same(tmp_path):
     assert again != load(case, set={"gravity": 9.8})
 
 
-def test_a_dict_says_what_the_file_says(scene):
-    given = tomllib.loads(SCENE)
+def test_a_dict_and_its_file_give_equal_cases(scene):
+    given = tomllib.loads(DETAILED)
     case = load(given)
     assert case == load(scene) and case.path is None and case.name == "case"
     given["links"]["valve"]["opening"] = {"time": np.array([0.0, 1.0]), "value": np.array([1.0, 0.0])}
@@ -285,15 +267,6 @@ def test_without_pipes_the_error_is_controlled():
     ]  # fmt: skip
 
 
-def two_tanks():
-    return {
-        "fluid": {"name": "user", "density": 1000, "bulk_modulus": 2e9},
-        "nodes": {"a": {"type": "tank", "area": 1, "level": 2}, "b": {"type": "tank", "area": 1, "level": 1}},
-        "links": {"hole": {"type": "orifice", "from": "a", "to": "b", "area": 0.01}},
-        "numerics": {"end": 10},
-    }
-
-
 def test_a_ramp_without_duration_is_a_jump():
     given = two_tanks()
     given["links"]["hole"]["opening"] = {"start": 2, "duration": 0, "value": [1, 0]}
@@ -302,7 +275,7 @@ def test_a_ramp_without_duration_is_a_jump():
     assert load(load(given).table()) == load(given)
 
 
-def test_one_point_is_a_constant():
+def test_a_single_point_is_a_constant():
     given = two_tanks()
     given["links"]["hole"]["opening"] = {"time": [3], "value": [0.5]}
     assert load(given).links["hole"].opening.constant
@@ -323,7 +296,7 @@ def test_every_size_of_a_valve_passes_the_flow_it_names(size, flow):
     assert load(given).links["hole"].flow_area() * np.sqrt(2 * 1e5 / 1000) == approx(flow, rel=1e-12)
 
 
-def test_what_the_schema_refers_to_is_what_it_says_unshared():
+def test_references_of_the_schema_have_unshared_meanings():
     """All references of the schema are defined and expand to the full schema, and its text reads back as the schema."""
     made, defs, unshared = schema(), schema()["$defs"], full_schema()
 
@@ -358,7 +331,7 @@ def test_a_parts_key_is_documented_with_its_unit():
     assert made["anyOf"][-1] == {"required": ["validation"]}
 
 
-def test_the_schema_wants_links_but_beside_a_basin_or_a_body():
+def test_the_schema_requires_links_except_with_a_basin_or_a_body():
     """`load` requires links on this condition, so editors report no fault in the shipped cases."""
     made = schema()
     assert made["if"]["required"] == ["nodes"] and made["if"]["not"] == {"required": ["controls"]}
@@ -380,7 +353,7 @@ def test_the_page_of_the_case_file_names_every_key_and_its_example_reads():
     keys = {key for model in models for key in model.keys()} | set(KINDS["nodes"]) | set(KINDS["links"])
     assert [key for key in sorted(keys) if not re.search(rf"\b{re.escape(key)}\b", page)] == []
     example = tomllib.loads(re.search(r"```toml\n(.*?)```", page, re.DOTALL)[1])
-    assert load({**example, "fluid": tomllib.loads(SCENE)["fluid"]}).links["main"].cells == 100
+    assert load({**example, "fluid": tomllib.loads(DETAILED)["fluid"]}).links["main"].cells == 100
 
 
 def headings(page: str) -> dict[str, str]:

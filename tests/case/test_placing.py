@@ -2,30 +2,13 @@
 
 import numpy as np
 import pytest
+from reference.placed_parts import CELLS, GATE, HILL, HOLE, LENGTH, SAFE, VENT, line, main, placed
 from reference.refusals import refused
-from reference.scenes import area, junction, lake, pipe, reservoir, scene, step, valve
+from reference.scenes import junction, valve
 
 import fvsolve
 from fvsolve.case.changes import changes
 from fvsolve.studies import sweep
-
-DIAMETER, SPEED, CELLS = 0.4, 1000.0, 60
-ROUGH = {"model": "quasi-steady", "roughness": 2e-4}
-HILL = {"chainage": [1000.0, 1750.0, 2200.0, 2300.0, 4000.0], "elevation": [30.0, 42.0, 65.0, 31.0, 20.0]}
-LENGTH = 3000.0
-
-
-def line(nodes: dict, links: dict, **more) -> dict:
-    """Case of a lake, given nodes and links up to a gate, and a valve that closes to 20 %."""
-    nodes = {"lake": lake(110.0, elevation=30.0), "gate": junction(elevation=20.0),
-             "sea": reservoir(2e5, elevation=20.0)} | nodes  # fmt: skip
-    links = links | {"tap": valve("gate", "sea", 0.02 * area(DIAMETER), step(0.5, 1.0, 0.2))}
-    return scene(nodes, links, 6.0, {"scheme": "weno5", "method": "rk4", "step": 0.02},
-                 ["gate.pressure", "tap.flow"], every=0.1, **more)  # fmt: skip
-
-
-def main(**more) -> dict:
-    return pipe("lake", "gate", LENGTH, DIAMETER, SPEED, CELLS, friction=ROUGH, profile=HILL, minor_loss=3.0) | more
 
 
 def part(start: str, end: str, low: float, high: float) -> dict:
@@ -37,13 +20,7 @@ def part(start: str, end: str, low: float, high: float) -> dict:
                 profile={"chainage": [low, *inner, high], "elevation": z}) | {"from": start, "to": end}  # fmt: skip
 
 
-VENT = {"type": "air-valve", "inlet": 0.05, "outlet": 0.05}
-HOLE = {"type": "leak", "coefficient": 2e-6}
-GATE = {"type": "valve", "loss_coefficient": 5.0, "diameter": DIAMETER}
-SAFE = {"type": "relief-valve", "to": "sea", "set_pressure": 12e5, "Kv": 100.0, "overpressure": 1e5}
-
-
-def by_hand() -> dict:
+def divided_pipe() -> dict:
     cuts = [1000.0, 1500.0, 2200.0, 2950.0, 3500.0, 4000.0]
     names = [("lake", "a"), ("b", "top"), ("top", "c"), ("c", "d"), ("d", "gate")]
     pipes = {f"p{k}": part(*names[k], cuts[k], cuts[k + 1]) for k in range(5)}
@@ -55,24 +32,8 @@ def by_hand() -> dict:
     return line(nodes, links)
 
 
-def placed(turned: bool = False, bends: list | None = None, **more) -> dict:
-    at = {"half": 1500.0, "top": "2.2 km", "hole": "2950 m", "safe": 3500}
-    one = main() | ({} if bends is None else {"bends": bends})
-    if turned:
-        mirrored = {
-            "chainage": (5000.0 - np.array(HILL["chainage"][::-1])).tolist(),
-            "elevation": HILL["elevation"][::-1],
-        }
-        at = {"half": 3500.0, "top": 2800.0, "hole": 2050.0, "safe": 1500.0}
-        one |= {"from": "gate", "to": "lake", "profile": mirrored}
-    said = {name: {"on": "main", "at": at[name]} for name in at}
-    nodes = {"top": VENT | said["top"]}
-    links = {"safe": SAFE | said["safe"], "hole": HOLE | said["hole"], "main": one, "half": GATE | said["half"]}
-    return line(nodes, links, **more)
-
-
-def test_it_is_the_pipe_that_is_cut_by_hand() -> None:
-    one, other = fvsolve.run(placed()), fvsolve.run(by_hand())
+def test_the_pipe_equals_a_pipe_divided_manually() -> None:
+    one, other = fvsolve.run(placed()), fvsolve.run(divided_pipe())
     for probe in one.probes:
         assert np.allclose(one[probe], other[probe], rtol=1e-10), probe
     assert [leg for leg in one.routes] == ["main"]
@@ -202,7 +163,7 @@ def test_probes_count_along_the_whole_pipe() -> None:
         (("main", "friction", {"model": "steady"}), "links.main.friction"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_named_once(change, told: str) -> None:
+def test_each_fault_is_named_once(change, told: str) -> None:
     case = placed()
     name, key, value = change
     case["links"][name][key] = value
@@ -213,13 +174,13 @@ def test_what_is_wrong_is_named_once(change, told: str) -> None:
     assert len(error.faults) == 1
 
 
-def test_one_of_two_nodes_at_one_place_is_left_out() -> None:
+def test_two_nodes_at_a_place_become_a_single_node() -> None:
     nodes = {name: {"type": "junction", "on": "main", "at": 2500.0} for name in ("spot", "stop")}
     refused(line(nodes, {"main": main()}), "spot has the same place; leave out spot or stop, or change `at`")
 
 
 @pytest.mark.parametrize("cells", [7, 8])
-def test_what_lies_in_the_middle_of_a_cell_goes_to_the_same_face_from_either_end(cells: int) -> None:
+def test_a_part_in_the_middle_of_a_cell_goes_to_the_same_face_from_either_end(cells: int) -> None:
     said = {key: one for key, one in main(cells=cells).items() if key != "profile"}
     for k in range(cells):
         at = (k + 0.5) * LENGTH / cells
@@ -254,7 +215,7 @@ def test_names_are_given_once_and_pieces_are_there(change, told: str) -> None:
     assert told in str(refused(case))
 
 
-def test_what_cannot_stand_in_a_pipe_is_named() -> None:
+def test_parts_that_cannot_be_on_a_pipe_are_named() -> None:
     case = line({"m": {"type": "mass", "mass": 1.0, "on": "main", "at": 2000.0}}, {"main": main()})
     refused(case, "a mass cannot be placed on a pipe")
     case = line({}, {"main": main(), "second": main() | {"on": "main", "at": 2000.0}})

@@ -30,7 +30,7 @@ def test_the_feature_of_the_page_runs_and_no_file_of_the_package_changes(home):
     assert OUTPUT in python(home, "-m", *COMMAND.split()).stdout.splitlines()
 
 
-def test_a_feature_of_others_works_beside_delay_lines_and_in_a_resumed_run(home):
+def test_a_feature_of_another_package_works_with_delay_lines_and_in_a_resumed_run(home):
     """A run in two parts has the counts of a run without a pause, but for records of the state in between."""
     text = """
 import fvsolve
@@ -51,7 +51,7 @@ print((highest[0] <= highest[1]).all(), abs(highest[1] - highest[2]).max() < 1e-
 
 def test_built_in_features_have_slots_of_their_own():
     headers = list(features.headers())
-    assert len({header.slot for header in headers}) == len(headers) == len(features.FEATURES.own()) == 3
+    assert len({header.slot for header in headers}) == len(headers) == len(features.FEATURES.own()) == 4
     assert all(header.declaration.load().slot == header.slot for header in headers)
     assert all(header.declaration.load().wakes == header.wakes for header in headers)
 

@@ -6,10 +6,10 @@ Jumps that arrive within a step at a junction with a valve or a rigid column are
 import numpy as np
 import pytest
 from reference.delays import turned
+from reference.lines_with_jumps import EXACT, SPEED, line
 from reference.scenes import (
     AMBIENT,
     GRAVITY,
-    NO_FRICTION,
     RHO,
     WATER,
     area,
@@ -33,16 +33,9 @@ from fvsolve.features.delay_lines.kernels.history_update import earliest_arrival
 from fvsolve.features.delay_lines.kernels.line_rates import smooth_wave_linear
 from fvsolve.studies.outcome import RowSink
 
-SPEED = 1000.0
 METHODS = {
     "euler": {"courant": 0.9}, "rk4": {"step": 0.0137}, "gauss-4": {"step": 0.05}, "rodas-5p": {"rtol": 1e-4},
 }  # fmt: skip
-EXACT = {"pipe_model": "finite-volume", "scheme": "upwind", "method": "euler", "courant": 1.0}
-
-
-def line(one: str, other: str, length: float, bore: float = 0.3, **keys) -> dict:
-    return {"type": "pipe", "from": one, "to": other, "length": length, "diameter": bore, "wave_speed": SPEED,
-            "friction": NO_FRICTION, "cells": 10, **keys}  # fmt: skip
 
 
 def in_cells(case: dict, size: float) -> dict:
@@ -102,7 +95,7 @@ DEVICES = {
 }  # fmt: skip
 
 
-def beside(device: str, numerics: dict, before: float, after: float) -> dict:
+def demand_near_device(device: str, numerics: dict, before: float, after: float) -> dict:
     """Case of a demand that changes at once, 100 m from an instantaneous device."""
     link, head = DEVICES[device]
     nodes = {"side": lake(head), "r": lake(50.0), "n": junction(), "m": junction(step(0.5, before, after))}
@@ -115,13 +108,13 @@ def beside(device: str, numerics: dict, before: float, after: float) -> dict:
 @pytest.mark.in_turn
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("method", METHODS)
-def test_a_device_acts_before_what_a_jump_brings_it_is_noted(device, method):
+def test_a_device_that_acts_before_the_arrival_of_a_jump_is_noted(device, method):
     """Devices switch at the arrival of a jump, with the events and extremes of cells of 2 m.
 
     Cells change the jump to a ramp, so a disc bursts there at its burst pressure; with lines it bursts at once.
     """
     demand = (0.04, 0.0) if device in ("relief-valve", "rupture-disc") else (0.0, 0.04)
-    case = beside(device, {"method": method, **METHODS[method]}, *demand)
+    case = demand_near_device(device, {"method": method, **METHODS[method]}, *demand)
     found, truth = fvsolve.run(case), fvsolve.run(in_cells(case, 2.0))
     if device == "rupture-disc":
         assert found.extremes["n.head"].maximum == pytest.approx(50.0)
@@ -135,7 +128,7 @@ def test_a_device_acts_before_what_a_jump_brings_it_is_noted(device, method):
 
 def test_a_device_behind_a_short_line():
     """A jump reaches a check valve through a line shorter than a step, with the extremes of characteristics."""
-    case = beside("check-valve", {"method": "euler", "step": 0.013}, 0.0, 0.04)
+    case = demand_near_device("check-valve", {"method": "euler", "step": 0.013}, 0.0, 0.04)
     case["nodes"]["q"] = junction()
     case["links"]["p"]["to"] = "q"
     case["links"]["stub"] = line("q", "m", 4.0)
@@ -208,7 +201,7 @@ def test_a_probe_reads_the_same_from_both_ends_of_a_line(share):
         assert one.envelope["main"][key] == pytest.approx(other.envelope["main"][key][::-1], abs=1e-4)
 
 
-def test_pulses_that_meet_between_two_places_of_a_line():
+def test_pulses_that_cross_between_two_places_of_a_line():
     """The envelope contains the sum of two pulses that cross inside a line with two stored places."""
 
     def stop(t):
@@ -275,7 +268,7 @@ def test_an_air_valve_lets_air_in_as_a_jump_arrives(method):
     same_extremes(found, truth, 2e-2)
 
 
-def test_auto_takes_cells_where_a_force_is_asked_for():
+def test_auto_takes_cells_where_a_force_is_requested():
     case = stub(8.0, {"method": "euler", "courant": 0.9}, 1.0)
     case["numerics"] |= {"pipe_model": "auto", "scheme": "muscl", "method": "ssp-rk3"}
     case["output"]["probes"] = ["main.force"]
@@ -285,7 +278,7 @@ def test_auto_takes_cells_where_a_force_is_asked_for():
 
 
 @pytest.mark.parametrize(("length", "ramp", "step"), [(9.0, 0.02, 0.01), (901.3, 0.005, 0.002)])
-def test_a_ramp_too_quick_for_the_steps_is_told(length, ramp, step):
+def test_a_ramp_too_quick_for_the_steps_is_reported(length, ramp, step):
     """A ramp too fast for the steps gives a notice of kind `lines`, and `auto` selects cells."""
     case = stub(2.0, {"method": "euler", "step": step}, 2.5)
     del case["links"]["short"], case["nodes"]["j"]
@@ -375,7 +368,7 @@ BOUNDED = [(stub(130.0, METHODS["euler"]), 100), (stub(130.0, METHODS["rodas-5p"
 
 
 @pytest.mark.parametrize("case, jumps_seen", BOUNDED)
-def test_bounds_by_which_cells_are_left_out_contain_all_waves(case, jumps_seen):
+def test_bounds_by_the_selection_of_cells_contain_all_waves(case, jumps_seen):
     """The bounds of the entries around a time contain each wave at any moment of it, beside its jumps too.
 
     In the short cases many of these times are before the first entry.
@@ -387,17 +380,17 @@ def test_bounds_by_which_cells_are_left_out_contain_all_waves(case, jumps_seen):
     places, clock = history.offsets_of(past), history.reading_data(past, int(past[history.COUNT]) - 1)
     wrap = int(past[history.CAPACITY]) - 1
     longest = max(np.diff([history.time_of(past, k) for k in range(history.PROFILE_ENTRIES, int(past[history.COUNT]))]))
-    for line, wave in ((lines_of(model)[k].copy(), wave) for k in range(2) for wave in range(2)):
-        bounds = history.bounds_of(places, line, 0)
-        wave_bounds.write_bounds(past, places, clock, line, 0, wave)  # anew, because those of the last entry are there
-        (ring, mask), head = history.ring_of(places, line, 0), history.jump_head(places, int(line["stretch"]), wave)
+    for row, wave in ((lines_of(model)[k].copy(), wave) for k in range(2) for wave in range(2)):
+        bounds = history.bounds_of(places, row, 0)
+        wave_bounds.write_bounds(past, places, clock, row, 0, wave)  # anew, because those of the last entry are there
+        (ring, mask), head = history.ring_of(places, row, 0), history.jump_head(places, int(row["stretch"]), wave)
 
         def sent_wave(t, ring=ring, mask=mask, head=head, wave=wave):
             jumps = history.jumps_until(past, places, head, t + clock[4])
             return smooth_wave_linear(past, clock, ring, mask, wave, t) + jumps
 
         for _ in range(50):
-            begin, end = np.sort(clock[1] - line["tau"] * random.uniform(0.0, 1.0, 2))
+            begin, end = np.sort(clock[1] - row["tau"] * random.uniform(0.0, 1.0, 2))
             listed = range(int(past[head + history.JUMP_COUNT]))
             first = history.first_after(past, places, head, begin - clock[4])
             assert history.count_until(past, places, head, first // 2, begin - clock[4]) == first

@@ -5,6 +5,7 @@ import functools
 import numpy as np
 import pytest
 from reference import folders
+from reference.jacobians import random_state, rates, stray
 from reference.meshes import triangles, write
 from reference.scenes import NO_FRICTION, SHARP, chamber, junction, lake, pipe, scene, tank, valve
 from scipy.sparse import csc_array
@@ -24,35 +25,8 @@ SCHEMES = ["upwind", "linear-upwind", "fromm", "central", "upwind3", "upwind5", 
 TIMES = (0.0, 0.7, 2.3, 3.5)  # [s]; valves of random networks are open, half shut, nearly shut, shut
 
 
-def rates(model, t: float, y: np.ndarray) -> np.ndarray:
-    """Rates of all states and of the mass ledger : float64[n + ledger]."""
-    dydt, out = model.evaluate(t, y)
-    at = model.layout["supply"]
-    return np.concatenate((dydt, out[at : at + model.ledgers]))
-
-
 def random_model(seed: int, scheme: str, law: str):
     return fvsolve.build(fvsolve.load(random_network(seed, scheme, law)))
-
-
-def random_state(model, rng) -> np.ndarray:
-    return model.scale * rng.normal(scale=rng.choice([0.0, 0.02, 0.2]), size=model.y_size)
-
-
-def stray(model, t: float, y: np.ndarray) -> float:
-    """Greatest change of a rate by a state outside the pattern, over the greatest change by a state inside it."""
-    states = np.arange(model.y_size)
-    if states.size > 2000:  # sample of the states of a basin
-        states = np.random.default_rng(states.size).choice(states, 100, replace=False)
-    pattern, base = jacobian_pattern(model)[:, states].toarray(), rates(model, t, y)
-    change = np.empty(pattern.shape)
-    for k, j in enumerate(states):
-        moved = y.copy()
-        moved[j] += 1e-2 * model.scale[j]
-        change[:, k] = np.abs(rates(model, t, moved) - base)
-    known = np.max(change * pattern, axis=1)
-    rounding = max(1e-10 * np.max(known), 1e-300)  # for rates that do not change
-    return float(np.max(np.max(change * ~pattern, axis=1) / np.maximum(known, rounding)))
 
 
 @pytest.mark.in_turn
@@ -72,7 +46,7 @@ def test_shipped_cases_keep_to_their_pattern(path):
 
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
-def test_what_is_carried_keeps_to_its_pattern_beside_sides_and_corners_too(scheme):
+def test_advected_scalars_stay_within_their_pattern_at_sides_and_corners_too(scheme):
     settings = {"nodes.sheet.cells": [14, 12], "numerics.scheme": scheme}
     model, rng = fvsolve.build(fvsolve.load(CASES[0].parent / "swirl.toml", settings)), np.random.default_rng(0)
     assert stray(model, 0.2, model.scale * rng.normal(size=model.y_size)) < 1e-7
@@ -102,7 +76,7 @@ def test_scalars_that_decay_spread_and_pass_the_boundary_keep_to_their_pattern(p
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("mesh", ["grid", "holes", "triangles"])
-def test_a_lone_basin_keeps_to_its_pattern_with_scalars_and_without(tmp_path, mesh, scheme):
+def test_an_isolated_basin_stays_within_its_pattern_with_and_without_scalars(tmp_path, mesh, scheme):
     shape = {"size": [9.0, 6.0], "cells": [18, 12]}
     if mesh == "holes":
         shape["holes"] = [[3.0, 2.0, 4.5, 4.0]]
@@ -183,7 +157,7 @@ def test_differences_by_color_are_those_state_by_state(law, scheme):
 @pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["upwind", "upwind5", "muscl"])
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_what_slopes_store_is_what_they_supply(law, scheme):
+def test_storage_in_slopes_is_their_supply(law, scheme):
     """Slopes of the rates, weighted with the mass per state, add up to the slopes of the supplies."""
     for seed in (0, 2):  # with friction and without
         model, rng = random_model(seed, scheme, law), np.random.default_rng(seed)

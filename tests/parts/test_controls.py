@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from reference import governor
 from reference.folders import CASES
-from reference.scenes import GRAVITY, WATER, lake, pipe, reservoir, scene, tank, valve
+from reference.level_control import METHODS, SECTION, SUPPLY, final, orifice_flow, pi, tower
+from reference.resumed_runs import killed_and_resumed, same_files
+from reference.scenes import GRAVITY, WATER, lake, pipe, reservoir, scene, valve
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.core.assembly.schedule_tables import period_of
@@ -24,37 +24,9 @@ from fvsolve.features.controls.feature import blocks_of
 from fvsolve.parts.formula_program import Program
 from fvsolve.studies.linearise import linearise
 
-METHODS = ("dormand-prince", "radau-iia-5", "rodas-5p", "auto")
 CLOSE = 1e-9
-SECTION, ORIFICE, SUPPLY = 2.0, 20e-4, 20.0
 REAL = {"name": "Water", "temperature": 293.15, "law": "table"}
 LAWS = [WATER, {**WATER, "law": "log"}, REAL]
-
-
-def orifice_flow(opening, head):
-    """Flow through a valve of `tower` [m3/s]."""
-    return opening * ORIFICE * np.sign(head) * np.sqrt(2.0 * GRAVITY * abs(head))
-
-
-def tower(inlet, outlet, level=4.0, end=300.0, numerics=None, **top):
-    """Case of a tank between a lake and the air, with the openings of both valves."""
-    nodes = {"source": lake(SUPPLY, elevation=0.0), "tower": tank(SECTION, level, elevation=0.0),
-             "town": lake(0.0, elevation=0.0)}  # fmt: skip
-    links = {"inlet": valve("source", "tower", ORIFICE, inlet), "outlet": valve("tower", "town", ORIFICE, outlet)}
-    probes = ["tower.level", *(f"controls.{name}.output" for name in top.get("controls", {}))]
-    return scene(nodes, links, end, numerics or {"rtol": 1e-10}, probes, end / 100, **top)
-
-
-def pi(setpoint, gain=0.8, integral=120.0, **more):
-    more |= {} if integral is None else {"integral_time": integral}
-    return {"type": "pi", "input": "tower.level", "setpoint": setpoint, "gain": gain, **more}
-
-
-def final(case, method, **numerics):
-    """Values of the probes at the end of a case, by a method with a tolerance of 1e-10."""
-    model = fvsolve.build(fvsolve.load(case, {"numerics.method": method, "numerics.rtol": 1e-10, **numerics}))
-    state = fvsolve.advance(model, fvsolve.initial_state(model), model.case.numerics.end)
-    return model.observe(state)
 
 
 def solved(rates, y, times):
@@ -66,7 +38,7 @@ def solved(rates, y, times):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_level_held_by_pi_is_that_of_hand_written_equations(method):
+def test_a_level_controlled_by_pi_follows_the_explicit_equations(method):
     outlet = {"time": [10.0, 11.0], "value": [0.5, 0.7]}
 
     def rates(t, y, k):
@@ -81,7 +53,7 @@ def test_a_level_held_by_pi_is_that_of_hand_written_equations(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_pid_with_limits_and_tracking_is_that_of_hand_written_equations(method):
+def test_pid_with_limits_and_tracking_follows_the_explicit_equations(method):
     gain, ti, td, n, b, c, tt = 1.5, 60.0, 8.0, 6.0, 0.7, 0.3, 25.0
     steps = {"time": [0.0, 20.0, 120.0], "value": [4.0, 4.6, 4.2], "kind": "step"}
     control = pi(steps, gain, ti, derivative_time=td, derivative_filter=n, setpoint_weight=b, derivative_weight=c,
@@ -141,7 +113,7 @@ def lagged() -> list[float]:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_formula_of_level_and_lagged_level_is_that_of_hand_written_equations(method):
+def test_a_formula_of_level_and_lagged_level_follows_the_explicit_equations(method):
     formula = "min(0.6, max(0.1, 0.25 + 1.5*(4 - h) + 0.2*e)) + 0.02*sin(t/7)*where(t < 50, 1, 0)"
     controls = {
         "act": {"type": "function", "inputs": {"h": "tower.level", "e": "controls.lag"}, "formula": formula},
@@ -213,7 +185,7 @@ def moving_case(law):
 @pytest.mark.in_turn
 @pytest.mark.parametrize("law", LAWS, ids=["linear", "log", "table"])
 @pytest.mark.parametrize("method", ["ssp-rk3", *METHODS])
-def test_a_loop_at_rest_does_not_move_by_one_bit(method, law):
+def test_a_loop_at_rest_does_not_change_any_bit(method, law):
     case = fvsolve.load(moving_case(law), {"numerics.method": method})
     case = fvsolve.load(case, {"controls.back.formula": "1.2 + 0*t", "output.every": 0.1})
     assert fvsolve.build(case).steady["moving"] == []
@@ -348,7 +320,7 @@ def test_explicit_and_implicit_methods_agree_on_a_pump_a_pipe_and_a_filter_under
 
 
 @pytest.mark.parametrize("law", LAWS, ids=["linear", "log", "table"])
-def test_the_pattern_of_the_jacobian_contains_what_blocks_read_and_drive(law):
+def test_the_pattern_of_the_jacobian_contains_inputs_and_targets_of_blocks(law):
     for case in (moving_case(law), tower({"control": "hold"}, 0.5, controls={"hold": pi(4.0, filter=3.0)})):
         model = fvsolve.build(fvsolve.load(case))
         pattern = jacobian_pattern(model).toarray()[: model.y_size].astype(bool)

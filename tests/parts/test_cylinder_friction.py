@@ -5,11 +5,10 @@ from math import exp
 
 import numpy as np
 import pytest
-from model.test_sparsity import stray
 from reference.cylinders import AMBIENT, BETA, RHO, Jack
+from reference.jacobians import stray
+from reference.resumed_runs import killed_and_resumed, same_files
 from scipy.integrate import solve_ivp
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.errors import CaseError
@@ -169,7 +168,7 @@ def test_restated_friction_moves_alike(what, case):
     assert [t for t, _ in events_of(other)] == pytest.approx([t for t, _ in events_of(one)], abs=END * EXACT)
 
 
-def test_a_cylinder_whose_case_moves_has_the_same_friction():
+def test_a_cylinder_with_a_moving_case_has_the_same_friction():
     """Rod on the frame, case on the mass: it moves backward, and tears off backward."""
     nodes = fed()["nodes"]
     nodes["ground"]["initial_position"] = 2.0 * JACK.x

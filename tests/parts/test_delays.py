@@ -4,12 +4,12 @@ from math import factorial, pi
 
 import numpy as np
 import pytest
-from parts.test_controls import METHODS, SECTION, final, orifice_flow, tower
-from parts.test_controls import pi as pi_control
-from parts.test_samples import sampled_plant, two_lags, value_at
+from reference.delay_blocks import TAU, blocks, delayed_loop
+from reference.level_control import METHODS, SECTION, final, orifice_flow, tower
+from reference.level_control import pi as pi_control
+from reference.resumed_runs import killed_and_resumed, same_files
+from reference.sampled_control import sampled_plant, two_lags, value_at
 from scipy.integrate import solve_ivp
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.errors import CaseError, FvsolveError
@@ -17,24 +17,6 @@ from fvsolve.studies import stability
 from fvsolve.studies.linearise import linearise
 
 EXACT = 1e-9
-TAU = 0.7
-
-
-def delayed_loop(gain=1.0, tau=TAU, end=5.0, **numerics):
-    """Case of the integrator x' = -gain x(t - tau), x = 1 up to the start."""
-    controls = {
-        "plant": {"type": "transfer-function", "input": "controls.gain", "numerator": [1.0], "denominator": [1.0, 0.0],
-                  "initial": 1.0},
-        "gain": {"type": "function", "inputs": {"x": "controls.late"}, "formula": f"-{gain!r}*x"},
-        "late": {"type": "delay", "input": "controls.plant", "delay": tau, "initial": 1.0},
-    }  # fmt: skip
-    return blocks(controls, end, **numerics)
-
-
-def blocks(controls, end, **numerics):
-    probes = [f"controls.{name}.output" for name in controls]
-    return {"schema": 1, "controls": controls, "numerics": {"end": end, **(numerics or {"rtol": 1e-10})},
-            "output": {"every": end / 50, "probes": probes}}  # fmt: skip
 
 
 def by_steps(t, gain=1.0, tau=TAU):
@@ -52,7 +34,7 @@ def test_an_integrator_behind_a_delay_is_the_polynomials_of_the_method_of_steps(
 
 
 @pytest.mark.parametrize("method", ["dormand-prince", "radau-iia-5", "rodas-5p"])
-def test_the_loop_swings_from_one_percent_above_its_limit_on(method):
+def test_the_loop_grows_from_1_percent_above_its_limit(method):
     """K = pi / (2 tau), by the roots of s + K exp(-s tau)."""
     for factor, grows in ((0.99, False), (1.01, True)):
         run = fvsolve.run(delayed_loop(factor * pi / (2 * TAU), end=100.0, method=method, rtol=1e-8))
@@ -150,7 +132,7 @@ def test_a_delay_that_acts_at_samples_holds_the_input_of_a_delay_before_each():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_two_delays_in_series_are_one_of_their_sum_in_any_order_of_blocks(method):
+def test_two_delays_in_series_equal_a_delay_of_their_sum_in_any_order_of_blocks(method):
     whole = delayed_loop(2.0)
     controls = whole["controls"]
     halves = controls | {"half": {"type": "delay", "input": "controls.plant", "delay": 0.3, "initial": 1.0},
@@ -211,7 +193,7 @@ def test_a_killed_and_resumed_run_with_delays_is_the_unbroken_run(tmp_path):
     same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 1100.0))
 
 
-def test_what_needs_all_inputs_in_the_state_is_refused():
+def test_features_that_need_all_inputs_in_the_state_are_refused():
     model = fvsolve.build(fvsolve.load(delayed_loop()))
     with pytest.raises(FvsolveError, match="control of type delay"):
         model.rhs(0.0, model.start)

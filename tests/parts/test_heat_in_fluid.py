@@ -5,31 +5,19 @@ import math
 
 import numpy as np
 import pytest
-from model.test_sparsity import random_state, stray
 from pytest import approx
+from reference.heated_fluid import CP, METHODS, OIL, ZERO, heated
+from reference.jacobians import random_state, stray
 from reference.refusals import refused
-from reference.scenes import AMBIENT, GRAVITY, RHO, area, chamber, junction, pipe, reservoir, scene, tank, valve
+from reference.scenes import AMBIENT, GRAVITY, RHO, area, chamber, junction, pipe, reservoir, tank, valve
 from scipy.linalg import expm
 
 import fvsolve
 from fvsolve.core.fluid import specific_heat
 from fvsolve.studies.energy_balance import energy
 
-CP, ZERO = 1900.0, 273.15
 LAWS = ["linear", "log", "table", "mixture"]
-METHODS = [{"method": "rk4", "step": 4.0}, {"method": "dormand-prince", "rtol": 1e-10},
-           {"method": "radau-iia-5", "rtol": 1e-10}, {"method": "rodas-5p", "rtol": 1e-10},
-           {"method": "auto", "rtol": 1e-10}]  # fmt: skip
-WARM = {"heat": True, "specific_heat": "1.9 kJ/kg/K", "unit": "degC", "initial": 40.0}
-OIL = {"name": "user", "density": RHO, "bulk_modulus": 1.6e9, "viscosity": "46 cSt"}
 VG46 = [["40 degC", "46 cSt"], ["100 degC", "6.76 cSt"]]
-
-
-def heated(nodes, links, end, heat_from=(), numerics=None, probes=(), fluid=None, **scalar) -> dict:
-    """Case in which the parts `heat_from` heat the fluid; other arguments as for `scene`."""
-    warm = {**WARM, "heat_from": heat_from if heat_from == "all" else list(heat_from), **scalar}
-    return scene(nodes, links, end, numerics or METHODS[-1], probes, end / 40, scalars={"temperature": warm},
-                 fluid=fluid or OIL)  # fmt: skip
 
 
 def unit(links=None, nodes=None, **more) -> dict:
@@ -418,7 +406,7 @@ def test_the_energy_of_friction_follows_the_viscosity():
     assert fvsolve.run(case).ledger["temperature"]["heat"]["a"] != book["heat"]["a"]
 
 
-def test_steady_friction_keeps_the_viscosity_of_the_start_and_says_so():
+def test_steady_friction_retains_the_viscosity_of_the_start_with_a_notice():
     case = hammer(friction={"model": "steady", "roughness": 1e-5})
     case["fluid"]["viscosity"] = {"law": "astm-d341", "points": VG46}
     notes = [notice.text for notice in fvsolve.build(fvsolve.load(case)).warnings]
@@ -494,7 +482,7 @@ def test_all_losses_of_a_displacement_machine_heat_the_fluid(kind, drive):
 
 
 @pytest.mark.parametrize("drive", ["speed", "inertia"])
-def test_the_pattern_of_the_jacobian_has_what_heats_by_a_machine(drive):
+def test_the_pattern_of_the_jacobian_has_the_heat_of_a_machine(drive):
     model, rng = fvsolve.build(fvsolve.load(circuit("motor", drive))), np.random.default_rng(1)
     assert stray(model, 0.0, model.scale * rng.normal(scale=0.1, size=model.y_size)) < 1e-7
 
@@ -581,7 +569,7 @@ FAULTS = [
 @pytest.mark.parametrize(
     "keys, value, said", FAULTS, ids=[f"{'.'.join(keys)}-{k}" for k, (keys, *_) in enumerate(FAULTS)]
 )
-def test_what_cannot_be_is_refused(keys, value, said):
+def test_impossible_settings_are_refused(keys, value, said):
     nodes = {"air": {"type": "ambient", "temperature": 290.0}, "lake": reservoir(AMBIENT)}
     links = {"cooler": {"type": "heat-exchanger", "from": "high", "to": "air", "conductance": 5.0},
              "leak": valve("sump", "lake", 1e-6)}  # fmt: skip
@@ -606,7 +594,7 @@ def test_a_temperature_that_nothing_heats_is_noted():
     assert not any("heats or cools" in text for text in notes)
 
 
-def test_all_faults_are_said_at_once():
+def test_all_faults_are_reported_at_once():
     case = unit()
     case["scalars"]["temperature"] |= {"heat_from": ["pomp", "throtle"]}
     case["links"]["cooler"] = {"type": "heat-exchanger", "from": "sump", "to": "nowhere", "effectiveness": 2.0}

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from model.test_sparsity import stray
-from parts.test_controls import METHODS
+from reference.jacobians import stray
+from reference.level_control import METHODS
+from reference.quasi_steady import FACTOR, HAZEN, loss_of, pipe
+from reference.resumed_runs import killed_and_resumed, same_files
 from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, junction, lake, reservoir, scene, step, tank, valve
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, root
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.core.fluid import LAWS
@@ -19,13 +19,6 @@ from fvsolve.studies import energy
 
 CLOSE = 1e-9
 EXACT = {"rtol": 1e-12}
-FACTOR = {"model": "steady", "factor": 0.02}
-HAZEN = {"model": "hazen-williams", "coefficient": 120.0}
-
-
-def pipe(start, end, length=100.0, diameter=0.05, friction=FACTOR, **more):
-    return {"type": "pipe", "from": start, "to": end, "length": length, "diameter": diameter, "friction": friction,
-            "pipe_model": "quasi-steady", **more}  # fmt: skip
 
 
 def two_tanks(friction=FACTOR, end=600.0, numerics=EXACT, probes=(), **more):
@@ -45,30 +38,6 @@ def test_tanks_equalise_as_in_the_closed_form(method):
     speed = bore * math.sqrt(2.0 * GRAVITY / (0.02 * 100.0 / 0.05 + 3.0)) * (1.0 / 2.0 + 1.0 / 3.0)
     heads = 3.0 + run["upper.level"] - run["lower.level"]
     assert run.ok and heads == pytest.approx((math.sqrt(7.0) - 0.5 * speed * run.t) ** 2, abs=CLOSE)
-
-
-def colebrook(reynolds, roughness):
-    def residual(x):
-        return x + 2.0 * math.log10(roughness / 3.7 + 2.51 * x / reynolds)
-
-    return brentq(residual, 1.0, 50.0, xtol=1e-14, rtol=1e-14) ** -2
-
-
-def swamee_jain(reynolds, roughness):
-    return 0.25 / math.log10(roughness / 3.7 + 5.74 / reynolds**0.9) ** 2
-
-
-def loss_of(friction, flow, length=100.0, diameter=0.05, minor=2.0):
-    """Head loss [m] of a flow [m3/s], by the formulas of the handbooks."""
-    velocity = flow / area(diameter)
-    other = minor * velocity**2 / (2.0 * GRAVITY)
-    if friction["model"] == "hazen-williams":
-        return other + 4.727 * 0.3048**-0.685 * length * (flow / friction["coefficient"]) ** 1.852 / diameter**4.871
-    if friction["model"] == "chezy-manning":
-        return other + length * (velocity * friction["coefficient"] / (diameter / 4.0) ** (2.0 / 3.0)) ** 2
-    law = swamee_jain if friction["model"] == "swamee-jain" else colebrook
-    factor = friction.get("factor") or law(velocity * diameter * RHO / 1e-3, friction["roughness"] / diameter)
-    return other + factor * length / diameter * velocity**2 / (2.0 * GRAVITY)
 
 
 FRICTIONS = [FACTOR, HAZEN, {"model": "chezy-manning", "coefficient": 0.011},
@@ -139,7 +108,7 @@ loop_rates.guess = [50.0, 45.0, 45.0]
 
 
 @pytest.mark.parametrize("method", ["dormand-prince", "radau-iia-5"])
-def test_tanks_behind_a_loop_of_pipes_follow_hand_written_equations(method):
+def test_tanks_behind_a_loop_of_pipes_follow_explicit_equations(method):
     run = fvsolve.run(loop(), {"numerics.method": method})
     first = solve_ivp(loop_rates, (0.0, 3600.0 - 1e-9), [3.0, 2.0], "DOP853", rtol=1e-11, atol=1e-12)
     last = solve_ivp(loop_rates, (3600.0, 7200.0), first.y[:, -1], "DOP853", rtol=1e-11, atol=1e-12)
@@ -253,7 +222,7 @@ def test_a_pipe_with_waves_comes_to_the_same_flow():
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("friction", [HAZEN, *FRICTIONS[-2:]], ids=lambda one: one["model"])
-def test_at_rest_nothing_moves_by_one_bit(method, law, friction):
+def test_at_rest_no_bit_changes(method, law, friction):
     case = loop(friction, 600.0, {"rtol": 1e-8}, fluid={**WATER, "law": law})
     for node in case["nodes"].values():
         if node["type"] == "junction":
@@ -300,7 +269,7 @@ def test_a_killed_run_resumes_to_the_bit(tmp_path):
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_pressure_is_linear_along_the_pipe_and_flow_is_one(law):
+def test_pressure_is_linear_along_the_pipe_and_flow_is_uniform(law):
     probes = [f"main.{q}@{x}" for q in ("pressure", "gauge_pressure", "head") for x in (0, 0.25, 1)]
     probes += ["main.flow@0.7", "main.velocity@0.3", "upper.pressure", "lower.pressure", "lower.head"]
     case = two_tanks(probes=probes)
@@ -383,7 +352,7 @@ def test_scalars_a_force_and_bodies_are_refused_by_name():
         fvsolve.build(fvsolve.load(two_tanks(rough) | {"fluid": fluid}))
 
 
-def test_all_faults_of_a_pipe_are_told_at_once():
+def test_all_faults_of_a_pipe_are_reported_at_once():
     link = pipe("upper", "lower", friction={"model": "unsteady", "roughness": 1e-4}, initial_flow=1e-3)
     with pytest.raises(CaseError) as caught:
         fvsolve.load(two_tanks() | {"links": {"main": link}})

@@ -2,19 +2,16 @@
 
 import math
 import random
-import subprocess
-import sys
 from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import pytest
-from model.test_rest import ROUGH, moved, still_probes, town
 from reference import vessels
 from reference.cylinders import Jack
+from reference.resumed_runs import killed_and_resumed, long_run, same_files
 from reference.scenes import AMBIENT, GRAVITY, chamber, junction, lake, pipe, ramp, reservoir, scene, tank, valve
+from reference.still_networks import ROUGH, moved, still_probes, town
 from scipy.integrate import solve_ivp
-from solve.test_resume import long_run, same_files
 
 import fvsolve
 
@@ -30,7 +27,7 @@ GIVEN = [
 AUTO = [{"method": "auto", "rtol": 1e-7}]
 
 
-def said(numerics: dict) -> str:
+def settings_text(numerics: dict) -> str:
     return " ".join(str(value) for value in numerics.values())
 
 
@@ -68,12 +65,12 @@ def agrees(result, wanted, near: float) -> None:
 
 @pytest.mark.in_turn
 @pytest.mark.parametrize("build", [harbour, jack])
-@pytest.mark.parametrize("numerics", RTOL + AUTO, ids=said)
+@pytest.mark.parametrize("numerics", RTOL + AUTO, ids=settings_text)
 def test_error_control_ends_where_the_explicit_run_does(build, numerics, explicit):
     agrees(fvsolve.run(build(**numerics)), explicit[build], 5e-5)
 
 
-@pytest.mark.parametrize("numerics", GIVEN, ids=said)
+@pytest.mark.parametrize("numerics", GIVEN, ids=settings_text)
 def test_given_steps_end_near_it_and_the_ledger_closes(numerics, explicit):
     near = {"implicit-euler": 0.1, "trapezoid": 0.05}.get(numerics["method"], 0.015)  # order 1; ringing
     agrees(fvsolve.run(harbour(**numerics)), explicit[harbour], near)
@@ -84,8 +81,8 @@ def test_given_steps_move_a_cylinder_and_keep_its_oil(method, near, explicit):
     agrees(fvsolve.run(jack(method=method, step=2e-5)), explicit[jack], near)
 
 
-@pytest.mark.parametrize("numerics", [*RTOL, *GIVEN, *AUTO], ids=said)
-def test_a_looped_network_without_an_event_does_not_move_by_one_bit(numerics):
+@pytest.mark.parametrize("numerics", [*RTOL, *GIVEN, *AUTO], ids=settings_text)
+def test_a_looped_network_without_an_event_does_not_change_any_bit(numerics):
     case = town(ROUGH, {})
     case["numerics"] = {"end": 60.0, "scheme": "muscl", **numerics}
     result = fvsolve.run(case)
@@ -111,7 +108,7 @@ def test_twenty_travel_times_a_step_is_no_limit_for_implicit_methods(method):
 
 
 @pytest.mark.parametrize(
-    "numerics", [{"method": "radau-iia-5", "rtol": 1e-7}, {"method": "esdirk-4", "step": 0.01}], ids=said
+    "numerics", [{"method": "radau-iia-5", "rtol": 1e-7}, {"method": "esdirk-4", "step": 0.01}], ids=settings_text
 )
 def test_dense_banded_and_sparse_algebra_give_the_same_run(numerics):
     runs = [fvsolve.run(harbour(linear_algebra=kind, **numerics)) for kind in ("dense", "banded", "sparse")]
@@ -125,8 +122,8 @@ EVENTS = [{"method": name, "rtol": 1e-8} for name in ("radau-iia-5", "rodas-5p",
 EVENTS += [{"method": name, "step": 0.05} for name in ("gauss-4", "trapezoid")]
 
 
-@pytest.mark.parametrize("numerics", EVENTS, ids=said)
-def test_a_tank_runs_dry_when_torricelli_says(numerics):
+@pytest.mark.parametrize("numerics", EVENTS, ids=settings_text)
+def test_a_tank_runs_dry_at_torricellis_time(numerics):
     slope = 0.01 * math.sqrt(2 * GRAVITY) / 2.0
     dry = 2 * (math.sqrt(3.5) - math.sqrt(2.0)) / slope
     nodes = {"basin": tank(2.0, 1.5, elevation=10.0), "air": reservoir(AMBIENT, elevation=8.0)}
@@ -139,7 +136,7 @@ def test_a_tank_runs_dry_when_torricelli_says(numerics):
     assert result.ledger["mass"]["relative"] < 1e-13
 
 
-@pytest.mark.parametrize("numerics", EVENTS, ids=said)
+@pytest.mark.parametrize("numerics", EVENTS, ids=settings_text)
 def test_a_tank_spills_from_the_moment_it_is_full(numerics):
     nodes = {"basin": tank(2.0, 1.0, height=1.5), "spring": {"type": "inflow", "flow": 0.02}}
     case = scene(nodes, {"pipe": valve("spring", "basin", 0.05)}, 100.0, numerics, ["basin.level"], 1.0)
@@ -150,36 +147,10 @@ def test_a_tank_spills_from_the_moment_it_is_full(numerics):
     assert result["basin.level"] == pytest.approx(np.minimum(1.0 + 0.01 * result.t, 1.5), abs=1e-9)
 
 
-DYING = """
-import itertools, os, sys
-from importlib import import_module
-import fvsolve
-rooms = import_module("fvsolve.core.solve.solve")
-rooms.CHECKPOINT_SECONDS = rooms.CHUNK_SECONDS = 0.0
-save, pauses = rooms.Run.save, itertools.count(1)
-def save_and_die(run):
-    dies = run.loop.t >= float(sys.argv[3])
-    if dies or next(pauses) % 20 == 0:
-        save(run)
-    if dies:
-        os._exit(9)
-rooms.Run.save = save_and_die
-fvsolve.run(sys.argv[1], out=sys.argv[2], pictures=sys.argv[4] == "True")
-"""
-
-
-def killed_and_resumed(whole: Path, moment: float, pictures: bool = False) -> Path:
-    """Folder of a run of the case of `whole` that is killed after `moment` [s], then resumed in this process."""
-    script, broken = whole.parent / "dying.py", whole.parent / "broken"
-    script.write_text(DYING)
-    died = subprocess.run([sys.executable, *map(str, (script, whole / "case.toml", broken, moment, pictures))])
-    assert died.returncode == 9 and moment <= reached(broken) < fvsolve.open_run(whole).t[-1]
-    assert fvsolve.run(whole / "case.toml", out=broken, resume=True, pictures=pictures).reason == "finished"
-    return broken
-
-
 @pytest.mark.parametrize(
-    "numerics", [{"method": name, "rtol": 3e-7} for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "auto")], ids=said
+    "numerics",
+    [{"method": name, "rtol": 3e-7} for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "auto")],
+    ids=settings_text,
 )
 def test_dead_at_a_random_moment_and_resumed_is_the_unbroken_run(tmp_path, numerics):
     seed = random.randrange(10**6)
@@ -189,15 +160,6 @@ def test_dead_at_a_random_moment_and_resumed_is_the_unbroken_run(tmp_path, numer
     assert whole.ok, whole.reason
     moment = random.Random(seed).uniform(0.1, 0.7) * whole.t[-1]
     same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", moment, pictures))
-
-
-def reached(folder) -> float:
-    """Time of the last checkpoint [s], 0 without a checkpoint."""
-    try:
-        with np.load(folder / "restart.npz") as kept:
-            return float(kept["t"])
-    except FileNotFoundError:
-        return 0.0
 
 
 def busy(numerics: dict) -> dict:
@@ -227,7 +189,7 @@ BALL = {  # rtol, method: errors at the end as measured, of the position [m] and
 
 
 @pytest.mark.parametrize("rtol, method", BALL)
-def test_a_ball_on_a_damped_stop_bounces_as_solve_ivp_says(rtol, method):
+def test_a_ball_on_a_damped_stop_bounces_as_by_solve_ivp(rtol, method):
     """A ball on a damped stop follows free flight and SciPy's contact.
 
     The force of the damper starts with a jump, which difference quotients must not treat as a slope.
@@ -276,7 +238,9 @@ def test_a_tank_that_runs_dry_through_another_does_not_stop_newton(rtol):
 
 
 @pytest.mark.parametrize(
-    "numerics", [{"method": name, "rtol": 1e-6} for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "auto")], ids=said
+    "numerics",
+    [{"method": name, "rtol": 1e-6} for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "auto")],
+    ids=settings_text,
 )
 def test_a_scene_without_a_state_runs_as_any_other(numerics):
     nodes = {"high": reservoir(3e5), "low": reservoir(1e5)}
@@ -305,7 +269,7 @@ def set_free() -> tuple[float, float]:
 @pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["radau-iia-5", "radau-iia-9"])
 @pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-8, 1e-9, 1e-10])
-def test_no_step_passes_what_a_valve_sets_free_as_it_shuts(method, rtol, set_free):
+def test_no_step_passes_the_motion_that_a_shutting_valve_releases(method, rtol, set_free):
     """The step to the closure of a spool valve includes the effect of the closure on the load.
 
     All stages of this step may be earlier than the closure; the velocity then was wrong by 7e-6 m/s at any tolerance.
@@ -338,7 +302,7 @@ def basin_between_a_tank_and_a_pipe(rtol: float) -> dict:
     }  # fmt: skip
 
 
-def test_a_pool_between_a_tank_and_a_pipe_needs_steps_as_its_tolerance_asks():
+def test_a_pool_between_a_tank_and_a_pipe_needs_steps_of_its_tolerance():
     """At a tolerance of 1e-8 Newton's method once failed in nearly every step, and the run had no end."""
     loose, tight = (fvsolve.run(basin_between_a_tank_and_a_pipe(rtol)) for rtol in (1e-6, 1e-8))
     assert loose.ok and tight.ok
@@ -347,7 +311,7 @@ def test_a_pool_between_a_tank_and_a_pipe_needs_steps_as_its_tolerance_asks():
         assert tight[probe] == pytest.approx(loose[probe], abs=1e-5 * np.ptp(loose[probe]))
 
 
-def test_a_run_whose_steps_no_longer_advance_ends_with_the_reason(monkeypatch):
+def test_a_run_with_steps_that_no_longer_advance_ends_with_the_reason(monkeypatch):
     """With the whole run as the least advance of 20 attempts every run counts as stalled; given steps never do."""
     module = import_module("fvsolve.core.solve.solve")
     for name, value in {"STALLED_ATTEMPTS": 20, "STALLED_ADVANCE": 1.0, "CHUNK_SECONDS": 0.0, "FIRST_CHUNK": 1}.items():

@@ -7,7 +7,8 @@ import threading
 
 import numpy as np
 import pytest
-from reference.scenes import reservoir, scene
+from reference.basin_scenes import MESH, SCENES, VALVE, carried, dyed, water, with_maxima
+from reference.scenes import AMBIENT, reservoir, scene
 
 import fvsolve
 from fvsolve.core.kernels import band_exchange
@@ -18,80 +19,10 @@ from fvsolve.core.solve.run_loop import RunLoop
 from fvsolve.core.solve.solve import Run
 from fvsolve.errors import FvsolveError
 
-VALVE = {"type": "valve", "from": "pool.near", "to": "river", "area": 0.05}
-PIPE = {"type": "pipe", "from": "pool.near", "to": "river", "length": 10.0, "diameter": 0.3, "cells": 5,
-        "wave_speed": 100.0, "friction": {"model": "steady", "factor": 0.02}}  # fmt: skip
-POOL = {
-    "type": "basin", "size": [4.0, 3.0], "cells": [8, 12], "level": 0.5, "manning": 0.02,
-    "bed": "0.6*exp(-((x-2)^2 + (y-1.4)^2))", "start": {"level": "0.5 + where(y < 1.2, 0.2, 0) + 0.02*x"},
-    "patches": {"near": {"side": "west"}, "far": {"side": "east", "boundary": "open"},
-                "top": {"side": "north", "span": [1.0, 2.0], "boundary": "open"}},
-}  # fmt: skip
-PROBES = ["pool.near.head", "near.flow", "pool.depth@1.1,1.3", "pool.u@3,2.9"]
-
-
-def water(link=VALVE, basin=None, end=0.2, probes=PROBES, **numerics):
-    numerics = {"scheme": "muscl", "method": "ssp-rk2", **numerics}
-    numerics |= {} if {"step", "rtol"} & {*numerics} else {"courant": 0.5}
-    nodes = {"pool": POOL | (basin or {})} | ({"river": reservoir(AMBIENT + 2e3)} if link else {})
-    probes = probes if link else [one for one in probes if "@" in one]
-    return scene(nodes, {"near": link} if link else {}, end, numerics, probes, every=0.05)
-
-
 DYED_MESH = {"cells": [60, 48], "holes": [[1.8, 1.25, 2.6, 1.875]]}
-HOLLOW = {"cells": [48, 60], "holes": [[0.15, 0.2, 0.25, 0.3]]}
-MESH = {"cells": [60, 50], "holes": [[1.8, 1.2, 2.6, 1.8]]}  # 2880 cells: twelve blocks
 
 
-def liquid(law="linear", scheme="muscl", boundary="open", **mesh):
-    block = {"type": "basin", "physics": "liquid", "size": [0.4, 0.5], "cells": [7, 15],
-             "pressure": 1e7, "thickness": 0.1,
-             "patches": {"near": {"side": "west", "span": [0.1, 0.3]},
-                         "far": {"side": "north", "boundary": boundary}}, **mesh}  # fmt: skip
-    valve = {"type": "valve", "from": "pool.near", "to": "river", "area": 1e-4}
-    numerics = {"scheme": scheme, "method": "ssp-rk3", "courant": 0.8, "initial": "rest"}
-    probes = ["near.flow", "pool.pressure@0.2,0.3", "pool.near.pressure"]
-    fluid = {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2300.0}
-    return scene({"pool": block, "river": reservoir(2e7)}, {"near": valve}, 3e-4, numerics, probes, every=1e-4,
-                 fluid=fluid | {"law": law})  # fmt: skip
-
-
-def dyed(scheme="muscl", mesh=None, **dye):
-    patches = {"near": {"side": "west", "span": [1.0, 2.0]}}
-    pool = {"patches": patches, "scalars": {"dye": "where(y < 1.5, 1, 0.2)"}} | (mesh or {})
-    found = water(VALVE, pool, probes=["pool.dye@1.1,1.4", "near.flow"], scheme=scheme)
-    return found | {"scalars": {"dye": {"unit": "mg/l", "initial": 0.4, **dye}}}
-
-
-def carried(scheme="muscl", diffusivity=0.0):
-    sheet = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [11, 12],
-             "velocity": {"expression": "swirl", "period": 1.0},
-             "scalars": {"dye": "exp(-20*((x-0.3)^2+(y-0.5)^2))"}}  # fmt: skip
-    numerics = {"scheme": scheme, "method": "ssp-rk3", "courant": 0.8}
-    dye = {"unit": "mg/l", "diffusivity": diffusivity}
-    return scene({"sheet": sheet}, {}, 0.25, numerics, ["sheet.dye@0.3,0.5"], every=0.05, scalars={"dye": dye})
-
-
-def lined(**numerics):
-    """Case of delay lines between a basin, a chamber and a demand that stops, with jumps within steps."""
-    case = water(
-        PIPE | {"pipe_model": "delay-line", "to": "air"}, end=0.3, probes=["pool.near.head", "air.pressure"], **numerics
-    )
-    del case["nodes"]["river"]
-    case["nodes"] |= {
-        "air": {"type": "chamber", "volume": 50.0},
-        "gate": {"type": "junction", "demand": {"time": [0.0, 0.0503], "value": [0.02, 0.0], "kind": "step"}},
-    }
-    case["links"]["far"] = PIPE | {"from": "air", "to": "gate", "length": 7.0, "pipe_model": "delay-line"}
-    return case
-
-
-def with_maxima(case, *basins):
-    """Case that records the greatest values in cells of the basins."""
-    return case | {"output": case["output"] | {"maxima": [*basins], "wet_depth": 0.02}}
-
-
-class Kept(MemorySink):
+class FrameSink(MemorySink):
     """Sink in memory that also keeps field frames."""
 
     takes_fields = True
@@ -100,11 +31,11 @@ class Kept(MemorySink):
         self.frames = [*getattr(self, "frames", []), values]
 
 
-def told(case, threads: int, state=None):
+def result_bytes(case, threads: int, state=None):
     """Bytes of all results of a run, and its summary."""
     case = case | {"output": case["output"] | {"fields": 3}}
     model = fvsolve.build(fvsolve.load(case))
-    sink, state = Kept(model), state or initial_state(model)
+    sink, state = FrameSink(model), state or initial_state(model)
     sink.begin(model, state)
     run = Run(model, state, sink, None, threads)
     summary = run.go()
@@ -117,53 +48,13 @@ def told(case, threads: int, state=None):
     return [np.array(one).tobytes() for one in kept], summary
 
 
-AMBIENT = 101325.0
-RAIN = {"rain": {"time": ["0 s", "0.1 s", "0.3 s"], "value": ["0 mm/h", "9 m/h", "1 m/h"]}}
-HORTON = {"model": "horton", "initial": "(6 + x)/3600", "final": "1 m/h", "decay": "5 1/s"}
-GREEN_AMPT = {"model": "green-ampt", "conductivity": "1 m/h", "suction": "9 cm", "deficit": 0.4}
-SCENES = {
-    "upwind, euler": water(scheme="upwind", method="euler"),
-    "muscl, ssp-rk2": water(),
-    "muscl, a limiter of its own, rk4": water(limiter="minmod", method="rk4"),
-    "upwind5, ssp-rk3": water(scheme="upwind5", method="ssp-rk3"),
-    "weno5, ssp-rk3": water(scheme="weno5", method="ssp-rk3"),
-    "walls all around": water(basin={"patches": {"near": {"side": "west"}}}),
-    "given steps": water(step=2e-3),
-    "a tolerance": water(rtol=1e-3, method="bogacki-shampine", probes=()),
-    "a tolerance, first same as last": water(rtol=1e-4, method="dormand-prince"),
-    "a pipe": water(PIPE, end=0.1, probes=["pool.near.head", "pool.depth@1.1,1.3"]),
-    "delay lines": lined(),
-    "delay lines, given steps": lined(step=2e-3, method="rk4"),
-    "dense output of its own": water(method="rk4"),
-    "a liquid": liquid(),
-    "a liquid between walls": liquid(boundary="wall"),
-    "a liquid, upwind5": liquid(scheme="upwind5"),
-    "a liquid, weno5, log": liquid("log", "weno5"),
-    "a liquid, log": liquid("log"),
-    "a dye in water": dyed(),
-    "a dye in water that spreads, upwind": dyed("upwind", diffusivity=1e-3),
-    "greatest values": with_maxima(water(), "pool"),
-    "rain and Horton": water(basin=RAIN | {"infiltration": HORTON}),
-    "rain and Green-Ampt, rk4": water(basin=RAIN | {"infiltration": GREEN_AMPT}, method="rk4"),
-    "a mesh, rain and Green-Ampt": water(basin=MESH | RAIN | {"infiltration": GREEN_AMPT}),
-    "a dye": carried(),
-    "a dye that spreads, upwind": carried("upwind", 1e-3),
-    "a mesh": with_maxima(water(basin=MESH), "pool"),
-    "a mesh, upwind, euler": water(basin=MESH, scheme="upwind", method="euler"),
-    "a mesh, a tolerance": water(basin=MESH, rtol=1e-3, method="bogacki-shampine", probes=()),
-    "a mesh, a pipe": water(PIPE, MESH, end=0.1, probes=["pool.near.head", "pool.depth@1.1,1.3"]),
-    "a liquid on a mesh": liquid(**HOLLOW),
-    "a liquid on a mesh, log": liquid("log", **HOLLOW),
-}
-
-
 @pytest.mark.parametrize("name", SCENES)
-def test_any_number_of_threads_gives_the_bits_of_one(name):
+def test_any_number_of_threads_gives_the_same_bits(name):
     case = SCENES[name]
     assert not single_thread_reason(fvsolve.build(fvsolve.load(case)))
-    bits, one = told(case, 1)
+    bits, one = result_bytes(case, 1)
     for threads in (2, 3, 4):
-        found, summary = told(case, threads)
+        found, summary = result_bytes(case, threads)
         assert found == bits, threads
         assert summary.threads == threads and summary.ledgers == one.ledgers
 
@@ -176,23 +67,23 @@ FORMED = ("muscl, ssp-rk2", "muscl, a limiter of its own, rk4", "upwind5, ssp-rk
 @pytest.mark.in_turn
 @pytest.mark.parametrize("name", FORMED)
 @pytest.mark.parametrize("cells", [1, 20, 10**6])
-def test_stages_formed_beside_rates_have_the_bits_of_those_formed_after_all(name, cells, monkeypatch):
+def test_stages_formed_with_rates_have_the_bits_of_those_formed_after_all(name, cells, monkeypatch):
     """Blocked stages have the bits of whole stages, for several block sizes and numbers of threads."""
-    bits, _ = told(SCENES[name], 1)
+    bits, _ = result_bytes(SCENES[name], 1)
     here = importlib.import_module("fvsolve.core.solve.partition")
     monkeypatch.setattr(here, "LEAST_STATES", 0)
     monkeypatch.setattr(here, "CACHED_CELLS", cells)
     model = fvsolve.build(fvsolve.load(SCENES[name]))
     assert RunLoop(model).stepper.structure.size > 0
-    assert told(SCENES[name], 1)[0] == bits
-    assert told(SCENES[name], 3)[0] == bits
+    assert result_bytes(SCENES[name], 1)[0] == bits
+    assert result_bytes(SCENES[name], 3)[0] == bits
 
 
-def test_as_many_threads_as_rows():
-    assert told(water(), 12)[0] == told(water(), 1)[0]
+def test_number_of_threads_may_equal_that_of_rows():
+    assert result_bytes(water(), 12)[0] == result_bytes(water(), 1)[0]
 
 
-def test_two_basins_and_one_that_each_steps_whole():
+def test_two_basins_with_a_basin_that_each_thread_steps_as_a_whole():
     """Several basins give equal bits, although each thread computes all cells of a small mesh that is not a grid."""
     case = water()
     case["nodes"]["round"] = {"type": "basin", "size": [2.0, 2.0], "cells": [6, 6], "holes": [[0.0, 0.0, 1.0, 1.0]],
@@ -202,8 +93,8 @@ def test_two_basins_and_one_that_each_steps_whole():
     for name in ("round", "other"):
         case["links"][name] = VALVE | {"from": f"{name}.near", "to": "pool.near"}
     case = with_maxima(case, "pool", "round", "other")
-    bits, _ = told(case, 1)
-    found, summary = told(case, 3)
+    bits, _ = result_bytes(case, 1)
+    found, summary = result_bytes(case, 3)
     assert found == bits
     (notice,) = [one for one in summary.warnings if one.kind == "threads"]
     why = "round: its mesh is not a full rectangle and has fewer than 2048 cells"
@@ -254,7 +145,7 @@ def test_bands_that_do_not_wait_for_each_other_are_seen():
     assert any(stepped(case, 2, race) != whole for _ in range(5))
 
 
-def test_handles_of_threads_are_made_again_only_where_an_array_has_grown():
+def test_handles_of_threads_are_formed_again_only_where_an_array_has_grown():
     """A run pauses many times; a handle for each pause would fill the memory."""
     model = fvsolve.build(fvsolve.load(water(end=1.0)))
     loop = RunLoop(model, threads=2)
@@ -317,7 +208,7 @@ ALONE = {
 
 
 @pytest.mark.parametrize("name", ALONE)
-def test_what_one_thread_steps_is_said(name):
+def test_work_of_a_single_thread_is_reported(name):
     case, why = ALONE[name]
     model = fvsolve.build(fvsolve.load(case))
     assert why in single_thread_reason(model) and divisible_rows(model)["most"] == 1
@@ -340,6 +231,6 @@ def test_more_threads_than_rows_are_named():
         fvsolve.run(water(basin=MESH), threads=13)
 
 
-def test_check_says_what_can_be_shared_out(fvs):
+def test_check_states_the_shareable_parts(fvs):
     assert "threads: up to 50 share 50 rows of tank" in fvs("check", "dam-break")[1]
     assert "threads: 1; plain: its mesh is not a full rectangle" in fvs("check", "flooding")[1]

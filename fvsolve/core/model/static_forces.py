@@ -7,8 +7,8 @@ from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.table_handle import make_handle
 from fvsolve.core.model.run_data import zeros_for_run
 
-PACKAGE = "fvsolve"  # package of the kernel functions
-FOLDER = "core.kernels.mechanism"
+PACKAGE = "fvsolve.core"  # package of the kernel functions
+FOLDER = "kernels.mechanism"
 MOTION, LINES = f"{FOLDER}.body_kinematics: kinematics", f"{FOLDER}.bushings_and_pins: add_element_forces"
 WEIGH, ACCELERATE = f"{FOLDER}.mass_matrix: start_mass_matrix", f"{FOLDER}.mass_matrix: solve_accelerations"
 BUSHINGS = f"{FOLDER}.bushings_and_pins: add_bushing_loads"
@@ -17,8 +17,8 @@ PINNED, GAPS, HOLD = (
     for name in ("solve_pinned_accelerations", "start_gaps", "add_start_pin_forces")
 )
 # loads on bodies of fluid at rest, in addition to pushes
-FLUID_LOADS = ("core.basins.basin_frames: set_frames", "core.basins.frame_forces: add_frame_forces")
-WALL_LOADS = ("core.basins.moving_walls: push_bodies_at_rest",)
+FLUID_LOADS = ("basins.basin_frames: set_frames", "basins.frame_forces: add_frame_forces")
+WALL_LOADS = ("basins.moving_walls: push_bodies_at_rest",)
 LOADS = f"{FOLDER}.fluid_loads: add_fluid_loads"
 INERTIAL = ("set_segment_drives", "moving_tank_pressures", "add_cell_drives", "moving_column_rates")
 DRIVES, *DRIVEN = (f"{FOLDER}.inertial_forces: {name}" for name in INERTIAL)
