@@ -169,7 +169,7 @@ def with_held_velocities(model, tables: rec.Tables, t: float) -> rec.Tables:
     if not any(row["period"] > 0.0 for row in tables.basins):
         return tables
     tables = tables._replace(basins=tables.basins.copy(), plane=tables.plane.copy())
-    for basin, row in zip(model.basins, tables.basins, strict=True):
+    for basin, row in zip(model.meshed, tables.basins, strict=True):
         if row["period"] > 0.0:
             grid = basin.mesh.grid
             faces = grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx if basin.is_grid else basin.mesh.left.size
@@ -200,7 +200,7 @@ def with_weights(at: OperatingPoint, weights: tuple[float, ...], degree: int) ->
 def has_limiter(model) -> bool:
     """True if a model uses a limited scheme, in pipes with cells or in basins."""
     scheme = model.case.numerics.scheme
-    for basin in model.basins:
+    for basin in model.meshed:
         # basins limit their slopes with all schemes except `upwind`, basin grids not with `upwind5` either
         if scheme != "upwind" and not (scheme == "upwind5" and basin.is_grid):
             return True
@@ -359,7 +359,7 @@ def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray
     pattern.sort_indices()
     rows, starts = pattern.indices, pattern.indptr[:-1]
     columns = np.repeat(np.arange(n), np.diff(pattern.indptr))
-    basins = tuple(f"{basin.name}." for basin in model.basins)
+    basins = tuple(f"{basin.name}." for basin in model.meshed)
     in_basins = np.array([name.startswith(basins) for name in model.state_names])
     for steps in (STEPS, FINER_STEPS):
         slopes, sides = matrix_entries(at, width, rows, columns, steps)
@@ -403,7 +403,7 @@ def refuse_state(model, j: int, cause: str) -> None:
 
     cause : "slope" if difference quotients do not converge, "kink" if they differ from side to side
     """
-    basin = next((part for part in model.basins if model.state_names[j].startswith(f"{part.name}.")), None)
+    basin = next((part for part in model.meshed if model.state_names[j].startswith(f"{part.name}.")), None)
     if basin is not None:
         cause = "basin"
     reason = {

@@ -16,12 +16,12 @@ from scipy.interpolate import CubicSpline
 from scipy.special import j0
 
 import fvsolve
-from fvsolve.core.basins.cell_sides import BLOCK, MEASURES, NX, NY, REACH
-from fvsolve.core.basins.liquid import liquid_grid
-from fvsolve.core.basins.liquid.grid_nonlinear import log1p_vector
-from fvsolve.core.basins.liquid.liquid_mesh import ROWS, add_side_linear, add_side_linear_moving
-from fvsolve.core.basins.liquid.liquid_sides import LiquidGrid, LiquidScheme, side_kinds, work_size
 from fvsolve.core.kernels.dtypes import LINEAR, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
+from fvsolve.features.basins.cell_sides import BLOCK, MEASURES, NX, NY, REACH
+from fvsolve.features.basins.liquid import liquid_grid
+from fvsolve.features.basins.liquid.grid_nonlinear import log1p_vector
+from fvsolve.features.basins.liquid.liquid_mesh import ROWS, add_side_linear, add_side_linear_moving
+from fvsolve.features.basins.liquid.liquid_sides import LiquidGrid, LiquidScheme, side_kinds, work_size
 
 SCHEMES = {"upwind": UPWIND, "muscl": MUSCL, "upwind5": LINEAR, "weno5": WENO5}
 LIMITERS = {"minmod": MINMOD, "van-leer": VAN_LEER, "monotonized-central": MONOTONIZED_CENTRAL}

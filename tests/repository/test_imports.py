@@ -51,7 +51,7 @@ def test_compiled_files_of_parts_and_basins_import_compiled_code_only():
             assert is_compiled(other) or other.split(".")[1] in ("kernels", "jit"), f"{module} imports {other}"
 
 
-@pytest.mark.parametrize("folder", ["parts", "core/basins"])
+@pytest.mark.parametrize("folder", ["parts", "features/basins"])
 def test_declarations_import_no_lowering(folder):
     """A `part.py` beside a compiled law states keys only, so that a schema needs no tables and no compiled law."""
     graph = grimp.build_graph("fvsolve", exclude_type_checking_imports=True, cache_dir=None)
@@ -69,11 +69,11 @@ def test_parts_are_declared_without_numba():
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 
-@pytest.mark.parametrize("folder", ["parts", "core/basins"])
+@pytest.mark.parametrize("folder", ["parts", "features/basins"])
 def test_every_folder_of_parts_and_basins_has_a_declaration(folder):
     folders = [path for path in (Path(fvsolve.__file__).parent / folder).iterdir() if (path / "__init__.py").is_file()]
     from fvsolve.parts.conduit.part import ConduitFlow
 
-    assert ConduitFlow.package == "fvsolve.core.basins.conduit"  # whose declaration is that of a link
-    folders = [path for path in folders if (folder, path.name) != ("core/basins", "conduit")]
+    assert ConduitFlow.package == "fvsolve.features.basins.conduit"  # whose declaration is that of a link
+    folders = [path for path in folders if (folder, path.name) != ("features/basins", "conduit")]
     assert folders and all((path / "part.py").is_file() for path in folders)

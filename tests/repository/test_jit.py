@@ -354,7 +354,9 @@ def test_only_rooms_that_are_hashed_compile():
 def test_what_declares_or_lowers_compiles_nothing():
     """Of parts only laws are hashed, of basins only compiled files; edits elsewhere keep the compiled code."""
     hashed = {path.relative_to(cache_folders.PACKAGE) for path in cache_folders.compiled_sources()}
-    assert Path("core/basins/liquid/grid_linear.py") in hashed and Path("core/basins/basin_scalars.py") in hashed
+    assert (
+        Path("features/basins/liquid/grid_linear.py") in hashed and Path("features/basins/basin_scalars.py") in hashed
+    )
     assert {path.name[:3] for path in hashed if path.parts[0] == "parts"} == {"law"}
     assert not any(path.name.startswith(("part", "lower")) for path in hashed if path.parts[0] == "basins")
 

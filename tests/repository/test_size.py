@@ -44,7 +44,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/report": (5007, 21),
     "fvsolve/studies": (17599, 68),
     "fvsolve/core/assembly": (2279, 11),
-    "fvsolve/core/basins": (13029, 61),
+    "fvsolve/features/basins": (13029, 61),
     "fvsolve/core/fluid": (1087, 4),
     "fvsolve/core/kernels": (15117, 63),
     "fvsolve/core/mesh": (1512, 6),
