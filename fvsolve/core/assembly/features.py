@@ -170,21 +170,15 @@ class Feature:
         return []
 
     def start(self, draft, y: np.ndarray) -> None:
-        """Write the states of the feature at the start; those that it leaves are 0."""
+        """Write the states of the feature at the start; those that it leaves are 0. Add notices on them."""
 
-    def start_notices(self, draft, y: np.ndarray) -> list:
-        """Notices on the states y of the model at the start."""
-        return []
-
-    def level(self, draft, y: np.ndarray, attitudes: Callable[[], dict[str, np.ndarray]] | None = None) -> None:
+    def level(self, draft, y: np.ndarray, attitudes: Callable[[], dict[str, np.ndarray]] | None = None) -> list[str]:
         """Write the states of its fluid at rest on bodies to the states y of the model.
 
+        Returns the names of the functions that compute the loads of this fluid, "module: function".
         attitudes : function that returns the rotation matrix of each body; None for attitudes at the start
         """
-
-    def loads_at_rest(self, draft) -> Sequence[str]:
-        """Functions that compute the loads of its fluid at rest on bodies, "module: function"."""
-        return ()
+        return []
 
     def close(self, draft) -> None:
         """Complete the tables of the feature; from here on they are constant."""
@@ -397,12 +391,8 @@ class FeatureRun:
         """Greatest flow through each of its links from which node i draws, at critical flow [m3/s]."""
         return []
 
-    def marked_nodes(self) -> Iterable[int]:
-        """Nodes without a mark of their own when they run dry, because `marks` reports them."""
-        return ()
-
     def marks(self, start: float, t: float, entered: np.ndarray) -> list:
-        """Marks of a run, see `run_summary.Mark`.
+        """Marks of a run, see `run_summary.Mark`, in place of marks "dry" of the same places.
 
         start, t : times of start and end [s]; entered : float64[nodes]  mass that has entered at each node [kg]
         """

@@ -17,6 +17,16 @@ class MeshedPart:
 
     name : of the part in the case; part, mesh : its keys, and its mesh; n : number of its cells
     is_grid : True if the mesh is a full rectangle; quantities : names of the states of each cell
+    courant_factor : rate that limits its steps over its wave rate
+    has_constant_speed : True if the wave speed and the sizes of cells are the same in all states
+    records_maxima : True if the greatest values of its cells are recorded
+    row_size : number of cells of a row, which threads share; the last row may have fewer
+    undivided_reason : reason why its rows cannot be distributed over threads; "" if they can
+    states_per_cell : number of states in each cell, with scalars
+    first_state : number of its first state; the states of its cells lie side by side, quantity by quantity
+    forms_stages : True if the kernel of the rates of cells can form sums of stages too, because nothing is added to its
+    rates later; rows at nodes, to which many functions add, are excepted: their sums are formed elsewhere
+    margin : rows at an edge of a band that functions of other bands read or change
     Arguments of the methods: y : deviations of cells from rest, float64[quantities, n], or the states of the model,
     where so stated; out, layout : output array of the right-hand side, and the places of its parts
     """
@@ -28,15 +38,20 @@ class MeshedPart:
     is_grid: bool
     quantities: tuple[str, ...]
     units: ClassVar[dict[str, str]] = {}  # of fields
+    courant_factor: float = 1.0
+    has_constant_speed: bool = False
+    records_maxima: bool = False
+    row_size: int
+    undivided_reason: str
+    states_per_cell: int
+    first_state: int
+    forms_stages: bool = False
+    margin: ClassVar[int] = 0
     full_rate: float = 0.0  # greatest possible rate of its waves where that is known, which limits steps [1/s]
-
-    def states_of(self, y: np.ndarray) -> np.ndarray:
-        """Its states among the states y of the model : float64[quantities, n]."""
-        raise NotImplementedError
 
     def deviations(self, y: np.ndarray) -> np.ndarray:
         """Deviations of quantities of cells from rest at the states y of the model : float64[quantities, n]."""
-        return self.states_of(y)
+        raise NotImplementedError
 
     # steps ----------
 
@@ -48,19 +63,9 @@ class MeshedPart:
         raise NotImplementedError
 
     @property
-    def courant_factor(self) -> float:
-        """Rate that limits its steps over its wave rate."""
-        return 1.0
-
-    @property
     def has_waves(self) -> bool:
         """True if the part has waves, and not only scalars in a given velocity."""
         return bool(self.quantities)
-
-    @property
-    def has_constant_speed(self) -> bool:
-        """True if the wave speed and the sizes of cells are the same in all states."""
-        return False
 
     def filling_step(self) -> float:
         """Longest explicit step while no wave limits steps, at Courant number 1 [s]."""
@@ -72,26 +77,6 @@ class MeshedPart:
 
     # rows of cells, which threads share ----------
 
-    margin: ClassVar[int] = 0  # rows at an edge of a band that functions of other bands read or change
-
-    @property
-    def undivided_reason(self) -> str:
-        """Reason why its rows cannot be distributed over threads; "" if they can."""
-        return "its rows cannot be distributed over threads"
-
-    @property
-    def forms_stages(self) -> bool:
-        """True if the kernel of the rates of cells can form sums of stages too: nothing is added to its rates later.
-
-        Rows of cells at patches, to which many functions add, are excepted: their sums are formed elsewhere.
-        """
-        return False
-
-    @property
-    def row_size(self) -> int:
-        """Number of cells of a row; the last may have fewer."""
-        raise NotImplementedError
-
     @property
     def row_count(self) -> int:
         """Number of rows."""
@@ -99,16 +84,6 @@ class MeshedPart:
 
     def row_text(self, count: int) -> str:
         """Number of rows as a text, with their name."""
-        raise NotImplementedError
-
-    @property
-    def states_per_cell(self) -> int:
-        """Number of states in each cell, with scalars."""
-        raise NotImplementedError
-
-    @property
-    def first_state(self) -> int:
-        """Number of the first state of the part; the states of its cells lie side by side, quantity by quantity."""
         raise NotImplementedError
 
     def cells_of_rows(self, first: int, stop: int) -> tuple[int, int]:
@@ -168,11 +143,6 @@ class MeshedPart:
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
         """Output fields by name, with a value (a vector of three for the velocity) for each cell, in SI units."""
         return {}
-
-    @property
-    def records_maxima(self) -> bool:
-        """True if the greatest values of its cells are recorded."""
-        return False
 
     def maxima(self, t: float, recorded: np.ndarray) -> dict[str, np.ndarray]:
         """Quantities `maxima` of its physics up to time t [s] by name : float64[n] in SI.

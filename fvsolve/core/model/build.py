@@ -456,8 +456,6 @@ def model_of(draft: ModelDraft, notices: Callable[[ModelDraft], list[Notice]] = 
         feature.start(draft, start)
     first, last = case.numerics.start, case.numerics.end
     inside = sorted((t, jump) for t, jump in draft.schedules.breaks.items() if first <= t <= last)
-    for feature in draft.features:
-        draft.warnings += feature.start_notices(draft, start)
     draft.warnings += notices(draft)
     draft.warnings += limiter_notices(draft.case.numerics.scheme, draft.case.numerics.limiter)
     return Model(

@@ -73,12 +73,10 @@ class StaticForces:
         self.out = np.zeros(int(self.layout["size"]))
         self.y, self.tables = np.zeros(draft.size), draft.tables
         rubber = (BUSHINGS,) if len(draft.bushing_table) else ()
-        loads = [name for feature in draft.features for name in feature.loads_at_rest(draft)]
+        loads = [name for feature in draft.features for name in feature.level(draft, self.y)]
         self.pushes = (MOTION, LINES, *rubber, *loads)
         if len(draft.moving_segment_table):
             self.pushes += NETWORKS
-        for feature in draft.features:
-            feature.level(draft, self.y)
         if loads:  # these functions write to `plane`
             self.tables = draft.tables._replace(plane=draft.tables.plane.copy())
         self.run(MOTION)

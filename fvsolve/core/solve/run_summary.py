@@ -104,11 +104,11 @@ class Summary:
         return 1e9 * self.processor / max(1, self.steps * max(1, self.cells))
 
 
-def find_marks(run_data: RunData) -> list[Mark]:
+def find_marks(run_data: RunData, of_features: list[Mark]) -> list[Mark]:
     """First time of each condition outside the model's validity, at each place.
 
     Pressures below vapour pressure are left out under a density law that models cavities. Overflow of tanks is always
-    left out, because the mass ledger contains it.
+    left out, because the mass ledger contains it. of_features : marks that replace "dry" at the same places
     """
     model, marks = run_data.model, run_data.marks
     if np.isnan(marks).all():
@@ -117,8 +117,6 @@ def find_marks(run_data: RunData) -> list[Mark]:
     kinds = [("below vapor pressure", f"links.{pipe.name}") for pipe in pipes]
     kinds += [(kind, f"nodes.{name}") for kind in ("below vapor pressure", "dry", "spilling") for name in nodes]
     kinds = [(kind, place.removesuffix(".inside")) for kind, place in kinds]
-    for node in (node for own in run_data.features for node in own.marked_nodes()):
-        kinds[len(pipes) + len(nodes) + node] = "", ""  # the feature reports them, see `FeatureRun.marks`
     kinds += [("stopped dead", f"links.{name}") for name in model.column_names]
     kinds += [("beyond its stroke", f"links.{name}") for name in model.piston_names]
     kinds += [("outside its curve", f"links.{name}") for name, *_ in model.devices]
@@ -139,11 +137,14 @@ def find_marks(run_data: RunData) -> list[Mark]:
         ),
         "dry": "no water is left for the outflow; the missing water is added (`made_up` in the mass balance)",
     }
+    explained = {mark.place for mark in of_features}
     found = [(*kinds[k], float(marks[k])) for k in np.flatnonzero(np.isfinite(marks[: len(kinds)]))]
     return [
         Mark(kind, place, time, f"{place.split('.', 1)[1]}: {texts[kind]}")
         for kind, place, time in found
-        if kind in texts and not (kind == "below vapor pressure" and model.cavitates)
+        if kind in texts
+        and not (kind == "below vapor pressure" and model.cavitates)
+        and not (kind == "dry" and place in explained)
     ]
 
 

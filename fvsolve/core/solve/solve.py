@@ -444,7 +444,7 @@ class Run:
         ok = reason == "finished" and not held and all(entry.ok for entry in warnings)
         extremes, watched = found.find_extremes(self.run_data)
         summary = Summary(
-            reason, ok, loop.t, found.find_marks(self.run_data) + held, ledgers, extremes,
+            reason, ok, loop.t, found.find_marks(self.run_data, held) + held, ledgers, extremes,
             found.find_envelope(self.run_data), found.find_point_envelopes(self.run_data), watched,
             loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
             self.setup, events,

@@ -10,14 +10,12 @@ import numpy as np
 
 from fvsolve.core.assembly.features import Feature, FeatureRun
 from fvsolve.core.assembly.model_draft import aligned_zeros
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.features.basins import lower
 
 # functions of the loads on bodies of water at rest, and of water at rest on moving walls
 LOADS_AT_REST = ("basin_frames: set_frames", "frame_forces: add_frame_forces")
 WALL_LOADS = ("moving_walls: push_bodies_at_rest",)
 PACKAGE = "fvsolve.features.basins"
-HELD = (rec.DISCHARGE, rec.LINKED, rec.INTERIOR)  # closures of patches whose outflow is held at critical flow
 
 
 class Basins(Feature, slot=2, wakes="kind basin, kind conduit"):
@@ -50,17 +48,13 @@ class Basins(Feature, slot=2, wakes="kind basin, kind conduit"):
 
     def start(self, draft, y: np.ndarray) -> None:
         lower.start_basins(self.meshed, y)
+        draft.warnings += [notice for basin in self.meshed for notice in basin.notices(basin.deviations(y))]
 
-    def start_notices(self, draft, y: np.ndarray) -> list:
-        return [notice for basin in self.meshed for notice in basin.notices(basin.deviations(y))]
-
-    def level(self, draft, y: np.ndarray, attitudes=None) -> None:
+    def level(self, draft, y: np.ndarray, attitudes=None) -> list[str]:
+        names = list(WALL_LOADS) if (draft.wall_table["body"] >= 0).any() else []
         if any(basin.row["frame"] >= 0 for basin in self.meshed):
             lower.start_basins(self.meshed, y, None if attitudes is None else attitudes())
-
-    def loads_at_rest(self, draft) -> list[str]:
-        names = LOADS_AT_REST if any(basin.row["frame"] >= 0 for basin in self.meshed) else ()
-        names += WALL_LOADS if (draft.wall_table["body"] >= 0).any() else ()
+            names = [*LOADS_AT_REST, *names]
         return [f"{PACKAGE}.{name}" for name in names]
 
     def copy_for(self, case) -> Basins:
@@ -151,16 +145,11 @@ class BasinRun(FeatureRun):
 
     def written_tables(self) -> dict[str, np.ndarray]:
         tables = self.run_data.model.tables
-        if not self.moves:
+        if not any(basin.moves or basin.row["frame"] >= 0 for basin in self.feature.meshed):
             return {}
         plane = aligned_zeros(tables.plane.size)
         plane[:] = tables.plane
         return {"plane": plane, "basins": tables.basins.copy()}
-
-    @property
-    def moves(self) -> bool:
-        """True if walls move or a body carries a basin."""
-        return any(basin.moves or basin.row["frame"] >= 0 for basin in self.feature.meshed)
 
     def compute_all_loads(self) -> None:
         if any(basin.row["frame"] >= 0 for basin in self.feature.meshed):
@@ -174,12 +163,8 @@ class BasinRun(FeatureRun):
                 found.append(basin.greatest_outflow(patch, work))
         return found
 
-    def marked_nodes(self) -> np.ndarray:
-        patches = self.run_data.tables.patches
-        return patches["node"][np.isin(patches["closure"], HELD)]
-
     def marks(self, start: float, t: float, entered: np.ndarray) -> list:
-        if not len(self.marked_nodes()):
+        if not np.isin(self.run_data.tables.patches["closure"], lower.HELD).any():
             return []
         from fvsolve.features.basins.held_discharges import held_discharges
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.solve.run_summary import Mark, scheduled_volume
-from fvsolve.features.basins.feature import HELD
+from fvsolve.features.basins.lower import HELD
 
 HELD_TEXTS = (  # of a scheduled outflow, and of an outflow through links or from an interior patch
     ("the scheduled outflow", "less than scheduled have left; give less outflow, or `stage` or `rating`"),

@@ -6,6 +6,8 @@ import numpy as np
 
 from fvsolve.core.kernels import dtypes as rec
 
+HELD = (rec.DISCHARGE, rec.LINKED, rec.INTERIOR)  # closures of patches whose outflow is held at critical flow
+
 
 def lower_basins(draft, own) -> None:
     """Fill the tables of basins, moving walls and patches in a draft, and add the states of basins to it.

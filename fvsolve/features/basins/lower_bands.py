@@ -46,13 +46,6 @@ class BandedRows(MeshedPart):
         return "" if self.banded else f"its physics {self.part.physics} cannot be distributed over threads"
 
     @property
-    def blocks_needed(self) -> np.ndarray:
-        """Array `need` of `cell_sides` of a mesh that is not a grid : int64[blocks]."""
-        slots, count = self.integers[0], -(-self.n // BLOCK)
-        at = HEAD + INDICES * count * slots * BLOCK // 2
-        return self.integers[at : at + count]
-
-    @property
     def row_size(self) -> int:
         return int(self.row["nx"]) or BLOCK
 
@@ -71,7 +64,11 @@ class BandedRows(MeshedPart):
     def rows_read(self, first: int, stop: int) -> tuple[int, int]:
         if self.row["nx"] > 0:
             return max(first - BAND_MARGIN, 0), min(stop + BAND_MARGIN, self.row_count)
-        need = self.blocks_needed  # rates read values at sides, and these read the cells next to them
+        slots, count = self.integers[0], -(-self.n // BLOCK)
+        at = HEAD + INDICES * count * slots * BLOCK // 2
+        need = self.integers[
+            at : at + count
+        ]  # array `need` of `cell_sides`: rates read values at sides, and these read the cells next to them
         sides = int(np.searchsorted(need, first, "right")), int(need[stop - 1])
         return int(np.searchsorted(need, sides[0], "right")), int(need[sides[1] - 1])
 

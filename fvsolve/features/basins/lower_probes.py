@@ -12,23 +12,18 @@ def lower_probe(draft, basins: list, probe, row) -> bool:
         lower_section(draft, basins, row, probe)
     elif probe.point is not None and probe.quantity in draft.case.scalars:
         return False
+    elif probe.point is not None and probe.name in draft.case.lumped:
+        lower_surface(draft, row, probe)
     elif probe.point is not None:
-        lower_point(draft, basins, row, probe)
+        row["kind"] = rec.CELL_FIELD
+        cells, weights = cells_at_point(draft, row, probe)
+        basins[row["index"]].lower_probe(row, probe.quantity, cells, weights)
     elif probe.part == "nodes" and probe.name in draft.case.meshes:
         row["kind"], row["index"] = rec.CELL_FIELD, list(draft.case.meshes).index(probe.name)
         basins[row["index"]].lower_probe(row, probe.quantity, np.zeros(0, int), np.zeros(0))
     else:
         return False
     return True
-
-
-def lower_point(draft, basins: list, row, probe) -> None:
-    """Fill the row of a probe at a point of a basin."""
-    if probe.name in draft.case.lumped:
-        return lower_surface(draft, row, probe)
-    row["kind"] = rec.CELL_FIELD
-    cells, weights = cells_at_point(draft, row, probe)
-    basins[row["index"]].lower_probe(row, probe.quantity, cells, weights)
 
 
 def lower_section(draft, basins: list, row, probe) -> None:

@@ -47,12 +47,10 @@ class BasinPattern(FeaturePattern):
                 yield pairs_of(unique_states(self.of.size + i), pattern.cell_states(basin, cells))
             joint = rec.DISCHARGE, rec.RATING, *pattern.THROUGH_FACES  # one level for all faces
             if row["closure"] in joint or (row["closure"] == rec.STAGE and row["neighbours"] >= 0):
-                read = unique_states(self.behind(i), pattern.cell_states(basin, self.cells_at_faces(row)))
+                read = unique_states(
+                    self.behind(i), pattern.cell_states(basin, pattern.cells_at_faces(self.integers, row))
+                )
                 yield pairs_of(self.behind(i), read)
-
-    def cells_at_faces(self, row) -> np.ndarray:
-        """Cells whose states the flow through the faces of a patch reads; row : its row of the table"""
-        return pattern.cells_at_faces(self.integers, row)
 
     def behind(self, i: int, quantities: int | None = None) -> np.ndarray:
         """States of the cells behind patch i.
@@ -69,7 +67,7 @@ class BasinPattern(FeaturePattern):
             return None
         row = self.patches[i]
         if row["closure"] in pattern.THROUGH_FACES:
-            read = pattern.cell_states(self.basins[row["basin"]], self.cells_at_faces(row))
+            read = pattern.cell_states(self.basins[row["basin"]], pattern.cells_at_faces(self.integers, row))
             return unique_states(self.behind(i), read)
         return unique_states(self.behind(i, 1), *(self.walls["y"][self.walls["basin"] == row["basin"]]))
 
