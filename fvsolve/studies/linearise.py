@@ -81,13 +81,13 @@ class Linear:
     def state_units(self) -> list[str]:
         """SI units of the states x."""
         names, model = set(self.states), self.at.model
-        basins = {basin.name: basin.part.physics_type.states for basin in model.meshed}
+        meshed = {part.name: part.part.physics_type.states for part in model.meshed}
         units = []
         for name in self.states:
             part, quantity = name.rsplit(".", 1)
             plain = quantity.rstrip("0123456789[]")
-            if part in basins:
-                units.append(basins[part].get(quantity.split("[")[0], "-"))
+            if part in meshed:
+                units.append(meshed[part].get(quantity.split("[")[0], "-"))
             elif part.startswith("controls."):
                 # an integral of a block has the unit of its output, other states of blocks that of its input
                 first, output = model.case.controls[part.removeprefix("controls.")].dimensions
@@ -183,7 +183,7 @@ def refuse_limiter(model) -> None:
     scheme, schemes = model.case.numerics.scheme, model.case.schemes
     if has_limiter(model):
         linear = "upwind"
-        if model.meshed and all(basin.is_grid for basin in model.meshed):
+        if model.meshed and all(part.is_grid for part in model.meshed):
             linear = "upwind or upwind5"
         elif "upwind5" in schemes and not model.meshed:
             linear = f"{SCHEMES[scheme].twin} (equals {scheme} in smooth solutions), upwind or upwind5"

@@ -270,6 +270,14 @@ class Feature:
         """Inputs that can be held at values : name -> `assembly.lowering.Input`."""
         return {}
 
+    def driving_schedules(self, model) -> Iterable[int]:
+        """Schedules that drive motions, whose rate of change counts where a model is held at a time."""
+        return ()
+
+    def held_tables(self, tables, t: float) -> dict[str, np.ndarray]:
+        """Tables of the model, as copies by name, with values that vary by themselves held at those at t [s]."""
+        return {}
+
     def to_hold(self) -> tuple[Feature, np.ndarray]:
         """Copy of the feature, and the array in which values of its inputs are set."""
         return self, np.zeros(0)

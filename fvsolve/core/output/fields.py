@@ -134,7 +134,7 @@ class FieldSeries:
         carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
         units = {basin.name: basin.units | basin.units_of_maxima | (carried if basin.scalars else {})
                  for basin in model.meshed}  # fmt: skip
-        self.basins = {
+        self.meshes = {
             basin.name: (*basin_geometry(basin, self.places[basin.name]), units[basin.name]) for basin in model.meshed
         }
         self.references = {basin.name: reference_xml(basin) for basin in model.meshed}
@@ -156,7 +156,7 @@ class FieldSeries:
         """
         index = self.folder / "fields.pvd"
         lines = index.read_text(encoding="utf-8").splitlines() if index.is_file() else []
-        n = frames * (len(self.basins) + (1 if self.pipes else 0) + (1 if self.bodies else 0))
+        n = frames * (len(self.meshes) + (1 if self.pipes else 0) + (1 if self.bodies else 0))
         entries = [f"{line}\n" for line in lines if line.startswith("<DataSet")][:n]
         matches = [FILE_ATTRIBUTE.search(line) for line in entries]
         if len(entries) < n or not all(match and (self.folder / match[1]).is_file() for match in matches):
@@ -188,7 +188,7 @@ class FieldSeries:
             file, (points, speed) = f"fields/bodies-{self.frames:06d}.vtu", self.bodies.at(frame["out"])
             blocks, grid = {"body": [self.bodies.line_body], "speed": [speed]}, [("line", self.bodies.lines)]
             write_frame(self.folder / file, grid_xml(points, grid), blocks, {"speed": "m/s"})
-            self._add_to_collection(t, len(self.basins) + 1, file)
+            self._add_to_collection(t, len(self.meshes) + 1, file)
         if self.pipes:
             file = f"fields/{self.frames:06d}.vtu"
             data = {name: [np.concatenate([frame[pipe][name] for pipe in self.pipes])] for name in self.units}
@@ -201,7 +201,7 @@ class FieldSeries:
 
     def _write_basin(self, t: float, part: int, basin, frame: dict) -> None:
         """Write the fields of a basin at time `t` [s]; part : its number in the index; frame : as for `write`."""
-        points, cells, units = self.basins[basin.name]
+        points, cells, units = self.meshes[basin.name]
         file, values = f"fields/{basin.name}-{self.frames:06d}.vtu", frame[basin.name]
         if self.pieces is not None and basin.name in self.pieces.rows:
             file = f"fields/{basin.name}-{self.frames:06d}.pvtu"

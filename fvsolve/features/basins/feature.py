@@ -118,6 +118,23 @@ class Basins(Feature, slot=2, wakes="kind basin, kind conduit"):
     def open_nodes(self, model) -> set[int]:
         return {int(row["node"]) for row in model.tables.patches if row["open"]}
 
+    def driving_schedules(self, model) -> list[int]:
+        return [int(row["schedule"]) for row in model.tables.walls]
+
+    def held_tables(self, tables, t: float) -> dict[str, np.ndarray]:
+        """Tables in which given velocities that reverse periodically are held."""
+        if not any(row["period"] > 0.0 for row in tables.basins):
+            return {}
+        basins, plane = tables.basins.copy(), tables.plane.copy()
+        for basin, row in zip(self.meshed, basins, strict=True):
+            if row["period"] > 0.0:
+                grid = basin.mesh.grid
+                faces = grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx if basin.is_grid else basin.mesh.left.size
+                factor = np.cos(np.pi * t / row["period"])
+                plane[row["flows"] : row["flows"] + faces] *= factor
+                row["fastest"], row["period"] = abs(factor) * row["fastest"], 0.0
+        return {"basins": basins, "plane": plane}
+
     def energy_refusal(self) -> str:
         from fvsolve.features.basins.accounts import energy_refusal
 
