@@ -12,6 +12,7 @@ from reference.scenes import pipe, reservoir, scene
 import fvsolve
 from fvsolve.case.changes import CLASSES, changes, declaration_of
 from fvsolve.errors import FvsolveError
+from fvsolve.parts.network_elements import network_of
 from fvsolve.parts.value import SHAPE
 
 # keys of class `shape` that do not change the shape of the shipped case; a separate test shows that they can
@@ -32,8 +33,8 @@ def form(model) -> tuple:
     tables = {name: (table.shape, *(table[column].tobytes() for column in whole_columns(table)))
               for name, table in zip(model.tables._fields, model.tables, strict=True)}  # fmt: skip
     tables["integers"] = model.tables.integers.tobytes()
-    if model.network is not None:
-        tables["network"] = model.network.arrays(model.network.conducting)[0].tobytes()
+    if (network := network_of(model)) is not None:
+        tables["network"] = network.arrays(network.conducting)[0].tobytes()
     names = (model.state_names, model.node_names, model.link_names, model.valve_names, model.column_names,
              model.piston_names, model.mass_names, model.events, [probe.text for probe in model.probes])  # fmt: skip
     return tables, names, model.shapes
@@ -48,11 +49,11 @@ def start(model) -> list[bytes]:
     tables = model.tables
     flows = [table["flow"].tobytes() for table in (tables.pipes, tables.columns, tables.valves)]
     profile = [profile.tobytes() for _, profile in sorted(model.profiles.items())]
-    flows += [] if model.network is None else [model.network.values.tobytes()]
+    flows += [] if network_of(model) is None else [network_of(model).values.tobytes()]
     return [model.start.tobytes(), tables.nodes["pressure"].tobytes(), *flows, *profile]
 
 
-def found_class(before, after) -> str:
+def observed_class(before, after) -> str:
     if form(before) != form(after):
         return "shape"
     return "value" if start(before) == start(after) else "profile"
@@ -94,7 +95,7 @@ class Trial:
         values = others(table, keys, value, self.every)
         for to in () if self.every and said == SHAPE else reversed(values) if self.every else values:
             try:
-                found = found_class(before, fvsolve.build(fvsolve.load(moved(table, keys, to))))
+                found = observed_class(before, fvsolve.build(fvsolve.load(moved(table, keys, to))))
             except FvsolveError:
                 continue
             place = f"{name}: {spoken(keys)}"
@@ -114,11 +115,11 @@ class Trial:
 
 
 @pytest.fixture(autouse=True)
-def beside_their_files(monkeypatch):
+def in_folder_of_cases(monkeypatch):
     monkeypatch.chdir(CASES)
 
 
-def test_a_key_changes_no_more_than_it_says_and_each_that_says_shape_does():
+def test_a_key_changes_no_more_than_declared_and_each_key_of_shape_does():
     """Each kind of key in one case; a test below takes two cases."""
     trial = Trial(every=False)
     for name in NAMES:
@@ -129,7 +130,7 @@ def test_a_key_changes_no_more_than_it_says_and_each_that_says_shape_does():
     assert len(trial.names) > 100
 
 
-def test_keys_that_no_shipped_case_gives_change_no_more_than_they_say():
+def test_keys_of_no_shipped_case_change_no_more_than_declared():
     trial = Trial(every=False)
     trial.case("others", OTHERS)
     trial.case("dyed", DYED)
@@ -144,7 +145,7 @@ def test_losses_alike_are_another_shape_where_a_pipe_joins():
     before = fvsolve.build(fvsolve.load(case))
     for key, other in (("loss_in", 1.5), ("loss_out", 1.0)):
         after = fvsolve.build(fvsolve.load(moved(case, ("nodes", "tank", "connection", key), other)))
-        assert found_class(before, after) == "shape" == changes(before.case, f"nodes.tank.connection.{key}")
+        assert observed_class(before, after) == "shape" == changes(before.case, f"nodes.tank.connection.{key}")
 
 
 def test_a_regulating_valve_that_acts_at_once_is_another_shape():
@@ -161,10 +162,10 @@ def test_a_regulating_valve_that_acts_at_once_is_another_shape():
     case = scene(nodes, links, 1.0, {"pipe_model": "quasi-steady"})
     after = fvsolve.build(fvsolve.load(moved(case, ("links", "v", "time_constant"), 0.0)))
     before = fvsolve.build(fvsolve.load(case))
-    assert found_class(before, after) == "shape" == changes(before.case, "links.v.time_constant")
+    assert observed_class(before, after) == "shape" == changes(before.case, "links.v.time_constant")
 
 
-def test_no_key_of_any_shipped_case_changes_more_than_it_says():
+def test_no_key_of_any_shipped_case_changes_more_than_declared():
     """The start of load-sensing takes 0.2 s; its keys are changed by the test above."""
     trial = Trial(every=True)
     for name in NAMES:
@@ -173,7 +174,7 @@ def test_no_key_of_any_shipped_case_changes_more_than_it_says():
     assert trial.wrong == []
 
 
-def test_what_a_key_changes_depends_on_the_case_where_its_part_says_so():
+def test_effect_of_a_key_depends_on_the_case_where_its_part_states_so():
     """Classes depend on stated cells, on the target of a signal, and on unsteady friction."""
     case = fvsolve.load("valve-closure")
     for key, said in {

@@ -59,10 +59,10 @@ def wakes(header: Header, case, words: set[str]) -> bool:
 
 
 def words_of(case) -> set[str]:
-    """Words of a case that may wake features: "pipe_model NAME" for pipes, and "kind NAME" for each type of part."""
+    """Words of a case that may wake features: "pipe_model NAME" for pipes, and those of each part, see `Part.words`."""
     common = case.numerics.pipe_model
     models = {f"pipe_model {link.pipe_model or common}" for link in case.links.values() if link.kind == "pipe"}
-    return models | {f"kind {part.kind}" for part in (*case.nodes.values(), *case.links.values())}
+    return models.union(*(part.words for part in (*case.nodes.values(), *case.links.values())))
 
 
 def features_of(case, given_up: Collection[str] = ()) -> list[Feature]:
@@ -132,7 +132,10 @@ class Feature:
         """Continue when nodes are grouped; group : label of the group of each node."""
 
     def lower_behind_nodes(self, draft) -> None:
-        """Fill the tables of the feature, after those of nodes and links and before those of networks; add faults."""
+        """Fill the tables of the feature, after those of nodes and links; add faults."""
+
+    def lower_behind_meshes(self, draft) -> None:
+        """Fill the tables of the feature, after those of parts with a mesh; add faults."""
 
     def lower_last(self, draft) -> None:
         """Fill the tables of the feature, after all others; add faults."""
@@ -165,6 +168,17 @@ class Feature:
         """Draft whose start the feature has balanced; start : function of a draft -> model with its steady start."""
         return draft
 
+    def prepare_start(self, draft, trial: Callable[[Any], Any]) -> None:
+        """Set values that the steady start needs. trial : function of a copy of the draft, which fills its start in."""
+
+    def begin_motion(self, draft, start) -> list[str]:
+        """Complete the steady start of the flow, start; texts on what changes with time at the start."""
+        return []
+
+    def accelerations(self, draft) -> dict[str, float]:
+        """Accelerations of masses that the feature moves [m/s2], by name, at the forces in the table of masses."""
+        return {}
+
     def settle(self, draft) -> list[str]:
         """Continue after the steady start; names of parts to be given up, after which the tables are made again."""
         return []
@@ -193,10 +207,11 @@ class Feature:
         """Terms of its functions, that is, phases of the right-hand side and jobs: (place in the order, `RhsTerms`).
 
         cast : `ModelFeatures` of the model without those of features
-        Places: first: before all others; pipes: behind those of pipes; sources: with event functions, after the nodes
-        are solved and before sources of networks; solved: then, behind these; events: with event functions of
-        restrictions; flow: behind those of the memory of pipes; carried: then, of what flows carry; cells: then, of
-        what is carried in meshes; last: behind all others but records of nodes.
+        Places: first: before all others; pipes: behind those of pipes; events: with event functions of restrictions;
+        devices: behind those of devices; flow: behind those of the memory of pipes; carried: then, of what flows carry;
+        cells: then, of what is carried in meshes; last: behind all others but records of nodes.
+        Places of event functions, in this order, after the nodes are solved: given: values that follow from states and
+        nodes; sources: schedules that the feature sets; followed: what follows such schedules; solved: other values.
         """
         return ()
 
@@ -244,8 +259,15 @@ class Feature:
         """Reason why the energy of a case with the feature cannot be computed; "" if it can."""
         return ""
 
+    def end_accounts(self, accounts) -> None:
+        """Add accounts with the rows of power and stored energy behind those of all other parts."""
+
+    def energy_rows(self, model) -> Iterable[tuple[str, dict[int, float]]]:
+        """Rows of the energy of deviations, (name, state -> factor), see `model.energy_norm.energy_form`."""
+        return ()
+
     def add_accounts(self, accounts) -> None:
-        """Add accounts of its energy, see `model.energy_accounts.Accounts`, behind those of other parts."""
+        """Add accounts with the rows of power and stored energy behind those of masses, see `model.energy_accounts`."""
 
     def add_fields(self, fields: dict, model, y: np.ndarray, out: np.ndarray) -> None:
         """Add values along pipes and at nodes to the result of `Model.fields`."""
@@ -270,9 +292,9 @@ class Feature:
         """Inputs that can be held at values : name -> `assembly.lowering.Input`."""
         return {}
 
-    def driving_schedules(self, model) -> Iterable[int]:
-        """Schedules that drive motions, whose rate of change counts where a model is held at a time."""
-        return ()
+    def driven(self) -> set[int]:
+        """Numbers of schedules whose rates are speeds; -1 for none."""
+        return set()
 
     def held_tables(self, tables, t: float) -> dict[str, np.ndarray]:
         """Tables of the model, as copies by name, with values that vary by themselves held at those at t [s]."""
@@ -305,7 +327,7 @@ class FeaturePattern:
         """States on which a source of a network depends; None if the feature knows none. row : of the source"""
         return None
 
-    def pressure(self, i: int) -> np.ndarray | None:
+    def sets_pressure(self, i: int) -> np.ndarray | None:
         """States that set the pressure of node i; None if the feature does not set it."""
         return None
 
@@ -328,13 +350,26 @@ class FeaturePattern:
         """Yield groups of its places of reactions, see `features.scalars.pattern.reacting_places`."""
         yield from ()
 
+    def read_by(self, part, lowering) -> np.ndarray:
+        """States on which values of the feature depend that the law of a device reads before the nodes are solved."""
+        return np.zeros(0, dtype=np.int64)
+
+    def probe(self, row) -> np.ndarray | None:
+        """States on which the value of a probe depends; None if the feature does not compute it. row : of the probe"""
+        return None
+
     def pairs(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yield pairs (rates, states)."""
         yield from ()
 
 
 class FeatureRun:
-    """Data that a run writes for a feature, one object for each run. The base has none."""
+    """Data that a run writes for a feature, one object for each run. The base has none.
+
+    changes_flags : True if `at_event` may change event flags
+    """
+
+    changes_flags = False
 
     def __init__(self, feature: Feature, run_data) -> None:
         self.feature, self.run_data = feature, run_data
@@ -347,8 +382,8 @@ class FeatureRun:
         """Tables of the model that the run writes, as copies by name."""
         return {}
 
-    def compute_all_loads(self) -> None:
-        """Let compiled functions compute all loads of its fluid on bodies, for their work."""
+    def for_energy(self) -> None:
+        """Let functions compute what only energies need."""
 
     def views(self) -> dict[str, tuple[np.ndarray, dict[str, np.ndarray]]]:
         """Views that compiled functions open : name -> (array for its handle, tables of the model replaced in it)."""
@@ -384,6 +419,13 @@ class FeatureRun:
     def begin_at_break(self) -> None:
         """Continue at a break of a schedule, at which a segment of the run begins."""
 
+    def follow_flags(self) -> None:
+        """Write what belongs to the present event flags, `run_data.armed`."""
+
+    def at_event(self, y: np.ndarray) -> str:
+        """Change flags and states y at an event, after those of tanks and devices; text of a fault, "" for none."""
+        return ""
+
     def flags_changed(self, t: float, before: np.ndarray) -> None:
         """Continue at an event at t; before : event flags before it, those after it are `run_data.armed`"""
 
@@ -399,7 +441,7 @@ class FeatureRun:
         """Greatest flow through each of its links from which node i draws, at critical flow [m3/s]."""
         return []
 
-    def marks(self, start: float, t: float, entered: np.ndarray) -> list:
+    def held_marks(self, start: float, t: float, entered: np.ndarray) -> list:
         """Marks of a run, see `run_summary.Mark`, in place of marks "dry" of the same places.
 
         start, t : times of start and end [s]; entered : float64[nodes]  mass that has entered at each node [kg]

@@ -116,6 +116,10 @@ class MeshedPart:
         """Entries of the array `bands` for the rows from `first` to `stop` - 1."""
         raise NotImplementedError
 
+    def bounds(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Yield bounds of its states, see `model.state_bounds`."""
+        yield from ()
+
     # energy ----------
 
     def weights(self, y: np.ndarray) -> np.ndarray:

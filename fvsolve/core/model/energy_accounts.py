@@ -226,11 +226,12 @@ class Accounts:
             self.accounts.append(Account("law", name, "rigid column", (at, at + 1, at + 2), (1, -1, -1)))
         self.network_rows = self.power_count  # rows of power that `kernels.network_energy` fills
         self.mechanics()
-        self.networks()
+        for feature in model.features:
+            feature.add_accounts(self)
         self.bodies()
         self.devices()
         for feature in model.features:
-            feature.add_accounts(self)
+            feature.end_accounts(self)
         self.power_terms = terms_of(self.accounts)
         self.stored_terms = terms_of(self.stored_accounts)
 
@@ -294,19 +295,6 @@ class Accounts:
             self.add("dissipated", name, "friction", at + 1)
             self.add("law", name, "cylinder", at + 2)
 
-    def networks(self) -> None:
-        """Accounts of the parts of a network of rotation, electricity and heat."""
-        network = self.model.network
-        for item in network.booked if network is not None else ():
-            at, (group, _, name) = self.take(1), item.part.partition(".")
-            part = getattr(self.model.case, group)[name]
-            loss_of_other = item.ledger == "dissipated" and not part.in_network  # such as friction of a cylinder
-            kind = item.name.rpartition(".")[2] if loss_of_other else part.kind.replace("-", " ")
-            stores = item.ledger == "stored"
-            self.hold(name, kind, at if stores else None)
-            if not stores and item.ledger and item.heat_to is None:
-                self.add(item.ledger, name, kind, at)
-
     def bodies(self) -> None:
         for name in self.model.bushing_names:
             at = self.take(2)
@@ -358,7 +346,7 @@ def compute_all_loads(run_data: RunData) -> None:
     if len(run_data.model.tables.moving_segments):
         run_data.tables.moving_segments["loads_body"] = rec.JOINT_LOAD_READ
     for own in run_data.features:
-        own.compute_all_loads()
+        own.for_energy()
 
 
 def terms_of(accounts: list[Account]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -19,9 +19,7 @@ def fill_probes(draft, probes: list) -> np.ndarray:
         row["mark"] = -1
         if any(feature.probe(draft, probe, row) for feature in draft.features):
             continue
-        if probe.name in draft.case.network_places and probe.name not in parts["nodes"]:  # PUMP.shaft
-            draft.network.fill_node_probe(draft, row, probe.name, False)
-        elif probe.part == "nodes" and probe.name not in parts["nodes"]:  # a point of a body, or of the world
+        if probe.part == "nodes" and probe.name not in parts["nodes"]:  # a point of a body, or of the world
             lower_body_point(draft, row, probe)
         else:
             part = parts[probe.part][probe.name]

@@ -10,9 +10,9 @@ def state_bounds(model) -> tuple[np.ndarray, np.ndarray]:
 
     at : int64[3 q]  a bounded state, and up to two states that give the amount of which it is a share, else -1
     by : float64[q, 4]  base and gain of this amount, least share, greatest share
-    Bounds of masses come before those of amounts that they hold, because features are asked in the order of slots.
+    Bounds of meshes come first, because depths bound amounts in the water.
     """
-    rows: list = []
+    rows = [row for part in model.meshed for row in part.bounds()]
     for feature in model.features:
         rows += feature.bounds(model)
     if not rows:

@@ -437,7 +437,7 @@ class Run:
             ledger[:, : len(model.node_names)].sum(axis=0),
             [Event(t, *model.events[k]) for t, k in loop.switched],
         )
-        held = [mark for own in self.run_data.features for mark in own.marks(self.start, loop.t, entered)]
+        held = [mark for own in self.run_data.features for mark in own.held_marks(self.start, loop.t, entered)]
         unsupplied, losses = found.unsupplied_demands(self.run_data, (self.start, loop.t), entered, events)
         warnings += unsupplied + found.undetermined_notices(self.run_data)
         events = sorted([*events, *losses], key=lambda event: event.time)

@@ -23,7 +23,7 @@ def energy_refusal(case, feature) -> str:
     return ""
 
 
-def add_accounts(accounts, basins: list) -> None:
+def end_accounts(accounts, basins: list) -> None:
     """Add the accounts of moving walls, then those of basins, in the order of `kernels.energy_rows`."""
     names = [f"{basin.name}.{patch}" for basin in basins for patch in basin.walls]
     for name, row in zip(names, accounts.model.tables.walls, strict=True):

@@ -10,6 +10,7 @@ import numpy as np
 
 from fvsolve.core.assembly.features import Feature, FeatureRun
 from fvsolve.core.assembly.model_draft import aligned_zeros
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.features.basins import lower
 
 # functions of the loads on bodies of water at rest, and of water at rest on moving walls
@@ -18,17 +19,19 @@ WALL_LOADS = ("moving_walls: push_bodies_at_rest",)
 PACKAGE = "fvsolve.features.basins"
 
 
-class Basins(Feature, slot=2, wakes="kind basin, kind conduit"):
-    """Basins of a case. meshed : `BasinRows` of each, in the order of their table"""
+class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
+    """Basins of a case. meshed : `BasinRows` of each, in the order of their table; walls : table of moving walls"""
 
     def __init__(self, case, given_up=()) -> None:
         super().__init__(case, given_up)
         self.meshed: list[Any] = []
+        self.walls = np.zeros(0, rec.WALL)
 
     # build ----------
 
     def lower_behind_nodes(self, draft) -> None:
         lower.lower_basins(draft, self)
+        self.walls = draft.wall_table
 
     def probe(self, draft, probe, row) -> bool:
         from fvsolve.features.basins.lower_probes import lower_probe
@@ -98,11 +101,6 @@ class Basins(Feature, slot=2, wakes="kind basin, kind conduit"):
         for basin in self.meshed:
             basin.states_of(weights)[:] = basin.weights(basin.deviations(y))
 
-    def bounds(self, model) -> list[tuple[np.ndarray, np.ndarray]]:
-        from fvsolve.features.basins.bounds import depths
-
-        return [*depths(self.meshed)]
-
     def masses(self, model, y: np.ndarray) -> Iterator[tuple[float, float]]:
         for basin in self.meshed:
             rest, per = basin.mass()
@@ -118,8 +116,8 @@ class Basins(Feature, slot=2, wakes="kind basin, kind conduit"):
     def open_nodes(self, model) -> set[int]:
         return {int(row["node"]) for row in model.tables.patches if row["open"]}
 
-    def driving_schedules(self, model) -> list[int]:
-        return [int(row["schedule"]) for row in model.tables.walls]
+    def driven(self) -> set[int]:
+        return {int(k) for k in self.walls["schedule"]}
 
     def held_tables(self, tables, t: float) -> dict[str, np.ndarray]:
         """Tables in which given velocities that reverse periodically are held."""
@@ -140,10 +138,10 @@ class Basins(Feature, slot=2, wakes="kind basin, kind conduit"):
 
         return energy_refusal(self.case, self)
 
-    def add_accounts(self, accounts) -> None:
-        from fvsolve.features.basins.accounts import add_accounts
+    def end_accounts(self, accounts) -> None:
+        from fvsolve.features.basins.accounts import end_accounts
 
-        add_accounts(accounts, self.meshed)
+        end_accounts(accounts, self.meshed)
 
     def add_fields(self, fields: dict, model, y: np.ndarray, out: np.ndarray) -> None:
         for basin in self.meshed:
@@ -168,7 +166,7 @@ class BasinRun(FeatureRun):
         plane[:] = tables.plane
         return {"plane": plane, "basins": tables.basins.copy()}
 
-    def compute_all_loads(self) -> None:
+    def for_energy(self) -> None:
         if any(basin.row["frame"] >= 0 for basin in self.feature.meshed):
             self.run_data.tables.basins["loads_body"] = 1
 
@@ -180,7 +178,7 @@ class BasinRun(FeatureRun):
                 found.append(basin.greatest_outflow(patch, work))
         return found
 
-    def marks(self, start: float, t: float, entered: np.ndarray) -> list:
+    def held_marks(self, start: float, t: float, entered: np.ndarray) -> list:
         if not np.isin(self.run_data.tables.patches["closure"], lower.HELD).any():
             return []
         from fvsolve.features.basins.held_discharges import held_discharges

@@ -14,6 +14,7 @@ from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.core.assembly.scheme_codes import code_of_limiter, family
 from fvsolve.core.assembly.state_names import Numbered
 from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.model.state_bounds import NO_STATE, bound_rows
 from fvsolve.core.schemes import LIMITERS, SCHEMES
 from fvsolve.core.steppers.analysis.stability_properties import ssp_radius
 from fvsolve.core.steppers.tableau import METHODS
@@ -456,6 +457,18 @@ class BasinRows(BandedRows):
     def depth_of(self, y: np.ndarray) -> np.ndarray:
         """Depth of each cell over which amounts of scalars are distributed, at deviations y : float64[n]."""
         return np.ones(self.n)
+
+    def bounds(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Yield `bound_rows` that keep depths of water at 0 or above, and limit velocities between steps.
+
+        With bed friction, a velocity between two steps lies between those of the steps.
+        """
+        states, none = int(self.row["y"]) + np.arange(self.n), NO_STATE
+        if self.deep:
+            yield bound_rows(states, none, none, self.at_rest(), 0.0, -1.0, np.inf)
+        if self.fades > 0.0 and self.row["friction"] != rec.NO_DRAG:
+            for k in range(1, len(self.quantities)):
+                yield bound_rows(states + k * self.n, states, none, self.at_rest(), 1.0, self.fades, -1.0)
 
     def start_scalars(self, y: np.ndarray) -> None:
         """Write the amounts of scalars at the start to the states y of the model, for the depths of cells in y."""

@@ -61,7 +61,7 @@ class BasinPattern(FeaturePattern):
         cells = self.integers[row["first"] : row["first"] + row["count"]]
         return pattern.cell_states(self.basins[row["basin"]], cells, quantities)
 
-    def pressure(self, i: int) -> np.ndarray | None:
+    def sets_pressure(self, i: int) -> np.ndarray | None:
         """First quantity of the cells behind a patch, and the travels of walls of its basin."""
         if i not in self.patches:
             return None

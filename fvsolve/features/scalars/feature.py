@@ -37,10 +37,10 @@ VISCOSITY = RhsTerms(rates="viscosity: viscous_friction")
 EXCHANGERS = RhsTerms(outlet_values="fluid_heat: node_temperatures", scalar_rates="potential_networks: network_rates")
 
 
-class Scalars(Feature, slot=3, wakes="section scalars, section reactions"):
+class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
     """Scalars, reactions and heat of a case."""
 
-    def lower_behind_nodes(self, draft) -> None:
+    def lower_behind_meshes(self, draft) -> None:
         lower.lower_scalars(draft)
         reactions.lower_reactions(draft)
 
