@@ -1,4 +1,4 @@
-"""Exact solutions, which a case file names under `[exact]`."""
+"""Exact solutions, which a case file names under `[exact]`; may import kernels and fluids of `core`."""
 
 import re
 from collections.abc import Iterator
