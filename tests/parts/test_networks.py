@@ -4,11 +4,11 @@ from math import exp, pi, sqrt
 
 import numpy as np
 import pytest
+from reference.element_networks import GROUND, network, runs, two_port
 from reference.folders import CASES
+from reference.resumed_runs import killed_and_resumed, same_files
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.cli.printing import exit_code
@@ -22,26 +22,6 @@ from fvsolve.studies.loops.loop import loop
 
 EXACT = 1e-9
 METHODS = ["dormand-prince", "radau-iia-5", "rodas-5p", "auto"]
-GROUND = {"gnd": {"type": "ground"}}
-
-
-def network(nodes, links, end=1.0, probes=None, **more):
-    """Case of a network without fluid; nodes given as a list of names are terminals."""
-    if isinstance(nodes, str):
-        nodes = GROUND | {name: {"type": "terminal"} for name in nodes.split()}
-    numerics = {"end": end, "rtol": 1e-11, **more.pop("numerics", {})}
-    output = {"every": end / 40} | ({"probes": probes} if probes else {})
-    return {"schema": 1, "nodes": nodes, "links": links, "numerics": numerics, "output": output, **more}
-
-
-def two_port(kind, start, stop, **keys):
-    return {"type": kind, "from": start, "to": stop, **keys}
-
-
-def runs(case, method="dormand-prince", **set):
-    run = fvsolve.run(case, {"numerics.method": method} | set)
-    assert run.ok, run.reason
-    return run
 
 
 def jump(before, after, time=0.0):

@@ -7,12 +7,11 @@ from math import pi
 
 import numpy as np
 import pytest
-from model.test_sparsity import stray
-from parts.test_networks import GROUND, network, runs, two_port
+from reference.element_networks import GROUND, network, runs, two_port
+from reference.jacobians import stray
+from reference.resumed_runs import killed_and_resumed, same_files
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.errors import CaseError
