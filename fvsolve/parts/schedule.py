@@ -10,7 +10,6 @@ import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
-from fvsolve.parts.csv_rows import copy_name, find_file, read_columns, split_header
 from fvsolve.parts.table_model import keys_json, read_keys
 from fvsolve.parts.value import NEEDED, Choice, Number, Quantity, Range, ReadContext, Rows, Text, Value, ValueFault
 from fvsolve.units import DIMENSIONS, UNITS, begins_as_quantity, expected, is_number_with_unit, may_be_gauge, show
@@ -222,6 +221,8 @@ class Scheduled(Value):
         return Schedule("harmonic", (-np.inf, np.inf), reach, 1.0, values, (mean, amplitude, period, phase))
 
     def _read_file(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
+        from fvsolve.parts.csv_rows import copy_name, find_file, read_columns, split_header
+
         values = read_keys(given, self.forms["file"], setting)
         kind = values["kind"]
         try:
