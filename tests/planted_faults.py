@@ -129,7 +129,7 @@ FAULTS = [
     Fault("exchange/fmi/variables.py", "inputs + list({variable.name", "inputs[:-1] + list({variable.name"),
     Fault("studies/loops/sampled.py", "self.drive * (1.0 + z[place])", "self.drive * (1.0 - z[place])"),
     Fault(
-        "core/model/network_elimination.py",
+        "features/networks/elimination.py",
         "scale = (1.0, -1.0, -item.value, item.value)",
         "scale = (1.0, -1.0, item.value, -item.value)",
     ),

@@ -4,9 +4,9 @@ import math
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.core.assembly.mechanics import PushLowering, join_ports
-from fvsolve.core.assembly.network_elements import fill_network_probe
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.hydraulic_nodes import Chamber
+from fvsolve.parts.network_elements import fill_network_probe
 from fvsolve.parts.network_parts import dry_friction
 from fvsolve.parts.nodes_and_links import Link, Ports
 from fvsolve.parts.table_model import CaseContext, Faults, Nested, Table

@@ -8,10 +8,10 @@ from pydantic import Field
 
 from fvsolve.core.assembly.lowering import FORCE, Input, rows_in
 from fvsolve.core.assembly.mechanics import AxisLowering, PushLowering, join_ports
-from fvsolve.core.assembly.network_elements import CAPACITY, FLOW, Element
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
 from fvsolve.parts.body import NamedPoints
+from fvsolve.parts.network_elements import CAPACITY, FLOW, Element
 from fvsolve.parts.nodes_and_links import Coupling, Node
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import CaseContext, Faults

@@ -12,6 +12,7 @@ from reference.scenes import pipe, reservoir, scene
 import fvsolve
 from fvsolve.case.changes import CLASSES, changes, declaration_of
 from fvsolve.errors import FvsolveError
+from fvsolve.parts.network_elements import network_of
 from fvsolve.parts.value import SHAPE
 
 # keys of class `shape` that do not change the shape of the shipped case; a separate test shows that they can
@@ -32,8 +33,8 @@ def form(model) -> tuple:
     tables = {name: (table.shape, *(table[column].tobytes() for column in whole_columns(table)))
               for name, table in zip(model.tables._fields, model.tables, strict=True)}  # fmt: skip
     tables["integers"] = model.tables.integers.tobytes()
-    if model.network is not None:
-        tables["network"] = model.network.arrays(model.network.conducting)[0].tobytes()
+    if (network := network_of(model)) is not None:
+        tables["network"] = network.arrays(network.conducting)[0].tobytes()
     names = (model.state_names, model.node_names, model.link_names, model.valve_names, model.column_names,
              model.piston_names, model.mass_names, model.events, [probe.text for probe in model.probes])  # fmt: skip
     return tables, names, model.shapes
@@ -48,7 +49,7 @@ def start(model) -> list[bytes]:
     tables = model.tables
     flows = [table["flow"].tobytes() for table in (tables.pipes, tables.columns, tables.valves)]
     profile = [profile.tobytes() for _, profile in sorted(model.profiles.items())]
-    flows += [] if model.network is None else [model.network.values.tobytes()]
+    flows += [] if network_of(model) is None else [network_of(model).values.tobytes()]
     return [model.start.tobytes(), tables.nodes["pressure"].tobytes(), *flows, *profile]
 
 

@@ -237,7 +237,8 @@ class Accounts:
             self.accounts.append(Account("law", name, "rigid column", (at, at + 1, at + 2), (1, -1, -1)))
         self.network_rows = self.power_count  # rows of power that `kernels.network_energy` fills
         self.mechanics()
-        self.networks()
+        for feature in model.features:
+            feature.add_accounts(self)
         self.bodies()
         self.devices()
         self.walls()
@@ -304,19 +305,6 @@ class Accounts:
             self.add("dissipated", name, "leak", at)
             self.add("dissipated", name, "friction", at + 1)
             self.add("law", name, "cylinder", at + 2)
-
-    def networks(self) -> None:
-        """Accounts of the parts of a network of rotation, electricity and heat."""
-        network = self.model.network
-        for item in network.booked if network is not None else ():
-            at, (group, _, name) = self.take(1), item.part.partition(".")
-            part = getattr(self.model.case, group)[name]
-            loss_of_other = item.ledger == "dissipated" and not part.in_network  # such as friction of a cylinder
-            kind = item.name.rpartition(".")[2] if loss_of_other else part.kind.replace("-", " ")
-            stores = item.ledger == "stored"
-            self.hold(name, kind, at if stores else None)
-            if not stores and item.ledger and item.heat_to is None:
-                self.add(item.ledger, name, kind, at)
 
     def bodies(self) -> None:
         for name in self.model.bushing_names:

@@ -112,7 +112,8 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     elongations = Elongations(model, y)
     stored |= {e: (names[e], row) for e, row in chamber_rows(model, y, elongations)}
     parts = [*stored.values(), *spring_rows(model, y, elongations), *device_rows(model, y)]
-    parts += [*kinetic_rows(model, y), *joint_spring_rows(model), *network_rows(model)]
+    parts += [*kinetic_rows(model, y), *joint_spring_rows(model)]
+    parts += [row for feature in model.features for row in feature.energy_rows(model)]
     entries = [(k, i, value) for k, (_, row) in enumerate(parts) for i, value in row.items()]
     row, column, value = (np.array(column_values) for column_values in zip(*entries, strict=True))
     matrix = csr_array((value, (row, column)), shape=(len(parts), model.y_size))
@@ -202,17 +203,6 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
     for feature in model.features:
         feature.weigh(model, weights)
     return weights
-
-
-def network_rows(model):
-    """Yield (name, state -> factor) of each row of L for stores of networks, except those of pumps and masses."""
-    network = model.network
-    for column, item in network.stores.items() if network is not None else ():
-        if item.state_of is None:
-            size = np.sqrt(0.5 * item.value * (SCALAR_WEIGHT if item.thermal else 1.0))
-            terms = network.dependent.get(column, {column: 1.0})
-            row = {network.states[c]: float(size * value * network.stores[c].unit) for c, value in terms.items()}
-            yield item.part.partition(".")[2], row
 
 
 def spring_rows(model, y: np.ndarray, elongations: Elongations):

@@ -7,7 +7,7 @@ from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.table_handle import make_handle
 from fvsolve.core.model.run_data import zeros_for_run
 
-PACKAGE = "fvsolve"  # package of the kernel functions
+PACKAGE = "fvsolve.core"  # package of the kernel functions
 FOLDER = "kernels.mechanism"
 MOTION, LINES = f"{FOLDER}.body_kinematics: kinematics", f"{FOLDER}.bushings_and_pins: add_element_forces"
 WEIGH, ACCELERATE = f"{FOLDER}.mass_matrix: start_mass_matrix", f"{FOLDER}.mass_matrix: solve_accelerations"

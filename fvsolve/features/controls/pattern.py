@@ -57,6 +57,9 @@ class BlockCouplings(FeaturePattern):
     def sensor(self, row) -> np.ndarray:
         """States on which the value of a sensor depends."""
         model, kind, i = self.model, row["kind"], int(row["index"])
+        for own in model.features:
+            if (states := own.probe(row)) is not None:
+                return states
         if kind == rec.LEVEL or (kind == rec.PRESSURE and not model.inner[i]):
             return unique_states(model.pressure_states(i), self.schedule(model.nodes[i]["schedule"]))
         if kind == rec.PRESSURE:
@@ -65,8 +68,6 @@ class BlockCouplings(FeaturePattern):
             return unique_states(model.masses[i] + (kind == rec.VELOCITY))
         if kind in (rec.PISTON_POSITION, rec.PISTON_VELOCITY):
             return model.places(model.pistons[i], int(kind == rec.PISTON_VELOCITY))
-        if kind == rec.NETWORK_VALUE:
-            return model.probe_states(row)
         if kind == rec.VALVE_FLOW:
             link = model.valves[i]
             ends = (model.sets[link[end]] for end in ("from_node", "to_node"))
