@@ -37,7 +37,7 @@ def test_stations_on_the_way_of_a_run_exist():
         assert not method or re.search(rf"^    def {method}\b", source, re.MULTILINE), f"{path}: {method}"
 
 
-def test_each_folder_says_what_it_holds_and_what_it_may_import():
+def test_docstrings_of_folders_state_contents_and_imports():
     page = (DOCS / "developing.md").read_text("utf-8").partition("## How a run goes")[0]
     folders = {path.parent.name for path in PACKAGE.glob("*/__init__.py")} - {"data"}
     named = {
