@@ -39,7 +39,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/data": (12, 1),
     "fvsolve/exact": (1482, 7),
     "fvsolve/exchange": (1, 1),
-    "fvsolve/features": (22828, 142),
+    "fvsolve/features": (22837, 142),
     "fvsolve/parts": (19959, 133),
     "fvsolve/report": (4973, 21),
     "fvsolve/studies": (17428, 67),
