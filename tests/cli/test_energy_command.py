@@ -215,4 +215,4 @@ def test_an_ordinary_run_loads_its_balance_for_the_watch_and_nothing_of_the_comm
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     watch = ["kernels.energy_rows", "kernels.energy_supply", "kernels.network_energy", "kernels.pipe_energy",
              "model.energy_accounts"]  # fmt: skip
-    assert said.stdout.strip() == str([f"fvsolve.{name}" for name in [*watch, "solve.energy_watch"]])
+    assert said.stdout.strip() == str([f"fvsolve.core.{name}" for name in [*watch, "solve.energy_watch"]])

@@ -70,7 +70,7 @@ def test_a_name_that_no_method_has(command_in_folder, tmp_path):
 
 def test_a_picture_of_all_methods_is_refused(command_in_folder):
     code, _, err = command_in_folder("methods", "--out", "all.png")
-    assert code == 2 and "Add the NAME" in err
+    assert code == 2 and "; add the NAME" in err
 
 
 def test_a_picture_of_an_unknown_kind_is_refused(command_in_folder):

@@ -258,7 +258,7 @@ def test_the_command_shows_its_runs(fvs, tmp_path) -> None:
     said = json.loads(text)
     assert status == 1 and said["value"] is None and said["nearest"]["value"] == 30.0
     status, text, _ = fvs("size", str(tmp_path / "still.toml"), "--vary", "nodes.lake.head=20,30")
-    assert status == 1 and "the nearest to the limits is 30" in text and "Try values above it" in text
+    assert status == 1 and "the nearest to the limits is 30" in text and "; try values above it" in text
     assert {"value", "bracket", "runs"} <= set(said)
 
 

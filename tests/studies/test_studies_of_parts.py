@@ -299,7 +299,7 @@ def test_a_chart_of_lines_is_judged_by_cells():
 
 def test_a_chart_of_lines_has_steps_and_no_more():
     for asked in ({"schemes": ["upwind"]}, {"cells": [10]}, {"rtol": [1e-3]}):
-        with pytest.raises(FvsolveError, match="Use step for their resolution"):
+        with pytest.raises(FvsolveError, match="; use step for their resolution"):
             studies.chart(rough(), **asked)
     with pytest.raises(FvsolveError, match="if delay lines are exact, any step is accurate"):
         studies.chart(main(2.0, every=0.0499), methods=["euler"], step=[0.05])
