@@ -337,7 +337,7 @@ def sum_listed_jumps(past, places, at, t):
     The list must not be empty.
     """
     count = int(past[at + JUMP_COUNT])
-    # Usually all jumps of the list were sent before t, and no search is needed.
+    # If the last jump was sent by t, all were, and no search is needed.
     if past[jump_place(past, places, at, count - 1)] > t:
         count = first_after(past, places, at, t)
     return sum_of_first(past, places, at, count)
@@ -395,7 +395,7 @@ def insert_jump(past, places, at, t, size):
     """
     queue, count, tolerance = int(past[JUMP_CAPACITY]), int(past[at + JUMP_COUNT]), time_tolerance(past)
     i = count
-    # A new jump is nearly always the latest, so the search begins at the end of the list.
+    # From the end of the list, because jumps are inserted mostly in the order of their times.
     while i > 0 and past[jump_place(past, places, at, i - 1)] > t + tolerance:
         i -= 1
     before = jump_place(past, places, at, max(i - 1, 0))
