@@ -415,7 +415,7 @@ def smoothed_error(handle, r, t, h, now, new, error, shift):
         d[i] = shift * f[i]
     run_handle.call_solve(r.calls[run_handle.REAL_SOLVE], r.structure, r.factors, d)
     for i in range(y.size):
-        w = 1.0 / (size * (scale[i] + max(abs(y[i]), abs(y_new[i]))))
+        w = 1.0 / (size * error_scale(scale[i], max(abs(y[i]), abs(y_new[i]))))
         plain += (w * f[i]) * (w * f[i])
         dot += (w * f[i]) * (w * d[i])
         smooth += (w * d[i]) * (w * d[i])
