@@ -32,7 +32,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve": (1605, 12),
     "tests": (1086, 8),
     "benchmarks": (9597, 64),
-    "fvsolve/case": (8409, 30),
+    "fvsolve/case": (8414, 30),
     "fvsolve/cli": (3753, 19),
     "fvsolve/compile": (1590, 9),
     "fvsolve/core": (752, 3),
