@@ -7,14 +7,14 @@ import numpy as np
 
 from fvsolve.core.assembly.features import FeaturePattern, with_slot
 from fvsolve.core.basins import lower_pattern as pattern
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.pipe_energy import MAX_WIDTH
 from fvsolve.core.model.jacobian_pattern import Pairs, ends_of
 from fvsolve.core.model.state_pairs import pairs_of, unique_states
 from fvsolve.core.steady import union
 from fvsolve.features.scalars.lower import STORES
 from fvsolve.features.scalars.reactions import names_read
-from fvsolve.parts.network_elements import SLOT
+from fvsolve.parts import law_elements as codes
+from fvsolve.parts.law_elements import SLOT
 
 LIMITER_CELLS = 2  # cells that a limited value at a face reads on each side; at an end of a pipe, 1 more
 
@@ -33,7 +33,7 @@ class ScalarPattern(FeaturePattern):
         yield from reaction_pairs(self.couplings, model)
 
     def source(self, row) -> np.ndarray | None:
-        if row["kind"] != rec.FLUID_HEAT:
+        if row["kind"] != codes.FLUID_HEAT:
             return None
         node = int(self.couplings.model.tables.exchangers[int(row["index"])]["node"])
         return unique_states(self.temperature.values[node], *self.temperature.through[node])
