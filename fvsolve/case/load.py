@@ -135,11 +135,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     output = read_output(reading, numerics, kinds)
     kinds["run_up"] = run_up_kinds(reading, output)
     expect, compare = claims.read_expectations(reading, kinds, routes), claims.read_comparisons(reading, kinds)
-    validation = None
-    if "validation" in reading.raw.table:
-        from fvsolve.case.validation_table import read_validation
-
-        validation = read_validation(reading, kinds, routes)
+    validation = read_validation_table(reading, kinds, routes)
     limits = claims.read_limits(reading, kinds, routes, parts.links, state, general["gravity"])
     check_parts(reading, cut, parts, state, numerics, general["gravity"])
     cells = has_cells(cut.table)
@@ -166,6 +162,15 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
         exact=named, energy=energy, copies=dict(setting.files), read=reading.read, validation=validation,
     )  # fmt: skip
     return case if named is None else with_exact(reading, case)
+
+
+def read_validation_table(reading: Reading, kinds: dict[str, Any], routes: dict[str, Any]) -> Any:
+    """Table `validation`; None without one."""
+    if "validation" not in reading.raw.table:
+        return None
+    from fvsolve.case.validation_table import read_validation
+
+    return read_validation(reading, kinds, routes)
 
 
 def read_energy(reading: Reading, parts: Parts) -> "EnergyUse | None":

@@ -22,7 +22,6 @@ import numpy as np
 from fvsolve import attitude, units
 from fvsolve.case import checks
 from fvsolve.case.bodies import joint_coordinate
-from fvsolve.core.basins.lower import basin_start
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.mechanics_tables import pushed_masses
 from fvsolve.core.model.static_forces import (
@@ -85,10 +84,8 @@ class Configuration(StaticForces):
         first = int(self.layout["pressure"])
         for row in self.draft.piston_table:
             self.out[[first + row["a"], first + row["b"]]] = 0.0
-        if (self.draft.basin_table["frame"] >= 0).any():
-            level = basin_start(self.draft.basins, self.draft.size, self.attitudes())
-            for basin in self.draft.basins:
-                basin.states_of(self.y)[:] = basin.states_of(level)
+        for feature in self.draft.features:
+            feature.level(self.draft, self.y, self.attitudes)
 
     def force(self, y: np.ndarray) -> np.ndarray:
         """Generalised forces in a configuration : float64[size] [N], [N m], on joint freedoms, then on masses."""
@@ -384,8 +381,8 @@ def refuse_overturned(at: Configuration, y: np.ndarray) -> None:
     at.force(y)
     if at.out[rec.STATUS] != rec.NO_WEIGHT:
         return
-    where = int(at.out[rec.WHERE]) - len(at.draft.basins)
-    name = list(at.draft.case.places)[where] if where >= 0 else at.draft.basins[where].name
+    names = [*(part.name for part in at.draft.meshed), *at.draft.case.places]
+    name = names[int(at.out[rec.WHERE])]
     text = f"{name} is turned over in the equilibrium found, and its contents would run out"
     at.draft.fault(f"nodes.{name}", f'{text}; hold the body upright, state another position, or use initial = "steady"')
 

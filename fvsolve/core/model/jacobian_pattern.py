@@ -3,8 +3,7 @@
 Cells of a pipe depend on their neighbours within the reach of the scheme. A node depends on the edge cells of all its
 pipes, and cells whose stencil crosses a pipe end depend on the same cells. Tanks, chambers and given pressures separate
 groups of nodes: their pressure follows from their own states, except that chambers of cylinders also depend on their
-masses. Cells of a basin depend on the cells around them (`basins.lower_pattern`). A patch is a node whose pressure is
-set by the cells behind it.
+masses. Features state the couplings of their own states, and of nodes whose pressure they set.
 """
 
 from collections.abc import Iterator
@@ -12,8 +11,6 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.sparse import coo_array, csc_array
 
-from fvsolve.core.basins import lower_pattern as pattern
-from fvsolve.core.basins.lower_pattern import all_states
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.state_pairs import pairs_of, unique_states
 from fvsolve.core.schemes import SCHEMES, Reach
@@ -56,8 +53,7 @@ class Couplings:
         joined = [[int(self.bodies[i]["root"]) for i in pair] for pair in joined if min(pair) >= 0]
         self.ties = union(len(self.bodies), joined)
         self.devices, self.parts, self.floats = tables.devices, model.devices, tables.floats
-        self.model, self.basins, self.integers, self.walls = model, model.basins, tables.integers, tables.walls
-        self.patches = {int(row["node"]): row for row in tables.patches}
+        self.integers = tables.integers
         self.features = [feature.pattern(self) for feature in model.features]
         self.sets: list[np.ndarray] = []
         self.sets = self.pressures()  # for each node, the states that set its pressure
@@ -72,34 +68,14 @@ class Couplings:
             yield from self.beyond(pipe)
             yield from self.friction_memory_pairs(pipe)
             yield from self.creep_pairs(pipe)
-        for basin in self.basins:
-            yield pattern.interior_pattern(basin)
-            if basin.soil is not None:
-                yield pattern.source_pattern(basin)
-        yield from self.boundary_pairs()
         yield from self.stored()
         for column in self.columns:
             yield pairs_of(unique_states(column["y"]), unique_states(*(self.sets[i] for i in ends_of(column))))
         yield from self.moving()
         yield from self.device_pairs()
-        yield from self.wall_pairs()
         yield from self.moving_fluid_pairs()
         for own in self.features:
             yield from own.pairs()
-
-    def boundary_pairs(self) -> Iterator[Pairs]:
-        """Yield couplings of the flow through open patches of basins with the cells there."""
-        for i, row in self.patches.items():
-            basin, behind = self.basins[row["basin"]], row["ring"] + row["faces"]
-            if row["open"]:
-                cells = pattern.cells_read(pattern.neighbours(basin), self.integers[behind : behind + row["faces"]])
-                yield pairs_of(unique_states(self.size + i), pattern.cell_states(basin, cells))
-            joint = rec.DISCHARGE, rec.RATING, *pattern.THROUGH_FACES  # one level for all faces
-            if row["closure"] in joint or (row["closure"] == rec.STAGE and row["neighbours"] >= 0):
-                read = unique_states(
-                    self.behind(i), pattern.cell_states(basin, pattern.cells_at_faces(self.integers, row))
-                )
-                yield pairs_of(self.behind(i), read)
 
     # nodes ------------------------------------------------------------------------------------------------------
 
@@ -120,29 +96,14 @@ class Couplings:
         y = self.nodes["y"][i]
         return np.array([y] if y >= 0 else [], dtype=np.int64)
 
-    def behind(self, i: int, quantities: int | None = None) -> np.ndarray:
-        """States of the cells behind patch i; empty for other nodes.
-
-        quantities : number of quantities of the basin that are included, from the first on; None for all
-        """
-        if i not in self.patches:
-            return unique_states()
-        row = self.patches[i]
-        cells = self.integers[row["first"] : row["first"] + row["count"]]
-        return pattern.cell_states(self.basins[row["basin"]], cells, quantities)
-
     def pressure_states(self, i: int) -> np.ndarray:
-        """Indices of the states that set the pressure of a storing node or a patch.
+        """Indices of the states that set the pressure of a storing node, or of one whose pressure a feature sets.
 
-        For a node they are its mass, positions of pistons and states of its device. For a patch they are the first
-        quantity of the cells behind it, and the travels of walls of its basin.
+        For a storing node they are its mass, positions of pistons and states of its device.
         """
-        if i in self.patches and self.patches[i]["closure"] in pattern.THROUGH_FACES:
-            row = self.patches[i]
-            read = pattern.cells_at_faces(self.integers, row)
-            return unique_states(self.behind(i), pattern.cell_states(self.basins[row["basin"]], read))
-        if i in self.patches:
-            return unique_states(self.behind(i, 1), *(self.walls["y"][self.walls["basin"] == self.patches[i]["basin"]]))
+        for own in self.features:
+            if (states := own.sets_pressure(i)) is not None:
+                return states
         given = self.schedule(self.nodes["schedule"][i])
         of_devices = (self.device_states(row) for row in self.devices if row["row"] >= 0 and row["node"] == i)
         of_pistons = (self.places(row, 0) for row in self.pistons if i in (row["a"], row["b"]))
@@ -253,7 +214,7 @@ class Couplings:
         return [joined[group[i]] if self.inner[i] else self.pressure_states(i) for i in range(len(group))]
 
     def stored(self) -> Iterator[Pairs]:
-        """Yield pairs (rates, states) of the masses in tanks, chambers and patches, and of the mass ledger.
+        """Yield pairs (rates, states) of the masses in nodes and in what they feed, and of the mass ledger.
 
         The states are those that determine the flows into them.
         """
@@ -273,7 +234,8 @@ class Couplings:
             for i, other in ((row["a"], row["b"]), (row["b"], row["a"])):
                 into[i] += [swept, *([self.pressure_states(other)] if row["leakage"] > 0.0 else [])]
         for i in np.flatnonzero(~self.inner):
-            yield pairs_of(unique_states(self.own(i), self.behind(i), self.size + i), unique_states(*into[i]))
+            fed = (own.fed(i) for own in self.features)
+            yield pairs_of(unique_states(self.own(i), *fed, self.size + i), unique_states(*into[i]))
 
     def moving(self) -> Iterator[Pairs]:
         """Yield couplings of positions of masses with their velocities, and of these with adjacent masses and chambers.
@@ -328,33 +290,14 @@ class Couplings:
                 if "rod" in row.dtype.names:
                     yield from (self.own(row["a"]), self.own(row["b"]))
 
-    def wall_pairs(self) -> Iterator[Pairs]:
-        """Yield couplings of basin cells with the travel of moving walls, and of this travel with masses and bodies.
-
-        The masses and bodies are those that move the walls; their couplings with the cells at the walls are included.
-        """
-        for wall in self.walls:
-            basin, mass = self.basins[wall["basin"]], self.masses[wall["mass"]] if wall["mass"] >= 0 else -1
-            speed = unique_states(mass + 1) if mass >= 0 else unique_states()
-            if wall["body"] >= 0:
-                speed = self.joint_states(self.bodies[wall["body"]], 1)
-            yield pairs_of(pattern.all_states(basin), unique_states(wall["y"], speed))
-            yield pairs_of(unique_states(wall["y"]), speed)
-            behind = self.integers[wall["faces"] + wall["count"] :][: wall["count"]]
-            cells = pattern.cells_read(pattern.neighbours(basin), behind)
-            yield pairs_of(speed, unique_states(wall["y"], pattern.cell_states(basin, cells)))
-
     def moving_fluid_pairs(self) -> Iterator[Pairs]:
         """Yield couplings of fluid on bodies and of the bodies that it moves.
 
         They depend on each other, and on chambers that push the bodies.
         """
         trees: dict[int, list] = {}
-        for basin in self.basins:
-            if basin.row["body"] >= 0:
-                trees.setdefault(self.tree_root(self.bodies[basin.row["body"]]["root"]), []).append(
-                    pattern.all_states(basin)
-                )
+        for body, states in (pair for own in self.features for pair in own.on_bodies()):
+            trees.setdefault(self.tree_root(self.bodies[body]["root"]), []).append(states)
         for index, cells in self.moving_fluid_states() if len(self.moving_segments) else ():
             trees.setdefault(self.tree_root(self.bodies[self.moving_segments[index]["body"]]["root"]), []).append(cells)
         for root, cells in trees.items():
@@ -484,7 +427,7 @@ def jacobian_pattern(model) -> csc_array:
 
 
 def lumped_states(model) -> np.ndarray:
-    """Indices of all states except waves in cells of pipes, states of basins and travels of their walls : int64[q].
+    """Indices of all states except waves in cells of pipes, and states of meshes : int64[q].
 
     Most are states of lumped parts such as tanks, chambers and masses. Their pressures are hundreds of bars, while the
     flow of restrictions bends within a few pascals. The result is empty under density laws whose pressures come from
@@ -493,6 +436,6 @@ def lumped_states(model) -> np.ndarray:
     if model.case.law.name not in ("linear", "log"):  # pressures come from iterations, rougher than rounding
         return np.zeros(0, dtype=np.int64)
     pipes = model.tables.pipes[model.tables.pipes["cells"] > 0]
-    cells = [pipe["y"] + np.arange(2 * pipe["cells"]) for pipe in pipes] + [all_states(basin) for basin in model.basins]
-    walls = [[at for at, _, _ in basin.stretches] for basin in model.basins]  # every cell's volume follows these
-    return np.setdiff1d(np.arange(model.y_size), np.concatenate([[], *cells, *walls]))
+    cells = [pipe["y"] + np.arange(2 * pipe["cells"]) for pipe in pipes]
+    cells += [states for feature in model.features for states in feature.cell_states(model)]
+    return np.setdiff1d(np.arange(model.y_size), np.concatenate([[], *cells]))

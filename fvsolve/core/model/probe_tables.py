@@ -19,14 +19,7 @@ def fill_probes(draft, probes: list) -> np.ndarray:
         row["mark"] = -1
         if any(feature.probe(draft, probe, row) for feature in draft.features):
             continue
-        if probe.part == "sections":
-            lower_section(draft, row, probe)
-        elif probe.point is not None:
-            lower_basin_point(draft, row, probe)
-        elif probe.part == "nodes" and probe.name in case.meshes:
-            row["kind"], row["index"] = rec.CELL_FIELD, list(case.meshes).index(probe.name)
-            draft.basins[row["index"]].lower_probe(row, probe.quantity, np.zeros(0, int), np.zeros(0))
-        elif probe.part == "nodes" and probe.name not in parts["nodes"]:  # a point of a body, or of the world
+        if probe.part == "nodes" and probe.name not in parts["nodes"]:  # a point of a body, or of the world
             lower_body_point(draft, row, probe)
         else:
             part = parts[probe.part][probe.name]
@@ -48,19 +41,10 @@ def lower_body_point(draft, row, probe) -> None:
     row["index"] = point_row(draft, probe.name)
 
 
-def lower_basin_point(draft, row, probe) -> None:
-    """Fill the row of a probe at a point of a basin."""
-    if probe.name in draft.case.lumped:
-        return lower_surface(draft, row, probe)
-    row["kind"] = rec.CELL_FIELD
-    cells, weights = cells_at_point(draft, row, probe)
-    draft.basins[row["index"]].lower_probe(row, probe.quantity, cells, weights)
-
-
 def cells_at_point(draft, row, probe) -> tuple[np.ndarray, np.ndarray]:
-    """Cells of a basin that a probe at a point reads, and their weights, after they are written to its row."""
+    """Cells of a mesh that a probe at a point reads, and their weights, after they are written to its row."""
     k = list(draft.case.meshes).index(probe.name)
-    cells, weights = draft.basins[k].points.cell_weights(*probe.point)
+    cells, weights = draft.meshed[k].points.cell_weights(*probe.point)
     row["index"], row["count"], row["cell"] = k, cells.size, len(draft.integers)
     row["weights"] = len(draft.floats)
     draft.integers += cells.tolist()
@@ -68,35 +52,10 @@ def cells_at_point(draft, row, probe) -> tuple[np.ndarray, np.ndarray]:
     return cells, weights
 
 
-def lower_section(draft, row, probe) -> None:
-    """Fill the row of a probe of the flow through a section: its marked faces, and their lengths with signs."""
-    name = draft.case.output.sections[probe.name].basin
-    k = list(draft.case.meshes).index(name)
-    basin = draft.basins[k]
-    chain = basin.sections[probe.name]
-    row["kind"], row["index"], row["count"] = rec.SECTION_FLOW, k, chain.faces.size
-    row["cell"], row["weights"] = len(draft.integers), len(draft.floats)
-    draft.integers += np.searchsorted(basin.marks.faces, chain.faces).tolist()
-    draft.floats += (chain.turn * basin.mesh.length[chain.faces]).tolist()
-
-
-def lower_surface(draft, row, probe) -> None:
-    """Fill the row of a probe of depth at a point of a basin with sloshing modes."""
-    from fvsolve.case import sloshing
-
-    case, basin = draft.case, draft.case.nodes[probe.name]
-    arguments = basin, case.lumped[probe.name]
-    modes, shares = sloshing.surface_factors(*arguments, *probe.point, case.properties.density, case.gravity)
-    row["kind"], row["offset"] = rec.SURFACE_VALUE, sloshing.depth_of(*arguments)
-    row["cell"], row["count"], row["weights"] = len(draft.integers), len(modes), len(draft.floats)
-    draft.integers += [draft.body_names.index(sloshing.mode_body_name(probe.name, mode)) for mode in modes]
-    draft.floats += shares
-
-
 def probe_offsets(draft, start) -> None:
     """Set scale and offset of the probes of nodes, links and masses from the initial steady state.
 
-    Probes of basins and bodies, and of forces on pipes, do not need them. Also sets the steady pressures of watched
+    Probes of meshes and bodies, and of forces on pipes, do not need them. Also sets the steady pressures of watched
     quantities along pipes.
     """
     count = len(draft.case.probes)
@@ -109,7 +68,7 @@ def probe_offsets(draft, start) -> None:
         pairs += zip(*feature.probe_rows(), strict=True)
     for row, probe in pairs:
         if row["kind"] >= rec.CELL_FIELD and row["kind"] != rec.PRESSURE_BETWEEN:
-            continue  # basins hold the profile of theirs, the others need none
+            continue  # meshes hold the profile of theirs, the others need none
         if draft.case.law.linear:
             linear_offsets(draft, start, row, probe)
         else:

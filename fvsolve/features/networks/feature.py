@@ -59,8 +59,13 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
 
     # build ----------
 
+<<<<<<< HEAD
     def lower_behind_basins(self, draft) -> None:
         self.network = lower.lower_network(self, draft)
+=======
+    def lower_behind_meshes(self, draft) -> None:
+        self.network = lower.lower_network(draft)
+>>>>>>> 51411def8b032de1b6cbc25fe62f9a03f84b155e
 
     def probe(self, draft, probe, row) -> bool:
         case = draft.case
