@@ -59,13 +59,8 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
 
     # build ----------
 
-<<<<<<< HEAD
-    def lower_behind_basins(self, draft) -> None:
-        self.network = lower.lower_network(self, draft)
-=======
     def lower_behind_meshes(self, draft) -> None:
-        self.network = lower.lower_network(draft)
->>>>>>> 51411def8b032de1b6cbc25fe62f9a03f84b155e
+        self.network = lower.lower_network(self, draft)
 
     def probe(self, draft, probe, row) -> bool:
         case = draft.case
@@ -128,7 +123,7 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
             found.append(("first", SHAFTS))
             if (model.tables.schedules["pieces"] == 0).any():  # schedules that features set after `prepare`
                 found.append(("pipes", DRIVEN_SHAFTS))
-        return found + ([("basins", EXCHANGERS)] if len(model.tables.exchangers) else [])
+        return found + ([("carried", EXCHANGERS)] if len(model.tables.exchangers) else [])
 
     def run(self, run_data) -> FeatureRun:
         return FeatureRun(self, run_data) if self.network is None else NetworkRun(self, run_data)

@@ -108,13 +108,7 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
             if heated:
                 yield "carried", HEAT[linear]
             if cast.pipes and (tables.pipes["temperature"] > 0.0).any():
-<<<<<<< HEAD
-                yield "basins", VISCOSITY
-=======
                 yield "carried", VISCOSITY
-            if len(tables.exchangers):
-                yield "carried", EXCHANGERS
->>>>>>> 51411def8b032de1b6cbc25fe62f9a03f84b155e
         if len(tables.reactions):  # those in basins are added later
             yield "carried", REACTIONS
 

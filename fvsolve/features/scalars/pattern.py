@@ -6,11 +6,6 @@ from functools import cached_property
 import numpy as np
 
 from fvsolve.core.assembly.features import FeaturePattern, with_slot
-<<<<<<< HEAD
-from fvsolve.core.basins import lower_pattern as pattern
-=======
-from fvsolve.core.kernels import dtypes as rec
->>>>>>> 51411def8b032de1b6cbc25fe62f9a03f84b155e
 from fvsolve.core.kernels.pipe_energy import MAX_WIDTH
 from fvsolve.core.model.jacobian_pattern import Pairs, ends_of
 from fvsolve.core.model.state_pairs import pairs_of, unique_states
@@ -18,7 +13,6 @@ from fvsolve.core.steady import union
 from fvsolve.features.scalars.lower import STORES
 from fvsolve.features.scalars.reactions import names_read
 from fvsolve.parts import law_elements as codes
-from fvsolve.parts.law_elements import SLOT
 
 LIMITER_CELLS = 2  # cells that a limited value at a face reads on each side; at an end of a pipe, 1 more
 
@@ -76,7 +70,7 @@ class ScalarCouplings:
         self.heated, self.tables = self.row["specific_heat"] > 0.0, model.tables
         self.heat_end = int(model.layout["extent"] - model.layout["supply"])  # rows of the ledger up to that of heat
         for exchanger in self.tables.exchangers if self.heated else ():
-            self.through[exchanger["node"]].append(with_slot(of.features, SLOT).row_states(exchanger["place"]))
+            self.through[exchanger["node"]].append(with_slot(of.features, codes.SLOT).row_states(exchanger["place"]))
         for source in self.tables.heat_sources if self.heated else ():
             for i in ends_of(of.valves[source["valve"]]):
                 self.through[i] += self.heat_states(source)
