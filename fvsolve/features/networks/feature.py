@@ -51,7 +51,7 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
         self.start_speeds: dict[int, float] = {}
         self.begun = None
         self.known: tuple = (None, {})
-        self.sources, self.rates = np.zeros(0, tables.NETWORK_INPUT), np.zeros(0, tables.NETWORK_RATE)
+        self.source_table, self.rates = np.zeros(0, tables.NETWORK_INPUT), np.zeros(0, tables.NETWORK_RATE)
         self.elements, self.switches = np.zeros(0, tables.NETWORK_ELEMENT), np.zeros(0, tables.NETWORK_SWITCH)
         self.settings = np.zeros(1, tables.NETWORK_SETTINGS)
         self.shafts: list[str] = []
@@ -74,7 +74,7 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
 
     def reserve(self, draft) -> None:
         draft.sizes.out("shaft", len(self.shafts))
-        draft.sizes.out("network", len(self.sources))
+        draft.sizes.out("network", len(self.source_table))
 
     def placed(self, draft) -> None:
         self.settings[0]["inputs"] = draft.sizes.offsets["network"]
@@ -105,12 +105,16 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
     def copy_for(self, case) -> Networks:
         own = copy.copy(self)
         own.case, own.start_speeds, own.known = case, dict(self.start_speeds), (None, {})
-        own.sources, own.elements, own.switches = self.sources.copy(), self.elements.copy(), self.switches.copy()
+        own.source_table, own.elements, own.switches = (
+            self.source_table.copy(),
+            self.elements.copy(),
+            self.switches.copy(),
+        )
         return own
 
     def close(self, draft) -> None:
         self.begun, self.known = None, (None, {})
-        for array in (self.sources, self.rates, self.elements, self.switches, self.settings):
+        for array in (self.source_table, self.rates, self.elements, self.switches, self.settings):
             array.flags.writeable = False
 
     # model ----------
@@ -168,7 +172,7 @@ class NetworkRun(FeatureRun):
     def tables(self, view: str = "") -> tables.NetworkTables:
         own = self.feature
         return tables.NetworkTables(
-            own.sources, own.rates, own.elements, own.switches, own.settings, own.turned, own.turned_devices,
+            own.source_table, own.rates, own.elements, own.switches, own.settings, own.turned, own.turned_devices,
             self.places, self.factors,
         )  # fmt: skip
 
@@ -196,7 +200,7 @@ class NetworkRun(FeatureRun):
         if not network.switches:
             return ""
         mode = network.mode_of(run_data.armed)
-        at, inputs = int(self.feature.settings[0]["inputs"]), self.feature.sources
+        at, inputs = int(self.feature.settings[0]["inputs"]), self.feature.source_table
         sources = inputs["start"] + run_data.written.spare[at : at + len(inputs)]
         if text := network.fault_in(mode, y, sources):
             if (mode := network.commutated(mode, y, sources)) is None:

@@ -131,8 +131,8 @@ def probed_angles(case) -> list[str]:
 
 def fill_tables(own, draft, network: Network) -> None:
     """Fill the tables of sources, rates, elements with power, switches, and shafts that devices read."""
-    own.sources = np.zeros(len(network.sources), NETWORK_INPUT)
-    for item, row in zip(network.sources, own.sources, strict=True):
+    own.source_table = np.zeros(len(network.sources), NETWORK_INPUT)
+    for item, row in zip(network.sources, own.source_table, strict=True):
         row["sign"] = 1.0
         if item.reads is None:
             row["kind"], row["index"] = codes.SCHEDULE_INPUT, network.schedules[item.part, item.key]

@@ -17,7 +17,7 @@ class NetworkCouplings(FeaturePattern):
     def __init__(self, feature, couplings) -> None:
         super().__init__(feature)
         self.couplings, self.network = couplings, feature.network
-        self.sources, self.switches = feature.sources, feature.switches
+        self.source_table, self.switches = feature.source_table, feature.switches
 
     def pairs(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yield couplings of the stores of networks with each other, and with what their sources follow."""
@@ -52,7 +52,7 @@ class NetworkCouplings(FeaturePattern):
 
     def source_states(self, j: int) -> np.ndarray:
         """States on which a source of a network depends."""
-        row, network, model = self.sources[j], self.network, self.couplings
+        row, network, model = self.source_table[j], self.network, self.couplings
         i = int(row["index"])
         if row["kind"] == codes.SCHEDULE_INPUT:
             return model.schedule(i)

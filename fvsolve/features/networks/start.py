@@ -336,7 +336,7 @@ class NetworkStart:
         """Write the start to the tables and event flags of the draft."""
         draft, network = self.draft, self.network
         self.own.network = network = replace(network, values=self.values.copy(), written={})
-        self.own.sources["start"] = [self.values[network.columns[item.name]] for item in network.sources]
+        self.own.source_table["start"] = [self.values[network.columns[item.name]] for item in network.sources]
         for k, switch in enumerate(self.switches):
             flag = network.flags[switch.name]
             if switch.kind == codes.FRICTION:
