@@ -133,7 +133,7 @@ FAULTS = [
         "scale = (1.0, -1.0, -item.value, item.value)",
         "scale = (1.0, -1.0, item.value, -item.value)",
     ),
-    Fault("core/kernels/potential_networks.py", "forward = most - torque", "forward = 1.01 * most - torque"),
+    Fault("features/networks/kernels/networks.py", "forward = most - torque", "forward = 1.01 * most - torque"),
     Fault(
         "features/controls/kernels/input_histories.py",
         "weight *= (time - other) / (histories[here] - other)",

@@ -209,7 +209,7 @@ class Case(Displayable):
 
     @cached_property
     def network_places(self) -> frozenset[str]:
-        """Places of a network of rotation, electricity and heat: its nodes, and other places that its links join."""
+        """Nodes of rotation, electricity and heat, and other places that links between such nodes join."""
         own = [name for name, node in self.nodes.items() if node.domain in NETWORK_DOMAINS]
         return frozenset([*own, *(place for link in self.links.values() for place in link.network_places)])
 

@@ -18,7 +18,7 @@ Faults = Iterator[tuple[tuple, str]]
 WORLD = ""  # root of all bodies; it has no name
 
 
-def network(table: dict[str, Any]) -> Faults:
+def connection_faults(table: dict[str, Any]) -> Faults:
     """Faults (key path, message) of connections of a case: unknown names, unconnected nodes, wrong domains.
 
     Further faults are separate networks, networks in which no part sets a pressure, and junctions that join only rigid

@@ -113,18 +113,18 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
         reading.setting.span = times.start, times.end
     reading.setting.step = numerics.step if numerics is not None else None
     check_names(reading)
-    network = part_reading.cut_pipes(reading, state, numerics)
+    cut = part_reading.cut_pipes(reading, state, numerics)
     scalars = read_scalars(reading)
     reactions: dict[str, Any] = {}
     if "reactions" in reading.raw.table:
         from fvsolve.case.reactions import reaction_kinds, read_reactions
 
         reactions = read_reactions(reading, scalars)
-    parts = part_reading.read_parts(reading, network)
+    parts = part_reading.read_parts(reading, cut)
     scalars = fill_specific_heats(reading, scalars, parts.links, state)
     check_unused_signals(reading)
-    kinds = part_reading.place_kinds(network, parts, scalars, bool(reading.faults))
-    routes = read_routes(reading, network, parts.links)
+    kinds = part_reading.place_kinds(cut, parts, scalars, bool(reading.faults))
+    routes = read_routes(reading, cut, parts.links)
     kinds["routes"] = {name: route and (legs(route, parts.links), parts.links) for name, route in routes.items()}
     kinds["reactions"] = reaction_kinds(reactions) if reactions else {}
     blocks = {}
@@ -137,11 +137,11 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     expect, compare = claims.read_expectations(reading, kinds, routes), claims.read_comparisons(reading, kinds)
     validation = read_validation_table(reading, kinds, routes)
     limits = claims.read_limits(reading, kinds, routes, parts.links, state, general["gravity"])
-    check_parts(reading, network, parts, state, numerics, general["gravity"])
-    cells = has_cells(network.table)
-    check_times(reading, network, parts, fluid, state, numerics or valid_times(reading), cells, expect)
+    check_parts(reading, cut, parts, state, numerics, general["gravity"])
+    cells = has_cells(cut.table)
+    check_times(reading, cut, parts, fluid, state, numerics or valid_times(reading), cells, expect)
     numerics = fill_numerics(reading, parts, fluid, scalars, numerics, cells)
-    reading.add(checks.scalar_faults(scalars, parts.nodes, parts.links, network.pieces, reading.raw.table))
+    reading.add(checks.scalar_faults(scalars, parts.nodes, parts.links, cut.pieces, reading.raw.table))
     reading.add(checks.scalar_range_faults(scalars, reactions, parts.nodes, parts.links))
     links = part_reading.fill_cells(reading, parts.links, state, numerics)
     if None not in (numerics, output, state) and not reading.faults:
@@ -386,20 +386,20 @@ def valid_times(reading: Reading) -> Numerics | None:
 
 
 def check_parts(
-    reading: Reading, network: chainage.CutTable, parts: Parts, state: Any, numerics: Numerics | None, gravity: float
+    reading: Reading, cut: chainage.CutTable, parts: Parts, state: Any, numerics: Numerics | None, gravity: float
 ) -> None:
     """Check connections, and each part in the context of the others. state : properties of the fluid, None if faulty"""
-    if network.connections_known:
-        reading.add(connections.network(part_reading.network_table(network, parts)))
+    if cut.connections_known:
+        reading.add(connections.connection_faults(part_reading.network_table(cut, parts)))
     start = numerics.start if numerics is not None else 0.0
-    raw, links = replace(reading.raw, table=network.table), parts.links | network.uncut
+    raw, links = replace(reading.raw, table=cut.table), parts.links | cut.uncut
     about = reading.setting.ambient, gravity, state, raw, start
     reading.add(checks.part_faults(parts.nodes, links, *about, parts.meshes, parts.lumped))
 
 
 def check_times(
     reading: Reading,
-    network: chainage.CutTable,
+    cut: chainage.CutTable,
     parts: Parts,
     fluid: FluidSpec | None,
     state: Any,
@@ -417,7 +417,7 @@ def check_times(
     if any(is_kind(node, "basin") for node in parts.nodes.values()):
         from fvsolve.case import basins
 
-        span, named = (times.start, times.end), network.table.get("nodes", {})
+        span, named = (times.start, times.end), cut.table.get("nodes", {})
         reading.add(basins.find_faults(parts.nodes, parts.links, parts.meshes, state, span, named))
     reading.add(checks.claim_faults(expect, times))
 

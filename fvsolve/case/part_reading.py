@@ -58,9 +58,9 @@ def cut_pipes(reading: Reading, properties: Any, numerics: Numerics | None) -> c
     return result
 
 
-def read_parts(reading: Reading, network: chainage.CutTable) -> Parts:
+def read_parts(reading: Reading, cut: chainage.CutTable) -> Parts:
     """Nodes, links and meshes of basins without faults; nodes with the elevations of the pipe profiles at them."""
-    nodes, links = (_read_group(reading, network, group) for group in ("nodes", "links"))
+    nodes, links = (_read_group(reading, cut, group) for group in ("nodes", "links"))
     nodes = inherit_elevations(nodes, links)
     meshes: dict[str, Any] = {}
     lumped: dict[str, Any] = {}
@@ -76,9 +76,9 @@ def read_parts(reading: Reading, network: chainage.CutTable) -> Parts:
     return Parts(sound, links, meshes, lumped)
 
 
-def _read_group(reading: Reading, network: chainage.CutTable, group: str) -> dict[str, Any]:
+def _read_group(reading: Reading, cut: chainage.CutTable, group: str) -> dict[str, Any]:
     """Nodes or links without faults; group : "nodes" or "links"."""
-    table = network.table
+    table = cut.table
     alone = any(connections.kind_name(node) in (*LINKLESS, None) for node in table.get("nodes", {}).values())
     alone = alone or reading.needs_no_fluid
     if group not in table and not (group == "links" and alone or "controls" in table and not table.get("links")):
@@ -90,7 +90,7 @@ def _read_group(reading: Reading, network: chainage.CutTable, group: str) -> dic
             reading.fault((group, name), f"{show(part)} is not a table; expected a table with a type")
             continue
         kind = part_kind(reading, group, name, part)
-        if kind is not None and (group, name) not in network.unreadable:
+        if kind is not None and (group, name) not in cut.unreadable:
             make = functools.partial(read_part, reading, table, kind, part)
             with reading.catch(group, name):
                 result[name] = reading.reuse((group, name), part, make)
@@ -148,12 +148,12 @@ def table_kinds(table: dict[str, Any], group: str) -> dict[str, Any]:
     return {name: kind and kind.variant(with_defaults(table, table[group][name])) for name, kind in kinds.items()}
 
 
-def place_kinds(network: chainage.CutTable, parts: Parts, scalars: dict[str, Any], faulty: bool) -> dict[str, Any]:
+def place_kinds(cut: chainage.CutTable, parts: Parts, scalars: dict[str, Any], faulty: bool) -> dict[str, Any]:
     """Kinds of places and parts that probes may name, as for `read_probe`, without routes.
 
     faulty : True if faults were found, so that points, patches or pieces of some parts may be unknown
     """
-    table = network.table
+    table = cut.table
     nodes, links = table_kinds(table, "nodes"), table_kinds(table, "links")
     bare = [
         name for name, kind in nodes.items() if is_kind(kind, "basin") and name not in (*parts.meshes, *parts.lumped)
@@ -189,13 +189,13 @@ def place_kinds(network: chainage.CutTable, parts: Parts, scalars: dict[str, Any
     return {"nodes": nodes, "links": links, "scalars": scalars, "uncut": dict.fromkeys(uncut), "pipes": pipes}
 
 
-def network_table(network: chainage.CutTable, parts: Parts) -> dict[str, Any]:
+def network_table(cut: chainage.CutTable, parts: Parts) -> dict[str, Any]:
     """Nested dicts of the case for the check of connections, in which basins have all patches of their meshes.
 
     A basin with a faulty mesh file has the patches that links name. A node that cannot be read is replaced by a
     junction; links that cannot be read are left out, except pipes.
     """
-    nodes, links = network.table.get("nodes", {}), network.table.get("links", {})
+    nodes, links = cut.table.get("nodes", {}), cut.table.get("links", {})
     patches = {}
     for name, mesh in parts.meshes.items():
         from fvsolve.case import basins
@@ -204,16 +204,16 @@ def network_table(network: chainage.CutTable, parts: Parts) -> dict[str, Any]:
     lost = [name for name, part in nodes.items()
             if connections.has_mesh_file(part) and name not in (*parts.meshes, *parts.lumped)]  # fmt: skip
     patches |= {name: connections.named_places(name, links) for name in lost}
-    if not patches and not network.unreadable:
-        return network.table
+    if not patches and not cut.unreadable:
+        return cut.table
     own = {}
     for name, names in patches.items():
         given = nodes[name].get("patches")  # a value of another type is a fault of its own
         own[name] = {**nodes[name], "patches": dict.fromkeys(names, {}) | (given if isinstance(given, dict) else {})}
-    own |= {name: {"type": "junction"} for group, name in network.unreadable if group == "nodes"}
-    unfit = [name for group, name in network.unreadable if group == "links" and not chainage.is_pipe(links[name])]
+    own |= {name: {"type": "junction"} for group, name in cut.unreadable if group == "nodes"}
+    unfit = [name for group, name in cut.unreadable if group == "links" and not chainage.is_pipe(links[name])]
     links = {name: part for name, part in links.items() if name not in unfit}
-    return {**network.table, "nodes": {**nodes, **own}, "links": links}
+    return {**cut.table, "nodes": {**nodes, **own}, "links": links}
 
 
 def fill_cells(reading: Reading, links: dict[str, Any], properties: Any, numerics: Numerics | None) -> dict[str, Any]:

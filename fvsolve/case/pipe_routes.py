@@ -206,9 +206,9 @@ def legs(route: Route, links: dict[str, Any]) -> list[Leg]:
     return result
 
 
-def read_routes(reading: Reading, network: CutTable, links: dict[str, Any]) -> dict[str, Route | None]:
+def read_routes(reading: Reading, cut: CutTable, links: dict[str, Any]) -> dict[str, Route | None]:
     """Routes by name; None for a faulty route. links : links without faults"""
-    table, result = network.table, {}
+    table, result = cut.table, {}
     named, odd = table.get("links", {}), set()
     for name, given in table.get("routes", {}).items():
         result[name] = None
@@ -217,13 +217,13 @@ def read_routes(reading: Reading, network: CutTable, links: dict[str, Any]) -> d
             reading.fault(("routes", name), text)
             continue
         with reading.catch("routes", name):
-            result[name] = expand_pieces(Route.model_validate(given, context=reading.setting), network.pieces, links)
+            result[name] = expand_pieces(Route.model_validate(given, context=reading.setting), cut.pieces, links)
             continue
         odd.add(name)
         with suppress(KeyError, TypeError, ValueError):
             pipes = Route.values()["pipes"].read(given["pipes"], reading.setting)
-            result[name] = expand_pieces(Route.model_construct(pipes=pipes), network.pieces, links)
-    faulty = list(route_faults(result, links, named, network.pieces)) if network.connections_known else []
+            result[name] = expand_pieces(Route.model_construct(pipes=pipes), cut.pieces, links)
+    faulty = list(route_faults(result, links, named, cut.pieces)) if cut.connections_known else []
     reading.add(faulty)
     lost = odd | {keys[1] for keys, _ in faulty}
     pipes = {name for name, link in links.items() if link.kind == "pipe"}

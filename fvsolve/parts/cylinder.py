@@ -5,6 +5,7 @@ from typing import Annotated, Any, ClassVar
 
 from fvsolve.core.assembly.mechanics import PushLowering, join_ports
 from fvsolve.core.kernels import dtypes as rec
+from fvsolve.parts import law_elements as codes
 from fvsolve.parts.hydraulic_nodes import Chamber
 from fvsolve.parts.network_elements import fill_network_probe
 from fvsolve.parts.network_parts import dry_friction
@@ -185,7 +186,7 @@ class CylinderRows(PushLowering, kind="cylinder"):
     def probe(self, draft, name, probe, row) -> None:
         if probe.quantity == "force" and draft.case.links[name].has_dry_friction:
             fill_network_probe(draft, row, f"links.{name}", "all flows")
-            row["side"], row["cell"] = rec.NET_PUSH, draft.push_names.index(name)
+            row["side"], row["cell"] = codes.NET_PUSH, draft.push_names.index(name)
             return None
         if probe.quantity == "force":
             return super().probe(draft, name, probe, row)

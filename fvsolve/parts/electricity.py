@@ -7,7 +7,7 @@ from pydantic import Field
 
 from fvsolve.core.assembly.lowering import VALUE as ANY_VALUE
 from fvsolve.core.assembly.lowering import InputKind
-from fvsolve.core.kernels import dtypes as rec
+from fvsolve.parts import law_elements as codes
 from fvsolve.parts.network_elements import (
     CAPACITY,
     FLOW,
@@ -244,7 +244,7 @@ class SwitchRows(NetworkRows, kind="switch"):
         place = f"links.{name}"
         found = [Element(RESISTANCE, place, place, ends_of(case, part), part.resistance, switch=place,
                          ledger="dissipated")]  # fmt: skip
-        return found, [Switch(rec.SWITCH, place, place, place, place, (0.0,), part.closed, "closed")]
+        return found, [Switch(codes.SWITCH, place, place, place, place, (0.0,), part.closed, "closed")]
 
     def probe(self, draft, name, probe, row) -> None:
         reads = "all flows" if probe.quantity == "current" else "drop"
@@ -277,7 +277,7 @@ class DiodeRows(NetworkRows, kind="diode"):
                     ledger="dissipated"),
             Element(POTENTIAL, f"{place}.forward", place, (inner, second), schedule=constant(part.forward_voltage),
                     switch=place, ledger="dissipated"),
-        ], [Switch(rec.DIODE, place, place, place, f"{place}.forward", (part.forward_voltage,))]  # fmt: skip
+        ], [Switch(codes.DIODE, place, place, place, f"{place}.forward", (part.forward_voltage,))]  # fmt: skip
 
 
 class DcMotor(Link, kind="dc-motor"):

@@ -6,8 +6,8 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from fvsolve.core.assembly.lowering import InputKind
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.errors import article
+from fvsolve.parts import law_elements as codes
 from fvsolve.parts.network_elements import (
     CAPACITY,
     FLOW,
@@ -209,7 +209,7 @@ class HeatExchangerRows(NetworkRows, kind="heat-exchanger"):
 
     def network_elements(self, case, name: str, part: Any):
         place, to = f"links.{name}", node_or_reference(case, part.to)
-        return [Element(FLOW, place, place, (None, to), reads=(rec.FLUID_HEAT, name), ledger="supplied",
+        return [Element(FLOW, place, place, (None, to), reads=(codes.FLUID_HEAT, name), ledger="supplied",
                         thermal=True)], []  # fmt: skip
 
 

@@ -10,9 +10,8 @@ from typing import Any, ClassVar, NamedTuple
 
 from fvsolve.core.assembly.features import with_slot
 from fvsolve.core.assembly.lowering import Input, InputKind, Lowering
-from fvsolve.core.kernels import dtypes as rec
+from fvsolve.parts import law_elements as codes
 
-SLOT = 3  # of the feature `networks`
 CAPACITY, INERTANCE, RESISTANCE, POTENTIAL, FLOW, TRANSFORMER, LOCK, GAUGE = range(8)
 """Kinds of elements: flow = value d potential / dt; potential = value d flow / dt; potential = value times flow; given
 potential; given flow; potential 1 = value times potential 2; equal potentials, with the value as share of the flow of
@@ -66,8 +65,8 @@ class Element(NamedTuple):
 class Switch(NamedTuple):
     """Element that is on or off, as an event flag tells.
 
-    kind : rec.SWITCH, rec.DIODE or rec.FRICTION, which is on while it sticks; schedule : what closes a switch, or the
-    torque of a clutch, with its key
+    kind : SWITCH, DIODE or FRICTION of `law_elements`, which is on while it sticks; schedule : what closes a switch, or
+    the torque of a clutch, with its key
     drop, flow : names of the elements whose difference of potentials and whose flow decide
     numbers : forward voltage of a diode; of friction: kinetic torque, greatest torque at rest, speed of the exponential
     (0 for none); factor of the torque at rest on a scheduled torque
@@ -107,15 +106,15 @@ class NetworkRows(Lowering):
 
 def network_of(owner) -> Any:
     """Network (`features.networks.network.Network`) of a draft or model; None without one."""
-    own = with_slot(owner.features, SLOT)
+    own = with_slot(owner.features, codes.SLOT)
     return None if own is None else own.network
 
 
 def fill_network_probe(draft, row, element: str, reads: str, sign: float = 1.0) -> None:
     """Fill the row of a probe that reads an element of the network; arguments as in `NetworkRows.quantities`."""
     network = network_of(draft)
-    row["kind"], row["scale"] = rec.NETWORK_VALUE, sign
-    row["side"] = {"power": rec.POWER, "entropy": rec.ENTROPY, "locked": rec.LOCKED}.get(reads, rec.ROW)
+    row["kind"], row["scale"] = codes.NETWORK_VALUE, sign
+    row["side"] = {"power": codes.POWER, "entropy": codes.ENTROPY, "locked": codes.LOCKED}.get(reads, codes.ROW)
     if reads == "locked":
         row["index"] = network.flags[element]
     elif reads == "all flows":

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from fvsolve.core.kernels import dtypes as rec
+from fvsolve.parts import law_elements as codes
 from fvsolve.parts.network_elements import (
     FLOW,
     LOCK,
@@ -62,9 +62,9 @@ def dry_friction(
 
     numbers : as those of `Switch`; torque : schedule of the torque of a clutch
     """
-    switch = Switch(rec.FRICTION, place, place, f"{place}.friction", f"{place}.lock", numbers, torque, "torque")
+    switch = Switch(codes.FRICTION, place, place, f"{place}.friction", f"{place}.lock", numbers, torque, "torque")
     return [
-        Element(FLOW, f"{place}.friction", place, ends, reads=(rec.FRICTION_FLOW, place), ledger="dissipated",
+        Element(FLOW, f"{place}.friction", place, ends, reads=(codes.FRICTION_FLOW, place), ledger="dissipated",
                 heat_to=heat_to),
         Element(LOCK, f"{place}.lock", place, ends, numbers[1] or 1.0, switch=place),
     ], [switch]  # fmt: skip

@@ -9,6 +9,7 @@ from pydantic import Field
 from fvsolve.core.assembly.lowering import FORCE, Input, rows_in
 from fvsolve.core.assembly.mechanics import AxisLowering, PushLowering, join_ports
 from fvsolve.core.kernels import dtypes as rec
+from fvsolve.parts import law_elements as codes
 from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
 from fvsolve.parts.body import NamedPoints
 from fvsolve.parts.network_elements import CAPACITY, FLOW, Element
@@ -48,7 +49,7 @@ class MassRows(AxisLowering, kind="mass"):
         mass = case.nodes_with_water[name].mass
         return [
             Element(CAPACITY, place, place, (name, None), mass, f"{name}.velocity", state_of=("mass", name)),
-            Element(FLOW, f"{place}.force", place, (None, name), reads=(rec.FORCE_INPUT, name)),
+            Element(FLOW, f"{place}.force", place, (None, name), reads=(codes.FORCE_INPUT, name)),
         ], []  # fmt: skip
 
 

@@ -393,6 +393,10 @@ class FeatureRun:
         """Arrays of float64 that a state needs in addition to y, by the name in its memory; they may grow."""
         return {}
 
+    def coefficients(self) -> list[np.ndarray]:
+        """Arrays of numbers of 8 bytes that follow from the event flags, in addition to `arrays`."""
+        return []
+
     def store(self, name: str, values: np.ndarray) -> bool:
         """Set one of `arrays`; True if it is a new array. The base writes into the array, which does not grow."""
         self.arrays()[name][:] = values

@@ -264,10 +264,6 @@ class ModelDraft:
     wall_table: np.ndarray = no_rows(rec.WALL)
     coupling_table: np.ndarray = no_rows(rec.COUPLING)
     probe_table: np.ndarray = no_rows(rec.PROBE)
-    network_input_table: np.ndarray = no_rows(rec.NETWORK_INPUT)
-    network_rate_table: np.ndarray = no_rows(rec.NETWORK_RATE)
-    network_element_table: np.ndarray = no_rows(rec.NETWORK_ELEMENT)
-    network_switch_table: np.ndarray = no_rows(rec.NETWORK_SWITCH)
     start_flags: dict[int, bool] = field(default_factory=dict)  # event flags at the start that no state tells
 
     # results of the start

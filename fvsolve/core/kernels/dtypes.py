@@ -360,44 +360,6 @@ SCHEDULE = record(
 # scale, offset, output u of the block at the start
 PIECE_COLUMNS = 7
 
-NETWORK_INPUT = record(  # source of a network of potential and flow, see `kernels.potential_networks`
-    kind=i8,
-    index=i8,  # schedule, device, mass, switch, element or heat exchanger
-    side=i8,  # of a device: quantity that is read
-    sign=f8,
-    start=f8,  # value at the start
-)
-# Sources: a schedule; quantity of a device, such as the torque of the fluid on its shaft; force on a mass; torque of
-# dry friction that slips; heat that an element dissipates; heat from the fluid through a heat exchanger. Later kinds
-# depend on earlier ones.
-SCHEDULE_INPUT, DEVICE_INPUT, FORCE_INPUT, FRICTION_FLOW, HEAT_INPUT, FLUID_HEAT = 0, 1, 2, 3, 4, 5
-
-NETWORK_RATE = record(y=i8)  # state whose rate is the value of the row of the same number
-NETWORK_ELEMENT = record(  # element of a network with power
-    drop=i8,  # row of its difference of potentials
-    flow=i8,  # row of its flow
-    category=i8,  # NOT_BOOKED, STORED, DISSIPATED or SUPPLIED
-    thermal=i8,  # 1 if its flow is a heat flow: then its power is `weight` times the flow
-    weight=f8,
-    capacity=f8,  # of a store of potential, else 0
-    inertance=f8,  # of a store of flow, else 0
-    start=f8,  # potential or flow that it stores at the start
-)
-NOT_BOOKED, STORED, DISSIPATED, SUPPLIED = 0, 1, 2, 3
-NETWORK_SWITCH = record(
-    kind=i8,
-    flag=i8,  # first of two event flags, of friction four
-    schedule=i8,  # of a switch; torque of a clutch; -1 for none
-    drop=i8,  # row of its difference of potentials
-    flow=i8,  # row of its flow, of friction while it sticks
-    forward=f8,  # forward voltage of a diode [V]
-    kinetic=f8,  # friction torque in motion [N m]
-    static=f8,  # greatest friction torque at rest [N m]
-    stribeck=f8,  # speed at which the excess at rest has fallen to 1/e; 0 for none [rad/s]
-    factor=f8,  # greatest torque at rest over a scheduled torque
-    rounding=f8,  # slip of friction, or reverse current of a diode, that is rounding
-)
-SWITCH, DIODE, FRICTION = 0, 1, 2
 
 CLUSTER_RECORD = record(
     first_node=i8,
@@ -449,7 +411,7 @@ LAYOUT = record(
     pin=i8,  # forces of pins, three for each [N]
     body=i8,  # data of bodies, see `kernels.mechanism.body_layout`
     isolated=i8,  # codes of nodes, see `isolated_nodes`
-    network=i8,  # sources of networks: change since the start
+    shaft=i8,  # speeds of shafts that laws of devices read before the nodes are solved [rad/s]
     size=i8,
 )
 BODY_OUT = 45  # numbers of each body in `out`
@@ -491,10 +453,6 @@ WALL_VALUE = 19  # of a moving wall
 BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = 20, 21, 22, 23  # quantity in `side`, see `mechanism.body_values`
 SURFACE_VALUE = 24  # of a surface described by modes
 PIPE_FORCE = 25  # on a whole pipe
-# of a network, by the code in `side`: value of row `index`; times that of row `cell`; row `cell` over its value;
-# 1 while the friction with the flag `index` sticks; force of the force element `cell` minus the value of row `index`
-NETWORK_VALUE = 27
-ROW, POWER, ENTROPY, LOCKED, NET_PUSH = 0, 1, 2, 3, 4
 SCHEDULE_VALUE = 28  # of schedule `index`
 # of a reaction, by the code in `side`: molar flow, power, mean affinity over all places; affinity at a place, whose
 # scalar probe has the kind in `head` and the index in `scalar`
@@ -668,7 +626,7 @@ HEAT_SOURCE = record(  # restriction whose dissipated power heats the fluid wher
 
 EXCHANGER = record(  # heat exchanger between a fluid place and a thermal node
     node=i8,
-    place=i8,  # row of the temperature of the thermal node in the rows of the network
+    place=i8,  # row of the temperature of the thermal node, see `features.networks`
     conductance=f8,  # [W/K]
     effectiveness=f8,
     slowness=f8,  # 1 / heat capacity of the thermal node, 0 for an ambient [K/J]
@@ -722,10 +680,6 @@ RECORDS = {
     "exchangers": EXCHANGER,
     "walls": WALL,
     "couplings": COUPLING,
-    "network_inputs": NETWORK_INPUT,
-    "network_rates": NETWORK_RATE,
-    "network_elements": NETWORK_ELEMENT,
-    "network_switches": NETWORK_SWITCH,
     "reactions": REACTION,
 }
 # `Tables`: of a model, read-only; `RunArrays`: written by a run; `HandleTables`: behind a handle, also addresses of
@@ -735,7 +689,7 @@ RunArrays = namedtuple("RunArrays",
     (
         "clock", "work", "armed", "marks", "scratch", "spare", "seen", "bands", "joint", "sums", "envelope", "extremes",
         "applied", "stack",
-        "network_places", "network_factors", "maxima", "accepted", "features", "memory",
+        "maxima", "accepted", "features", "memory",
     ),
 )  # fmt: skip
 HandleTables = namedtuple("HandleTables", (*Tables._fields, *RunArrays._fields, "calls", "hooks"))
@@ -745,7 +699,6 @@ INTEGERS = (
     "bands",
     "joint",
     "sums",
-    "network_places",
     "features",
     "memory",
     "calls",

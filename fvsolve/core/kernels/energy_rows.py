@@ -1,6 +1,6 @@
 """Index of the first entry of each kind of part at the end of the energy arrays `power` and `stored`.
 
-The order is: elements of networks, bushings, bodies, devices, moving walls, basins.
+The order is: rows of features, bushings, bodies, devices, moving walls, basins.
 """
 
 from fvsolve.jit import njit
@@ -40,12 +40,6 @@ def bushing_power_row(tables, power):
 
 
 @njit(forceinline=True)
-def network_power_row(tables, power):
-    """Index of the first entry of elements of networks in `power`."""
-    return bushing_power_row(tables, power) - tables.network_elements.size
-
-
-@njit(forceinline=True)
 def device_stored_row(tables, stored):
     """Index of the first entry of devices in `stored`."""
     return stored.size - tables.basins.size - tables.devices.size
@@ -61,9 +55,3 @@ def body_stored_row(tables, stored):
 def bushing_stored_row(tables, stored):
     """Index of the first entry of bushings in `stored`."""
     return body_stored_row(tables, stored) - tables.bushings.size
-
-
-@njit(forceinline=True)
-def network_stored_row(tables, stored):
-    """Index of the first entry of elements of networks in `stored`."""
-    return bushing_stored_row(tables, stored) - tables.network_elements.size

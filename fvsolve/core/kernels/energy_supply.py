@@ -136,8 +136,6 @@ def copy_run(run, own):
         size = run.memory[2 * k + 1]
         copy(floats_at(run.memory[2 * k], size), floats_at(own.memory[2 * k], size))
     copy(run.armed, own.armed)
-    copy(run.network_places, own.network_places)
-    copy(run.network_factors, own.network_factors)
     own.clock[0]["limit"], own.clock[0]["step"] = run.clock[0]["limit"], run.clock[0]["step"]
     return True
 

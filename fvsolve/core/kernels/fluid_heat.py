@@ -9,12 +9,11 @@ from fvsolve.core.kernels import calls
 from fvsolve.core.kernels.devices import HEAT, POWER
 from fvsolve.core.kernels.network_energy import total_head, total_pressure
 from fvsolve.core.kernels.pipe_energy import GAUSS_WEIGHTS, at_point, mass_at_point, polynomial_width
-from fvsolve.core.kernels.potential_networks import row_value
 from fvsolve.core.kernels.scalar_transport import heated_scalar
 from fvsolve.core.kernels.steady_friction import drag
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.core.kernels.viscosity import cell_reynolds
-from fvsolve.jit import njit, specialise
+from fvsolve.jit import specialise
 
 POTENTIAL = BAROTROPIC = RESTRICTIONS = None  # constants of the templates
 
@@ -82,23 +81,9 @@ def _heat_of_pipes(t, y, dydt, out, handle):
             out[row] = pipe["dx"] * total
 
 
-@njit
-def node_temperatures(t, y, dydt, out, handle):
-    """Write the temperatures of the thermal nodes of heat exchangers, in the unit of the scalar, to `out`."""
-    tables = open_tables(handle)
-    exchangers, at, zero = (
-        tables.exchangers,
-        tables.layout[0]["exchange"],
-        tables.scalars[heated_scalar(tables)]["zero"],
-    )
-    for k in range(exchangers.size):
-        out[at + 2 * k] = row_value(y, out, tables, exchangers[k]["place"]) - zero
-
-
 def _heat_for_events(t, y, out, handle, g):
-    """Write heat and temperatures of exchangers to `out`, which scalars at nodes follow, before event functions."""
+    """Write the heat of restrictions to `out`, which scalars at nodes follow, before event functions."""
     RESTRICTIONS(t, y, g[:0], out, handle)
-    node_temperatures(t, y, g[:0], out, handle)
 
 
 LINEAR = {"POTENTIAL": total_pressure, "BAROTROPIC": False}

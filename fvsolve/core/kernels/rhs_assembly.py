@@ -25,7 +25,7 @@ class RhsTerms(NamedTuple):
     prepare: str = ""  # from (t, y) alone: conductances, speeds, pressures of vessels
     outgoing_waves: str = ""  # outgoing waves at pipe ends
     known_pressures: str = ""  # pressures of nodes with storage or given pressure, flows from outside
-    decide: str = ""  # outputs of blocks that drive the network, from states alone
+    decide: str = ""  # outputs of blocks that drive restrictions, devices and nodes, from states alone
     inflow: str = ""  # flows of rigid columns into nodes
     solve_nodes: str = ""  # pressures of other nodes, flows of restrictions
     column_nodes: str = ""  # pressures of nodes that only columns determine

@@ -284,8 +284,6 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         stops=draft.stop_table, pistons=draft.piston_table, devices=draft.device_table, basins=draft.basin_table,
         patches=draft.patch_table, scalars=draft.scalar_table, heat_sources=draft.heat_source_table,
         exchangers=draft.exchanger_table, walls=draft.wall_table, couplings=draft.coupling_table,
-        network_inputs=draft.network_input_table, network_rates=draft.network_rate_table,
-        network_elements=draft.network_element_table, network_switches=draft.network_switch_table,
         reactions=draft.reaction_table, integers=np.array(draft.integers, dtype=np.int64),
         floats=np.array(draft.floats, dtype=float), profile=profile, plane=draft.plane(), pieces=pieces,
     )  # fmt: skip

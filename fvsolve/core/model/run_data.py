@@ -94,7 +94,8 @@ class RunData:
         for own in self.features:
             for name, (array, replaced) in own.views().items():
                 views.append(View(array, addresses_of(self.tables._replace(**replaced)), self.feature_tables(name)))
-        written = written._replace(memory=places_in_memory(list(self.arrays().values())))
+        following = [array for own in self.features for array in own.coefficients()]
+        written = written._replace(memory=places_in_memory([*self.arrays().values(), *following]))
         self.kept.append(written.memory)
         return linked_handles(shared, views, written, callables, self.feature_tables(), self.kept)
 

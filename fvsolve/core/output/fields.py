@@ -1,8 +1,8 @@
 """Fields of a run: the index fields.pvd and its .vtu files with the values of all cells at the output times.
 
-Pipes are chains of line cells along the network layout, with the elevation upwards. Bodies are lines from the origin to
-the centre of mass and to the points; force elements are lines, and a sloshing mass is a line from its rest position to
-its position. Cell data are in SI, pressures are absolute, and every array carries its unit as the VTK key UNITS_LABEL.
+Pipes are chains of line cells along their plan, with the elevation upwards. Bodies are lines from the origin to the
+centre of mass and to the points; force elements are lines, and a sloshing mass is a line from its rest position to its
+position. Cell data are in SI, pressures are absolute, and every array carries its unit as the VTK key UNITS_LABEL.
 
 Under MPI each rank writes a .vtu file of its rows of a basin, rank 0 also the .pvtu index. Rank 0 has the values of all
 cells. The other ranks wait for a broadcast of a function to call and its arguments (`solve.parallel_bands`).

@@ -428,7 +428,7 @@ def set_step_mode(control, model: Model) -> None:
 
 
 def cost_of_rates(model: Model) -> float:
-    """Cost of the right-hand side relative to that of rates without a network: 1 and the restrictions of the network.
+    """Cost of the right-hand side relative to that of rates alone: 1 and the number of restrictions in clusters.
 
     They are solved together by Newton's method, which takes about a microsecond for each of them.
     """

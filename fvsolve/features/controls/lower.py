@@ -17,6 +17,7 @@ from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.probe_tables import fill_probes
 from fvsolve.features.controls.kernels.tables import CONTROL, DRIVEN, DRIVEN_DEVICE, DRIVEN_NODE, DRIVEN_VALVE
 from fvsolve.features.controls.rows import control_rows_of, small_change
+from fvsolve.parts import law_elements as codes
 from fvsolve.parts.network_elements import network_of
 
 STATE_KINDS = (rec.LEVEL, rec.POSITION, rec.VELOCITY, rec.PISTON_POSITION, rec.PISTON_VELOCITY)
@@ -152,7 +153,7 @@ def is_known_early(draft, row, probe) -> bool:
     if kind == rec.DEVICE_VALUE:
         name, part, device = draft.devices[row["index"]]
         return probe.quantity in device.states_of(draft, name, part)
-    if kind == rec.NETWORK_VALUE:
+    if kind == codes.NETWORK_VALUE:
         return network_of(draft).is_known_early(row)
     return kind in STATE_KINDS or kind == rec.CELL_FIELD
 
@@ -190,7 +191,7 @@ def check_network_order(draft, name: str, block: Block, rows: dict, numbers: dic
             draft.fault(f"controls.{name}", f"{text}; give [controls.{name}] a `filter`")
     network = network_of(draft)
     for probe in block.inputs if block.control.feeds_through and network is not None else ():
-        if not isinstance(probe, str) and rows[probe.text]["kind"] == rec.NETWORK_VALUE:
+        if not isinstance(probe, str) and rows[probe.text]["kind"] == codes.NETWORK_VALUE:
             if network.follows_blocks(draft, rows[probe.text]):
                 text = f"{probe.text} may follow at once from what a control drives, a loop without a state"
                 draft.fault(f"controls.{name}", f"{text}; give [controls.{name}] a `filter`")
@@ -201,6 +202,6 @@ def follows_scalars(draft, row) -> bool:
     if row["kind"] in (rec.NODE_SCALAR, rec.PIPE_SCALAR, rec.CELL_SCALAR):
         return True
     network = network_of(draft)
-    sources = network.inputs_of(row) if row["kind"] == rec.NETWORK_VALUE else ()
+    sources = network.inputs_of(row) if row["kind"] == codes.NETWORK_VALUE else ()
     reads = (network.sources[j].reads for j in sources)
-    return any(item is not None and item[0] == rec.FLUID_HEAT for item in reads)
+    return any(item is not None and item[0] == codes.FLUID_HEAT for item in reads)

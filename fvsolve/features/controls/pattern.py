@@ -9,6 +9,7 @@ import numpy as np
 from fvsolve.core.assembly.features import FeaturePattern
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.state_pairs import pairs_of, unique_states
+from fvsolve.parts.network_elements import network_of
 
 
 class BlockCouplings(FeaturePattern):
@@ -93,8 +94,8 @@ class BlockCouplings(FeaturePattern):
             yield pairs_of(self.own(k), unique_states(*read))
         tables, network = self.tables, {*self.tables.valves["schedule"], *self.tables.nodes["schedule"]}
         network |= {*tables.valves["command"]}
-        inputs = tables.network_inputs
-        network |= {*inputs["index"][inputs["kind"] == rec.SCHEDULE_INPUT], *tables.network_switches["schedule"]}
+        if (own := network_of(self.model.model)) is not None:
+            network |= {*own.schedules.values()}
         network |= {*tables.devices["schedule"], *tables.braces["schedule"], *self.controls["setpoint"]}
         other = [index for index in self.follows if index not in network]  # shafts, scalars
         if other:

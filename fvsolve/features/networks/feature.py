@@ -11,17 +11,25 @@ from fvsolve.core.assembly.features import Feature, FeatureRun
 from fvsolve.core.kernels.rhs_assembly import RhsTerms
 from fvsolve.features.networks import lower, start
 from fvsolve.features.networks.elimination import NetworkError
+from fvsolve.features.networks.kernels import tables
 from fvsolve.features.networks.network import Network
 
-GIVEN = RhsTerms(events="potential_networks: sources_for_events")
-FOLLOWED = RhsTerms(events="potential_networks: sources_again")
+PACKAGE = "fvsolve.features.networks.kernels"
+SHAFTS = RhsTerms(prepare="networks: turn_shafts", package=PACKAGE)
+DRIVEN_SHAFTS = RhsTerms(decide="networks: drive_shafts", package=PACKAGE)
+GIVEN = RhsTerms(events="networks: sources_for_events", package=PACKAGE)
+FOLLOWED = RhsTerms(events="networks: sources_again", package=PACKAGE)
 TERMS = RhsTerms(
-    rate_limits="potential_networks: known_sources",
-    move="potential_networks: network_rates",
-    observe="potential_networks: observe_networks",
-    events="potential_networks: switch_events",
-    power="potential_networks: power_networks",
-    stored="potential_networks: stored_networks",
+    rate_limits="networks: known_sources",
+    move="networks: network_rates",
+    observe="networks: observe_networks",
+    events="networks: switch_events",
+    power="networks: power_networks",
+    stored="networks: stored_networks",
+    package=PACKAGE,
+)
+EXCHANGERS = RhsTerms(
+    outlet_values="networks: node_temperatures", scalar_rates="networks: network_rates", package=PACKAGE
 )
 
 
@@ -32,6 +40,7 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
     start_speeds : column of the network -> speed found for the start
     begun : steady start with which that of the network was computed, and can be computed again
     known : steady start, and the potentials that are known before its nodes are solved
+    shafts : places whose speeds laws of devices read; other arrays : see `kernels.tables`
     """
 
     single_thread_reason = "parts of rotation, electricity and heat read the whole state"
@@ -42,11 +51,16 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
         self.start_speeds: dict[int, float] = {}
         self.begun = None
         self.known: tuple = (None, {})
+        self.source_table, self.rates = np.zeros(0, tables.NETWORK_INPUT), np.zeros(0, tables.NETWORK_RATE)
+        self.elements, self.switches = np.zeros(0, tables.NETWORK_ELEMENT), np.zeros(0, tables.NETWORK_SWITCH)
+        self.settings = np.zeros(1, tables.NETWORK_SETTINGS)
+        self.shafts: list[str] = []
+        self.turned = self.turned_devices = np.zeros(0, dtype=np.int64)
 
     # build ----------
 
     def lower_behind_meshes(self, draft) -> None:
-        self.network = lower.lower_network(draft)
+        self.network = lower.lower_network(self, draft)
 
     def probe(self, draft, probe, row) -> bool:
         case = draft.case
@@ -59,8 +73,11 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
         return 0.0 if self.network is None else lower.network_rate(self.network)
 
     def reserve(self, draft) -> None:
-        if self.network is not None:
-            lower.reserve_network(draft, self.network)
+        draft.sizes.out("shaft", len(self.shafts))
+        draft.sizes.out("network", len(self.source_table))
+
+    def placed(self, draft) -> None:
+        self.settings[0]["inputs"] = draft.sizes.offsets["network"]
 
     # start ----------
 
@@ -88,17 +105,29 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
     def copy_for(self, case) -> Networks:
         own = copy.copy(self)
         own.case, own.start_speeds, own.known = case, dict(self.start_speeds), (None, {})
+        own.source_table, own.elements, own.switches = (
+            self.source_table.copy(),
+            self.elements.copy(),
+            self.switches.copy(),
+        )
         return own
 
     def close(self, draft) -> None:
         self.begun, self.known = None, (None, {})
+        for array in (self.source_table, self.rates, self.elements, self.switches, self.settings):
+            array.flags.writeable = False
 
     # model ----------
 
     def terms(self, model, cast) -> list[tuple[str, RhsTerms]]:
         if self.network is None:
             return []
-        return [("given", GIVEN), ("followed", FOLLOWED), ("devices", TERMS)]
+        found = [("given", GIVEN), ("followed", FOLLOWED), ("devices", TERMS)]
+        if self.shafts:
+            found.append(("first", SHAFTS))
+            if (model.tables.schedules["pieces"] == 0).any():  # schedules that features set after `prepare`
+                found.append(("pipes", DRIVEN_SHAFTS))
+        return found + ([("carried", EXCHANGERS)] if len(model.tables.exchangers) else [])
 
     def run(self, run_data) -> FeatureRun:
         return FeatureRun(self, run_data) if self.network is None else NetworkRun(self, run_data)
@@ -134,18 +163,31 @@ class NetworkRun(FeatureRun):
 
     def __init__(self, feature: Networks, run_data) -> None:
         super().__init__(feature, run_data)
-        self.network = feature.network
+        self.network = network = feature.network
         self.mode: tuple[bool, ...] | None = None
+        count, capacity = network.rows.count, network.capacity
+        self.places = np.zeros(3 * count + capacity, dtype=np.int64)
+        self.factors = np.zeros(count + capacity)
+
+    def tables(self, view: str = "") -> tables.NetworkTables:
+        own = self.feature
+        return tables.NetworkTables(
+            own.source_table, own.rates, own.elements, own.switches, own.settings, own.turned, own.turned_devices,
+            self.places, self.factors,
+        )  # fmt: skip
+
+    def coefficients(self) -> list[np.ndarray]:
+        return [self.places, self.factors]
 
     def follow_flags(self) -> None:
-        mode, written = self.network.mode_of(self.run_data.armed), self.run_data.written
+        mode = self.network.mode_of(self.run_data.armed)
         if mode == self.mode:
             return
         try:
             places, factors = self.network.arrays(mode)
         except NetworkError:  # the run ends, see `at_event`
             return
-        written.network_places[: places.size], written.network_factors[: factors.size] = places, factors
+        self.places[: places.size], self.factors[: factors.size] = places, factors
         self.mode = mode
 
     def at_event(self, y: np.ndarray) -> str:
@@ -158,7 +200,7 @@ class NetworkRun(FeatureRun):
         if not network.switches:
             return ""
         mode = network.mode_of(run_data.armed)
-        at, inputs = int(run_data.model.layout["network"]), run_data.tables.network_inputs
+        at, inputs = int(self.feature.settings[0]["inputs"]), self.feature.source_table
         sources = inputs["start"] + run_data.written.spare[at : at + len(inputs)]
         if text := network.fault_in(mode, y, sources):
             if (mode := network.commutated(mode, y, sources)) is None:

@@ -11,24 +11,31 @@ from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.static_forces import rounding
 from fvsolve.features.networks.elimination import Elimination, NetworkError, dependent_stores, substituted
 from fvsolve.features.networks.faults import NO_INERTIA, NO_SPEED, network_faults, stated_faults
+from fvsolve.features.networks.kernels.tables import (
+    NETWORK_ELEMENT,
+    NETWORK_INPUT,
+    NETWORK_RATE,
+    NETWORK_SWITCH,
+)
 from fvsolve.features.networks.network import MOST_STATES, Network
+from fvsolve.parts import law_elements as codes
 from fvsolve.parts.heat import exchanger_names
 from fvsolve.parts.network_elements import FLOW, INERTANCE, Element, Switch, node_or_reference
 
 CURRENT_ROUNDING = 1e-13  # of diodes, over the sum of all sources divided by their resistance
 SAMPLES = 12  # times at which responses are computed for the sizes of states
-CATEGORIES = {"": rec.NOT_BOOKED, "stored": rec.STORED, "dissipated": rec.DISSIPATED, "supplied": rec.SUPPLIED}
+CATEGORIES = {"": codes.NOT_BOOKED, "stored": codes.STORED, "dissipated": codes.DISSIPATED, "supplied": codes.SUPPLIED}
 EVENTS = {
-    rec.SWITCH: ("closes", "opens"),
-    rec.DIODE: ("conducts", "blocks"),
-    rec.FRICTION: ("slips forward", "sticks", "slips backward", "sticks"),
+    codes.SWITCH: ("closes", "opens"),
+    codes.DIODE: ("conducts", "blocks"),
+    codes.FRICTION: ("slips forward", "sticks", "slips backward", "sticks"),
 }
 
 
-def lower_network(draft) -> Network | None:
+def lower_network(own, draft) -> Network | None:
     """Fill the tables of the network of a case, and add the states of its stores and of angles that are probed.
 
-    Returns the network, None if the case has no elements or if the network has a fault.
+    Returns the network, None if the case has no elements or if the network has a fault. own : feature of the draft
     """
     elements, switches = parts_of_network(draft.case)
     if not elements:
@@ -61,16 +68,8 @@ def lower_network(draft) -> Network | None:
     network.integrals |= {item.name: state_place(draft, item, 1.0) for item in network.sources if item.state_of}
     for place, text in speed_faults(draft, network):
         draft.fault(place, text)
-    fill_tables(draft, network)
+    fill_tables(own, draft, network)
     return network
-
-
-def reserve_network(draft, network: Network) -> None:
-    """Reserve the arrays of a network: its sources, and the coefficients of the present mode."""
-    draft.sizes.out("network", len(draft.network_input_table))
-    count, capacity = network.rows.count, network.capacity
-    draft.sizes.run_array("network_places", 3 * count + capacity)
-    draft.sizes.run_array("network_factors", count + capacity)
 
 
 def parts_of_network(case) -> tuple[list[Element], list[Switch]]:
@@ -85,7 +84,7 @@ def parts_of_network(case) -> tuple[list[Element], list[Switch]]:
             switches += more
     for item in [item for item in elements if item.heat_to is not None]:
         node = node_or_reference(case, item.heat_to)
-        elements.append(Element(FLOW, f"{item.name}.heat", item.part, (None, node), reads=(rec.HEAT_INPUT, item.name),
+        elements.append(Element(FLOW, f"{item.name}.heat", item.part, (None, node), reads=(codes.HEAT_INPUT, item.name),
                                 thermal=True))  # fmt: skip
     return elements, switches
 
@@ -93,10 +92,10 @@ def parts_of_network(case) -> tuple[list[Element], list[Switch]]:
 def friction_faults(network: Network, found: Elimination) -> Iterator[tuple[str, str]]:
     """Yield a fault (place, text) for each dry friction whose slip depends on a torque of friction at once."""
     torques = {
-        network.columns[item.name] for item in network.sources if item.reads and item.reads[0] == rec.FRICTION_FLOW
+        network.columns[item.name] for item in network.sources if item.reads and item.reads[0] == codes.FRICTION_FLOW
     }
     for switch in network.switches:
-        if switch.kind == rec.FRICTION:
+        if switch.kind == codes.FRICTION:
             terms = found.drop(network.elements[network.numbers[switch.drop]])
             if torques & terms.keys():
                 yield switch.part, NO_INERTIA
@@ -130,48 +129,53 @@ def probed_angles(case) -> list[str]:
                               and case.nodes[p.name].domain == "rotational"))  # fmt: skip
 
 
-def fill_tables(draft, network: Network) -> None:
-    """Fill the tables of sources, rates, elements with power, and switches."""
-    draft.network_input_table = np.zeros(len(network.sources), rec.NETWORK_INPUT)
-    for item, row in zip(network.sources, draft.network_input_table, strict=True):
+def fill_tables(own, draft, network: Network) -> None:
+    """Fill the tables of sources, rates, elements with power, switches, and shafts that devices read."""
+    own.source_table = np.zeros(len(network.sources), NETWORK_INPUT)
+    for item, row in zip(network.sources, own.source_table, strict=True):
         row["sign"] = 1.0
         if item.reads is None:
-            row["kind"], row["index"] = rec.SCHEDULE_INPUT, network.schedules[item.part, item.key]
+            row["kind"], row["index"] = codes.SCHEDULE_INPUT, network.schedules[item.part, item.key]
             continue
         row["kind"], name = item.reads
-        if row["kind"] == rec.DEVICE_INPUT:
+        if row["kind"] == codes.DEVICE_INPUT:
             name, quantity, row["sign"] = name
             row["index"] = draft.device_names.index(name)
             row["side"] = draft.devices[row["index"]][2].quantities.index(quantity)
-        elif row["kind"] == rec.FORCE_INPUT:
+        elif row["kind"] == codes.FORCE_INPUT:
             row["index"] = draft.mass_index[name]
-        elif row["kind"] == rec.FLUID_HEAT:
+        elif row["kind"] == codes.FLUID_HEAT:
             row["index"] = exchanger_names(draft.case).index(name)
-        elif row["kind"] == rec.FRICTION_FLOW:
+        elif row["kind"] == codes.FRICTION_FLOW:
             row["index"] = [switch.name for switch in network.switches].index(name)
         else:
             row["index"] = [other.name for other in network.booked].index(name)
     draft.exchanger_table = exchanger_rows(draft, network)
+    by_shaft = {k: device.turns_with(part) for k, (_, part, device) in enumerate(draft.devices)}
+    devices = [k for k, shaft in by_shaft.items() if shaft is not None]
+    own.shafts = list(dict.fromkeys(by_shaft[k] for k in devices))
+    own.turned = np.array([network.node_row(shaft) for shaft in own.shafts], dtype=np.int64)
+    own.turned_devices = np.array(devices, dtype=np.int64)
     places = [*network.states.values(), *network.integrals.values()]
-    draft.network_rate_table = np.array([(place,) for place in places], rec.NETWORK_RATE)
-    draft.network_element_table = np.zeros(len(network.booked), rec.NETWORK_ELEMENT)
-    for item, row in zip(network.booked, draft.network_element_table, strict=True):
+    own.rates = np.array([(place,) for place in places], NETWORK_RATE)
+    own.elements = np.zeros(len(network.booked), NETWORK_ELEMENT)
+    for item, row in zip(network.booked, own.elements, strict=True):
         row["drop"], row["flow"] = network.rows_of(item.name)
         row["category"] = CATEGORIES["" if item.heat_to is not None else item.ledger]
         row["thermal"], row["weight"] = item.thermal, (item.ends[0] is not None) - (item.ends[1] is not None)
         if item.is_store:
             row["inertance" if item.kind == INERTANCE else "capacity"] = item.value
-    draft.network_switch_table = np.zeros(len(network.switches), rec.NETWORK_SWITCH)
-    for switch, row in zip(network.switches, draft.network_switch_table, strict=True):
+    own.switches = np.zeros(len(network.switches), NETWORK_SWITCH)
+    for switch, row in zip(network.switches, own.switches, strict=True):
         row["kind"], row["flag"] = switch.kind, network.flags[switch.name]
         row["schedule"] = network.schedules.get((switch.part, switch.key), -1)
         row["drop"] = network.rows_of(switch.drop)[0]
         row["flow"] = network.rows_of(switch.flow)[1]
-        if switch.kind == rec.FRICTION:
+        if switch.kind == codes.FRICTION:
             row["kinetic"], row["static"], row["stribeck"], row["factor"] = switch.numbers
         else:
             row["forward"] = switch.numbers[0]
-            if switch.kind == rec.DIODE:
+            if switch.kind == codes.DIODE:
                 ohm = network.elements[network.numbers[f"{switch.name}.resistance"]].value
                 row["rounding"] = CURRENT_ROUNDING * sum(map(source_size, network.sources)) / ohm
 

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.steady import union
 from fvsolve.errors import listing
 from fvsolve.features.networks.elimination import (
@@ -26,6 +25,7 @@ from fvsolve.features.networks.elimination import (
     reduced,
     substituted,
 )
+from fvsolve.parts import law_elements as codes
 from fvsolve.parts.network_elements import TRANSFORMER, Element, Switch
 
 ROUNDING = 1e-12  # sum of terms that is rounding, over the sum of their magnitudes
@@ -75,7 +75,7 @@ class Network:
     def __post_init__(self) -> None:
         stores = [item for item in self.elements if item.is_store]
         sources = [item for item in self.elements if item.is_source]
-        sources.sort(key=lambda item: item.reads[0] if item.reads else rec.SCHEDULE_INPUT)
+        sources.sort(key=lambda item: item.reads[0] if item.reads else codes.SCHEDULE_INPUT)
         self.columns = {item.name: k for k, item in enumerate((*stores, *sources))}
         self.stores, self.sources = dict(enumerate(stores)), sources
 
@@ -84,14 +84,14 @@ class Network:
     @property
     def conducting(self) -> tuple[bool, ...]:
         """Mode in which all switches are closed, all diodes conduct and all friction slips."""
-        return tuple(switch.kind != rec.FRICTION for switch in self.switches)
+        return tuple(switch.kind != codes.FRICTION for switch in self.switches)
 
     def mode_of(self, armed: np.ndarray) -> tuple[bool, ...]:
         """True for each switch that is closed, each diode that conducts and each friction that sticks, by flags."""
         on = []
         for switch in self.switches:
             flag = self.flags[switch.name]
-            sticks = not (armed[flag] or armed[flag + 2]) if switch.kind == rec.FRICTION else bool(armed[flag])
+            sticks = not (armed[flag] or armed[flag + 2]) if switch.kind == codes.FRICTION else bool(armed[flag])
             on.append(sticks)
         return tuple(on)
 
@@ -101,7 +101,7 @@ class Network:
             is_on = {switch.name: on for switch, on in zip(self.switches, mode, strict=True)}
             active = [item for item in self.elements if not item.switch or is_on[item.switch]]
             # an open switch is the limit of a small leak; slipping friction is no such limit
-            leaks = [item.ends for switch in self.switches if switch.kind != rec.FRICTION and not is_on[switch.name]
+            leaks = [item.ends for switch in self.switches if switch.kind != codes.FRICTION and not is_on[switch.name]
                      for item in self.elements if item.name == switch.drop]  # fmt: skip
             constant = () if mode == self.conducting else self.constant_columns
             self.solved[mode] = Elimination(active, self.columns, leaks, constant)
@@ -231,16 +231,16 @@ class Network:
 
     def is_known_early(self, row) -> bool:
         """True if a probe reads states alone."""
-        if row["side"] == rec.LOCKED or row["index"] >= self.rows.integrals:
+        if row["side"] == codes.LOCKED or row["index"] >= self.rows.integrals:
             return True
-        rows = [int(row["index"]), *([int(row["cell"])] if row["side"] in (rec.POWER, rec.ENTROPY) else [])]
+        rows = [int(row["index"]), *([int(row["cell"])] if row["side"] in (codes.POWER, codes.ENTROPY) else [])]
         return all(column < len(self.stores) for r in rows for column in self.columns_of_rows[r])
 
     def inputs_of(self, row) -> set[int]:
         """Numbers of the sources that a probe reads, also through torques of friction and heat."""
-        if row["side"] == rec.LOCKED or row["index"] >= self.rows.integrals:
+        if row["side"] == codes.LOCKED or row["index"] >= self.rows.integrals:
             return set()
-        rows = [int(row["index"]), *([int(row["cell"])] if row["side"] in (rec.POWER, rec.ENTROPY) else [])]
+        rows = [int(row["index"]), *([int(row["cell"])] if row["side"] in (codes.POWER, codes.ENTROPY) else [])]
         return self.inputs_of_columns(set().union(*(self.columns_of_rows[r] for r in rows)))
 
     def inputs_of_columns(self, columns: set[int]) -> set[int]:
@@ -256,12 +256,12 @@ class Network:
     def columns_followed(self, j: int) -> set[int]:
         """Columns of stores and sources that the source j follows: torque of friction, heat of an element."""
         item = self.sources[j]
-        if item.reads is not None and item.reads[0] == rec.FLUID_HEAT:
+        if item.reads is not None and item.reads[0] == codes.FLUID_HEAT:
             return set(self.columns_of_rows[self.node_row(item.ends[1])])
-        if item.reads is None or item.reads[0] not in (rec.FRICTION_FLOW, rec.HEAT_INPUT):
+        if item.reads is None or item.reads[0] not in (codes.FRICTION_FLOW, codes.HEAT_INPUT):
             return set()
         name = item.reads[1]
-        if item.reads[0] == rec.FRICTION_FLOW:
+        if item.reads[0] == codes.FRICTION_FLOW:
             name = next(switch.drop for switch in self.switches if switch.name == name)
             return self.columns_of_rows[self.rows_of(name)[0]]
         return set().union(*(self.columns_of_rows[r] for r in self.rows_of(name)))
@@ -272,7 +272,7 @@ class Network:
         for j in self.inputs_of(row):
             item = self.sources[j]
             index = self.schedules.get((item.part, item.key), -1)
-            if item.reads is not None and item.reads[0] == rec.FRICTION_FLOW:
+            if item.reads is not None and item.reads[0] == codes.FRICTION_FLOW:
                 switch = next(other for other in self.switches if other.name == item.reads[1])
                 index = self.schedules.get((switch.part, switch.key), -1)
             if index in followers:
@@ -281,7 +281,7 @@ class Network:
 
     def fill_node_probe(self, draft, row, node: str, angle: bool) -> None:
         """Fill the row of a probe of the potential of a node, or of its angle."""
-        row["kind"], row["side"], row["scale"] = rec.NETWORK_VALUE, rec.ROW, 1.0
+        row["kind"], row["side"], row["scale"] = codes.NETWORK_VALUE, codes.ROW, 1.0
         row["index"] = self.rows.integrals + list(self.integrals).index(node) if angle else self.node_row(node)
 
     def terms(self, mode: tuple[bool, ...]) -> list[Terms]:
@@ -313,7 +313,7 @@ class Network:
         return rows[:first] + [cleaned(substituted(item, self.dependent)) for item in rows[first:]]
 
     def arrays(self, mode: tuple[bool, ...]) -> tuple[np.ndarray, np.ndarray]:
-        """(`network_places`, `network_factors`) in a mode, see `kernels.potential_networks`."""
+        """(`network_places`, `network_factors`) in a mode, see `kernels.networks`."""
         if mode not in self.written:
             self.written[mode] = self.make_arrays(mode)
         return self.written[mode]
@@ -355,7 +355,7 @@ class Network:
     def lightness(self, node: str) -> float:
         """Rate of the potential of a node per flow into it through its torque of the fluid [1/kg/m2], at least 0."""
         rows, found = self.terms(self.conducting), 0.0
-        torques = [item for item in self.sources if item.reads is not None and item.reads[0] == rec.DEVICE_INPUT]
+        torques = [item for item in self.sources if item.reads is not None and item.reads[0] == codes.DEVICE_INPUT]
         sources = [self.columns[item.name] for item in torques if item.ends[0] == node]
         rates = dict(zip(self.states, rows, strict=False))
         for column, factor in rows[self.node_row(node)].items():
@@ -403,7 +403,7 @@ class Network:
 
         sources : present values of all sources
         """
-        blocking = [k for k, switch in enumerate(self.switches) if switch.kind == rec.DIODE and not mode[k]]
+        blocking = [k for k, switch in enumerate(self.switches) if switch.kind == codes.DIODE and not mode[k]]
         for count in range(1, min(len(blocking), MOST_DIODES) + 1):
             for chosen in combinations(blocking, count):
                 other = tuple(on or k in chosen for k, on in enumerate(mode))
@@ -422,7 +422,7 @@ class Network:
     def set_diodes(self, mode: tuple[bool, ...], armed: np.ndarray) -> None:
         """Set the event flags of all diodes to a mode."""
         for switch, on in zip(self.switches, mode, strict=True):
-            if switch.kind == rec.DIODE:
+            if switch.kind == codes.DIODE:
                 flag = self.flags[switch.name]
                 armed[flag], armed[flag + 1] = float(on), float(not on)
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from fvsolve.core.assembly.features import FeaturePattern
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.state_pairs import pairs_of, unique_states
+from fvsolve.parts import law_elements as codes
 
 
 class NetworkCouplings(FeaturePattern):
@@ -16,9 +16,8 @@ class NetworkCouplings(FeaturePattern):
 
     def __init__(self, feature, couplings) -> None:
         super().__init__(feature)
-        tables = couplings.model.tables
         self.couplings, self.network = couplings, feature.network
-        self.inputs, self.switches = tables.network_inputs, tables.network_switches
+        self.source_table, self.switches = feature.source_table, feature.switches
 
     def pairs(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yield couplings of the stores of networks with each other, and with what their sources follow."""
@@ -41,29 +40,29 @@ class NetworkCouplings(FeaturePattern):
         return unique_states() if shaft is None else self.row_states(self.network.node_row(shaft))
 
     def probe(self, row) -> np.ndarray | None:
-        if row["kind"] != rec.NETWORK_VALUE:
+        if row["kind"] != codes.NETWORK_VALUE:
             return None
         network, r = self.network, int(row["index"])
-        if row["side"] == rec.LOCKED:
+        if row["side"] == codes.LOCKED:
             return unique_states()
         if r >= network.rows.integrals:
             return unique_states(list(network.integrals.values())[r - network.rows.integrals])
-        rows = [r, *([int(row["cell"])] if row["side"] in (rec.POWER, rec.ENTROPY) else [])]
+        rows = [r, *([int(row["cell"])] if row["side"] in (codes.POWER, codes.ENTROPY) else [])]
         return self.states_of(set().union(*(network.columns_of_rows[r] for r in rows)))
 
     def source_states(self, j: int) -> np.ndarray:
         """States on which a source of a network depends."""
-        row, network, model = self.inputs[j], self.network, self.couplings
+        row, network, model = self.source_table[j], self.network, self.couplings
         i = int(row["index"])
-        if row["kind"] == rec.SCHEDULE_INPUT:
+        if row["kind"] == codes.SCHEDULE_INPUT:
             return model.schedule(i)
-        if row["kind"] == rec.DEVICE_INPUT:
+        if row["kind"] == codes.DEVICE_INPUT:
             return model.device_reading(model.devices[i])
-        if row["kind"] == rec.FORCE_INPUT:
+        if row["kind"] == codes.FORCE_INPUT:
             return unique_states(*model.pushing_states(i))
         for own in model.features:
             if (states := own.source(row)) is not None:
                 return states
         stores = {column for column in network.columns_followed(j) if column in network.states}
-        switch = int(self.switches[i]["schedule"]) if row["kind"] == rec.FRICTION_FLOW else -1
+        switch = int(self.switches[i]["schedule"]) if row["kind"] == codes.FRICTION_FLOW else -1
         return unique_states(*(network.states[column] for column in stores), model.schedule(switch))

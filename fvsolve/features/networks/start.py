@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.steady import union
 from fvsolve.errors import listing
 from fvsolve.features.networks.elimination import Elimination, NetworkError, Terms, substituted
 from fvsolve.features.networks.faults import network_faults, tie_fault
+from fvsolve.parts import law_elements as codes
 from fvsolve.parts.heat import exchanger_names
 from fvsolve.parts.network_elements import Element
 
@@ -38,7 +38,7 @@ class NetworkStart:
         self.switches = self.network.switches
         self.known = self.stores.keys() - {*self.free}
         self.exchange = [self.fluid_exchange(item) for item in self.network.sources
-                         if item.reads is not None and item.reads[0] == rec.FLUID_HEAT]  # fmt: skip
+                         if item.reads is not None and item.reads[0] == codes.FLUID_HEAT]  # fmt: skip
         self.directions = [self.first_direction(k) for k in range(len(self.switches))]
         self.mode = tuple(self.begins_on(k) for k in range(len(self.switches)))
 
@@ -58,7 +58,7 @@ class NetworkStart:
             if item.reads is None:
                 schedule = network.schedules[item.part, item.key]
                 self.values[network.columns[item.name]] = self.start.schedule_value(schedule)
-            elif item.reads[0] in (rec.DEVICE_INPUT, rec.FORCE_INPUT) and self.solved:
+            elif item.reads[0] in (codes.DEVICE_INPUT, codes.FORCE_INPUT) and self.solved:
                 self.values[network.columns[item.name]] = self.given_by_others(item)
         for column, item in self.stores.items():
             value = item.initial if item.state_of is None else self.state_of_other(item)
@@ -81,7 +81,7 @@ class NetworkStart:
         """Quantity of a device, such as the torque of the fluid on a shaft, or force on a mass, at the start."""
         kind, name = item.reads
         draft = self.draft
-        if kind == rec.FORCE_INPUT:
+        if kind == codes.FORCE_INPUT:
             return float(draft.mass_table[draft.mass_index[name]]["force"])
         name, quantity, sign = name
         k = draft.device_names.index(name)
@@ -129,7 +129,7 @@ class NetworkStart:
     def first_direction(self, k: int) -> float:
         """Direction of a slip between known speeds; 0 for friction that may stick, and for other switches."""
         switch = self.switches[k]
-        if switch.kind != rec.FRICTION:
+        if switch.kind != codes.FRICTION:
             return 0.0
         found = self.network.equations(self.network.conducting)
         terms = substituted(found.drop(self.element(switch.drop)), self.network.dependent)
@@ -140,8 +140,8 @@ class NetworkStart:
     def begins_on(self, k: int) -> bool:
         """First guess of the state of a switch: as scheduled; diodes block; friction sticks."""
         switch = self.switches[k]
-        if switch.kind != rec.SWITCH:
-            return switch.kind == rec.FRICTION and self.directions[k] == 0.0
+        if switch.kind != codes.SWITCH:
+            return switch.kind == codes.FRICTION and self.directions[k] == 0.0
         return self.start.schedule_value(self.network.schedules[switch.part, switch.key]) > 0.5
 
     # search ---------------------------------------------------------------------------------------------------
@@ -178,7 +178,7 @@ class NetworkStart:
 
     def let_slip(self) -> bool:
         """Let the last friction slip that sticks, where the mode has no solution; False if there is none."""
-        sticking = [k for k, on in enumerate(self.mode) if on and self.switches[k].kind == rec.FRICTION]
+        sticking = [k for k, on in enumerate(self.mode) if on and self.switches[k].kind == codes.FRICTION]
         if not sticking:
             return False
         k, network = sticking[-1], self.network
@@ -278,13 +278,13 @@ class NetworkStart:
             if item.reads is None:
                 continue
             kind, name = item.reads
-            if kind == rec.DEVICE_INPUT:
+            if kind == codes.DEVICE_INPUT:
                 self.values[network.columns[item.name]] = self.given_by_others(item)
-            elif kind == rec.FRICTION_FLOW:
+            elif kind == codes.FRICTION_FLOW:
                 k = numbers[name]
                 slip = self.sum_of(substituted(found.drop(self.element(self.switches[k].drop)), network.dependent))
                 self.values[network.columns[item.name]] = self.directions[k] * self.friction_torque(k, slip)
-            elif kind == rec.HEAT_INPUT:
+            elif kind == codes.HEAT_INPUT:
                 other = self.element(name)
                 active = not other.switch or on[other.switch]
                 drop, flow = (self.sum_of(substituted(terms, network.dependent))
@@ -312,12 +312,12 @@ class NetworkStart:
         for k, switch in enumerate(self.switches):
             drop_terms = substituted(found.drop(self.element(switch.drop)), network.dependent)
             drop, on = self.sum_of(drop_terms), self.mode[k]
-            if switch.kind == rec.DIODE:
+            if switch.kind == codes.DIODE:
                 flow = found.flow(self.element(switch.flow)) if on else {}
-                least = -self.draft.tables.network_switches[k]["rounding"]
+                least = -self.own.switches[k]["rounding"]
                 changes = self.sum_of(substituted(flow, network.dependent)) < least if on else drop > switch.numbers[0]
                 direction = 0.0
-            elif switch.kind == rec.SWITCH:
+            elif switch.kind == codes.SWITCH:
                 continue
             elif on:
                 torque = self.sum_of(found.flow(self.element(switch.flow)))
@@ -336,16 +336,16 @@ class NetworkStart:
         """Write the start to the tables and event flags of the draft."""
         draft, network = self.draft, self.network
         self.own.network = network = replace(network, values=self.values.copy(), written={})
-        draft.tables.network_inputs["start"] = [self.values[network.columns[item.name]] for item in network.sources]
+        self.own.source_table["start"] = [self.values[network.columns[item.name]] for item in network.sources]
         for k, switch in enumerate(self.switches):
             flag = network.flags[switch.name]
-            if switch.kind == rec.FRICTION:
+            if switch.kind == codes.FRICTION:
                 terms = network.terms(network.conducting)[network.rows_of(switch.drop)[0]]
-                draft.tables.network_switches[k]["rounding"] = self.rounding(terms)
+                self.own.switches[k]["rounding"] = self.rounding(terms)
                 draft.start_flags |= {flag: self.directions[k] > 0.0, flag + 2: self.directions[k] < 0.0}
             else:
                 draft.start_flags[flag] = self.mode[k]
-        for item, row in zip(network.booked, draft.tables.network_elements, strict=True):
+        for item, row in zip(network.booked, self.own.elements, strict=True):
             if item.is_store:
                 row["start"] = self.values[network.columns[item.name]]
 

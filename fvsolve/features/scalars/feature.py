@@ -34,7 +34,6 @@ HEAT_FOR_EVENTS = {
 }
 VALUES_FOR_EVENTS = RhsTerms(events="scalar_transport: mix_for_events")
 VISCOSITY = RhsTerms(rates="viscosity: viscous_friction")
-EXCHANGERS = RhsTerms(outlet_values="fluid_heat: node_temperatures", scalar_rates="potential_networks: network_rates")
 
 
 class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
@@ -110,8 +109,6 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
                 yield "carried", HEAT[linear]
             if cast.pipes and (tables.pipes["temperature"] > 0.0).any():
                 yield "carried", VISCOSITY
-            if len(tables.exchangers):
-                yield "carried", EXCHANGERS
         if len(tables.reactions):  # those in basins are added later
             yield "carried", REACTIONS
 

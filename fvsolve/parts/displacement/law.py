@@ -13,18 +13,17 @@ from math import copysign, sqrt
 from fvsolve.core.kernels.density import density
 from fvsolve.core.kernels.dtypes import LAW_LINEAR, RATE, RATE_UNWANTED
 from fvsolve.core.kernels.network_balance import node_impedance, stiffness_of
-from fvsolve.core.kernels.potential_networks import known_potential
 from fvsolve.core.kernels.restrictions import head_drop, valve_driving_pressure
 from fvsolve.core.kernels.schedule_pieces import schedule_value
 from fvsolve.core.kernels.self_acting_valves import event_pair
 from fvsolve.jit import njit
 
-# Numbers: displacement [m3/rad], leakage [m3/s/Pa], viscous friction [N m s/rad], dry friction [N m]; row of the speed
-# in the network, -1 for a scheduled speed; rate of the shaft per torque [1/kg/m2]; lag of the setting [s], 0 for none;
+# Numbers: displacement [m3/rad], leakage [m3/s/Pa], viscous friction [N m s/rad], dry friction [N m]; number of the
+# shaft in `out`, -1 for a scheduled speed; rate of the shaft per torque [1/kg/m2]; lag of the setting [s], 0 for none;
 # setting at the start; range of a compensator [Pa], 0 without one; shares that the set pressure and the sensed pressure
 # give at the start; schedule of the set pressure, -1 for none, and its value at the start [Pa]; sensed node, or -1
 (
-    DISPLACEMENT, LEAKAGE, VISCOUS, DRY, SPEED_ROW, LIGHTNESS, LAG, SETTING, RANGE, SHARE, SENSED_SHARE, SET_SCHEDULE,
+    DISPLACEMENT, LEAKAGE, VISCOUS, DRY, SHAFT, LIGHTNESS, LAG, SETTING, RANGE, SHARE, SENSED_SHARE, SET_SCHEDULE,
     SET_PRESSURE, SENSED, COUNT,
 ) = range(15)  # fmt: skip
 FULL, NONE, LIMITED = 0, 2, 4  # event flags of a compensator, beside `event`
@@ -33,12 +32,12 @@ TORQUE, SETTING_VALUE, TAKEN = 0, 1, 2  # quantities
 
 
 @njit
-def machine_speed(t, y, tables, device):
+def machine_speed(t, out, tables, device):
     """Angular velocity of the shaft [rad/s]."""
-    row = int(tables.floats[device["data"] + SPEED_ROW])
-    if row < 0:
+    shaft = int(tables.floats[device["data"] + SHAFT])
+    if shaft < 0:
         return schedule_value(tables, device["schedule"], t)
-    return known_potential(t, y, tables, row)
+    return out[tables.layout[0]["shaft"] + shaft]
 
 
 @njit
@@ -53,7 +52,7 @@ def machine_setting(t, y, tables, device):
 def set(t, y, out, tables, device):
     """Write to `out` the speed times the setting [rad/s], as drive, and the conductance that marks it as open."""
     layout, k = tables.layout[0], device["valve"]
-    out[layout["drive"] + k] = machine_setting(t, y, tables, device) * machine_speed(t, y, tables, device)
+    out[layout["drive"] + k] = machine_setting(t, y, tables, device) * machine_speed(t, out, tables, device)
     out[layout["conductance"] + k] = tables.valves[k]["conductance"]
 
 
@@ -104,7 +103,7 @@ def pressure_drop(out, tables, k):
 def shaft_torque(t, y, out, tables, device):
     """Torque on the shaft with all losses [N m]; at rest without dry friction."""
     floats, at = tables.floats, device["data"]
-    w = machine_speed(t, y, tables, device)
+    w = machine_speed(t, out, tables, device)
     dry = copysign(floats[at + DRY], w) if w != 0.0 else 0.0
     return fluid_torque(t, y, out, tables, device) - floats[at + VISCOUS] * w - dry
 
@@ -163,7 +162,7 @@ def machine_rate(t, y, out, tables, device):
     if device["y"] >= 0:
         rate = 1.0 / floats[at + LAG]
         if floats[at + RANGE] > 0.0:
-            w = machine_speed(t, y, tables, device)
+            w = machine_speed(t, out, tables, device)
             gain = rho * floats[at + DISPLACEMENT] * abs(w) * rate / floats[at + RANGE]
             rate += max(gain * node_impedance(tables, j), sqrt(gain * behind))
     gain = rho * floats[at + LIGHTNESS] * (machine_setting(t, y, tables, device) * floats[at + DISPLACEMENT]) ** 2
@@ -201,7 +200,7 @@ def value(t, y, out, tables, device, quantity):
     """
     if quantity == SETTING_VALUE:
         return machine_setting(t, y, tables, device)
-    by_network = tables.floats[device["data"] + SPEED_ROW] >= 0.0
+    by_network = tables.floats[device["data"] + SHAFT] >= 0.0
     torque = fluid_torque(t, y, out, tables, device) if by_network else shaft_torque(t, y, out, tables, device)
     return torque if quantity == TORQUE else 0.0 - torque
 
@@ -212,8 +211,8 @@ def power(t, y, dydt, out, tables, device):
 
     A network that turns the shaft has its own account of the supplied power and of friction.
     """
-    w = machine_speed(t, y, tables, device)
-    if tables.floats[device["data"] + SPEED_ROW] >= 0.0:
+    w = machine_speed(t, out, tables, device)
+    if tables.floats[device["data"] + SHAFT] >= 0.0:
         return 0.0, 0.0, -fluid_torque(t, y, out, tables, device) * w
     taken = -shaft_torque(t, y, out, tables, device) * w
     return taken, 0.0, taken
@@ -222,4 +221,4 @@ def power(t, y, dydt, out, tables, device):
 @njit
 def heat(t, y, out, tables, device):
     """Power that the fluid and all losses take from the shaft [W]."""
-    return -shaft_torque(t, y, out, tables, device) * machine_speed(t, y, tables, device)
+    return -shaft_torque(t, y, out, tables, device) * machine_speed(t, out, tables, device)

@@ -7,11 +7,12 @@ import numpy as np
 
 from fvsolve.core.assembly.features import with_slot
 from fvsolve.core.assembly.lowering import ANGULAR_SPEED, POSITION, Device, Input
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.steady import Edge
+from fvsolve.parts import law_elements as codes
 from fvsolve.parts.displacement import law
 from fvsolve.parts.displacement.part import LAG
-from fvsolve.parts.network_elements import FLOW, SLOT, Element, fill_network_probe, network_of, node_or_reference
+from fvsolve.parts.law_elements import SLOT
+from fvsolve.parts.network_elements import FLOW, Element, fill_network_probe, network_of, node_or_reference
 from fvsolve.parts.network_parts import dry_friction
 from fvsolve.parts.rotation import resistances
 
@@ -57,7 +58,7 @@ class MachineRows(Device, kind="displacement-pump"):
         if shaft is None:
             return [], []
         ends, (_, viscous, dry) = (shaft, None), part.losses
-        found = [Element(FLOW, f"{place}.fluid", place, ends, reads=(rec.DEVICE_INPUT, (name, "torque", -1.0)))]
+        found = [Element(FLOW, f"{place}.fluid", place, ends, reads=(codes.DEVICE_INPUT, (name, "torque", -1.0)))]
         found += resistances(place, ends, viscous)
         friction, switches = dry_friction(place, ends, (dry, dry, 0.0, 1.0)) if dry > 0.0 else ([], [])
         return found + friction, switches
@@ -85,7 +86,7 @@ class MachineRows(Device, kind="displacement-pump"):
             device["schedule"] = draft.schedules.add(part.speed)
         numbers = {
             law.DISPLACEMENT: part.displacement, law.LEAKAGE: leakage, law.VISCOUS: viscous, law.DRY: dry,
-            law.SPEED_ROW: -1.0, law.LAG: part.setting_time or LAG, law.SET_SCHEDULE: -1.0, law.SENSED: -1.0,
+            law.SHAFT: -1.0, law.LAG: part.setting_time or LAG, law.SET_SCHEDULE: -1.0, law.SENSED: -1.0,
         }  # fmt: skip
         return [float(numbers.get(k, 0.0)) for k in range(law.COUNT)]
 
@@ -146,7 +147,7 @@ class MachineRows(Device, kind="displacement-pump"):
         floats[at + law.SETTING] = setting
         valve["drive"] = setting * self.speed_at(start, k)
         if row["schedule"] < 0:
-            floats[at + law.SPEED_ROW] = network_of(draft).node_row(part.shaft)
+            floats[at + law.SHAFT] = with_slot(draft.features, SLOT).shafts.index(part.shaft)
             floats[at + law.LIGHTNESS] = network_of(draft).lightness(part.shaft)
         return []
 

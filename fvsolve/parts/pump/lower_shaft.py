@@ -7,7 +7,7 @@ import numpy as np
 
 from fvsolve.core.assembly.lowering import Input
 from fvsolve.core.assembly.schedule_tables import value_at
-from fvsolve.core.kernels import dtypes as rec
+from fvsolve.parts import law_elements as codes
 from fvsolve.parts.network_elements import CAPACITY, FLOW, Element
 from fvsolve.parts.pump import law
 from fvsolve.parts.pump.head_curve import CurvePoints, Quadrants, quadrants, zero_head_flow
@@ -289,7 +289,7 @@ class ShaftLowering:
             Element(CAPACITY, f"{place}.shaft", place, (shaft, None), part.inertia or 1.0, f"{name}.speed",
                     state_of=("device", name), unit=rated),
             Element(FLOW, f"{place}.fluid", place, (None, shaft),
-                    reads=(rec.DEVICE_INPUT, (name, "torque", self.fluid_torque_sign))),
+                    reads=(codes.DEVICE_INPUT, (name, "torque", self.fluid_torque_sign))),
         ], []  # fmt: skip
 
     def speed_input(self, model, name, sort) -> dict[str, Input]:

@@ -3,7 +3,7 @@
 from math import asinh, pi, sinh, sqrt
 
 from fvsolve.core.assembly.lowering import Device
-from fvsolve.core.kernels import dtypes as rec
+from fvsolve.parts import law_elements as codes
 from fvsolve.parts.network_elements import FLOW, Element, node_or_reference
 from fvsolve.parts.solenoid import law
 
@@ -27,9 +27,9 @@ class SolenoidRows(Device, kind="solenoid"):
         armature = part.ports["armature"]
         found = [Element(FLOW, place, place, (p, n), state=f"{name}.flux", initial=part.initial_flux,
                          state_of=("device", name), unit=1.0 / part.turns,
-                         reads=(rec.DEVICE_INPUT, (name, "current", 1.0)))]  # fmt: skip
+                         reads=(codes.DEVICE_INPUT, (name, "current", 1.0)))]  # fmt: skip
         if case.nodes[armature].kind == "mass":
-            reads = rec.DEVICE_INPUT, (name, "force", 1.0)
+            reads = codes.DEVICE_INPUT, (name, "force", 1.0)
             found.append(Element(FLOW, f"{place}.force", place, (None, armature), reads=reads))
         return found, []
 

@@ -13,13 +13,15 @@ friction that changes its state changes both arrays.
 from math import exp
 
 from fvsolve.core.kernels import calls
-from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.kernels.devices import VALUE
-from fvsolve.core.kernels.energy_rows import network_power_row, network_stored_row
+from fvsolve.core.kernels.devices import SET, VALUE
+from fvsolve.core.kernels.energy_rows import bushing_power_row, bushing_stored_row
 from fvsolve.core.kernels.mass_dynamics import forces
+from fvsolve.core.kernels.scalar_transport import heated_scalar
 from fvsolve.core.kernels.schedule_pieces import schedule_value
 from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.networks.kernels.tables import open_networks
 from fvsolve.jit import njit
+from fvsolve.parts import law_elements as codes
 
 TINY = 1e-300  # in place of a zero of an event function
 CLOSED = 0.5  # value of `closed` above which a switch is closed
@@ -28,7 +30,7 @@ CLOSED = 0.5  # value of `closed` above which a switch is closed
 @njit(forceinline=True)
 def row_change(y, out, tables, r):
     """Change of row r since the start."""
-    places, factors, inputs = tables.network_places, tables.network_factors, tables.layout[0]["network"]
+    places, factors, inputs = tables.network_places, tables.network_factors, tables.network_settings[0]["inputs"]
     first, middle, last, rows = places[3 * r], places[3 * r + 1], places[3 * r + 2], places[0] // 3
     # Entries follow three offsets for each row in `places`, and one value for each row in `factors`.
     change, shift = 0.0, rows - places[0]
@@ -56,7 +58,7 @@ def known_potential(t, y, tables, r):
     for k in range(middle, last):
         source = tables.network_inputs[places[k]]
         # Other sources are not known yet and count as unchanged.
-        if source["kind"] == rec.SCHEDULE_INPUT:
+        if source["kind"] == codes.SCHEDULE_INPUT:
             given = source["sign"] * schedule_value(tables, source["index"], t)
             value += factors[k + shift] * (given - source["start"])
     return value
@@ -104,22 +106,22 @@ def element_power(y, out, tables, element):
 
 
 @njit
-def write_sources(t, y, out, tables):
-    """Write the changes of all sources since the start to `out`."""
-    inputs, at = tables.network_inputs, tables.layout[0]["network"]
+def write_sources(t, y, out, core, tables):
+    """Write the changes of all sources since the start to `out`. core : open tables of the model alone"""
+    inputs, at = tables.network_inputs, tables.network_settings[0]["inputs"]
     for j in range(inputs.size):
         source = inputs[j]
         kind, i = source["kind"], source["index"]
-        if kind == rec.SCHEDULE_INPUT:
+        if kind == codes.SCHEDULE_INPUT:
             value = schedule_value(tables, i, t)
-        elif kind == rec.DEVICE_INPUT:
-            device = tables.devices[i]
-            value = calls.call_value(tables.hooks[device["hooks"], VALUE], t, y, out, tables, device, source["side"])
-        elif kind == rec.FORCE_INPUT:
+        elif kind == codes.DEVICE_INPUT:
+            device = core.devices[i]
+            value = calls.call_value(core.hooks[device["hooks"], VALUE], t, y, out, core, device, source["side"])
+        elif kind == codes.FORCE_INPUT:
             value = out[tables.layout[0]["net_force"] + i]
-        elif kind == rec.FLUID_HEAT:
+        elif kind == codes.FLUID_HEAT:
             value = out[tables.layout[0]["exchange"] + 2 * i + 1]
-        elif kind == rec.FRICTION_FLOW:
+        elif kind == codes.FRICTION_FLOW:
             value = slipping_torque(t, y, out, tables, tables.network_switches[i])
         else:
             value = element_power(y, out, tables, tables.network_elements[i])
@@ -129,9 +131,9 @@ def write_sources(t, y, out, tables):
 @njit
 def network_rates(t, y, dydt, out, handle):
     """Write all sources to `out`, and the rates of stores to `dydt`."""
-    tables = open_tables(handle)
+    tables = open_networks(handle)
     # Sources also without rates to write: probes read them.
-    write_sources(t, y, out, tables)
+    write_sources(t, y, out, open_tables(handle), tables)
     rates = tables.network_rates
     if dydt.size > 0:
         for r in range(rates.size):
@@ -141,30 +143,77 @@ def network_rates(t, y, dydt, out, handle):
 @njit
 def known_sources(t, y, dydt, out, handle):
     """Write all sources to `out` before blocks decide that read them."""
-    tables = open_tables(handle)
+    tables = open_networks(handle)
     if tables.settings[0]["reads_solved"] == 1:
-        write_sources(t, y, out, tables)
+        write_sources(t, y, out, open_tables(handle), tables)
+
+
+@njit
+def write_temperatures(y, out, tables):
+    """Write the temperatures of the thermal nodes of heat exchangers, in the unit of the scalar, to `out`."""
+    exchangers, at = tables.exchangers, tables.layout[0]["exchange"]
+    if exchangers.size > 0:
+        zero = tables.scalars[heated_scalar(tables)]["zero"]
+        for k in range(exchangers.size):
+            out[at + 2 * k] = row_value(y, out, tables, exchangers[k]["place"]) - zero
+
+
+@njit
+def node_temperatures(t, y, dydt, out, handle):
+    """Write the temperatures of the thermal nodes of heat exchangers, before the scalars are mixed."""
+    write_temperatures(y, out, open_networks(handle))
+
+
+@njit
+def turn_shafts(t, y, dydt, out, handle):
+    """Write the speeds of shafts that laws of devices read before the nodes are solved."""
+    tables = open_networks(handle)
+    turned, at = tables.turned, tables.layout[0]["shaft"]
+    for k in range(turned.size):
+        out[at + k] = known_potential(t, y, tables, turned[k])
+
+
+@njit
+def drive_shafts(t, y, dydt, out, handle):
+    """Write the speeds of shafts that follow blocks, and set the devices on them again."""
+    turn_shafts(t, y, dydt, out, handle)
+    devices, tables = open_networks(handle).turned_devices, open_tables(handle)
+    for k in range(devices.size):
+        device = tables.devices[devices[k]]
+        calls.call_set(tables.hooks[device["hooks"], SET], t, y, out, tables, device)
+
+
+@njit(forceinline=True)
+def network_power_row(tables, power):
+    """Index of the first entry of elements of networks in `power`."""
+    return bushing_power_row(tables, power) - tables.network_elements.size
+
+
+@njit(forceinline=True)
+def network_stored_row(tables, stored):
+    """Index of the first entry of elements of networks in `stored`."""
+    return bushing_stored_row(tables, stored) - tables.network_elements.size
 
 
 @njit
 def observe_networks(t, y, out, handle, values):
     """Write the values of the probes of networks to `values`."""
-    tables = open_tables(handle)
+    tables = open_networks(handle)
     probes = tables.probes
     for k in range(probes.size):
-        if probes[k]["kind"] == rec.NETWORK_VALUE:
+        if probes[k]["kind"] == codes.NETWORK_VALUE:
             i, side = probes[k]["index"], probes[k]["side"]
-            if side == rec.LOCKED:
+            if side == codes.LOCKED:
                 # Dry friction is locked while neither direction of slip is active.
                 value = 0.0 if tables.armed[i] + tables.armed[i + 2] > 0.0 else 1.0
             else:
                 value = row_value(y, out, tables, i)
-            if side == rec.POWER:
+            if side == codes.POWER:
                 value *= row_value(y, out, tables, probes[k]["cell"])
-            elif side == rec.ENTROPY:
+            elif side == codes.ENTROPY:
                 # Flow of entropy: flow of heat over temperature.
                 value = row_value(y, out, tables, probes[k]["cell"]) / value
-            elif side == rec.NET_PUSH:
+            elif side == codes.NET_PUSH:
                 value = out[tables.layout[0]["push"] + probes[k]["cell"]] - value
             values[k] = probes[k]["scale"] * value + 0.0  # no negative zero
 
@@ -172,17 +221,20 @@ def observe_networks(t, y, out, handle, values):
 @njit
 def sources_for_events(t, y, out, handle, g):
     """Write all sources to `out` before event functions are evaluated; g is not used."""
-    tables = open_tables(handle)
+    tables = open_networks(handle)
     # Forces on masses are sources, and no rates have been computed at this state.
     if tables.masses.size > 0:
-        forces(t, y, out, tables)
-    write_sources(t, y, out, tables)
+        forces(t, y, out, open_tables(handle))
+    write_sources(t, y, out, open_tables(handle), tables)
+    write_temperatures(y, out, tables)
 
 
 @njit
 def sources_again(t, y, out, handle, g):
     """Write all sources to `out` once more, after features have set the schedules that they follow; g is not used."""
-    write_sources(t, y, out, open_tables(handle))
+    tables = open_networks(handle)
+    write_sources(t, y, out, open_tables(handle), tables)
+    write_temperatures(y, out, tables)
 
 
 @njit(forceinline=True)
@@ -218,13 +270,13 @@ def friction_events(t, y, out, tables, switch, g):
 @njit
 def switch_events(t, y, out, handle, g):
     """Write the event functions of all switches, diodes and dry frictions to g."""
-    tables = open_tables(handle)
+    tables = open_networks(handle)
     for k in range(tables.network_switches.size):
         switch = tables.network_switches[k]
-        if switch["kind"] == rec.FRICTION:
+        if switch["kind"] == codes.FRICTION:
             friction_events(t, y, out, tables, switch, g)
             continue
-        if switch["kind"] == rec.SWITCH:
+        if switch["kind"] == codes.SWITCH:
             left = CLOSED - schedule_value(tables, switch["schedule"], t)
         elif tables.armed[switch["flag"]] > 0.0:
             # A diode that conducts blocks when its flow changes sign.
@@ -238,17 +290,17 @@ def switch_events(t, y, out, handle, g):
 @njit
 def power_networks(t, y, dydt, out, handle, power):
     """Write the power into each element of a network [W] to `power`; of a source the power that it supplies."""
-    tables = open_tables(handle)
+    tables = open_networks(handle)
     elements, first = tables.network_elements, network_power_row(tables, power)
     for k in range(elements.size):
         into = element_power(y, out, tables, elements[k])
-        power[first + k] = -into if elements[k]["category"] == rec.SUPPLIED else into
+        power[first + k] = -into if elements[k]["category"] == codes.SUPPLIED else into
 
 
 @njit
 def stored_networks(t, y, dydt, out, handle, stored):
     """Write the change of the energy in each element since the start [J] to `stored`."""
-    tables = open_tables(handle)
+    tables = open_networks(handle)
     elements, first = tables.network_elements, network_stored_row(tables, stored)
     for k in range(elements.size):
         element, energy = elements[k], 0.0
