@@ -169,8 +169,6 @@ class EndStopRows(PushLowering, kind="end-stop"):
     table = "stop"
 
     def fill(self, draft, name, link, rows) -> None:
-        from fvsolve.core.kernels.mass_dynamics import contact_force  # not loaded by models without bodies
-
         (row,) = rows
         x, speed = join_ports(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["stiffness"], row["damping"] = link.stiffness, link.damping
@@ -178,9 +176,7 @@ class EndStopRows(PushLowering, kind="end-stop"):
         row["above"] = NO_STOP if link.maximum is None else link.maximum - x
         for distance, sign in ((float(row["below"]), 1.0), (float(row["above"]), -1.0)):
             if distance <= 0.0:
-                row["force"] += sign * contact_force(
-                    float(link.stiffness), float(link.damping), -distance, float(-sign * speed)
-                )
+                row["force"] += sign * max(0.0, link.stiffness * -distance + link.damping * float(-sign * speed))
 
 
 class Force(Coupling, kind="force"):

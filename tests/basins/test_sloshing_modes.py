@@ -173,8 +173,8 @@ def test_a_free_tank_on_rails_keeps_its_momentum():
 
     def momentum(state):
         out = model.evaluate(state.t, state.y)[1]
-        from fvsolve.core.kernels.mechanism.body_kinematics import centre_of
-        from fvsolve.core.kernels.mechanism.body_layout import body_row
+        from fvsolve.core.kernels.moving_frames import body_row
+        from fvsolve.features.motion.kernels.body_kinematics import centre_of
 
         return sum(row["mass"] * centre_of(row, out, body_row(model.tables, k))[3] for k, row in enumerate(bodies))
 

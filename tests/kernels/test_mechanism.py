@@ -7,10 +7,10 @@ from reference.scenes import GRAVITY, scene
 
 import fvsolve
 from fvsolve.core.kernels.dtypes import BODY_OUT
-from fvsolve.core.kernels.mechanism.body_layout import ACCELERATION, ATTITUDE, POSITION, SPIN_RATE
+from fvsolve.core.kernels.moving_frames import ACCELERATION, ATTITUDE, POSITION, SPIN_RATE
 from fvsolve.core.model import RunData
 from fvsolve.core.model.energy_accounts import Accounts
-from fvsolve.core.model.static_forces import mass_factor
+from fvsolve.features.motion.static_forces import mass_factor
 
 pytest.importorskip("pinocchio", reason="pinocchio (pin) is the peer here")
 SIZES = [(1, "free"), (3, ""), (6, "free"), (12, ""), (30, "free")]

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 import fvsolve
 from fvsolve.case.changes import changes
 from fvsolve.core.model.build import tables_with_start
-from fvsolve.core.model.equilibrium_search import Configuration
 from fvsolve.errors import CaseError
+from fvsolve.features.motion.equilibrium_search import Configuration
 from fvsolve.studies import order
 
 CEILING = {"type": "frame", "points": {"a": [0, 0, 0]}}

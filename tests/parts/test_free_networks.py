@@ -303,7 +303,7 @@ def momenta(model, t, y):
     """Momentum and angular momentum about the origin of the world, of a body with its network : float64[6]."""
     out, tables, found = model.evaluate(t, y)[1], model.tables, np.zeros(6)
     row, linear = out[int(model.layout["body"]) :], model.case.law.linear
-    turn, place, speed, spin = row[:9].reshape(3, 3), row[9:12], row[12:15], row[15:18]  # see `mechanism.body_layout`
+    turn, place, speed, spin = row[:9].reshape(3, 3), row[9:12], row[12:15], row[15:18]  # see `kernels.moving_frames`
 
     def add(momentum, r, own=0.0):
         found[:3] += momentum

@@ -21,6 +21,8 @@ class ArraySizes:
         self.size = 0
         self.run_arrays: dict[str, int | tuple[int, int]] = {}
         self.marks = 0
+        self.event_flags = 0
+        self.reads_rates = False  # True if `out` depends on rates, also where they are not requested
         self.scratch: list[Callable[[int], int]] = []
         self.spare: list[Callable[[int], int]] = [lambda out: out]
         self.places = [0]
@@ -36,6 +38,10 @@ class ArraySizes:
     def run_array(self, name: str, shape: int | tuple[int, int]) -> None:
         """State the shape of an array of `RunArrays`."""
         self.run_arrays[name] = shape
+
+    def flags(self, count: int) -> None:
+        """Reserve event flags of the run, behind those that are reserved."""
+        self.event_flags += int(count)
 
     def need_places(self, count: int) -> None:
         """State the number of cells of a pipe, or of places that are computed like them."""
@@ -66,5 +72,5 @@ class ArraySizes:
         places = max(self.places)
         found["scratch"] = max((int(size(places)) for size in self.scratch), default=0)
         found["spare"] = max(int(size(self.size)) for size in self.spare)
-        found["marks"] = self.marks
+        found["marks"], found["armed"] = self.marks, self.event_flags
         return rec.RunArrays(**found)

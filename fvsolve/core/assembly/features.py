@@ -82,12 +82,25 @@ def features_of(case, given_up: Collection[str] = ()) -> list[Feature]:
     return [awake[slot].declaration.load()(case, given_up) for slot in sorted(awake)]
 
 
+class Squares(NamedTuple):
+    """Energy of small deviations as squares of linear forms, a form given by the factor of each state in it.
+
+    stored : state of a stored amount -> its form; first, last : (name of a part, form), before and behind those of
+    devices
+    """
+
+    stored: dict[int, dict[int, float]] = {}
+    first: list[tuple[str, dict[int, float]]] = []
+    last: list[tuple[str, dict[int, float]]] = []
+
+
 class Feature:
     """Base of features, with one object for each case. `draft` is the `ModelDraft`, `model` the `Model`, of the case.
 
     slot : number of the feature, by which its compiled functions find its tables
     packages : names of further modules with compiled functions, such as laws of parts
     sets_arrivals : True if its `record` writes out[ARRIVES], the next time at which a step must end, for waves
+    reads_nodes : True if its functions need pressures or flows of nodes, also in a model that has only basins
     reads_solved : True if it reads values that only the solved nodes determine, before rates are computed
     shortest_delay : no stage of a step may be later than this after the beginning of the step [s]
     step_histories : names of arrays in the memory of a state that contain values at past steps
@@ -98,7 +111,7 @@ class Feature:
     slot = 0
     wakes: frozenset[str] = frozenset()
     packages: Sequence[str] = ()
-    sets_arrivals = reads_solved = False
+    sets_arrivals = reads_nodes = reads_solved = False
     shortest_delay = np.inf
     step_histories: Sequence[str] = ()
     single_thread_reason = ""
@@ -124,6 +137,9 @@ class Feature:
 
     def grouped(self, draft, group: np.ndarray) -> None:
         """Continue when nodes are grouped; group : label of the group of each node."""
+
+    def lower_behind_links(self, draft) -> None:
+        """Fill the tables of the feature, after those of links and devices and before those of basins; add faults."""
 
     def lower_behind_basins(self, draft) -> None:
         """Fill the tables of the feature, after those of basins and before those of networks; add faults."""
@@ -152,9 +168,21 @@ class Feature:
     def placed(self, draft) -> None:
         """Read the offsets of stretches of `out`, in `draft.sizes.offsets`."""
 
+    def rest(self, case, draft) -> tuple[Any, list]:
+        """Case whose parts begin at rest where their forces balance, and notices; draft : with its steady start."""
+        return case, []
+
     def balanced(self, draft, start: Callable[[Any], Any]):
         """Draft whose start the feature has balanced; start : function of a draft -> model with its steady start."""
         return draft
+
+    def supported(self, draft, start) -> dict[int, float]:
+        """Pressures of closed nodes that support loads, in a solved steady start : node -> pressure [Pa]."""
+        return {}
+
+    def moving(self, draft, start) -> list[str]:
+        """Texts of what moves at the start, which is solved; completes the tables of the feature for it."""
+        return []
 
     def settle(self, draft) -> list[str]:
         """Continue after the steady start; names of parts to be given up, after which the tables are made again."""
@@ -176,9 +204,10 @@ class Feature:
         """Terms of its functions, that is, phases of the right-hand side and jobs: (place in the order, `RhsTerms`).
 
         cast : `ModelFeatures` of the model without those of features
-        Places: first: before all others; pipes: behind those of pipes; sources: with event functions, after the nodes
-        are solved and before sources of networks; solved: then, behind these; events: with event functions of
-        restrictions; basins: behind those of basins; last: behind all others but records of nodes.
+        Places: first: before all others; pipes: behind those of pipes; closed: with event functions, after the nodes
+        are solved; sources: then, before sources of networks; solved: then, behind these; events: with event functions
+        of restrictions; links: behind those of pipes, restrictions and columns; basins: behind those of basins; last:
+        behind all others but records of nodes.
         """
         return ()
 
@@ -197,6 +226,10 @@ class Feature:
     def modes(self, model) -> list[tuple[str, np.ndarray]]:
         """Modes of cells: pairs of a name and eigenvalues [1/s], see `step_limits.growing_modes`."""
         return []
+
+    def squares(self, model, y: np.ndarray) -> Squares:
+        """Squares of linear forms in deviations from the state y, whose sum is the energy of the feature."""
+        return Squares()
 
     def weigh(self, model, weights: np.ndarray) -> None:
         """Write the weights of its states in the norm of deviations, from those of masses, see `model.energy_norm`."""
@@ -246,6 +279,30 @@ class FeaturePattern:
     def schedule(self, *indices: int) -> np.ndarray:
         """States on which schedules with these numbers depend."""
         return np.zeros(0, dtype=np.int64)
+
+    def pressure(self, i: int) -> np.ndarray:
+        """States on which the pressure of storing node i depends, in addition to its mass."""
+        return np.zeros(0, dtype=np.int64)
+
+    def inflows(self) -> Iterator[tuple[int, np.ndarray]]:
+        """Yield (storing node, states on which a flow of the feature into it depends)."""
+        yield from ()
+
+    def device(self, row) -> np.ndarray:
+        """States of the feature that a device reads; row : of the device"""
+        return np.zeros(0, dtype=np.int64)
+
+    def wall(self, row) -> np.ndarray:
+        """States of the speed of a moving wall that the feature moves; row : of the wall"""
+        return np.zeros(0, dtype=np.int64)
+
+    def probe(self, row) -> np.ndarray | None:
+        """States on which a probe depends; None if the feature does not compute it. row : of the probe"""
+        return None
+
+    def schedules(self) -> set[int]:
+        """Numbers of the schedules that `pairs` contain, wherever blocks set them."""
+        return set()
 
     def source(self, row) -> np.ndarray | None:
         """States on which a source of a network depends; None if the feature knows none. row : of the source"""

@@ -126,6 +126,9 @@ class Hydraulics:
         return reynolds * math.pi / 4.0 * diameter * viscosity
 
 
+ROUNDING_SHARE = 1e-12  # a sum of forces of a joint below this share of their magnitudes is rounding
+# likewise in a computed equilibrium: stiff springs amplify the rounding of a length by this much
+EQUILIBRIUM_SHARE = 1e-9
 CACHE_LINE = 8  # floats of a cache line
 
 
@@ -222,7 +225,7 @@ class ModelDraft:
     lines: list[tuple] = field(default_factory=list)
     factor_size: int = 0  # entries of a mass matrix factor
     mass_names: list[str] = field(default_factory=list)
-    mass_index: dict[str | None, int] = field(default_factory=dict)
+    mass_index: dict[str | None, int] = field(default_factory=lambda: {None: 0})
     piston_names: list[str] = field(default_factory=list)
     push_names: list[str] = field(default_factory=list)
     wall_names: list[str] = field(default_factory=list)
@@ -377,6 +380,11 @@ class ModelDraft:
     def inside(self, name: str) -> str:
         """Name of the inner node of a part that has one, else of the part itself."""
         return f"{name}.inside" if f"{name}.inside" in self.node_index else name
+
+    @property
+    def rounding(self) -> float:
+        """Fraction of the sum of force magnitudes below which the sum of these forces counts as rounding error."""
+        return EQUILIBRIUM_SHARE if self.case.numerics.initial == "equilibrium" else ROUNDING_SHARE
 
     @property
     def device_names(self) -> list[str]:

@@ -228,7 +228,7 @@ def axes_in_world(basin, out: np.ndarray, layout) -> tuple[np.ndarray, np.ndarra
     out, layout : output array of the right-hand side, and the places of its parts
     """
     from fvsolve.core.kernels.dtypes import BODY_OUT
-    from fvsolve.core.kernels.mechanism.body_layout import ATTITUDE, POSITION
+    from fvsolve.core.kernels.moving_frames import ATTITUDE, POSITION
 
     first = int(layout["body"]) + BODY_OUT * int(basin.row["body"])
     place, turn = out[first + POSITION :][:3], out[first + ATTITUDE :][:9].reshape(3, 3)

@@ -19,9 +19,8 @@ from fvsolve.core.basins.basin_output import basin_first_row
 from fvsolve.core.basins.cell_sides import BLOCK, MEASURES, blocks, row_across, stretch_of_cell
 from fvsolve.core.kernels.dtypes import NO_DRAG, NO_WIDTH, RATE, STATUS, WALL_VALUE, WHERE
 from fvsolve.core.kernels.energy_rows import WALL_ROWS, wall_power_row
-from fvsolve.core.kernels.mass_dynamics import motion
-from fvsolve.core.kernels.mechanism.body_layout import FORCE
-from fvsolve.core.kernels.mechanism.body_layout import body_row as row_of_body
+from fvsolve.core.kernels.moving_frames import FORCE, motion
+from fvsolve.core.kernels.moving_frames import body_row as row_of_body
 from fvsolve.core.kernels.schedule_pieces import schedule_slopes
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.jit import njit

@@ -442,19 +442,19 @@ LAYOUT = record(
     moving_segment=i8,  # change of the driving energy of moving stretches since the start [J/kg]
     rates=i8,  # in `work`: rates, if `out` depends on them and they are not requested; else -1
     forces=i8,  # in `work`: rates from which forces on pipes are computed; else -1
-    tank=i8,  # inertia of basins on bodies, see `kernels.mechanism.body_layout`
+    tank=i8,  # inertia of basins on bodies, see `kernels.moving_frames`
     wall=i8,  # outward force of the water on moving walls, minus that of the profile [N]
     travel=i8,  # of force elements: change of length since the start and its rate [m, m/s]
     along=i8,  # unit vectors of lines, between their points
     pin=i8,  # forces of pins, three for each [N]
-    body=i8,  # data of bodies, see `kernels.mechanism.body_layout`
+    body=i8,  # data of bodies, see `kernels.moving_frames`
     isolated=i8,  # codes of nodes, see `isolated_nodes`
     network=i8,  # sources of networks: change since the start
     size=i8,
 )
 BODY_OUT = 45  # numbers of each body in `out`
 GN = 14  # index of g_n among the numbers of a frame, see `basins.basin_frames`
-TANK_OUT = 24  # numbers in `out` of each basin on a body, see `mechanism.body_layout`
+TANK_OUT = 24  # numbers in `out` of each basin on a body, see `kernels.moving_frames`
 RATE, STATUS, WHERE, CLOSING, ARRIVES, LONGEST = 0, 1, 2, 3, 4, 5  # first entries of `out`
 # Least slope [m2/s] of laws between levels in Newton's method; 0: it follows the flow. FIRM_SLOPE is that of limited
 # steps, of the steady start, and of the density laws other than `linear`.
@@ -488,7 +488,12 @@ NODE_SCALAR, PIPE_SCALAR = 13, 14
 CELL_FIELD, PATCH_FLOW, CELL_SCALAR = 15, 16, 17  # probes of basins
 GIVEN_FLOW = 18  # of a patch with given velocity
 WALL_VALUE = 19  # of a moving wall
-BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = 20, 21, 22, 23  # quantity in `side`, see `mechanism.body_values`
+BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = (
+    20,
+    21,
+    22,
+    23,
+)  # quantity in `side`, see `features.motion.kernels.body_values`
 SURFACE_VALUE = 24  # of a surface described by modes
 PIPE_FORCE = 25  # on a whole pipe
 # of a network, by the code in `side`: value of row `index`; times that of row `cell`; row `cell` over its value;

@@ -16,7 +16,6 @@ from fvsolve.core.kernels import calls
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.devices import VALUE
 from fvsolve.core.kernels.energy_rows import network_power_row, network_stored_row
-from fvsolve.core.kernels.mass_dynamics import forces
 from fvsolve.core.kernels.schedule_pieces import schedule_value
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.jit import njit
@@ -166,10 +165,7 @@ def observe_networks(t, y, out, handle, values):
 @njit
 def sources_for_events(t, y, out, handle, g):
     """Write all sources to `out` before event functions are evaluated; g is not used."""
-    tables = open_tables(handle)
-    if tables.masses.size > 0:
-        forces(t, y, out, tables)
-    write_sources(t, y, out, tables)
+    write_sources(t, y, out, open_tables(handle))
 
 
 @njit

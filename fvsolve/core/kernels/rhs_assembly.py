@@ -107,13 +107,6 @@ READ = {
     ),
 }
 UNSTEADY_FRICTION = {"power": "relaxation: add_friction_power", "stored": "relaxation: add_friction_stored"}
-FLUID_LOADS = {
-    "boundary_inflow": "mechanism.fluid_loads: add_fluid_loads",
-    "accelerate": "mechanism.inertial_forces: pipe_rate_limit",
-    "fluid_response": "mechanism.inertial_forces: accelerate_network_flow",
-    "power": "mechanism.fluid_energy: add_power",
-    "stored": "mechanism.fluid_energy: add_stored",
-}
 COLUMNS = {"inflow": "rigid_columns: column_inflows", "rate_limits": "rigid_columns: column_rate_limit"}
 COMPONENTS = {
     "formulas": RhsTerms(events="schedule_pieces: formula_events"),
@@ -137,49 +130,6 @@ COMPONENTS = {
         column_nodes="rigid_columns: column_pressures_barotropic",
         move="rigid_columns: column_rates_barotropic",
         **COLUMNS,
-    ),
-    "bodies": RhsTerms(
-        prepare="mechanism.body_kinematics: kinematics",
-        observe="mechanism.body_values: observe_bodies",
-        power="mechanism.body_values: power_bodies",
-        stored="mechanism.body_values: stored_bodies",
-    ),
-    "no pins": RhsTerms(accelerate="mechanism.mass_matrix: solve_accelerations"),
-    "pins": RhsTerms(
-        accelerate="mechanism.bushings_and_pins: solve_pinned_accelerations",
-        observe="mechanism.bushings_and_pins: observe_pins",
-    ),
-    "bushings": RhsTerms(
-        move="mechanism.bushings_and_pins: add_bushing_loads",
-        accelerate="mechanism.bushings_and_pins: bushing_rate_limit",
-        observe="mechanism.bushings_and_pins: observe_bushings",
-        power="mechanism.bushings_and_pins: power_bushings",
-        stored="mechanism.bushings_and_pins: stored_bushings",
-    ),
-    "stretches": RhsTerms(events="mechanism.body_kinematics: kinematics_for_events"),
-    "lines": RhsTerms(move="mechanism.bushings_and_pins: add_element_forces"),
-    "moving segments": RhsTerms(
-        prepare="mechanism.inertial_forces: set_segment_drives",
-        known_pressures="mechanism.inertial_forces: moving_tank_pressures",
-        rates="mechanism.inertial_forces: add_cell_drives",
-        **FLUID_LOADS,
-    ),
-    "moving segments, barotropic": RhsTerms(
-        prepare="mechanism.inertial_forces: set_segment_drives",
-        known_pressures="mechanism.inertial_forces: moving_tank_pressures_barotropic",
-        rates="mechanism.inertial_forces: add_cell_drives_barotropic",
-        **FLUID_LOADS,
-    ),
-    "masses": RhsTerms(
-        prepare="mass_dynamics: piston_chambers",
-        move="mass_dynamics: mass_rates",
-        observe="mass_dynamics: observe_masses",
-        record="mass_dynamics: record_masses",
-        events="mass_dynamics: mass_events",
-    ),
-    "energy of masses": RhsTerms(power="mass_energy: add_power_linear", stored="mass_energy: add_stored_linear"),
-    "energy of masses, barotropic": RhsTerms(
-        power="mass_energy: add_power_barotropic", stored="mass_energy: add_stored_barotropic"
     ),
     "devices": RhsTerms(
         prepare="devices: set_devices",
@@ -208,6 +158,8 @@ COUPLED = RhsTerms(solve_nodes="node_clusters: solve_coupled_clusters")
 BANDS = RhsTerms(exchange="band_exchange: exchange_states", reduce_rate="band_exchange: reduce_rate")
 BOUNDARY_EXCHANGE = RhsTerms(package="fvsolve.core.basins", boundary_exchange="basin_patches: put_boundary_flows")
 MIXED = RhsTerms(mix="scalar_transport: mix_scalars")
+# places of terms of features whose event functions need solved nodes, see `assembly.features.Feature.terms`
+WITH_NODES = ("first", "pipes", "closed", "sources", "solved", "events", "basins", "last")
 ALWAYS = RhsTerms(record="observation: record_nodes", events="observation: tank_events")
 
 
@@ -216,7 +168,6 @@ class ModelFeatures(NamedTuple):
 
     family : kernels of the density law, "linear", "barotropic" or "cavitating"
     laws : names of the modules of parts' laws, in the order of the rows of `hooks`
-    lines : True if force elements join points of bodies
     features, further_packages : place and terms of features, and their further modules, see `assembly.features`
     basins, carried : terms of basins, and of the scalars that they carry; see `basins.basin_terms`
     alone : True if there are only basins, and no link
@@ -231,12 +182,6 @@ class ModelFeatures(NamedTuple):
     pipes: bool
     clusters: bool = False
     columns: bool = False
-    masses: bool = False
-    bodies: bool = False
-    lines: bool = False
-    pins: bool = False
-    bushings: bool = False
-    moving_segments: bool = False
     unsteady_friction: bool = False
     viscoelastic_walls: bool = False
     devices: bool = False
@@ -267,16 +212,15 @@ class ModelFeatures(NamedTuple):
         lumped = linear and not self.pipes and not any(terms.outgoing_waves for terms in self.terms_at("pipes"))
         yield from (ALONE,) if self.alone else (LUMPED,) if lumped else (NETWORK, NODES[family])
         yield READ["linear" if linear else "barotropic"]
-        if self.masses:
-            yield COMPONENTS["energy of masses" if linear else "energy of masses, barotropic"]
         if self.pipes:
             yield PIPES[family]
         yield from self.terms_at("pipes")
         if self.valves:
             yield COMPONENTS["valves"]
         bends = any(hook_of(law, "bends") is not None for law in self.modules())
-        if self.devices or bends or self.networks or any(terms.events for _, terms in self.features):
+        if self.devices or bends or self.networks or any(terms.events for terms in self.terms_at(*WITH_NODES)):
             yield COMPONENTS["closed"]  # their event functions need solved nodes
+        yield from self.terms_at("closed")
         if self.networks:
             yield COMPONENTS["sources of networks"]
         if followed := list(self.terms_at("sources")):
@@ -294,19 +238,7 @@ class ModelFeatures(NamedTuple):
                 yield COUPLED
         if self.columns:
             yield COMPONENTS["columns" if linear else "columns, barotropic"]
-        if self.bodies:
-            yield COMPONENTS["bodies"]
-            yield COMPONENTS["pins" if self.pins else "no pins"]
-        if self.bushings:
-            yield COMPONENTS["bushings"]
-        if self.moving_segments:
-            yield COMPONENTS["moving segments" if linear else "moving segments, barotropic"]
-        if self.lines:
-            yield COMPONENTS["stretches"]
-        if self.masses:
-            yield COMPONENTS["masses"]
-        if self.lines:
-            yield COMPONENTS["lines"]
+        yield from self.terms_at("links")
         if self.devices:
             yield COMPONENTS["devices"]
         if self.networks:
@@ -330,9 +262,9 @@ class ModelFeatures(NamedTuple):
             yield COMPONENTS["pipes"]
         yield ALWAYS
 
-    def terms_at(self, place: str) -> Iterator[RhsTerms]:
-        """Yield the terms of features at a place in the order of functions."""
-        yield from (terms for where, terms in self.features if where == place)
+    def terms_at(self, *places: str) -> Iterator[RhsTerms]:
+        """Yield the terms of features at these places in the order of functions."""
+        yield from (terms for where, terms in self.features if where in places)
 
     def modules(self) -> list:
         """Loaded modules of the laws of parts, in the order of `laws`."""

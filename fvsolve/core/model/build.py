@@ -88,13 +88,10 @@ def steady_profile(draft) -> dict[str, Any]:
 
         start = NonlinearStart(draft)
     start.solve()
-    if len(draft.piston_table):
-        from fvsolve.core.model.mechanics_tables import find_closed_chambers, supporting_pressures
-
-        find_closed_chambers(draft, start)
-        start.loads = supporting_pressures(draft, start)
-        if start.loads:
-            start.solve()
+    for feature in draft.features:
+        start.loads |= feature.supported(draft, start)
+    if start.loads:
+        start.solve()
     start.report_frictionless()
     start.freeze_factors()
     start.fill_nodes()
@@ -162,10 +159,10 @@ def build_like(case: Case, like: Model | None = None) -> Model:
     """
     notices = []
     if case.needs_equilibrium:
-        from fvsolve.core.model.equilibrium_search import with_equilibrium
-
-        steady = replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"}))
-        case, notices = with_equilibrium(case, tables_with_start(steady))
+        draft = tables_with_start(replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"})))
+        for feature in draft.features:
+            case, found = feature.rest(case, draft)
+            notices += found
     if like is not None and not like.tables_before_start:
         like.tables_before_start.append(tables_before_start(like.case))
     reused = None if like is None else with_new_sizes(like.tables_before_start[0], case)
@@ -238,7 +235,7 @@ def fill_nodes(draft: ModelDraft) -> None:
 
 
 def fill_links(draft: ModelDraft) -> None:
-    """Fill the tables of links, devices, bodies and masses."""
+    """Fill the tables of links and devices, and of features between them."""
     draft.pipe_names, draft.pipe_table = draft.fill("pipe", rec.PIPE)
     for feature in draft.features:
         feature.lower(draft)
@@ -248,21 +245,8 @@ def fill_links(draft: ModelDraft) -> None:
     for row in draft.pipe_table:
         for end in ("from_node", "to_node"):
             draft.node_table["admittance"][row[end]] += row["end_admittance"]
-    draft.mass_index = {None: 0}
-    if has_motion(draft):
-        from fvsolve.core.model import mechanics_tables  # only cases with masses or bodies need it
-
-        mechanics_tables.lower_bodies(draft)
-        mechanics_tables.lower_moving_segments(draft)
-        mechanics_tables.lower_masses(draft)
-        mechanics_tables.lower_lines(draft)
-
-
-def has_motion(draft: ModelDraft) -> bool:
-    """True if a case has masses, bodies, or elements between them."""
-    case, elements = draft.case, ("brace", "stop", "piston", "pin", "bushing")
-    has_masses = any(node.domain == "translational" for node in case.nodes.values())
-    return bool(case.poses) or has_masses or any(draft.links.get(table) for table in elements)
+    for feature in draft.features:
+        feature.lower_behind_links(draft)
 
 
 def elements_of(case: Case) -> list:
@@ -318,10 +302,6 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     for feature in draft.features:
         feature.reserve_ledger(draft)
     reserve_basins(draft)
-    if has_motion(draft):
-        from fvsolve.core.model.mechanics_tables import reserve_mechanics
-
-        reserve_mechanics(draft)
     if draft.network is not None:
         from fvsolve.core.model.network_tables import reserve_networks
 
@@ -333,7 +313,7 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         feature.placed(draft)
     if (draft.probe_table["kind"] == rec.PIPE_FORCE).any():
         layout["forces"] = draft.to_work(most_states(draft))
-    if draft.moving_segment_table["loads_body"].any():
+    if sizes.reads_rates:
         layout["rates"] = draft.to_work(most_states(draft))
     draft.tables = rec.Tables(
         settings=settings, layout=layout, pipes=draft.pipe_table, nodes=draft.node_table, valves=draft.valve_table,
@@ -370,9 +350,9 @@ def reserve_network(draft: ModelDraft) -> None:
     # it shut off a demand; for each node the first and the last time at which its demand is not supplied, and the first
     # at which its pressure is not determined.
     sizes.marks = pipes * (4 if draft.case.law.cavitates else 1) + 3 * nodes + columns
-    sizes.marks += 2 * len(draft.device_table) + len(draft.piston_table) + valves + 3 * nodes
+    sizes.marks += 2 * len(draft.device_table) + valves + 3 * nodes
     sizes.run_array("clock", 1)
-    sizes.run_array("armed", tanks.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table))
+    sizes.flags(tanks.EVENTS * draft.tanks + len(draft.events))
     sizes.run_array("envelope", (4, draft.cells))
     sizes.run_array("extremes", (4, len(draft.probe_table)))
     sizes.run_array("stack", draft.schedules.stack)

@@ -269,14 +269,13 @@ class Model(Displayable):
         from fvsolve.core.kernels.rhs_assembly import ModelFeatures
 
         has = rec.Tables(*(len(table) > 0 for table in self.tables))
-        mechanics = [has.clusters, has.columns, has.masses, has.bodies, has.lines, has.pins, has.bushings]
-        mechanics.append(has.moving_segments)
         basins, carried, valves = terms_of_basins(self.basins, has.valves), terms_of_scalars(self.basins), has.valves
-        alone = bool(self.basins) and not (self.pipes or valves or has.devices or any(mechanics))
+        alone = bool(self.basins) and not (self.pipes or valves or has.devices or has.clusters or has.columns)
+        alone = alone and not any(feature.reads_nodes for feature in self.features)
         alone = alone and bool((self.tables.nodes["kind"] == rec.PATCH).all())
         cells = bool((self.tables.pipes["cells"] > 0).any())
-        cast = ModelFeatures(self.case.law.family, cells, *mechanics, self.unsteady, self.creeps, has.devices,
-                    tuple(self.laws), basins, carried, valves, (), (), has.couplings, alone,
+        cast = ModelFeatures(self.case.law.family, cells, has.clusters, has.columns, self.unsteady, self.creeps,
+                    has.devices, tuple(self.laws), basins, carried, valves, (), (), has.couplings, alone,
                     forces=bool(self.layout["forces"] >= 0), formulas=bool((self.tables.schedules["pieces"] < 0).any()),
                     networks=self.network is not None,
                     device_heat=bool((self.tables.heat_sources["device"] >= 0).any()))  # fmt: skip

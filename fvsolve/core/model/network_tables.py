@@ -12,7 +12,6 @@ from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.network import MOST_STATES, Network
 from fvsolve.core.model.network_elimination import Elimination, NetworkError, dependent_stores, substituted
 from fvsolve.core.model.network_faults import NO_INERTIA, NO_SPEED, network_faults, stated_faults
-from fvsolve.core.model.static_forces import rounding
 from fvsolve.parts.heat import exchanger_names
 
 CURRENT_ROUNDING = 1e-13  # of diodes, over the sum of all sources divided by their resistance
@@ -28,7 +27,7 @@ EVENTS = {
 def lower_networks(draft) -> None:
     """Fill the tables of the network of a case, and add the states of its stores and of angles that are probed."""
     elements, switches = parts_of_network(draft.case)
-    network = Network(elements, switches, tuple(sorted(draft.case.network_places)), rounding=rounding(draft))
+    network = Network(elements, switches, tuple(sorted(draft.case.network_places)), rounding=draft.rounding)
     try:
         found = network.equations(network.conducting)
     except NetworkError as error:

@@ -28,8 +28,6 @@ def fill_probes(draft, probes: list) -> np.ndarray:
             draft.basins[row["index"]].lower_probe(row, probe.quantity, np.zeros(0, int), np.zeros(0))
         elif probe.name in draft.case.network_places and probe.name not in parts["nodes"]:  # PUMP.shaft
             draft.network.fill_node_probe(draft, row, probe.name, False)
-        elif probe.part == "nodes" and probe.name not in parts["nodes"]:  # a point of a body, or of the world
-            lower_body_point(draft, row, probe)
         else:
             part = parts[probe.part][probe.name]
             lowering_of(type(part)).of(part).probe(draft, probe.name, probe, row)
@@ -41,19 +39,8 @@ def all_probes(case) -> list:
     return [*case.probes, *case.extreme_probes]
 
 
-def lower_body_point(draft, row, probe) -> None:
-    """Fill the row of a probe at a named point of a body or of the world."""
-    from fvsolve.core.assembly.mechanics import point_row
-    from fvsolve.core.kernels.mechanism.body_values import POINT_QUANTITIES
-
-    row["kind"], row["side"] = rec.POINT_VALUE, POINT_QUANTITIES.index(probe.quantity)
-    row["index"] = point_row(draft, probe.name)
-
-
 def lower_basin_point(draft, row, probe) -> None:
     """Fill the row of a probe at a point of a basin."""
-    if probe.name in draft.case.lumped:
-        return lower_surface(draft, row, probe)
     row["kind"] = rec.CELL_FIELD
     cells, weights = cells_at_point(draft, row, probe)
     draft.basins[row["index"]].lower_probe(row, probe.quantity, cells, weights)
@@ -80,19 +67,6 @@ def lower_section(draft, row, probe) -> None:
     row["cell"], row["weights"] = len(draft.integers), len(draft.floats)
     draft.integers += np.searchsorted(basin.marks.faces, chain.faces).tolist()
     draft.floats += (chain.turn * basin.mesh.length[chain.faces]).tolist()
-
-
-def lower_surface(draft, row, probe) -> None:
-    """Fill the row of a probe of depth at a point of a basin with sloshing modes."""
-    from fvsolve.case import sloshing
-
-    case, basin = draft.case, draft.case.nodes[probe.name]
-    arguments = basin, case.lumped[probe.name]
-    modes, shares = sloshing.surface_factors(*arguments, *probe.point, case.properties.density, case.gravity)
-    row["kind"], row["offset"] = rec.SURFACE_VALUE, sloshing.depth_of(*arguments)
-    row["cell"], row["count"], row["weights"] = len(draft.integers), len(modes), len(draft.floats)
-    draft.integers += [draft.body_names.index(sloshing.mode_body_name(probe.name, mode)) for mode in modes]
-    draft.floats += shares
 
 
 def probe_offsets(draft, start) -> None:

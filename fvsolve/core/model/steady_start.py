@@ -305,7 +305,7 @@ class SteadyStart:
         return Edge(i, j, law_of(LEAK, g))
 
     def leak_flow(self, row, p_a: float, p_b: float) -> float:
-        """Leakage past a piston from chamber A to B [kg/s], as `kernels.mass_dynamics.leak_flow`.
+        """Leakage past a piston from chamber A to B [kg/s], as `features.motion.kernels.mass_dynamics.leak_flow`.
 
         p_a, p_b : pressures in the chambers [Pa]
         """
@@ -508,11 +508,8 @@ class SteadyStart:
 
     def report(self) -> dict[str, Any]:
         draft, moving = self.draft, []
-        if len(draft.mass_table) or len(draft.body_table):
-            from fvsolve.core.model.mechanics_tables import driven_at_start, start_masses
-            from fvsolve.core.model.static_forces import start_bodies
-
-            moving = start_masses(draft, self) + start_bodies(draft, self) + driven_at_start(draft, self)
+        for feature in draft.features:
+            moving += feature.moving(draft, self)
         moving += self.moving
         if draft.network is not None:
             from fvsolve.core.model.network_start import start_network

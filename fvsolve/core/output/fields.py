@@ -100,7 +100,7 @@ def world_points(model, out: np.ndarray, owner: np.ndarray, place: np.ndarray) -
     owner : int[p]         body of each point, -1 for the world
     place : float64[p, 3]  coordinates in the axes of the body [m]
     """
-    from fvsolve.core.kernels.mechanism.body_layout import ATTITUDE, POSITION, SPIN, VELOCITY
+    from fvsolve.core.kernels.moving_frames import ATTITUDE, POSITION, SPIN, VELOCITY
 
     first, n = int(model.layout["body"]), len(model.body_names)
     points, speed = place.copy(), np.zeros_like(place)

@@ -189,16 +189,19 @@ class SloshingCheck:
         out : output array of the right-hand side; i : number of the body; place, normal : centre of the basin [m] and
         unit normal of its bed in the axes of the body; modal : True for sloshing modes
         """
+        from fvsolve.core.kernels import moving_frames as frame
         from fvsolve.core.kernels.dtypes import BODY_OUT
-        from fvsolve.core.kernels.mechanism import body_layout
 
         row = out[int(self.model.layout["body"]) + BODY_OUT * i :][:BODY_OUT]
-        turn, gravity = row[body_layout.ATTITUDE :][:9].reshape(3, 3), self.model.case.gravity
-        spin, arm, up = row[body_layout.SPIN :][:3], turn @ place, turn @ normal
+        turn, gravity = row[frame.ATTITUDE :][:9].reshape(3, 3), self.model.case.gravity
+        spin, arm, up = row[frame.SPIN :][:3], turn @ place, turn @ normal
         down = np.cross(spin, np.cross(spin, arm)) + (0.0, 0.0, gravity)
         weight, reference = (
             up @ (row[a:][:3] + np.cross(row[b:][:3], arm) + down)
-            for a, b in ((body_layout.ACCELERATION, body_layout.SPIN_RATE), (body_layout.BIAS, body_layout.SPIN_BIAS))
+            for a, b in (
+                (frame.ACCELERATION, frame.SPIN_RATE),
+                (frame.BIAS, frame.SPIN_BIAS),
+            )
         )
         return float(weight), gravity if modal else float(reference)
 

@@ -411,8 +411,8 @@ class RunLoop:
 
 
 def stored_states(model: Model) -> np.ndarray:
-    """Numbers of the states that are stored amounts, also travel of masses, whose sums are compensated."""
-    sums = [*model.tables.nodes["y"], *model.tables.masses["y"]]
+    """Numbers of the states that are stored amounts, or travel, whose sums are compensated."""
+    sums = [*model.tables.nodes["y"]]
     for feature in model.features:
         sums += feature.stored_states(model).tolist()
     return np.array([at for at in sums if at >= 0], dtype=np.int64)

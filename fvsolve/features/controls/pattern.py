@@ -61,10 +61,9 @@ class BlockCouplings(FeaturePattern):
             return unique_states(model.pressure_states(i), self.schedule(model.nodes[i]["schedule"]))
         if kind == rec.PRESSURE:
             return model.sets[i]
-        if kind in (rec.POSITION, rec.VELOCITY):
-            return unique_states(model.masses[i] + (kind == rec.VELOCITY))
-        if kind in (rec.PISTON_POSITION, rec.PISTON_VELOCITY):
-            return model.places(model.pistons[i], int(kind == rec.PISTON_VELOCITY))
+        for own in model.features:
+            if (states := own.probe(row)) is not None:
+                return states
         if kind == rec.NETWORK_VALUE:
             return model.probe_states(row)
         if kind == rec.VALVE_FLOW:
@@ -94,7 +93,8 @@ class BlockCouplings(FeaturePattern):
         network |= {*tables.valves["command"]}
         inputs = tables.network_inputs
         network |= {*inputs["index"][inputs["kind"] == rec.SCHEDULE_INPUT], *tables.network_switches["schedule"]}
-        network |= {*tables.devices["schedule"], *tables.braces["schedule"], *self.controls["setpoint"]}
+        network |= {*tables.devices["schedule"], *self.controls["setpoint"]}
+        network |= {index for own in self.model.features for index in own.schedules()}
         other = [index for index in self.follows if index not in network]  # shafts, scalars
         if other:
             yield pairs_of(np.arange(self.size), self.schedule(*other))

@@ -1,6 +1,6 @@
 """Current, force and stored energy of a solenoid; the network integrates the voltage of its coil to flux linkage."""
 
-from fvsolve.core.kernels.mass_dynamics import motion
+from fvsolve.core.kernels.moving_frames import motion
 from fvsolve.jit import njit
 
 TURNS, CORE, SATURATION, PER_GAP, CLOSED, FLUX = range(6)

@@ -11,12 +11,12 @@ of the joint, s : its coordinate.
 
 from math import atan2, cos, hypot, sin, sqrt
 
+from fvsolve.core.kernels import moving_frames as layout
 from fvsolve.core.kernels.dtypes import BODY_VALUE, FREE, POINT_VALUE, PRISMATIC, SURFACE_VALUE, TANK_OUT
 from fvsolve.core.kernels.energy_rows import BODY_ROWS, body_power_row, body_stored_row
-from fvsolve.core.kernels.mechanism import body_layout as layout
-from fvsolve.core.kernels.mechanism.body_kinematics import centre_of, joint_coordinate, joint_parameters, point_at
-from fvsolve.core.kernels.mechanism.body_layout import body_row
-from fvsolve.core.kernels.mechanism.vectors import (
+from fvsolve.core.kernels.moving_frames import body_row
+from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.core.kernels.vectors import (
     cross,
     dot,
     minus,
@@ -28,7 +28,7 @@ from fvsolve.core.kernels.mechanism.vectors import (
     vector,
     vector_product,
 )
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.motion.kernels.body_kinematics import centre_of, joint_coordinate, joint_parameters, point_at
 from fvsolve.jit import njit
 
 BODY_QUANTITIES = (

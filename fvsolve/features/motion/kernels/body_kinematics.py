@@ -11,12 +11,12 @@ q'' = 0. The axes of a joint are in scratch[9:18], see `set_joint_frame`.
 
 from math import cos, sin, sqrt
 
+from fvsolve.core.kernels import moving_frames as layout
 from fvsolve.core.kernels.dtypes import ABOUT, ALONG, BALL, BODY_OUT, FREE, PRISMATIC, REVOLUTE
-from fvsolve.core.kernels.mechanism import body_layout as layout
-from fvsolve.core.kernels.mechanism.body_layout import body_row
-from fvsolve.core.kernels.mechanism.vectors import add_vector, cross, minus, plus, rotate, scaled, vector, write_vector
+from fvsolve.core.kernels.moving_frames import body_row
 from fvsolve.core.kernels.schedule_pieces import schedule_slopes, schedule_value
 from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.core.kernels.vectors import add_vector, cross, minus, plus, rotate, scaled, vector, write_vector
 from fvsolve.jit import njit
 
 

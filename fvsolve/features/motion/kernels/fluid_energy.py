@@ -11,12 +11,12 @@ Arguments are those of `fluid_loads`. z : elevation of the start of a segment in
 increase per distance along the segment.
 """
 
+from fvsolve.core.kernels import moving_frames as layout
 from fvsolve.core.kernels.dtypes import CHAMBER, FIXED, JUNCTION, TANK
-from fvsolve.core.kernels.mechanism import body_layout as layout
-from fvsolve.core.kernels.mechanism import fluid_loads as fluid
-from fvsolve.core.kernels.mechanism.vectors import cross, dot, plus, scalar_product, scaled, vector
 from fvsolve.core.kernels.network_energy import COLUMN, NODE, PIPE, VALVE, energy_head
 from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.core.kernels.vectors import cross, dot, plus, scalar_product, scaled, vector
+from fvsolve.features.motion.kernels import fluid_loads as fluid
 from fvsolve.jit import njit
 
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from fvsolve.case import bodies
 from fvsolve.case.bodies import free_joints
-from fvsolve.core.assembly.mechanics import PLAIN_LINE, are_points, distance_and_rate, push_ends
+from fvsolve.core.assembly.mechanics import PLAIN_LINE, are_points, distance_and_rate, point_row, push_ends
 from fvsolve.core.assembly.schedule_tables import break_times
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.model.static_forces import DRIVES, MOTION, StaticForces, pin_rows, rounding
+from fvsolve.features.motion.static_forces import DRIVES, MOTION, StaticForces, pin_rows
 from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.units import show
 
@@ -109,7 +109,7 @@ def start_masses(draft, start) -> list[str]:
     for row in draft.wall_table:
         if row["mass"] >= 0:
             size[row["mass"]] += abs(row["rest"])
-    masses["force"] = np.where(np.abs(total) > rounding(draft) * size, total, 0.0)
+    masses["force"] = np.where(np.abs(total) > draft.rounding * size, total, 0.0)
     moving = []
     for name, row in zip(draft.mass_names, masses, strict=False):
         if row["velocity"] != 0.0:
@@ -256,6 +256,9 @@ def reserve_mechanics(draft) -> None:
     spatial += constraints * (2 * freedoms + constraints + 1)
     draft.sizes.need_scratch(max(spatial, 18 if bodies else 0))
     draft.sizes.need_scratch(2 * masses)
+    draft.sizes.marks += len(draft.piston_table)
+    draft.sizes.flags(2 * len(draft.stop_table))
+    draft.sizes.reads_rates |= bool(draft.moving_segment_table["loads_body"].any())
 
 
 def fill_body(draft, name: str, body: Any, row) -> None:
@@ -419,3 +422,33 @@ def driven_at_start(draft, start) -> list[str]:
                     texts.append(f"{kind} {name}: the motion of its body drives its flow with "
                                  f"{draft.case.amount(rho * push, 'pressure', span=True)}")  # fmt: skip
     return texts
+
+
+def lower_body_probe(draft, row, probe) -> None:
+    """Fill the row of a probe of a body."""
+    from fvsolve.features.motion.kernels.body_values import BODY_QUANTITIES
+
+    quantity = "angle" if probe.quantity == "travel" else probe.quantity
+    row["kind"], row["side"] = rec.BODY_VALUE, BODY_QUANTITIES.index(quantity)
+    row["index"] = draft.body_names.index(probe.name)
+
+
+def lower_body_point(draft, row, probe) -> None:
+    """Fill the row of a probe at a named point of a body or of the world."""
+    from fvsolve.features.motion.kernels.body_values import POINT_QUANTITIES
+
+    row["kind"], row["side"] = rec.POINT_VALUE, POINT_QUANTITIES.index(probe.quantity)
+    row["index"] = point_row(draft, probe.name)
+
+
+def lower_surface(draft, row, probe) -> None:
+    """Fill the row of a probe of depth at a point of a basin with sloshing modes."""
+    from fvsolve.case import sloshing
+
+    case, basin = draft.case, draft.case.nodes[probe.name]
+    arguments = basin, case.lumped[probe.name]
+    modes, shares = sloshing.surface_factors(*arguments, *probe.point, case.properties.density, case.gravity)
+    row["kind"], row["offset"] = rec.SURFACE_VALUE, sloshing.depth_of(*arguments)
+    row["cell"], row["count"], row["weights"] = len(draft.integers), len(modes), len(draft.floats)
+    draft.integers += [draft.body_names.index(sloshing.mode_body_name(probe.name, mode)) for mode in modes]
+    draft.floats += shares

@@ -7,13 +7,14 @@ e / (rho0 V) under the density law `linear`, ln(rho / rho_0) = ln(1 + e V0 / (m0
 0 marks initial values. For a piston between points of bodies the state is the mass itself, which a closed chamber
 conserves to the last bit. The force of a spring, stop or piston follows from its change of length (travel) in `out`: on
 the axis from the positions of two masses, between bodies from two points, written by
-`kernels.mechanism.body_kinematics`. Its two masses are then the same fixed frame, on which the net force is zero.
+`body_kinematics`. Its two masses are then the same fixed frame, on which the net force is zero.
 """
 
 from math import log, log1p, sqrt
 
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.density import density, log_density, pressure_of_log
+from fvsolve.core.kernels.moving_frames import motion
 from fvsolve.core.kernels.schedule_pieces import schedule_value
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.jit import njit
@@ -21,14 +22,6 @@ from fvsolve.jit import njit
 CONTACT_STEPS = (
     0.6  # times the rate of a contact: `step_control.closing_step` then takes a quarter of a radian in a step
 )
-
-
-@njit(forceinline=True)
-def motion(mass, y):
-    """(change of position since the start [m], velocity [m/s]) of a mass."""
-    if mass["y"] < 0:
-        return 0.0, 0.0
-    return y[mass["y"]], mass["velocity"] + y[mass["y"] + 1]
 
 
 @njit(forceinline=True)
@@ -53,7 +46,7 @@ def travel_of(out, tables, k):
 def write_travels(y, out, tables):
     """Write the change of length of all force elements between masses, and its rate, to `out`.
 
-    Elements between points of bodies are written by `kernels.mechanism.body_kinematics`.
+    Elements between points of bodies are written by `body_kinematics`.
     """
     braces, stops, pistons = tables.braces, tables.stops, tables.pistons
     at = tables.layout[0]["travel"]
@@ -362,6 +355,12 @@ def record_masses(t, y, out, handle, values):
         x = piston["position"] + piston_travel(out, tables, k)[0]
         if not 0.0 <= x <= piston["stroke"] and marks[at] != marks[at]:
             marks[at] = t
+
+
+@njit
+def forces_for_events(t, y, out, handle, g):
+    """Write all element forces and net forces to `out`, for sources of networks that read them; g is not used."""
+    forces(t, y, out, open_tables(handle))
 
 
 @njit

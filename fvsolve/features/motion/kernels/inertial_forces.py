@@ -14,15 +14,15 @@ q'' is solved with the fluid loads (`fluid_loads`) and with the inertia of the f
 of flow are corrected for q''.
 """
 
+from fvsolve.core.kernels import moving_frames as layout
 from fvsolve.core.kernels.density import enthalpy, pressure_of_enthalpy
 from fvsolve.core.kernels.dtypes import JOINT_LOAD_READ, LAW_LINEAR, NO_WEIGHT, RATE, RATE_UNWANTED, STATUS, TANK, WHERE
-from fvsolve.core.kernels.mechanism import body_layout as layout
-from fvsolve.core.kernels.mechanism import fluid_loads as fluid
-from fvsolve.core.kernels.mechanism.body_layout import body_row
-from fvsolve.core.kernels.mechanism.mass_matrix import add_body_force, clear_column, mobility
-from fvsolve.core.kernels.mechanism.vectors import cross, dot, minus, plus, rotate, rotate_back, scalar_product, vector
+from fvsolve.core.kernels.moving_frames import body_row
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.core.kernels.tanks import tank_level
+from fvsolve.core.kernels.vectors import cross, dot, minus, plus, rotate, rotate_back, scalar_product, vector
+from fvsolve.features.motion.kernels import fluid_loads as fluid
+from fvsolve.features.motion.kernels.mass_matrix import add_body_force, clear_column, mobility
 from fvsolve.jit import njit
 
 THIN_LAYER = 1e-6  # thickness of a layer added at the surface to test if fluid has weight there [m]

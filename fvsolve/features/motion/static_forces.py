@@ -8,7 +8,7 @@ from fvsolve.core.kernels.table_handle import make_handle
 from fvsolve.core.model.run_data import zeros_for_run
 
 PACKAGE = "fvsolve"  # package of the kernel functions
-FOLDER = "kernels.mechanism"
+FOLDER = "features.motion.kernels"
 MOTION, LINES = f"{FOLDER}.body_kinematics: kinematics", f"{FOLDER}.bushings_and_pins: add_element_forces"
 WEIGH, ACCELERATE = f"{FOLDER}.mass_matrix: start_mass_matrix", f"{FOLDER}.mass_matrix: solve_accelerations"
 BUSHINGS = f"{FOLDER}.bushings_and_pins: add_bushing_loads"
@@ -17,8 +17,8 @@ PINNED, GAPS, HOLD = (
     for name in ("solve_pinned_accelerations", "start_gaps", "add_start_pin_forces")
 )
 # loads on bodies of fluid at rest, in addition to pushes
-FLUID_LOADS = ("basins.basin_frames: set_frames", "basins.frame_forces: add_frame_forces")
-WALL_LOADS = ("basins.moving_walls: push_bodies_at_rest",)
+FLUID_LOADS = ("core.basins.basin_frames: set_frames", "core.basins.frame_forces: add_frame_forces")
+WALL_LOADS = ("core.basins.moving_walls: push_bodies_at_rest",)
 LOADS = f"{FOLDER}.fluid_loads: add_fluid_loads"
 INERTIAL = ("set_segment_drives", "moving_tank_pressures", "add_cell_drives", "moving_column_rates")
 DRIVES, *DRIVEN = (f"{FOLDER}.inertial_forces: {name}" for name in INERTIAL)
@@ -112,7 +112,7 @@ class StaticForces:
 
     def loads(self) -> np.ndarray:
         """Force [N] and torque [N m] on every body : float64[bodies, 6], a view of `out`."""
-        from fvsolve.core.kernels.mechanism.body_layout import FORCE
+        from fvsolve.core.kernels.moving_frames import FORCE
 
         first, count = int(self.layout["body"]), len(self.draft.body_table)
         return self.out[first : first + rec.BODY_OUT * count].reshape(count, rec.BODY_OUT)[:, FORCE : FORCE + 6]
@@ -161,12 +161,12 @@ class StaticForces:
         return [(int(point["body"]), point["place"], force, torque) for point in ends if point["body"] >= 0]
 
     def row_of(self, i: int) -> np.ndarray:
-        """Values of body i in `out` (`kernels.mechanism.body_layout`)."""
+        """Values of body i in `out` (`kernels.moving_frames`)."""
         return self.out[int(self.layout["body"]) + rec.BODY_OUT * i :][: rec.BODY_OUT]
 
     def position_of(self, point: int) -> np.ndarray:
         """Position of a point in the current configuration [m]."""
-        from fvsolve.core.kernels.mechanism.body_layout import ATTITUDE, POSITION
+        from fvsolve.core.kernels.moving_frames import ATTITUDE, POSITION
 
         i, place = int(self.tables.points[point]["body"]), self.tables.points[point]["place"]
         if i < 0:
@@ -179,7 +179,7 @@ class StaticForces:
 
         i, place : body and point in its axes at which they act. `forces` must have written the joint axes to `scratch`.
         """
-        from fvsolve.core.kernels.mechanism.body_layout import ARM, ATTITUDE
+        from fvsolve.core.kernels.moving_frames import ARM, ATTITUDE
 
         bodies, effects = self.draft.body_table, np.zeros(len(self.draft.freedom_table))
         columns = self.written.scratch[: 6 * len(effects)].reshape(-1, 6)
@@ -204,9 +204,6 @@ class StaticForces:
 
 RANK_TOLERANCE = 1e-8  # a row of pins is redundant if its independent part is below this share of the largest row
 PIN_RATE_TOLERANCE = 1e-6  # greatest rate at which a pin may open at the start [m/s]
-ROUNDING_SHARE = 1e-12  # a sum of forces of a joint below this share of their magnitudes is rounding
-# likewise in a computed equilibrium: stiff springs amplify the rounding of a length by this much
-EQUILIBRIUM_SHARE = 1e-9
 
 
 def refuse_massless(draft, at: StaticForces) -> None:
@@ -256,14 +253,9 @@ def start_bodies(draft, start) -> list[str]:
     if len(draft.pin_table):
         left, accelerate = start_pins(draft, at), PINNED
     size = at.sizes(pushes)
-    draft.freedom_table["balance"] = np.where(np.abs(left) <= rounding(draft) * size, left, 0.0)
+    draft.freedom_table["balance"] = np.where(np.abs(left) <= draft.rounding * size, left, 0.0)
     at.run(*at.pushes, accelerate)
     return motion_at_start(draft, at.accelerations())
-
-
-def rounding(draft) -> float:
-    """Fraction of the sum of force magnitudes below which the sum of these forces counts as rounding error."""
-    return EQUILIBRIUM_SHARE if draft.case.numerics.initial == "equilibrium" else ROUNDING_SHARE
 
 
 def pin_rows(draft, at: StaticForces) -> np.ndarray:

@@ -22,26 +22,26 @@ import numpy as np
 from fvsolve import attitude, units
 from fvsolve.case import checks
 from fvsolve.case.bodies import joint_coordinate
+from fvsolve.core.assembly.model_draft import EQUILIBRIUM_SHARE, ROUNDING_SHARE
 from fvsolve.core.basins.lower import basin_start
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.model.mechanics_tables import pushed_masses
 from fvsolve.core.model.network_start import accelerations_of_masses
-from fvsolve.core.model.static_forces import (
-    EQUILIBRIUM_SHARE,
+from fvsolve.errors import Notice
+from fvsolve.features.motion.lower import pushed_masses
+from fvsolve.features.motion.static_forces import (
+    FOLDER,
     GAPS,
     HOLD,
     LINES,
     MOTION,
     RANK_TOLERANCE,
-    ROUNDING_SHARE,
     StaticForces,
 )
-from fvsolve.errors import Notice
 from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.schedule import constant
 
 DIFFERENCE_STEP = 1e-6  # step of finite differences [rad], [m]
-CHAMBERS, PUSHES = "kernels.mass_dynamics: piston_chambers", "kernels.mass_dynamics: mass_rates"
+CHAMBERS, PUSHES = f"{FOLDER}.mass_dynamics: piston_chambers", f"{FOLDER}.mass_dynamics: mass_rates"
 
 
 class Configuration(StaticForces):
@@ -265,7 +265,7 @@ class Configuration(StaticForces):
 
     def attitudes(self) -> dict[str, np.ndarray]:
         """Rotation matrix of every body in the current configuration : name -> float64[3, 3]."""
-        from fvsolve.core.kernels.mechanism.body_layout import ATTITUDE
+        from fvsolve.core.kernels.moving_frames import ATTITUDE
 
         return {name: self.row_of(i)[ATTITUDE : ATTITUDE + 9].reshape(3, 3).copy()
                 for i, name in enumerate(self.draft.body_names)}  # fmt: skip

@@ -27,14 +27,12 @@ lambda.
 
 from math import sqrt
 
+from fvsolve.core.kernels import moving_frames as layout
 from fvsolve.core.kernels.dtypes import ABOUT, BUSHING_VALUE, PIN_VALUE, RATE, RATE_UNWANTED
 from fvsolve.core.kernels.energy_rows import BUSHING_ROWS, bushing_power_row, bushing_stored_row
-from fvsolve.core.kernels.mechanism import body_layout as layout
-from fvsolve.core.kernels.mechanism import mass_matrix as mass
-from fvsolve.core.kernels.mechanism.body_kinematics import body_of_point, point_at, spin_of
-from fvsolve.core.kernels.mechanism.body_layout import add_force, add_torque, body_row
-from fvsolve.core.kernels.mechanism.body_values import acceleration_at
-from fvsolve.core.kernels.mechanism.vectors import (
+from fvsolve.core.kernels.moving_frames import add_force, add_torque, body_row
+from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.core.kernels.vectors import (
     cross,
     minus,
     plus,
@@ -44,7 +42,9 @@ from fvsolve.core.kernels.mechanism.vectors import (
     vector,
     vector_product,
 )
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.motion.kernels import mass_matrix as mass
+from fvsolve.features.motion.kernels.body_kinematics import body_of_point, point_at, spin_of
+from fvsolve.features.motion.kernels.body_values import acceleration_at
 from fvsolve.jit import njit
 
 

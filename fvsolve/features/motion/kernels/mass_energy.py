@@ -3,15 +3,7 @@
 The entries of `power` and `stored` follow those of columns, in the order listed there.
 """
 
-from fvsolve.core.kernels.mass_dynamics import (
-    contact_force,
-    excess_of,
-    leak_flow,
-    motion,
-    piston_travel,
-    stop_travel,
-    travel_of,
-)
+from fvsolve.core.kernels.moving_frames import motion
 from fvsolve.core.kernels.network_energy import (
     BRACE,
     COLUMN,
@@ -28,6 +20,14 @@ from fvsolve.core.kernels.network_energy import (
 )
 from fvsolve.core.kernels.pipe_energy import height_pressure
 from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.motion.kernels.mass_dynamics import (
+    contact_force,
+    excess_of,
+    leak_flow,
+    piston_travel,
+    stop_travel,
+    travel_of,
+)
 from fvsolve.jit import njit, specialise
 
 

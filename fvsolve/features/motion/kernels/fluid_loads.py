@@ -28,10 +28,12 @@ s : offset in `work`, or `scratch`, of the angular velocity and the velocity at 
 degree of freedom
 """
 
+from fvsolve.core.kernels import moving_frames as layout
 from fvsolve.core.kernels.dtypes import CHAMBER, FIXED, JUNCTION, LAW_LINEAR, MOVED_BY_FORCES, TANK, TANK_OUT
-from fvsolve.core.kernels.mechanism import body_layout as layout
-from fvsolve.core.kernels.mechanism.body_layout import add_force, add_torque, body_row, freedom_path, nearest_free_body
-from fvsolve.core.kernels.mechanism.vectors import (
+from fvsolve.core.kernels.moving_frames import add_force, add_torque, body_row
+from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.core.kernels.tanks import tank_level
+from fvsolve.core.kernels.vectors import (
     cross,
     dot,
     minus,
@@ -44,8 +46,7 @@ from fvsolve.core.kernels.mechanism.vectors import (
     vector_product,
     write_vector,
 )
-from fvsolve.core.kernels.table_handle import open_tables
-from fvsolve.core.kernels.tanks import tank_level
+from fvsolve.features.motion.kernels.body_trees import freedom_path, nearest_free_body
 from fvsolve.jit import njit
 
 ZERO_VECTOR = (0.0, 0.0, 0.0)
