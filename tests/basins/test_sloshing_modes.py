@@ -14,6 +14,7 @@ from fvsolve import advance, load, run
 from fvsolve.case import sloshing
 from fvsolve.core.model.model import State
 from fvsolve.errors import CaseError
+from fvsolve.features.motion.kernels.tables import motion_of
 from fvsolve.studies import linearise
 from fvsolve.studies.energy_balance import energy
 
@@ -169,7 +170,7 @@ def test_a_free_tank_on_rails_keeps_its_momentum():
     case = case_of(body, tank(), 3.0, {"step": 0.01}, links={"push": push})
     case["nodes"]["world"] = {"type": "frame", "points": {"o": [-5, 0, 0]}}
     model = model_of(case)
-    bodies, names = model.tables.bodies, model.body_names
+    bodies, names = motion_of(model).body_table, motion_of(model).body_names
 
     def momentum(state):
         out = model.evaluate(state.t, state.y)[1]

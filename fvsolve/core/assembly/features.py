@@ -94,6 +94,26 @@ class Squares(NamedTuple):
     last: list[tuple[str, dict[int, float]]] = []
 
 
+class Coordinate(NamedTuple):
+    """Coordinate of a part that moves along a line.
+
+    net : place of the force on it among the net forces in `out`, -1 for none; frame : its number among frames, or -1
+    y, rate : offsets in y of its position and velocity, as deviations, or -1; schedule : that sets it, or -1
+    position [m], velocity [m/s], force [N] : at the start; inertia [kg]; lightness : 1 / inertia, 0 if fixed [1/kg]
+    """
+
+    net: int
+    frame: int
+    y: int
+    rate: int
+    schedule: int
+    position: float
+    velocity: float
+    force: float
+    inertia: float
+    lightness: float
+
+
 class Feature:
     """Base of features, with one object for each case. `draft` is the `ModelDraft`, `model` the `Model`, of the case.
 
@@ -105,6 +125,9 @@ class Feature:
     shortest_delay : no stage of a step may be later than this after the beginning of the step [s]
     step_histories : names of arrays in the memory of a state that contain values at past steps
     single_thread_reason : reason why a model with the feature is stepped by a single thread; "" if it is not
+    frames : names of frames that move, whose data it writes to `out`, see `kernels.moving_frames`
+    leaks : rows of links that leak between nodes a and b and change their volumes: `leakage` [m3/s/Pa], `speed`,
+    `sweep_a`, `sweep_b`; leak_names : names of these links
     further_cells : number of cells whose cost the feature adds to that of pipes and basins; negative if it saves
     """
 
@@ -115,6 +138,9 @@ class Feature:
     shortest_delay = np.inf
     step_histories: Sequence[str] = ()
     single_thread_reason = ""
+    frames: Sequence[str] = ()
+    leaks: Any = ()
+    leak_names: Sequence[str] = ()
     further_cells = 0
 
     def __init__(self, case, given_up: Collection[str] = ()) -> None:
@@ -137,6 +163,23 @@ class Feature:
 
     def grouped(self, draft, group: np.ndarray) -> None:
         """Continue when nodes are grouped; group : label of the group of each node."""
+
+    def join(self, draft, row, ports, places, toward=None, about=None) -> tuple[float, float] | None:
+        """Write to the row of a force element what it joins; None if the feature has no such parts.
+
+        Returns the distance of the second part from the first at the start [m], and its rate [m/s]; for points
+        `toward` a direction only the rate along it, and `about` an axis that of the angle [rad/s].
+        ports : columns of the row for the two parts; places : their names, or names of points
+        """
+        return None
+
+    def point(self, draft, place: str) -> int:
+        """Number of a named point of what moves, or of the world; -1 if the feature has none."""
+        return -1
+
+    def coordinate(self, name: str) -> Coordinate | None:
+        """Coordinate of a part that the feature moves along a line; None for others."""
+        return None
 
     def lower_behind_links(self, draft) -> None:
         """Fill the tables of the feature, after those of links and devices and before those of basins; add faults."""
@@ -237,6 +280,22 @@ class Feature:
     def add_fields(self, fields: dict, model, y: np.ndarray, out: np.ndarray) -> None:
         """Add values along pipes and at nodes to the result of `Model.fields`."""
 
+    def fast_parts(self) -> list[str]:
+        """Names of parts that can limit the step."""
+        return []
+
+    def marks(self) -> list[tuple[str, str]]:
+        """Kind and place of each entry of `marks` that the feature has reserved."""
+        return []
+
+    def driven(self) -> set[int]:
+        """Numbers of schedules whose rates are speeds; -1 for none."""
+        return set()
+
+    def drawn(self, model):
+        """Lines that move with parts, in the way of `motion.drawing.BodyLines`; None for none."""
+        return None
+
     def facts(self, model) -> dict[str, Any]:
         """Facts for `fvsolve check`."""
         return {}
@@ -252,6 +311,24 @@ class Feature:
     def ledgers(self, model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict]:
         """Balances of a run, by name; y : its last state; ledger : float64[2, m], sums of its rates by sign"""
         return {}
+
+    def begin_accounts(self, accounts) -> None:
+        """Add accounts of energy with rows behind those of columns, see `model.energy_accounts`."""
+
+    def add_accounts(self, accounts) -> None:
+        """Add accounts of energy with rows before those of devices."""
+
+    def above(self, model) -> dict[str, float]:
+        """Energy of parts at the start, above that at rest, see `model.energy_accounts.available_energy` [J]."""
+        return {}
+
+    def swept_masses(self, y: np.ndarray) -> Iterable[float]:
+        """Masses that nodes contain in addition to their states, because volumes have changed [kg]."""
+        return ()
+
+    def schedule_of(self, name: str) -> int:
+        """Number of the schedule of a link of the feature; -1 for others."""
+        return -1
 
     def inputs(self, model) -> dict[str, Any]:
         """Inputs that can be held at values : name -> `assembly.lowering.Input`."""
@@ -287,14 +364,6 @@ class FeaturePattern:
     def inflows(self) -> Iterator[tuple[int, np.ndarray]]:
         """Yield (storing node, states on which a flow of the feature into it depends)."""
         yield from ()
-
-    def device(self, row) -> np.ndarray:
-        """States of the feature that a device reads; row : of the device"""
-        return np.zeros(0, dtype=np.int64)
-
-    def wall(self, row) -> np.ndarray:
-        """States of the speed of a moving wall that the feature moves; row : of the wall"""
-        return np.zeros(0, dtype=np.int64)
 
     def probe(self, row) -> np.ndarray | None:
         """States on which a probe depends; None if the feature does not compute it. row : of the probe"""
@@ -372,8 +441,15 @@ class FeatureRun:
         """True if the feature corrected the state at t, so that the step before it cannot be repeated."""
         return False
 
+    def for_energy(self) -> None:
+        """Let functions compute what only energies need; raises FvsolveError if that is not possible."""
+
     def notices(self) -> list:
         """Notices at the end of a run."""
+        return []
+
+    def end_notices(self, y: np.ndarray) -> list:
+        """Notices on the last state of a run."""
         return []
 
 

@@ -30,7 +30,7 @@ def reserve_basins(draft) -> None:
     sizes, basins, walls = draft.sizes, len(draft.basin_table), len(draft.wall_table)
     sizes.ledger("source", draft.sources)
     sizes.out("wall", walls)
-    sizes.out("tank", rec.TANK_OUT * basins if len(draft.body_table) else 0)
+    sizes.out("tank", rec.TANK_OUT * basins if draft.frame_names else 0)
     sizes.run_array("seen", draft.size if walls else 0)
     sizes.run_array("bands", 2 * basins)
     sizes.run_array("maxima", draft.maxima_size)

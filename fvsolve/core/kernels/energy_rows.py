@@ -1,12 +1,12 @@
 """Index of the first entry of each kind of part at the end of the energy arrays `power` and `stored`.
 
-The order is: elements of networks, bushings, bodies, devices, moving walls, basins.
+The order is: elements of networks, parts of features, devices, moving walls, basins.
 """
 
 from fvsolve.jit import njit
 
 # Rows of `power` for each part. `stored` has one row for each of these parts and none for a wall.
-BUSHING_ROWS, BODY_ROWS, DEVICE_ROWS, WALL_ROWS, BASIN_ROWS = 2, 3, 3, 2, 5
+DEVICE_ROWS, WALL_ROWS, BASIN_ROWS = 3, 2, 5
 
 
 @njit(forceinline=True)
@@ -28,21 +28,10 @@ def device_power_row(tables, power):
 
 
 @njit(forceinline=True)
-def body_power_row(tables, power):
-    """Index of the first entry of bodies in `power`."""
-    return device_power_row(tables, power) - BODY_ROWS * tables.bodies.size
-
-
-@njit(forceinline=True)
-def bushing_power_row(tables, power):
-    """Index of the first entry of bushings in `power`."""
-    return body_power_row(tables, power) - BUSHING_ROWS * tables.bushings.size
-
-
-@njit(forceinline=True)
 def network_power_row(tables, power):
     """Index of the first entry of elements of networks in `power`."""
-    return bushing_power_row(tables, power) - tables.network_elements.size
+    first = device_power_row(tables, power) - tables.layout[0]["feature_power"]
+    return first - tables.network_elements.size
 
 
 @njit(forceinline=True)
@@ -52,18 +41,7 @@ def device_stored_row(tables, stored):
 
 
 @njit(forceinline=True)
-def body_stored_row(tables, stored):
-    """Index of the first entry of bodies in `stored`."""
-    return device_stored_row(tables, stored) - tables.bodies.size
-
-
-@njit(forceinline=True)
-def bushing_stored_row(tables, stored):
-    """Index of the first entry of bushings in `stored`."""
-    return body_stored_row(tables, stored) - tables.bushings.size
-
-
-@njit(forceinline=True)
 def network_stored_row(tables, stored):
     """Index of the first entry of elements of networks in `stored`."""
-    return bushing_stored_row(tables, stored) - tables.network_elements.size
+    first = device_stored_row(tables, stored) - tables.layout[0]["feature_stored"]
+    return first - tables.network_elements.size

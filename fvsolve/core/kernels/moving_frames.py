@@ -43,14 +43,6 @@ def body_row(tables, i):
 
 
 @njit(forceinline=True)
-def motion(mass, y):
-    """(change of position since the start [m], velocity [m/s]) of a mass."""
-    if mass["y"] < 0:
-        return 0.0, 0.0
-    return y[mass["y"]], mass["velocity"] + y[mass["y"] + 1]
-
-
-@njit(forceinline=True)
 def add_force(out, row, rx, ry, rz, fx, fy, fz):
     """Add a force (fx, fy, fz) [N] to the sums FORCE and TORQUE of a body, in axes of the world.
 

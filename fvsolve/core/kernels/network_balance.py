@@ -77,8 +77,8 @@ def net_flows(out, tables):
         out[net + columns[k]["from_node"]] -= change
         out[net + columns[k]["to_node"]] += change
     # The state of a moving chamber is its excess mass, so a growing volume counts as an outflow.
-    for k in range(tables.pistons.size):
-        for i in (tables.pistons[k]["a"], tables.pistons[k]["b"]):
+    for i in range(nodes.size if tables.settings[0]["swept"] == 1 else 0):
+        if nodes[i]["kind"] == MOVING:
             out[net + i] -= out[layout["swept"] + nodes[i]["row"]]
 
 

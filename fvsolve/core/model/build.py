@@ -227,7 +227,7 @@ def model_with_start(draft: ModelDraft) -> Model:
 def fill_nodes(draft: ModelDraft) -> None:
     """Fill the table of fluid nodes, one NODE row for each."""
     table = draft.node_table = np.zeros(len(draft.case.places), rec.NODE)
-    table["y"] = table["shape"] = table["schedule"] = table["row"] = table["moving_segment"] = -1
+    table["y"] = table["shape"] = table["schedule"] = table["row"] = table["forcing"] = -1
     table["full"] = np.inf
     for row, (name, node) in zip(table, draft.case.places.items(), strict=True):
         row["elevation"] = draft.case.elevations[name]
@@ -318,10 +318,7 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     draft.tables = rec.Tables(
         settings=settings, layout=layout, pipes=draft.pipe_table, nodes=draft.node_table, valves=draft.valve_table,
         columns=draft.column_table, clusters=draft.cluster_table, schedules=schedules, probes=draft.probe_table,
-        bodies=draft.body_table, freedoms=draft.freedom_table, points=np.array(draft.points, rec.POINT),
-        lines=draft.line_table, pins=draft.pin_table, bushings=draft.bushing_table,
-        moving_segments=draft.moving_segment_table, masses=draft.mass_table, braces=draft.brace_table,
-        stops=draft.stop_table, pistons=draft.piston_table, devices=draft.device_table, basins=draft.basin_table,
+        devices=draft.device_table, basins=draft.basin_table,
         patches=draft.patch_table, scalars=draft.scalar_table, heat_sources=draft.heat_source_table,
         exchangers=draft.exchanger_table, walls=draft.wall_table, couplings=draft.coupling_table,
         network_inputs=draft.network_input_table, network_rates=draft.network_rate_table,
@@ -349,6 +346,7 @@ def reserve_network(draft: ModelDraft) -> None:
     # location of the first cavity, greatest cavity volume, and its time. The last are: for each valve the time at which
     # it shut off a demand; for each node the first and the last time at which its demand is not supplied, and the first
     # at which its pressure is not determined.
+    sizes.first_mark = pipes + 3 * nodes + columns
     sizes.marks = pipes * (4 if draft.case.law.cavitates else 1) + 3 * nodes + columns
     sizes.marks += 2 * len(draft.device_table) + valves + 3 * nodes
     sizes.run_array("clock", 1)
@@ -391,6 +389,7 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     s["start"] = case.numerics.start
     s["reads_solved"] = any(feature.reads_solved for feature in draft.features)
     s["ambient"], s["gravity"] = case.ambient_pressure, case.gravity
+    s["swept"] = (draft.node_table["kind"] == rec.MOVING).any()
     s["vapor"], s["unmarked"] = case.law.cavity_pressure, -np.inf
     if case.patches_with_faces:
         from fvsolve.core.basins.free_surface.patch_closures import DEEPEST
@@ -446,8 +445,7 @@ def model_of(draft: ModelDraft, notices: Callable[[ModelDraft], list[Notice]] = 
     draft.warnings += limiter_notices(draft.case.numerics.scheme, draft.case.numerics.limiter)
     return Model(
         case, draft.tables, draft.shapes, draft.state_names, np.array(draft.scale), inside, draft.schedules.spacing,
-        draft.meshes, list(case.places), list(case.links), draft.valve_names, draft.column_names, draft.piston_names,
-        draft.mass_names, draft.body_names, draft.bushing_names,
+        draft.meshes, list(case.places), list(case.links), draft.valve_names, draft.column_names,
         dict(case.elevations), case.probes, draft.warnings,
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
         draft.basins, case.extreme_probes, draft.watched_start, closed(draft),

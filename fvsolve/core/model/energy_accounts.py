@@ -47,16 +47,10 @@ def available_energy(model: Model) -> dict[str, float]:
         energies[pipe.name] = pipe_energy(model, k) + friction_memory_energy(model, k) + creep_energy(model, k)
     for name, row in zip(model.column_names, tables.columns, strict=True):
         energies[name] = 0.5 * row["flow"] ** 2 * row["length"] / (model.case.properties.density * row["area"])
-    for name, row in zip(model.mass_names, tables.masses, strict=False):
-        if row["y"] >= 0:
-            energies[name] = 0.5 * row["velocity"] ** 2 / row["lightness"]
     for basin in model.basins:
         energies[basin.name] = basin.above(basin.deviations(model.start), datum)
-    for (name, *_), row in zip(rows_in(model.case, "brace"), tables.braces, strict=True):
-        if row["stiffness"] > 0.0:
-            energies[name] = 0.5 * row["force"] ** 2 / row["stiffness"]
-    for (name, *_), row in zip(rows_in(model.case, "stop"), tables.stops, strict=True):
-        energies[name] = 0.5 * row["stiffness"] * min(0.0, row["below"], row["above"]) ** 2
+    for feature in model.features:
+        energies |= feature.above(model)
     return {name: float(value) for name, value in energies.items()}
 
 
@@ -193,11 +187,6 @@ class Accounts:
     def __init__(self, run_data: RunData) -> None:
         self.run_data, self.model = run_data, run_data.model
         model, case = run_data.model, run_data.model.case
-        if case.poses:
-            from fvsolve.case.bodies import missing_reactions
-
-            if faults := [f"{'.'.join(place)}: {text}" for place, text in missing_reactions(case.nodes, case.links)]:
-                raise FvsolveError(f"the energy of this network on a body is not supported; {'; '.join(faults)}")
         compute_all_loads(run_data)
         if any(basin.part.on is not None and basin.opening for basin in model.basins):
             raise FvsolveError("the energy of a basin on a body with an open side is not supported; expected closed "
@@ -236,9 +225,11 @@ class Accounts:
             self.hold(name, "rigid column", at + 2)
             self.accounts.append(Account("law", name, "rigid column", (at, at + 1, at + 2), (1, -1, -1)))
         self.network_rows = self.power_count  # rows of power that `kernels.network_energy` fills
-        self.mechanics()
+        for feature in model.features:
+            feature.begin_accounts(self)
         self.networks()
-        self.bodies()
+        for feature in model.features:
+            feature.add_accounts(self)
         self.devices()
         self.walls()
         self.basins()
@@ -283,28 +274,6 @@ class Accounts:
                 else:
                     self.add("dissipated", name, "valve", at)
 
-    def mechanics(self) -> None:
-        model, tables = self.model, self.model.tables
-        names = [*model.mass_names, *[""] * (len(tables.masses) - len(model.mass_names))]
-        for name, row in zip(names, tables.masses, strict=True):
-            at = self.take(1)
-            self.hold(name, "mass", at if row["y"] >= 0 else None)
-        for name, link, lowering in rows_in(model.case, "brace"):
-            at, stores = self.take(1), lowering.ledger_name == "stored"
-            self.hold(name, link.kind, at if stores else None)
-            if not stores:
-                self.add(lowering.ledger_name, name, link.kind, at)
-        for name, link, _ in rows_in(model.case, "stop"):
-            at = self.take(2)
-            self.stops.append((len(self.accounts), len(self.accounts) + 1))
-            self.hold(name, link.kind, at)
-            self.add("dissipated", name, link.kind, at + 1)
-        for name in model.piston_names:
-            at = self.take(3)
-            self.add("dissipated", name, "leak", at)
-            self.add("dissipated", name, "friction", at + 1)
-            self.add("law", name, "cylinder", at + 2)
-
     def networks(self) -> None:
         """Accounts of the parts of a network of rotation, electricity and heat."""
         network = self.model.network
@@ -317,19 +286,6 @@ class Accounts:
             self.hold(name, kind, at if stores else None)
             if not stores and item.ledger and item.heat_to is None:
                 self.add(item.ledger, name, kind, at)
-
-    def bodies(self) -> None:
-        for name in self.model.bushing_names:
-            at = self.take(2)
-            self.hold(name, "bushing", at)
-            self.add("dissipated", name, "bushing", at + 1)
-        for name, row in zip(self.model.body_names, self.model.tables.bodies, strict=True):
-            at = self.take(3)
-            self.hold(name, "body", at)
-            if row["damping"] > 0.0:
-                self.add("dissipated", name, "joint", at + 1)
-            if row["schedule"] >= 0:
-                self.add("supplied", name, "drive", at + 2)
 
     def devices(self) -> None:
         for name, part, _ in self.model.devices:
@@ -383,9 +339,9 @@ class Accounts:
 
 
 def compute_all_loads(run_data: RunData) -> None:
-    """Let the right-hand side compute all loads of fluid on bodies, for their work; changes tables of `run_data`."""
-    if len(run_data.model.tables.moving_segments):
-        run_data.tables.moving_segments["loads_body"] = rec.JOINT_LOAD_READ
+    """Let the right-hand side compute all that energies need; changes tables of `run_data`."""
+    for own in run_data.features:
+        own.for_energy()
     if (run_data.model.tables.basins["frame"] >= 0).any():
         run_data.tables.basins["loads_body"] = 1
 

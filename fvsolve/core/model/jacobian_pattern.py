@@ -275,9 +275,9 @@ class Couplings:
         ends = self.valves[device["valve"]] if device["valve"] >= 0 else None
         nodes = [device["node"], device["second"], *(() if ends is None else ends_of(ends))]
         opening = unique_states() if ends is None else self.opening_states(ends)
-        of_features = (own.device(device) for own in self.features)
-        read = (self.sets[n] for n in nodes if n >= 0)
-        return unique_states(self.device_states(device), opening, *of_features, *read)
+        read = [self.sets[n] for n in nodes if n >= 0]
+        read += [device["travel"] + np.arange(2)] if device["travel"] >= 0 else []
+        return unique_states(self.device_states(device), opening, *read)
 
     def wall_pairs(self) -> Iterator[Pairs]:
         """Yield couplings of basin cells with the travel of moving walls, and of this travel with what moves the walls.
@@ -286,7 +286,7 @@ class Couplings:
         """
         for wall in self.walls:
             basin = self.basins[wall["basin"]]
-            speed = unique_states(*(own.wall(wall) for own in self.features))
+            speed = unique_states(*([wall["rate"]] if wall["rate"] >= 0 else []))
             yield pairs_of(pattern.all_states(basin), unique_states(wall["y"], speed))
             yield pairs_of(unique_states(wall["y"]), speed)
             behind = self.integers[wall["faces"] + wall["count"] :][: wall["count"]]

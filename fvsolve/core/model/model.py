@@ -144,10 +144,6 @@ class Model(Displayable):
     link_names: list[str]
     valve_names: list[str]
     column_names: list[str]
-    piston_names: list[str]
-    mass_names: list[str]
-    body_names: list[str]
-    bushing_names: list[str]
     elevation: dict[str, float]
     probes: list[Any]
     warnings: list[Notice]
@@ -186,6 +182,19 @@ class Model(Displayable):
     def block_names(self) -> list[str]:
         """Names of blocks of `controls`, in the order of their table."""
         return decision_order(self.case.controls)
+
+    @property
+    def frame_names(self) -> list[str]:
+        """Names of frames that move, in the order of their data in `out`, see `kernels.moving_frames`."""
+        return [name for feature in self.features for name in feature.frames]
+
+    def coordinate(self, name: str):
+        """`Coordinate` of a part that moves along a line, see `assembly.features`."""
+        return next(found for feature in self.features if (found := feature.coordinate(name)) is not None)
+
+    def schedule_of(self, name: str) -> int:
+        """Number of the schedule of a link of a feature."""
+        return next(k for feature in self.features if (k := feature.schedule_of(name)) >= 0)
 
     @property
     def y_size(self) -> int:
@@ -503,12 +512,9 @@ class Model(Displayable):
             for own, start in zip(basin.states_of(y)[:1], basin.states_of(self.start)[:1], strict=True):
                 initial += rest + float(np.sum(per * start))
                 change += float(np.sum(per * (own - start)))
-        for row in self.tables.pistons:  # mass of chambers on an axis: state plus swept mass
-            if row["line"] >= 0:
-                continue
-            places = self.tables.masses[[row["case"], row["rod"]]]["y"]
-            back, forth = (float(y[place]) if place >= 0 else 0.0 for place in places)
-            change += float(row["sweep_a"] + row["sweep_b"]) * (forth - back)
+        for feature in self.features:
+            for swept in feature.swept_masses(y):
+                change += swept
         return initial, change
 
     @functools.cached_property

@@ -82,7 +82,7 @@ class NetworkStart:
         kind, name = item.reads
         draft = self.draft
         if kind == rec.FORCE_INPUT:
-            return float(draft.mass_table[draft.mass_index[name]]["force"])
+            return draft.coordinate(name).force
         name, quantity, sign = name
         k = draft.device_names.index(name)
         _, part, device = draft.devices[k]
@@ -122,7 +122,7 @@ class NetworkStart:
         kind, name = item.state_of
         draft = self.draft
         if kind == "mass":
-            return float(draft.mass_table[draft.mass_index[name]]["velocity"])
+            return draft.coordinate(name).velocity
         k = draft.device_names.index(name)
         return item.unit * float(draft.devices[k][2].speed_at(self.start, int(draft.device_table[k]["valve"])))
 

@@ -111,7 +111,7 @@ def state_place(draft, item: Element, size: float) -> int:
     kind, name = item.state_of
     if kind == "device":
         return int(draft.device_table[draft.device_names.index(name)]["y"])
-    return int(draft.mass_table[draft.mass_index[name]]["y"]) + 1
+    return draft.coordinate(name).rate
 
 
 def probed_angles(case) -> list[str]:
@@ -136,7 +136,7 @@ def fill_tables(draft, network: Network) -> None:
             row["index"] = draft.device_names.index(name)
             row["side"] = draft.devices[row["index"]][2].quantities.index(quantity)
         elif row["kind"] == rec.FORCE_INPUT:
-            row["index"] = draft.mass_index[name]
+            row["index"] = draft.coordinate(name).net
         elif row["kind"] == rec.FLUID_HEAT:
             row["index"] = exchanger_names(draft.case).index(name)
         elif row["kind"] == rec.FRICTION_FLOW:

@@ -44,8 +44,6 @@ class RunData:
             basins = model.tables.basins.copy()
             self.tables = model.tables._replace(plane=aligned_zeros(model.tables.plane.size), basins=basins)
             self.tables.plane[:] = model.tables.plane
-        if len(model.tables.moving_segments):  # `loads_body` is set where joint forces are read
-            self.tables = self.tables._replace(moving_segments=model.tables.moving_segments.copy())
         self.clock = self.written.clock[0]
         self.armed, self.marks = self.written.armed, self.written.marks
         self.envelope, self.extremes = self.written.envelope, self.written.extremes

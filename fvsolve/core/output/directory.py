@@ -86,7 +86,7 @@ class RunDirectory:
         _refuse_reserved_names(model.case)
         self.identity = identity(model.case)
         self.history = csv_files.HistoryFile(self.folder / "history.csv", time_column(model.case), probe_columns(model))
-        drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.basins) + len(model.body_names) > 0
+        drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.basins) + len(model.frame_names) > 0
         self.fields = FieldSeries(self.folder, model) if drawn else None
         self.lines = csv_files.LineSeries(self.folder, model) if model.case.output.lines else None
         if self.folder.exists() and not self.folder.is_dir():

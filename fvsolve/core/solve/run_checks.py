@@ -162,7 +162,7 @@ class SloshingCheck:
             free = basin.on is not None and basin.physics_type.has_modes and any(free_joints(basin.on, case.nodes))
             if modal or (free and not basin.lumped):
                 place = np.array(basin.place) + basin.rotation[:, :2] @ mesh.centroid
-                about = model.body_names.index(basin.on), place, basin.rotation[:, 2]
+                about = model.frame_names.index(basin.on), place, basin.rotation[:, 2]
                 self.tanks.append((name, modal, about, *(rises(model, name) if modal else ())))
         self.restart_data = np.zeros((len(self.tanks), 4))
 
@@ -228,10 +228,10 @@ def rises(model, name: str) -> tuple:
     case = model.case
     basin, mesh = case.nodes[name], case.lumped[name]
     modes = sloshing.modes_of(basin, mesh, case.properties.density, case.gravity)
-    rows = [model.tables.bodies[model.body_names.index(sloshing.mode_body_name(name, mode))] for mode in modes]
+    rows = [model.coordinate(sloshing.mode_body_name(name, mode)) for mode in modes]
     lifts = np.zeros((2, len(modes)))
     lifts[[mode.along for mode in modes], range(len(modes))] = [mode.rise for mode in modes]
-    at, start = [int(row["y"]) for row in rows], np.array([row["start"][0] for row in rows])
+    at, start = [row.y for row in rows], np.array([row.position for row in rows])
     return np.array(at), start, lifts / sloshing.depth_of(basin, mesh), sloshing.outline_of(mesh).is_round
 
 

@@ -481,7 +481,7 @@ def fused_step_allowed(model: Model, method: Method) -> bool:
     return bool(
         model.case.law.linear and settings["scheme"] == rec.UPWIND and settings["from_arriving"]
         and method.explicit and method.stages == 1 and numerics.rtol is None
-        and model.y_size == 2 * model.cells and model.shapes.armed == 0 and not len(model.tables.moving_segments)
+        and model.y_size == 2 * model.cells and model.shapes.armed == 0
         and not model.functions.cast.features
         and {*laws.tolist()} <= {rec.FRICTION_NONE, rec.FRICTION_FACTOR}
     )  # fmt: skip

@@ -8,6 +8,7 @@ import numpy as np
 
 from fvsolve.core.assembly.features import Squares
 from fvsolve.core.assembly.lowering import rows_in
+from fvsolve.features.motion.kernels.tables import motion_of
 from fvsolve.features.motion.static_forces import mass_factor
 
 
@@ -21,10 +22,10 @@ def squares_of_motion(model, y: np.ndarray) -> Squares:
 def spring_rows(model, y: np.ndarray, elongations: Elongations):
     """Yield (name, state -> factor) of each row of L for springs, and for stops in contact."""
     braces, stops = rows_in(model.case, "brace"), rows_in(model.case, "stop")
-    for k, ((name, *_), row) in enumerate(zip(braces, model.tables.braces, strict=True)):
+    for k, ((name, *_), row) in enumerate(zip(braces, motion_of(model).brace_table, strict=True)):
         if row["stiffness"] > 0.0:
             yield name, elongations.by(k, row["from_mass"], row["to_mass"], float(np.sqrt(0.5 * row["stiffness"])))
-    for k, ((name, *_), row) in enumerate(zip(stops, model.tables.stops, strict=True), len(braces)):
+    for k, ((name, *_), row) in enumerate(zip(stops, motion_of(model).stop_table, strict=True), len(braces)):
         x = elongations.travel(k)
         if row["below"] + x < 0.0 or x > row["above"]:
             yield name, elongations.by(k, row["from_mass"], row["to_mass"], float(np.sqrt(0.5 * row["stiffness"])))
@@ -36,9 +37,9 @@ def chamber_rows(model, y: np.ndarray, elongations: Elongations):
     The same excess mass e [kg] in less volume has more pressure. If the cylinder joins points of bodies, the mass state
     is e plus the gained volume times the density at the start.
     """
-    nodes, pistons = model.tables.nodes, model.tables.pistons
+    nodes, pistons = model.tables.nodes, motion_of(model).piston_table
     per_mass = elongations.out[int(model.layout["stiffness"]) :]
-    first = len(model.tables.braces) + len(model.tables.stops)
+    first = len(motion_of(model).brace_table) + len(motion_of(model).stop_table)
     for k, row in enumerate(pistons, first):
         x = elongations.travel(k)
         for name, sign in (("a", 1.0), ("b", -1.0)):
@@ -73,7 +74,7 @@ class Elongations:
 
         i, j : masses that it joins; equal if it joins points of bodies
         """
-        places = self.model.tables.masses["y"]
+        places = motion_of(self.model).mass_table["y"]
         if i != j:
             return {int(places[m]): sign * factor for m, sign in ((i, -1.0), (j, 1.0)) if places[m] >= 0}
         return {at: factor * float(row[2 * k]) for at, row in self.slopes.items() if row[2 * k] != 0.0}
@@ -84,9 +85,9 @@ class Elongations:
 
         The values are those of the elongation and its rate for each of the k force elements.
         """
-        tables, slopes = self.model.tables, {}
-        last = self.first + 2 * (len(tables.braces) + len(tables.stops) + len(tables.pistons))
-        for body in tables.bodies:
+        tables, slopes = motion_of(self.model), {}
+        last = self.first + 2 * (len(tables.brace_table) + len(tables.stop_table) + len(tables.piston_table))
+        for body in tables.body_table:
             count = int(body["freedoms"]) + (body["freedoms"] >= 3)
             for at in range(int(body["y"]), int(body["y"]) + count):
                 step = 1e-6 * (self.model.scale[at] + abs(self.y[at])) * 1e2
@@ -102,12 +103,13 @@ def kinetic_rows(model, y: np.ndarray):
 
     The energy is v' M v / 2 = |F v|^2 / 2: velocities v, mass matrix M = F' F with the factor F from the kernels.
     """
-    bodies, freedoms, n = model.tables.bodies, model.tables.freedoms, len(model.tables.freedoms)
+    motion = motion_of(model)
+    bodies, freedoms, n = motion.body_table, motion.freedom_table, len(motion.freedom_table)
     if not n:
         return
     factor = mass_factor(model, y)[8 * n :]
     rate = [int(body["rate"]) + k for body in bodies for k in range(body["freedoms"])]
-    names = [name for name, body in zip(model.body_names, bodies, strict=True) for _ in range(body["freedoms"])]
+    names = [name for name, body in zip(motion.body_names, bodies, strict=True) for _ in range(body["freedoms"])]
     for name, row in zip(names, freedoms, strict=True):
         path = model.tables.integers[row["path"] : row["path"] + row["depth"] + 1]
         entries = np.sqrt(0.5) * factor[row["row"] : row["row"] + row["depth"] + 1]
@@ -116,6 +118,6 @@ def kinetic_rows(model, y: np.ndarray):
 
 def joint_spring_rows(model):
     """Yield (name, state -> factor) of the row of L for each spring of a joint."""
-    for name, body in zip(model.body_names, model.tables.bodies, strict=True):
+    for name, body in zip(motion_of(model).body_names, motion_of(model).body_table, strict=True):
         if body["stiffness"] > 0.0:
             yield name, {int(body["y"]): float(np.sqrt(0.5 * body["stiffness"]))}

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Iterator
+
 import numpy as np
 
-from fvsolve.core.assembly.features import Feature, Squares
+from fvsolve.core.assembly.features import Coordinate, Feature, FeatureRun, Squares
 from fvsolve.core.kernels.rhs_assembly import RhsTerms
-from fvsolve.features.motion import lower
+from fvsolve.features.motion import lower, ports
+from fvsolve.features.motion.kernels import tables as records
+from fvsolve.features.motion.kernels.tables import MotionTables
 
 PACKAGE = "fvsolve.features.motion.kernels"
 MASSES = RhsTerms(
@@ -69,12 +74,90 @@ MOVING_FLUID = {  # by True for the density law `linear`
 }
 
 
+TABLES = {  # name of a table of a case -> its record
+    "body_table": records.BODY,
+    "freedom_table": records.FREEDOM,
+    "point_table": records.POINT,
+    "line_table": records.LINE,
+    "pin_table": records.PIN,
+    "bushing_table": records.BUSHING,
+    "moving_segment_table": records.MOVING_SEGMENT,
+    "mass_table": records.MASS,
+    "brace_table": records.BRACE,
+    "stop_table": records.STOP,
+    "piston_table": records.PISTON,
+    "settings": records.MOTION_SETTINGS,
+}
+
+
 class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
-    """Masses, bodies, and what acts between them, of a case."""
+    """Masses, bodies, and what acts between them, of a case.
+
+    TABLES : attributes with the tables; names of their rows are in lists such as `mass_names`
+    mass_index : name -> row of `mass_table`; None -> row of the fixed frame of elements between points
+    points, lines : rows of their tables while these are filled; point_index : name of a point -> its row
+    factor_size : number of entries of the factor of the mass matrix
+    locked : piston -> sides whose closed chambers may support a load
+    shut : piston -> sides that no open link joins to another node
+    """
 
     reads_nodes = True
 
+    def __init__(self, case, given_up=()) -> None:
+        super().__init__(case, given_up)
+        for name, record in TABLES.items():
+            setattr(self, name, np.zeros(int(name == "settings"), record))
+        self.body_names: list[str] = []
+        self.mass_names: list[str] = []
+        self.piston_names: list[str] = []
+        self.push_names: list[str] = []
+        self.pin_names: list[str] = []
+        self.bushing_names: list[str] = []
+        self.mass_index: dict[str | None, int] = {None: 0}
+        self.points: list[tuple] = []
+        self.point_index: dict[str, int] = {}
+        self.lines: list[tuple] = []
+        self.factor_size = 0
+        self.locked: dict[int, list[str]] = {}
+        self.shut: dict[int, list[str]] = {}
+
+    def tables(self) -> MotionTables:
+        """Tables as compiled functions read them."""
+        return MotionTables(*(getattr(self, name) for name in TABLES))
+
+    @property
+    def frames(self) -> list[str]:
+        return self.body_names
+
+    @property
+    def leaks(self) -> np.ndarray:
+        return self.piston_table
+
+    @property
+    def leak_names(self) -> list[str]:
+        return self.piston_names
+
     # build ----------
+
+    def join(self, draft, row, ports_of_row, places, toward=None, about=None) -> tuple[float, float]:
+        return ports.join_ports(draft, row, ports_of_row, places, toward=toward, about=about)
+
+    def point(self, draft, place: str) -> int:
+        return ports.point_row(draft, place)
+
+    def coordinate(self, name: str) -> Coordinate | None:
+        if name in self.mass_index:
+            i = self.mass_index[name]
+            row, at = self.mass_table[i], int(self.mass_table[i]["y"])
+            start = (float(row[key]) for key in ("position", "velocity", "force"))
+            return Coordinate(i, -1, at, at + 1 if at >= 0 else -1, -1, *start, 0.0, float(row["lightness"]))
+        if name in self.body_names:
+            i = self.body_names.index(name)
+            row = self.body_table[i]
+            places = (int(row[key]) for key in ("y", "rate", "schedule"))
+            start = float(row["start"][0]), float(row["speed"][0]), 0.0
+            return Coordinate(-1, i, *places, *start, float(row["mass"]), 0.0)
+        return None
 
     def lower_behind_links(self, draft) -> None:
         lower.lower_bodies(draft)
@@ -83,20 +166,7 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
         lower.lower_lines(draft)
 
     def probe(self, draft, probe, row) -> bool:
-        case = draft.case
-        if probe.part != "nodes":
-            return False
-        if probe.point is not None and probe.name in case.lumped:
-            lower.lower_surface(draft, row, probe)
-            return True
-        if probe.point is None and probe.name in case.poses:
-            lower.lower_body_probe(draft, row, probe)
-            return True
-        elsewhere = probe.name in (case.nodes.keys() | case.places.keys() | case.network_places)
-        if probe.point is not None or elsewhere:
-            return False
-        lower.lower_body_point(draft, row, probe)
-        return True
+        return lower.lower_probe(draft, row, probe)
 
     def reserve(self, draft) -> None:
         lower.reserve_mechanics(draft)
@@ -107,7 +177,7 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
         return with_equilibrium(case, draft)
 
     def supported(self, draft, start) -> dict[int, float]:
-        if not len(draft.piston_table):
+        if not len(self.piston_table):
             return {}
         lower.find_closed_chambers(draft, start)
         return lower.supporting_pressures(draft, start)
@@ -117,23 +187,38 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
 
         return lower.start_masses(draft, start) + start_bodies(draft, start) + lower.driven_at_start(draft, start)
 
+    def close(self, draft) -> None:
+        for name in TABLES:
+            getattr(self, name).flags.writeable = False
+
+    def copy_for(self, case) -> Motion:
+        own = copy.copy(self)
+        own.case, own.locked, own.shut = case, dict(self.locked), dict(self.shut)
+        for name, record in TABLES.items():  # as bytes: numpy would copy records field by field
+            table = getattr(self, name)
+            setattr(own, name, np.ndarray(table.shape, record, bytearray(table.tobytes())))
+        return own
+
     # model ----------
 
     def terms(self, model, cast) -> list[tuple[str, RhsTerms]]:
-        tables, linear, found = model.tables, cast.family == "linear", []
-        if len(tables.masses):
+        linear, found = cast.family == "linear", []
+        if len(self.mass_table):
             found.append(ENERGY[linear])
-        if len(tables.bodies):
-            found += [BODIES, ACCELERATIONS[len(tables.pins) > 0]]
-        if len(tables.bushings):
+        if len(self.body_table):
+            found += [BODIES, ACCELERATIONS[len(self.pin_table) > 0]]
+        if len(self.bushing_table):
             found.append(BUSHINGS)
-        if len(tables.moving_segments):
+        if len(self.moving_segment_table):
             found.append(MOVING_FLUID[linear])
-        found += [STRETCHES] if len(tables.lines) else []
-        found += [MASSES] if len(tables.masses) else []
-        found += [LINES] if len(tables.lines) else []
-        events = [FORCES_FOR_EVENTS] if len(tables.masses) and model.network is not None else []
+        found += [STRETCHES] if len(self.line_table) else []
+        found += [MASSES] if len(self.mass_table) else []
+        found += [LINES] if len(self.line_table) else []
+        events = [FORCES_FOR_EVENTS] if len(self.mass_table) and model.network is not None else []
         return [("links", terms) for terms in found] + [("closed", terms) for terms in events]
+
+    def run(self, run_data) -> MotionRun:
+        return MotionRun(self, run_data)
 
     def pattern(self, couplings):
         from fvsolve.features.motion.pattern import MotionPattern
@@ -146,10 +231,76 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
         return squares_of_motion(model, y)
 
     def weigh(self, model, weights: np.ndarray) -> None:
-        for row in model.tables.masses:
+        for row in self.mass_table:
             if row["y"] >= 0:
                 weights[int(row["y"]) + 1] = 0.5 / row["lightness"]
 
+    def begin_accounts(self, accounts) -> None:
+        from fvsolve.features.motion.energy import mass_accounts
+
+        mass_accounts(self, accounts)
+
+    def add_accounts(self, accounts) -> None:
+        from fvsolve.features.motion.energy import body_accounts
+
+        body_accounts(self, accounts)
+
+    def above(self, model) -> dict[str, float]:
+        from fvsolve.features.motion.energy import energies_at_start
+
+        return energies_at_start(self)
+
+    def swept_masses(self, y: np.ndarray) -> Iterator[float]:
+        for row in self.piston_table:  # of chambers on an axis, whose mass is state plus swept mass
+            if row["line"] < 0:
+                places = self.mass_table[[row["case"], row["rod"]]]["y"]
+                back, forth = (float(y[place]) if place >= 0 else 0.0 for place in places)
+                yield float(row["sweep_a"] + row["sweep_b"]) * (forth - back)
+
+    def schedule_of(self, name: str) -> int:
+        names = self.push_names[: len(self.brace_table)]
+        return int(self.brace_table[names.index(name)]["schedule"]) if name in names else -1
+
+    def driven(self) -> set[int]:
+        return {int(row["schedule"]) for row in self.body_table}
+
+    def marks(self) -> list[tuple[str, str]]:
+        return [("beyond its stroke", f"links.{name}") for name in self.piston_names]
+
     def stored_states(self, model) -> np.ndarray:
-        places = model.tables.masses["y"]
+        places = self.mass_table["y"]
         return places[places >= 0]
+
+    def facts(self, model) -> dict:
+        names = self.mass_names
+        masses = {
+            name: {key: row[key].item() for key in ("position", "velocity", "force")}
+            for name, row in zip(names, self.mass_table, strict=False)
+        }
+        return {"masses": masses, "bodies": {name: lower.pose_facts(pose) for name, pose in self.case.poses.items()}}
+
+    def fast_parts(self) -> list[str]:
+        return [*self.mass_names, *self.body_names]
+
+    def drawn(self, model):
+        from fvsolve.features.motion.drawing import BodyLines
+
+        return BodyLines(model) if self.body_names else None
+
+
+class MotionRun(FeatureRun):
+    """Stretches of fluid on bodies of a run: `loads_body` is set where only energies need their loads."""
+
+    def __init__(self, feature: Motion, run_data) -> None:
+        super().__init__(feature, run_data)
+        self.segments = feature.moving_segment_table.copy()
+
+    def tables(self, view: str = "") -> MotionTables:
+        return self.feature.tables()._replace(moving_segments=self.segments)
+
+    def for_energy(self) -> None:
+        lower.refuse_missing_loads(self.run_data.model.case)
+        self.segments["loads_body"] = records.JOINT_LOAD_READ
+
+    def end_notices(self, y: np.ndarray) -> list:
+        return lower.drift_notices(self.feature, y)

@@ -20,13 +20,12 @@ class MotionPattern(FeaturePattern):
 
     def __init__(self, feature, couplings) -> None:
         super().__init__(feature)
-        tables = couplings.model.tables
         self.model = couplings
-        self.masses, self.pistons = tables.masses["y"], tables.pistons
-        self.braces = [*tables.braces, *tables.stops]
-        self.bodies, self.lines, self.points = tables.bodies, tables.lines, tables.points
-        self.moving_segments, self.bushings = tables.moving_segments, tables.bushings
-        joined = [[self.points[pin[end]]["body"] for end in ("from_point", "to_point")] for pin in tables.pins]
+        self.masses, self.pistons = feature.mass_table["y"], feature.piston_table
+        self.braces = [*feature.brace_table, *feature.stop_table]
+        self.bodies, self.lines, self.points = feature.body_table, feature.line_table, feature.point_table
+        self.moving_segments, self.bushings = feature.moving_segment_table, feature.bushing_table
+        joined = [[self.points[pin[end]]["body"] for end in ("from_point", "to_point")] for pin in feature.pin_table]
         joined = [[int(self.bodies[i]["root"]) for i in pair] for pair in joined if min(pair) >= 0]
         self.ties = union(len(self.bodies), joined)
 
@@ -41,16 +40,6 @@ class MotionPattern(FeaturePattern):
             for i, other in ((row["a"], row["b"]), (row["b"], row["a"])):
                 leak = [self.model.pressure_states(other)] if row["leakage"] > 0.0 else []
                 yield i, unique_states(swept, *leak)
-
-    def device(self, row) -> np.ndarray:
-        mass = self.masses[row["mass"]] if row["mass"] >= 0 else -1
-        return unique_states(*([mass, mass + 1] if mass >= 0 else []))
-
-    def wall(self, row) -> np.ndarray:
-        if row["body"] >= 0:
-            return self.joint_states(self.bodies[row["body"]], 1)
-        mass = self.masses[row["mass"]] if row["mass"] >= 0 else -1
-        return unique_states(mass + 1) if mass >= 0 else unique_states()
 
     def source(self, row) -> np.ndarray | None:
         return unique_states(*self.pushing_states(int(row["index"]))) if row["kind"] == rec.FORCE_INPUT else None
@@ -127,13 +116,13 @@ class MotionPattern(FeaturePattern):
     def moving_fluid_states(self) -> Iterator[tuple[int, np.ndarray]]:
         """Yield (row of `moving_segments`, its states and those that set its pressures) for the fluid on bodies."""
         for i, node in enumerate(self.model.nodes):
-            if node["moving_segment"] >= 0:
-                yield node["moving_segment"], unique_states(self.model.own(i), self.model.sets[i])
+            if node["forcing"] >= 0:
+                yield node["forcing"], unique_states(self.model.own(i), self.model.sets[i])
         for row in (*self.model.pipes, *self.model.columns):
-            if row["moving_segment"] >= 0:
+            if row["forcing"] >= 0:
                 own = row["y"] + np.arange(2 * row["cells"]) if "cells" in row.dtype.names else row["y"]
                 at_ends = (self.model.sets[row[end]] for end in ("from_node", "to_node"))
-                yield row["moving_segment"], unique_states(own, *at_ends)
+                yield row["forcing"], unique_states(own, *at_ends)
 
     # states of masses and joints ----------
 

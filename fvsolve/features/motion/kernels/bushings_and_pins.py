@@ -28,10 +28,8 @@ lambda.
 from math import sqrt
 
 from fvsolve.core.kernels import moving_frames as layout
-from fvsolve.core.kernels.dtypes import ABOUT, BUSHING_VALUE, PIN_VALUE, RATE, RATE_UNWANTED
-from fvsolve.core.kernels.energy_rows import BUSHING_ROWS, bushing_power_row, bushing_stored_row
+from fvsolve.core.kernels.dtypes import BUSHING_VALUE, PIN_VALUE, RATE, RATE_UNWANTED
 from fvsolve.core.kernels.moving_frames import add_force, add_torque, body_row
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.core.kernels.vectors import (
     cross,
     minus,
@@ -43,8 +41,10 @@ from fvsolve.core.kernels.vectors import (
     vector_product,
 )
 from fvsolve.features.motion.kernels import mass_matrix as mass
+from fvsolve.features.motion.kernels.body_energy_rows import BUSHING_ROWS, bushing_power_row, bushing_stored_row
 from fvsolve.features.motion.kernels.body_kinematics import body_of_point, point_at, spin_of
 from fvsolve.features.motion.kernels.body_values import acceleration_at
+from fvsolve.features.motion.kernels.tables import ABOUT, open_motion
 from fvsolve.jit import njit
 
 
@@ -63,7 +63,7 @@ def add_element_end_force(out, tables, k, acts, f):
 @njit
 def add_element_forces(t, y, dydt, out, handle):
     """Add the forces of all elements to their bodies: along their direction at `to`, opposite to it at `from`."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     offsets, lines = tables.layout[0], tables.lines
     for k in range(lines.size):
         line = lines[k]
@@ -168,7 +168,7 @@ def bushing_loads(out, tables, bushing):
 @njit
 def add_bushing_loads(t, y, dydt, out, handle):
     """Add the forces and torques of all bushings to their bodies."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     bushings = tables.bushings
     for k in range(bushings.size):
         force, torque = bushing_loads(out, tables, bushings[k])
@@ -185,7 +185,7 @@ def bushing_rate_limit(t, y, dydt, out, handle):
     """
     if out[RATE] == RATE_UNWANTED:
         return
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     bushings, at = tables.bushings, 7 * tables.freedoms.size
     stiffness, damping, none = 0.0, 0.0, (0.0, 0.0, 0.0)
     for k in range(bushings.size):
@@ -210,7 +210,7 @@ def bushing_rate_limit(t, y, dydt, out, handle):
 @njit
 def observe_bushings(t, y, out, handle, values):
     """Write probe values of bushings: magnitude of gap [m], force [N] or torque [N m]."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     probes = tables.probes
     for k in range(probes.size):
         if probes[k]["kind"] == BUSHING_VALUE:
@@ -226,7 +226,7 @@ def observe_bushings(t, y, out, handle, values):
 @njit
 def power_bushings(t, y, dydt, out, handle, power):
     """Write two entries of `power` for each bushing [W]: rate of stored energy, dissipated power."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     at = bushing_power_row(tables, power)
     for k in range(tables.bushings.size):
         bushing = tables.bushings[k]
@@ -245,7 +245,7 @@ def stored_bushings(t, y, dydt, out, handle, stored):
 
     k [N/m], k_turn [N m/rad] : stiffnesses of the bushing; eps : vector of the Euler parameters of its rotation
     """
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     at = bushing_stored_row(tables, stored)
     for k in range(tables.bushings.size):
         bushing, gap = tables.bushings[k], bushing_motion(out, tables, tables.bushings[k])[0]
@@ -352,7 +352,7 @@ def start_gaps(t, y, dydt, out, handle):
 
     It is the whole displacement, not its change since the start.
     """
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     pins, at = tables.pins, tables.layout[0]["pin"]
     for k in range(pins.size):
         gap = relative_motion(out, tables, pins[k])[0]
@@ -363,7 +363,7 @@ def start_gaps(t, y, dydt, out, handle):
 @njit
 def add_start_pin_forces(t, y, dydt, out, handle):
     """Add the pin forces at the start to the forces on bodies, along the directions of the pins at the state y."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     pins = tables.pins
     for k in range(pins.size):
         for r in range(pins[k]["rows"]):
@@ -377,7 +377,7 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
 
     The pin forces [N] are also added to the loads of bodies. out[RATE] is raised by `body_rate_limit` and to `pull`.
     """
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     pins, work, n, at = tables.pins, tables.scratch, tables.freedoms.size, tables.layout[0]["pin"]
     # lambda is then the change of the pin forces since the start, which is zero in an equilibrium.
     add_start_pin_forces(t, y, dydt, out, handle)
@@ -417,7 +417,7 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
 @njit
 def observe_pins(t, y, out, handle, values):
     """Write probe values of pins: magnitude of gap [m] or force [N], in the constrained directions."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     probes, pins = tables.probes, tables.pins
     for k in range(probes.size):
         if probes[k]["kind"] == PIN_VALUE:

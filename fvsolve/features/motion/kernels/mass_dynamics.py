@@ -14,14 +14,21 @@ from math import log, log1p, sqrt
 
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.density import density, log_density, pressure_of_log
-from fvsolve.core.kernels.moving_frames import motion
 from fvsolve.core.kernels.schedule_pieces import schedule_value
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.motion.kernels.tables import open_motion
 from fvsolve.jit import njit
 
 CONTACT_STEPS = (
     0.6  # times the rate of a contact: `step_control.closing_step` then takes a quarter of a radian in a step
 )
+
+
+@njit(forceinline=True)
+def motion(mass, y):
+    """(change of position since the start [m], velocity [m/s]) of a mass."""
+    if mass["y"] < 0:
+        return 0.0, 0.0
+    return y[mass["y"]], mass["velocity"] + y[mass["y"] + 1]
 
 
 @njit(forceinline=True)
@@ -137,7 +144,7 @@ def piston_chambers(t, y, dydt, out, handle):
     contains only the change of the leak since the start. A piston between points of bodies takes no flow, because the
     state of its chambers is their mass. First, `write_travels` writes the travels of force elements between masses.
     """
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     layout, nodes, pistons = tables.layout[0], tables.nodes, tables.pistons
     write_travels(y, out, tables)
     for k in range(pistons.size):
@@ -189,7 +196,7 @@ def forces(t, y, out, tables):
         if brace["schedule"] >= 0:
             change += schedule_value(tables, brace["schedule"], t) - brace["given"]
         add_push(out, tables, k, brace["from_mass"], brace["to_mass"], change, brace["force"])
-    first = armed.size - 2 * stops.size
+    first = tables.motion_settings[0]["flag"]
     for k in range(stops.size):
         stop = stops[k]
         x, speed = stop_travel(out, tables, k)
@@ -228,7 +235,7 @@ def push_stiffness(out, tables, k):
         return braces[k]["stiffness"], braces[k]["damping"]
     k -= braces.size
     if k < stops.size:
-        first = armed.size - 2 * (stops.size - k)
+        first = tables.motion_settings[0]["flag"] + 2 * k
         if armed[first] + armed[first + 1] > 0.0:
             return stops[k]["stiffness"], stops[k]["damping"]
         return 0.0, 0.0
@@ -274,7 +281,7 @@ def contact_rate(out, tables):
     exceeds x_0. A load at rest on a stop does not limit the step.
     """
     masses, stops, armed = tables.masses, tables.stops, tables.armed
-    net, first, greatest = tables.layout[0]["net_force"], armed.size - 2 * stops.size, 0.0
+    net, first, greatest = tables.layout[0]["net_force"], tables.motion_settings[0]["flag"], 0.0
     for k in range(stops.size):
         stop = stops[k]
         i, j = stop["from_mass"], stop["to_mass"]
@@ -303,7 +310,7 @@ def mass_rates(t, y, dydt, out, handle):
     A given step is divided while a contact lasts, by out[CLOSING].
     STATUS is NO_VOLUME if a piston has used up its chamber.
     """
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     layout, nodes, masses = tables.layout[0], tables.nodes, tables.masses
     forces(t, y, out, tables)
     if out[rec.RATE] != rec.RATE_UNWANTED:
@@ -328,7 +335,7 @@ def mass_rates(t, y, dydt, out, handle):
 @njit
 def observe_masses(t, y, out, handle, values):
     """Write the values of the probes of masses, force elements and pistons to `values`."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     layout, masses, pistons, probes = tables.layout[0], tables.masses, tables.pistons, tables.probes
     for k in range(probes.size):
         kind, i = probes[k]["kind"], probes[k]["index"]
@@ -347,9 +354,9 @@ def observe_masses(t, y, out, handle, values):
 @njit
 def record_masses(t, y, out, handle, values):
     """Record the first time at which each piston leaves its stroke, in `marks`."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     marks, pistons = tables.marks, tables.pistons
-    first = tables.pipes.size + 3 * tables.nodes.size + tables.columns.size
+    first = tables.motion_settings[0]["mark"]
     for k in range(pistons.size):
         piston, at = pistons[k], first + k
         x = piston["position"] + piston_travel(out, tables, k)[0]
@@ -360,16 +367,16 @@ def record_masses(t, y, out, handle, values):
 @njit
 def forces_for_events(t, y, out, handle, g):
     """Write all element forces and net forces to `out`, for sources of networks that read them; g is not used."""
-    forces(t, y, out, open_tables(handle))
+    forces(t, y, out, open_motion(handle))
 
 
 @njit
 def mass_events(t, y, out, handle, g):
     """Write the event functions of stops to g: remaining free travel to each of their two sides [m]."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     stops = tables.stops
     write_travels(y, out, tables)
-    first = g.size - 2 * stops.size
+    first = tables.motion_settings[0]["flag"]
     for k in range(stops.size):
         x, _ = stop_travel(out, tables, k)
         g[first + 2 * k], g[first + 2 * k + 1] = stops[k]["below"] + x, stops[k]["above"] - x

@@ -1,0 +1,81 @@
+"""Rows of force elements that act on masses along an axis, or between points of bodies."""
+
+import numpy as np
+
+from fvsolve.features.motion.kernels import tables as records
+from fvsolve.features.motion.kernels.tables import motion_of
+
+PLAIN_LINE = (-1, -1, -1, records.ALONG, (0.0, 0.0, 0.0), 0.0)  # a line
+
+
+def push_ends(link) -> tuple[str | None, str]:
+    """Names of the two masses or points that a force element joins; the first may be None."""
+    return (
+        (link.ports["case"], link.ports["rod"]) if "rod" in link.ports else (link.ports.get("from"), link.ports["to"])
+    )
+
+
+def are_points(draft, *places: str | None) -> bool:
+    """True if any of the names is a point of a body or of the world."""
+    return any(place is not None and place not in motion_of(draft).mass_index for place in places)
+
+
+def join_ports(draft, row, ports: tuple[str, str], places: tuple[str | None, str], **line) -> tuple[float, float]:
+    """Write to the row of a force element the two masses or points that it joins, see `Feature.join`."""
+    motion = motion_of(draft)
+    row["line"] = -1
+    if are_points(draft, *places):
+        row["line"] = add_line(draft, places, **line)
+        row[ports[0]] = row[ports[1]] = motion.mass_index[None]
+        return distance_and_rate(draft, places, motion.lines[-1])
+    for port, place in zip(ports, places, strict=True):
+        row[port] = motion.mass_index[place]
+    first, second = (motion.mass_table[int(row[port])] for port in ports)
+    return second["position"] - first["position"], second["velocity"] - first["velocity"]
+
+
+def point_row(draft, place: str) -> int:
+    """Row in the table of points for the point that a link or a probe names; added on first use."""
+    motion = motion_of(draft)
+    if place not in motion.point_index:
+        name, position = draft.case.body_point(place)
+        motion.point_index[place] = len(motion.points)
+        motion.points.append((motion.body_names.index(name) if name else -1, tuple(position)))
+    return motion.point_index[place]
+
+
+def add_line(draft, places: tuple[str | None, str], toward=None, about=None) -> int:
+    """Add a line of action of a force between two points; return its row in the table of lines.
+
+    toward : vector of a direction of the world; about : vector of an axis of the second body, about which a torque
+    acts; None for both: the force acts along the line between the points. `lower_lines` later writes the number of the
+    force element.
+    """
+    ends = [-1 if place is None else point_row(draft, place) for place in places]
+    acts, direction = (records.ALONG, (0.0, 0.0, 0.0)) if about is None else (records.ABOUT, about)
+    acts, direction = (acts, direction) if toward is None else (records.TOWARD, toward)
+    lines = motion_of(draft).lines
+    lines.append((-1, *ends, acts, tuple(direction), 0.0))
+    return len(lines) - 1
+
+
+def distance_and_rate(draft, places: tuple[str | None, str], line) -> tuple[float, float]:
+    """Distance between two points at the start [m], and its rate [m/s]; a point None is the origin of the world.
+
+    For a line that acts TOWARD a direction the result is (0, relative velocity in this direction [m/s]). For a line
+    that acts ABOUT an axis it is (0, relative angular velocity about the axis [rad/s]). line : entry of `Motion.lines`
+    """
+    ends = []
+    for place in places:
+        name, position = ("", np.zeros(3)) if place is None else draft.case.body_point(place)
+        pose = draft.case.pose_of(name)
+        ends.append((pose.at(position), pose.velocity_at(position), pose.spin))
+    (x, u, a), (z, v, b) = ends
+    _, _, _, acts, direction, _ = line
+    if acts == records.ABOUT:
+        axis = draft.case.poses[draft.case.body_point(places[1])[0]].attitude @ direction
+        return 0.0, float(np.dot(axis, b - a))
+    if acts == records.TOWARD:
+        return 0.0, float(np.dot(direction, v - u))
+    length = float(np.linalg.norm(z - x))
+    return length, float(np.dot(z - x, v - u)) / length if length > 0.0 else 0.0
