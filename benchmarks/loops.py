@@ -21,6 +21,7 @@ from scipy.integrate import solve_ivp
 
 from fvsolve import build, load
 from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.parts.network_elements import network_of
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from reference import servo_axis as axis  # noqa: E402
@@ -81,7 +82,7 @@ def ladder(case: dict, sections: int) -> dict:
 
 def entries(case: dict) -> int:
     """Number of entries of all rates of a network."""
-    network = build(load(case)).network
+    network = network_of(build(load(case)))
     return sum(len(terms) for terms in network.terms(network.conducting)[: len(network.states)])
 
 

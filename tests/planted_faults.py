@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 TOP = Path(__file__).parents[1]
-QUICK_NEEDED, ALL_NEEDED = 45, 49
+QUICK_NEEDED, ALL_NEEDED = 46, 50
 WITHOUT_OWN_TEST = (
     "--deselect",
     "tests/repository/test_tools_of_tests.py",
@@ -64,6 +64,7 @@ FAULTS = [
     ),
     Fault("compile/cache_folders.py", 'digest.update(path.read_bytes() + b"\\0")', 'digest.update(b"\\0")'),
     Fault("report/draw/plot.py", "np.argmin(values[a:b])", "np.argmax(values[a:b])"),
+    Fault("core/schemes.py", "(k + 1) ** power - k**power", "(k + 1) ** power + k**power"),
     Fault("core/mesh/mesh.py", "angle=float(angle[sharpest])", "angle=float(1.01 * angle[sharpest])"),
     Fault("core/steppers/ros.py", "1.0 / (later - t) if later > t", "-1.0 / (later - t) if later > t"),
     Fault("core/steppers/analysis/trees.py", "return nodes * math.prod(", "return (nodes + 1) * math.prod("),
@@ -128,7 +129,7 @@ FAULTS = [
     Fault("exchange/fmi/variables.py", "inputs + list({variable.name", "inputs[:-1] + list({variable.name"),
     Fault("studies/loops/sampled.py", "self.drive * (1.0 + z[place])", "self.drive * (1.0 - z[place])"),
     Fault(
-        "core/model/network_elimination.py",
+        "features/networks/elimination.py",
         "scale = (1.0, -1.0, -item.value, item.value)",
         "scale = (1.0, -1.0, item.value, -item.value)",
     ),

@@ -7,8 +7,8 @@ import numpy as np
 from pydantic import Field
 
 from fvsolve.core.assembly.lowering import TORQUE, Input, Lowering, lowering_of
-from fvsolve.core.assembly.network_elements import FLOW, Element
 from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
+from fvsolve.parts.network_elements import FLOW, Element, network_of
 from fvsolve.parts.nodes_and_links import Link, TwoPort
 from fvsolve.parts.pump.law import OWN_NUMBERS
 from fvsolve.parts.pump.lower_shaft import torques_on
@@ -182,7 +182,7 @@ class TorqueRows(Lowering, kind="torque"):
 
     def inputs(self, model, name, part):
         if part.to in model.case.network_places:
-            return {"torque": Input(TORQUE, model.network.schedules[f"links.{name}", "torque"])}
+            return {"torque": Input(TORQUE, network_of(model).schedules[f"links.{name}", "torque"])}
         turned = part.to.removesuffix(".shaft")
         row = lowering_of(type(model.case.links[turned])).row_of(model, turned)
         place = [torque is part for torque in torques_on(model.case, turned)].index(True)

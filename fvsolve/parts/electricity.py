@@ -7,7 +7,8 @@ from pydantic import Field
 
 from fvsolve.core.assembly.lowering import VALUE as ANY_VALUE
 from fvsolve.core.assembly.lowering import InputKind
-from fvsolve.core.assembly.network_elements import (
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.parts.network_elements import (
     CAPACITY,
     FLOW,
     GAUGE,
@@ -21,7 +22,6 @@ from fvsolve.core.assembly.network_elements import (
     fill_network_probe,
     node_or_reference,
 )
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.network_parts import (
     HEAT_TO,
     GivenPotential,

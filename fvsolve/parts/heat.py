@@ -6,7 +6,9 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from fvsolve.core.assembly.lowering import InputKind
-from fvsolve.core.assembly.network_elements import (
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.errors import article
+from fvsolve.parts.network_elements import (
     CAPACITY,
     FLOW,
     RESISTANCE,
@@ -14,8 +16,6 @@ from fvsolve.core.assembly.network_elements import (
     NetworkRows,
     node_or_reference,
 )
-from fvsolve.core.kernels import dtypes as rec
-from fvsolve.errors import article
 from fvsolve.parts.network_parts import GivenPotential, GivenPotentialRows, NetworkNodeRows, ends_of
 from fvsolve.parts.nodes_and_links import Link, Node, TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled

@@ -3,16 +3,17 @@
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from fvsolve.core.assembly.network_elements import (
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.parts.network_elements import (
     FLOW,
     LOCK,
     POTENTIAL,
     Element,
     NetworkRows,
     Switch,
+    network_of,
     node_or_reference,
 )
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.nodes_and_links import Node
 from fvsolve.parts.schedule import Schedule
 from fvsolve.parts.value import Text
@@ -36,7 +37,7 @@ class NetworkNodeRows(NetworkRows, kind=""):
     """Base of the conversion of nodes, whose probes read their potential, or the angle of a shaft."""
 
     def probe(self, draft, name, probe, row) -> None:
-        draft.network.fill_node_probe(draft, row, name, probe.quantity == "angle")
+        network_of(draft).fill_node_probe(draft, row, name, probe.quantity == "angle")
 
 
 class GivenPotentialRows(NetworkNodeRows, kind=""):

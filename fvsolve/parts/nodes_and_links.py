@@ -35,6 +35,11 @@ class Part(Table):
             cls.kind = kind
             cls.kinds.declare(kind, cls, f"a {cls.noun} of type")
 
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Words that may wake features, see `core.assembly.features`."""
+        return (f"kind {self.kind}",)
+
     @classmethod
     def variant(cls, given: dict[str, Any]) -> "type[Part]":
         """Class of a part with the given keys: this class, or a subclass with other ports or quantities."""
@@ -60,6 +65,10 @@ class Node(Part):
     driven: ClassVar[tuple[str, float] | None] = None
     domain: ClassVar[str] = "hydraulic"  # | "translational" | "spatial" | "rotational" | "electrical" | "thermal"
     main_quantities: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded where a case has no probes
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        return (*super().words, f"domain {self.domain}")
 
     elevation: Annotated[float | None, Quantity(
         "length", about="elevation above datum, at all nodes or none [m]; "
@@ -141,6 +150,10 @@ class Link(Part):
         """Places of its ports that its elements in a network of potential and flow join."""
         return tuple(place for port, place in self.ports.items() if port in self.network_ports
                      or self.in_network and self.joins.get(port) != "hydraulic")  # fmt: skip
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        return (*super().words, *(["element of a network"] if self.network_places else []))
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, "Link"]]:
         """(places, links) of the solved network for this link, each by name.

@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from fvsolve.core.assembly.lowering import ANGULAR_SPEED, InputKind
-from fvsolve.core.assembly.network_elements import (
+from fvsolve.parts.network_elements import (
     CAPACITY,
     INERTANCE,
     RESISTANCE,

@@ -7,10 +7,10 @@ import numpy as np
 from pydantic import Field
 
 from fvsolve.core.assembly.lowering import FORCE, Input, Lowering
-from fvsolve.core.assembly.network_elements import CAPACITY, FLOW, Element
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
 from fvsolve.parts.body import NamedPoints
+from fvsolve.parts.network_elements import CAPACITY, FLOW, Element
 from fvsolve.parts.nodes_and_links import Coupling, Node
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import CaseContext, Faults

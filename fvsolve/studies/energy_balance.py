@@ -57,11 +57,9 @@ class EnergyLoop(RunLoop):
             code, left = super().run(1.0), left - 1.0
             if self.state["steps"] > steps and code in ACCEPTED_CODES:
                 after = armed.copy()
-                armed[:] = rules  # the flags of the right-hand side of this step
-                self.run_data.update_network()
+                self.run_data.use_flags(rules)  # those of the right-hand side of this step
                 self.add(self.released_stops(t, y, self.step_energy(t, y, *first_values)) + self.jump_correction(t, y))
-                armed[:] = after
-                self.run_data.update_network()
+                self.run_data.use_flags(after)
                 self.on_step()
         return code
 

@@ -63,7 +63,7 @@ def is_suited(model: Any) -> bool:
 
 def steps_without_states(model: Any) -> bool:
     """True if the steps of a model of pipes and restrictions do not depend on its states."""
-    if model.shapes.armed or len(model.devices) or model.network is not None or states_outside_cells(model).size:
+    if model.shapes.armed or len(model.devices) or states_outside_cells(model).size:
         return False
     has_lines = (model.tables.pipes["cells"] == 0).any()
     return not (has_lines and any(jump for _, jump in model.breaks))

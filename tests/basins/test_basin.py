@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from reference.basins import PLANE, assert_equal_files, ended, model_of, run_in_two_parts
+from reference.basins import PLANE, alone, assert_equal_files, basin, ended, model_of, run_in_two_parts
 from reference.scenes import AMBIENT, GRAVITY, WATER, junction, lake, pipe, ramp, reservoir, scene, tank, valve
 from scipy.optimize import brentq
 
@@ -13,18 +13,6 @@ import fvsolve
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.studies.accuracy.model_hierarchy import ladder
 from fvsolve.studies.failure_map import failure_map
-
-
-def basin(size, cells, level, **more) -> dict:
-    return {"type": "basin", "size": list(size), "cells": list(cells), "level": level, **more}
-
-
-def alone(pool: dict, end: float, **numerics) -> dict:
-    """Return a case of a basin that only a closed valve joins to a network."""
-    pool = {**pool, "patches": {"east": {"side": "east"}}}
-    nodes = {"pool": pool, "out": reservoir(AMBIENT)}
-    links = {"shut": valve("pool.east", "out", 0.01, opening=0.0) | {"opening": 0.0}}
-    return scene(nodes, links, end, PLANE | numerics, ["pool.east.head"], end)
 
 
 def depths(case: dict) -> tuple[np.ndarray, np.ndarray]:

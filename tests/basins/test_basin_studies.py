@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from model.test_sparsity import stray
 from pytest import approx
 from reference.basins import PLANE, model_of
 from reference.folders import CASES
+from reference.jacobians import stray
 from reference.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene, valve
 
 import fvsolve

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from basins.test_faces import triangles
 from reference.basins import model_of
+from reference.face_fields import triangles
 from reference.scenes import pipe, reservoir, scene
 
 import fvsolve

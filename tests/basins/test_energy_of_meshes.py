@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from basins.test_faces import Field, G, march, triangles
 from pytest import approx
+from reference.face_fields import Field, G, march, triangles
 from reference.meshes import corner_lists, delaunay, write
 
 import fvsolve

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from basins import test_faces
-from basins.test_liquid import RHO, SCHEMES, Box, C, noise
 from pytest import approx
+from reference import face_fields
 from reference.basins import model_of, on_sides
 from reference.isentrope import Isentrope, Riemann
+from reference.liquid_boxes import RHO, SCHEMES, Box, C, noise
 from reference.meshes import boundary, triangles, write
 from reference.scenes import NO_FRICTION, junction, ramp, reservoir, scene, stiff_pipe, valve
 
@@ -139,10 +139,10 @@ def test_a_table_of_the_log_law_is_the_log_law(scheme, reflect):
 
 @pytest.mark.parametrize("scheme", [rec.UPWIND, rec.MUSCL])
 def test_so_it_is_on_triangles(scheme, tmp_path):
-    field = test_faces.triangles(tmp_path, 10, 8)
-    scale = test_faces.RHO * np.array([1.0, test_faces.C, test_faces.C])
+    field = face_fields.triangles(tmp_path, 10, 8)
+    scale = face_fields.RHO * np.array([1.0, face_fields.C, face_fields.C])
     state = 0.02 * scale[:, None] * np.random.default_rng(4).uniform(-1.0, 1.0, (3, len(field.area)))
-    table = of_log(1e5, test_faces.RHO, test_faces.C)
+    table = of_log(1e5, face_fields.RHO, face_fields.C)
     (exact, rate), (found, same) = (field.liquid(rec.LAW_LOG, scheme, state, table=one) for one in (None, table))
     assert np.abs(found - exact).max() < 1e-9 * np.abs(exact).max()
     assert same == approx(rate, rel=1e-7)

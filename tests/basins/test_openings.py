@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from model.test_sparsity import stray
 from pytest import approx
 from reference.basins import SIDES, model_of, on_sides
+from reference.jacobians import stray
 from reference.meshes import boundary, triangles, write
 from reference.pairs import pairs
 from reference.scenes import RHO, WATER, scene

@@ -5,9 +5,9 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from model.test_sparsity import stray
 from pytest import approx
 from reference.basins import assert_equal_files, ended, halved, model_of, run_in_two_parts
+from reference.jacobians import stray
 from reference.meshes import boundary, triangles, write
 from reference.scenes import GRAVITY as G
 from reference.scenes import inflow, lake, scene

@@ -5,25 +5,23 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from reference.basins import ended, model_of, on_sides
-from reference.meshes import boundary, triangles, write
-from reference.scenes import scene
+from reference.basins import ended, model_of
+from reference.rainfall import (
+    CONDUCTIVITY,
+    DEFICIT,
+    GREEN_AMPT,
+    HILLS,
+    HORTON,
+    MM_PER_HOUR,
+    OPEN,
+    SUCTION,
+    field,
+    on_triangles,
+)
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fvsolve
-
-MM_PER_HOUR = 1.0 / 3.6e6  # [m/s]
-NUMERICS = {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.9}
-TOTALS = [f"field.{name}" for name in ("volume", "wet_area", "rain", "rained", "infiltration", "infiltrated")]
-
-
-def field(end, numerics=None, patches=None, every=None, **basin) -> dict:
-    own = {"type": "basin", "size": [10.0, 10.0], "cells": [4, 4], "level": -1.0, "elevation": 0.0, **basin}
-    own |= {"patches": patches} if patches else {}
-    given = {key: value for key, value in (NUMERICS | (numerics or {})).items() if value is not None}
-    return scene({"field": own}, {}, end, given, TOTALS, every or end / 20)
-
 
 LONG, SLOPE, ROUGHNESS, INTENSITY = 100.0, 0.02, 0.02, 50 * MM_PER_HOUR
 PLANE = {"size": [LONG, 1.0], "cells": [200, 1], "bed": f"{SLOPE}*({LONG} - x)", "manning": ROUGHNESS,
@@ -70,9 +68,6 @@ def test_the_recession_after_rain_is_that_of_kinematic_waves():
     assert np.sum(np.abs(depth - exact)) < 0.01 * np.sum(exact)
 
 
-CONDUCTIVITY, SUCTION, DEFICIT = 6.5 * MM_PER_HOUR, 0.1668, 0.34
-GREEN_AMPT = {"model": "green-ampt", "conductivity": "6.5 mm/h", "suction": "166.8 mm", "deficit": DEFICIT}
-HORTON = {"model": "horton", "initial": "60 mm/h", "final": "10 mm/h", "decay": "2 1/h"}
 BY_METHOD = {
     "ssp-rk2": {"courant": 0.9}, "rk4": {"courant": 0.9}, "dormand-prince": {"rtol": 1e-6}, "tr-bdf2": {"step": 5.0},
     "radau-iia-5": {"rtol": 1e-7}, "rodas-5p": {"rtol": 1e-7},
@@ -107,7 +102,7 @@ def soil_in_cells(by: str, folder, **texts) -> dict:
     """Numbers of a soil by formulas of x and y on 4 x 4 cells of 2.5 m, or by rasters with the values at centres."""
     if by == "formula":
         return texts
-    from basins.test_rasters import ascii_grid
+    from reference.raster_files import ascii_grid
 
     centres = {name: 2.5 * array + 1.25 for name, array in zip("yx", np.mgrid[:4, :4], strict=True)}
     return {key: {"raster": str(ascii_grid(folder / f"{key}.asc", eval(text, centres), size=2.5))}
@@ -175,12 +170,10 @@ def test_a_constant_capacity_takes_no_more_than_the_rain():
 
 
 STORM = {"time": ["0 s", "20 s", "60 s", "90 s"], "value": ["0 mm/h", "900 mm/h", "100 mm/h", "0 mm/h"]}
-HILLS = "0.3*sin(1.7*x)*cos(2.3*y) + 0.04*x"
 SOILS = {
     "none": {}, "constant": {"infiltration": {"model": "constant", "rate": "1e-5*(2 + sin(x))"}},
     "horton": {"infiltration": HORTON}, "green-ampt": {"infiltration": GREEN_AMPT},
 }  # fmt: skip
-OPEN = {"out": {"side": "east", "boundary": "critical"}}
 
 
 @pytest.mark.in_turn
@@ -201,20 +194,6 @@ def test_a_storm_on_dry_rough_ground_keeps_its_balance_and_depths_above_zero(sch
     assert found["field.infiltrated"][-1] == approx(-1e-3 * mass["by_node"].get("field.infiltration", 0.0), rel=1e-12)
     model, state = ended(case)
     assert (model.basins[0].depth + model.basins[0].deviations(state.y)[0]).min() > -1e-15
-
-
-def on_triangles(case: dict, sides, folder) -> dict:
-    """The same case with triangles."""
-    basin = dict(case["nodes"]["field"])
-    size = basin.pop("size")
-    del basin["cells"]
-    points, cells = triangles(size, 1.0)
-    write(folder / "t.msh", points, cells.tolist(), on_sides(points, boundary(cells), size, sides))
-    patches = {
-        name: {key: value for key, value in patch.items() if key != "side"} for name, patch in basin["patches"].items()
-    }
-    patches = {side: patches["out"] for side in sides}
-    return case | {"nodes": {"field": basin | {"mesh": {"file": str(folder / "t.msh")}, "patches": patches}}}
 
 
 @pytest.mark.parametrize("soil", SOILS)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from basins.test_rain import GREEN_AMPT, HILLS, HORTON, OPEN, field, on_triangles
-from basins.test_rasters import ascii_grid, geotiff
 from pytest import approx
 from reference.basins import ended, model_of
+from reference.rainfall import GREEN_AMPT, HILLS, HORTON, OPEN, field, on_triangles
+from reference.raster_files import ascii_grid, geotiff
 from reference.refusals import refused
 from scipy.io import netcdf_file
 

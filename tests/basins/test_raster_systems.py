@@ -7,8 +7,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-from basins.test_rasters import ascii_grid, bed_of, geotiff, heights, netcdf, pond
 from pytest import approx
+from reference.raster_files import ascii_grid, bed_of, geotiff, heights, netcdf, pond
 from reference.refusals import refused
 from scipy.io import netcdf_file
 

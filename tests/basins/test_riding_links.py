@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from model.test_sparsity import stray
 from reference.basins import model_of, on_sides, slowing, straight
+from reference.jacobians import stray
 from reference.meshes import boundary, triangles, write
 from reference.scenes import AMBIENT, GRAVITY, RHO, scene
 from scipy.integrate import solve_ivp

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from case.test_placing import placed
 from reference.folders import DOCS
+from reference.placed_parts import placed
 from reference.refusals import refused
 
 import fvsolve

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from case.test_faults import SCENE as PLAIN
 from pytest import approx
 from reference import folders
+from reference.case_texts import DETAILED, two_tanks
 from reference.refusals import refused
 
 from fvsolve.case import Case, FluidSpec, Numerics, Output, load, schema
@@ -23,29 +23,11 @@ from fvsolve.errors import CaseError
 from fvsolve.parts import KINDS, Friction, Wall
 from fvsolve.parts.control import Control
 
-# Example of the design, with a user fluid.
-SCENE = "\n" + PLAIN
-for plain, full in {
-    'title = "A valve shuts"': 'title = "A valve shuts at the end of a 914 m main"',
-    "density = 998": "density = 1000",
-    "viscosity = 1e-3": 'viscosity = "1 cSt"',
-    "vapor_pressure = 2339": 'vapor_pressure = "2339 Pa"',
-    "courant = 0.9": 'scheme = "muscl"\nlimiter = "van-leer"\nmethod = "ssp-rk3"\ncourant = 0.9',
-    'probes = ["gate.pressure"]': """\
-every = "10 ms"
-fields = 50
-probes = ["gate.pressure", "gate.head", "valve.flow", "main.pressure@0.5"]
-
-[expect]
-"max(gate.pressure)" = { value = "1.0751 MPa", rtol = 1e-2 }""",
-}.items():
-    SCENE = SCENE.replace(plain, full)
-
 
 @pytest.fixture
 def scene(tmp_path):
     path = tmp_path / "scene.toml"
-    path.write_text(SCENE)
+    path.write_text(DETAILED)
     return path
 
 
@@ -219,7 +201,7 @@ def test_the_resolved_case_says_the_same(tmp_path):
 
 
 def test_a_dict_says_what_the_file_says(scene):
-    given = tomllib.loads(SCENE)
+    given = tomllib.loads(DETAILED)
     case = load(given)
     assert case == load(scene) and case.path is None and case.name == "case"
     given["links"]["valve"]["opening"] = {"time": np.array([0.0, 1.0]), "value": np.array([1.0, 0.0])}
@@ -283,15 +265,6 @@ def test_without_pipes_the_error_is_controlled():
     assert [probe.text for probe in case.output.probes] == [
         "a.pressure", "a.head", "a.level", "b.pressure", "b.head", "b.level", "hole.flow"
     ]  # fmt: skip
-
-
-def two_tanks():
-    return {
-        "fluid": {"name": "user", "density": 1000, "bulk_modulus": 2e9},
-        "nodes": {"a": {"type": "tank", "area": 1, "level": 2}, "b": {"type": "tank", "area": 1, "level": 1}},
-        "links": {"hole": {"type": "orifice", "from": "a", "to": "b", "area": 0.01}},
-        "numerics": {"end": 10},
-    }
 
 
 def test_a_ramp_without_duration_is_a_jump():
@@ -380,7 +353,7 @@ def test_the_page_of_the_case_file_names_every_key_and_its_example_reads():
     keys = {key for model in models for key in model.keys()} | set(KINDS["nodes"]) | set(KINDS["links"])
     assert [key for key in sorted(keys) if not re.search(rf"\b{re.escape(key)}\b", page)] == []
     example = tomllib.loads(re.search(r"```toml\n(.*?)```", page, re.DOTALL)[1])
-    assert load({**example, "fluid": tomllib.loads(SCENE)["fluid"]}).links["main"].cells == 100
+    assert load({**example, "fluid": tomllib.loads(DETAILED)["fluid"]}).links["main"].cells == 100
 
 
 def headings(page: str) -> dict[str, str]:

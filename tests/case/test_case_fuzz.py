@@ -3,20 +3,19 @@
 import copy
 import tomllib
 
-from case.test_case_file import SCENE, two_tanks
-from case.test_faults import CHAMBER, TANK
-from case.test_placing import placed
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis_profiles import examples
 from reference import folders
+from reference.case_texts import CHAMBER, DETAILED, TANK, two_tanks
+from reference.placed_parts import placed
 
 from fvsolve.case import Case, load
 from fvsolve.case.text import key_lines, write
 from fvsolve.errors import CaseError
 
 CASES = sorted(folders.CASES.glob("*.toml"))
-SEEDS = [tomllib.loads(SCENE), two_tanks(), tomllib.loads(SCENE + TANK), tomllib.loads(SCENE + CHAMBER)]
+SEEDS = [tomllib.loads(DETAILED), two_tanks(), tomllib.loads(DETAILED + TANK), tomllib.loads(DETAILED + CHAMBER)]
 DESIGN = {"limits": {"top": {"on": "main", "minimum": "vacuum", "maximum": "20 bar"},
                      "quick": {"on": ["main-2"], "quantity": "velocity", "maximum": 3}},
           "routes": {"way": {"pipes": ["main"]}},
@@ -122,10 +121,10 @@ def test_a_spoiled_file_is_a_case_or_faults(tmp_path, case):
 
 
 @examples(150)
-@given(text=st.text(), cut=st.integers(0, len(SCENE)), drop=st.integers(0, 12))
+@given(text=st.text(), cut=st.integers(0, len(DETAILED)), drop=st.integers(0, 12))
 def test_a_file_with_noise_is_a_case_or_faults(tmp_path, text, cut, drop):
     path = tmp_path / "case.toml"
-    path.write_bytes((SCENE[:cut] + text + SCENE[cut + drop :]).encode("utf-8", "surrogatepass"))
+    path.write_bytes((DETAILED[:cut] + text + DETAILED[cut + drop :]).encode("utf-8", "surrogatepass"))
     case_or_faults(path)
 
 
@@ -147,7 +146,7 @@ def test_any_setting_is_a_case_or_faults(seed, key, value):
 @given(data=st.binary(max_size=80) | st.text(max_size=80).map(lambda text: f"t,s\n{text}".encode("utf-8", "replace")))
 def test_any_schedule_file_is_a_schedule_or_faults(tmp_path, data):
     (tmp_path / "x.csv").write_bytes(data)
-    (tmp_path / "case.toml").write_text(SCENE)
+    (tmp_path / "case.toml").write_text(DETAILED)
     case_or_faults(tmp_path / "case.toml", set={"links.valve.opening": {"file": "x.csv"}})
 
 

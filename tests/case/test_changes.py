@@ -1,12 +1,11 @@
 """Each kind of key changes no more of a model than its class states, in up to two shipped cases."""
 
 import copy
-import re
-import tomllib
 from collections import Counter
 from functools import cache, partial
 
 import pytest
+from reference.changed_keys import DYED, LARGE, NAMES, OTHERS, leaves, others, raw_case, spoken
 from reference.folders import CASES
 from reference.scenes import pipe, reservoir, scene
 
@@ -14,53 +13,11 @@ import fvsolve
 from fvsolve.case.changes import CLASSES, changes, declaration_of
 from fvsolve.errors import FvsolveError
 from fvsolve.features.motion.kernels.tables import motion_of
-from fvsolve.parts.value import SHAPE, Choice
+from fvsolve.parts.network_elements import network_of
+from fvsolve.parts.value import SHAPE
 
-# Cases that take long to build, which come last; others that take tenths of a second, which come before them.
-LARGE = ("net3-day", "net3-pump-trip", "adelaide", "bowl", "swirl", "accumulator")
-SLOW = ("governor", "load-sensing", "digital-pressure", "tank-relay", "solenoid-valve", "dam-break", "excavator")
-NAMES = sorted((path.stem for path in CASES.glob("*.toml")), key=lambda name: (name in LARGE, name in SLOW, name))
-NUMBER = re.compile(r"\s*([+-]?[\d._]+(?:[eE][+-]?\d+)?)(\s*\S.*|)")
-HAIR = 1e-4
 # keys of class `shape` that do not change the shape of the shipped case; a separate test shows that they can
 ALIKE = {"loss_in", "loss_out", "time_constant"}
-
-
-def raw_case(name: str) -> dict:
-    """Table of a shipped case without expectations and comparisons."""
-    table = tomllib.loads((CASES / f"{name}.toml").read_text(encoding="utf-8"))
-    return {key: one for key, one in table.items() if key not in ("expect", "compare")}
-
-
-def leaves(table, keys=()):
-    """(keys, value) of every value of a case, also of the entries of lists."""
-    inner = table.items() if isinstance(table, dict) else enumerate(table) if isinstance(table, list) else ()
-    for key, one in inner:
-        yield from leaves(one, (*keys, key))
-    if not isinstance(table, (dict, list)):
-        yield keys, table
-
-
-def others(table: dict, keys: tuple, value, far: bool) -> list:
-    """Other values of a key: slightly greater numbers, for shapes (or if `far`) much greater; other words, places."""
-    inner = table
-    for key in keys[:-1]:
-        inner = inner[key]
-    given, places = inner[keys[-1]], [*table["nodes"]]
-    if isinstance(given, bool):
-        return [not given]
-    if isinstance(value, Choice):
-        return [word for word in value.words if word != given][: None if value.changes == SHAPE else 2]
-    if isinstance(given, str) and not NUMBER.fullmatch(given):
-        return [name for name in places if name != given][:2] if given in places else []
-    if isinstance(given, int) and value.changes == SHAPE:
-        return [given + 1, given - 1, 2 * given, given + 1e-9]
-    number, unit = NUMBER.fullmatch(given).groups() if isinstance(given, str) else (given, None)
-    near = [float(number) * factor for factor in ((1 + HAIR, 4 / 3) if far else (1 + HAIR,))]
-    if value.changes == SHAPE:
-        near += [4 / 3 * float(number), 1e-9, -1e-9, 10 * float(number), 1000 * float(number)]
-        near += [one for one in (inner.values() if isinstance(inner, dict) else ()) if isinstance(one, float)]
-    return [f"{one!r}{unit}" for one in near] if unit is not None else near
 
 
 def moved(table: dict, keys: tuple, to) -> dict:
@@ -79,8 +36,8 @@ def form(model) -> tuple:
     tables = {name: (table.shape, *(table[column].tobytes() for column in whole_columns(table)))
               for name, table in {**model.tables._asdict(), **of_motion}.items()}  # fmt: skip
     tables["integers"] = model.tables.integers.tobytes()
-    if model.network is not None:
-        tables["network"] = model.network.arrays(model.network.conducting)[0].tobytes()
+    if (network := network_of(model)) is not None:
+        tables["network"] = network.arrays(network.conducting)[0].tobytes()
     names = (model.state_names, model.node_names, model.link_names, model.valve_names, model.column_names,
              () if motion is None else (motion.piston_names, motion.mass_names), model.events,
              [probe.text for probe in model.probes])  # fmt: skip
@@ -96,7 +53,7 @@ def start(model) -> list[bytes]:
     tables = model.tables
     flows = [table["flow"].tobytes() for table in (tables.pipes, tables.columns, tables.valves)]
     profile = [profile.tobytes() for _, profile in sorted(model.profiles.items())]
-    flows += [] if model.network is None else [model.network.values.tobytes()]
+    flows += [] if network_of(model) is None else [network_of(model).values.tobytes()]
     return [model.start.tobytes(), tables.nodes["pressure"].tobytes(), *flows, *profile]
 
 
@@ -104,11 +61,6 @@ def found_class(before, after) -> str:
     if form(before) != form(after):
         return "shape"
     return "value" if start(before) == start(after) else "profile"
-
-
-def spoken(keys: tuple) -> str:
-    """Path of a key as in a setting, without places in lists."""
-    return ".".join(f'"{key}"' if re.search(r"\W", key) else key for key in keys if isinstance(key, str))
 
 
 class Trial:
@@ -180,54 +132,6 @@ def test_a_key_changes_no_more_than_it_says_and_each_that_says_shape_does():
     assert trial.wrong == []
     assert {place.split(".")[-1] for place in trial.never()} <= ALIKE
     assert len(trial.names) > 100
-
-
-SIZE = {"diameter": 0.05, "loss_coefficient": 2.0}
-TRIM = {"opening": [0.0, 0.5, 1.0], "flow_area": [0.0, 0.2, 1.0]}
-OTHERS = scene(  # keys of no shipped case
-    {
-        "lake": {"type": "reservoir", "head": 40.0},
-        "a": {"type": "junction", "demand": 2e-3, "required_pressure": 4e5, "minimum_pressure": 1.5e5,
-              "demand_exponent": 0.6},
-        "b": {"type": "junction"}, "c": {"type": "junction"},
-        "gas": {"type": "accumulator", "volume": 0.1, "precharge": 2e5, "exponent": 1.3,
-                "connection": {"area": 2e-3, "loss_in": 1.0, "loss_out": 1.5}},
-        "vessel": {"type": "accumulator", "volume": 0.5, "level": 0.4, "diameter": 0.6, "slope": 0.5, "bottom": 0.3,
-                   "compressor": {"start": 0.5, "stop": 0.45, "flow": 1e-3}},
-        "urn": {"type": "accumulator", "volume": 0.5, "level": 0.4, "area": {"level": [0.0, 0.5], "area": [0.3, 0.5]}},
-        "air": {"type": "air-valve", "inlet": 0.05, "outlet": 0.01, "discharge_coefficient": 0.5, "volume": 1e-3,
-                "temperature": 290.0, "switch_velocity": 0.5, "throttled_outlet": 5e-3},
-        "pond": {"type": "tank", "area": {"level": [0.0, 5.0], "area": [2.0, 3.0]}, "level": 1.0},
-    },
-    {
-        "main": {"type": "pipe", "from": "lake", "to": "a", "length": 200.0, "diameter": 0.2, "cells": 9,
-                 "wall": {"youngs_modulus": 2e11, "thickness": 5e-3}, "fittings": ["bend-90"], "minor_loss": 1.0,
-                 "friction": {"model": "quasi-steady", "factor": 0.02}},
-        "hole": {"type": "leak", "from": "a", "coefficient": 1e-6, "exponent": 0.7, "opening": 0.5},
-        "on": {"type": "pipe", "from": "a", "to": "b", "length": 100.0, "nominal": "DN100", "wave_speed": 1000.0},
-        "check": {"type": "check-valve", "from": "b", "to": "gas", "cracking_pressure": 100.0, "overpressure": 1e4,
-                  "natural_frequency": 5.0, "damping_ratio": 0.5, **SIZE},
-        "trim": {"type": "valve", "from": "b", "to": "air", "characteristic": TRIM, "laminar_reynolds": 20.0, **SIZE},
-        "down": {"type": "pipe", "from": "air", "to": "c", "length": 50.0, "diameter": 0.1, "wave_speed": 1000.0,
-                 "friction": {"model": "steady", "roughness": 1e-4}, "cells": 4},
-        "keep": {"type": "pressure-sustaining", "from": "c", "to": "pond", "set_pressure": 3e5, "band": 2e5,
-                 "time_constant": 1.0, **SIZE},
-        "limit": {"type": "flow-control", "from": "b", "to": "pond", "set_flow": 5e-3, "time_constant": 2.0, **SIZE},
-        "rest": {"type": "rigid-column", "from": "c", "to": "pond", "length": 10.0, "diameter": 0.1,
-                 "friction": {"model": "chezy-manning", "coefficient": 0.01}},
-        "lift": {"type": "pump", "from": "pond", "to": "c", "power": 500.0, "efficiency": 0.7, "rated_speed": 150.0,
-                 "inertia": 1.0, "speed": 1.0},
-        "first": {"type": "valve", "from": "b", "to": "vessel", "area": 1e-3},
-        "second": {"type": "valve", "from": "b", "to": "urn", "area": 1e-3},
-        "turn": {"type": "torque", "to": "lift.shaft", "torque": 20.0},
-    },
-    1.0, {"cell_time": 0.02},
-)  # fmt: skip
-DYED = scene(
-    {"lake": reservoir(2e5, scalars={"dye": 1.0}), "tank": {"type": "tank", "area": 2.0, "level": 3.0}},
-    {"main": pipe("lake", "tank", 100.0, 0.1, 1000.0, 4, scalars={"dye": 0.5}, minor_loss=1.0)}, 1.0, {},
-    scalars={"dye": {"unit": "g/l", "initial": 0.1, "diffusivity": 1e-3, "decay": 0.1, "ambient": 0.2}},
-)  # fmt: skip
 
 
 def test_keys_that_no_shipped_case_gives_change_no_more_than_they_say():

@@ -4,59 +4,12 @@ import re
 import tomllib
 
 import pytest
+from reference.case_texts import CHAMBER, SCENE, TANK
 from reference.refusals import refused
 
 from fvsolve import run
 from fvsolve.case import load
 from fvsolve.errors import CaseError, FvsolveError, nearest
-
-SCENE = """\
-schema = 1
-title = "A valve shuts"
-
-[fluid]
-name = "user"
-density = 998
-bulk_modulus = "2.2 GPa"
-viscosity = 1e-3
-vapor_pressure = 2339
-
-[nodes.lake]
-type = "reservoir"
-head = "45.72 m"
-
-[nodes.gate]
-type = "junction"
-
-[nodes.outfall]
-type = "reservoir"
-pressure = "0 barg"
-
-[links.main]
-type = "pipe"
-from = "lake"
-to = "gate"
-length = "914.4 m"
-diameter = "304.8 mm"
-wave_speed = "1219.2 m/s"
-friction = { model = "steady", roughness = "0.26 mm" }
-cells = 200
-
-[links.valve]
-type = "valve"
-from = "gate"
-to = "outfall"
-area = "0.001768 m2"
-discharge_coefficient = 0.6
-opening = { start = "1 s", duration = "0.05 s", value = [1.0, 0.0] }
-
-[numerics]
-end = "10 s"
-courant = 0.9
-
-[output]
-probes = ["gate.pressure"]
-"""
 
 
 def faults(text, folder, set=None):
@@ -117,18 +70,6 @@ to = "gate"
 length = 1
 diameter = 1
 """
-TANK = """
-[nodes.t]
-type = "tank"
-area = 1
-level = 1
-[links.hole]
-type = "orifice"
-from = "t"
-to = "gate"
-Kv = 1
-"""
-CHAMBER = TANK.replace("tank", "chamber").replace("area = 1\nlevel = 1", 'volume = 1\ninitial_pressure = "0 bar"')
 
 
 def tank(old, new):

@@ -2,30 +2,13 @@
 
 import numpy as np
 import pytest
+from reference.placed_parts import CELLS, GATE, HILL, HOLE, LENGTH, SAFE, VENT, line, main, placed
 from reference.refusals import refused
-from reference.scenes import area, junction, lake, pipe, reservoir, scene, step, valve
+from reference.scenes import junction, valve
 
 import fvsolve
 from fvsolve.case.changes import changes
 from fvsolve.studies import sweep
-
-DIAMETER, SPEED, CELLS = 0.4, 1000.0, 60
-ROUGH = {"model": "quasi-steady", "roughness": 2e-4}
-HILL = {"chainage": [1000.0, 1750.0, 2200.0, 2300.0, 4000.0], "elevation": [30.0, 42.0, 65.0, 31.0, 20.0]}
-LENGTH = 3000.0
-
-
-def line(nodes: dict, links: dict, **more) -> dict:
-    """Case of a lake, given nodes and links up to a gate, and a valve that closes to 20 %."""
-    nodes = {"lake": lake(110.0, elevation=30.0), "gate": junction(elevation=20.0),
-             "sea": reservoir(2e5, elevation=20.0)} | nodes  # fmt: skip
-    links = links | {"tap": valve("gate", "sea", 0.02 * area(DIAMETER), step(0.5, 1.0, 0.2))}
-    return scene(nodes, links, 6.0, {"scheme": "weno5", "method": "rk4", "step": 0.02},
-                 ["gate.pressure", "tap.flow"], every=0.1, **more)  # fmt: skip
-
-
-def main(**more) -> dict:
-    return pipe("lake", "gate", LENGTH, DIAMETER, SPEED, CELLS, friction=ROUGH, profile=HILL, minor_loss=3.0) | more
 
 
 def part(start: str, end: str, low: float, high: float) -> dict:
@@ -35,12 +18,6 @@ def part(start: str, end: str, low: float, high: float) -> dict:
     share = (high - low) / LENGTH
     return main(length=high - low, cells=round(CELLS * share), minor_loss=3.0 * share,
                 profile={"chainage": [low, *inner, high], "elevation": z}) | {"from": start, "to": end}  # fmt: skip
-
-
-VENT = {"type": "air-valve", "inlet": 0.05, "outlet": 0.05}
-HOLE = {"type": "leak", "coefficient": 2e-6}
-GATE = {"type": "valve", "loss_coefficient": 5.0, "diameter": DIAMETER}
-SAFE = {"type": "relief-valve", "to": "sea", "set_pressure": 12e5, "Kv": 100.0, "overpressure": 1e5}
 
 
 def by_hand() -> dict:
@@ -53,22 +30,6 @@ def by_hand() -> dict:
         "half": GATE | {"from": "a", "to": "b"}, "hole": HOLE | {"from": "c"}, "safe": SAFE | {"from": "d"},
     }  # fmt: skip
     return line(nodes, links)
-
-
-def placed(turned: bool = False, bends: list | None = None, **more) -> dict:
-    at = {"half": 1500.0, "top": "2.2 km", "hole": "2950 m", "safe": 3500}
-    one = main() | ({} if bends is None else {"bends": bends})
-    if turned:
-        mirrored = {
-            "chainage": (5000.0 - np.array(HILL["chainage"][::-1])).tolist(),
-            "elevation": HILL["elevation"][::-1],
-        }
-        at = {"half": 3500.0, "top": 2800.0, "hole": 2050.0, "safe": 1500.0}
-        one |= {"from": "gate", "to": "lake", "profile": mirrored}
-    said = {name: {"on": "main", "at": at[name]} for name in at}
-    nodes = {"top": VENT | said["top"]}
-    links = {"safe": SAFE | said["safe"], "hole": HOLE | said["hole"], "main": one, "half": GATE | said["half"]}
-    return line(nodes, links, **more)
 
 
 def test_it_is_the_pipe_that_is_cut_by_hand() -> None:

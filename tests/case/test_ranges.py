@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from case.test_faults import SCENE
 from reference import folders, scenes
+from reference.case_texts import SCENE
 
 from fvsolve import run
 from fvsolve.case import load

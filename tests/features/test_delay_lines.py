@@ -23,6 +23,7 @@ from reference.delays import (
     turned,
 )
 from reference.scenes import RHO, junction, lake, ramp, scene, valve
+from reference.short_lines import short, vessel
 
 import fvsolve
 from fvsolve import studies
@@ -141,23 +142,6 @@ def test_envelopes_are_taken_along_the_line():
     assert found.extremes["a.pressure"].maximum < found["a.pressure"][0] + 1.4 * JUMP
 
 
-S = np.linspace(0.0, 1.0, 41)
-SLOW = {"time": (0.2 + 0.4 * S).tolist(), "value": (FLOW * (1.0 - S**3 * (10.0 - 15.0 * S + 6.0 * S * S))).tolist(),
-        "kind": "smooth"}  # fmt: skip
-
-
-def short(line: str, **numerics) -> dict:
-    """Case with stubs of 3 m and 5 m between longer pipes, a valve at a stub, and a demand that stops within 0.4 s."""
-    nodes = {"lake": {"type": "reservoir", "pressure": 6e5}, "a": {"type": "junction"}, "b": {"type": "junction"},
-             "c": {"type": "junction"}, "sink": {"type": "reservoir", "pressure": 1e5},
-             "gate": {"type": "junction", "demand": SLOW}}  # fmt: skip
-    links = {"up": pipe("lake", "a", 300.0, cells=50), "stub": pipe("a", "b", 3.0, cells=1),
-             "down": pipe("b", "gate", 240.0, cells=40), "spur": pipe("b", "c", 5.0, cells=1),
-             "tap": {"type": "valve", "from": "c", "to": "sink", "area": 2e-4}}  # fmt: skip
-    return scene(nodes, links, 3.0, {"pipe_model": line, **numerics},
-                 ["gate.pressure", "b.pressure", "c.pressure", "tap.flow"], 0.05)  # fmt: skip
-
-
 def test_lines_shorter_than_a_step_know_each_other():
     """Lines shorter than a step agree with cells of 2.5 ms; the error decreases with the square of the step."""
     truth, errors = fvsolve.run(short("finite-volume", scheme="upwind5", method="rk4", courant=0.8)), []
@@ -193,16 +177,6 @@ def test_stores_beside_lines_are_as_beside_cells(method):
     for probe in probes:
         a, b = known(one, probe)[1], known(two, probe)[1]
         assert np.abs(a - b).max() < 3e-3 * np.ptp(b)
-
-
-def vessel(method: str, step: float, end: float = 3.0, volume: float = 20.0, cells: int = 2) -> dict:
-    """Case of a demand that stops at once between a lake and a chamber, at a time within a step."""
-    stop = {"time": [0.0, 0.0503], "value": [FLOW, 0.0], "kind": "step"}
-    nodes = {"lake": {"type": "reservoir", "pressure": 6e6}, "v": {"type": "chamber", "volume": volume},
-             "a": {"type": "junction", "demand": stop}}  # fmt: skip
-    links = {"up": pipe("lake", "a", 317.0, cells=cells),
-             "neck": pipe("a", "v", 123.0, cells=cells, diameter=0.1)}  # fmt: skip
-    return scene(nodes, links, end, {"pipe_model": "delay-line", "method": method, "step": step}, ["v.pressure"], 0.1)
 
 
 @pytest.mark.parametrize("method", ["rk4", "ssp-rk2", "trapezoid"])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from features.test_delay_lines import vessel
+from reference.short_lines import vessel
 
 import fvsolve
 from fvsolve.core.output.memory_sink import MemorySink

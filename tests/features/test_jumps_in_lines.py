@@ -6,10 +6,10 @@ Jumps that arrive within a step at a junction with a valve or a rigid column are
 import numpy as np
 import pytest
 from reference.delays import turned
+from reference.lines_with_jumps import EXACT, SPEED, line
 from reference.scenes import (
     AMBIENT,
     GRAVITY,
-    NO_FRICTION,
     RHO,
     WATER,
     area,
@@ -33,16 +33,9 @@ from fvsolve.features.delay_lines.kernels.history_update import earliest_arrival
 from fvsolve.features.delay_lines.kernels.line_rates import smooth_wave_linear
 from fvsolve.studies.outcome import RowSink
 
-SPEED = 1000.0
 METHODS = {
     "euler": {"courant": 0.9}, "rk4": {"step": 0.0137}, "gauss-4": {"step": 0.05}, "rodas-5p": {"rtol": 1e-4},
 }  # fmt: skip
-EXACT = {"pipe_model": "finite-volume", "scheme": "upwind", "method": "euler", "courant": 1.0}
-
-
-def line(one: str, other: str, length: float, bore: float = 0.3, **keys) -> dict:
-    return {"type": "pipe", "from": one, "to": other, "length": length, "diameter": bore, "wave_speed": SPEED,
-            "friction": NO_FRICTION, "cells": 10, **keys}  # fmt: skip
 
 
 def in_cells(case: dict, size: float) -> dict:
@@ -387,17 +380,17 @@ def test_bounds_by_which_cells_are_left_out_contain_all_waves(case, jumps_seen):
     places, clock = history.offsets_of(past), history.reading_data(past, int(past[history.COUNT]) - 1)
     wrap = int(past[history.CAPACITY]) - 1
     longest = max(np.diff([history.time_of(past, k) for k in range(history.PROFILE_ENTRIES, int(past[history.COUNT]))]))
-    for line, wave in ((lines_of(model)[k].copy(), wave) for k in range(2) for wave in range(2)):
-        bounds = history.bounds_of(places, line, 0)
-        wave_bounds.write_bounds(past, places, clock, line, 0, wave)  # anew, because those of the last entry are there
-        (ring, mask), head = history.ring_of(places, line, 0), history.jump_head(places, int(line["stretch"]), wave)
+    for row, wave in ((lines_of(model)[k].copy(), wave) for k in range(2) for wave in range(2)):
+        bounds = history.bounds_of(places, row, 0)
+        wave_bounds.write_bounds(past, places, clock, row, 0, wave)  # anew, because those of the last entry are there
+        (ring, mask), head = history.ring_of(places, row, 0), history.jump_head(places, int(row["stretch"]), wave)
 
         def sent_wave(t, ring=ring, mask=mask, head=head, wave=wave):
             jumps = history.jumps_until(past, places, head, t + clock[4])
             return smooth_wave_linear(past, clock, ring, mask, wave, t) + jumps
 
         for _ in range(50):
-            begin, end = np.sort(clock[1] - line["tau"] * random.uniform(0.0, 1.0, 2))
+            begin, end = np.sort(clock[1] - row["tau"] * random.uniform(0.0, 1.0, 2))
             listed = range(int(past[head + history.JUMP_COUNT]))
             first = history.first_after(past, places, head, begin - clock[4])
             assert history.count_until(past, places, head, first // 2, begin - clock[4]) == first

@@ -12,8 +12,7 @@ from hypothesis_profiles import examples
 import fvsolve
 from invariance import equivalent_networks as equivalent
 from invariance.random_scenes import SEEDS, networks, shuffled
-from invariance.result_comparison import alike, told
-from invariance.test_networks import EXPERIMENTAL, near
+from invariance.result_comparison import EXPERIMENTAL, alike, near, told
 
 pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)
 SMALL = 1e-9  # delay_tolerance; smaller jumps than a quarter of it are smoothed

@@ -16,23 +16,10 @@ from reference.scenes import GRAVITY, WATER
 import fvsolve
 from fvsolve.case.text import write
 from invariance import equivalent_networks as equivalent
-from invariance.random_scenes import IMPLICIT, SEEDS, networks, shuffled
-from invariance.result_comparison import IN_PARTS, alike, told, with_frames
+from invariance.random_scenes import SEEDS, networks, shuffled
+from invariance.result_comparison import EXPERIMENTAL, alike, near, told, with_frames
 
-EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # warning of numba while it compiles
 pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings fail, such as of NaN values
-ROUND = 1e-9
-
-
-def near(case: dict) -> float:
-    """Allowed difference between equivalent cases, over the greatest value of the quantity.
-
-    An implicit step with weno5 may have two solutions, which differ by the error of a step, and rounding selects one.
-    In one example both residuals are 5e-12 and the solutions differ by 1.4e-6.
-    """
-    if case["numerics"]["scheme"] == "weno5" and case["numerics"]["method"] in IMPLICIT:
-        return IN_PARTS
-    return 10 * case["numerics"].get("rtol", 0.1 * ROUND)
 
 
 @examples(6)

@@ -1,7 +1,7 @@
 """Nodes whose pressure the equations hardly determine are named."""
 
 import pytest
-from parts.test_dry_tanks import main, restated
+from reference.quasi_steady import main, restated
 from reference.scenes import junction, lake, scene, step, valve
 
 import fvsolve

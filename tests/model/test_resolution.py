@@ -3,7 +3,7 @@
 from copy import deepcopy
 
 import pytest
-from reference import scenes
+from reference.pump_stations import station
 from reference.scenes import junction, lake, pipe, ramp, reservoir, scene, step, valve
 
 import fvsolve
@@ -94,21 +94,6 @@ def test_the_same_event_as_a_table_a_signal_or_a_trip_is_as_quick() -> None:
 def test_no_shipped_case_has_too_few_cells() -> None:
     few = {name: told(name) for name in shipped.names()}
     assert {name for name, notes in few.items() if [one for one in notes if one.limit in (3, 6, 10, 40)]} == set()
-
-
-def station(at: float | str = 20.0, **more) -> dict:
-    """Case of a check valve behind a pump, a main with a vessel, and a reservoir on a hill."""
-    nodes = {"sump": lake(5.0, elevation=0.0), "out": junction(elevation=0.0), "top": lake(60.0, elevation=50.0),
-             "vessel": {"type": "accumulator", "volume": 5.0, "gas_volume": 2.0, "on": "main", "at": at}}  # fmt: skip
-    rub = {"model": "quasi-steady", "roughness": 1e-4}
-    links = {
-        "pump": scenes.pump("sump", "header", curve={"flow": [0.0, 0.2, 0.3], "head": [90.0, 70.0, 50.0]}, trip=0.5,
-                            rated_speed=150.0, inertia=20.0),
-        "flap": {"type": "check-valve", "from": "header", "to": "out", "area": 0.1},
-        "main": pipe("out", "top", 2600.0, 0.5, 1000.0, 60, friction=rub) | more,
-    }  # fmt: skip
-    nodes["header"] = {"type": "chamber", "volume": 0.1, "elevation": 0.0}
-    return scene(nodes, links, 2.0, {"scheme": "muscl"}, ["vessel.pressure"])
 
 
 def test_a_piece_of_one_cell_between_a_check_valve_and_a_vessel_is_noted_once() -> None:

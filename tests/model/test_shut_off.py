@@ -1,7 +1,7 @@
 """Starts without solution: faults with the group of nodes, its demand, the links that shut it off, and the remedy."""
 
 import pytest
-from parts.test_dry_tanks import altitude, main, restated
+from reference.quasi_steady import altitude, main, restated
 from reference.scenes import junction, lake, reservoir, scene, tank, valve
 
 import fvsolve

@@ -5,7 +5,8 @@ The truth is a closed form, or characteristics at Courant number 1 in cells of e
 
 import numpy as np
 import pytest
-from features.test_jumps_in_lines import EXACT, WATER, junction, lake, line, scene
+from reference.lines_with_jumps import EXACT, line
+from reference.scenes import WATER, junction, lake, scene
 
 import fvsolve
 

@@ -13,8 +13,8 @@ import tomllib
 
 import numpy as np
 import pytest
-from case.test_changes import DYED, LARGE, OTHERS, leaves, others, raw_case, spoken
-from case.test_changes import NAMES as EVERY
+from reference.changed_keys import DYED, LARGE, OTHERS, leaves, others, raw_case, spoken
+from reference.changed_keys import NAMES as EVERY
 from reference.folders import CASES
 
 import fvsolve

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from parts.test_controls import METHODS
+from reference.level_control import METHODS
 from reference.scenes import GRAVITY, RHO, WATER, area, junction, lake, scene, step, tank, valve
 
 import fvsolve

@@ -5,10 +5,10 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from model.test_sparsity import stray
 from pytest import approx
-from reference.bodies import CLOSE, OIL, Crane, bodies, body, pendulum, random_tree, turn
+from reference.bodies import CLOSE, COUPLER, CRANK, OIL, Crane, bodies, body, parallelogram, pendulum, random_tree, turn
 from reference.cylinders import valve_flow
+from reference.jacobians import stray
 from reference.scenes import AMBIENT, GRAVITY, scene
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
@@ -375,23 +375,6 @@ def test_an_end_stop_between_points_throws_back_without_loss():
 
 
 # loops ------------------------------------------------------------------------------------------------------
-
-CRANK, COUPLER = (2.0, 1.0), (3.0, 1.5)  # mass [kg] and length [m]
-
-
-def parallelogram(angle: float = 1.0, rate: float = 0.0, **pin) -> tuple[dict, dict]:
-    """Return nodes and links of two hanging cranks with a level coupler between their ends, closed by a pin."""
-    (m, a), (n, b) = CRANK, COUPLER
-
-    def rod(mass, length, joint):
-        inertia = mass * length**2 / 12.0
-        return body(mass, [inertia, inertia, 0.0], {"kind": "revolute", "axis": [0, 1, 0], **joint},
-                    centre_of_mass=[0, 0, -length / 2.0], points={"end": [0, 0, -length]})  # fmt: skip
-
-    nodes = {"one": rod(m, a, {"angle": angle, "rate": rate}),
-             "two": rod(m, a, {"angle": angle, "at": [b, 0, 0], "rate": rate}),
-             "coupler": rod(n, b, {"on": "one.end", "angle": -math.pi / 2.0 - angle, "rate": -rate})}  # fmt: skip
-    return nodes, {"loop": {"type": "pin", "from": "two.end", "to": "coupler.end", "axis": [0, 1, 0], **pin}}
 
 
 def swing(angle: float, end: float) -> float:

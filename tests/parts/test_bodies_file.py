@@ -1,8 +1,7 @@
 """Faults, notices and values as read of bodies, joints, masses, cylinders and spool valves in a case file."""
 
 import pytest
-from parts.test_bodies import parallelogram
-from reference.bodies import Crane, bodies, body, pendulum
+from reference.bodies import Crane, bodies, body, parallelogram, pendulum
 from reference.refusals import refused
 
 import fvsolve

@@ -4,11 +4,11 @@ from math import pi
 
 import numpy as np
 import pytest
-from model.test_sparsity import stray
 from pytest import approx
 from reference import conduits as exact_section
 from reference.basins import assert_equal_files, run_in_two_parts
 from reference.conduits import DamBreak, backwater, bore, uniform_depth
+from reference.jacobians import stray
 from reference.scenes import WATER
 from scipy.integrate import quad
 from scipy.optimize import brentq

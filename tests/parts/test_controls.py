@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from reference import governor
 from reference.folders import CASES
-from reference.scenes import GRAVITY, WATER, lake, pipe, reservoir, scene, tank, valve
+from reference.level_control import METHODS, SECTION, SUPPLY, final, orifice_flow, pi, tower
+from reference.resumed_runs import killed_and_resumed, same_files
+from reference.scenes import GRAVITY, WATER, lake, pipe, reservoir, scene, valve
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.core.assembly.schedule_tables import period_of
@@ -24,37 +24,9 @@ from fvsolve.features.controls.feature import blocks_of
 from fvsolve.parts.formula_program import Program
 from fvsolve.studies.linearise import linearise
 
-METHODS = ("dormand-prince", "radau-iia-5", "rodas-5p", "auto")
 CLOSE = 1e-9
-SECTION, ORIFICE, SUPPLY = 2.0, 20e-4, 20.0
 REAL = {"name": "Water", "temperature": 293.15, "law": "table"}
 LAWS = [WATER, {**WATER, "law": "log"}, REAL]
-
-
-def orifice_flow(opening, head):
-    """Flow through a valve of `tower` [m3/s]."""
-    return opening * ORIFICE * np.sign(head) * np.sqrt(2.0 * GRAVITY * abs(head))
-
-
-def tower(inlet, outlet, level=4.0, end=300.0, numerics=None, **top):
-    """Case of a tank between a lake and the air, with the openings of both valves."""
-    nodes = {"source": lake(SUPPLY, elevation=0.0), "tower": tank(SECTION, level, elevation=0.0),
-             "town": lake(0.0, elevation=0.0)}  # fmt: skip
-    links = {"inlet": valve("source", "tower", ORIFICE, inlet), "outlet": valve("tower", "town", ORIFICE, outlet)}
-    probes = ["tower.level", *(f"controls.{name}.output" for name in top.get("controls", {}))]
-    return scene(nodes, links, end, numerics or {"rtol": 1e-10}, probes, end / 100, **top)
-
-
-def pi(setpoint, gain=0.8, integral=120.0, **more):
-    more |= {} if integral is None else {"integral_time": integral}
-    return {"type": "pi", "input": "tower.level", "setpoint": setpoint, "gain": gain, **more}
-
-
-def final(case, method, **numerics):
-    """Values of the probes at the end of a case, by a method with a tolerance of 1e-10."""
-    model = fvsolve.build(fvsolve.load(case, {"numerics.method": method, "numerics.rtol": 1e-10, **numerics}))
-    state = fvsolve.advance(model, fvsolve.initial_state(model), model.case.numerics.end)
-    return model.observe(state)
 
 
 def solved(rates, y, times):

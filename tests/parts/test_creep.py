@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from model.test_sparsity import random_state, stray
 from pytest import approx
 from reference import stopped_lines
+from reference.jacobians import random_state, stray
 from reference.refusals import refused
 from reference.scenes import WATER, area, junction, reservoir, scene
 

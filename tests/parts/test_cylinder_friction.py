@@ -5,11 +5,10 @@ from math import exp
 
 import numpy as np
 import pytest
-from model.test_sparsity import stray
 from reference.cylinders import AMBIENT, BETA, RHO, Jack
+from reference.jacobians import stray
+from reference.resumed_runs import killed_and_resumed, same_files
 from scipy.integrate import solve_ivp
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.errors import CaseError

@@ -4,12 +4,12 @@ from math import factorial, pi
 
 import numpy as np
 import pytest
-from parts.test_controls import METHODS, SECTION, final, orifice_flow, tower
-from parts.test_controls import pi as pi_control
-from parts.test_samples import sampled_plant, two_lags, value_at
+from reference.delay_blocks import TAU, blocks, delayed_loop
+from reference.level_control import METHODS, SECTION, final, orifice_flow, tower
+from reference.level_control import pi as pi_control
+from reference.resumed_runs import killed_and_resumed, same_files
+from reference.sampled_control import sampled_plant, two_lags, value_at
 from scipy.integrate import solve_ivp
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.errors import CaseError, FvsolveError
@@ -17,24 +17,6 @@ from fvsolve.studies import stability
 from fvsolve.studies.linearise import linearise
 
 EXACT = 1e-9
-TAU = 0.7
-
-
-def delayed_loop(gain=1.0, tau=TAU, end=5.0, **numerics):
-    """Case of the integrator x' = -gain x(t - tau), x = 1 up to the start."""
-    controls = {
-        "plant": {"type": "transfer-function", "input": "controls.gain", "numerator": [1.0], "denominator": [1.0, 0.0],
-                  "initial": 1.0},
-        "gain": {"type": "function", "inputs": {"x": "controls.late"}, "formula": f"-{gain!r}*x"},
-        "late": {"type": "delay", "input": "controls.plant", "delay": tau, "initial": 1.0},
-    }  # fmt: skip
-    return blocks(controls, end, **numerics)
-
-
-def blocks(controls, end, **numerics):
-    probes = [f"controls.{name}.output" for name in controls]
-    return {"schema": 1, "controls": controls, "numerics": {"end": end, **(numerics or {"rtol": 1e-10})},
-            "output": {"every": end / 50, "probes": probes}}  # fmt: skip
 
 
 def by_steps(t, gain=1.0, tau=TAU):

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from numpy.polynomial.chebyshev import chebfit, chebval
 from reference.folders import CASES
+from reference.resumed_runs import killed_and_resumed, same_files
 from scipy.integrate import solve_ivp
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.errors import CaseError

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from parts.test_controls import METHODS
-from parts.test_quasi_steady_pipe import pipe
+from reference.level_control import METHODS
+from reference.quasi_steady import altitude, main, restated
 from reference.scenes import junction, lake, scene, tank
 
 import fvsolve
@@ -22,17 +22,8 @@ def demand(flow: float) -> dict:
     return {"time": STARTS, "value": [flow * PATTERN[hour % 6] for hour in range(24)], "kind": "step"}
 
 
-def main(start: str, end: str, length: float, diameter: float, coefficient: float = 110.0) -> dict:
-    return pipe(start, end, length, diameter, {"model": "hazen-williams", "coefficient": coefficient})
-
-
 def check(start: str, end: str) -> dict:
     return {"type": "check-valve", "from": start, "to": end, "diameter": 0.2, "loss_coefficient": 1e-4}
-
-
-def altitude(tank_name: str, **levels: float) -> dict:
-    return {"type": "altitude-valve", "from": f"{tank_name}-inlet", "to": tank_name, "diameter": 0.2,
-            "loss_coefficient": 1e-4, **levels}  # fmt: skip
 
 
 def day(nodes: dict, links: dict, numerics: dict | None = None) -> dict:
@@ -51,15 +42,6 @@ def behind_a_check_valve(numerics: dict | None = None) -> dict:
              "p3": main("tower-inlet", "end", 300.0, 0.2, 120.0),
              "gate": altitude("tower", full_level=6.0, empty_level=2.0)}  # fmt: skip
     return day(nodes, links, numerics)
-
-
-def restated(case: dict) -> dict:
-    """The same case with its nodes and links in the opposite order, and its pipes turned."""
-    links = {name: dict(link) for name, link in reversed(case["links"].items())}
-    for link in links.values():
-        if link["type"] == "pipe":
-            link["from"], link["to"] = link["to"], link["from"]
-    return {**case, "nodes": dict(reversed(case["nodes"].items())), "links": links}
 
 
 def events_of(run, name: str) -> list[tuple[float, str]]:

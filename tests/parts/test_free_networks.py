@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from model.test_sparsity import stray
-from parts.test_riding_networks import BORE, DEPTH, HALF, LEVEL, ROLL, TANK, said, u_tube
+from reference.jacobians import stray
+from reference.refusals import said
 from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, scene
+from reference.u_tubes import BORE, DEPTH, HALF, LEVEL, ROLL, TANK, u_tube
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, least_squares
 

@@ -8,11 +8,11 @@ import math
 
 import numpy as np
 import pytest
-from model.test_sparsity import random_state, stray
 from pytest import approx
 from reference import scenes, stopped_lines
 from reference.characteristics import Line, Network, ValvePipe, darcy, hazen_williams
 from reference.folders import CASES
+from reference.jacobians import random_state, stray
 from reference.orders import observed_order
 from reference.refusals import refused
 from reference.scenes import (

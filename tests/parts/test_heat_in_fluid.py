@@ -5,31 +5,19 @@ import math
 
 import numpy as np
 import pytest
-from model.test_sparsity import random_state, stray
 from pytest import approx
+from reference.heated_fluid import CP, METHODS, OIL, ZERO, heated
+from reference.jacobians import random_state, stray
 from reference.refusals import refused
-from reference.scenes import AMBIENT, GRAVITY, RHO, area, chamber, junction, pipe, reservoir, scene, tank, valve
+from reference.scenes import AMBIENT, GRAVITY, RHO, area, chamber, junction, pipe, reservoir, tank, valve
 from scipy.linalg import expm
 
 import fvsolve
 from fvsolve.core.fluid import specific_heat
 from fvsolve.studies.energy_balance import energy
 
-CP, ZERO = 1900.0, 273.15
 LAWS = ["linear", "log", "table", "mixture"]
-METHODS = [{"method": "rk4", "step": 4.0}, {"method": "dormand-prince", "rtol": 1e-10},
-           {"method": "radau-iia-5", "rtol": 1e-10}, {"method": "rodas-5p", "rtol": 1e-10},
-           {"method": "auto", "rtol": 1e-10}]  # fmt: skip
-WARM = {"heat": True, "specific_heat": "1.9 kJ/kg/K", "unit": "degC", "initial": 40.0}
-OIL = {"name": "user", "density": RHO, "bulk_modulus": 1.6e9, "viscosity": "46 cSt"}
 VG46 = [["40 degC", "46 cSt"], ["100 degC", "6.76 cSt"]]
-
-
-def heated(nodes, links, end, heat_from=(), numerics=None, probes=(), fluid=None, **scalar) -> dict:
-    """Case in which the parts `heat_from` heat the fluid; other arguments as for `scene`."""
-    warm = {**WARM, "heat_from": heat_from if heat_from == "all" else list(heat_from), **scalar}
-    return scene(nodes, links, end, numerics or METHODS[-1], probes, end / 40, scalars={"temperature": warm},
-                 fluid=fluid or OIL)  # fmt: skip
 
 
 def unit(links=None, nodes=None, **more) -> dict:

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from model.test_sparsity import stray
-from parts.test_quasi_steady_pipe import HAZEN, loss_of
-from parts.test_quasi_steady_pipe import pipe as quick
+from reference.jacobians import stray
+from reference.quasi_steady import HAZEN, loss_of
+from reference.quasi_steady import pipe as quick
 from reference.refusals import refused
 from reference.scenes import (
     AMBIENT,

@@ -4,16 +4,17 @@ from math import exp, pi, sqrt
 
 import numpy as np
 import pytest
+from reference.element_networks import GROUND, network, runs, two_port
 from reference.folders import CASES
+from reference.resumed_runs import killed_and_resumed, same_files
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.cli.printing import exit_code
 from fvsolve.core.model.energy_norm import energy_form
 from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.parts.network_elements import network_of
 from fvsolve.parts.self_acting.law_check_valve import PRESSURE_MARGIN
 from fvsolve.studies import stability
 from fvsolve.studies.energy_balance import energy
@@ -22,26 +23,6 @@ from fvsolve.studies.loops.loop import loop
 
 EXACT = 1e-9
 METHODS = ["dormand-prince", "radau-iia-5", "rodas-5p", "auto"]
-GROUND = {"gnd": {"type": "ground"}}
-
-
-def network(nodes, links, end=1.0, probes=None, **more):
-    """Case of a network without fluid; nodes given as a list of names are terminals."""
-    if isinstance(nodes, str):
-        nodes = GROUND | {name: {"type": "terminal"} for name in nodes.split()}
-    numerics = {"end": end, "rtol": 1e-11, **more.pop("numerics", {})}
-    output = {"every": end / 40} | ({"probes": probes} if probes else {})
-    return {"schema": 1, "nodes": nodes, "links": links, "numerics": numerics, "output": output, **more}
-
-
-def two_port(kind, start, stop, **keys):
-    return {"type": kind, "from": start, "to": stop, **keys}
-
-
-def runs(case, method="dormand-prince", **set):
-    run = fvsolve.run(case, {"numerics.method": method} | set)
-    assert run.ok, run.reason
-    return run
 
 
 def jump(before, after, time=0.0):
@@ -180,7 +161,7 @@ def test_a_pump_that_a_motor_starts_has_equal_end_values_under_both_liquid_laws(
 
 
 def test_rates_of_a_motor_are_exact():
-    network = fvsolve.build(fvsolve.load(motor())).network
+    network = network_of(fvsolve.build(fvsolve.load(motor())))
     order = [network.columns[f"links.motor{end}" if end else "nodes.axle"] for end in (".inductance", "")]
     rates = dict(zip(network.states, network.terms(()), strict=False))
     found = [[rates[column].get(other, 0.0) for other in order] for column in order]
@@ -200,11 +181,11 @@ def test_the_energy_norm_of_a_network_is_that_of_its_stores():
 
 
 def test_check_names_states_and_ties_and_decides_passivity():
-    facts = fvsolve.build(fvsolve.load(motor())).network.facts()
+    facts = network_of(fvsolve.build(fvsolve.load(motor()))).facts()
     assert sorted(facts["states"]) == ["axle.speed", "motor.current"] and not facts["tied"]
     assert facts["passive"] and facts["greatest"] == pytest.approx(-2.0 * 1e-3, rel=1e-12)
     links = {"gear": two_port("gear", "a", "b", ratio=5.0)}
-    facts = fvsolve.build(fvsolve.load(shafts(links, ["a.speed"]))).network.facts()
+    facts = network_of(fvsolve.build(fvsolve.load(shafts(links, ["a.speed"])))).facts()
     assert facts["tied"] == {"a.speed": "5 b.speed"} and facts["passive"] and facts["greatest"] == 0.0
 
 

@@ -6,15 +6,14 @@ import tomllib
 
 import numpy as np
 import pytest
-from model.test_sparsity import stray
 from reference import lifted_valves
 from reference.folders import CASES
+from reference.jacobians import stray
 from reference.refusals import refused
+from reference.resumed_runs import killed_and_resumed, same_files
 from reference.scenes import AMBIENT, WATER, chamber, junction, lake, pipe, reservoir, scene, valve
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.studies.energy_balance import energy

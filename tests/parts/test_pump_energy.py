@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from parts.test_controls import METHODS
+from reference.level_control import METHODS
 from reference.scenes import GRAVITY, RHO, junction, lake, scene, tank
 
 import fvsolve

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from parts.test_pump_trip import BORE, FACTOR, LENGTH, TIGHT, column, column_truth, operating_flow
 from pytest import approx
+from reference.pump_columns import BORE, FACTOR, LENGTH, TIGHT, column, column_truth, operating_flow
 from reference.scenes import GRAVITY, RHO, area
 from scipy.integrate import solve_ivp
 

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from model.test_sparsity import stray
-from parts.test_controls import METHODS
+from reference.jacobians import stray
+from reference.level_control import METHODS
+from reference.quasi_steady import FACTOR, HAZEN, loss_of, pipe
+from reference.resumed_runs import killed_and_resumed, same_files
 from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, junction, lake, reservoir, scene, step, tank, valve
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, root
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.core.fluid import LAWS
@@ -19,13 +19,6 @@ from fvsolve.studies import energy
 
 CLOSE = 1e-9
 EXACT = {"rtol": 1e-12}
-FACTOR = {"model": "steady", "factor": 0.02}
-HAZEN = {"model": "hazen-williams", "coefficient": 120.0}
-
-
-def pipe(start, end, length=100.0, diameter=0.05, friction=FACTOR, **more):
-    return {"type": "pipe", "from": start, "to": end, "length": length, "diameter": diameter, "friction": friction,
-            "pipe_model": "quasi-steady", **more}  # fmt: skip
 
 
 def two_tanks(friction=FACTOR, end=600.0, numerics=EXACT, probes=(), **more):
@@ -45,30 +38,6 @@ def test_tanks_equalise_as_in_the_closed_form(method):
     speed = bore * math.sqrt(2.0 * GRAVITY / (0.02 * 100.0 / 0.05 + 3.0)) * (1.0 / 2.0 + 1.0 / 3.0)
     heads = 3.0 + run["upper.level"] - run["lower.level"]
     assert run.ok and heads == pytest.approx((math.sqrt(7.0) - 0.5 * speed * run.t) ** 2, abs=CLOSE)
-
-
-def colebrook(reynolds, roughness):
-    def residual(x):
-        return x + 2.0 * math.log10(roughness / 3.7 + 2.51 * x / reynolds)
-
-    return brentq(residual, 1.0, 50.0, xtol=1e-14, rtol=1e-14) ** -2
-
-
-def swamee_jain(reynolds, roughness):
-    return 0.25 / math.log10(roughness / 3.7 + 5.74 / reynolds**0.9) ** 2
-
-
-def loss_of(friction, flow, length=100.0, diameter=0.05, minor=2.0):
-    """Head loss [m] of a flow [m3/s], by the formulas of the handbooks."""
-    velocity = flow / area(diameter)
-    other = minor * velocity**2 / (2.0 * GRAVITY)
-    if friction["model"] == "hazen-williams":
-        return other + 4.727 * 0.3048**-0.685 * length * (flow / friction["coefficient"]) ** 1.852 / diameter**4.871
-    if friction["model"] == "chezy-manning":
-        return other + length * (velocity * friction["coefficient"] / (diameter / 4.0) ** (2.0 / 3.0)) ** 2
-    law = swamee_jain if friction["model"] == "swamee-jain" else colebrook
-    factor = friction.get("factor") or law(velocity * diameter * RHO / 1e-3, friction["roughness"] / diameter)
-    return other + factor * length / diameter * velocity**2 / (2.0 * GRAVITY)
 
 
 FRICTIONS = [FACTOR, HAZEN, {"model": "chezy-manning", "coefficient": 0.011},

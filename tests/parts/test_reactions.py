@@ -4,27 +4,22 @@ import copy
 
 import numpy as np
 import pytest
-from basins.test_basin import alone
-from model.test_sparsity import random_state, stray
 from pytest import approx
+from reference.basins import alone
+from reference.jacobians import random_state, stray
 from reference.orders import observed_order
+from reference.reacting_scalars import MOLES, moles
 from reference.refusals import refused
+from reference.resumed_runs import killed_and_resumed, same_files
 from reference.scenes import AMBIENT, area, chamber, junction, pipe, reservoir, scene, tank, valve
 from scipy.integrate import solve_ivp
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.case.changes import changes
 from fvsolve.core.step_limits.step_notices import step_limits
 
-MOLES = {"unit": "mol/m3"}
 METHODS = ("dormand-prince", "radau-iia-5", "rodas-5p", "auto")
 GAS = 8.31446261815324  # [J/mol/K]
-
-
-def moles(**start) -> dict:
-    return {name: {**MOLES, "initial": value} for name, value in start.items()}
 
 
 def stirred(scalars, reactions, end=10.0, probes=(), every=None, other=None, **numerics) -> dict:

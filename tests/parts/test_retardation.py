@@ -6,11 +6,11 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from parts.test_heat_in_fluid import CP, heated
-from parts.test_reactions import moles
-from parts.test_scalars import BORE, FLOW, SPEED, at_end, case_of, given, hammer, line, ogata_banks
 from pytest import approx
+from reference.dyed_pipes import BORE, FLOW, SPEED, at_end, case_of, given, hammer, line, ogata_banks
+from reference.heated_fluid import CP, heated
 from reference.orders import observed_order
+from reference.reacting_scalars import moles
 from reference.scenes import RHO, area, junction, pipe, ramp, reservoir, scene, smooth_ramp, smooth_step, step
 
 import fvsolve

@@ -3,43 +3,15 @@
 import meshio
 import numpy as np
 import pytest
-from reference.refusals import refused
+from reference.refusals import said
 from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, scene
+from reference.u_tubes import BORE, DEPTH, HALF, LEVEL, LOSS, ROLL, TANK, hull, u_tube
 from scipy.integrate import simpson, solve_ivp
 
 import fvsolve as fv
 from fvsolve.core.output.fields import read_series
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.studies.energy_balance import energy
-
-HALF, DEPTH, LEVEL = 4.0, 1.5, 0.8  # half distance of arms, depth of the duct, level above the duct [m]
-TANK, BORE, LOSS = 1.2, 0.6, 3.0  # area of tanks [m2], bore of the duct [m], loss [-]
-ROLL = {"mean": 0.0, "amplitude": 0.05, "period": 7.0}  # [rad], [s]
-SOLID = {"mass": 1.0, "inertia": [1.0, 1.0, 1.0]}
-
-
-def hull(**joint):
-    """Return a body with a driven joint."""
-    return {"type": "body", **SOLID, "joint": joint}
-
-
-def u_tube(turned=False, swap=False, angle=ROLL, **column):
-    """Return a case of a U-tube on a rolling body; `turned` puts its bow along y, `swap` reverses the duct."""
-
-    def named(x, y, z):
-        return [-y, x, z] if turned else [x, y, z]
-
-    ends = ("starboard", "port") if swap else ("port", "starboard")
-    return scene(
-        {
-            "hull": hull(kind="revolute", axis=named(1, 0, 0), angle=angle),
-            "port": {"type": "tank", "on": "hull", "at": named(0, HALF, -DEPTH), "area": TANK, "level": LEVEL},
-            "starboard": {"type": "tank", "on": "hull", "at": named(0, -HALF, -DEPTH), "area": TANK, "level": LEVEL},
-        },
-        {"duct": {"type": "rigid-column", "from": ends[0], "to": ends[1], "length": 2 * HALF, "diameter": BORE,
-                  "minor_loss": LOSS, **column}},
-        20.0, {"method": "dormand-prince", "rtol": 1e-9}, ["duct.flow", "port.level", "starboard.level"], every=0.1,
-    )  # fmt: skip
 
 
 def roll(t):
@@ -282,11 +254,6 @@ def test_two_columns_that_meet_at_a_shut_valve_are_one(law):
     one, two = fv.run(whole), fv.run(case)
     for name in ("first.flow", "second.flow"):
         assert two[name] == pytest.approx(one["duct.flow"], abs=1e-7)
-
-
-def said(case):
-    """Return the faults of a case: place -> message."""
-    return {fault.place: fault.message for fault in refused(case).faults}
 
 
 def test_what_does_not_ride_together_is_told_all_at_once():

@@ -2,41 +2,15 @@
 
 import numpy as np
 import pytest
-from parts.test_controls import METHODS, SECTION, SUPPLY, final, orifice_flow, pi, tower
-from parts.test_switching import FINE
 from reference import digital_pressure
-from reference.scenes import WATER
+from reference.level_control import FINE, METHODS, SECTION, SUPPLY, final, orifice_flow, pi, tower
+from reference.resumed_runs import killed_and_resumed, same_files
+from reference.sampled_control import LIMIT, sampled_plant, two_lags, value_at
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 
 EXACT = 1e-9
-LIMIT = 10.809425555853  # gain from which the sampled PI on two lags is unstable, by the spectral radius of its map
-
-
-def two_lags(gain, end, period=0.1, method="dormand-prince", **more):
-    """Case of a PI with samples on the plant 1 / ((0.5 s + 1)(0.1 s + 1)), whose setpoint steps at 0.05 s."""
-    setpoint = {"time": [0.0, 0.05], "value": [0.0, 1.0], "kind": "step"}
-    loop = {"type": "pi", "input": "controls.plant", "setpoint": setpoint, "gain": gain, "integral_time": 0.4, **more}
-    plant = {"type": "transfer-function", "input": "controls.loop", "numerator": [1.0], "denominator": [0.05, 0.6, 1.0]}
-    loop |= {"period": period} if period else {}
-    return {"schema": 1, "fluid": WATER, "controls": {"plant": plant, "loop": loop},
-            "numerics": {"end": end, "rtol": 1e-10, "method": method},
-            "output": {"every": 0.05, "probes": ["controls.plant.output", "controls.loop.output"]}}  # fmt: skip
-
-
-def sampled_plant(period):
-    """Matrices of the plant over one period with a held input."""
-    a, b = np.array([[0.0, 1.0], [-20.0, -12.0]]), np.array([[0.0], [20.0]])
-    exponential = expm(np.block([[a, b], [np.zeros((1, 3))]]) * period)
-    return exponential[:2, :2], exponential[:2, 2]
-
-
-def value_at(run, probe, time):
-    return run[probe][np.flatnonzero(np.abs(np.array(run.t) - time) < 1e-9)[-1]]
 
 
 @pytest.mark.parametrize("method", METHODS)

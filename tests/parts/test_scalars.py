@@ -7,17 +7,16 @@ from importlib import import_module
 import meshio
 import numpy as np
 import pytest
-from model.test_sparsity import random_state, stray
 from pytest import approx
+from reference.dyed_pipes import BORE, FLOW, HAMMER, SPEED, at_end, case_of, given, hammer, line, ogata_banks
+from reference.jacobians import random_state, stray
 from reference.orders import observed_order
 from reference.refusals import refused
 from reference.scenes import (
     AMBIENT,
     RHO,
-    area,
     chamber,
     junction,
-    pipe,
     ramp,
     reservoir,
     scene,
@@ -27,37 +26,12 @@ from reference.scenes import (
     tank,
     valve,
 )
-from scipy.special import erfc
 
 import fvsolve
-
-MUSCL = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
-SPEED, BORE, SLOW = 1.0, 0.1, 20.0  # flow [m/s], bore of pipes [m], waves [m/s] (slow, for few steps)
-FLOW = SPEED * area(BORE)
 
 
 def inflow(flow, **dye) -> dict:
     return {"type": "inflow", "flow": flow, **({"scalars": dye} if dye else {})}
-
-
-def given(**dye) -> dict:
-    """Return a reservoir at the pressure at which pipes have their stated area."""
-    return reservoir(AMBIENT, **({"scalars": dye} if dye else {}))
-
-
-def line(start, end, length=10.0, cells=100, **more) -> dict:
-    return pipe(start, end, length, BORE, SLOW, cells, **more)
-
-
-def case_of(nodes, links, end, numerics=None, probes=(), **dye) -> dict:
-    return scene(nodes, links, end, {**MUSCL, **(numerics or {})}, probes, end / 50, scalars={"dye": dye})
-
-
-def at_end(case: dict) -> tuple:
-    """Return (model, fields of the last state)."""
-    model = fvsolve.build(fvsolve.load(case))
-    state = fvsolve.advance(model, fvsolve.initial_state(model), case["numerics"]["end"])
-    return model, model.fields(state.y, model.evaluate(state.t, state.y)[1])
 
 
 def through(cells: int, **numerics) -> float:
@@ -152,13 +126,6 @@ def test_what_a_pump_turns_round_without_volume_is_mixed_too():
     assert [result["one.dye"][0], result["two.dye"][0]] == approx(mixed, rel=1e-11)
 
 
-def ogata_banks(x, t, d):
-    """Value in a semi-infinite pipe with the inlet at 1 from t = 0 on (Ogata and Banks 1961)."""
-    width = 2.0 * math.sqrt(d * t)
-    back = np.exp(SPEED * x / d) * erfc((x + SPEED * t) / width)
-    return 0.5 * (erfc((x - SPEED * t) / width) + back)
-
-
 def test_diffusion_behind_a_held_inlet_is_that_of_ogata_and_banks():
     errors = []
     for cells in (50, 100, 200):
@@ -242,20 +209,6 @@ def test_a_dry_tank_passes_on_what_comes_and_what_is_made_up_and_keeps_none():
         assert result["drain.dye"][-1] == approx((feed * 3.0 + (draw - feed) * 9.0) / draw, rel=1e-12)
         assert abs(result.ledger["dye"]["final"]) < 1e-3  # of 20 kg: amount and mass have errors of steps
         assert result.ledger["dye"]["relative"] < 1e-12
-
-
-HAMMER = {"lake": reservoir(5e5), "mid": junction(), "gate": junction(), "box": chamber(0.05), "sea": reservoir(1e5)}
-
-
-def hammer(scheme: str, friction: dict, **dye) -> dict:
-    links = {
-        "a": pipe("lake", "mid", 60.0, 0.1, 1000.0, 30, friction=friction),
-        "b": pipe("gate", "mid", 40.0, 0.1, 1200.0, 17, friction=friction, retardation={"dye": 1.288}),
-        "side": pipe("mid", "box", 10.0, 0.05, 1000.0, 4, friction=friction),
-        "v": valve("gate", "sea", 0.003, opening=ramp(0.05, 0.1, 1.0, 0.0)),
-    }
-    case = case_of(HAMMER, links, 1.5, {"scheme": scheme, "method": "ssp-rk3"}, ["gate.dye", "gate.pressure"], **dye)
-    return case
 
 
 @pytest.mark.in_turn

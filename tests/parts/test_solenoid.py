@@ -7,15 +7,15 @@ from math import pi
 
 import numpy as np
 import pytest
-from model.test_sparsity import stray
-from parts.test_networks import GROUND, network, runs, two_port
+from reference.element_networks import GROUND, network, runs, two_port
+from reference.jacobians import stray
+from reference.resumed_runs import killed_and_resumed, same_files
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.errors import CaseError
+from fvsolve.parts.network_elements import network_of
 from fvsolve.studies.energy_balance import energy
 from fvsolve.studies.linearise import linearise
 
@@ -367,7 +367,7 @@ def test_a_control_of_the_current_reaches_its_setpoint(method):
 def test_motions_at_the_start_and_states_are_named():
     model = fvsolve.build(fvsolve.load(coil(initial_flux=2e-5)))
     assert model.steady["moving"][0].startswith("coil.flux changes by 0.0173")
-    assert model.network.facts()["states"] == ["coil.flux"]
+    assert network_of(model).facts()["states"] == ["coil.flux"]
 
 
 def test_a_run_with_a_solenoid_resumes_to_the_bit(tmp_path):

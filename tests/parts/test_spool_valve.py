@@ -5,13 +5,12 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from model.test_sparsity import random_state, stray
 from pytest import approx
 from reference import servo_axis
 from reference.folders import CASES
+from reference.jacobians import random_state, stray
+from reference.resumed_runs import killed_and_resumed, same_files
 from scipy.integrate import solve_ivp
-from solve.test_implicit_runs import killed_and_resumed
-from solve.test_resume import same_files
 
 import fvsolve
 from fvsolve.errors import CaseError

@@ -4,12 +4,11 @@ import functools
 
 import numpy as np
 import pytest
-from parts.test_controls import METHODS, SECTION, SUPPLY, final, orifice_flow, pi, tower
+from reference.level_control import FINE, METHODS, SECTION, SUPPLY, final, orifice_flow, pi, tower
 from scipy.integrate import solve_ivp
 
 import fvsolve
 
-FINE = {"rtol": 1e-12, "atol": 1e-13}
 NEAR = 1e-8  # of levels and of times of switches [m, s]
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import fvsolve
 from fvsolve.core.mesh import rectangle
 from fvsolve.core.model.model import Model, State
+from reference.scenes import AMBIENT, reservoir, scene, valve
 
 PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
 HEAVY = {"type": "body", "mass": 10.0, "inertia": [1.0, 1.0, 1.0]}
@@ -90,3 +91,15 @@ def assert_equal_files(folder: Path, names: Iterable[str]) -> None:
     """Files of these names in the folders `run` and `whole` have equal bytes."""
     for name in names:
         assert (folder / "run" / name).read_bytes() == (folder / "whole" / name).read_bytes(), name
+
+
+def basin(size, cells, level, **more) -> dict:
+    return {"type": "basin", "size": list(size), "cells": list(cells), "level": level, **more}
+
+
+def alone(pool: dict, end: float, **numerics) -> dict:
+    """Return a case of a basin that only a closed valve joins to a network."""
+    pool = {**pool, "patches": {"east": {"side": "east"}}}
+    nodes = {"pool": pool, "out": reservoir(AMBIENT)}
+    links = {"shut": valve("pool.east", "out", 0.01, opening=0.0) | {"opening": 0.0}}
+    return scene(nodes, links, end, PLANE | numerics, ["pool.east.head"], end)

@@ -160,3 +160,21 @@ class Crane:
     def case(self, end: float, probes=(), law: str = "linear", every: float = 0.01, joint=None, cylinder=None, **more):
         return scene(self.nodes(**(joint or {})), self.links(**(cylinder or {})), end, more or CLOSE, probes, every,
                      fluid={**OIL, "law": law})  # fmt: skip
+
+
+CRANK, COUPLER = (2.0, 1.0), (3.0, 1.5)  # mass [kg] and length [m]
+
+
+def parallelogram(angle: float = 1.0, rate: float = 0.0, **pin) -> tuple[dict, dict]:
+    """Return nodes and links of two hanging cranks with a level coupler between their ends, closed by a pin."""
+    (m, a), (n, b) = CRANK, COUPLER
+
+    def rod(mass, length, joint):
+        inertia = mass * length**2 / 12.0
+        return body(mass, [inertia, inertia, 0.0], {"kind": "revolute", "axis": [0, 1, 0], **joint},
+                    centre_of_mass=[0, 0, -length / 2.0], points={"end": [0, 0, -length]})  # fmt: skip
+
+    nodes = {"one": rod(m, a, {"angle": angle, "rate": rate}),
+             "two": rod(m, a, {"angle": angle, "at": [b, 0, 0], "rate": rate}),
+             "coupler": rod(n, b, {"on": "one.end", "angle": -math.pi / 2.0 - angle, "rate": -rate})}  # fmt: skip
+    return nodes, {"loop": {"type": "pin", "from": "two.end", "to": "coupler.end", "axis": [0, 1, 0], **pin}}

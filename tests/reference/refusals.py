@@ -10,3 +10,8 @@ def refused(case, match: str | None = None, **more) -> fvsolve.CaseError:
     with pytest.raises(fvsolve.CaseError, match=match) as caught:
         fvsolve.load(case, **more)
     return caught.value
+
+
+def said(case):
+    """Return the faults of a case: place -> message."""
+    return {fault.place: fault.message for fault in refused(case).faults}

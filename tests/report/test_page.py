@@ -16,9 +16,9 @@ from urllib.parse import unquote
 
 import numpy as np
 import pytest
+from reference.design_studies import STUDY, throttled
 from reference.folders import DOCS
 from reference.scenes import junction, lake, pipe, ramp, scene, tank, valve
-from studies.test_design import STUDY, throttled
 
 import fvsolve
 from fvsolve.case.text import write

@@ -18,6 +18,7 @@ AWAKE = {
     "delay_lines": ["valve-closure", "--set", 'numerics.pipe_model="delay-line"'],
     "controls": ["tank-relay"],
     "scalars": ["temperature-front"],
+    "networks": ["clutch"],
     "motion": ["closed-cylinder"],
 }
 RUN = "import sys, fvsolve; from fvsolve.cli import main; print(fvsolve.__file__); sys.exit(main())"

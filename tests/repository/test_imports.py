@@ -1,5 +1,9 @@
-"""Import rules: no cycle, and compiled files of parts and basins import compiled code only."""
+"""Import rules: no cycle, and compiled files of parts and basins import compiled code only.
 
+No file of tests imports a test module.
+"""
+
+import ast
 import subprocess
 import sys
 from graphlib import CycleError, TopologicalSorter
@@ -33,9 +37,14 @@ def test_a_circle_is_seen(arrows, found):
     assert len(circle(arrows)) == found
 
 
+def below_core(module: str) -> list[str]:
+    """Names of a module below `fvsolve`, or below `fvsolve.core` if it is there."""
+    return module.removeprefix("fvsolve.").removeprefix("core.").split(".")
+
+
 def is_compiled(module: str) -> bool:
     """True for a law of a part, and for a file of a basin that is neither a declaration nor a lowering."""
-    _, folder, *names = module.split(".")
+    folder, *names = below_core(module)
     if folder == "parts":
         return len(names) == 2 and names[1].startswith("law")
     return folder == "basins" and len(names) > 0 and not names[-1].startswith(("part", "lower"))
@@ -44,20 +53,19 @@ def is_compiled(module: str) -> bool:
 def test_compiled_files_of_parts_and_basins_import_compiled_code_only():
     """The cache of compiled code is keyed by these sources, so nothing else may influence them."""
     graph = grimp.build_graph("fvsolve", exclude_type_checking_imports=True, cache_dir=None)
-    compiled = [module for module in sorted(graph.modules) if module.count(".") > 1 and is_compiled(module)]
-    assert {module.split(".")[1] for module in compiled} == {"parts", "basins"}
+    compiled = [module for module in sorted(graph.modules) if is_compiled(module)]
+    assert {below_core(module)[0] for module in compiled} == {"parts", "basins"}
     for module in compiled:
         for other in graph.find_modules_directly_imported_by(module):
-            assert is_compiled(other) or other.split(".")[1] in ("kernels", "jit"), f"{module} imports {other}"
+            assert is_compiled(other) or below_core(other)[0] in ("kernels", "jit"), f"{module} imports {other}"
 
 
 @pytest.mark.parametrize("folder", ["parts", "core/basins"])
 def test_declarations_import_no_lowering(folder):
     """A `part.py` beside a compiled law states keys only, so that a schema needs no tables and no compiled law."""
     graph = grimp.build_graph("fvsolve", exclude_type_checking_imports=True, cache_dir=None)
-    declared = [
-        module for module in graph.modules if module.startswith(f"fvsolve.{folder}.") and module.endswith(".part")
-    ]
+    place = f"fvsolve.{folder.replace('/', '.')}."
+    declared = [module for module in graph.modules if module.startswith(place) and module.endswith(".part")]
     assert declared
     for module in declared:
         for other in graph.find_modules_directly_imported_by(module):
@@ -77,3 +85,39 @@ def test_every_folder_of_parts_and_basins_has_a_declaration(folder):
     assert ConduitFlow.package == "fvsolve.core.basins.conduit"  # whose declaration is that of a link
     folders = [path for path in folders if (folder, path.name) != ("core/basins", "conduit")]
     assert folders and all((path / "part.py").is_file() for path in folders)
+
+
+TESTS = Path(__file__).parents[1]
+
+
+def imported_tests(text: str) -> list[str]:
+    """Modules of tests that a file imports, at its head or within a function."""
+    names = []
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names += [f"{node.module or ''}.{alias.name}" for alias in node.names]
+    places = [TESTS / name.replace(".", "/") for name in names]
+    files = {path.with_suffix(".py") for place in places for path in (place, place.parent)}
+    return sorted(path.stem for path in files if path.name.startswith("test_") and path.is_file())
+
+
+def test_no_file_of_tests_imports_a_test_module():
+    """What several files of tests need is in `tests/reference`, so each of them can be read and changed alone."""
+    files = {path.relative_to(TESTS): path.read_text(encoding="utf-8") for path in sorted(TESTS.rglob("*.py"))}
+    assert len(files) > 300
+    assert {path: found for path, text in files.items() if (found := imported_tests(text))} == {}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from repository.test_imports import circle",
+        "from repository import test_imports",
+        "import repository.test_imports as rules",
+        "def f():\n    from repository.test_imports import circle",
+    ],
+)
+def test_an_import_of_a_test_module_is_found(text):
+    assert imported_tests(text) == ["test_imports"]

@@ -12,28 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference.small_package import LAW, python
 
 import fvsolve
-from fvsolve import errors, jit
-from fvsolve.compile import cache_folders, child_process, store
+from fvsolve import jit
+from fvsolve.compile import cache_folders, store
 from fvsolve.core.steppers.run_handle import no_algebra
 
-LAW = """from fvsolve.jit import njit
-
-@njit
-def law(x):
-    return {factor} * x
-"""
-LOOP = """from fvsolve.jit import njit
-from fvsolve.core.kernels.law import law
-
-@njit
-def loop(n):
-    total = 0.0
-    for i in range(n):
-        total += law(float(i))
-    return total
-"""
 PROBE = """
 import sys
 from fvsolve.core.steppers.loop import loop
@@ -77,32 +62,6 @@ for function in (sum_of_squares, sum_of_cubes):
         stats = function.numba.stats
         print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 """
-
-
-@pytest.fixture
-def package(tmp_path):
-    """Small copy of the package: what compiles, and two compiled functions; the second calls the first."""
-    folder = tmp_path / "fvsolve"
-    for room in (folder, folder / "kernels", folder / "steppers"):
-        room.mkdir()
-        (room / "__init__.py").touch()
-    for module in (jit, errors, child_process):
-        shutil.copy(module.__file__, folder)
-    shutil.copytree(Path(store.__file__).parent, folder / "compile", ignore=shutil.ignore_patterns("__pycache__"))
-    (folder / "kernels" / "law.py").write_text(LAW.format(factor=2.0))
-    (folder / "steppers" / "loop.py").write_text(LOOP)
-    return folder
-
-
-def python(package: Path, code: str, told: str = "", **environment: str) -> list[str]:
-    """Words that `code` prints in a process with this copy and its own cache; only warnings like `told` are allowed."""
-    stated = {"FVSOLVE_CACHE": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
-    stated["PYTHONDONTWRITEBYTECODE"] = "1"  # bytecode files do not show an edit within a second
-    inherited = {k: v for k, v in os.environ.items() if k != "NUMBA_DISABLE_JIT"}
-    done = subprocess.run([sys.executable, "-c", code], env=inherited | stated | environment, cwd=package.parent,
-                          capture_output=True, text=True)  # fmt: skip
-    assert done.returncode == 0 and (re.search(told, done.stderr) if told else done.stderr == ""), done.stderr
-    return done.stdout.split()
 
 
 def test_second_process_needs_no_numba_and_an_edit_elsewhere_is_noticed(package):

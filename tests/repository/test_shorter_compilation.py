@@ -10,7 +10,7 @@ from numba.core.compiler import Flags, run_frontend
 from numba.core.ir import Inst, Var
 from numba.core.registry import cpu_target
 from numba.core.targetconfig import TargetConfig
-from repository.test_jit import package, python  # noqa: F401
+from reference.small_package import python
 
 from fvsolve.compile.numba_internals import numba_module
 from fvsolve.core.kernels import network_balance, schedule_pieces

@@ -142,8 +142,7 @@ def test_values_of_sources_are_those_of_the_energy_accounts(name):
     watch, loop, data = run.checks.energy, run.loop, RunData(model)
     for name, array in loop.run_data.arrays().items():
         data.set_array(name, array.copy())
-    data.armed[:] = loop.run_data.armed
-    data.update_network()
+    data.use_flags(loop.run_data.armed)
     data.clock["limit"] = loop.run_data.clock["limit"]
     accounts, dydt, out = Accounts(data), np.zeros(model.y_size), model.new_out()
     power = accounts.power_at(loop.t, loop.now.copy(), dydt, out)[accounts.of("supplied")]

@@ -2,19 +2,16 @@
 
 import math
 import random
-import subprocess
-import sys
 from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import pytest
-from model.test_rest import ROUGH, moved, still_probes, town
 from reference import vessels
 from reference.cylinders import Jack
+from reference.resumed_runs import killed_and_resumed, long_run, same_files
 from reference.scenes import AMBIENT, GRAVITY, chamber, junction, lake, pipe, ramp, reservoir, scene, tank, valve
+from reference.still_networks import ROUGH, moved, still_probes, town
 from scipy.integrate import solve_ivp
-from solve.test_resume import long_run, same_files
 
 import fvsolve
 
@@ -150,34 +147,6 @@ def test_a_tank_spills_from_the_moment_it_is_full(numerics):
     assert result["basin.level"] == pytest.approx(np.minimum(1.0 + 0.01 * result.t, 1.5), abs=1e-9)
 
 
-DYING = """
-import itertools, os, sys
-from importlib import import_module
-import fvsolve
-rooms = import_module("fvsolve.core.solve.solve")
-rooms.CHECKPOINT_SECONDS = rooms.CHUNK_SECONDS = 0.0
-save, pauses = rooms.Run.save, itertools.count(1)
-def save_and_die(run):
-    dies = run.loop.t >= float(sys.argv[3])
-    if dies or next(pauses) % 20 == 0:
-        save(run)
-    if dies:
-        os._exit(9)
-rooms.Run.save = save_and_die
-fvsolve.run(sys.argv[1], out=sys.argv[2], pictures=sys.argv[4] == "True")
-"""
-
-
-def killed_and_resumed(whole: Path, moment: float, pictures: bool = False) -> Path:
-    """Folder of a run of the case of `whole` that is killed after `moment` [s], then resumed in this process."""
-    script, broken = whole.parent / "dying.py", whole.parent / "broken"
-    script.write_text(DYING)
-    died = subprocess.run([sys.executable, *map(str, (script, whole / "case.toml", broken, moment, pictures))])
-    assert died.returncode == 9 and moment <= reached(broken) < fvsolve.open_run(whole).t[-1]
-    assert fvsolve.run(whole / "case.toml", out=broken, resume=True, pictures=pictures).reason == "finished"
-    return broken
-
-
 @pytest.mark.parametrize(
     "numerics", [{"method": name, "rtol": 3e-7} for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "auto")], ids=said
 )
@@ -189,15 +158,6 @@ def test_dead_at_a_random_moment_and_resumed_is_the_unbroken_run(tmp_path, numer
     assert whole.ok, whole.reason
     moment = random.Random(seed).uniform(0.1, 0.7) * whole.t[-1]
     same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", moment, pictures))
-
-
-def reached(folder) -> float:
-    """Time of the last checkpoint [s], 0 without a checkpoint."""
-    try:
-        with np.load(folder / "restart.npz") as kept:
-            return float(kept["t"])
-    except FileNotFoundError:
-        return 0.0
 
 
 def busy(numerics: dict) -> dict:

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from parts.test_dry_tanks import main, restated
+from reference.quasi_steady import main, restated
 from reference.scenes import junction, lake, scene, tank, valve
 
 import fvsolve

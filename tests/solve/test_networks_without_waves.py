@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from reference.networks_without_waves import DIAMETER, FACTOR, FALLING, LENGTH, SIZE, pipe, reducing, town
 from reference.scenes import AMBIENT, RHO, WATER
 from reference.scenes import GRAVITY as G
 from scipy.integrate import solve_ivp
@@ -21,35 +22,7 @@ from fvsolve.core.steppers import loop_records
 from fvsolve.core.steppers.step_control import store_next
 from fvsolve.features.controls.feature import blocks_of
 
-FACTOR, DIAMETER, LENGTH = 0.02, 0.2, 500.0
 LOSS = 8.0 * FACTOR * LENGTH / (math.pi**2 * G * DIAMETER**5)  # head per flow squared [s2/m5]
-SIZE = {"diameter": DIAMETER, "loss_coefficient": 0.5}
-
-
-def pipe(start, end):
-    friction = {"model": "steady", "factor": FACTOR}
-    return {"type": "pipe", "from": start, "to": end, "length": LENGTH, "diameter": DIAMETER, "friction": friction}
-
-
-def town(valve, demand=0.01, source=80.0, **numerics):
-    """Case: lake - pipe - valve - pipe - town with a demand - pipe - tower; heads of the lake as a schedule."""
-    return {
-        "schema": 1, "fluid": WATER,
-        "nodes": {
-            "lake": {"type": "reservoir", "head": source},
-            "a": {"type": "junction", "elevation": 0.0}, "b": {"type": "junction", "elevation": 0.0},
-            "town": {"type": "junction", "elevation": 0.0, "demand": demand},
-            "tower": {"type": "tank", "elevation": 30.0, "area": 50.0, "level": 3.0, "height": 60.0},
-        },
-        "links": {"p1": pipe("lake", "a"), "v": {"from": "a", "to": "b", **SIZE, **valve}, "p2": pipe("b", "town"),
-                  "p3": pipe("town", "tower")},
-        "numerics": {"end": 20000.0, "pipe_model": "quasi-steady", "rtol": 1e-9, **numerics},
-        "output": {"every": 500.0, "probes": ["tower.level", "a.head", "b.head", "v.flow", "v.opening", "p3.flow"]},
-    }  # fmt: skip
-
-
-def reducing(**keys):
-    return {"type": "pressure-reducing", "set_pressure": AMBIENT + 45.0 * RHO * G, "time_constant": 0.0, **keys}
 
 
 def run(case):
@@ -95,10 +68,6 @@ def test_a_sustaining_valve_that_acts_at_once_keeps_the_pressure_before_it():
     found = run(town(valve, end=15000.0))
     assert found["a.head"] == pytest.approx(np.full(found.t.size, 70.0), abs=1e-9)
     assert found["v.flow"] == pytest.approx(np.full(found.t.size, signed_root(10.0)), abs=1e-9)
-
-
-# lake: falls below the set pressure, then below the tower, then rises: the valve opens fully, shuts, opens, controls
-FALLING = {"time": [0, 4000, 8000, 12000, 16000, 20000], "value": [80, 80, 40, 25, 25, 80]}
 
 
 def test_a_valve_that_acts_at_once_opens_and_shuts_as_a_fast_one():

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-from solve.test_threads import SCENES, liquid, water, with_maxima
+from reference.basin_scenes import SCENES, liquid, water, with_maxima
 
 import fvsolve
 from fvsolve.core.output.fields import read_series

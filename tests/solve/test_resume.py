@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from basins.test_basin import alone, basin
+from reference.basins import alone, basin
 from reference.checkpoints import write_sealed
+from reference.networks_without_waves import FALLING, reducing, town
+from reference.resumed_runs import long_run, same_files
 from reference.scenes import branched
-from solve.test_networks_without_waves import FALLING, reducing, town
 
 import fvsolve
 from fvsolve.core.output.memory_sink import MemorySink
@@ -29,34 +30,11 @@ from fvsolve.core.solve.solve import Run
 import_module("fvsolve.core.solve.solve").CHECKPOINT_SECONDS = 0.02
 print(fvsolve.run(sys.argv[1], out=sys.argv[2], resume=True, pictures=False).reason)
 """
-WORK = ("rhs", "ended", "seconds", "seconds_setup", "seconds_total", "cost")  # work of the run, not its results
-
-
-def long_run(**numerics) -> dict:
-    """Case with about a second of steps."""
-    case = branched(fields=20)
-    case["nodes"]["tower"] = {"type": "tank", "area": 2.0, "level": 5.0, "height": 30.0, "elevation": 10.0}
-    case["links"]["riser"] = {"type": "valve", "from": "fork", "to": "tower", "area": 0.01,
-                              "discharge_coefficient": 0.6}  # fmt: skip
-    case["numerics"] = {"end": 2500.0, "scheme": "muscl", "method": "ssp-rk3", **numerics}
-    case["output"] |= {"every": 0.1, "probes": [*case["output"]["probes"], "tower.level"]}
-    return case
 
 
 def started(script: Path, case: Path, out: Path) -> subprocess.Popen:
     command = [sys.executable, str(script), str(case), str(out)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-
-def same_files(one: Path, other: Path) -> None:
-    files = sorted(path.relative_to(one) for path in one.rglob("*") if path.is_file())
-    assert files == sorted(path.relative_to(other) for path in other.rglob("*") if path.is_file())
-    for name in files:
-        if name.name == "summary.json":
-            said, again = (json.loads((run / name).read_text()) for run in (one, other))
-            assert {**said, **dict.fromkeys(WORK)} == {**again, **dict.fromkeys(WORK)}
-        elif name.name != "restart.npz":  # times of checkpoints differ
-            assert (one / name).read_bytes() == (other / name).read_bytes(), name
 
 
 @pytest.mark.parametrize(

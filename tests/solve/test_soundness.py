@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference.basin_scenes import liquid
 from reference.scenes import area, chamber, junction, lake, pipe, ramp, reservoir, scene, tank, valve
-from solve.test_threads import liquid
 
 import fvsolve
 from fvsolve.case.text import write

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from features.test_jumps_in_lines import WATER, junction, lake, line, scene
+from reference.lines_with_jumps import line
+from reference.scenes import WATER, junction, lake, scene
 
 import fvsolve
 

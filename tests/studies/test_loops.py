@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from parts.test_controls import pi as pi_control
-from parts.test_controls import tower
-from parts.test_delays import TAU, blocks, delayed_loop
-from parts.test_samples import LIMIT, sampled_plant
+from reference.delay_blocks import TAU, blocks, delayed_loop
 from reference.folders import CASES
+from reference.level_control import pi as pi_control
+from reference.level_control import tower
+from reference.sampled_control import LIMIT, sampled_plant
 from reference.scenes import WATER
 from scipy.linalg import expm
 from scipy.optimize import brentq

@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from model.test_resolution import station
+from reference.pump_stations import station
 from reference.scenes import area, junction, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from features.test_delay_lines import short, vessel
 from reference.delays import main, turned
 from reference.scenes import AMBIENT, GRAVITY, RHO, area, chamber, junction, pipe, reservoir, scene, tank, valve
+from reference.short_lines import short, vessel
 from scipy.optimize import brentq
 
 import fvsolve

@@ -6,13 +6,13 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from features.test_delay_lines import vessel
 from invariance.moving import SCENES, flume, u_tube
 from reference import pulses, pump_trip
 from reference.bodies import bodies, body
 from reference.delays import fork, main, turned
 from reference.folders import CASES
 from reference.scenes import GRAVITY, RHO, scene, tank
+from reference.short_lines import vessel
 from scipy.optimize import brentq
 
 import fvsolve

@@ -15,8 +15,8 @@ import pytest
 from numba import njit
 from reference import folders
 from reference.folders import CASES
+from reference.lossless_pipes import LENGTH, SPEED, courant_limit, lossless, scaled
 from reference.scenes import AMBIENT, RHO, WATER, chamber, ramp, reservoir, scene, step, tank, valve
-from studies.test_where_methods_fail_in_pipes import LENGTH, SPEED, courant_limit, lossless, scaled
 
 import fvsolve
 from fvsolve.case import load

@@ -59,10 +59,10 @@ def wakes(header: Header, case, words: set[str]) -> bool:
 
 
 def words_of(case) -> set[str]:
-    """Words of a case that may wake features: "pipe_model NAME" for pipes, and "kind NAME" for each type of part."""
+    """Words of a case that may wake features: "pipe_model NAME" for pipes, and those of each part, see `Part.words`."""
     common = case.numerics.pipe_model
     models = {f"pipe_model {link.pipe_model or common}" for link in case.links.values() if link.kind == "pipe"}
-    return models | {f"kind {part.kind}" for part in (*case.nodes.values(), *case.links.values())}
+    return models.union(*(part.words for part in (*case.nodes.values(), *case.links.values())))
 
 
 def features_of(case, given_up: Collection[str] = ()) -> list[Feature]:
@@ -185,7 +185,7 @@ class Feature:
         """Fill the tables of the feature, after those of links and devices and before those of basins; add faults."""
 
     def lower_behind_basins(self, draft) -> None:
-        """Fill the tables of the feature, after those of basins and before those of networks; add faults."""
+        """Fill the tables of the feature, after those of basins; add faults."""
 
     def lower_last(self, draft) -> None:
         """Fill the tables of the feature, after all others; add faults."""
@@ -223,9 +223,20 @@ class Feature:
         """Pressures of closed nodes that support loads, in a solved steady start : node -> pressure [Pa]."""
         return {}
 
-    def moving(self, draft, start) -> list[str]:
-        """Texts of what moves at the start, which is solved; completes the tables of the feature for it."""
+    def begin_forces(self, draft, start) -> list[str]:
+        """Set forces from the steady start of the flow, start; texts on what moves."""
         return []
+
+    def prepare_start(self, draft, trial: Callable[[Any], Any]) -> None:
+        """Set values that the steady start needs. trial : function of a copy of the draft, which fills its start in."""
+
+    def begin_motion(self, draft, start) -> list[str]:
+        """Complete the steady start of the flow, start; texts on what changes with time at the start."""
+        return []
+
+    def accelerations(self, draft) -> dict[str, float]:
+        """Accelerations of masses that the feature moves [m/s2], by name, at the forces in the table of masses."""
+        return {}
 
     def settle(self, draft) -> list[str]:
         """Continue after the steady start; names of parts to be given up, after which the tables are made again."""
@@ -247,10 +258,12 @@ class Feature:
         """Terms of its functions, that is, phases of the right-hand side and jobs: (place in the order, `RhsTerms`).
 
         cast : `ModelFeatures` of the model without those of features
-        Places: first: before all others; pipes: behind those of pipes; closed: with event functions, after the nodes
-        are solved; sources: then, before sources of networks; solved: then, behind these; events: with event functions
-        of restrictions; links: behind those of pipes, restrictions and columns; basins: behind those of basins; last:
-        behind all others but records of nodes.
+        Places: first: before all others; pipes: behind those of pipes; events: with event functions of restrictions;
+        links: behind those of pipes, restrictions and columns; devices: behind those of devices; basins: behind those
+        of basins; last: behind all others but records of nodes.
+        Places of event functions, in this order, after the nodes are solved: closed: forces; given: values that follow
+        from states, nodes and forces; sources: schedules that the feature sets; followed: what follows such schedules;
+        solved: other values.
         """
         return ()
 
@@ -276,6 +289,13 @@ class Feature:
 
     def weigh(self, model, weights: np.ndarray) -> None:
         """Write the weights of its states in the norm of deviations, from those of masses, see `model.energy_norm`."""
+
+    def energy_rows(self, model) -> Iterable[tuple[str, dict[int, float]]]:
+        """Rows of the energy of deviations, (name, state -> factor), see `model.energy_norm.energy_form`."""
+        return ()
+
+    def add_accounts(self, accounts) -> None:
+        """Add accounts of energy with rows behind those of others and before those of devices."""
 
     def add_fields(self, fields: dict, model, y: np.ndarray, out: np.ndarray) -> None:
         """Add values along pipes and at nodes to the result of `Model.fields`."""
@@ -314,9 +334,6 @@ class Feature:
 
     def begin_accounts(self, accounts) -> None:
         """Add accounts of energy with rows behind those of columns, see `model.energy_accounts`."""
-
-    def add_accounts(self, accounts) -> None:
-        """Add accounts of energy with rows before those of devices."""
 
     def above(self, model) -> dict[str, float]:
         """Energy of parts at the start, above that at rest, see `model.energy_accounts.available_energy` [J]."""
@@ -365,10 +382,6 @@ class FeaturePattern:
         """Yield (storing node, states on which a flow of the feature into it depends)."""
         yield from ()
 
-    def probe(self, row) -> np.ndarray | None:
-        """States on which a probe depends; None if the feature does not compute it. row : of the probe"""
-        return None
-
     def schedules(self) -> set[int]:
         """Numbers of the schedules that `pairs` contain, wherever blocks set them."""
         return set()
@@ -377,13 +390,26 @@ class FeaturePattern:
         """States on which a source of a network depends; None if the feature knows none. row : of the source"""
         return None
 
+    def read_by(self, part, lowering) -> np.ndarray:
+        """States on which values of the feature depend that the law of a device reads before the nodes are solved."""
+        return np.zeros(0, dtype=np.int64)
+
+    def probe(self, row) -> np.ndarray | None:
+        """States on which the value of a probe depends; None if the feature does not compute it. row : of the probe"""
+        return None
+
     def pairs(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yield pairs (rates, states)."""
         yield from ()
 
 
 class FeatureRun:
-    """Data that a run writes for a feature, one object for each run. The base has none."""
+    """Data that a run writes for a feature, one object for each run. The base has none.
+
+    changes_flags : True if `at_event` may change event flags
+    """
+
+    changes_flags = False
 
     def __init__(self, feature: Feature, run_data) -> None:
         self.feature, self.run_data = feature, run_data
@@ -425,6 +451,13 @@ class FeatureRun:
 
     def begin_at_break(self) -> None:
         """Continue at a break of a schedule, at which a segment of the run begins."""
+
+    def follow_flags(self) -> None:
+        """Write what belongs to the present event flags, `run_data.armed`."""
+
+    def at_event(self, y: np.ndarray) -> str:
+        """Change flags and states y at an event, after those of tanks and devices; text of a fault, "" for none."""
+        return ""
 
     def flags_changed(self, t: float, before: np.ndarray) -> None:
         """Continue at an event at t; before : event flags before it, those after it are `run_data.armed`"""

@@ -130,10 +130,6 @@ class Lowering:
         """Schedules of a part that can be held at a value : key -> input."""
         return {}
 
-    def network_elements(self, case, name: str, part: Any) -> tuple[list, list]:
-        """(elements, switches) of this part in the network of rotation, electricity and heat."""
-        return [], []
-
     def probe(self, draft, name: str, probe: Any, row) -> None:
         """Fill the PROBE row of a probe of this part."""
         row["kind"], row["index"] = rec.PRESSURE, draft.node_index[name]

@@ -251,9 +251,6 @@ class ModelDraft:
     network_rate_table: np.ndarray = no_rows(rec.NETWORK_RATE)
     network_element_table: np.ndarray = no_rows(rec.NETWORK_ELEMENT)
     network_switch_table: np.ndarray = no_rows(rec.NETWORK_SWITCH)
-    network: Any = None  # `model.network.Network` of rotation, electricity and heat; None without one
-    start_speeds: dict[int, float] = field(default_factory=dict)  # column of a network -> speed found for the start
-    network_start: Any = None  # its steady start, with which the start of a network can be computed again
     start_flags: dict[int, bool] = field(default_factory=dict)  # event flags at the start that no state tells
 
     # results of the start

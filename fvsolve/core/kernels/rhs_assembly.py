@@ -110,16 +110,6 @@ UNSTEADY_FRICTION = {"power": "relaxation: add_friction_power", "stored": "relax
 COLUMNS = {"inflow": "rigid_columns: column_inflows", "rate_limits": "rigid_columns: column_rate_limit"}
 COMPONENTS = {
     "formulas": RhsTerms(events="schedule_pieces: formula_events"),
-    "networks": RhsTerms(
-        rate_limits="potential_networks: known_sources",
-        move="potential_networks: network_rates",
-        observe="potential_networks: observe_networks",
-        events="potential_networks: switch_events",
-        power="potential_networks: power_networks",
-        stored="potential_networks: stored_networks",
-    ),
-    "sources of networks": RhsTerms(events="potential_networks: sources_for_events"),
-    "sources again": RhsTerms(events="potential_networks: sources_again"),
     "pipes": RhsTerms(record="observation: record_pipes"),
     "valves": RhsTerms(rate_limits="network_balance: valve_rate_limit"),
     "bends": RhsTerms(events="restrictions: restriction_events"),
@@ -197,7 +187,6 @@ class ModelFeatures(NamedTuple):
     boundary_exchange: bool = False
     forces: bool = False
     formulas: bool = False
-    networks: bool = False
     device_heat: bool = False
 
     def components(self) -> Iterator[RhsTerms]:
@@ -218,14 +207,13 @@ class ModelFeatures(NamedTuple):
         if self.valves:
             yield COMPONENTS["valves"]
         bends = any(hook_of(law, "bends") is not None for law in self.modules())
-        if self.devices or bends or self.networks or any(terms.events for terms in self.terms_at(*WITH_NODES)):
+        if self.devices or bends or any(terms.events for place, terms in self.features if place != "links"):
             yield COMPONENTS["closed"]  # their event functions need solved nodes
         yield from self.terms_at("closed")
-        if self.networks:
-            yield COMPONENTS["sources of networks"]
-        if followed := list(self.terms_at("sources")):
-            yield from followed
-            yield COMPONENTS["sources again"]
+        yield from self.terms_at("given")
+        if setting := list(self.terms_at("sources")):
+            yield from setting
+            yield from self.terms_at("followed")
         yield from self.terms_at("solved")
         if bends:
             yield COMPONENTS["bends"]
@@ -241,8 +229,7 @@ class ModelFeatures(NamedTuple):
         yield from self.terms_at("links")
         if self.devices:
             yield COMPONENTS["devices"]
-        if self.networks:
-            yield COMPONENTS["networks"]
+        yield from self.terms_at("devices")
         yield from self.last_components(family)
 
     def last_components(self, family: str) -> Iterator[RhsTerms]:

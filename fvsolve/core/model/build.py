@@ -32,55 +32,13 @@ def start_profile(draft) -> dict[str, Any]:
 
     Raises CaseError if no steady state is found.
     """
-    if any(device.turns_with(part) is not None for _, part, device in draft.devices):
-        from fvsolve.core.model.network_start import unknown_speeds  # only cases of rotation need it
-
-        if columns := unknown_speeds(draft, SteadyStart(draft)):
-            draft.start_speeds = balanced_speeds(draft, columns)
+    for feature in draft.features:
+        feature.prepare_start(draft, steady_profile)
     return steady_profile(draft)
 
 
-TURNS, DIFFERENCE = 40, 1e-6  # Newton iterations for speeds at the start; change of a speed for differences [rad/s]
-
-
-def balanced_speeds(draft, columns: list[int]) -> dict[int, float]:
-    """Speeds of shafts with displacement machines at which all torques balance : column of the network -> speed.
-
-    Standstill comes first. Adds a fault if no speeds are found.
-    """
-
-    def rates(speeds: np.ndarray) -> np.ndarray:
-        copy = draft.copy_for(draft.case)
-        copy.start_speeds = dict(zip(columns, map(float, speeds), strict=True))
-        steady_profile(copy)
-        network = copy.network
-        starts = network.arrays(network.mode_of(flags_at_start(copy)))[1]
-        return np.array([starts[list(network.states).index(column)] for column in columns])
-
-    speeds = np.zeros(len(columns))
-    found = rates(speeds)
-    for _ in range(TURNS):
-        if not found.any():
-            return dict(zip(columns, map(float, speeds), strict=True))
-        size = np.where(found != 0.0, np.sign(found), 1.0) * DIFFERENCE * (1.0 + np.abs(speeds))
-        slopes = np.array([(rates(speeds + change) - found) / change.sum() for change in np.diag(size)]).T
-        step = np.linalg.lstsq(slopes, -found, rcond=None)[0]
-        for halvings in range(30):
-            trial = speeds + 0.5**halvings * step
-            after = rates(trial)
-            if np.max(np.abs(after)) <= np.max(np.abs(found)):
-                break
-        if np.all(np.abs(trial - speeds) <= 1e-15 * np.abs(speeds)):
-            return dict(zip(columns, map(float, speeds), strict=True))
-        speeds, found = trial, after
-    store = draft.network.stores[columns[0]]
-    draft.fault(store.part, "no speed balances the torques on it at the start; give the key `initial_speed`")
-    draft.check()
-    return {}
-
-
 def steady_profile(draft) -> dict[str, Any]:
-    """Initial steady state at known speeds of shafts, as for `start_profile`."""
+    """Initial steady state with the values that features have set, as for `start_profile`."""
     if draft.case.law.linear:
         start = SteadyStart(draft)
     else:
@@ -202,12 +160,6 @@ def tables_before_start(case: Case, unfit: Collection[str] = ()) -> ModelDraft:
     lower_basins(draft)
     for feature in draft.features:
         feature.lower_behind_basins(draft)
-    if elements_of(case):
-        from fvsolve.core.model.network_tables import (
-            lower_networks,  # only cases of rotation, electricity or heat need it
-        )
-
-        lower_networks(draft)
     draft.check()
     for feature in draft.features:
         feature.lower_last(draft)
@@ -247,13 +199,6 @@ def fill_links(draft: ModelDraft) -> None:
             draft.node_table["admittance"][row[end]] += row["end_admittance"]
     for feature in draft.features:
         feature.lower_behind_links(draft)
-
-
-def elements_of(case: Case) -> list:
-    """Elements of rotation, electricity and heat of all parts of a case."""
-    parts = (*case.nodes.items(), *case.links.items())
-    return [element for name, part in parts
-            for element in lowering_of(type(part)).of(part).network_elements(case, name, part)[0]]  # fmt: skip
 
 
 def profile_size(draft: ModelDraft) -> int:
@@ -302,10 +247,6 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     for feature in draft.features:
         feature.reserve_ledger(draft)
     reserve_basins(draft)
-    if draft.network is not None:
-        from fvsolve.core.model.network_tables import reserve_networks
-
-        reserve_networks(draft)
     for feature in draft.features:
         feature.reserve(draft)
     layout = sizes.place()
@@ -404,10 +345,6 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
         waves = waves[pipes["cells"] > 0]
     rates = [*waves, *column_rates(draft)]
     rates += [feature.rate(draft) for feature in draft.features]
-    if draft.network is not None:
-        from fvsolve.core.model.network_tables import network_rate
-
-        rates.append(network_rate(draft))
     s["rate"] = max([0.0, *rates])
     return table
 
@@ -449,7 +386,7 @@ def model_of(draft: ModelDraft, notices: Callable[[ModelDraft], list[Notice]] = 
         dict(case.elevations), case.probes, draft.warnings,
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
         draft.basins, case.extreme_probes, draft.watched_start, closed(draft),
-        flags_at_start(draft), draft.network,
+        flags_at_start(draft),
     )  # fmt: skip
 
 

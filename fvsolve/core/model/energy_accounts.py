@@ -227,7 +227,6 @@ class Accounts:
         self.network_rows = self.power_count  # rows of power that `kernels.network_energy` fills
         for feature in model.features:
             feature.begin_accounts(self)
-        self.networks()
         for feature in model.features:
             feature.add_accounts(self)
         self.devices()
@@ -273,19 +272,6 @@ class Accounts:
                     self.taken[name] = at, resists[name]
                 else:
                     self.add("dissipated", name, "valve", at)
-
-    def networks(self) -> None:
-        """Accounts of the parts of a network of rotation, electricity and heat."""
-        network = self.model.network
-        for item in network.booked if network is not None else ():
-            at, (group, _, name) = self.take(1), item.part.partition(".")
-            part = getattr(self.model.case, group)[name]
-            loss_of_other = item.ledger == "dissipated" and not part.in_network  # such as friction of a cylinder
-            kind = item.name.rpartition(".")[2] if loss_of_other else part.kind.replace("-", " ")
-            stores = item.ledger == "stored"
-            self.hold(name, kind, at if stores else None)
-            if not stores and item.ledger and item.heat_to is None:
-                self.add(item.ledger, name, kind, at)
 
     def devices(self) -> None:
         for name, part, _ in self.model.devices:

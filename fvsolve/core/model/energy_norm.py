@@ -109,7 +109,8 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     squares = [feature.squares(model, y) for feature in model.features]
     stored |= {e: (names[e], row) for own in squares for e, row in own.stored.items()}
     parts = [*stored.values(), *(row for own in squares for row in own.first), *device_rows(model, y)]
-    parts += [*(row for own in squares for row in own.last), *network_rows(model)]
+    parts += [row for own in squares for row in own.last]
+    parts += [row for feature in model.features for row in feature.energy_rows(model)]
     entries = [(k, i, value) for k, (_, row) in enumerate(parts) for i, value in row.items()]
     row, column, value = (np.array(column_values) for column_values in zip(*entries, strict=True))
     matrix = csr_array((value, (row, column)), shape=(len(parts), model.y_size))
@@ -196,17 +197,6 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
     for feature in model.features:
         feature.weigh(model, weights)
     return weights
-
-
-def network_rows(model):
-    """Yield (name, state -> factor) of each row of L for stores of networks, except those of pumps and masses."""
-    network = model.network
-    for column, item in network.stores.items() if network is not None else ():
-        if item.state_of is None:
-            size = np.sqrt(0.5 * item.value * (SCALAR_WEIGHT if item.thermal else 1.0))
-            terms = network.dependent.get(column, {column: 1.0})
-            row = {network.states[c]: float(size * value * network.stores[c].unit) for c, value in terms.items()}
-            yield item.part.partition(".")[2], row
 
 
 def device_rows(model, y: np.ndarray):

@@ -49,7 +49,6 @@ class Couplings:
         self.devices, self.parts, self.floats = tables.devices, model.devices, tables.floats
         self.model, self.basins, self.integers, self.walls = model, model.basins, tables.integers, tables.walls
         self.patches = {int(row["node"]): row for row in tables.patches}
-        self.network, self.inputs, self.switches = model.network, tables.network_inputs, tables.network_switches
         self.features = [feature.pattern(self) for feature in model.features]
         self.sets: list[np.ndarray] = []
         self.sets = self.pressures()  # for each node, the states that set its pressure
@@ -74,8 +73,6 @@ class Couplings:
             yield pairs_of(unique_states(column["y"]), unique_states(*(self.sets[i] for i in ends_of(column))))
         yield from self.device_pairs()
         yield from self.wall_pairs()
-        if self.network is not None:
-            yield from self.network_pairs()
         for own in self.features:
             yield from own.pairs()
 
@@ -157,12 +154,10 @@ class Couplings:
             return self.schedule(link["schedule"])
         device = self.devices[link["device"]]
         _, part, rows = self.parts[link["device"]]
-        shaft, network, turned = rows.turns_with(part), self.network, unique_states()
-        if shaft is not None:
-            turned = self.network_states(network.columns_of_rows[network.node_row(shaft)])
+        of_features = [own.read_by(part, rows) for own in self.features]
         lifting = [self.sets[i] if self.sets else self.pressure_states(i) for i in self.lifting_nodes(link)]
         schedules = self.schedule(*rows.schedules_at_once(device, self.valves, self.floats))
-        return unique_states(self.acting_states(link["device"]), schedules, turned, *lifting)
+        return unique_states(self.acting_states(link["device"]), schedules, *of_features, *lifting)
 
     def lifting_nodes(self, link) -> list[int]:
         """Nodes whose pressures open a link at once, besides its ends; empty for links without such a device."""
@@ -228,47 +223,6 @@ class Couplings:
             read = [self.sets[i] for i in (*ends, row["node"], row["second"]) if i >= 0]
             read.append(self.schedule(row["schedule"], *rows.schedules_of_rates(row, self.valves, self.floats)))
             yield pairs_of(self.device_states(row), unique_states(self.acting_states(k), *read))
-
-    def network_pairs(self) -> Iterator[Pairs]:
-        """Yield couplings of the stores of networks with each other, and with what their sources follow."""
-        network = self.network
-        for r, place in enumerate([*network.states.values(), *network.integrals.values()]):
-            yield pairs_of(unique_states(place), self.network_states(network.columns_of_rows[r]))
-
-    def network_states(self, columns: set[int]) -> np.ndarray:
-        """States on which a linear function of stores and sources of a network depends."""
-        network = self.network
-        own = [network.states[column] for column in columns if column in network.states]
-        return unique_states(*own, *(self.source_states(j) for j in network.inputs_of_columns(columns)))
-
-    def network_potential(self, row: int) -> np.ndarray:
-        """States on which a row of a network depends."""
-        return self.network_states(self.network.columns_of_rows[row])
-
-    def probe_states(self, row) -> np.ndarray:
-        """States on which a probe of a network depends."""
-        network, r = self.network, int(row["index"])
-        if row["side"] == rec.LOCKED:
-            return unique_states()
-        if r >= network.rows.integrals:
-            return unique_states(list(network.integrals.values())[r - network.rows.integrals])
-        rows = [r, *([int(row["cell"])] if row["side"] in (rec.POWER, rec.ENTROPY) else [])]
-        return self.network_states(set().union(*(network.columns_of_rows[r] for r in rows)))
-
-    def source_states(self, j: int) -> np.ndarray:
-        """States on which a source of a network depends."""
-        row, network = self.inputs[j], self.network
-        i = int(row["index"])
-        if row["kind"] == rec.SCHEDULE_INPUT:
-            return self.schedule(i)
-        if row["kind"] == rec.DEVICE_INPUT:
-            return self.device_reading(self.devices[i])
-        for own in self.features:
-            if (states := own.source(row)) is not None:
-                return states
-        stores = {column for column in network.columns_followed(j) if column in network.states}
-        switch = int(self.switches[i]["schedule"]) if row["kind"] == rec.FRICTION_FLOW else -1
-        return unique_states(*(network.states[column] for column in stores), self.schedule(switch))
 
     def device_reading(self, device) -> np.ndarray:
         """States on which a quantity of a device can depend."""

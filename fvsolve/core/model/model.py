@@ -158,7 +158,6 @@ class Model(Displayable):
     watched_start: np.ndarray  # pressures of `watched` along pipes in the profile [Pa], nan for others
     features: list[Any]  # see `assembly.features`
     flags: np.ndarray  # event flags before a run
-    network: Any  # `network.Network` of rotation, electricity and heat; None without one
     # idle run data for evaluating single states; tables before the start is solved, reused by `vary`
     idle_run_data: deque[RunData] = field(default_factory=deque, init=False)
     tables_before_start: list = field(default_factory=list, init=False)
@@ -286,7 +285,6 @@ class Model(Displayable):
         cast = ModelFeatures(self.case.law.family, cells, has.clusters, has.columns, self.unsteady, self.creeps,
                     has.devices, tuple(self.laws), basins, carried, valves, (), (), has.couplings, alone,
                     forces=bool(self.layout["forces"] >= 0), formulas=bool((self.tables.schedules["pieces"] < 0).any()),
-                    networks=self.network is not None,
                     device_heat=bool((self.tables.heat_sources["device"] >= 0).any()))  # fmt: skip
         terms = tuple(pair for feature in self.features for pair in feature.terms(self, cast))
         packages = tuple(name for feature in self.features for name in feature.packages)

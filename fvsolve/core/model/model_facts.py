@@ -75,7 +75,7 @@ def checks(model) -> dict[str, Any]:
         "pipes": pipes, "basins": {item.name: basin_facts(item) for item in model.basins},
         "states": model.y_size, "cells": model.all_cells, "step": step, "step_set_by": set_by, "steps": steps,
         "steps_if_full": steps_if_full if steps_if_full > (steps or 0) else None,
-        "network": None if model.network is None else model.network.facts(), "reactions": {}, **facts,
+        "network": None, "reactions": {}, **facts,
         "expected_seconds": expected, "moving": model.steady["moving"],
         "warnings": [item.plain() for item in (*model.warnings, *cost_notices(model, steps, set_by))],
     }  # fmt: skip

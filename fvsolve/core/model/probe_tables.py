@@ -26,8 +26,6 @@ def fill_probes(draft, probes: list) -> np.ndarray:
         elif probe.part == "nodes" and probe.name in case.meshes:
             row["kind"], row["index"] = rec.CELL_FIELD, list(case.meshes).index(probe.name)
             draft.basins[row["index"]].lower_probe(row, probe.quantity, np.zeros(0, int), np.zeros(0))
-        elif probe.name in draft.case.network_places and probe.name not in parts["nodes"]:  # PUMP.shaft
-            draft.network.fill_node_probe(draft, row, probe.name, False)
         else:
             part = parts[probe.part][probe.name]
             lowering_of(type(part)).of(part).probe(draft, probe.name, probe, row)

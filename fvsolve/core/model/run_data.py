@@ -52,9 +52,7 @@ class RunData:
         self.kept: list = []  # arrays behind handles
         self.replaced = 0  # number of arrays that have been replaced since the start, because they have grown
         self.clock["limit"], self.marks[:] = np.inf, np.nan
-        self.armed[:] = model.flags
-        self.network_mode: tuple[bool, ...] | None = None
-        self.update_network()
+        self.use_flags(model.flags)
         basins = model.tables.basins
         self.written.bands[1::2] = np.where(basins["nx"] > 0, basins["ny"], basins["n"])  # all
         for array in (self.envelope, self.extremes):
@@ -110,9 +108,9 @@ class RunData:
 
     def reset(self, armed: np.ndarray | None = None) -> None:
         """Reset for another state: event flags as given or as at the start, and empty histories."""
-        self.armed[:], self.clock["limit"] = self.model.flags if armed is None else armed, np.inf
+        self.clock["limit"] = np.inf
         self.accepted[:] = 0.0
-        self.update_network()
+        self.use_flags(self.model.flags if armed is None else armed)
         for own in self.features:
             own.reset()
 
@@ -195,44 +193,20 @@ class RunData:
         for _ in range(3 + 2 * len(self.model.events)):
             self.model.functions.events(t, y, self.handle, g)
             before = self.armed.copy()
-            self.armed[:] = g <= 0.0
-            self.update_network()
+            self.use_flags(g <= 0.0)
             if (before == self.armed).all():
                 return
             self.store_times(t, before)
 
-    def update_network(self) -> None:
-        """Write the coefficients of the network that belong to the event flags of its switches."""
-        network = self.model.network
-        if network is None or (mode := network.mode_of(self.armed)) == self.network_mode:
-            return
-        from fvsolve.core.model.network_elimination import NetworkError
+    def use_flags(self, flags: np.ndarray) -> None:
+        """Set the event flags, and what features keep for them."""
+        self.armed[:] = flags
+        for own in self.features:
+            own.follow_flags()
 
-        try:
-            places, factors = network.arrays(mode)
-        except NetworkError:  # the run ends, see `apply_network`
-            return
-        self.written.network_places[: places.size], self.written.network_factors[: factors.size] = places, factors
-        self.network_mode = mode
-
-    def apply_network(self, y: np.ndarray) -> str:
-        """Update the coefficients of the network at an event, and the states that the new mode ties to others.
-
-        Returns the text of a fault if the network has no solution, or a switch would cut a flow; "" for none.
-        """
-        network = self.model.network
-        if network is None or not network.switches:
-            return ""
-        mode = network.mode_of(self.armed)
-        at, inputs = int(self.model.layout["network"]), self.tables.network_inputs
-        sources = inputs["start"] + self.written.spare[at : at + len(inputs)]
-        if text := network.fault_in(mode, y, sources):
-            if (mode := network.commutated(mode, y, sources)) is None:
-                return text
-            network.set_diodes(mode, self.armed)
-        self.update_network()
-        network.settle(self.network_mode, y)
-        return ""
+    def apply_event(self, y: np.ndarray) -> str:
+        """Let features change flags and states y at an event; returns the text of a fault, "" for none."""
+        return next((text for own in self.features if (text := own.at_event(y))), "")
 
     def store_times(self, t: float, before: np.ndarray) -> None:
         """Let features continue at an event at t [s]; before : event flags before the change."""

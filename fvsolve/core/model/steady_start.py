@@ -76,15 +76,6 @@ class SteadyStart:
         """Handle of the tables, by which compiled laws read them."""
         return make_handle((*self.draft.tables, *self.run_arrays))
 
-    @cached_property
-    def network_potentials(self) -> dict[str, float]:
-        """Potentials of the nodes of networks at the start, where stores and schedules give them."""
-        if self.draft.network is None:
-            return {}
-        from fvsolve.core.model.network_start import known_potentials
-
-        return known_potentials(self.draft, self)
-
     def pressure(self, i: int) -> float:
         """Pressure [Pa] at node i in the latest solution."""
         return self.law.pressure_of(self.answer.potential[i], self.nodes["elevation"][i])
@@ -506,12 +497,10 @@ class SteadyStart:
     def report(self) -> dict[str, Any]:
         draft, moving = self.draft, []
         for feature in draft.features:
-            moving += feature.moving(draft, self)
+            moving += feature.begin_forces(draft, self)
         moving += self.moving
-        if draft.network is not None:
-            from fvsolve.core.model.network_start import start_network
-
-            moving += start_network(draft, self)
+        for feature in draft.features:
+            moving += feature.begin_motion(draft, self)
         fluid, net = self.draft.fluid, self.nodes["inflow"].copy()
         for row in self.leaks:
             net[[row["a"], row["b"]]] -= row["speed"] * np.array([row["sweep_a"], row["sweep_b"]])

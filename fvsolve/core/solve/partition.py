@@ -222,8 +222,6 @@ def single_thread_reason(model: Model) -> str:
         return f"method {method} solves for all states at once; {EXPLICIT_ONLY}"
     if reason := next((feature.single_thread_reason for feature in model.features if feature.single_thread_reason), ""):
         return reason
-    if model.network is not None:
-        return "parts of rotation, electricity and heat read the whole state"
     meshes = model.case.meshes
     for probe in (*model.probes, *model.watched):
         if (probe.name in meshes and probe.quantity in READ_ALL_CELLS) or probe.part == "sections":

@@ -41,7 +41,6 @@ class ReusedLoop:
         self.fills = [(word, int(word[0])) for word, alike in zip(words, uniform, strict=True) if alike]
         self.copies = [(word, word.copy()) for word, alike in zip(words, uniform, strict=True) if not alike]
         self.histories = {name: array.copy() for name, array in loop.run_data.arrays().items()}
-        self.network_mode = loop.run_data.network_mode
         self.state: State | None = None  # state in which the loop is, as `advance` returned it
 
     @property
@@ -63,9 +62,9 @@ class ReusedLoop:
             words.fill(value)
         for words, values in self.copies:
             words[:] = values
-        loop.switched, loop.at_once, loop.last_switch, loop.network_fault = [], 0, np.nan, ""
+        loop.switched, loop.at_once, loop.last_switch, loop.event_fault = [], 0, np.nan, ""
         loop.recent_events.clear()
-        run_data.network_mode = self.network_mode
+        run_data.use_flags(run_data.armed)
         for name, first in self.histories.items():
             if first.size and not state.memory:
                 run_data.set_array(name, first.copy())

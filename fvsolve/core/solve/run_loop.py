@@ -76,7 +76,7 @@ class RunLoop:
         method = method_named(automatic.first_method(numerics.method))
         self.switched: list[tuple[float, int]] = []  # time and number of every event of a device
         self.at_once, self.last_switch = 0, np.nan
-        self.network_fault = ""  # reason why a network has no solution after a switch has opened
+        self.event_fault = ""  # reason why a run cannot continue after an event
         # times of the last events
         self.recent_events: deque[float] = deque(maxlen=MOST_EVENTS_IN_SPAN + 4 * self.armed.size)
         self.span = SPAN * (numerics.end - numerics.start)
@@ -182,7 +182,7 @@ class RunLoop:
     def steps(self, budget: float) -> int:
         """Take at most `budget` steps, for which the wave history has space; returns a code, see `run`."""
         self.control["budget"] = budget
-        code = loop_records.CHATTERING if self.network_fault else loop_records.SWITCHED
+        code = loop_records.CHATTERING if self.event_fault else loop_records.SWITCHED
         while code == loop_records.SWITCHED:
             before = self.armed.copy()
             functions, where = self.functions
@@ -218,7 +218,7 @@ class RunLoop:
         self.switched += [(self.t, int(k)) for k in now.nonzero()[0] if self.model.events[k][1]]
         self.run_data.store_times(self.t, before)
         self.apply_events()
-        if self.model.network is not None:  # diodes may have taken over the current of a switch
+        if any(own.changes_flags for own in self.run_data.features):
             more = (armed > earlier) & ~now
             self.switched += [(self.t, int(k)) for k in more.nonzero()[0] if self.model.events[k][1]]
 
@@ -235,12 +235,12 @@ class RunLoop:
             sums[0 if part > 0.0 else 1, i] += part
         for device, row in self.changed_at_events:
             device.apply_event(self.run_data, row, self.t, self.now, self.stepper.scale)
-        self.network_fault = self.run_data.apply_network(self.now)
+        self.event_fault = self.run_data.apply_event(self.now)
 
     def handle_events(self, before: np.ndarray) -> bool:
         """Record the last events; returns False if there are too many at the same time or in a short span of time."""
         self.record_events(before)
-        if self.network_fault:
+        if self.event_fault:
             return False
         self.at_once = self.at_once + 1 if self.t == self.last_switch else 1
         self.last_switch = self.t
@@ -309,8 +309,8 @@ class RunLoop:
         """
         model, text, names = self.model, FAILURES.get(code, ""), {}
         names["when"] = f"t = {model.case.amount(self.t, 'time', 6)}"
-        if code == loop_records.CHATTERING and self.network_fault:
-            return f"{self.network_fault} at {names['when']}"
+        if code == loop_records.CHATTERING and self.event_fault:
+            return f"{self.event_fault} at {names['when']}"
         if code == loop_records.CHATTERING:
             return self.chattering_text(names["when"])
         if code == loop_records.STOPPED:
@@ -401,9 +401,6 @@ class RunLoop:
         remedies = {device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names}
         for text in (feature.remedy(name) for feature in model.features for name in names):
             remedies |= {text: None} if text else {}
-        switches = [] if model.network is None else [item.part.partition(".")[2] for item in model.network.switches]
-        if {*names} & {*switches}:
-            remedies["give it more resistance or inertia"] = None
         parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
         verbs = "change their states" if len(names) > 1 else "changes its state"
         remedy = ", or ".join(remedies) or "put a chamber at the node of this part"

@@ -19,6 +19,7 @@ from fvsolve.features.controls import histories, lower
 from fvsolve.features.controls.kernels import input_histories, tables
 from fvsolve.features.controls.kernels.tables import BLOCK_SETTINGS, BLOCK_VALUE, CONTROL, DRIVEN, HOOKS, SLOT
 from fvsolve.features.controls.rows import small_change
+from fvsolve.parts.network_elements import network_of
 from fvsolve.parts.schedule import BLOCK_PREFIX
 from fvsolve.units import DIMENSIONS
 
@@ -126,7 +127,7 @@ class Controls(Feature, slot=1, wakes="section controls"):
     def terms(self, model, cast) -> list[tuple[str, RhsTerms]]:
         decide = "blocks: decide_linear" if cast.family == "linear" else "blocks: decide_barotropic"
         found = [("first", FIRST._replace(decide=decide)), ("events", EVENTS), ("last", LAST)]
-        return found + ([("sources", FOR_EVENTS)] if model.network is not None else [])
+        return found + ([("sources", FOR_EVENTS)] if network_of(model) is not None else [])
 
     @property
     def packages(self) -> list[str]:

@@ -17,6 +17,7 @@ from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.probe_tables import fill_probes
 from fvsolve.features.controls.kernels.tables import CONTROL, DRIVEN, DRIVEN_DEVICE, DRIVEN_NODE, DRIVEN_VALVE
 from fvsolve.features.controls.rows import control_rows_of, small_change
+from fvsolve.parts.network_elements import network_of
 
 STATE_KINDS = (rec.LEVEL, rec.POSITION, rec.VELOCITY, rec.PISTON_POSITION, rec.PISTON_VELOCITY)
 STORED = (rec.FIXED, rec.TANK, rec.CHAMBER, rec.MOVING, rec.VESSEL)
@@ -121,7 +122,7 @@ def driven_rows(draft) -> Iterator[tuple[int, int, int]]:
     for k, row in enumerate(draft.device_table):
         _, part, device = draft.devices[k]
         shaft, own = device.turns_with(part), device.schedules_at_once(row, draft.valve_table, draft.floats)
-        turned = [] if shaft is None else draft.network.schedules_of_node(shaft)
+        turned = [] if shaft is None else network_of(draft).schedules_of_node(shaft)
         for block in {followers[index] for index in (*own, *turned) if index in followers}:
             yield DRIVEN_DEVICE, k, block
     for i, row in enumerate(draft.node_table):
@@ -152,7 +153,7 @@ def is_known_early(draft, row, probe) -> bool:
         name, part, device = draft.devices[row["index"]]
         return probe.quantity in device.states_of(draft, name, part)
     if kind == rec.NETWORK_VALUE:
-        return draft.network.is_known_early(row)
+        return network_of(draft).is_known_early(row)
     return kind in STATE_KINDS or kind == rec.CELL_FIELD
 
 
@@ -187,9 +188,10 @@ def check_network_order(draft, name: str, block: Block, rows: dict, numbers: dic
         if not isinstance(probe, str) and follows_scalars(draft, rows[probe.text]):
             text = f"{probe.text} is known only after what the control drives"
             draft.fault(f"controls.{name}", f"{text}; give [controls.{name}] a `filter`")
-    for probe in block.inputs if block.control.feeds_through and draft.network is not None else ():
+    network = network_of(draft)
+    for probe in block.inputs if block.control.feeds_through and network is not None else ():
         if not isinstance(probe, str) and rows[probe.text]["kind"] == rec.NETWORK_VALUE:
-            if draft.network.follows_blocks(draft, rows[probe.text]):
+            if network.follows_blocks(draft, rows[probe.text]):
                 text = f"{probe.text} may follow at once from what a control drives, a loop without a state"
                 draft.fault(f"controls.{name}", f"{text}; give [controls.{name}] a `filter`")
 
@@ -198,6 +200,7 @@ def follows_scalars(draft, row) -> bool:
     """True if a sensor reads the value of a scalar, or the heat of a heat exchanger."""
     if row["kind"] in (rec.NODE_SCALAR, rec.PIPE_SCALAR, rec.CELL_SCALAR):
         return True
-    sources = draft.network.inputs_of(row) if row["kind"] == rec.NETWORK_VALUE else ()
-    reads = (draft.network.sources[j].reads for j in sources)
+    network = network_of(draft)
+    sources = network.inputs_of(row) if row["kind"] == rec.NETWORK_VALUE else ()
+    reads = (network.sources[j].reads for j in sources)
     return any(item is not None and item[0] == rec.FLUID_HEAT for item in reads)

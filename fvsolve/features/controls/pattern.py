@@ -57,6 +57,9 @@ class BlockCouplings(FeaturePattern):
     def sensor(self, row) -> np.ndarray:
         """States on which the value of a sensor depends."""
         model, kind, i = self.model, row["kind"], int(row["index"])
+        for own in model.features:
+            if (states := own.probe(row)) is not None:
+                return states
         if kind == rec.LEVEL or (kind == rec.PRESSURE and not model.inner[i]):
             return unique_states(model.pressure_states(i), self.schedule(model.nodes[i]["schedule"]))
         if kind == rec.PRESSURE:
@@ -64,8 +67,6 @@ class BlockCouplings(FeaturePattern):
         for own in model.features:
             if (states := own.probe(row)) is not None:
                 return states
-        if kind == rec.NETWORK_VALUE:
-            return model.probe_states(row)
         if kind == rec.VALVE_FLOW:
             link = model.valves[i]
             ends = (model.sets[link[end]] for end in ("from_node", "to_node"))

@@ -25,7 +25,6 @@ from fvsolve.case.bodies import joint_coordinate
 from fvsolve.core.assembly.model_draft import EQUILIBRIUM_SHARE, ROUNDING_SHARE
 from fvsolve.core.basins.lower import basin_start
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.model.network_start import accelerations_of_masses
 from fvsolve.errors import Notice
 from fvsolve.features.motion.kernels import tables as records
 from fvsolve.features.motion.kernels.tables import motion_of
@@ -67,7 +66,7 @@ class Configuration(StaticForces):
         self.starting_forces = [motion.piston_table[k]["force"].item() for k in self.locked]
         self.first = len(motion.brace_table) + len(motion.stop_table)
         self.count = self.pins + len(self.locked)
-        self.by_network = np.zeros(len(self.masses))
+        self.by_features = np.zeros(len(self.masses))
         self.hold(np.zeros(self.count))
 
     def hold(self, sizes: np.ndarray) -> None:
@@ -104,11 +103,11 @@ class Configuration(StaticForces):
             self.run(*self.pushes[1:], *(HOLD,) * (len(self.motion.pin_table) > 0))
             own = self.forces()
         net = self.out[int(self.layout["net_force"]) :][: len(self.masses)].copy()
-        self.by_network[:] = self.network_forces(net)
-        return np.concatenate([own, (net + self.by_network)[self.free]])
+        self.by_features[:] = self.forces_of_features(net)
+        return np.concatenate([own, (net + self.by_features)[self.free]])
 
-    def network_forces(self, net: np.ndarray) -> np.ndarray:
-        """Forces of a network on masses in the current configuration : float64[masses] [N].
+    def forces_of_features(self, net: np.ndarray) -> np.ndarray:
+        """Forces of features on masses in the current configuration : float64[masses] [N].
 
         net : float64[masses]  net forces of force elements and pistons [N]
         """
@@ -116,9 +115,10 @@ class Configuration(StaticForces):
         before = masses["position"].copy(), masses["force"].copy()
         masses["position"][self.free] += self.y[masses["y"][self.free]]
         masses["force"] = net
-        for name, acceleration in accelerations_of_masses(self.draft).items():
-            i = self.motion.mass_index[name]
-            forces[i] = acceleration / masses["lightness"][i] - net[i]
+        for feature in self.draft.features:
+            for name, acceleration in feature.accelerations(self.draft).items():
+                i = self.motion.mass_index[name]
+                forces[i] = acceleration / masses["lightness"][i] - net[i]
         masses["position"], masses["force"] = before
         return forces
 
@@ -137,7 +137,7 @@ class Configuration(StaticForces):
         for row in self.motion.piston_table:
             parts = [self.draft.node_table[row[side]]["pressure"] * row[f"area_{side}"] for side in "ab"]
             net += sum(parts) * np.isin(self.free, (row["case"], row["rod"]))
-        net += np.abs(self.by_network[self.free])
+        net += np.abs(self.by_features[self.free])
         for row in self.draft.wall_table:
             net += abs(row["rest"]) * (self.free == row["mass"])
         return sizes

@@ -12,6 +12,7 @@ from fvsolve.core.kernels.rhs_assembly import RhsTerms
 from fvsolve.features.motion import lower, ports
 from fvsolve.features.motion.kernels import tables as records
 from fvsolve.features.motion.kernels.tables import MotionTables
+from fvsolve.parts.network_elements import network_of
 
 PACKAGE = "fvsolve.features.motion.kernels"
 MASSES = RhsTerms(
@@ -182,7 +183,7 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
         lower.find_closed_chambers(draft, start)
         return lower.supporting_pressures(draft, start)
 
-    def moving(self, draft, start) -> list[str]:
+    def begin_forces(self, draft, start) -> list[str]:
         from fvsolve.features.motion.static_forces import start_bodies
 
         return lower.start_masses(draft, start) + start_bodies(draft, start) + lower.driven_at_start(draft, start)
@@ -214,7 +215,7 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
         found += [STRETCHES] if len(self.line_table) else []
         found += [MASSES] if len(self.mass_table) else []
         found += [LINES] if len(self.line_table) else []
-        events = [FORCES_FOR_EVENTS] if len(self.mass_table) and model.network is not None else []
+        events = [FORCES_FOR_EVENTS] if len(self.mass_table) and network_of(model) is not None else []
         return [("links", terms) for terms in found] + [("closed", terms) for terms in events]
 
     def run(self, run_data) -> MotionRun:

@@ -8,7 +8,6 @@ import numpy as np
 from fvsolve.case import bodies
 from fvsolve.case.bodies import free_joints
 from fvsolve.core.assembly.lowering import lowering_of
-from fvsolve.core.assembly.network_elements import fill_network_probe
 from fvsolve.core.assembly.schedule_tables import break_times
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.errors import FvsolveError, Notice
@@ -16,6 +15,7 @@ from fvsolve.features.motion.kernels import tables as records
 from fvsolve.features.motion.kernels.tables import motion_of
 from fvsolve.features.motion.ports import PLAIN_LINE, are_points, distance_and_rate, point_row, push_ends
 from fvsolve.features.motion.static_forces import DRIVES, MOTION, StaticForces, pin_rows
+from fvsolve.parts.network_elements import fill_network_probe
 from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.units import show
 
@@ -446,7 +446,7 @@ def driven_at_start(draft, start) -> list[str]:
                                ("rigid column", draft.column_names, draft.column_table)):  # fmt: skip
         for name, row in zip(names, table, strict=True):
             if row["forcing"] >= 0:
-                count = int(row["cells" if "cells" in row.dtype.names else "moving_segments"])
+                count = int(row["cells" if "cells" in row.dtype.names else "forcings"])
                 push = float(drives[row["forcing"] : row["forcing"] + count].sum())
                 if abs(push) > ROUNDING:
                     texts.append(f"{kind} {name}: the motion of its body drives its flow with "

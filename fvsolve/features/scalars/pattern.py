@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fvsolve.core.assembly.features import FeaturePattern
+from fvsolve.core.assembly.features import FeaturePattern, with_slot
 from fvsolve.core.basins import lower_pattern as pattern
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.pipe_energy import MAX_WIDTH
@@ -14,6 +14,7 @@ from fvsolve.core.model.state_pairs import pairs_of, unique_states
 from fvsolve.core.steady import union
 from fvsolve.features.scalars.lower import STORES
 from fvsolve.features.scalars.reactions import names_read
+from fvsolve.parts.network_elements import SLOT
 
 LIMITER_CELLS = 2  # cells that a limited value at a face reads on each side; at an end of a pipe, 1 more
 
@@ -71,7 +72,7 @@ class ScalarCouplings:
         self.heated, self.tables = self.row["specific_heat"] > 0.0, model.tables
         self.heat_end = int(model.layout["extent"] - model.layout["supply"])  # rows of the ledger up to that of heat
         for exchanger in self.tables.exchangers if self.heated else ():
-            self.through[exchanger["node"]].append(of.network_potential(exchanger["place"]))
+            self.through[exchanger["node"]].append(with_slot(of.features, SLOT).row_states(exchanger["place"]))
         for source in self.tables.heat_sources if self.heated else ():
             for i in ends_of(of.valves[source["valve"]]):
                 self.through[i] += self.heat_states(source)

@@ -5,12 +5,13 @@ from typing import ClassVar
 
 import numpy as np
 
+from fvsolve.core.assembly.features import with_slot
 from fvsolve.core.assembly.lowering import ANGULAR_SPEED, POSITION, Device, Input
-from fvsolve.core.assembly.network_elements import FLOW, Element, fill_network_probe, node_or_reference
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.steady import Edge
 from fvsolve.parts.displacement import law
 from fvsolve.parts.displacement.part import LAG
+from fvsolve.parts.network_elements import FLOW, SLOT, Element, fill_network_probe, network_of, node_or_reference
 from fvsolve.parts.network_parts import dry_friction
 from fvsolve.parts.rotation import resistances
 
@@ -62,7 +63,7 @@ class MachineRows(Device, kind="displacement-pump"):
         return found + friction, switches
 
     def probe(self, draft, name, probe, row) -> None:
-        if probe.quantity == "torque" and f"links.{name}" in getattr(draft.network, "total_numbers", {}):
+        if probe.quantity == "torque" and f"links.{name}" in getattr(network_of(draft), "total_numbers", {}):
             fill_network_probe(draft, row, f"links.{name}", "all flows", -self.direction)
             return
         super().probe(draft, name, probe, row)
@@ -99,7 +100,7 @@ class MachineRows(Device, kind="displacement-pump"):
         part, row = self.part(start, k), start.draft.device_table[start.valves[k]["device"]]
         if row["schedule"] >= 0:
             return start.schedule_value(row["schedule"])
-        return start.network_potentials[part.shaft]
+        return with_slot(start.draft.features, SLOT).potentials(start)[part.shaft]
 
     def share(self, start, k: int) -> float:
         """Share of the displacement that a compensator allows at the start."""
@@ -145,8 +146,8 @@ class MachineRows(Device, kind="displacement-pump"):
         floats[at + law.SETTING] = setting
         valve["drive"] = setting * self.speed_at(start, k)
         if row["schedule"] < 0:
-            floats[at + law.SPEED_ROW] = draft.network.node_row(part.shaft)
-            floats[at + law.LIGHTNESS] = draft.network.lightness(part.shaft)
+            floats[at + law.SPEED_ROW] = network_of(draft).node_row(part.shaft)
+            floats[at + law.LIGHTNESS] = network_of(draft).lightness(part.shaft)
         return []
 
     def source_at_start(self, start, part, row, quantity, flow) -> float:

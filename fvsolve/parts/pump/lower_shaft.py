@@ -6,9 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from fvsolve.core.assembly.lowering import Input
-from fvsolve.core.assembly.network_elements import CAPACITY, FLOW, Element
 from fvsolve.core.assembly.schedule_tables import value_at
 from fvsolve.core.kernels import dtypes as rec
+from fvsolve.parts.network_elements import CAPACITY, FLOW, Element
 from fvsolve.parts.pump import law
 from fvsolve.parts.pump.head_curve import CurvePoints, Quadrants, quadrants, zero_head_flow
 from fvsolve.parts.pump.part import EFFICIENCY

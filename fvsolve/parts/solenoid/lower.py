@@ -3,8 +3,8 @@
 from math import asinh, pi, sinh, sqrt
 
 from fvsolve.core.assembly.lowering import Device
-from fvsolve.core.assembly.network_elements import FLOW, Element, node_or_reference
 from fvsolve.core.kernels import dtypes as rec
+from fvsolve.parts.network_elements import FLOW, Element, node_or_reference
 from fvsolve.parts.solenoid import law
 
 MU_0 = 4e-7 * pi  # permeability of the vacuum, to 1e-9 [H/m]

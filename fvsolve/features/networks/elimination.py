@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.core.assembly.network_elements import (
+from fvsolve.core.steady import union
+from fvsolve.parts.network_elements import (
     CAPACITY,
     GAUGE,
     LOCK,
@@ -23,7 +24,6 @@ from fvsolve.core.assembly.network_elements import (
     TRANSFORMER,
     Element,
 )
-from fvsolve.core.steady import union
 
 HAS_FLOW = (CAPACITY, POTENTIAL, TRANSFORMER, LOCK)  # kinds whose flow is an unknown
 RANK = 1e-11  # singular values below this share of the greatest are zero

@@ -1,12 +1,18 @@
-"""Elements of networks of potential and flow, into which parts of rotation, electricity and heat are converted."""
+"""Elements of networks of potential and flow, into which parts of rotation, electricity and heat are converted.
+
+The feature `networks` puts them together: a part with elements has a lowering with the method `network_elements`, which
+returns its elements and switches.
+"""
 
 from __future__ import annotations
 
 from typing import Any, ClassVar, NamedTuple
 
+from fvsolve.core.assembly.features import with_slot
 from fvsolve.core.assembly.lowering import Input, InputKind, Lowering
 from fvsolve.core.kernels import dtypes as rec
 
+SLOT = 3  # of the feature `networks`
 CAPACITY, INERTANCE, RESISTANCE, POTENTIAL, FLOW, TRANSFORMER, LOCK, GAUGE = range(8)
 """Kinds of elements: flow = value d potential / dt; potential = value d flow / dt; potential = value times flow; given
 potential; given flow; potential 1 = value times potential 2; equal potentials, with the value as share of the flow of
@@ -90,7 +96,7 @@ class NetworkRows(Lowering):
 
     def inputs(self, model, name, part):
         place = f"{'links' if name in model.case.links and model.case.links[name] is part else 'nodes'}.{name}"
-        schedules = model.network.schedules
+        schedules = network_of(model).schedules
         return {key: Input(kind, schedules[place, key])
                 for key, kind in self.input_kinds.items() if (place, key) in schedules}  # fmt: skip
 
@@ -99,9 +105,15 @@ class NetworkRows(Lowering):
         fill_network_probe(draft, row, f"{probe.part}.{name}{end}", reads, sign)
 
 
+def network_of(owner) -> Any:
+    """Network (`features.networks.network.Network`) of a draft or model; None without one."""
+    own = with_slot(owner.features, SLOT)
+    return None if own is None else own.network
+
+
 def fill_network_probe(draft, row, element: str, reads: str, sign: float = 1.0) -> None:
     """Fill the row of a probe that reads an element of the network; arguments as in `NetworkRows.quantities`."""
-    network = draft.network
+    network = network_of(draft)
     row["kind"], row["scale"] = rec.NETWORK_VALUE, sign
     row["side"] = {"power": rec.POWER, "entropy": rec.ENTROPY, "locked": rec.LOCKED}.get(reads, rec.ROW)
     if reads == "locked":

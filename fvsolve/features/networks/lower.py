@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from fvsolve.core.assembly.lowering import lowering_of
-from fvsolve.core.assembly.network_elements import FLOW, INERTANCE, Element, Switch, node_or_reference
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.model.network import MOST_STATES, Network
-from fvsolve.core.model.network_elimination import Elimination, NetworkError, dependent_stores, substituted
-from fvsolve.core.model.network_faults import NO_INERTIA, NO_SPEED, network_faults, stated_faults
+from fvsolve.features.networks.elimination import Elimination, NetworkError, dependent_stores, substituted
+from fvsolve.features.networks.faults import NO_INERTIA, NO_SPEED, network_faults, stated_faults
+from fvsolve.features.networks.network import MOST_STATES, Network
 from fvsolve.parts.heat import exchanger_names
+from fvsolve.parts.network_elements import FLOW, INERTANCE, Element, Switch, node_or_reference
 
 CURRENT_ROUNDING = 1e-13  # of diodes, over the sum of all sources divided by their resistance
 SAMPLES = 12  # times at which responses are computed for the sizes of states
@@ -24,9 +24,14 @@ EVENTS = {
 }
 
 
-def lower_networks(draft) -> None:
-    """Fill the tables of the network of a case, and add the states of its stores and of angles that are probed."""
+def lower_network(draft) -> Network | None:
+    """Fill the tables of the network of a case, and add the states of its stores and of angles that are probed.
+
+    Returns the network, None if the case has no elements or if the network has a fault.
+    """
     elements, switches = parts_of_network(draft.case)
+    if not elements:
+        return None
     network = Network(elements, switches, tuple(sorted(draft.case.network_places)), rounding=draft.rounding)
     try:
         found = network.equations(network.conducting)
@@ -35,11 +40,10 @@ def lower_networks(draft) -> None:
         found = [*network_faults(error.faults, case), *stated_faults(error.relations, network.stores, fixed, case)]
         for place, text in found:
             draft.fault(place, text)
-        return
+        return None
     network.dependent = dependent_stores(found.relations, network.stores, network.states_of_others)
     for place, text in friction_faults(network, found):
         draft.fault(place, text)
-    draft.network = network
     for item in network.sources:
         if item.schedule is not None:
             network.schedules[item.part, item.key] = draft.schedules.add(item.schedule)
@@ -57,12 +61,13 @@ def lower_networks(draft) -> None:
     for place, text in speed_faults(draft, network):
         draft.fault(place, text)
     fill_tables(draft, network)
+    return network
 
 
-def reserve_networks(draft) -> None:
-    """Reserve the arrays of networks: their sources, and the coefficients of the present mode."""
+def reserve_network(draft, network: Network) -> None:
+    """Reserve the arrays of a network: its sources, and the coefficients of the present mode."""
     draft.sizes.out("network", len(draft.network_input_table))
-    count, capacity = draft.network.rows.count, draft.network.capacity
+    count, capacity = network.rows.count, network.capacity
     draft.sizes.run_array("network_places", 3 * count + capacity)
     draft.sizes.run_array("network_factors", count + capacity)
 
@@ -72,9 +77,11 @@ def parts_of_network(case) -> tuple[list[Element], list[Switch]]:
     elements: list[Element] = []
     switches: list[Switch] = []
     for name, part in (*case.nodes.items(), *case.links.items()):
-        own, more = lowering_of(type(part)).of(part).network_elements(case, name, part)
-        elements += own
-        switches += more
+        lowering = lowering_of(type(part)).of(part)
+        if hasattr(lowering, "network_elements"):
+            own, more = lowering.network_elements(case, name, part)
+            elements += own
+            switches += more
     for item in [item for item in elements if item.heat_to is not None]:
         node = node_or_reference(case, item.heat_to)
         elements.append(Element(FLOW, f"{item.name}.heat", item.part, (None, node), reads=(rec.HEAT_INPUT, item.name),
@@ -226,9 +233,8 @@ def source_size(item: Element) -> float:
     return float(finite.max(initial=0.0))
 
 
-def network_rate(draft) -> float:
+def network_rate(network: Network) -> float:
     """Greatest rate of a network [1/s], in the mode in which all switches conduct."""
-    network = draft.network
     if not network.states:
         return 0.0
     columns = list(network.states)

@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.core.assembly.network_elements import TRANSFORMER, Element, Switch
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.model.network_elimination import (
+from fvsolve.core.steady import union
+from fvsolve.errors import listing
+from fvsolve.features.networks.elimination import (
     Elimination,
     NetworkError,
     Terms,
@@ -25,8 +26,7 @@ from fvsolve.core.model.network_elimination import (
     reduced,
     substituted,
 )
-from fvsolve.core.steady import union
-from fvsolve.errors import listing
+from fvsolve.parts.network_elements import TRANSFORMER, Element, Switch
 
 ROUNDING = 1e-12  # sum of terms that is rounding, over the sum of their magnitudes
 CUT = 1e-6  # stored quantity that a switch may cut, over a small deviation

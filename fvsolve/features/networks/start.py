@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from fvsolve.core.assembly.network_elements import Element
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.model.network_elimination import Elimination, NetworkError, Terms, substituted
-from fvsolve.core.model.network_faults import network_faults, tie_fault
 from fvsolve.core.steady import union
 from fvsolve.errors import listing
+from fvsolve.features.networks.elimination import Elimination, NetworkError, Terms, substituted
+from fvsolve.features.networks.faults import network_faults, tie_fault
 from fvsolve.parts.heat import exchanger_names
+from fvsolve.parts.network_elements import Element
 
 TURNS = 60  # changes of switches, and of nonlinear sources, in the search
 RESTING = 1e-9  # rate of a store in equilibrium, over the sum of the magnitudes of its terms
@@ -30,8 +30,8 @@ class NetworkStart:
     free : columns of stores whose value is not known, then of integrating sources whose state is not known
     """
 
-    def __init__(self, draft, start, solved: bool = True) -> None:
-        self.draft, self.start, self.network, self.solved = draft, start, draft.network, solved
+    def __init__(self, own, draft, start, solved: bool = True) -> None:
+        self.own, self.draft, self.start, self.network, self.solved = own, draft, start, own.network, solved
         self.values = np.zeros(len(self.network.columns))
         self.integrating = {self.network.columns[item.name]: item for item in self.network.sources if item.state_of}
         self.free = self.stated_values()
@@ -62,7 +62,7 @@ class NetworkStart:
                 self.values[network.columns[item.name]] = self.given_by_others(item)
         for column, item in self.stores.items():
             value = item.initial if item.state_of is None else self.state_of_other(item)
-            value = self.draft.start_speeds.get(column) if value is None else value
+            value = self.own.start_speeds.get(column) if value is None else value
             if value is not None:
                 self.values[column] = value
                 known.add(column)
@@ -147,7 +147,7 @@ class NetworkStart:
     # search ---------------------------------------------------------------------------------------------------
 
     def find(self) -> None:
-        """Search for the start, and write it to the tables of the draft and to `draft.network`."""
+        """Search for the start, and write it to the tables of the draft and to the network of the feature."""
         for _ in range(TURNS):
             try:
                 faults = self.solve()
@@ -335,7 +335,7 @@ class NetworkStart:
     def write(self) -> None:
         """Write the start to the tables and event flags of the draft."""
         draft, network = self.draft, self.network
-        draft.network = network = replace(network, values=self.values.copy(), written={})
+        self.own.network = network = replace(network, values=self.values.copy(), written={})
         draft.tables.network_inputs["start"] = [self.values[network.columns[item.name]] for item in network.sources]
         for k, switch in enumerate(self.switches):
             flag = network.flags[switch.name]
@@ -350,30 +350,26 @@ class NetworkStart:
                 row["start"] = self.values[network.columns[item.name]]
 
 
-def unknown_speeds(draft, start) -> list[int]:
+def unknown_speeds(own, draft, start) -> list[int]:
     """Columns of stores without a stated value whose potential turns a displacement machine."""
-    search, network = NetworkStart(draft, start, solved=False), draft.network
+    search, network = NetworkStart(own, draft, start, solved=False), own.network
     rows, shafts = network.terms(network.conducting), {device.turns_with(part) for _, part, device in draft.devices}
     read = {column for node in network.nodes if node in shafts for column in rows[network.node_row(node)]}
     return [column for column in search.free if column in read]
 
 
-def known_potentials(draft, start) -> dict[str, float]:
+def known_potentials(own, draft, start) -> dict[str, float]:
     """Potentials at the start of nodes that stores and schedules determine; stores of unknown value count as 0."""
-    if draft.network is None:
-        return {}
-    search, network = NetworkStart(draft, start, solved=False), draft.network
+    search, network = NetworkStart(own, draft, start, solved=False), own.network
     rows = network.terms(network.conducting)
     return {node: network.start_of(rows[network.node_row(node)], search.values) for node in network.nodes}
 
 
-def start_network(draft, start) -> list[str]:
+def start_network(own, draft, start) -> list[str]:
     """Compute the start of the network of a draft; returns texts of the motions of its states at the start."""
-    if draft.network is None:
-        return []
-    search, draft.network_start = NetworkStart(draft, start), start
+    search = NetworkStart(own, draft, start)
     search.find()
-    network = draft.network
+    network = own.network
     if not network.values.size or draft.faults:
         return []
     factors, texts = network.arrays(search.mode)[1], []
@@ -385,18 +381,16 @@ def start_network(draft, start) -> list[str]:
     return texts
 
 
-def accelerations_of_masses(draft) -> dict[str, float]:
+def accelerations_of_masses(own, draft, start) -> dict[str, float]:
     """Accelerations of the masses that are stores of a network, at present positions and forces in their table.
 
     name -> acceleration [m/s2]. Forces include those of solenoids and of friction, which holds a mass if it can. Raises
     CaseError if the network has no start.
     """
-    if draft.network_start is None:
-        return {}
-    search = NetworkStart(draft, draft.network_start)
+    search = NetworkStart(own, draft, start)
     search.find()
     draft.check()
-    network = draft.network
+    network = own.network
     rates = zip(network.states, network.arrays(search.mode)[1], strict=False)
     found = ((network.stores[column], float(rate)) for column, rate in rates)
     return {item.state_of[1]: item.unit * rate for item, rate in found if item.state_of and item.state_of[0] == "mass"}

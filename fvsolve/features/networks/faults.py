@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from fvsolve.core.assembly.lowering import lowering_of
-from fvsolve.core.assembly.network_elements import FLOW, INERTANCE, Element, node_or_reference
-from fvsolve.core.model.network_elimination import NetworkFault, Terms, dependent_stores
 from fvsolve.errors import listing
+from fvsolve.features.networks.elimination import NetworkFault, Terms, dependent_stores
+from fvsolve.parts.network_elements import FLOW, INERTANCE, Element, node_or_reference
 
 AGREE = 1e-9  # relative difference of two values that are equal
 NO_SPEED = "has neither an inertia nor a given speed; give this shaft the key `inertia`"

@@ -1,0 +1,1 @@
+"""Networks of potential and flow: rotation, electricity and heat, with the forces on masses that they move."""
