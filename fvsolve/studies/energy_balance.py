@@ -188,7 +188,7 @@ class EnergyLoop(RunLoop):
         step; the remainder is dissipated. The rate of the stored energy has a kink where the contact force ends, which
         stage values do not resolve.
         """
-        lines = self.accounts.stops
+        lines = self.accounts.contacts
         if not lines:
             return part
         travels = [stop_travels(self.model, *state) for state in ((t, y), (self.t, self.now))]

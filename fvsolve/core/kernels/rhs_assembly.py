@@ -32,12 +32,12 @@ class RhsTerms(NamedTuple):
     incoming_waves: str = ""  # incoming waves from nodes into pipes
     balance: str = ""  # net flows into nodes, rates of storage in nodes
     rate_limits: str = ""  # rates that limit the step; event functions need the phases up to here
-    move: str = ""  # rates of columns, bodies, devices
+    move: str = ""  # rates of columns, devices, and what moves
     rates: str = ""  # rates of cells, in pipes and basins
     boundary_exchange: str = ""  # exchange between bands of flows through boundaries
     boundary_inflow: str = ""  # flows into cells through patches
-    accelerate: str = ""  # accelerations of bodies, from all forces
-    fluid_response: str = ""  # terms that depend on the accelerations of bodies
+    accelerate: str = ""  # accelerations of frames that move, from all forces
+    fluid_response: str = ""  # terms that depend on the accelerations of frames
     outlet_values: str = ""  # values of scalars in the water that leaves pipes and cells
     mix: str = ""  # values of scalars at nodes
     scalar_rates: str = ""  # rates of scalars in cells

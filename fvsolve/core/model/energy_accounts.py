@@ -31,8 +31,8 @@ def available_energy(model: Model) -> dict[str, float]:
     """Energy of every part at the start [J], above its energy at rest and at P = 0 : name -> energy.
 
     P = p - p_ambient + rho g z is the reduced pressure [Pa], z the elevation above the datum in the settings [m]. A
-    tank at P = 0 has its surface at the datum, or as near to it as its bottom and rim allow. Bodies and bushings are
-    not included; without them the sum over all parts is an upper bound of the energy that the model can release.
+    tank at P = 0 has its surface at the datum, or as near to it as its bottom and rim allow. Parts that move in space
+    are not included; without them the sum over all parts is an upper bound of the energy that the model can release.
     """
     tables, nodes, energies = model.tables, model.tables.nodes, {}
     datum = float(tables.settings[0]["datum"])
@@ -180,7 +180,7 @@ class Accounts:
     """Energy accounts of a model, for the run data of a run.
 
     Accounts of stored energy (`stored_accounts`) and of its rates (category "rate") are in the same order. Tables of
-    `run_data` are changed, so that all loads of fluid on bodies are computed. Raises FvsolveError if the energy of the
+    `run_data` are changed, so that all that energies need is computed. Raises FvsolveError if the energy of the
     case cannot be computed.
     """
 
@@ -204,7 +204,7 @@ class Accounts:
         self.power, self.stored = model.functions.energies
         self.accounts: list[Account] = []
         self.stored_accounts: list[Account] = []  # accounts of stored energy, by rows of `stored`
-        self.stops: list[tuple[int, int]] = []  # lines of the rate and of the loss of every stop
+        self.contacts: list[tuple[int, int]] = []  # lines of the rate and of the loss of every contact
         self.power_count = self.stores = 0
         nodes = model.tables.nodes
         for row, (name, place) in zip(nodes, case.places.items(), strict=True):

@@ -24,7 +24,7 @@ class EnergyForm:
 
     rows : sparse float64[m, n]  matrix L, a row for each store of energy; parts : name of the part of each row
     forward : sparse float64[r, n], back : sparse float64[n, r]  forward back = 1
-    idle : float64[n, k]  motions without energy, such as a common displacement of all masses of a train; each is small
+    idle : float64[n, k]  motions without energy, such as a common displacement of a whole train; each is small
     idle_rows : float64[k, n]  matrix that gives the amount of each motion without energy in a deviation
     least : least energy of a deviation of the size `Model.scale` [J]
     """
@@ -86,19 +86,14 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     g z^2 dx / (2 n rho A)
     excess mass m [kg] in a chamber or tank : m^2 dp/dm / (2 rho)
     mass flow M [kg/s] in a rigid column of length L : M^2 L / (2 rho A)
-    velocity v of a mass m : m v^2 / 2; velocities v of bodies with mass matrix M : v' M v / 2
-    elongation s of a spring, of a stop in contact, or of the spring of a joint, stiffness k : k s^2 / 2
-    excess mass e [kg] and travel x in a chamber of a cylinder : dp/dm (e - x A e0 / V)^2 / (2 rho), with piston area A,
-    volume V and excess mass e0 at y
-
     potential or flow d of a store of rotation or electricity with the value C : C d^2 / 2; of a heat capacity 1e-6 of
     this
 
-    Devices add rows (`energy_rows`), basins weights of their cells (`weights`). The form is exact under the density law
-    `linear` about a steady state at rest. A scalar stores no energy, and no other state depends on it; a deviation of
-    its amount, divided by its greatest possible value, counts as 1e-6 of the energy that the same mass would store.
-    Displacements without stiffness store nothing, see `EnergyForm.idle`. Raises FvsolveError if springs join too many
-    positions.
+    Devices and features add rows (`energy_rows`, `squares`), basins weights of their cells (`weights`). The form is
+    exact under the density law `linear` about a steady state at rest. A scalar stores no energy, and no other state
+    depends on it; a deviation of its amount, divided by its greatest possible value, counts as 1e-6 of the energy that
+    the same mass would store. Displacements without stiffness store nothing, see `EnergyForm.idle`. Raises FvsolveError
+    if springs join too many positions.
     """
     from scipy.sparse import csr_array
 
@@ -135,7 +130,7 @@ def form_of(rows: Any, parts: tuple[str, ...], scale: np.ndarray) -> EnergyForm:
         if at.size > MAX_GROUP:
             raise FvsolveError(
                 f"{at.size} positions are joined by springs; the energy norm is computed for at most {MAX_GROUP}; "
-                "expected fewer bodies or masses that springs join to each other"
+                "expected fewer parts that springs join to each other"
             )
         part = rows[:, at].toarray() * scale[at]
         part = np.vstack([part[np.any(part, axis=1)], np.zeros((1, at.size))])

@@ -192,7 +192,7 @@ class Couplings:
         return [joined[group[i]] if self.inner[i] else self.pressure_states(i) for i in range(len(group))]
 
     def stored(self) -> Iterator[Pairs]:
-        """Yield pairs (rates, states) of the masses in tanks, chambers and patches, and of the mass ledger.
+        """Yield pairs (rates, states) of the contents of tanks, chambers and patches, and of the mass ledger.
 
         The states are those that determine the flows into them.
         """
@@ -357,7 +357,7 @@ def jacobian_pattern(model) -> csc_array:
 def lumped_states(model) -> np.ndarray:
     """Indices of all states except waves in cells of pipes, states of basins and travels of their walls : int64[q].
 
-    Most are states of lumped parts such as tanks, chambers and masses. Their pressures are hundreds of bars, while the
+    Most are states of lumped parts such as tanks and chambers. Their pressures are hundreds of bars, while the
     flow of restrictions bends within a few pascals. The result is empty under density laws whose pressures come from
     iterations.
     """

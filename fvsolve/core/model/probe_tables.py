@@ -68,9 +68,9 @@ def lower_section(draft, row, probe) -> None:
 
 
 def probe_offsets(draft, start) -> None:
-    """Set scale and offset of the probes of nodes, links and masses from the initial steady state.
+    """Set scale and offset of the probes of nodes and links from the initial steady state.
 
-    Probes of basins and bodies, and of forces on pipes, do not need them. Also sets the steady pressures of watched
+    Probes of basins and features, and of forces on pipes, do not need them. Also sets the steady pressures of watched
     quantities along pipes.
     """
     count = len(draft.case.probes)

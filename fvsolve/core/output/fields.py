@@ -61,7 +61,7 @@ class FieldSeries:
             self.points, self.lines = pipe_geometry(model, places)
             self.owner = points_on_bodies(model, self.points)
         moving = {basin.name: np.zeros(2) for basin in model.basins if basin.part.on is not None}
-        self.places = places | moving  # a basin on a body is drawn in world axes, as bodies are
+        self.places = places | moving  # a basin on a body is drawn in world axes
         carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
         units = {basin.name: basin.units | basin.units_of_maxima | (carried if basin.scalars else {})
                  for basin in model.basins}  # fmt: skip
@@ -156,7 +156,7 @@ class FieldSeries:
         return self.fixed_grids[part]
 
     def points_at(self, frame: dict) -> np.ndarray:
-        """Points of the pipes in world axes at the time of a frame : float64[n, 3] [m]; points on bodies move."""
+        """Points of the pipes in world axes at the time of a frame : float64[n, 3] [m]; points on frames move."""
         if not (self.owner >= 0).any():
             return self.points
         return world_points(self.model, frame["out"], self.owner, self.points)[0]

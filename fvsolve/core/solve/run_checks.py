@@ -74,8 +74,8 @@ class RunChecks:
         """Check state y at time t [s], and update the wave rates of basins; returns the reason to stop, or ""."""
         for basin in self.moving:
             self.rates[basin.name] = max(self.rates.get(basin.name, 0.0), basin.max_rate(y)[0])
-        if stops := self.sloshing.check(t, y):
-            return stops
+        if reason := self.sloshing.check(t, y):
+            return reason
         ratio = np.abs(y) / self.largest
         if np.all(ratio <= NO_GROWTH / GROWTH_LIMIT):
             self.sound = t
@@ -143,7 +143,7 @@ RISE, LOSS = slice(0, 2), slice(2, 4)
 
 
 class SloshingCheck:
-    """Record of the wave height of sloshing modes and of the change of the water's weight by moving bodies.
+    """Record of the wave height of sloshing modes and of the change of the water's weight by the motion of its frame.
 
     Sloshing modes are computed under gravity, sloshing in cells under gravity and the motion of driven joints. Neither
     includes the acceleration of a body that moves freely.
@@ -325,7 +325,7 @@ class StepDoubling:
         self.restart_data[1] = steps + (self.interval if divided else 1.0)
         end = loop.control["end"]
         full_step = self.step if loop.t < end else min(self.step, end - memory["t_mark"])  # 0: any step is checked
-        # A step in which a jump in a delay line corrected masses of storing nodes or flows of columns is not checked,
+        # A step in which a jump in a delay line corrected contents of storing nodes or flows of columns is not checked,
         # because half steps have no such correction. The mark is removed when the corrected state is recorded again.
         # Neither is a step that ends at an event, because half steps would follow the equations after it.
         corrected = any(own.corrected_at(loop.t) for own in loop.run_data.features)

@@ -331,8 +331,8 @@ class RunLoop:
             if status == rec.NO_SOLUTION and index >= 0 and self.out[model.layout["supply"] + index] >= 0.0:
                 text = NO_WAY_OUT if self.out[model.layout["supply"] + index] > 0.0 else NO_BALANCE
             if status == rec.NO_WEIGHT:
-                bodies = [*(basin.name for basin in model.basins), *model.node_names]
-                names["name"] = bodies[index].removesuffix(".inside")
+                waters = [*(basin.name for basin in model.basins), *model.node_names]
+                names["name"] = waters[index].removesuffix(".inside")
             elif status == rec.NO_COOLANT:
                 from fvsolve.core.kernels.scalar_transport import GREATEST_RISE
 

@@ -30,7 +30,7 @@ def mass_accounts(motion, accounts) -> None:
             accounts.add(lowering.ledger_name, name, link.kind, at)
     for name, link, _ in rows_in(motion.case, "stop"):
         at = accounts.take(2)
-        accounts.stops.append((len(accounts.accounts), len(accounts.accounts) + 1))
+        accounts.contacts.append((len(accounts.accounts), len(accounts.accounts) + 1))
         accounts.hold(name, link.kind, at)
         accounts.add("dissipated", name, link.kind, at + 1)
     for name in motion.piston_names:
