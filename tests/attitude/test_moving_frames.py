@@ -56,7 +56,7 @@ def shares(t: float) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize("t", TIMES)
-def test_a_velocity_is_that_of_the_origin_what_the_body_sees_and_the_turn_61_62(t):
+def test_a_velocity_is_the_sum_of_those_of_origin_body_and_rotation_61_62(t):
     slide = at.derivative(rotation(t), within(t), along(within, t), rotation(t).T @ spin(t))
     assert_allclose(along(origin, t) + slide, along(place, t), atol=1e-10)
     fixed = at.derivative(rotation(t), within(t), np.zeros(3), rotation(t).T @ spin(t))  # (67)

@@ -20,8 +20,8 @@ RANDOM = [*np.random.default_rng(15).uniform(-3.0, 3.0, (20, 3))]
 TURNS = [*RANDOM, np.zeros(3), *np.pi * np.eye(3), *(np.pi - 1e-9) * np.eye(3), np.array([1e-9, -2e-9, 1e-10])]
 
 
-def same(found, wanted, far=1e-14):
-    assert_allclose(found, wanted, rtol=0, atol=far)
+def same(found, expected, far=1e-14):
+    assert_allclose(found, expected, rtol=0, atol=far)
 
 
 def derivative(of, t: float):
@@ -89,7 +89,7 @@ def test_every_form_comes_back(turn):
 
 @pytest.mark.parametrize("delta", [0.0, 1e-15, 1e-10, 1e-6, 0.1])
 @pytest.mark.parametrize("side", [1, -1])
-def test_angles_next_to_their_singularity_say_the_same_rotation(delta, side):
+def test_angles_next_to_their_singularity_state_the_same_rotation(delta, side):
     up = at.of_roll_pitch_yaw(0.4, side * (np.pi / 2 - delta), 1.1)
     same(at.of_roll_pitch_yaw(*at.roll_pitch_yaw(up)), up)
     flat = at.of_zyz(0.4, delta if side > 0 else np.pi - delta, 1.1)
@@ -158,29 +158,29 @@ def test_a_vector_seen_from_turning_axes_54_and_55():
 
     t = 0.3
     w = at.angular_velocity(rotation(t), derivative(rotation, t))
-    wanted = derivative(lambda t: rotation(t) @ u(t), t)
+    expected = derivative(lambda t: rotation(t) @ u(t), t)
     within = rotation(t).T @ w
-    same(at.derivative(rotation(t), u(t), derivative(u, t), within), wanted, 1e-9)
+    same(at.derivative(rotation(t), u(t), derivative(u, t), within), expected, 1e-9)
     seen = rotation(t) @ derivative(u, t)
-    same(seen + np.cross(w, rotation(t) @ u(t)), wanted, 1e-9)
+    same(seen + np.cross(w, rotation(t) @ u(t)), expected, 1e-9)
 
 
 def test_a_deviation_turns_by_w_less_the_turned_w_d_56_to_58():
-    def one(t):
+    def first_attitude(t):
         return at.of_zyz(*path(RANDOM[0], t))
 
-    def wanted(t):
+    def second_attitude(t):
         return at.of_zyz(*path(RANDOM[1], -2.0 * t))
 
-    w, w_d = (at.angular_velocity(of(0.0), derivative(of, 0.0)) for of in (one, wanted))
-    turn = at.deviation(one(0.0), wanted(0.0))
-    rate = derivative(lambda t: at.deviation(one(t), wanted(t)), 0.0)
-    same(turn @ wanted(0.0), one(0.0))
+    w, w_d = (at.angular_velocity(of(0.0), derivative(of, 0.0)) for of in (first_attitude, second_attitude))
+    turn = at.deviation(first_attitude(0.0), second_attitude(0.0))
+    rate = derivative(lambda t: at.deviation(first_attitude(t), second_attitude(t)), 0.0)
+    same(turn @ second_attitude(0.0), first_attitude(0.0))
     same(at.rotation_rate(turn, at.deviation_velocity(turn, w, w_d)), rate, 1e-10)
     assert np.abs(at.rotation_rate(turn, w - w_d) - rate).max() > 0.1  # (57) as printed
 
 
-def test_it_wants_no_scipy():
+def test_scipy_is_not_imported():
     code = "import sys, fvsolve.parts.attitude_keys; sys.exit('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
@@ -212,7 +212,7 @@ def test_a_free_top_turns_by_jacobis_functions():
     sn, cn, dn, _ = ellipj(rate * t, share)
     y = integrate(free, [*START, w1, 0.0, w3], t, "verner-7", rtol=1e-11)
     assert np.abs(y[:, 4:] - np.stack([w1 * cn, b * sn, w3 * dn], axis=1)).max() < 1e-9
-    off = [np.abs(momentum(one) - momentum(y[0])).max() for one in y]
+    off = [np.abs(momentum(value) - momentum(y[0])).max() for value in y]
     assert max(off) < 1e-9  # the attitude is exact as well: this vector is constant
 
 
@@ -248,7 +248,7 @@ def test_gauss_methods_keep_squares_and_rk4_does_not():
         begun = np.array([0.3, 0.05, 1.2])
         pairs = [(end[:4] @ end[:4], 1.0), (end[4:] @ (INERTIA * end[4:]), begun @ (INERTIA * begun))]
         pairs.append((np.linalg.norm(INERTIA * end[4:]), np.linalg.norm(INERTIA * begun)))
-        off[method] = max(abs(one / other - 1.0) for one, other in pairs)
+        off[method] = max(abs(value / other - 1.0) for value, other in pairs)
     assert off["gauss-4"] < 1e-11 and off["rk4"] > 1e-8
 
 
@@ -266,7 +266,7 @@ def test_angles_lose_their_order_next_to_their_pole_and_euler_parameters_know_no
         by_angles = integrate(angles, [delta, 0.0, 0.0], [0.0, end], "rk4", step=h)[-1]
         by_parameters = integrate(lambda t, y: at.euler_parameters_rate(y, turn), e, [0.0, end], "rk4", step=h)[-1]
         found = at.of_roll_pitch_yaw(*by_angles), at.of_euler_parameters(by_parameters)
-        return [np.abs(one - exact).max() for one in found]
+        return [np.abs(value - exact).max() for value in found]
 
     (far, whole), (near, same) = errors(0.3, h), errors(0.01, h)
     assert far < 1e-7 and near > 1e-3 and near > 1e4 * far
@@ -279,7 +279,7 @@ KINDS = ("free", "fixed", "ball")
 PITCHES = [0.3, -1.2, pi / 2 - 1e-6, pi / 2 - 1e-9, pi / 2 - 1e-14, pi / 2, -pi / 2, -pi / 2 + 1e-10]
 
 
-def said(*attitudes: dict) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def probed_attitudes(*attitudes: dict) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """Name, angles and Euler parameters that probes of bodies read at the start, for each attitude and joint kind."""
     bodies = {
         f"b{k}_{kind}": {
@@ -287,25 +287,25 @@ def said(*attitudes: dict) -> list[tuple[str, np.ndarray, np.ndarray]]:
         }
         for k, given in enumerate(attitudes) for kind in KINDS
     }  # fmt: skip
-    probes = [f"{name}.{one}" for name in bodies for one in ANGLES + PARAMETERS]
+    probes = [f"{name}.{value}" for name in bodies for value in ANGLES + PARAMETERS]
     model = build(load(scene(bodies, {}, 1.0, {"method": "rk4", "step": 0.1}, probes)))
     read = model.observe(0.0, model.start).reshape(len(bodies), 7)
     return [(name, row[:3], row[3:]) for name, row in zip(bodies, read, strict=True)]
 
 
-def test_angles_and_parameters_say_the_rotation_of_the_case():
-    found = said(*({"roll": 0.4, "pitch": pitch, "yaw": 1.1} for pitch in PITCHES))
+def test_angles_and_parameters_state_the_rotation_of_the_case():
+    found = probed_attitudes(*({"roll": 0.4, "pitch": pitch, "yaw": 1.1} for pitch in PITCHES))
     for pitch, (name, angles, e) in zip(np.repeat(PITCHES, len(KINDS)), found, strict=True):
-        wanted = at.of_roll_pitch_yaw(0.4, pitch, 1.1)
-        assert at.of_euler_parameters(e) == pytest.approx(wanted, abs=1e-14), name
+        expected = at.of_roll_pitch_yaw(0.4, pitch, 1.1)
+        assert at.of_euler_parameters(e) == pytest.approx(expected, abs=1e-14), name
         # within 1e-12 of 90 deg yaw is 0
-        assert at.of_roll_pitch_yaw(*angles) == pytest.approx(wanted, abs=1e-13), name
+        assert at.of_roll_pitch_yaw(*angles) == pytest.approx(expected, abs=1e-13), name
         if abs(pitch) < 1.5:
             assert angles == pytest.approx([0.4, pitch, 1.1], abs=1e-14)
 
 
-def test_at_the_pole_yaw_is_zero_as_the_page_says():
-    for _, angles, _ in said({"roll": 0.4, "pitch": pi / 2, "yaw": 1.1}):
+def test_at_the_pole_yaw_is_zero_as_the_page_states():
+    for _, angles, _ in probed_attitudes({"roll": 0.4, "pitch": pi / 2, "yaw": 1.1}):
         assert angles == pytest.approx([0.4 - 1.1, pi / 2, 0.0], abs=1e-12)
 
 
@@ -326,6 +326,8 @@ WANTED = [
 
 
 def test_every_form_of_the_case_is_the_attitude_of_the_run():
-    for (name, angles, e), wanted in zip(said(*FORMS), np.repeat(WANTED, len(KINDS), axis=0), strict=True):
-        assert at.of_euler_parameters(e) == pytest.approx(wanted, abs=1e-14), name
-        assert at.of_roll_pitch_yaw(*angles) == pytest.approx(wanted, abs=1e-14), name
+    for (name, angles, e), expected in zip(
+        probed_attitudes(*FORMS), np.repeat(WANTED, len(KINDS), axis=0), strict=True
+    ):
+        assert at.of_euler_parameters(e) == pytest.approx(expected, abs=1e-14), name
+        assert at.of_roll_pitch_yaw(*angles) == pytest.approx(expected, abs=1e-14), name

@@ -80,7 +80,7 @@ DISK |= {"weno5": 0.222}  # difference after a turn over the area of the disk, 1
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_a_slotted_disk_turned_once_around_keeps_its_bounds(scheme):
+def test_a_slotted_disk_after_a_full_rotation_stays_within_its_bounds(scheme):
     case = carried(scheme, 100, TURN, bounds=(0.0, 1.0))
     start = means(case.mesh, slotted, 8)
     end = case.run(start, 1.0, 0.5)
@@ -112,7 +112,7 @@ def random_case(scheme, seed, through=False, deep=False, **more) -> tuple[Carrie
 @pytest.mark.parametrize("deep", [False, True])
 @pytest.mark.parametrize("through", [False, True])
 @pytest.mark.parametrize("scheme", COURANT)
-def test_a_step_of_euler_keeps_the_values_within_those_around(scheme, through, deep):
+def test_a_step_of_euler_stays_within_the_values_of_neighbours(scheme, through, deep):
     for seed in range(50):
         case, s = random_case(scheme, seed, through, deep, bounds=(0.0, 1.1))
         depth = case.depth if deep else 1.0
@@ -180,7 +180,7 @@ def test_a_cloud_that_moves_and_spreads_stays_gaussian(scheme):
 
 @pytest.mark.parametrize("deep", [False, True])
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_what_is_uniform_stays_so_to_the_bit_in_any_flow_without_divergence(scheme, deep):
+def test_a_uniform_value_stays_uniform_to_the_bit_in_any_flow_without_divergence(scheme, deep):
     for seed in range(5):
         case, s = random_case(scheme, seed, through=True, deep=deep, bounds=(0.0, 1.0), diffusivity=0.01)
         case.outside[:] = 0.5
@@ -202,7 +202,7 @@ def test_a_uniform_value_changes_by_itself_times_the_divergence(scheme):
 
 @pytest.mark.parametrize("deep", [False, True])
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_what_is_carried_and_spread_is_conserved(scheme, deep):
+def test_an_advected_and_diffused_amount_is_conserved(scheme, deep):
     for seed in range(5):
         case, s = random_case(scheme, seed, deep=deep, bounds=(0.0, 1.1), diffusivity=0.01)
         share = case.rates(s) * case.mesh.area
@@ -211,7 +211,7 @@ def test_what_is_carried_and_spread_is_conserved(scheme, deep):
 
 @pytest.mark.parametrize("deep", [False, True])
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_what_comes_in_through_the_boundary_is_what_there_is_more_inside(scheme, deep):
+def test_inflow_through_the_boundary_is_the_gain_of_the_content(scheme, deep):
     for seed in range(5):
         case, s = random_case(scheme, seed, through=True, deep=deep, bounds=(0.0, 1.1), diffusivity=0.01)
         share, ring, excesses = case.rates(s, -0.7) * case.mesh.area, np.empty_like(case.outside), (NONE, NONE)
@@ -272,7 +272,7 @@ def test_dry_cells_carry_nothing():
     assert np.all(np.isfinite(rates)) and np.all(rates[::3] == 0.0)
 
 
-def test_a_step_of_euler_as_long_as_diffusion_allows_keeps_bounds():
+def test_a_step_of_euler_as_long_as_diffusion_allows_stays_within_bounds():
     for seed in range(20):
         case, s = random_case("upwind", seed, through=True, deep=True)
         rate = np.zeros_like(s)

@@ -55,7 +55,7 @@ def test_a_dam_breaks_as_in_the_exact_solution(low):
     assert errors[-1] < 0.02 and errors[0] / errors[2] > 4.0**0.95
 
 
-def test_a_lake_at_rest_does_not_move_by_one_bit_on_a_bank_and_behind_a_shut_valve():
+def test_a_lake_at_rest_does_not_change_any_bit_on_a_bank_and_behind_a_shut_valve():
     case = alone(basin((20.0, 10.0), (40, 20), 1.0, bed="0.13*x + 0.07*y"), 20.0)
     model = model_of(case)
     assert (model.fields(np.zeros(model.y_size), model.new_out())["pool"]["depth"] == 0.0).sum() > 100  # dry bank
@@ -84,24 +84,24 @@ def test_small_waves_slosh_at_the_periods_of_long_waves(mode):
     assert late[1] < 2e-3 and late[0] / late[1] > 2.0**1.8
 
 
-def test_a_dam_over_a_step_of_the_bed_keeps_the_error_that_the_page_tells():
+def test_a_dam_over_a_step_of_the_bed_has_the_error_that_the_page_states():
     """The error at a step of the bed, up to 1.7 %, does not fall with the size of cells.
 
     Exact solution: a fan to h, u on the left, constant flow and energy over the step, and a shock on the right.
     """
     left, right, rise = 1.0, 0.4, 0.2
 
-    def beside(h):
+    def level_excess(h):
         u = 2.0 * (math.sqrt(GRAVITY * left) - math.sqrt(GRAVITY * h))
         flow, head = h * u, h + u * u / (2.0 * GRAVITY) - rise
         over = brentq(lambda d: d + flow**2 / (2.0 * GRAVITY * d * d) - head, (flow**2 / GRAVITY) ** (1 / 3), left)
         return h, u, over, flow / over
 
     def amiss(h):
-        _, _, d, u = beside(h)
+        _, _, d, u = level_excess(h)
         return u - (d - right) * math.sqrt(0.5 * GRAVITY * (1.0 / d + 1.0 / right))
 
-    exact, off = np.array(beside(brentq(amiss, 0.75, 0.999))), []
+    exact, off = np.array(level_excess(brentq(amiss, 0.75, 0.999))), []
     for cells in (200, 400):
         bed, start = f"where(x < 20, 0, {rise})", {"level": f"where(x < 20, {left}, {right + rise})"}
         depth, velocity = depths(alone(basin((40.0, 0.4), (cells, 2), 1.0, bed=bed, start=start), 3.0))
@@ -165,7 +165,7 @@ def test_a_patch_that_falls_dry_stops_the_outflow_and_no_depth_falls_below_zero(
     assert result.ok and not result.summary["marks"]
 
 
-def test_a_pipe_that_discharges_into_one_of_two_joined_basins_keeps_all_mass(tmp_path):
+def test_a_pipe_that_discharges_into_two_joined_basins_conserves_mass(tmp_path):
     west = basin((6.0, 3.0), (12, 6), 1.0, patches={"in": {"side": "west"}, "gate": {"side": "east"}}, elevation=0.0)
     east = basin((3.0, 3.0), (6, 6), 1.0, patches={"gate": {"side": "west"}}, elevation=0.0)
     nodes = {"west": west, "east": east, "lake": lake(3.0, elevation=0.0), "end": junction(elevation=0.0)}
@@ -189,7 +189,7 @@ def test_a_pipe_that_discharges_into_one_of_two_joined_basins_keeps_all_mass(tmp
         assert pyvista.read(file)["surface"].min() > 0.9
 
 
-def test_what_the_network_gives_a_basin_gets():
+def test_flow_from_the_network_is_the_gain_of_the_basin():
     """Inflow through a patch raises the content by its amount."""
     pool = basin((5.0, 5.0), (10, 10), 0.5, patches={"in": {"side": "south", "span": [2.0, 3.0]}})
     nodes = {"pool": pool, "pump": {"type": "inflow", "flow": 0.05}}
@@ -226,7 +226,7 @@ def test_faults(name):
         fvsolve.load(case)
 
 
-def test_what_basins_do_not_go_with_yet_is_said():
+def test_features_that_basins_do_not_support_are_refused():
     case = alone(basin((4.0, 2.0), (8, 4), 0.2), 1.0)
     with pytest.raises(CaseError, match="one density"):
         fvsolve.load(case | {"fluid": {**case["fluid"], "law": "log"}})
@@ -235,28 +235,28 @@ def test_what_basins_do_not_go_with_yet_is_said():
             study(case)
 
 
-def test_a_run_interrupted_and_resumed_is_the_unbroken_one_frames_too(tmp_path):
+def test_a_run_interrupted_and_resumed_equals_the_uninterrupted_run_with_its_frames(tmp_path):
     case = alone(basin((40.0, 20.0), (160, 80), 0.2, start={"level": "where(x < 20, 0.2, 0.1)"}), 60.0)
     case["output"] |= {"fields": 12, "every": 1.0}
     run_in_two_parts(case, tmp_path, 5.0)
     assert_equal_files(tmp_path, ["history.csv", *(f"fields/pool-{k:06d}.vtu" for k in range(13)), "fields.pvd"])
 
 
-def test_what_is_wrong_in_a_mesh_file_is_named_by_the_file_and_by_no_key(tmp_path):
+def test_faults_of_a_mesh_file_name_the_file_and_no_key(tmp_path):
     import meshio
 
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
 
-    def said(cells, **keys) -> list:
+    def mesh_message(cells, **keys) -> list:
         meshio.write(tmp_path / "square.vtu", meshio.Mesh(points, [("quad", np.array([cells]))]))
         basin = {"type": "basin", "mesh": {"file": str(tmp_path / "square.vtu")}, "level": 1.0, **keys}
         with pytest.raises(CaseError) as caught:
             fvsolve.load(scene({"pool": basin}, {}, 1.0, {}))
         return [(fault.place, fault.message) for fault in caught.value.faults]
 
-    ((place, message),) = said([0, 1, 3, 2])
+    ((place, message),) = mesh_message([0, 1, 3, 2])
     assert place == "nodes.pool.mesh" and message.startswith("square.vtu: cells: ") and "cross themselves" in message
-    ((place, message),) = said([0, 1, 2, 3], patches={"west": {}})
+    ((place, message),) = mesh_message([0, 1, 2, 3], patches={"west": {}})
     assert place == "nodes.pool.patches.west"
     assert "square.vtu has no named groups of lines; in Gmsh name the lines of this patch" in message
     assert message.endswith('Physical Curve("west") = {1, 2};')
@@ -280,7 +280,7 @@ def test_a_level_on_the_bed_is_no_water_whatever_its_shape(holes):
     assert at_start(same, **holes)[0].max() < 1e-12
 
 
-def test_a_level_that_is_never_below_the_bed_does_as_one_that_runs_on_under_it():
+def test_a_level_never_below_the_bed_acts_as_a_level_that_continues_below_it():
     for surface in ("0.1", "0.1 + 0.05*x", "0.05 + 0.02*sin(3*x)*y"):
         over, under = at_start(f"max({PARABOLOID}, {surface})")[0], at_start(surface)[0]
         assert np.array_equal(over, under) and (over == 0.0).any() and (over > 0.0).any()
@@ -293,7 +293,7 @@ def test_a_start_at_rest_is_rest_to_the_bit_on_banks_too():
         assert np.all(model.start == 0.0)
 
 
-def test_the_water_of_a_start_is_the_integral_of_what_stands_above_the_bed():
+def test_the_initial_volume_is_the_integral_of_depths_above_the_bed():
     """Exact for a film and for a column on a slope; order 2 for a bowl, a cap of volume pi h^2 / (2 k)."""
     depth, area = at_start(f"{PARABOLOID} + 0.01")
     assert depth == approx(np.full(depth.size, 0.01), rel=1e-12)

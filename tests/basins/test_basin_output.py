@@ -106,7 +106,7 @@ def bilinear(values: np.ndarray) -> RegularGridInterpolator:
     return RegularGridInterpolator(axes, values.reshape(ny, nx))
 
 
-def test_probes_between_centres_are_bilinear_in_what_frames_hold():
+def test_probes_between_centres_are_bilinear_in_values_of_frames():
     """Probes over a partly dry bed equal SciPy's bilinear interpolation of the frame."""
     places = [(3.5, 1.2), (0.6, 3.3), (5.0, 2.0), (9.1, 0.3), (7.77, 2.9)]
     probes = [f"pool.{field}@{x},{y}" for x, y in places for field in FIELDS]
@@ -145,7 +145,7 @@ def test_probes_of_a_liquid_read_its_frames_at_centres(tmp_path):
         assert values[0] - 5e5 == approx(2.2e9 / RHO * y[k], rel=1e-6)
 
 
-def test_the_flow_of_a_patch_is_what_the_basin_gains():
+def test_the_flow_of_a_patch_is_the_gain_of_the_basin():
     """The flow through the only patch is the sum of rates times areas, and that of the valve, also in thin water."""
     model = model_of(draining(["pool.outlet.flow", "tap.flow"], level=2e-3))
     area = SIZE[0] * SIZE[1] / (CELLS[0] * CELLS[1])
@@ -231,7 +231,7 @@ def table(path) -> tuple[list[str], np.ndarray]:
     return rows[0], np.array(rows[1:], dtype=float)
 
 
-def test_lines_hold_what_the_frames_hold_at_their_points(tmp_path):
+def test_lines_have_the_values_of_frames_at_their_points(tmp_path):
     case = draining([], output={"fields": 3, "lines": {"cut": LINE}, "units": {"velocity": "mm/s"}})
     assert fvsolve.run(case, out=tmp_path / "run", pictures=False).ok
     names = sorted(path.name for path in (tmp_path / "run" / "lines").iterdir())
@@ -249,7 +249,7 @@ def test_lines_hold_what_the_frames_hold_at_their_points(tmp_path):
     assert found[:, 8] == approx(np.hypot(found[:, 6], found[:, 7]), rel=1e-12)
 
 
-def test_lines_of_a_resumed_run_are_those_of_the_unbroken_one(tmp_path):
+def test_lines_of_a_resumed_run_equal_those_of_the_uninterrupted_run(tmp_path):
     case = draining([], 30.0, {"fields": 12, "lines": {"cut": LINE}}, cells=[80, 40])
     late = "lines/cut-000012.csv"
     run_in_two_parts(case, tmp_path, 3.0, lambda run: (run / late).write_text("after the checkpoint"))
@@ -396,7 +396,7 @@ def test_view_animates_all_frames(dam, fvs):
     assert code == 2 and "--animate draws all times" in err
 
 
-def test_view_writes_a_page_to_turn_or_says_what_to_install(dam, fvs, tmp_path):
+def test_view_writes_a_page_that_turns_or_names_the_package_to_install(dam, fvs, tmp_path):
     code, _, err = fvs("view", dam, "--out", tmp_path / "dam.html")
     if importlib.util.find_spec("trame_pyvista"):
         assert code == 0 and "vtk" in (tmp_path / "dam.html").read_text(encoding="utf-8")
@@ -404,7 +404,7 @@ def test_view_writes_a_page_to_turn_or_says_what_to_install(dam, fvs, tmp_path):
         assert code == 2 and "pip install trame-pyvista" in err
 
 
-def test_an_mp4_without_imageio_says_what_to_install(dam, monkeypatch):
+def test_an_mp4_without_imageio_names_the_package_to_install(dam, monkeypatch):
     import sys
 
     monkeypatch.setitem(sys.modules, "imageio", None)
@@ -415,7 +415,7 @@ def test_an_mp4_without_imageio_says_what_to_install(dam, monkeypatch):
 # check ------------------------------------------------------------------------------------------------------
 
 
-def test_check_tells_of_basins(tmp_path, monkeypatch, fvs):
+def test_check_describes_basins(tmp_path, monkeypatch, fvs):
     monkeypatch.chdir(tmp_path)
     fvsolve.run(draining([], 0.1, bed="0.1*x"), out="run")
     code, out, _ = fvs("check", "run/case.toml", "--json")
@@ -431,7 +431,7 @@ def test_check_tells_of_basins(tmp_path, monkeypatch, fvs):
     assert code == 0 and "pool.outlet" in out and "free-surface" in out and "1.025 to 1.975" in out
 
 
-def test_what_a_mesh_leaves_unsaid_is_noted(tmp_path):
+def test_keys_that_a_mesh_leaves_out_are_noted(tmp_path):
     points, cells = shaken()
     path = write(tmp_path / "mm.msh", 1e7 * np.array(points), cells)
     model = model_of(liquid([], mesh={"file": str(path)}))
@@ -447,7 +447,7 @@ def test_a_summary_counts_the_cells_of_basins():
 
 
 @pytest.mark.parametrize("physics", ["free-surface", "liquid"])
-def test_rows_hold_what_passes_an_open_side(physics, tmp_path):
+def test_rows_contain_the_flow_through_an_open_side(physics, tmp_path):
     """The flow through the open side, integrated over the rows, is the gain of the content."""
     sea = {"sea": {"side": "west", "boundary": "open"}}
     if physics == "liquid":

@@ -60,13 +60,13 @@ def test_a_finer_run_judges_as_rows_judge_each_other():
         assert finer.rows[k].errors[name]["L1"] == approx(by_rows.rows[k].errors[name]["L1"], rel=0.1)
 
 
-def test_a_broken_dam_is_of_first_order_in_the_mean_and_the_note_says_why():
+def test_a_broken_dam_is_of_first_order_in_the_mean_with_the_reason_in_the_note():
     found = order(alone(pool((50, 2), "where(x < 5, 1, 0.4)", size=(10.0, 0.4)), 0.6), levels=4)
     assert found.fits["pool at the end: depth"]["L1"].order == approx(1.0, abs=0.1)
     assert any("the start jumps" in note and "about 1 in L1" in note for note in found.notes)
 
 
-def test_steps_alone_are_refined_on_one_mesh():
+def test_only_steps_are_refined_on_a_fixed_mesh():
     found = order(alone(pool((20, 10), SLOSH), 1.2), refine="time", levels=4)
     assert found.fits["pool at the end: depth"]["L1"].order == approx(2.0, abs=0.15)
     assert len({row.level.cells for row in found.rows}) == 1
@@ -85,7 +85,7 @@ def test_cells_of_pipes_and_basins_double_together_in_both_directions():
     assert cell_keys_of(scaled(cell_counts(case), 0.5)) == {"links.main.cells": 5, "nodes.pool.cells": [2, 3]}
 
 
-def test_what_a_basin_holds_is_the_same_on_coarser_cells():
+def test_the_content_of_a_basin_is_equal_on_coarser_cells():
     """Projection keeps contents to rounding, also on graded grids and with holes, and approximates the function."""
     for more in ({}, {"grading": [3.0, 0.5]}, {"holes": [[2.5, 1.25, 5.0, 2.5]]}):
         cases = [fvsolve.load(alone(pool(cells, **more), 1.0)) for cells in ((48, 32), (24, 16))]
@@ -97,7 +97,7 @@ def test_what_a_basin_holds_is_the_same_on_coarser_cells():
         assert np.abs(found - wanted).max() < 5e-3
 
 
-def test_a_mesh_from_a_file_has_no_finer_one(tmp_path):
+def test_a_mesh_from_a_file_has_no_finer_mesh(tmp_path):
     import meshio
 
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
@@ -156,7 +156,7 @@ def test_implicit_steps_come_to_where_explicit_ones_do(method):
     assert fvsolve.run(case).ledger["mass"]["relative"] < 1e-13
 
 
-def test_implicit_steps_may_cross_many_cells():
+def test_implicit_steps_may_cross_several_cells():
     """Implicit steps of Courant number 10 in a closed pool keep the mass."""
     case = alone(pool((16, 8), SLOSH), 4.0, method="radau-iia-5", courant=10.0)
     run = fvsolve.run(case)
@@ -165,7 +165,7 @@ def test_implicit_steps_may_cross_many_cells():
 
 
 @pytest.mark.parametrize("physics", ["free-surface", "liquid"])
-def test_what_leaves_by_an_open_side_is_in_the_ledger_of_implicit_steps(physics):
+def test_outflow_through_an_open_side_is_in_the_ledger_of_implicit_steps(physics):
     """The pattern contains the cells at the open side, so implicit steps keep the mass to rounding."""
     case = alone(pool((12, 8), SLOSH), 3.0) if physics == "free-surface" else block((12, 8), 1e-3)
     (basin,) = case["nodes"].values()
@@ -192,7 +192,7 @@ def test_a_slosh_blows_up_at_the_predicted_step():
     assert any("the state is not steady" in note for note in moving.notes)
 
 
-def test_a_limited_basin_is_measured_with_upwind_beside_it():
+def test_a_limited_basin_is_compared_with_upwind():
     row = stability(alone(pool((16, 4), size=(10.0, 4.0)), 1.0), ["muscl"], ["ssp-rk2"]).rows[0]
     assert row.measured == approx(row.frozen["upwind"], rel=0.01)
     assert any("in basins only the weights of upwind are used" in note for note in row.notes)
@@ -222,7 +222,7 @@ def scheme_loss(cells: int, **numerics) -> float:
     return found.scheme["pool"][-1]
 
 
-def test_what_a_scheme_takes_of_a_slosh_falls_with_its_order():
+def test_loss_of_a_slosh_by_a_scheme_falls_with_its_order():
     """The loss by upwind falls with the width of cells, the loss by limited slopes with its cube."""
     upwind = [scheme_loss(n, scheme="upwind") for n in (8, 16, 32)]
     muscl = [scheme_loss(n) for n in (8, 16, 32)]
@@ -231,7 +231,7 @@ def test_what_a_scheme_takes_of_a_slosh_falls_with_its_order():
     assert np.log2(muscl[1] / muscl[2]) == approx(3.0, abs=0.2)
 
 
-def test_a_method_that_keeps_squares_leaves_all_the_loss_to_the_scheme():
+def test_a_method_that_conserves_squares_leaves_all_the_loss_to_the_scheme():
     """The stored energy is nearly quadratic: the step loss by gauss-4 is below 1e-9 of it, and ssp-rk2 adds energy."""
     case = alone(pool((16, 8), SLOSH), 1.0)
     kept, made = (energy(case, {"numerics.method": method}) for method in ("gauss-4", "ssp-rk2"))
@@ -251,7 +251,7 @@ def test_the_energy_of_the_start_is_that_of_the_surface_over_the_datum():
     assert found.at_start["pool"] - still == approx(energy_of_slosh(), rel=2e-3)
 
 
-def test_a_basin_that_drains_gives_the_valve_what_its_tank_gives():
+def test_a_basin_that_drains_supplies_the_valve_as_its_tank_does():
     outlet = {"outlet": {"side": "east", "span": [1.25, 3.75]}}
     shown = {}
     for kind, place, node in (
@@ -270,7 +270,7 @@ def test_a_basin_that_drains_gives_the_valve_what_its_tank_gives():
 
 @pytest.mark.parametrize("patch", [{"side": "west"}, {"at": [5.0, 1.5], "area": 8.0}], ids=["side", "interior"])
 @pytest.mark.parametrize("head", [0.5, 3.0], ids=["out", "in"])
-def test_what_passes_a_patch_is_no_loss_of_the_scheme(head, patch):
+def test_flow_through_a_patch_is_no_loss_of_the_scheme(head, patch):
     """The power lost by the scheme in a state is equal to rounding with the valve at the patch open and closed."""
     found = []
     for opening in (0.0, 1.0):
@@ -356,7 +356,7 @@ def test_fifth_order_shows_on_grids_for_cells_start_from_their_means():
     assert order(slosh, levels=4).fits["pool at the end: depth"]["L1"].order == approx(5.0, abs=0.2)
 
 
-def test_energy_of_a_liquid_falls_by_what_the_scheme_takes():
+def test_energy_of_a_liquid_falls_by_the_loss_of_the_scheme():
     """The loss falls at third order with limited slopes; the energy at the start is that of the pulse."""
     loss = [energy(block((n, n // 2), 5e-4, courant=0.5)).scheme["block"][-1] for n in (32, 64, 128)]
     assert loss[0] > loss[1] > loss[2] > 0.0 and np.log2(loss[1] / loss[2]) == approx(3.0, abs=0.6)
@@ -373,7 +373,7 @@ def test_a_liquid_blows_up_at_the_predicted_step(scheme):
     assert row.difference == approx(0.0, abs=3e-4)
 
 
-def test_friction_of_the_bed_is_booked_and_takes_what_it_takes():
+def test_friction_of_the_bed_is_accounted_with_its_exact_loss():
     """Manning's friction dissipates what the stored energy loses besides the loss of the scheme, to 1 %."""
     smooth, rough = (energy(alone(pool((32, 16), SLOSH, **more), 2.0)) for more in ({}, {"manning": 0.05}))
     (taken,) = rough.dissipated.values()
@@ -390,7 +390,7 @@ def swirl(**numerics) -> dict:
     return scene({"sheet": sheet}, {}, 1.5, PLANE | {"courant": 0.5} | numerics, every=0.5, scalars={"dye": {}})
 
 
-def test_a_dye_in_a_vortex_that_turns_back_keeps_its_bounds_and_shows_its_order():
+def test_a_dye_in_a_vortex_that_turns_back_stays_within_bounds_and_shows_its_order():
     """The step follows the greatest velocity of the run, so it is not too long after the vortex is at rest."""
     found = order(swirl(), levels=4, cells=32)
     assert found.fits["sheet at the end: dye"]["L1"].order == approx(2.1, abs=0.3)
@@ -432,6 +432,6 @@ def test_studies_run_cases_with_lines_and_grids_of_frames():
     assert all(point.ok for point in chart(case, schemes=["muscl"], methods=["ssp-rk2"], cells=[8, 16]).points)
 
 
-def test_a_chart_says_that_cells_of_a_file_are_not_refined():
+def test_a_chart_states_that_cells_of_a_file_are_not_refined():
     with pytest.raises(FvsolveError, match=r"the mesh of plain is a file"):
         chart(CASES / "flooding.toml")

@@ -48,7 +48,7 @@ WAYS = {  # numerics without a notice of bounds
 @pytest.mark.in_turn
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("way", WAYS)
-def test_what_no_notice_warns_of_stays_in_its_bounds(way, shape, tmp_path):
+def test_settings_without_a_notice_stay_within_bounds(way, shape, tmp_path):
     case = swirled(shaped(tmp_path, shape), WAYS[way])
     found, model = rows(case), model_of(case)
     assert notices(case) == []
@@ -59,7 +59,7 @@ def test_what_no_notice_warns_of_stays_in_its_bounds(way, shape, tmp_path):
         assert state.y.min() > -ROUND and state.y.max() < 1.0 + ROUND
 
 
-def test_every_row_and_frame_between_steps_keeps_the_bounds_that_steps_keep(tmp_path):
+def test_every_row_and_frame_between_steps_stays_within_the_bounds_of_steps(tmp_path):
     """The cubic dense output of upwind with ssp-rk2 at Courant number 0.9 goes from -0.014 to 1.020."""
     import meshio
 
@@ -78,7 +78,7 @@ def test_a_step_that_leaves_the_bounds_is_shown_as_it_is():
     assert found.max() > 1.01 or found.min() < -0.01
 
 
-def test_rows_of_pipes_keep_the_bounds_of_what_flows_in():
+def test_rows_of_pipes_stay_within_the_bounds_of_the_inflow():
     """Rows between steps as long as cell travel times, for a sudden end of the dye."""
     nodes = {"a": reservoir(2e5, scalars={"dye": {"time": [0.0, 1.0], "value": [1.0, 0.0], "kind": "step"}}),
              "b": reservoir(1e5)}  # fmt: skip
@@ -91,14 +91,14 @@ def test_rows_of_pipes_keep_the_bounds_of_what_flows_in():
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_a_dye_in_sloshing_water_keeps_its_bounds_by_default(shape, tmp_path):
+def test_a_dye_in_sloshing_water_stays_within_its_bounds_by_default(shape, tmp_path):
     pool = {"type": "basin", "level": 0.5, "start": {"level": "0.5 + 0.2*cos(pi*x)"}, "scalars": {"dye": DISK}}
     case = scene({"sheet": pool | shaped(tmp_path, shape)}, {}, 1.0, {}, PROBES, 0.0043, scalars={"dye": {}})
     found = rows(case)
     assert found.min() > -ROUND and found.max() < 1.0 + ROUND and notices(case) == []
 
 
-def test_decay_alone_does_not_overshoot_what_it_leads_to():
+def test_decay_alone_does_not_overshoot_its_limit():
     case = swirled({"size": [1.0, 1.0], "cells": [8, 8]}, {"method": "euler"}, decay=400.0, ambient=0.5)
     found = rows(case)
     assert found.min() >= 0.0 and found.max() <= 1.0 and np.all(np.abs(found[:, -1] - 0.5) < 1e-9)
@@ -115,13 +115,13 @@ TOLD = {  # numerics, shape, key and limit of the notice, its text
 
 
 @pytest.mark.parametrize("name", TOLD)
-def test_who_chooses_what_keeps_no_bounds_is_told(name, tmp_path):
+def test_settings_that_violate_bounds_give_a_notice(name, tmp_path):
     numerics, shape, (key, limit), said = TOLD[name]
     (one,) = notices(swirled(shaped(tmp_path, shape, 8), numerics))
     assert (one.place, one.key, one.limit) == ("nodes.sheet", key, limit) and f"({said})" in one.text and one.ok
 
 
-def test_diffusion_over_cells_that_lean_is_told_and_over_rectangles_keeps_bounds(tmp_path):
+def test_diffusion_over_skewed_cells_gives_a_notice_and_over_rectangles_stays_within_bounds(tmp_path):
     (one,) = notices(swirled(shaped(tmp_path, "triangles", 8), {}, diffusivity=1e-3))
     assert "dye diffuses" in one.text
     case = swirled(shaped(tmp_path, "rectangle", 16), {}, diffusivity=1e-3)
@@ -129,7 +129,7 @@ def test_diffusion_over_cells_that_lean_is_told_and_over_rectangles_keeps_bounds
     assert notices(case) == [] and found.min() > -ROUND and found.max() < 1.0 + ROUND
 
 
-def test_a_velocity_that_gathers_is_told_and_one_without_divergence_is_not():
+def test_a_velocity_that_converges_gives_a_notice_and_a_velocity_without_divergence_does_not():
     for u, v, told in (("0.1*x*(1 - x)", 0, True), ("sin(pi*x)*cos(pi*y)", "-cos(pi*x)*sin(pi*y)", False)):
         case = swirled({"size": [1.0, 1.0], "cells": [8, 8]}, {})
         case["nodes"]["sheet"]["velocity"] = {"u": u, "v": v}

@@ -539,7 +539,7 @@ def test_a_restated_reach_gives_the_same(path, tmp_path):
 
 
 @pytest.mark.parametrize("threads", [2, 3])
-def test_any_number_of_threads_gives_the_bits_of_one(threads):
+def test_any_number_of_threads_gives_the_same_bits(threads):
     case = reach(DRIVEN, (100.0, 10.0), (100, 12), 5.0, level=2.0, bed="0.2*sin(x)*cos(y)", probes=["reach.up.flow"])
     one, more = (fvsolve.run(case, threads=count) for count in (1, threads))
     assert (one["reach.up.flow"] == more["reach.up.flow"]).all() and more.summary["threads"] == threads
@@ -578,7 +578,7 @@ def test_a_file_of_a_stage_states_its_unit(tmp_path):
     assert case.nodes["reach"].patches["up"].stage.value.tolist() == [1.0, 1.2]
 
 
-def test_a_rating_may_begin_where_the_bed_meets_the_outline():
+def test_a_rating_may_begin_where_the_bed_touches_the_outline():
     """The mean bed of the last cell, 2.5 mm, lies above the outline, where the rating begins."""
     rating = {"level": [0, 1, 2], "flow": [0, 12, 40]}
     keys = {"level": 0.0, "bed": "0.001*x", "size": (500.0, 2.0), "numerics": {"scheme": "muscl"}, "end": 20.0}
@@ -586,7 +586,7 @@ def test_a_rating_may_begin_where_the_bed_meets_the_outline():
     assert result.ok and result["reach.up.flow"][-1] < 0.0
 
 
-def test_two_reaches_without_a_link_between_them_are_one_case():
+def test_two_reaches_without_a_link_between_them_form_a_valid_case():
     data = reach({"up": {"side": "west", "discharge": 1.0}}, end=2.0, cells=(20, 2), probes=["reach.volume"])
     alone = fvsolve.run(fvsolve.load(data))
     data["nodes"]["other"] = data["nodes"]["reach"] | {"patches": {"sea": {"side": "west", "stage": 0.9 * DEEP}}}

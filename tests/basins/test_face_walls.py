@@ -86,7 +86,7 @@ def test_steady_flow_over_a_wall_has_the_levels_of_villemonte(line, tail, turned
 @pytest.mark.parametrize("scheme", ["upwind", "muscl"])
 @pytest.mark.parametrize("triangular", [False, True], ids=["grid", "triangles"])
 @pytest.mark.parametrize("beyond", ["1.25", "0"], ids=["wet", "dry"])
-def test_water_at_rest_beside_a_wall_does_not_move(beyond, triangular, scheme, numerics, tmp_path):
+def test_water_at_rest_next_to_a_wall_does_not_move(beyond, triangular, scheme, numerics, tmp_path):
     start = {"level": f"where(x < 12.05, 1, {beyond})"}
     bed = "where(x < 12.05, 0.3*sin(x) + x*y/50, 0)"  # with dry islands; west of the wall at the level of rest
     case = pool(bed=bed, start=start, numerics={"scheme": scheme} | numerics, end=3.0)

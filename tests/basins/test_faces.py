@@ -249,7 +249,7 @@ def test_a_slotted_disk_stays_between_its_bounds(tmp_path, name, quads):
 
 
 @pytest.mark.parametrize("wide", [1.0, WIDE])
-def test_a_step_of_euler_keeps_bounds_in_random_flows_and_depths(tmp_path, wide):
+def test_a_step_of_euler_stays_within_bounds_in_random_flows_and_depths(tmp_path, wide):
     """Values start at their bounds, with random flows through faces, which also change depths."""
     for seed in range(40):
         random, field = np.random.default_rng(seed), mixed(tmp_path) if seed % 2 else triangles(tmp_path, 9, 7)
@@ -279,7 +279,7 @@ def test_bounds_cost_a_smooth_value_nothing_that_shows(tmp_path, quads):
     assert observed_order(kept, [1 / 24, 1 / 48]) > 1.7
 
 
-def test_diffusion_fades_a_mode_at_second_order_and_meets_the_value_that_flows_in(tmp_path):
+def test_diffusion_damps_a_mode_at_second_order_and_reaches_the_value_of_the_inflow(tmp_path):
     """exp(-2 pi^2 t) cos(pi x) cos(pi y) between walls, and the front of Ogata and Banks (1961) behind an inlet."""
     errors, sizes = [], (16, 32)
     for n in sizes:

@@ -42,7 +42,7 @@ def kinds(found):
 @pytest.mark.parametrize("depth", [0.002, 0.005])
 @pytest.mark.parametrize("n", [0.02, 0.1])
 @pytest.mark.parametrize("slope", [0.05, 0.02])
-def test_films_run_as_manning_says_at_the_steps_of_their_waves(slope, n, depth, begins):
+def test_films_flow_by_manning_at_the_steps_of_their_waves(slope, n, depth, begins):
     right = manning(slope, n, depth)
     found, u, h = sheet(slope, depth, begins * right, friction={"manning": n})
     assert u[-1] == approx(right, rel=1e-6) and h[-1] == approx(depth, rel=1e-6)
@@ -63,12 +63,12 @@ def test_no_method_that_is_right_at_films_depends_on_its_steps(numerics):
     assert u[-1] == approx(right, rel=1e-6) and "friction" not in kinds(found)
 
 
-def test_films_run_as_darcy_says():
+def test_films_flow_by_darcy():
     right = math.sqrt(8.0 * G * 0.003 * 0.05 / 0.5)
     assert sheet(0.05, 0.003, 0.0, friction={"factor": 0.5})[1][-1] == approx(right, rel=1e-6)
 
 
-def test_films_run_as_manning_says_on_triangles_and_down_a_diagonal(tmp_path):
+def test_films_flow_by_manning_on_triangles_and_down_a_diagonal(tmp_path):
     points, cells, _ = halved((60.0, 60.0), (30, 30))
     right, bed = manning(0.05, 0.1, 0.005), "0.05*(60.0-(x + y)/sqrt(2))"
     hill = {"type": "basin", "mesh": {"file": str(write(tmp_path / "hill.vtk", points, cells))}, "level": -9.0,
@@ -165,7 +165,7 @@ def test_water_that_breaks_over_a_rough_dry_slope_is_all_there():
     assert after[:360].reshape(6, 60)[:, -1].min() > 0.1
 
 
-def test_upwind_says_by_how_much_films_are_too_slow():
+def test_upwind_states_by_how_much_films_are_too_slow():
     right = manning(0.05, 0.1, 0.005)
     found, u, _ = sheet(0.05, 0.005, right, {"scheme": "upwind"}, {"manning": 0.1})
     (one,) = [one for one in found.summary["warnings"] if one["kind"] == "film"]
@@ -174,7 +174,7 @@ def test_upwind_says_by_how_much_films_are_too_slow():
     assert "film" not in kinds(sheet(0.05, 0.5, 1.0, {"scheme": "upwind"}, {"manning": 0.03}, end=1.0)[0])
 
 
-def test_upwind_says_nothing_of_a_lake_and_its_shore():
+def test_upwind_states_nothing_of_a_lake_and_its_shore():
     shape = {"size": [20.0, 2.0], "cells": [20, 2], "bed": "0.3*(x - 10.2)"}
     lake = {"type": "basin", "level": 0.0, "manning": 0.1, **shape}
     assert "film" not in kinds(fvsolve.run(scene({"lake": lake}, {}, 1.0, {"scheme": "upwind"}, every=0.5)))
@@ -185,7 +185,7 @@ def test_upwind_says_nothing_of_a_lake_and_its_shore():
     "numerics", [{"method": "rk4"}, {"method": "dormand-prince", "rtol": 1e-6}], ids=["rk4", "rtol"]
 )
 @pytest.mark.parametrize("friction", [{"manning": 0.1}, {"factor": 8 * G * 0.1**2 / 0.005 ** (1 / 3)}], ids=["n", "f"])
-def test_methods_that_hold_friction_say_by_how_much_films_are_too_fast(numerics, friction):
+def test_methods_that_freeze_friction_state_by_how_much_films_are_too_fast(numerics, friction):
     right = manning(0.05, 0.1, 0.005)
     found, u, _ = sheet(0.05, 0.005, 0.5 * right, numerics, friction)
     worst = max((one for one in found.summary["warnings"] if one["kind"] == "friction"), key=lambda one: one["value"])
@@ -226,7 +226,7 @@ def test_films_that_move_go_as_an_implicit_method_has_them(tmp_path, kind):
     assert size > 1e-4 and np.abs(found[0] - found[1]).max() < 0.02 * size
 
 
-def test_a_film_on_a_body_that_feels_it_is_held_and_says_so():
+def test_a_film_on_a_body_that_its_force_moves_is_frozen_with_a_notice():
     nodes = slid({}) | {"b": {**THIN, "on": "plate", "start": {"u": "0.3"}}}
     for method, said in (({"method": "ssp-rk2"}, True), ({"method": "rodas-5p"}, False)):
         found = fvsolve.run(scene(nodes, {}, 0.1, {"scheme": "muscl", **method}, every=0.05))

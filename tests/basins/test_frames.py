@@ -54,7 +54,7 @@ def test_a_box_that_turns_so_fast_that_its_middle_is_dry_rests_too():
     assert flows[1] < 0.5 * flows[0] < 1e-3
 
 
-def test_a_box_that_slows_down_steadily_holds_its_water_aslant_and_a_tilted_one_level():
+def test_a_box_that_decelerates_steadily_has_an_inclined_surface_and_a_tilted_box_a_level_surface():
     slows = 0.2  # x = 10 (1 - (1 - t / 10)^2)
     travel = slowing(slows)
     slope = slows / GRAVITY
@@ -172,7 +172,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("text", FAULTS)
-def test_what_cannot_ride_is_refused_by_name(text):
+def test_features_that_cannot_move_with_a_body_are_refused_by_name(text):
     body, keys = FAULTS[text]
     basin = {key: value for key, value in {**tank(), **keys}.items() if value is not None}
     with pytest.raises(CaseError, match=text):

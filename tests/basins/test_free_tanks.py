@@ -72,7 +72,7 @@ def test_a_tank_on_a_spring_swings_at_the_root_of_the_tangent_law(along):
     assert errors[1] < 5e-3
 
 
-def test_a_free_tank_on_rails_keeps_its_momentum():
+def test_a_free_tank_on_rails_conserves_its_momentum():
     basin = tank(30, start={"level": f"{DEPTH} + 0.03 * cos(1.5 * x)"})
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5}
     case = scene({"cart": cart(50.0, rate=0.3), "b": basin}, {}, 2.0, numerics)
@@ -109,7 +109,7 @@ def rocking(n=24, **numerics):
     return scene(nodes, links, 2.0, {"scheme": "muscl", "method": "ssp-rk3", **numerics}, ["hull.angle"], every=0.02)
 
 
-def test_energy_of_a_hull_and_its_water_is_lost_by_the_scheme_alone_and_never_made():
+def test_energy_of_a_hull_and_its_water_is_lost_by_the_scheme_alone_and_never_created():
     parts = []
     for step in (4e-3, 2e-3):
         found = energy(rocking(step=step))
@@ -121,7 +121,7 @@ def test_energy_of_a_hull_and_its_water_is_lost_by_the_scheme_alone_and_never_ma
     assert parts[1] < parts[0] / 5.0 and parts[1] < 1e-4
 
 
-def test_what_drives_a_tank_is_what_its_water_gains_and_loses():
+def test_work_on_a_driven_tank_is_the_gain_and_the_loss_of_its_water():
     body = {
         "type": "body", "mass": 50.0, "inertia": [5.0, 5.0, 5.0],
         "joint": {"kind": "revolute", "axis": [0, 1, 0], "angle": {"mean": 0, "amplitude": 0.03, "period": 1.7}},
@@ -158,7 +158,7 @@ def test_frozen_water_is_the_body_that_weighs_as_much():
     assert np.ptp(one["hull.angle"]) > 0.3
 
 
-def test_in_heave_cells_and_frozen_water_are_one():
+def test_in_heave_cells_and_frozen_water_are_equal():
     case = sprung({**tank(1), "sloshing": "cells"}, cart(axis=(0, 0, 1), rate=0.05), 2e4, 1.0, {"step": 2e-3},
                   ["cart.z"], (0, 0, 9.0), preload=-300.0 * GRAVITY)  # fmt: skip
     cells = run(case)

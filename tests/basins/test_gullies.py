@@ -30,7 +30,7 @@ NOISY = "10 + 0.01*(40-x) + 0.03*y + 0.02*sin(7*x)*cos(5*y)"
 
 
 @pytest.mark.parametrize("below", ["river", "s"])
-def test_a_film_dries_out_beside_a_gully_that_passes_nothing(below):
+def test_a_film_dries_out_next_to_a_gully_that_passes_nothing(below):
     """Newton's method stopped here at 3556 and 3498 s, at flows of 1e-11 m3/s."""
     found = fvsolve.run(street(10.6, below, 3600.0, bed=NOISY, rain=RAIN))
     assert found.ok and found.summary["ledgers"]["mass"]["relative"] < 1e-12
@@ -48,7 +48,7 @@ def test_steps_at_a_gully_are_those_of_waves_with_its_crest_at_any_height(crest)
     assert found["m.flow"][-1] > 0.01
 
 
-def test_check_prints_a_crest_beside_the_bed(fvs, tmp_path):
+def test_check_prints_a_crest_and_its_bed(fvs, tmp_path):
     from fvsolve.core.run import model_of
 
     low, high = (model_of(street(crest, "river", 1.0, bed="10 + 0.01*x")).basins[0].chain_texts()

@@ -94,7 +94,7 @@ METHODS = {"ssp-rk2": {}, "rk4": {}, "dormand-prince": {"rtol": 1e-7, "courant":
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_all_methods_give_one_flow(method):
+def test_all_methods_give_the_same_flow(method):
     numerics = {"method": method, **METHODS[method], "scheme": "upwind"}
     found = fvsolve.run(pond(numerics=numerics, end=5.0))
     exact = fvsolve.run(pond(numerics={"method": "rk4", "courant": 0.1, "scheme": "upwind"}, end=5.0))
@@ -105,7 +105,7 @@ def test_all_methods_give_one_flow(method):
 @pytest.mark.parametrize("ground", ["0", "0.05*x + 0.1*sin(3*x)"])
 @pytest.mark.parametrize("head", [-1.0, 1.6])
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
-def test_a_pond_that_empties_and_fills_keeps_its_volume(ground, head, scheme):
+def test_a_pond_that_empties_and_fills_conserves_its_volume(ground, head, scheme):
     tide = {"time": [0, 4, 8, 12], "value": [head, head, 1.5, -1.0]}
     numerics = {"scheme": scheme, "courant": 0.3 if scheme == "weno5" else 0.9}
     case = pond(WIDE, lake(tide, elevation=0.0), 20.0, bed=ground, level=0.2, numerics=numerics)

@@ -73,7 +73,7 @@ def test_a_sudden_level_drives_the_flow_of_a_simple_wave(head, area, method):
 PIPED = {"from": "lake", "to": "reach.end", "length": 20.0, "diameter": 1.0}  # between the lake and the channel
 
 
-def test_a_delay_line_and_a_pipe_of_cells_bring_the_same_flow():
+def test_a_delay_line_and_a_pipe_of_cells_deliver_the_same_flow():
     flows = []
     for own in ({"pipe_model": "delay-line"}, {"cells": 100}):
         case = channel({"time": [0.0, 4.0], "value": [2.0, 2.3]}, numerics={"courant": 0.9})
@@ -189,7 +189,7 @@ def test_a_restated_channel_gives_the_same(path, tmp_path, monkeypatch):
     assert sign * there["gate.flow"] == approx(here["gate.flow"], rel=1e-9, abs=1e-9)
 
 
-def test_two_links_at_a_patch_are_one_of_both_areas():
+def test_two_links_at_a_patch_equal_a_link_of_both_areas():
     head = {"time": [0, 2, 4], "value": [2.0, 2.6, 1.6]}
     case = channel(head)
     case["links"]["gate"]["area"] = 0.4
@@ -245,7 +245,7 @@ PLACES = {"sides": ({"side": "east"}, {"side": "west"}),
 
 @pytest.mark.parametrize("method", ["ssp-rk2", "rodas-5p", "radau-iia-5"])
 @pytest.mark.parametrize("where", PLACES)
-def test_a_pump_lifts_water_from_one_basin_to_another(where, method):
+def test_a_pump_lifts_water_between_two_basins(where, method):
     """Levels of two basins, and of two tanks with the pump's curve H = 2 m - 800 q^2, by SciPy."""
     low, high = ({"type": "basin", "size": [size, 10.0], "cells": [int(size / 2), 5], "level": level, "elevation": 0.0,
                   "patches": {"end": patch}}
@@ -318,7 +318,7 @@ def test_a_restated_demand_beyond_critical_outflow_is_held_equally(path, tmp_pat
     assert there.marks[-1].volume == approx(here.marks[-1].volume, rel=1e-9)
 
 
-def test_a_demand_that_grows_beyond_critical_outflow_and_back_is_met_again():
+def test_a_demand_that_exceeds_critical_outflow_for_a_time_is_satisfied_again():
     """At a patch with a scheduled discharge the same outflow leaves."""
     probes, schedule = ["reach.end.flow"], {"time": [0, 1, 2, 3], "value": [2.0, 2.0, ASKED, 2.0]}
     case = drawn(probes=probes)
@@ -379,7 +379,7 @@ def test_a_film_falls_freely_into_whatever_lies_below_it(name, way):
 
 
 @pytest.mark.parametrize("method", ["ssp-rk2", "ssp-rk3", "euler"])
-def test_a_pump_whose_sump_is_dry_waits(method):
+def test_a_pump_with_a_dry_sump_waits(method):
     """The level of the dry patch falls until the pump gives its shut-off head; then a hydrograph fills the sump."""
     sump = {"type": "basin", "size": [24.0, 10.0], "cells": [24, 10], "elevation": 0.0, "level": 0.0, "bed": "0.1*x",
             "start": {"level": -0.01}, "patches": {"intake": {"side": "west", "span": ["4 m", "6 m"]},

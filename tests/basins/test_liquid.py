@@ -51,7 +51,7 @@ def order(box: Box, exact, end: float, sizes, courant: float = 0.5) -> float:
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_standing_modes_of_a_box_are_met_at_the_order_of_the_scheme(scheme):
+def test_standing_modes_of_a_box_converge_at_the_order_of_the_scheme(scheme):
     """The modes have periods of 0.12 s and 0.08 s."""
     box = Box(4, 3, scheme, (1.0, 0.75))
     sizes, end, courant = ((16, 32), 0.1, 0.1) if ORDERS[scheme] == 5 else ((64, 128), 0.03, 0.5)
@@ -202,7 +202,7 @@ def test_a_round_pulse_stays_round(scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("log", [False, True], ids=["linear", "log"])
-def test_what_is_mirrored_or_turned_stays_so_to_the_bit_and_mass_stays(scheme, log):
+def test_mirrored_and_rotated_liquids_stay_so_to_the_bit_and_conserve_mass(scheme, log):
     box = Box(7, 9, scheme, (7.0, 4.5), log=log)
     for sides in (WALLS, shares(box)):
         box = replace(box, reflect=sides)
@@ -248,7 +248,7 @@ def test_few_cells_between_walls_are_a_corner_of_their_mirror_images(nx, ny, log
 
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5"])
-def test_the_log_law_is_the_linear_one_for_small_waves(scheme):
+def test_the_log_law_is_the_linear_law_for_small_waves(scheme):
     """The difference of the laws is of second order in the size of the waves."""
     box = Box(12, 9, scheme, (12, 9))
     apart = []
@@ -284,7 +284,7 @@ def test_a_vortex_is_carried_unchanged(scheme):
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_what_the_flow_carries_along_keeps_the_order_of_the_scheme(scheme):
+def test_an_advected_value_has_the_order_of_the_scheme(scheme):
     """Tangential velocity in a stream that enters and leaves at given pressure."""
 
     def exact(box, t):
@@ -342,7 +342,7 @@ def test_a_stream_is_stopped_by_a_wall_at_the_exact_pressure(scheme):
 @pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("size", [0.05, 0.5])
-def test_a_simple_wave_steepens_as_the_exact_one(size, scheme):
+def test_a_simple_wave_steepens_as_the_exact_solution(size, scheme):
     """At Mach number 0.005 the order is that of linear waves; at 0.05 products reduce fifth order to second."""
 
     def velocity(x):
@@ -376,7 +376,7 @@ def measures(nx, ny, reach) -> np.ndarray:
     return geometry
 
 
-def test_a_uniform_liquid_passes_a_moving_side_by_its_flux_less_what_the_side_sweeps():
+def test_a_uniform_liquid_passes_a_moving_side_by_its_flux_less_the_swept_amount():
     """Flux of mass m - speed rho, and of momentum p n - speed (mx, my), with p = c^2 (rho - rho_0) and m along n."""
     random = np.random.default_rng(3)
     nx, ny, reach, w, mx, my = block(random)

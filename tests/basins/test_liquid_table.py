@@ -223,7 +223,7 @@ def test_implicit_steps_agree_with_explicit_ones(holes):
 
 
 @pytest.mark.parametrize("wave_speed", [30.0, 120.0, 1000.0])
-def test_walls_that_give_much_leave_pressure_what_it_is(wave_speed):
+def test_walls_with_large_compliance_leave_the_pressure_unchanged(wave_speed):
     """A slope of pressure accelerates the fluid as between rigid walls, and the state returns the given pressure."""
     pool = {
         "type": "basin", "physics": "liquid", "size": [1.0, 0.2], "cells": [10, 2], "pressure": 3e5, "thickness": 0.1,

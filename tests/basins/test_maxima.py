@@ -79,7 +79,7 @@ def dam(**numerics) -> dict:
 
 
 @pytest.mark.parametrize("numerics", [{}, {"method": "rodas-5p", "rtol": 1e-4}], ids=["explicit", "implicit"])
-def test_the_tongue_of_a_dam_break_arrives_when_ritter_says(numerics):
+def test_the_tongue_of_a_dam_break_arrives_at_ritters_time(numerics):
     """Depth (2 c - x / t)^2 / (9 g) reaches d at t = x / (2 c - 3 sqrt(g d)), and stays above it."""
     case = dam(**numerics)
     if "rtol" in numerics:

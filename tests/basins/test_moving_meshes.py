@@ -57,7 +57,7 @@ def as_it_is(mesh, points):
 @pytest.mark.in_turn
 @pytest.mark.parametrize("kind", ["triangles", "quads", "mixed"])
 @pytest.mark.parametrize("many", [(12, 4), (40, 9)])
-def test_what_is_known_of_sides_is_that_of_the_mesh_with_corners_where_they_are(tmp_path, kind, many):
+def test_geometry_of_sides_is_that_of_the_mesh_with_moved_corners(tmp_path, kind, many):
     patches = {"west": {"travel": straight(0.2), "zone": 0.7}, "east": {"travel": straight(-0.3)}}
     case = scene({"b": pool(tub(tmp_path, kind, many), patches)}, {}, 1.0, {**STEPPED, "step": 0.01},
                  scalars={"dye": {"initial": 1.0, "diffusivity": 1e-3}})  # fmt: skip
@@ -100,7 +100,7 @@ def test_homologous_expansion_is_exact_to_round_off_under_every_method(tmp_path,
 @pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["upwind", "muscl"])
 @pytest.mark.parametrize("method", EXACT)
-def test_between_walls_that_swing_a_lake_of_uniform_content_is_wherever_lines_are_and_mass_is_kept(
+def test_between_oscillating_walls_a_uniform_lake_stays_uniform_at_any_lines_and_conserves_mass(
     tmp_path, method, scheme
 ):
     swings = {"mean": 0.1, "amplitude": 0.25, "period": 1.1, "phase": 0.4}
@@ -303,7 +303,7 @@ def test_where_no_wave_has_come_yet_lines_that_swing_leave_a_liquid_as_it_is(tmp
 
 
 @pytest.mark.parametrize(("law", "method"), [("linear", "ssp-rk3"), ("log", "ssp-rk3"), ("linear", "rodas-4")])
-def test_a_mass_on_a_spring_beside_a_column_of_liquid_swings_at_the_root_of_the_cotangent_law(law, method):
+def test_a_mass_on_a_spring_at_a_column_of_liquid_oscillates_at_the_root_of_the_cotangent_law(law, method):
     mass, length, section = 2.0, 2.0, 0.1 * 0.05
     for side in ("east", "south") if method == "ssp-rk3" else ("north",):
         errors = []
@@ -335,7 +335,7 @@ def test_a_mass_on_a_spring_beside_a_column_of_liquid_swings_at_the_root_of_the_
 @pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["log", "linear"])
 @pytest.mark.parametrize("method", ["ssp-rk3", "rodas-4"])
-def test_a_box_and_a_chamber_of_one_length_that_one_mass_compresses_have_one_pressure(law, method):
+def test_a_box_and_a_chamber_of_equal_length_that_a_mass_compresses_have_equal_pressures(law, method):
     """A heavy mass, slow compared with the waves of the box, sweeps A dx in the box and in the chamber."""
     nodes = {"b": column(law, {"west": {"body": "lid"}}, 4), "lid": {"type": "mass", "mass": 4e5,
              "initial_velocity": 0.05}, "ground": {"type": "frame"}}  # fmt: skip
@@ -384,7 +384,7 @@ def test_momentum_changes_by_the_forces_of_both_walls_alone(tmp_path, law, schem
 @pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("method", ["ssp-rk3", "implicit-midpoint", "rodas-4"])
-def test_a_liquid_that_is_turned_or_seen_from_behind_says_the_same(law, method):
+def test_a_rotated_or_mirrored_liquid_has_the_same_results(law, method):
     found = []
     for side, sign in (("west", 1.0), ("east", -1.0), ("south", 1.0), ("north", -1.0)):
         travel = {"mean": 0.0, "amplitude": sign * 1e-3, "period": 5e-3}
@@ -460,7 +460,7 @@ def test_the_ledger_of_energy_has_the_work_of_the_wall_and_its_step_part_falls_w
 
 
 @pytest.mark.parametrize("side", ["east", "south"])
-def test_what_law_linear_loses_beside_a_wall_stands_by_its_name_and_a_height_lifts_nothing(side):
+def test_error_of_law_linear_at_a_wall_is_named_and_a_height_does_not_lift(side):
     """Uniform compression: p = c^2 r does work, and w (c^2 r^2 - m^2) / (2 rho) is lost, with m = w (rho + r)."""
     travel, lost = smooth_ramp(0.0, 1.0, 0.0, -0.2 if side == "east" else 0.2, 401), []
     times = np.linspace(0.0, 1.0, 2001)

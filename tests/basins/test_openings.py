@@ -58,7 +58,7 @@ LAWS = ["water", "linear", "log", "table"]
 @pytest.mark.parametrize(
     "path, scheme, law", [one for one in pairs(PATHS, schemes("grid"), LAWS) if one[1] in schemes(one[0])]
 )
-def test_what_cells_beside_an_open_side_gain_is_booked_to_it(path, scheme, law, tmp_path):
+def test_gain_of_cells_at_an_open_side_is_accounted_to_it(path, scheme, law, tmp_path):
     """Noise near the middle of a side is booked at this side alone; noise everywhere, at all sides."""
     patches = OPEN if law == "water" else IMPEDANCE
     basin = pool(path, tmp_path, patches, **physics(law))
@@ -102,7 +102,7 @@ def test_a_stream_through_two_open_sides_shows_at_both(path, tmp_path):
 @pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log", "table"])
 @pytest.mark.parametrize("path", PATHS)
-def test_a_wave_that_meets_nothing_beyond_leaves_half_its_flow_at_either_end(path, law, tmp_path):
+def test_a_wave_into_an_empty_half_leaves_half_its_flow_at_either_end(path, law, tmp_path):
     """rho u A / 2 at both ends at the start, as no wave enters; Mach numbers under `log` and `table` are small."""
     patches = {side: OPEN[side] for side in ("west", "east")}
     basin = pool(path, tmp_path, patches, **physics(law), start={"u": 0.01})
@@ -155,7 +155,7 @@ def test_a_given_velocity_shows_at_the_patches_that_it_passes(path, tmp_path):
 @pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["water", "linear", "log"])
 @pytest.mark.parametrize(("path", "scheme"), [("grid", s) for s in schemes("grid")] + [("triangles", "muscl")])
-def test_what_passes_open_sides_keeps_to_its_pattern(path, scheme, law, tmp_path):
+def test_flow_through_open_sides_stays_within_its_pattern(path, scheme, law, tmp_path):
     patches = OPEN if law == "water" else IMPEDANCE
     basin = pool(path, tmp_path, patches, **physics(law))
     if path == "grid":

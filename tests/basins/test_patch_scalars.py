@@ -114,7 +114,7 @@ def pond(place, scheme="muscl", dye=SALT, start=0.5, bed=ROUGH, numerics=None, *
 @pytest.mark.parametrize("path", ["grid", "triangles"])
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
 @pytest.mark.parametrize("place", PLACES)
-def test_a_tide_keeps_amount_and_bounds_of_a_dye_and_uniform_values(place, scheme, path, tmp_path):
+def test_a_tide_conserves_amount_and_bounds_of_a_dye_and_uniform_values(place, scheme, path, tmp_path):
     """Bounds over a dry bed; uniform values over a wet one, because values fade in films of less than a micron."""
     for dye, bed in ((SALT, ROUGH), (0.5, "0.02*x + 0.02*sin(3*x)*cos(2*y)")):
         case = pond(PLACES[place], scheme, dye, 0.5, bed)
@@ -133,7 +133,7 @@ def test_a_tide_keeps_amount_and_bounds_of_a_dye_and_uniform_values(place, schem
 
 @pytest.mark.parametrize("method", ["implicit-midpoint", "tr-bdf2", "radau-iia-5", "rodas-5p"])
 @pytest.mark.parametrize("place", PLACES)
-def test_implicit_methods_carry_what_explicit_methods_carry(place, method):
+def test_implicit_methods_carry_the_same_as_explicit_methods(place, method):
     own = {"step": 0.02} if method == "implicit-midpoint" else {"rtol": 1e-6}
     flat = {"bed": "0", "scheme": "upwind"}
     found = fvsolve.run(pond(PLACES[place], numerics={"method": method, "courant": None, **own}, **flat))

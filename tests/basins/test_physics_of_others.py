@@ -144,7 +144,7 @@ print(json.dumps(said))
 
 
 @pytest.fixture(scope="module")
-def said(tmp_path_factory) -> dict:
+def process_results(tmp_path_factory) -> dict:
     """Results of a process in which the folder of the physics `belt` is registered."""
     folder = tmp_path_factory.mktemp("others") / "belt"
     folder.mkdir()
@@ -157,26 +157,26 @@ def said(tmp_path_factory) -> dict:
     return json.loads(found.stdout.splitlines()[-1])
 
 
-def test_it_runs_exactly(said):
+def test_it_runs_exactly(process_results):
     """Euler steps of Courant number 1 move upwind values by one cell each, to the bit."""
-    assert said["exact"] == [[0.0, 0.5, 1.0, 1.5, 2.0], [0.0, 0.0, 0.0, 0.0, 300.5]]
+    assert process_results["exact"] == [[0.0, 0.5, 1.0, 1.5, 2.0], [0.0, 0.0, 0.0, 0.0, 300.5]]
 
 
-def test_it_is_stepped_implicitly(said):
+def test_it_is_stepped_implicitly(process_results):
     """Upwind rates 2 (T[i - 1] - T[i]) weight the start k cells upstream by exp(-2 t) (2 t)^k / k!."""
-    times, found = said["implicit"]
+    times, found = process_results["implicit"]
     share = [sum((2.0 * t) ** k / factorial(k) * exp(-2.0 * t) for k in (4, 5)) for t in times]
     assert found == approx([300.5 * one for one in share], abs=0.01)
-    assert said["missed"] == 0  # dependences outside the pattern
+    assert process_results["missed"] == 0  # dependences outside the pattern
 
 
-def test_it_is_checked_by_its_own_declaration(said):
-    assert 'no physics named "belt"; expected one of free-surface, liquid, transport' in said["unknown"]
-    assert "nodes.belt: pace is missing" in said["missing"]
-    assert 'nodes.belt.level: is not a key of physics "belt"; it belongs to free-surface' in said["other"]
-    assert 'nodes.belt.start.u: does not apply to physics "belt"' in said["start"]
-    assert 'fluid.law: "log" does not apply to basins; expected "linear"' in said["law"]
-    assert said["path"] == "grid" and said["schema"]
+def test_it_is_checked_by_its_own_declaration(process_results):
+    assert 'no physics named "belt"; expected one of free-surface, liquid, transport' in process_results["unknown"]
+    assert "nodes.belt: pace is missing" in process_results["missing"]
+    assert 'nodes.belt.level: is not a key of physics "belt"; it belongs to free-surface' in process_results["other"]
+    assert 'nodes.belt.start.u: does not apply to physics "belt"' in process_results["start"]
+    assert 'fluid.law: "log" does not apply to basins; expected "linear"' in process_results["law"]
+    assert process_results["path"] == "grid" and process_results["schema"]
 
 
 def test_every_physics_is_a_folder_that_lowers_itself():
@@ -190,7 +190,7 @@ def test_every_physics_is_a_folder_that_lowers_itself():
 
 
 @pytest.mark.parametrize("key", ["pressure", "size"])  # keys of liquids and of all basins
-def test_a_key_that_is_there_keeps_its_meaning(key):
+def test_a_key_that_exists_retains_its_meaning(key):
     keys = {"__annotations__": {key: Annotated[float, Quantity("time")]}, "__module__": __name__}
     with pytest.raises(FvsolveError, match=f'"clock" declares {key} differently from the existing key of a basin'):
         type(Physics)("Clock", (Physics,), keys, name="clock")
@@ -210,10 +210,10 @@ print(Physics.kinds["liquid"].__name__)
 """
 
 
-def test_a_key_keeps_its_meaning_in_a_process_that_has_not_loaded_its_physics():
+def test_a_key_retains_its_meaning_in_a_process_that_has_not_loaded_its_physics():
     found = subprocess.run([sys.executable, "-c", FIRST], capture_output=True, text=True)
-    said, liquid = found.stdout.splitlines()
-    assert 'physics "clock" declares pressure differently' in said and liquid == "Liquid"
+    message, liquid = found.stdout.splitlines()
+    assert 'physics "clock" declares pressure differently' in message and liquid == "Liquid"
 
 
 def test_a_name_that_is_there_is_taken():

@@ -77,7 +77,7 @@ def test_a_uniform_scalar_stays_uniform_in_sloshing_water(scheme, path, tmp_path
 
 
 @pytest.mark.parametrize("end", [2.0, 12.0])
-def test_a_uniform_scalar_stays_uniform_beside_films_that_a_pipe_fills(end):
+def test_a_uniform_scalar_stays_uniform_next_to_films_that_a_pipe_fills(end):
     """Films had up to 1.011 and deep water 0.9988 to 1.0021 of a tracer that all sources have as 1."""
     film = {
         "type": "basin", "elevation": 0.0, "size": [20.0, 12.0], "cells": [8, 8], "level": -50.0,
@@ -144,7 +144,7 @@ def test_a_plane_wave_of_a_liquid_is_that_of_a_pipe():
 @pytest.mark.in_turn
 @pytest.mark.parametrize(("boundary", "left"), [({"boundary": "open"}, 0.0), ({"impedance": 3.0 * RHO * SPEED}, 0.5)])
 @pytest.mark.parametrize("holes", [None, [[3.9, 0.0, 4.0, 0.2]]], ids=["grid", "faces"])
-def test_what_a_boundary_sends_back_of_a_wave(boundary, left, holes):
+def test_a_boundary_reflects_a_known_part_of_a_wave(boundary, left, holes):
     """A pulse returns with the factor (Z - rho a) / (Z + rho a), and the mass balance closes."""
     pool = liquid(cells=[320, 10], patches={"far": {"side": "west", **boundary}})
     pool["start"] = {"pressure": "1e5*exp(-12*(x - 1.5)^2)", "u": f"-1e5*exp(-12*(x - 1.5)^2)/{RHO * SPEED}"}
@@ -158,7 +158,7 @@ def test_what_a_boundary_sends_back_of_a_wave(boundary, left, holes):
     assert abs(ledger["relative"]) < 1e-13 and (ledger["outflow"] > 0.0 or left > 0.0)
 
 
-def test_what_leaves_by_an_open_side_is_no_mark():
+def test_outflow_through_an_open_side_is_no_mark():
     """Outflow through an open side is not marked as spilling or running dry."""
     pool = water(start=WAVY, patches={"sea": {"side": "east", "boundary": "open"}})
     result = fvsolve.run(case(pool, 2.0))
@@ -166,7 +166,7 @@ def test_what_leaves_by_an_open_side_is_no_mark():
 
 
 @pytest.mark.parametrize("path", ["grid", "holes"])
-def test_what_is_the_same_everywhere_leaves_so_by_open_sides_and_drains(path):
+def test_a_uniform_value_leaves_unchanged_through_open_sides_and_drains(path):
     """A uniform dye, equal to that beyond an open side, stays uniform, and its balance closes to rounding."""
     patches = {"sea": {"side": "east", "boundary": "open", "scalars": {"dye": 3.0}}, "drain": {"side": "south"}}
     pool = basin(level=0.6, bed="0.1*y + 0.05*x", start={"level": "0.6 + 0.1*cos(pi*x/4)"}, patches=patches)
@@ -356,7 +356,7 @@ def test_a_tank_without_friction_drains_to_the_last_film(scheme):
     assert depth.min() >= 0.0 and depth.max() < 1e-3
 
 
-def test_a_run_keeps_its_mesh_and_its_resolved_case_reads_back(tmp_path):
+def test_a_run_stores_its_mesh_and_its_resolved_case_reads_back(tmp_path):
     (tmp_path / "meshes").mkdir()
     points, cells = triangles((4.0, 2.0), 0.5)
     write(tmp_path / "meshes" / "t.msh", points, cells.tolist())

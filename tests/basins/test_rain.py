@@ -180,7 +180,7 @@ SOILS = {
 @pytest.mark.parametrize("soil", SOILS)
 @pytest.mark.parametrize("mesh", ["grid", "triangles"])
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
-def test_a_storm_on_dry_rough_ground_keeps_its_balance_and_depths_above_zero(scheme, mesh, soil, tmp_path):
+def test_a_storm_on_dry_rough_ground_conserves_its_balance_and_depths_above_zero(scheme, mesh, soil, tmp_path):
     sides = ("east",)
     case = field(120.0, {"scheme": scheme}, OPEN, cells=[12, 10], bed=HILLS, manning=0.03, rain=STORM, **SOILS[soil])
     if mesh == "triangles":
@@ -198,7 +198,7 @@ def test_a_storm_on_dry_rough_ground_keeps_its_balance_and_depths_above_zero(sch
 
 @pytest.mark.parametrize("soil", SOILS)
 @pytest.mark.parametrize("threads", [2, 3])
-def test_any_number_of_threads_gives_the_bits_of_one(threads, soil):
+def test_any_number_of_threads_gives_the_same_bits(threads, soil):
     case = field(30.0, {}, OPEN, cells=[12, 24], bed=HILLS, manning=0.03, rain=STORM, **SOILS[soil])
     case["output"]["probes"] = ["field.out.flow", "field.rained", "field.depth@3,4"]
     one, more = (fvsolve.run(case, threads=count) for count in (1, threads))
@@ -209,7 +209,7 @@ def test_any_number_of_threads_gives_the_bits_of_one(threads, soil):
 
 @pytest.mark.parametrize("probe", ["volume", "wet_area", "infiltrated", "infiltration"])
 @pytest.mark.parametrize("asked", ["probes", "limits"])
-def test_a_probe_that_reads_all_cells_has_one_thread_and_the_same_bits(asked, probe):
+def test_a_probe_that_reads_all_cells_has_a_single_thread_and_the_same_bits(asked, probe):
     case = field(30.0, {}, OPEN, cells=[12, 24], bed=HILLS, manning=0.03, rain=STORM)
     case["output"]["probes"] = [f"field.{probe}"] if asked == "probes" else ["field.rained"]
     case |= {"limits": {"most": {"on": "field", "quantity": probe, "maximum": 1e3}}} if asked == "limits" else {}
@@ -230,7 +230,7 @@ def test_no_rain_and_a_tight_soil_move_not_a_bit(scheme):
     assert not dydt.any() and not out[model.layout["supply"] :][: model.ledgers].any()
 
 
-def test_a_resumed_run_has_the_bits_and_the_balance_of_a_whole_one(tmp_path):
+def test_a_resumed_run_has_the_bits_and_the_balance_of_an_uninterrupted_run(tmp_path):
     numerics = {"courant": None, "step": 0.0625}
     case = field(90.0, numerics, OPEN, cells=[12, 10], bed=HILLS, manning=0.03, rain=STORM, infiltration=GREEN_AMPT)
     whole = fvsolve.run(case)
@@ -315,7 +315,7 @@ def test_a_v_shaped_catchment_has_the_flow_and_the_store_of_kinematic_waves():
     assert found["field.volume"][-1] == approx(planes + channel, rel=0.02)
 
 
-def test_a_field_of_manning_with_one_value_gives_the_bits_of_a_number():
+def test_a_uniform_field_of_manning_gives_the_bits_of_a_number():
     both = [field(60.0, {}, OPEN, cells=[12, 10], bed=HILLS, manning=n, rain=STORM) for n in (0.03, "0.03 + 0*x")]
     one, other = (fvsolve.run(case) for case in both)
     assert (one["field.volume"] == other["field.volume"]).all()

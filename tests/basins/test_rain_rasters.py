@@ -204,7 +204,7 @@ def test_rain_that_is_no_rate_is_named_with_its_remedy(tmp_path):
     assert 'has the unit "months since start"' in str(refused(field(1.0, rain={"raster": str(tmp_path / "a.nc")})))
 
 
-def test_too_many_frames_for_the_memory_are_a_fault(tmp_path, monkeypatch):
+def test_too_large_a_number_of_frames_for_the_memory_is_a_fault(tmp_path, monkeypatch):
     rain = {"raster": radar(tmp_path / "radar.nc", np.ones((400, 4, 4)), np.arange(400.0))}
     monkeypatch.setattr("fvsolve.case.basins.free_memory", lambda: 1e6)
     text = str(refused(field(1.0, cells=[16, 12], rain=rain, level=-1.0)))

@@ -44,7 +44,7 @@ LENGTHS = [  # models of laboratories, and surveys in metres
 ]
 
 
-def test_numbers_of_degrees_and_of_lengths_are_told_apart():
+def test_numbers_of_degrees_and_of_lengths_are_distinguished():
     assert [grid for grid in DEGREES if not are_probably_degrees(*grid)] == []
     assert [grid for grid in LENGTHS if are_probably_degrees(*grid)] == []
 
@@ -180,7 +180,7 @@ def test_rain_after_cf_falls_as_stated(unit, scale, tmp_path):
     assert result["pond.rained"][-1] == approx(1e-5 * 60.0, rel=1e-9)
 
 
-def test_a_megabyte_of_one_sign_in_a_raster_is_read_or_refused_in_bounded_time(tmp_path):
+def test_a_megabyte_of_equal_characters_in_a_raster_is_read_or_refused_in_bounded_time(tmp_path):
     head, row = "ncols 2\nnrows 1\nxllcorner 0\nyllcorner 0\ncellsize 10\n", "1 2\n"
     start, count = time.process_time(), 0
     for sign in " 9,\n#a":

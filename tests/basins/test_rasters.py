@@ -250,7 +250,7 @@ def test_a_missing_extra_is_named_with_its_command(tmp_path, monkeypatch):
         assert 'pip install "fvsolve[gis]"' in str(refused(pond({"raster": str(tmp_path / f"dem.{name}")})))
 
 
-def test_no_projected_crs_counts_as_degrees_and_every_geographic_one_does():
+def test_no_projected_crs_counts_as_degrees_and_every_geographic_crs_does():
     """All codes that PROJ of rasterio knows: up to 9140 by its own list, and every projected one beyond."""
     rasterio = pytest.importorskip("rasterio")
     counts = {"degrees": 0, "metres": 0}

@@ -154,7 +154,7 @@ def test_mirrored_and_turned_water_has_the_same_bits(scheme):
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_flows_through_faces_are_what_depth_changes_by_and_none_pass_a_wall(scheme):
+def test_flows_through_faces_sum_to_the_change_of_depth_and_none_pass_a_wall(scheme):
     rng = np.random.default_rng(1)
     water = Water(graded(9, 3.0, 2.0), graded(7, 2.0, 0.5), rng.random((7, 9)) - 0.8, scheme=scheme)
     h, q = rng.random((7, 9)), rng.standard_normal((2, 7, 9))
@@ -196,7 +196,7 @@ def bump(x):
 @pytest.mark.in_turn
 @pytest.mark.parametrize(("scheme", "low"), [("upwind", 0.9), ("muscl", 1.9), ("upwind5", 4.5), ("weno5", 4.5)])
 @pytest.mark.parametrize("way", ["east", "north"])
-def test_smooth_flow_over_a_bed_keeps_the_order_of_the_scheme(scheme, low, way):
+def test_smooth_flow_over_a_bed_has_the_order_of_the_scheme(scheme, low, way):
     """Steady flow by Bernoulli around the bump, before waves from the walls arrive."""
     q, end = 1.0, 1.5
     energy = 1.0 + 0.5 * q * q / G
@@ -312,7 +312,7 @@ def test_water_swings_in_thackers_bowls_for_three_periods(kind, scheme):
 
 
 @pytest.mark.parametrize(("law", "coefficient"), [(MANNING, 0.03), (DARCY, 0.05)])
-def test_flow_down_a_slope_nears_the_normal_one(law, coefficient):
+def test_flow_down_a_slope_approaches_the_normal_flow(law, coefficient):
     """U tanh(g S t / U) in the middle of a long channel, with U = h^(2/3) sqrt(S) / n or sqrt(8 g h S / f)."""
     tilt, h, end = 0.01, 1.0, 60.0
     x = even(240, 1200.0)

@@ -134,7 +134,7 @@ def test_shallow_water_on_a_cart_swings_by_the_tangent_law():
     assert frequencies(case_of(body, tank(level=depth)))[0] == pytest.approx(truth, rel=1e-3)
 
 
-def test_in_a_cylinder_that_turns_water_swings_as_in_one_that_does_not(tmp_path):
+def test_in_a_rotating_cylinder_water_oscillates_as_in_a_fixed_cylinder(tmp_path):
     rate = 0.4
     basin = tank(at=[-0.3, 0.2, 0.0], mesh={"file": disc(tmp_path / "disc.msh")})
     del basin["size"], basin["cells"]
@@ -163,7 +163,7 @@ def test_water_that_is_level_in_a_tank_that_leans_rests(method):
     assert np.ptp(result["hull.joint_tx"]) < 1e-9 * abs(result["hull.joint_tx"][0])
 
 
-def test_a_free_tank_on_rails_keeps_its_momentum():
+def test_a_free_tank_on_rails_conserves_its_momentum():
     body = hull({"kind": "prismatic", "axis": [1, 0, 0], "rate": 0.3, "stiffness": 0.0}, 50.0)
     push = {"type": "force", "from": "world.o", "to": "hull", "direction": [1, 0, 0],
             "force": {"time": [0.0, 0.2, 0.2 + 1e-9], "value": [60.0, 60.0, 0.0]}}  # fmt: skip
@@ -186,7 +186,7 @@ def test_a_free_tank_on_rails_keeps_its_momentum():
     assert momentum(last) == pytest.approx(momentum(first), rel=1e-12)
 
 
-def test_energy_is_kept_to_the_order_of_the_method():
+def test_energy_is_conserved_to_the_order_of_the_method():
     body = hull({"kind": "revolute", "axis": [0, 1, 0], "stiffness": 3e4, "angle": 0.1})
     lost = []
     for step in (0.02, 0.01):
@@ -212,7 +212,7 @@ def test_modes_lie_on_cells_where_water_is_shallow_and_waves_small():
     assert np.abs(found[probes[1]] - fine[probes[1]]).max() < 0.03 * force
 
 
-def test_check_says_when_shallow_water_is_not_the_rung_and_a_run_when_modes_are_not():
+def test_check_warns_where_shallow_water_is_no_valid_model_and_a_run_where_modes_are_not():
     deep, shallow = (model_of(case_of(hull({"kind": "fixed"}), tank(level=level, sloshing="cells"),
                                         numerics={"method": "ssp-rk3", "courant": 0.5} ))
                      for level in (DEPTH, 0.05))  # fmt: skip
@@ -237,7 +237,7 @@ def test_a_body_that_falls_freely_ends_by_name_for_its_water_has_no_weight_left(
     assert still.ok
 
 
-def test_weight_that_a_lift_adds_is_told_of_modes_which_do_not_feel_it():
+def test_weight_that_a_lift_adds_is_noted_for_modes_that_neglect_it():
     told = []
     for share in (0.05, 0.5):
         travel = {"start": -2.0, "duration": 4.0, "value": [0.0, -8.0 * share * GRAVITY], "exponent": 2}
@@ -272,7 +272,7 @@ def test_depth_is_level_at_the_start_however_suddenly_its_body_is_let_go():
         ({"patches": {"out": {"side": "west", "boundary": "open"}}}, "nodes.b.patches.out.boundary", "only with walls"),
     ],
 )
-def test_what_modes_do_not_know_is_named(change, place, said):
+def test_features_that_modes_do_not_support_are_named(change, place, said):
     basin = {key: value for key, value in {**tank(), **change}.items() if value is not None}
     with pytest.raises(CaseError) as error:
         load(case_of(hull({"kind": "fixed"}), basin))

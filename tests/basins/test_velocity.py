@@ -68,7 +68,7 @@ def test_flows_by_name_are_the_integrals_of_their_velocity_and_leave_no_divergen
     assert np.all(divergence(mixed, flows) == 0.0)
 
 
-def test_names_say_in_one_line_what_they_are():
+def test_names_describe_themselves_in_a_single_line():
     for function in EXPRESSIONS.values():
         assert function.__doc__ and "\n" not in function.__doc__
 
@@ -130,7 +130,7 @@ def test_a_stream_function_from_a_file_leaves_no_divergence(tmp_path, mixed):
     ],
 )
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-def test_velocities_that_cannot_be_had_are_refused_with_what_is_wanted(velocity, words):
+def test_velocities_that_are_impossible_are_refused_with_the_expected_form(velocity, words):
     with pytest.raises(ValueError, match=words):
         face_flows(rectangle((1.0, 1.0), (4, 3)), velocity)
 
@@ -182,7 +182,7 @@ def carrying(velocity, mesh=None, **more) -> dict:
 
 
 @pytest.mark.parametrize("key", ["u", "level"])
-def test_what_is_carried_starts_from_no_flow_of_its_own(key):
+def test_an_advected_scalar_starts_without_a_flow_of_its_own(key):
     case = carrying({"stream": "sin(pi*x)*sin(pi*y)"}, size=[1.0, 1.0], cells=[4, 4], start={key: 1.0})
     with pytest.raises(CaseError, match=f'start.{key}: does not apply to physics "transport"'):
         fvsolve.load(case)

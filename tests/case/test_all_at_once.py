@@ -82,7 +82,7 @@ def faults(*paths: tuple) -> set[tuple[str, str]]:
     return set()
 
 
-def test_one_fault_in_each_section_is_one_fault_each_and_all_come_at_once() -> None:
+def test_a_fault_in_each_section_gives_a_message_each_and_all_come_at_once() -> None:
     alone = [faults(path) for path in ODD]
     assert [len(one) for one in alone] == [1] * len(ODD)
     assert faults(*ODD) == set().union(*alone)
@@ -94,7 +94,7 @@ def test_no_fault_hides_or_makes_another(first: tuple) -> None:
         assert faults(first, other) == faults(first) | faults(other), other
 
 
-def test_faults_that_follow_from_another_are_not_told() -> None:
+def test_faults_that_follow_from_another_are_not_reported() -> None:
     case = whole()
     case["nodes"]["gate"]["type"] = "juncton"  # links, probes, claims and limits refer to it
     case["links"]["main"]["diameter"] = "3 kg"  # pieces, routes, a limit and elevations use it
@@ -120,7 +120,7 @@ def keys_of(table: Any, above: tuple = ()) -> Iterator[tuple]:
 
 
 @pytest.mark.parametrize("name", ["pumping-main", "plastic-main", "bend-force", "basin-draining", "closed-cylinder"])
-def test_whatever_is_no_value_is_told_where_it_stands_and_nowhere_else(name: str) -> None:
+def test_every_invalid_value_is_reported_at_its_own_place_only(name: str) -> None:
     base = tomllib.loads((DOCS.parent / "cases" / f"{name}.toml").read_text(encoding="utf-8"))
     for path in keys_of(base):
         case = copy.deepcopy(base)
@@ -136,7 +136,7 @@ def test_whatever_is_no_value_is_told_where_it_stands_and_nowhere_else(name: str
             assert all(one.startswith(own) or own.startswith(f"{one}.") for one in places), (own, str(error))
 
 
-def test_an_exact_solution_without_a_viscosity_says_so() -> None:
+def test_an_exact_solution_without_a_viscosity_is_refused_with_the_reason() -> None:
     case = tomllib.loads((DOCS.parent / "cases" / "laminar-line.toml").read_text(encoding="utf-8"))
     del case["fluid"]["viscosity"]
     case["nodes"]["valve"]["demand"] = {"time": [0.0, 1.0, 2.0], "value": [1e-5, 1e-5, 0.0], "kind": "smooth"}

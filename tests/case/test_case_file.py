@@ -31,7 +31,7 @@ def scene(tmp_path):
     return path
 
 
-def test_what_the_design_says_is_what_the_case_holds(scene):
+def test_the_text_of_the_design_is_read_into_the_case(scene):
     case = load(scene)
     assert (case.name, case.path, case.schema) == ("scene", scene, 1)
     assert (case.ambient_pressure, case.gravity) == (101325.0, 9.80665)
@@ -187,7 +187,7 @@ def test_wave_speed_and_cells(tmp_path):
     assert (alike.links["main"].cells, alike.links["stiff"].cells) == (100, 8)  # equal travel times of cells
 
 
-def test_the_resolved_case_says_the_same(tmp_path):
+def test_the_resolved_case_describes_the_same_case(tmp_path):
     case = load(dressed(tmp_path))
     there = tmp_path / "run"
     there.mkdir()
@@ -200,7 +200,7 @@ def test_the_resolved_case_says_the_same(tmp_path):
     assert again != load(case, set={"gravity": 9.8})
 
 
-def test_a_dict_says_what_the_file_says(scene):
+def test_a_dict_and_its_file_give_equal_cases(scene):
     given = tomllib.loads(DETAILED)
     case = load(given)
     assert case == load(scene) and case.path is None and case.name == "case"
@@ -275,7 +275,7 @@ def test_a_ramp_without_duration_is_a_jump():
     assert load(load(given).table()) == load(given)
 
 
-def test_one_point_is_a_constant():
+def test_a_single_point_is_a_constant():
     given = two_tanks()
     given["links"]["hole"]["opening"] = {"time": [3], "value": [0.5]}
     assert load(given).links["hole"].opening.constant
@@ -296,7 +296,7 @@ def test_every_size_of_a_valve_passes_the_flow_it_names(size, flow):
     assert load(given).links["hole"].flow_area() * np.sqrt(2 * 1e5 / 1000) == approx(flow, rel=1e-12)
 
 
-def test_what_the_schema_refers_to_is_what_it_says_unshared():
+def test_references_of_the_schema_have_unshared_meanings():
     """All references of the schema are defined and expand to the full schema, and its text reads back as the schema."""
     made, defs, unshared = schema(), schema()["$defs"], full_schema()
 
@@ -331,7 +331,7 @@ def test_a_parts_key_is_documented_with_its_unit():
     assert made["anyOf"][-1] == {"required": ["validation"]}
 
 
-def test_the_schema_wants_links_but_beside_a_basin_or_a_body():
+def test_the_schema_requires_links_except_with_a_basin_or_a_body():
     """`load` requires links on this condition, so editors report no fault in the shipped cases."""
     made = schema()
     assert made["if"]["required"] == ["nodes"] and made["if"]["not"] == {"required": ["controls"]}

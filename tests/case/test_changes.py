@@ -57,7 +57,7 @@ def start(model) -> list[bytes]:
     return [model.start.tobytes(), tables.nodes["pressure"].tobytes(), *flows, *profile]
 
 
-def found_class(before, after) -> str:
+def observed_class(before, after) -> str:
     if form(before) != form(after):
         return "shape"
     return "value" if start(before) == start(after) else "profile"
@@ -99,7 +99,7 @@ class Trial:
         values = others(table, keys, value, self.every)
         for to in () if self.every and said == SHAPE else reversed(values) if self.every else values:
             try:
-                found = found_class(before, fvsolve.build(fvsolve.load(moved(table, keys, to))))
+                found = observed_class(before, fvsolve.build(fvsolve.load(moved(table, keys, to))))
             except FvsolveError:
                 continue
             place = f"{name}: {spoken(keys)}"
@@ -119,11 +119,11 @@ class Trial:
 
 
 @pytest.fixture(autouse=True)
-def beside_their_files(monkeypatch):
+def in_folder_of_cases(monkeypatch):
     monkeypatch.chdir(CASES)
 
 
-def test_a_key_changes_no_more_than_it_says_and_each_that_says_shape_does():
+def test_a_key_changes_no_more_than_declared_and_each_key_of_shape_does():
     """Each kind of key in one case; a test below takes two cases."""
     trial = Trial(every=False)
     for name in NAMES:
@@ -134,7 +134,7 @@ def test_a_key_changes_no_more_than_it_says_and_each_that_says_shape_does():
     assert len(trial.names) > 100
 
 
-def test_keys_that_no_shipped_case_gives_change_no_more_than_they_say():
+def test_keys_of_no_shipped_case_change_no_more_than_declared():
     trial = Trial(every=False)
     trial.case("others", OTHERS)
     trial.case("dyed", DYED)
@@ -149,7 +149,7 @@ def test_losses_alike_are_another_shape_where_a_pipe_joins():
     before = fvsolve.build(fvsolve.load(case))
     for key, other in (("loss_in", 1.5), ("loss_out", 1.0)):
         after = fvsolve.build(fvsolve.load(moved(case, ("nodes", "tank", "connection", key), other)))
-        assert found_class(before, after) == "shape" == changes(before.case, f"nodes.tank.connection.{key}")
+        assert observed_class(before, after) == "shape" == changes(before.case, f"nodes.tank.connection.{key}")
 
 
 def test_a_regulating_valve_that_acts_at_once_is_another_shape():
@@ -166,10 +166,10 @@ def test_a_regulating_valve_that_acts_at_once_is_another_shape():
     case = scene(nodes, links, 1.0, {"pipe_model": "quasi-steady"})
     after = fvsolve.build(fvsolve.load(moved(case, ("links", "v", "time_constant"), 0.0)))
     before = fvsolve.build(fvsolve.load(case))
-    assert found_class(before, after) == "shape" == changes(before.case, "links.v.time_constant")
+    assert observed_class(before, after) == "shape" == changes(before.case, "links.v.time_constant")
 
 
-def test_no_key_of_any_shipped_case_changes_more_than_it_says():
+def test_no_key_of_any_shipped_case_changes_more_than_declared():
     """The start of load-sensing takes 0.2 s; its keys are changed by the test above."""
     trial = Trial(every=True)
     for name in NAMES:
@@ -178,7 +178,7 @@ def test_no_key_of_any_shipped_case_changes_more_than_it_says():
     assert trial.wrong == []
 
 
-def test_what_a_key_changes_depends_on_the_case_where_its_part_says_so():
+def test_effect_of_a_key_depends_on_the_case_where_its_part_states_so():
     """Classes depend on stated cells, on the target of a signal, and on unsteady friction."""
     case = fvsolve.load("valve-closure")
     for key, said in {

@@ -223,7 +223,7 @@ def with_block(**keys):
         ),
     ],
 )  # fmt: skip
-def test_a_fault_of_a_block_has_one_message_with_its_remedy(changes, message):
+def test_a_fault_of_a_block_has_a_message_with_its_remedy(changes, message):
     assert matches(only_fault(changes), message)
 
 
@@ -254,7 +254,7 @@ def test_the_unit_of_a_setpoint_is_that_of_the_block_that_it_follows():
     assert matches(text, 'controls.outer.unit: "bar" is a pressure; expected a level*')
 
 
-def test_one_control_cannot_drive_keys_of_unlike_units():
+def test_a_control_cannot_drive_keys_of_unlike_units():
     town = {"nodes.town.head": {"control": "level"}, "controls.level.limits": [0, 1]}
     text = "controls.level: drives a head and a number; expected keys of one unit, or a block for each"
     assert only_fault(town) == text
@@ -264,7 +264,7 @@ def test_one_control_cannot_drive_keys_of_unlike_units():
     )
 
 
-def test_one_control_may_drive_several_keys_of_one_unit():
+def test_a_control_may_drive_several_keys_of_equal_units():
     fvsolve.build(fvsolve.load(edited(LEVEL, {"links.outlet.opening": {"control": "level"}})))
 
 
@@ -293,7 +293,7 @@ def test_a_schedule_names_a_control_that_exists(value, place, message):
     assert matches(only_fault({"links.inlet.opening": value}), f"links.inlet.{place}: {message}")
 
 
-def test_without_controls_the_message_says_so():
+def test_without_controls_the_message_names_their_absence():
     text = 'links.inlet.opening.control: no control named "level"; [controls] has none'
     assert only_fault({"controls": GONE}) == text
 
@@ -395,7 +395,7 @@ def test_a_cascade_starts_balanced():
         ({"controls.level": LAG | {"denominator": [1, 0]}}, ": the input is 4 m, but not 0"),
     ],
 )
-def test_a_loop_without_balance_asks_for_its_initial_output(changes, state):
+def test_a_loop_without_balance_requires_its_initial_output(changes, state):
     text = (
         f"controls.level: no output of level balances the start{state}; give the key `initial`, the output at the start"
     )
@@ -505,7 +505,7 @@ def test_a_pressure_dependent_demand_follows_a_control_with_limits():
 
 
 @pytest.mark.parametrize("text, key", [(BASIN, "nodes.flume.patches.paddle.travel"), (BODY, "nodes.arm.joint.angle")])
-def test_what_moves_a_wall_or_a_joint_follows_no_control(text, key):
+def test_a_moving_wall_or_joint_follows_no_control(text, key):
     found = only_fault({"controls.a": CONSTANT, key: {"control": "a"}}, text)
     assert found.startswith(f"{key}: cannot follow a control, because the motion needs its slopes; expected a schedule")
 
@@ -662,7 +662,7 @@ def test_a_formula_within_the_range_of_its_key_is_legal(formula):
         ({"input": "tower.level"}, 'input: unknown key; did you mean "inputs"?'),
     ],
 )  # fmt: skip
-def test_a_fault_of_a_function_has_one_message(keys, message):
+def test_a_fault_of_a_function_has_a_message(keys, message):
     found = [text for text in faults({"controls.level": FUNCTION | keys}) if "h is unknown" not in text]
     assert len(found) == 1
     assert matches(found[0], f"controls.level.{message}")
@@ -711,7 +711,7 @@ def test_a_derivative_time_is_0_or_above():
         ({"denominator": [1, "1 s"]}, 'denominator[1]: "1 s" is a time; expected a number*'),
     ],
 )  # fmt: skip
-def test_a_fault_of_a_transfer_function_has_one_message(keys, message):
+def test_a_fault_of_a_transfer_function_has_a_message(keys, message):
     assert matches(only_fault({"controls.level": LAG | keys}), f"controls.level.{message}")
 
 
@@ -726,7 +726,7 @@ def test_a_fault_of_a_transfer_function_has_one_message(keys, message):
         ([3, 5], ["1 m", 0], 'output[0]: "1 m" is a length; expected a number*'),
     ],
 )
-def test_a_fault_of_a_table_has_one_message(inputs, outputs, message):
+def test_a_fault_of_a_table_has_a_message(inputs, outputs, message):
     changes = {"controls.level": TABLE | {"table": {"input": inputs, "output": outputs}}}
     assert matches(only_fault(changes), f"controls.level.table.{message}")
 

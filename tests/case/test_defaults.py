@@ -65,7 +65,7 @@ def spelled_out():
     return {"one": common | one, "two": common | two}
 
 
-def test_defaults_are_as_if_every_pipe_had_said_them(file):
+def test_defaults_equal_keys_in_every_pipe(file):
     case = load(file())
     nodes = {"lake": lake(50), "mid": junction(), "end": junction(0.01)}
     other = load(scene(nodes, spelled_out(), 1.0, {}, gravity=9.80665, ambient_pressure=101325.0))

@@ -685,7 +685,7 @@ def test_a_dict_that_cannot_start_has_faults_without_lines():
         run(tomllib.loads(SHUT))
 
 
-def test_a_study_is_no_case_and_says_what_runs_it(tmp_path):
+def test_a_study_is_no_case_and_names_its_command(tmp_path):
     (tmp_path / "plan.toml").write_text('case = "main.toml"\n[events.trip.links.pump]\ntrip = 1\n')
     refused(tmp_path / "plan.toml", "1 fault\n  is a study of a case; fvsolve study plan.toml runs it")
 

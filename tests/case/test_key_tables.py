@@ -23,7 +23,7 @@ def test_every_part_has_a_table_on_the_page_and_every_table_a_row_a_key():
     ]
 
 
-def test_what_holds_where_a_key_is_left_out_has_a_column():
+def test_defaults_of_keys_have_a_column():
     rows = key_table("accumulator").splitlines()
     assert "| `initial_pressure` | Pa | that of the steady state | profile | gas pressure at the start |" in rows
     words = "polytropic exponent n in p V^n: 1 isothermal, 1.4 adiabatic air"
@@ -38,6 +38,6 @@ def test_writing_a_page_leaves_its_prose_alone(tmp_path):
     assert (before, after) == ("Before.\n\n<!-- keys: frame -->\n", "<!-- end -->\n\nAfter.\n") and table
 
 
-def test_what_has_no_keys_is_named():
+def test_parts_without_keys_are_named():
     with pytest.raises(FvsolveError, match='unknown table of keys "vlave"; did you mean "valve"'):
         key_table("vlave")

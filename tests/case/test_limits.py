@@ -67,7 +67,7 @@ def judged(case: dict) -> dict:
 
 
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_planted_exceedance_is_found_at_its_chainage_and_time(turned: bool) -> None:
+def test_a_planted_exceedance_is_located_at_its_chainage_and_time(turned: bool) -> None:
     routes = {"line": {"pipes": ["low", "high"], "start": "5 km"}}
     limits = {"top": {"on": "line", "maximum": "14 bar"}, "vacuum": {"on": "pipes", "minimum": "vacuum"}}
     found = judged(shut(turned, routes=routes, limits=limits))
@@ -114,7 +114,7 @@ def test_among_the_nodes_a_reservoir_is_not_judged() -> None:
     assert judged(case)["low"].value == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_same_limit_said_in_other_words_has_the_same_verdict() -> None:
+def test_the_same_limit_in_other_words_has_the_same_verdict() -> None:
     level = HEAD + JUMP / (RHO * GRAVITY) - 20.0 - 1.0  # 1 m below the greatest pressure head at the gate
     gauge = RHO * GRAVITY * level
     limits = {
@@ -139,7 +139,7 @@ def test_the_same_limit_said_in_other_words_has_the_same_verdict() -> None:
     assert shown["gauge"].value == pytest.approx(found["gauge"].value / 6894.757293168)
 
 
-def test_velocity_is_limited_in_both_directions_and_flow_in_one() -> None:
+def test_velocity_is_limited_in_both_directions_and_flow_in_a_single_direction() -> None:
     limits = {"fast": {"on": "pipes", "quantity": "velocity", "maximum": 0.49},
               "slow": {"on": "pipes", "quantity": "velocity", "maximum": 0.51},
               "back": {"on": "low", "quantity": "flow", "minimum": -0.3 * area(DIAMETER)}}  # fmt: skip
@@ -151,7 +151,7 @@ def test_velocity_is_limited_in_both_directions_and_flow_in_one() -> None:
     assert not ahead["back"].ok and not back["back"].ok
 
 
-def test_a_limit_that_is_just_met_holds_and_every_one_of_two_bounds_counts() -> None:
+def test_a_limit_that_is_just_reached_holds_and_both_bounds_count() -> None:
     top = AMBIENT + RHO * GRAVITY * (HEAD - 20.0) + JUMP
     low = AMBIENT + RHO * GRAVITY * (HEAD - 20.0) - JUMP
     for least, greatest, ok, bound in ((low, top, True, None), (low + 1.0, top + 9.0, False, "minimum"),
@@ -181,7 +181,7 @@ def test_no_row_is_needed_to_find_it(method: str, law: str) -> None:
 
 
 @pytest.mark.parametrize("method", ["rodas-5p", "dormand-prince", "radau-iia-9", "auto"])
-def test_what_lies_between_long_steps_is_judged_by_rows(method: str) -> None:
+def test_extremes_between_long_steps_are_judged_by_rows(method: str) -> None:
     """Two tanks oscillate about 2.5 m through a column at rtol 1e-3, in few steps per period, up to a level of 3 m."""
     column = {"type": "rigid-column", "from": "a", "to": "b", "length": 100.0, "diameter": 0.5}
     tanks = {name: {"type": "tank", "area": 2.0, "level": level} for name, level in (("a", 3.0), ("b", 2.0))}
@@ -229,7 +229,7 @@ def test_where_numbers_are_not_to_be_trusted_no_limit_holds(fvs, tmp_path, monke
     assert found.ok and [one.ok for one in found.verdicts] == [False, False] and found.verdicts[0].margin > 0.0
 
 
-def test_what_goes_on_after_the_end_is_noted_and_nothing_is_sized_by_it(fvs, tmp_path, monkeypatch) -> None:
+def test_events_after_the_end_are_noted_and_size_nothing(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     case = shut(limits={"top": {"on": "pipes", "maximum": "14 bar"}})
     flow = VELOCITY * area(DIAMETER)
@@ -296,7 +296,7 @@ def test_expect_reaches_whole_pipes_and_routes() -> None:
         (3.0, "", "is not a table"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_named(limit, place: str, told: str) -> None:
+def test_faults_are_named(limit, place: str, told: str) -> None:
     error = refused(shut(limits={"one": limit}))
     assert told in str(error)
     assert f"limits.one{'.' if place else ''}{place}" in str(error)
@@ -356,7 +356,7 @@ def test_a_route_runs_through_pumps_and_valves_and_against_its_pipes() -> None:
     assert fvsolve.load(found.table()) == found
 
 
-def test_a_route_is_one_table_with_a_running_chainage(tmp_path) -> None:
+def test_a_route_is_a_single_table_with_a_continuous_chainage(tmp_path) -> None:
     case = shut(
         turned=True, routes={"line": {"pipes": ["low", "high"], "start": "5 km"}}, output={"units": {"head": "ft"}}
     )
@@ -461,7 +461,7 @@ def test_a_value_that_is_no_number_never_holds(wrong: float, bounds: dict) -> No
     assert states == {"open"} or not math.isnan(wrong)
 
 
-def test_a_place_that_is_passed_fails_beside_one_that_is_not_known() -> None:
+def test_a_known_exceedance_fails_also_next_to_an_unknown_place() -> None:
     rows = [{"name": "a", "quantity": "head", "until": 1.0, "state": state, "margin": margin, "bound": "minimum"}
             for state, margin in (("holds", 1.0), ("open", None), ("fails", -2.0))]  # fmt: skip
     assert verdict(rows)["state"] == "fails" and verdict(rows[:2])["state"] == "open"
@@ -537,7 +537,7 @@ def test_a_claim_of_values_before_it_holds_or_fails() -> None:
     assert [one.state for one in result.expectations] == ["holds", "fails", "holds", "holds", "fails"]
 
 
-def test_the_command_says_which_and_why(fvs, tmp_path, monkeypatch) -> None:
+def test_the_command_names_the_failed_limits_with_reasons(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(write(marked(expect={"final(gate.head)": WIDE})))
     status, text, _ = fvs("run", "scene.toml", "--no-pictures")

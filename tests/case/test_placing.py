@@ -20,7 +20,7 @@ def part(start: str, end: str, low: float, high: float) -> dict:
                 profile={"chainage": [low, *inner, high], "elevation": z}) | {"from": start, "to": end}  # fmt: skip
 
 
-def by_hand() -> dict:
+def divided_pipe() -> dict:
     cuts = [1000.0, 1500.0, 2200.0, 2950.0, 3500.0, 4000.0]
     names = [("lake", "a"), ("b", "top"), ("top", "c"), ("c", "d"), ("d", "gate")]
     pipes = {f"p{k}": part(*names[k], cuts[k], cuts[k + 1]) for k in range(5)}
@@ -32,8 +32,8 @@ def by_hand() -> dict:
     return line(nodes, links)
 
 
-def test_it_is_the_pipe_that_is_cut_by_hand() -> None:
-    one, other = fvsolve.run(placed()), fvsolve.run(by_hand())
+def test_the_pipe_equals_a_pipe_divided_manually() -> None:
+    one, other = fvsolve.run(placed()), fvsolve.run(divided_pipe())
     for probe in one.probes:
         assert np.allclose(one[probe], other[probe], rtol=1e-10), probe
     assert [leg for leg in one.routes] == ["main"]
@@ -163,7 +163,7 @@ def test_probes_count_along_the_whole_pipe() -> None:
         (("main", "friction", {"model": "steady"}), "links.main.friction"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_named_once(change, told: str) -> None:
+def test_each_fault_is_named_once(change, told: str) -> None:
     case = placed()
     name, key, value = change
     case["links"][name][key] = value
@@ -174,13 +174,13 @@ def test_what_is_wrong_is_named_once(change, told: str) -> None:
     assert len(error.faults) == 1
 
 
-def test_one_of_two_nodes_at_one_place_is_left_out() -> None:
+def test_two_nodes_at_a_place_become_a_single_node() -> None:
     nodes = {name: {"type": "junction", "on": "main", "at": 2500.0} for name in ("spot", "stop")}
     refused(line(nodes, {"main": main()}), "spot has the same place; leave out spot or stop, or change `at`")
 
 
 @pytest.mark.parametrize("cells", [7, 8])
-def test_what_lies_in_the_middle_of_a_cell_goes_to_the_same_face_from_either_end(cells: int) -> None:
+def test_a_part_in_the_middle_of_a_cell_goes_to_the_same_face_from_either_end(cells: int) -> None:
     said = {key: one for key, one in main(cells=cells).items() if key != "profile"}
     for k in range(cells):
         at = (k + 0.5) * LENGTH / cells
@@ -215,7 +215,7 @@ def test_names_are_given_once_and_pieces_are_there(change, told: str) -> None:
     assert told in str(refused(case))
 
 
-def test_what_cannot_stand_in_a_pipe_is_named() -> None:
+def test_parts_that_cannot_be_on_a_pipe_are_named() -> None:
     case = line({"m": {"type": "mass", "mass": 1.0, "on": "main", "at": 2000.0}}, {"main": main()})
     refused(case, "a mass cannot be placed on a pipe")
     case = line({}, {"main": main(), "second": main() | {"on": "main", "at": 2000.0}})

@@ -151,12 +151,12 @@ def test_notes_of_ranges_reach_check_and_summary():
 
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
-def test_shipped_cases_are_within_what_practice_knows(path):
+def test_shipped_cases_are_within_ranges_of_practice(path):
     assert not [note.text for note in model_of(load(path)).warnings if note.kind == "range"]
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_examples_of_the_docs_are_within_what_practice_knows(name):
+def test_examples_of_the_docs_are_within_ranges_of_practice(name):
     try:
         raw = tomllib.loads(EXAMPLES[name])
     except tomllib.TOMLDecodeError:
@@ -314,7 +314,7 @@ def ladder(pipes: int) -> dict:
     return scenes.scene(nodes, links, 0.1, scenes.SMOOTH, output={"units": {"pressure": "barg", "velocity": "cm/s"}})
 
 
-def test_check_shows_what_stands_out_of_many_in_the_units_of_the_output(capsys):
+def test_check_shows_outliers_in_the_units_of_the_output(capsys):
     from fvsolve.cli import printing
     from fvsolve.cli.terminal import show
 

@@ -51,7 +51,7 @@ def test_keys_of_several_units_share_a_pattern_and_the_resolved_case_has_it():
     assert "factor = -0.004" in read.resolved()
 
 
-def test_a_wrong_factor_is_told_at_its_place():
+def test_a_wrong_factor_is_reported_at_its_place():
     faults = []
     for signal, form in (
         ({"signal": "day", "factor": "3 m"}, PATTERN), ({"signal": "day", "factor": "1 l/s"}, "sin(t)"),
@@ -96,7 +96,7 @@ def test_a_sum_is_the_table_of_the_added_values(kind):
         ({"sum": [{"signal": "loop"}]}, "sum[0].signal", "refers to another signal"),
     ],
 )
-def test_a_wrong_sum_is_told_at_its_place(given, place, message):
+def test_a_wrong_sum_is_reported_at_its_place(given, place, message):
     with pytest.raises(CaseError) as caught:
         fvsolve.load(filling(given, signals={"loop": {"sum": [{"signal": "loop"}]}} if "loop" in str(given) else {}))
     (fault,) = caught.value.faults
@@ -104,14 +104,14 @@ def test_a_wrong_sum_is_told_at_its_place(given, place, message):
 
 
 @pytest.mark.parametrize(("dimension", "one"), [("pressure", "1 barg"), ("temperature", "15 degC")])
-def test_values_whose_units_have_different_zeros_take_no_sum(dimension, one):
+def test_values_in_units_with_different_zeros_take_no_sum(dimension, one):
     with pytest.raises(ValueFault) as caught:
         Scheduled(dimension).read({"sum": [one, one]}, ReadContext())
     ((place, message),) = caught.value.faults
     assert place == ("sum",) and "takes no sum" in message
 
 
-def test_a_sum_out_of_range_is_told():
+def test_a_sum_out_of_range_is_reported():
     case = filling(0.01, signals={"day": PATTERN})
     case["links"]["gate"]["opening"] = {"sum": [{"signal": "day", "factor": 0.6}, 0.3]}
     with pytest.raises(CaseError, match=r"links.gate.opening.sum"):

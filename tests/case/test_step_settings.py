@@ -68,7 +68,7 @@ def test_the_file_is_refused(case, wanted):
     assert wanted in str(refused(case))
 
 
-def test_who_asks_for_error_control_is_told_who_can():
+def test_error_control_by_a_method_without_it_names_methods_with_it():
     error = refused(piped(method="trapezoid", rtol=1e-6))
     assert all(f'"{name}"' in str(error) for name in ABLE)
     with pytest.raises(FvsolveError) as said:
@@ -115,7 +115,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("f, y0, wanted", WRONG.values(), ids=WRONG)
-def test_integrate_refuses_what_is_no_equation(f, y0, wanted):
+def test_integrate_refuses_invalid_equations(f, y0, wanted):
     with pytest.raises(FvsolveError) as caught:
         integrate(f, y0, [0.0, 1.0])
     assert wanted in str(caught.value)
@@ -139,7 +139,7 @@ def test_no_tableau_takes_the_place_of_a_method_that_is_there(name):
         ({"method": "dormand-prince"}, ("dormand-prince", "courant", 0.9)),
     ],
 )
-def test_what_is_left_out_is_filled_in(numerics, found):
+def test_settings_left_out_get_defaults(numerics, found):
     filled = fvsolve.load(piped(**numerics)).numerics
     assert (filled.method, getattr(filled, found[1])) == (found[0], found[2])
 
@@ -152,7 +152,7 @@ def joined(volume: float, **numerics) -> dict:
     return scene(nodes, {"gate": valve("pool.out", "pot", 1e-4)}, 0.02, numerics, ["pot.pressure"], 1e-3)
 
 
-def test_check_says_what_explicit_steps_will_cost_and_not_of_the_remedy(tmp_path, fvs):
+def test_check_states_the_cost_of_explicit_steps_and_not_of_the_remedy(tmp_path, fvs):
     file = tmp_path / "joined.toml"
     file.write_text(write(joined(1e-6)))
     code, out, _ = fvs("check", file, "--json")
@@ -167,11 +167,11 @@ def test_check_says_what_explicit_steps_will_cost_and_not_of_the_remedy(tmp_path
 
 
 @pytest.mark.parametrize("given", [{"method": "rk4", "courant": 0.8}, {"method": "dormand-prince", "rtol": 1e-6}])
-def test_the_cost_is_told_for_all_explicit_control_and_not_where_waves_rule(given):
-    def told(volume):
+def test_the_cost_is_stated_for_all_explicit_control_and_not_where_waves_limit_the_step(given):
+    def cost_notices(volume):
         return [one for one in build(load(joined(volume, **given))).checks["warnings"] if one["kind"] == "cost"]
 
-    assert told(1e-6) and not told(1.0)
+    assert cost_notices(1e-6) and not cost_notices(1.0)
 
 
 TWO_TANKS = Path(fvsolve.__file__).parents[1] / "cases" / "two-tanks.toml"
@@ -215,7 +215,7 @@ def test_a_method_of_a_file_is_that_of_its_tableau(tmp_path):
     assert run.ok and np.array_equal(run["low.level"], same["low.level"])
 
 
-def test_the_run_directory_keeps_a_copy_and_runs_again_to_the_same_numbers(tmp_path, fvs):
+def test_the_run_directory_stores_a_copy_that_runs_again_to_the_same_numbers(tmp_path, fvs):
     case = placed(tmp_path / "there", file="methods/ssp43.txt", method="methods/ssp43.txt")
     fvs("run", str(case), "--out", str(tmp_path / "first"))
     assert (tmp_path / "first" / "ssp43.txt").read_text() == SSP43
@@ -240,11 +240,11 @@ def test_a_file_is_named_on_the_command_line_too(tmp_path, fvs):
         ("rk4.txt", SSP43, "rk4.txt", 'numerics.method.*"rk4" is not free'),
     ],
 )
-def test_what_a_file_lacks_is_a_fault_of_the_key(tmp_path, file, tableau, method, said):
+def test_missing_entries_of_a_file_are_a_fault_of_the_key(tmp_path, file, tableau, method, said):
     refused(placed(tmp_path, tableau, file, method), said)
 
 
-def test_two_files_of_one_name_are_not_one_method(tmp_path):
+def test_two_files_of_equal_names_are_different_methods(tmp_path):
     fvsolve.load(placed(tmp_path / "one"))
     fvsolve.load(placed(tmp_path / "copy"))  # with an equal tableau
     refused(placed(tmp_path / "two", HEUN_EULER), "another method already.*rename")
@@ -268,7 +268,7 @@ def test_a_chart_prints_a_line_that_the_case_accepts(tmp_path, inside):
     assert METHODS[fvsolve.load(case).numerics.method].order == 3
 
 
-def test_points_are_found_again_only_by_the_same_tableau(tmp_path):
+def test_stored_points_are_reused_only_for_the_same_tableau(tmp_path):
     from fvsolve.studies.result_cache import case_key
 
     case = fvsolve.load(placed(tmp_path, method="dormand-prince"))

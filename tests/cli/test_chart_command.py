@@ -14,7 +14,7 @@ def folder(tmp_path):
     return tmp_path / "out"
 
 
-def test_a_chart_leaves_table_and_both_pictures_and_says_what_the_default_costs(fvs, folder):
+def test_a_chart_leaves_table_and_both_pictures_and_states_the_cost_of_the_default(fvs, folder):
     code, said, _ = fvs("chart", "two-tanks", *GIVEN, "--target", "1e-3", "--out", folder)
     assert code == 0
     assert {path.name for path in folder.iterdir()} == {"chart.csv", "chart.png", "chart.svg", "points.jsonl"}
@@ -27,7 +27,7 @@ def test_a_chart_leaves_table_and_both_pictures_and_says_what_the_default_costs(
     assert "\nmethod = " in said and "\nrtol = " in said
 
 
-def test_json_is_one_object_with_every_point_unrounded(fvs, folder):
+def test_json_is_a_single_object_with_every_point_unrounded(fvs, folder):
     code, said, _ = fvs("chart", "chamber-and-orifice", *GIVEN, "--json", "--out", folder)
     found = json.loads(said)
     assert code == 0
@@ -69,7 +69,7 @@ def test_the_lines_that_are_printed_reach_the_target_when_run(fvs, folder, tmp_p
         (["--target", "-1e-3"], "--target: -0.001 is not a valid error"),
     ],
 )
-def test_what_is_asked_wrongly_is_named(fvs, folder, arguments, said):
+def test_invalid_requests_are_named(fvs, folder, arguments, said):
     code, out, error = fvs("chart", "two-tanks", *arguments, "--out", folder)
     assert (code, out) == (2, "")
     assert said in error

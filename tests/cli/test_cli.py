@@ -66,7 +66,7 @@ def case(tmp_path, monkeypatch):
     return "shut.toml"
 
 
-def test_run_tells_the_extremes_the_claims_and_the_files(case, fvs):
+def test_run_prints_the_extremes_the_claims_and_the_files(case, fvs):
     code, out, err = fvs("run", case)
     assert code == 0 and err == ""
     assert "A valve shuts" in out and "gate.pressure" in out and "holds: min(valve.flow)" in out
@@ -75,7 +75,7 @@ def test_run_tells_the_extremes_the_claims_and_the_files(case, fvs):
     assert fvsolve.open_run("runs/shut").ok
 
 
-def test_json_is_one_object_with_unrounded_numbers(case, fvs):
+def test_json_is_a_single_object_with_unrounded_numbers(case, fvs):
     code, out, err = fvs("run", case, "--json", "--out", "there")
     said = json.loads(out)
     assert code == 0 and err == ""
@@ -91,7 +91,7 @@ def test_several_cases_go_to_directories_of_their_own(case, fvs):
 
 
 @pytest.mark.parametrize("options", [("--out", "both"), ("--out", "both", "--force"), ()])
-def test_cases_that_would_write_one_directory_are_refused_before_any_runs(case, fvs, options):
+def test_cases_that_would_write_to_the_same_directory_are_refused_before_any_runs(case, fvs, options):
     for folder in ("n1", "n2"):
         Path(folder).mkdir()
         Path(folder, "main.toml").write_text(CASE)
@@ -113,12 +113,12 @@ def test_set_overrides_any_key(case, fvs):
     assert written.links["main"].length == 500.0 and written.links["main"].friction.model == "none"
 
 
-def test_set_without_a_value_says_what_was_wanted(case, fvs):
+def test_set_without_a_value_names_the_expected_form(case, fvs):
     code, out, err = fvs("run", case, "--set", "links.main.cells")
     assert code == 2 and out == "" and "expected KEY=VALUE" in err
 
 
-def test_all_bad_settings_are_said_at_once(case, fvs):
+def test_all_bad_settings_are_reported_at_once(case, fvs):
     settings = ["nope", "links.mian.cells=4", "=3", "numeric.end=4", "links.main.cells=many"]
     code, out, err = fvs("check", case, *(f"--set={one}" for one in settings))
     assert code == 2 and out == "" and "shut.toml: 5 faults" in err
@@ -129,7 +129,7 @@ def test_all_bad_settings_are_said_at_once(case, fvs):
     assert code == 2 and "shut.toml: 1 fault\n  --set nope: expected KEY=VALUE" in err
 
 
-def test_a_case_that_cannot_start_says_where(case, fvs):
+def test_a_case_that_cannot_start_names_the_place(case, fvs):
     line = CASE.splitlines().index("[links.main]") + 1
     for command in ("run", "check"):
         code, out, err = fvs(command, case, "--set", "nodes.gate.type=reservoir", "--set", "nodes.gate.head=1 m")
@@ -172,7 +172,7 @@ def test_a_missing_file_is_named_and_a_near_case_suggested(case, fvs):
     assert code == 2 and f'did you mean "{name}"' in err
 
 
-def test_check_says_what_was_understood(case, fvs):
+def test_check_shows_the_interpretation(case, fvs):
     code, out, _ = fvs("check", case)
     assert code == 0
     assert all(word in out for word in ("main", "1200", "lake", "gate", "Reynolds", "step"))
@@ -304,7 +304,7 @@ def wait_for_a_checkpoint(path: Path, running: subprocess.Popen) -> None:
         time.sleep(0.01)
 
 
-def test_an_epanet_file_is_told_from_a_case(fvs, tmp_path):
+def test_an_epanet_file_is_distinguished_from_a_case(fvs, tmp_path):
     path = tmp_path / "pump.inp"
     path.write_text("[TITLE]\nA town\n\n[JUNCTIONS]\na 10 5\n[END]\n")
     for command in ("run", "check"):
@@ -313,7 +313,7 @@ def test_an_epanet_file_is_told_from_a_case(fvs, tmp_path):
         assert code == 2 and "an EPANET network" in said and "fvsolve import" in said
 
 
-def test_a_case_beside_the_mesh_it_comes_with_is_copied_and_another_mesh_is_kept(fvs, tmp_path, monkeypatch):
+def test_a_case_is_copied_next_to_its_mesh_and_another_mesh_stays(fvs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert fvs("new", "flooding", "one.toml")[0] == 0
     code, out, _ = fvs("new", "flooding", "two.toml")

@@ -41,14 +41,14 @@ def case(tmp_path):
 
 
 @pytest.fixture
-def told(monkeypatch, fvs, tmp_path):
+def energy_command(monkeypatch, fvs, tmp_path):
     """Function that runs `fvsolve energy` in a temporary folder: (exit code, standard output, standard error)."""
     monkeypatch.chdir(tmp_path)
     return partial(fvs, "energy")
 
 
-def test_the_ledger_is_printed_and_written_row_by_row(told, case, tmp_path):
-    code, out, _ = told(case, "--port", "lake")
+def test_the_ledger_is_printed_and_written_row_by_row(energy_command, case, tmp_path):
+    code, out, _ = energy_command(case, "--port", "lake")
     assert code == 0
     assert "passive over this run" in out
     assert "the numerical method dissipates energy" in out
@@ -67,8 +67,8 @@ def test_the_ledger_is_printed_and_written_row_by_row(told, case, tmp_path):
     assert (folder / "energy.svg").read_text().startswith("<?xml")
 
 
-def test_its_json_has_the_documented_keys_and_nothing_beside_it(told, case):
-    code, out, err = told(case, "--json", "--port", "gate")
+def test_its_json_has_exactly_the_documented_keys(energy_command, case):
+    code, out, err = energy_command(case, "--json", "--port", "gate")
     said = json.loads(out)
     assert (code, err) == (0, "")
     page = folders.page("energy")
@@ -80,8 +80,8 @@ def test_its_json_has_the_documented_keys_and_nothing_beside_it(told, case):
     assert set(said["at_start"]) == {"main"}
 
 
-def test_pairs_are_run_and_tabled(told, case, tmp_path):
-    code, out, _ = told(case, "--scheme", "upwind,upwind5", "--method", "ssp-rk3,euler", "--json")
+def test_pairs_are_run_and_tabled(energy_command, case, tmp_path):
+    code, out, _ = energy_command(case, "--scheme", "upwind,upwind5", "--method", "ssp-rk3,euler", "--json")
     rows = json.loads(out)["pairs"]
     assert code == 0
     assert [(row["scheme"], row["method"]) for row in rows] == [
@@ -90,18 +90,18 @@ def test_pairs_are_run_and_tabled(told, case, tmp_path):
     assert (tmp_path / "runs" / "hammer.energy" / "pairs.csv").read_text().count("\n") == 5
     kept = tmp_path / "runs" / "hammer.energy" / "points.jsonl"
     before = kept.read_text()
-    code, out, _ = told(case, "--method", "euler", "--scheme", "upwind5")
+    code, out, _ = energy_command(case, "--method", "euler", "--scheme", "upwind5")
     assert kept.read_text() == before
     assert "create energy in this run: upwind5 with euler" in out
 
 
-def test_without_a_case_it_says_what_schemes_and_methods_claim(told):
-    code, out, _ = told("--scheme", "upwind,fromm,upwind5", "--method", "euler,gauss-4", "--json")
+def test_without_a_case_it_prints_claims_of_schemes_and_methods(energy_command):
+    code, out, _ = energy_command("--scheme", "upwind,fromm,upwind5", "--method", "euler,gauss-4", "--json")
     said = json.loads(out)
     assert code == 0
     assert {one["scheme"]: one["passive"] for one in said["schemes"]} == {
         "upwind": True, "fromm": True, "upwind5": False}  # fmt: skip
-    code, out, _ = told("--scheme", "upwind,fromm,upwind5", "--method", "euler,gauss-4")
+    code, out, _ = energy_command("--scheme", "upwind,fromm,upwind5", "--method", "euler,gauss-4")
     assert "create energy at every step size: fromm with euler" in out
     assert "schemes that create energy at pipe ends with every method, up to the gain above: upwind5" in out
 
@@ -114,8 +114,8 @@ def test_without_a_case_it_says_what_schemes_and_methods_claim(told):
         (["--method", "rk5"], 'no method named "rk5"'), (["--set", "nodes.lake.hed=3"], "unknown key"),
     ],
 )  # fmt: skip
-def test_bad_input_is_named(told, case, arguments, fault):
-    code, out, err = told(case, *arguments)
+def test_bad_input_is_named(energy_command, case, arguments, fault):
+    code, out, err = energy_command(case, *arguments)
     assert code == 2
     assert fault in err
     assert not out
@@ -128,55 +128,55 @@ def tanks(tmp_path):
     return str(path)
 
 
-def test_methods_that_were_refused_are_given_no_verdict_and_a_way_out_that_works(told, tanks):
-    code, out, _ = told(tanks, "--method", "euler,rk4")
+def test_methods_that_were_refused_are_given_no_verdict_and_a_way_out_that_works(energy_command, tanks):
+    code, out, _ = energy_command(tanks, "--method", "euler,rk4")
     assert code == 2
     assert "weno5 with euler, weno5 with rk4: refused: numerics.method: each estimates no error" in out
     assert "no pair ran, so the creation of energy was not checked" in out
     assert "creates energy in this run" not in out
     way_out = out.partition("--set ")[2].split()[0]
-    code, out, _ = told(tanks, "--method", "euler,implicit-euler", "--set", way_out)
+    code, out, _ = energy_command(tanks, "--method", "euler,implicit-euler", "--set", way_out)
     assert code == 0
     assert "create energy in this run: weno5 with euler\n" in out
-    code, out, _ = told(tanks, "--method", "euler,auto")
+    code, out, _ = energy_command(tanks, "--method", "euler,auto")
     assert code == 0
     assert 'weno5 with euler: refused: numerics.method: method "euler" estimates no error' in out
     assert "none of the pairs that ran creates energy in this run" in out
-    code, out, _ = told(tanks, "--method", "euler", "--json")
+    code, out, _ = energy_command(tanks, "--method", "euler", "--json")
     assert code == 2
     assert "estimates no error" in json.loads(out)["pairs"][0]["reason"]
 
 
 @pytest.mark.parametrize("given", [["--port", "lake"], ["--set", "numerics.end=1"], ["--out", "there"]])
-def test_what_asks_about_a_run_is_refused_by_name_without_a_case(told, given):
-    code, out, err = told(*given)
+def test_options_about_a_run_are_refused_by_name_without_a_case(energy_command, given):
+    code, out, err = energy_command(*given)
     assert (code, out) == (2, "")
     assert err.startswith(f"{given[0]}: valid only with a case")
 
 
-def test_without_a_case_auto_is_said_to_be_several_methods(told):
-    code, _, err = told("--method", "auto")
+def test_without_a_case_auto_is_described_as_several_methods(energy_command):
+    code, _, err = energy_command("--method", "auto")
     assert code == 2
     assert "changes between dormand-prince and rodas-5p (radau-iia-5 below rtol 1e-06);" in err
 
 
-def test_a_case_without_ports_says_that_it_has_none(told, tanks):
-    code, _, err = told(tanks, "--port", "a")
+def test_a_case_without_ports_states_that_it_has_none(energy_command, tanks):
+    code, _, err = energy_command(tanks, "--port", "a")
     assert code == 2
     assert err.strip().endswith("expected a reservoir, an inflow or a junction; the case has no such node")
 
 
-def test_what_newton_leaves_is_told_beside_the_verdict(told, tmp_path):
+def test_the_residual_of_newton_is_printed_with_the_verdict(energy_command, tmp_path):
     pot = chamber(0.02, "5 barg")
     (tmp_path / "pot.toml").write_text(write(joined(reservoir("50 barg"), pot, 1e-6)))
     step = ["--set", "numerics.step=0.01", "--set", "numerics.end=5"]  # the chamber is full after 2 s
-    code, out, _ = told("pot.toml", "--set", "numerics.method=radau-iia-5", "--set", "numerics.rtol=1e-3")
+    code, out, _ = energy_command("pot.toml", "--set", "numerics.method=radau-iia-5", "--set", "numerics.rtol=1e-3")
     assert code == 0
     assert "J, of which Newton residuals cause " in out
-    code, out, _ = told("pot.toml", "--set", "numerics.method=gauss-4", *step)
+    code, out, _ = energy_command("pot.toml", "--set", "numerics.method=gauss-4", *step)
     assert code == 0
     assert "J: rounding" in out
-    code, out, _ = told("pot.toml", "--set", "numerics.method=rk4", *step)
+    code, out, _ = energy_command("pot.toml", "--set", "numerics.method=rk4", *step)
     assert "Newton" not in out
 
 
@@ -201,8 +201,8 @@ def test_ctrl_c_ends_with_130_and_promises_nothing_that_is_not_there(tanks, tmp_
     assert not (tmp_path / "runs" / "tanks.energy" / "points.jsonl").exists()
 
 
-def test_a_run_that_blows_up_is_shown_with_what_it_created(told, case):
-    code, out, _ = told(case, "--set", "numerics.courant=3", "--json")
+def test_a_run_that_blows_up_is_shown_with_its_created_energy(energy_command, case):
+    code, out, _ = energy_command(case, "--set", "numerics.courant=3", "--json")
     said = json.loads(out)
     assert code == 1
     assert "has grown to" in said["reason"]

@@ -30,7 +30,7 @@ TIME = {"euler": 1, "ssp-rk2": 2, "ssp-rk3": 3, "rk4": 4, "implicit-euler": 1, "
 
 
 @pytest.mark.parametrize(("method", "p"), TIME.items())
-def test_every_method_shows_its_order_in_time_on_one_grid(method, p):
+def test_every_method_shows_its_order_in_time_on_a_single_grid(method, p):
     points = pulses.FINE if p == 4 else pulses.FEW
     case, levels = pulses.case(20, courant=0.4, points=points), 6 if p == 1 else 4
     found = order(case, methods=method, refine="time", levels=levels).plain()
@@ -43,7 +43,7 @@ def test_every_method_shows_its_order_in_time_on_one_grid(method, p):
 
 
 @pytest.mark.parametrize(("scheme", "p"), [("upwind", 1), ("upwind3", 3), ("upwind5", 5), ("weno5", 5)])
-def test_a_front_shows_p_over_p_plus_one_and_is_called_one(scheme, p, capsys, tmp_path):
+def test_a_front_shows_p_over_p_plus_1_and_is_called_a_front(scheme, p, capsys, tmp_path):
     [found] = studies(capsys, tmp_path, pulses.front(), "--scheme", scheme, "--levels", "5")
     fits = found["fits"]["pressure"]
     assert fits["L1"]["order"] == approx(p / (p + 1), abs=0.05)
@@ -52,7 +52,7 @@ def test_a_front_shows_p_over_p_plus_one_and_is_called_one(scheme, p, capsys, tm
     assert any("fronts" in note and f"{p / (p + 1):.2g} in L1" in note for note in found["notes"])
 
 
-def test_a_kink_shows_twice_that_and_is_called_one(capsys, tmp_path):
+def test_a_kink_shows_twice_that_and_is_called_a_kink(capsys, tmp_path):
     case = pulses.front(scheme="upwind5")
     case["nodes"]["gate"] = scenes.junction(scenes.ramp(0.02, 0.02, 0.05, 0.0))
     [found] = studies(capsys, tmp_path, case, "--levels", "6")
@@ -61,7 +61,7 @@ def test_a_kink_shows_twice_that_and_is_called_one(capsys, tmp_path):
     assert any("kinks" in note for note in found["notes"])
 
 
-def test_one_pipe_or_one_key_can_be_refined_alone():
+def test_a_single_pipe_or_key_can_be_refined_alone():
     found = order("smooth-stop", levels=2, key="links.lower.cells").plain()
     assert [row["cells"] for row in found["rows"]] == [74, 94]
     assert order("smooth-stop", levels=2, key="numerics.courant").plain()["refine"] == "time"
@@ -77,7 +77,7 @@ def test_cell_time_is_a_resolution_of_the_pipes_that_state_no_cells(capsys, tmp_
     assert code == 2 and "is not a resolution of this case" in err
 
 
-def test_settings_that_leave_no_exact_solution_are_said(capsys, tmp_path):
+def test_settings_that_leave_no_exact_solution_are_named(capsys, tmp_path):
     case = pulses.case(points=pulses.FEW)
     words = ("--set", "links.main.minor_loss=2", "--levels", "3", "--scheme", "upwind3")
     [found] = studies(capsys, tmp_path, case, *words)
@@ -85,7 +85,7 @@ def test_settings_that_leave_no_exact_solution_are_said(capsys, tmp_path):
 
 
 @pytest.mark.parametrize("key", ["links.main.diameter", "links.mian.cells", "output.every", "numerics.end"])
-def test_what_is_no_resolution_is_refused_with_those_that_are(key, capsys):
+def test_an_invalid_resolution_is_refused_with_the_valid_ones(key, capsys):
     code, out, err = call(capsys, "gradual-closure", "--key", key)
     assert code == 2 and not out
     for one in ("links.main.cells", "numerics.step", "numerics.rtol", "numerics.courant"):
@@ -109,12 +109,12 @@ def test_what_is_no_resolution_is_refused_with_those_that_are(key, capsys):
         (["tank-draining", "--key", "links.main.cells"], "numerics.rtol"),
     ],
 )
-def test_what_cannot_be_asked_is_refused_by_name(words, told, capsys, tmp_path):
+def test_impossible_requests_are_refused_by_name(words, told, capsys, tmp_path):
     code, out, err = call(capsys, *words, "--out", str(tmp_path))
     assert code == 2 and not out and told in err
 
 
-def test_the_table_picture_and_sheet_say_the_same(capsys, tmp_path):
+def test_the_table_picture_and_sheet_agree(capsys, tmp_path):
     words = ("smooth-stop", "--levels", "3", "--out", str(tmp_path))
     code, shown, _ = call(capsys, *words)
     assert code == 0 and 'exact solution "rays"' in shown and "fitted order of" in shown
@@ -148,6 +148,6 @@ def test_a_failed_row_is_a_row_with_its_reason(capsys, tmp_path):
     assert any("failed" in note for note in found["notes"])
 
 
-def test_a_name_that_is_asked_for_twice_is_studied_once(capsys, tmp_path):
+def test_a_name_given_twice_is_studied_once(capsys, tmp_path):
     found = studies(capsys, tmp_path, pulses.case(points=pulses.FEW), "--method", "rk4,rk4, rk4", "--levels", "2")
     assert [one["method"] for one in found] == ["rk4"]

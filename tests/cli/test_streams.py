@@ -50,7 +50,7 @@ def test_a_run_is_complete_whatever_its_streams_are(streams, code, case, tmp_pat
 @pytest.mark.parametrize("command, code", [
     ("list", 0), ("--version", 0), ("run nothing", 2), ("nonsense", 2), ("schema", 0), ("compare none none", 2),
 ])  # fmt: skip
-def test_each_command_keeps_its_exit_code(command, code, streams, tmp_path):
+def test_each_command_retains_its_exit_code(command, code, streams, tmp_path):
     done = shell(f"fvsolve {command} {streams}", tmp_path)
     assert done.returncode == code and "Traceback" not in done.stderr and "internal error" not in done.stderr
 

@@ -59,7 +59,7 @@ def printed(cases):
 
 
 @pytest.mark.parametrize("command, pattern, si, own, size", TOLD)
-def test_a_number_is_told_in_the_unit_asked_for(command, pattern, si, own, size, cases, printed, fvs):
+def test_a_number_is_printed_in_the_requested_unit(command, pattern, si, own, size, cases, printed, fvs):
     if command not in printed:
         out = [] if command in ("optimise", "size", "check") else ["--out"]
         said = [fvs(command, path, *ASKED[command], *out, *([path.parent / command] * len(out))) for path in cases]
@@ -78,6 +78,6 @@ def test_a_response_is_drawn_in_the_unit_that_stands_at_it(cases):
     assert output_unit(load(cases[1]), inner) == (pytest.approx(1e-8), "bar/(l/s)")
 
 
-def test_a_number_without_a_unit_is_sized_without_one(fvs, cases):
+def test_a_number_without_a_unit_is_sized_without_a_unit(fvs, cases):
     code, out, _ = fvs("size", cases[0], "--vary", "links.valve.discharge_coefficient=0.5,0.6", "--goal", "maximum")
     assert code == 0 and out.startswith("links.valve.discharge_coefficient  ") and "[" not in out

@@ -20,7 +20,7 @@ def warm(*words: str, **environment: str):
 
 
 @pytest.mark.skipif(not jit.COMPILING, reason="JIT is off")
-def test_what_has_been_warmed_is_compiled_no_more(tmp_path, fvs):
+def test_warmed_cases_are_not_compiled_again(tmp_path, fvs):
     """The second time, the code is in a copy of the cache, because other tests may add code to the first one."""
     first = json.loads(fvs("precompile", "--for", "two-tanks", "--json")[1])
     for source in Path(first["directory"]).rglob("*"):
@@ -47,7 +47,7 @@ def test_what_has_been_warmed_is_compiled_no_more(tmp_path, fvs):
         ({"NUMBA_DISABLE_JIT": "1"}, "NUMBA_DISABLE_JIT is set"),
     ],
 )
-def test_where_nothing_can_be_kept_is_said_and_nothing_compiled(environment, named):
+def test_without_a_writable_cache_a_message_comes_and_nothing_is_compiled(environment, named):
     done = warm("--for", "two-tanks", **environment)
     assert done.returncode == 2 and named in done.stderr and done.stdout == ""
 

@@ -7,7 +7,7 @@ from fvsolve.report.draw.plot import select_curves, thin_series
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_thinned_series_keeps_both_extremes_of_each_bin(sign):
+def test_a_thinned_series_retains_both_extremes_of_each_bin(sign):
     t = np.linspace(0.0, 1.0, 9000)
     values = np.sin(40.0 * t)
     values[1234] = sign * 7.0  # a single row
@@ -34,7 +34,7 @@ def labels(columns: dict, measured=()) -> tuple[dict, list]:
     return {panel.quantity: [line.label for line in panel.lines] for panel in panels}, still
 
 
-def test_pressure_and_head_of_a_place_are_one_curve():
+def test_pressure_and_head_of_a_place_are_a_single_curve():
     both = {"gate.pressure": 1e5 + 9.8e3 * WAVE, "gate.head": 3.0 + WAVE, "top.head": OTHER}
     assert labels(both)[0] == {"pressure": ["gate (head alike)"], "head": ["top"]}
     assert labels(both, ["gate.head"])[0]["head"] == ["gate", "top"]  # compared with a measurement
@@ -42,12 +42,12 @@ def test_pressure_and_head_of_a_place_are_one_curve():
     assert labels(moved)[0] == {"pressure": ["gate"], "head": ["gate", "top"]}
 
 
-def test_what_stands_still_is_named_and_not_drawn_but_in_a_picture_of_rest():
+def test_constant_series_are_named_and_drawn_only_in_a_picture_of_rest():
     lake = np.full(T.size, 45.0) + 1e-12 * WAVE
     assert labels({"lake.head": lake, "a.flow": WAVE}) == ({"flow": ["a"]}, [("lake.head", "x", lake[0])])
     assert labels({"lake.head": lake}) == ({"head": ["lake"]}, [])
 
 
-def test_a_curve_that_would_lie_on_another_is_named_beside_it():
+def test_a_curve_that_would_cover_another_is_named_with_it():
     flows = {"main.flow@0": WAVE, "valve.flow": WAVE + 1e-4 * OTHER, "leak.flow": 0.9 * WAVE}
     assert labels(flows)[0] == {"flow": ["main at 0, valve", "leak"]}

@@ -68,7 +68,7 @@ def test_lumped_parts_are_drawn_without_a_field(fvs, tmp_path, monkeypatch):
     assert not list(tmp_path.rglob("*.png"))  # pictures of the run before are deleted
 
 
-def test_numbers_are_told_in_the_units_of_the_output_and_margins_as_differences(fvs, tmp_path, monkeypatch):
+def test_numbers_are_printed_in_the_units_of_the_output_and_margins_as_differences(fvs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     units = 'output.units={pressure="psig",head="ft",length="ft",time="min",velocity="ft/s",level="ft",flow="gpm"}'
     _, said, _ = fvs("run", "pumping-main", "--no-pictures", "--set", units, "--set", "numerics.end=1")
@@ -83,7 +83,7 @@ def test_numbers_are_told_in_the_units_of_the_output_and_margins_as_differences(
     assert "mm/s" not in said and said.count(" ft/s") >= 2
 
 
-def test_names_cover_neither_each_other_nor_symbols_and_what_finds_no_room_is_left_out():
+def test_names_cover_neither_each_other_nor_symbols_and_names_without_space_are_left_out():
     at = [(10.0 * k, 50.0) for k in range(1, 10)]
     found = place_labels(at, [(30.0, 8.0)] * 9, [4.0] * 9, [(x - 2, y - 2, x + 2, y + 2) for x, y in at],
                          np.zeros((0, 2)), (0, 0, 100, 100))  # fmt: skip
@@ -106,7 +106,7 @@ def test_a_line_is_followed_in_profile_a_level_plan_from_above_and_all_else_asla
     assert east**2 + north**2 + up**2 == approx(2.0)  # orthographic projection of three axes (Gauss)
 
 
-def test_every_kind_of_part_has_a_symbol_and_a_new_one_that_of_what_it_is_made_of():
+def test_every_kind_of_part_has_a_symbol_and_a_new_kind_that_of_its_base():
     kinds = {**Node.kinds, **Link.kinds}
     assert set(kinds) - {"pipe"} <= set(SYMBOLS)
     assert len(set(SYMBOLS.values())) == len(SYMBOLS)
@@ -131,7 +131,7 @@ def bowl():
     return mesh, radius, 8.0 / n
 
 
-def test_the_shore_is_where_the_surface_meets_the_bed_to_a_part_of_a_cell(bowl):
+def test_the_shore_is_where_the_surface_touches_the_bed_to_a_part_of_a_cell(bowl):
     mesh, radius, cell = bowl
     found = field_canvas.water_mesh(mesh, 1.0, ("depth",))
     shore = np.vstack(field_canvas.boundary_loops(found))
@@ -140,7 +140,7 @@ def test_the_shore_is_where_the_surface_meets_the_bed_to_a_part_of_a_cell(bowl):
     assert np.asarray(found.points)[:, 2] == approx(np.full(found.n_points, 0.1 * radius), abs=1e-6)
 
 
-def test_the_shore_of_a_basin_that_rides_is_as_good_in_its_own_axes(bowl):
+def test_the_shore_of_a_basin_on_a_body_is_as_good_in_its_own_axes(bowl):
     mesh, radius, cell = bowl
     turn, place = np.array([[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]), (3.0, 4.0, 5.0)
     mesh.points = mesh.points @ turn.T + place
@@ -150,7 +150,7 @@ def test_the_shore_of_a_basin_that_rides_is_as_good_in_its_own_axes(bowl):
     assert shore[:, 2] == approx(np.full(len(shore), 0.1 * radius), abs=1e-3)
 
 
-def test_what_is_cut_out_of_a_basin_and_what_rises_from_its_bed_are_houses(bowl):
+def test_holes_of_a_basin_and_blocks_on_its_bed_are_houses(bowl):
     mesh, _, _ = bowl
     middle = mesh.cell_centers().points
     inside = (np.abs(middle[:, 0] - 2.0) < 0.5) & (np.abs(middle[:, 1]) < 0.5)

@@ -215,7 +215,7 @@ THEN PUMP lift STATUS IS OPEN"""
 
 
 @pytest.mark.parametrize("rules", [BOTH_SIDES, BOTH_SIDES.partition("\nRULE 2")[0] + "\nELSE PUMP lift STATUS IS OPEN"])
-def test_a_link_rests_between_actions_that_hold_on_both_sides_of_one_level(rules, tmp_path):
+def test_a_link_rests_between_actions_that_hold_on_both_sides_of_a_common_level(rules, tmp_path):
     """The pump would switch without end at 3.5 m; in EPANET at a step of 10 s it switches at almost each step."""
     path, imported = town(tmp_path, rules=rules)
     blocks = tomllib.loads(imported.text)["controls"]
@@ -230,7 +230,7 @@ def test_a_link_rests_between_actions_that_hold_on_both_sides_of_one_level(rules
     assert level[0] < 3.4 and level[-1] == pytest.approx(3.5, abs=0.01)
 
 
-def test_a_pump_rests_between_speeds_on_both_sides_of_one_level(tmp_path):
+def test_a_pump_rests_between_speeds_on_both_sides_of_a_common_level(tmp_path):
     """The level stays where the two speeds alternate, as in EPANET at a step of 10 s."""
     controls = "LINK lift 0.7 IF NODE tower ABOVE 3.5\nLINK lift 1.05 IF NODE tower BELOW 3.5"
     path, imported = town(tmp_path, controls=controls, speed="SPEED 1.05")
@@ -242,7 +242,7 @@ def test_a_pump_rests_between_speeds_on_both_sides_of_one_level(tmp_path):
     assert run[f"nodes.{imported.nodes['tower']}.level"] == pytest.approx(day.level("tower", run.t), abs=0.01)
 
 
-def test_what_has_no_key_is_listed_with_its_number(tmp_path):
+def test_features_without_a_key_are_listed_with_their_number(tmp_path):
     rules = ("RULE 7\nIF SYSTEM DEMAND ABOVE 20\nTHEN PUMP lift STATUS IS OPEN\n"
              "RULE 8\nIF TANK tower FILLTIME ABOVE 5\nTHEN PIPE p5 STATUS IS CLOSED")  # fmt: skip
     _, imported = town(tmp_path, rules=rules)

@@ -132,7 +132,7 @@ LINES = [("auto", 0.0), ("finite-volume", 3.0)]  # numerics.pipe_model, and shor
 @pytest.mark.in_turn
 @pytest.mark.parametrize("line, shortest", LINES)
 @pytest.mark.parametrize("name", ["Net2", "Net3"])
-def test_without_an_event_nothing_moves_by_one_bit_and_a_closure_moves_it(name, line, shortest):
+def test_without_an_event_no_bit_changes_and_a_closure_moves_the_network(name, line, shortest):
     case = still(import_network(SHIPPED / f"{name}.inp", shortest=shortest))
     case["numerics"]["pipe_model"] = line
     drawn = {node: float(part["demand"].split()[0]) for node, part in case["nodes"].items() if "demand" in part}
@@ -163,7 +163,7 @@ def test_a_pump_trip_on_net3_moves_nothing_before_and_travels_at_its_wave_speed_
     assert np.ptp(far[t <= arrival - 0.5]) < 1e-2 and far[0] - far[-1] > 5.0
 
 
-def test_a_pipe_shorter_than_asked_for_is_lengthened_with_its_loss_and_said_so(tmp_path):
+def test_a_pipe_shorter_than_requested_is_lengthened_with_its_loss_and_a_notice(tmp_path):
     path = tmp_path / "in" / "short.inp"
     path.parent.mkdir()
     for formula, roughness in (("H-W", 110), ("C-M", 0.011)):
@@ -175,7 +175,7 @@ def test_a_pipe_shorter_than_asked_for_is_lengthened_with_its_loss_and_said_so(t
 
 
 @pytest.mark.parametrize("name", ["Net3", "ky4"])
-def test_every_pipe_is_as_long_as_in_epanet_and_those_shorter_than_a_cell_are_said(name):
+def test_every_pipe_is_as_long_as_in_epanet_and_those_shorter_than_a_cell_are_named(name):
     made = import_network(SHIPPED / f"{name}.inp")
     network, case = wntr.network.WaterNetworkModel(str(SHIPPED / f"{name}.inp")), load(tomllib.loads(made.text))
     lengths = {pipe: link.length for pipe, link in network.pipes()}
@@ -202,7 +202,7 @@ def test_short_pipes_set_no_step_and_keep_their_own_loss(tmp_path):
 
 
 @pytest.mark.parametrize("units, exponent", [("LPS", 0.5), ("LPS", 0.9), ("GPM", 0.9)])
-def test_emitters_draw_what_epanet_says(units, exponent, tmp_path):
+def test_emitters_draw_the_flow_of_epanet(units, exponent, tmp_path):
     path = tmp_path / "in" / "leaky.inp"
     path.parent.mkdir()
     text = SMALL.format(r=110, formula="H-W").replace("UNITS LPS", f"UNITS {units}\nEMITTER EXPONENT {exponent}")
@@ -253,7 +253,7 @@ BEHIND = {  # links to junction d, whose demand depends on its pressure
 
 @pytest.mark.parametrize("way", BEHIND)
 @pytest.mark.parametrize("demand", [2, 0])
-def test_a_demand_behind_a_valve_gets_what_its_pressure_allows(way, demand, tmp_path):
+def test_a_demand_behind_a_valve_gets_the_flow_that_its_pressure_allows(way, demand, tmp_path):
     changes = {"[DEMANDS]": f"d 8 {demand}\n[DEMANDS]", **BEHIND[way]}
     path = written(tmp_path, changes, FOLLOWS.format(required=40, least=0))
     if demand or not way.startswith("shut"):
@@ -274,7 +274,7 @@ def test_a_pump_of_constant_power_lifts_as_in_epanet_whatever_the_fluid_weighs(w
 @pytest.mark.in_turn
 @pytest.mark.parametrize("weight, setting", [(0.8, 28), (0.8, 33.6), (0.8, 41), (1.3, 54.6), (1.3, 58), (1.3, 68)])
 @pytest.mark.parametrize("kind", ["PRV", "PSV"])
-def test_a_set_pressure_is_one_of_water_whatever_the_fluid_weighs(kind, weight, setting, tmp_path):
+def test_a_set_pressure_is_a_pressure_of_water_at_any_density_of_the_fluid(kind, weight, setting, tmp_path):
     """Some settings exceed every source; in the second file the import moves the junction, because a pipe is steep."""
     changes = {"p4 a c 500 150 110 0 Open\n": "", "[VALVES]": f"[VALVES]\nv1 a c 150 {kind} {setting} 2"}
     path = written(tmp_path, changes, f"SPECIFIC GRAVITY {weight}\n")
@@ -339,7 +339,7 @@ def test_a_valve_that_drives_its_flow_uphill_is_listed(tmp_path):
     assert ["v1"] in [names for what, names in made.notes if what.startswith("PBV raises the head along its flow")]
 
 
-def test_cells_grow_only_where_there_would_be_too_many():
+def test_cells_grow_only_where_their_number_would_be_too_large():
     assert cell_time([1e4, 2e4], 1200.0) == 0.01
     assert cell_time([1e6], 1000.0) == 0.025
 
@@ -365,7 +365,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("good", FAULTS)
-def test_a_broken_file_is_told_by_its_fault(good, tmp_path, fvs):
+def test_a_broken_file_is_reported_by_its_fault(good, tmp_path, fvs):
     bad, said = FAULTS[good]
     path = tmp_path / "bad.inp"
     path.write_text(SMALL.format(r=110, formula="H-W").replace(good, bad, 1))
@@ -374,7 +374,7 @@ def test_a_broken_file_is_told_by_its_fault(good, tmp_path, fvs):
     assert not (tmp_path / "x.toml").exists()
 
 
-def test_all_faults_that_epanet_lists_are_said_at_once(tmp_path, fvs):
+def test_all_faults_that_epanet_lists_are_reported_at_once(tmp_path, fvs):
     path = tmp_path / "bad.inp"
     text = SMALL.format(r=110, formula="H-W").replace("p2 a b", "p2 a bb").replace("500 150", "500 -150")
     path.write_text(text)
@@ -399,7 +399,7 @@ def test_a_network_without_a_source_or_an_hour_before_its_start(tmp_path, fvs):
     assert code == 2 and "0 or more" in err
 
 
-def test_the_command_writes_a_case_that_checks_and_never_writes_over_one(tmp_path, fvs):
+def test_the_command_writes_a_case_that_checks_and_never_writes_over_a_file(tmp_path, fvs):
     to = tmp_path / "town.toml"
     code, out, err = fvs("import", SHIPPED / "Net2.inp", to, "--hour", "7", "--wave-speed", "1000 m/s")
     assert code == 0 and str(to) in out and (tmp_path / "schema.json").exists()
@@ -419,7 +419,7 @@ def test_the_command_writes_a_case_that_checks_and_never_writes_over_one(tmp_pat
     assert fvs("import", "--hour", "3")[0] == 2
 
 
-def test_without_the_toolkit_the_message_says_what_to_install(monkeypatch, tmp_path, fvs):
+def test_without_the_toolkit_the_message_names_the_package_to_install(monkeypatch, tmp_path, fvs):
     monkeypatch.setattr(network_file, "is_installed", lambda: False)
     code, _, err = fvs("import", SHIPPED / "Net2.inp", tmp_path / "x.toml")
     assert code == 2 and 'pip install "fvsolve[epanet]"' in err

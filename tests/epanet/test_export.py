@@ -107,7 +107,7 @@ def test_pipes_of_other_formulas_have_equal_heads(name, gravity, tmp_path):
     assert all("Swamee and Jain" in note for note in notes)
 
 
-def test_what_epanet_cannot_express_is_refused_all_at_once():
+def test_features_that_epanet_cannot_express_are_refused_all_at_once():
     case = load(
         SMALL,
         {

@@ -153,17 +153,17 @@ def test_points_of_a_pressure_breaker_lie_near_its_greater_loss(setting, loss, m
     assert np.interp(between, flows, losses) == pytest.approx(exact, abs=1.01 * part_tables.LINE_ERROR)
 
 
-def found_notes(imported):
+def import_notes(imported):
     return {text: names for text, names in imported.notes if "elevation of a reservoir" not in text}
 
 
 def test_losses_that_a_link_cannot_have_are_named(tmp_path):
     imported, found = start_of(town(tmp_path, points="g 5 1\ng 20 24"), tmp_path)
-    (note,) = found_notes(imported)
+    (note,) = import_notes(imported)
     assert "negative loss at small flows" in note and note in imported.causes[0]
     assert differences(found)["heads"] < SAME  # at the present flow
     imported, found = start_of(town(tmp_path, points="g 0 9\ng 20 4"), tmp_path)
-    (note,) = found_notes(imported)
+    (note,) = import_notes(imported)
     assert "falls as the flow rises" in note and imported.causes
     assert tomllib.loads(imported.text)["links"]["v"]["type"] == "valve"
 
@@ -181,7 +181,7 @@ def test_a_negative_flow_through_a_pressure_breaker_during_the_day_is_named(tmp_
 def test_settings_by_controls_are_listed(tmp_path):
     path = town(tmp_path, "PBV 10 0", controls="LINK v 12 IF NODE tower BELOW 2.5")
     imported = import_network(path, day=True)
-    assert found_notes(imported) == {"not imported, because it sets a valve of this kind": ["control 1"]}
+    assert import_notes(imported) == {"not imported, because it sets a valve of this kind": ["control 1"]}
 
 
 def test_a_general_valve_has_its_points_and_no_note(tmp_path):
@@ -189,7 +189,7 @@ def test_a_general_valve_has_its_points_and_no_note(tmp_path):
         imported = import_network(town(tmp_path), day=day)
         loss = tomllib.loads(imported.text)["links"]["v"]["loss"]
         assert loss == {"flow": ["0 l/s", "5 l/s", "12 l/s", "20 l/s"], "head": ["0 m", "2 m", "9 m", "24 m"]}
-        assert not found_notes(imported)
+        assert not import_notes(imported)
 
 
 @pytest.mark.parametrize("name", ["GPV", "GPV with a loss at no flow", "PBV", "PBV with a greater minor loss"])
@@ -216,7 +216,7 @@ def test_drops_are_exported_as_heads(tmp_path):
     assert [loss for _, loss in read_network(back).links["v"].curve] == pytest.approx(head)
 
 
-def test_a_setting_that_no_control_changes_back_is_kept(tmp_path):
+def test_a_setting_that_no_control_changes_back_stays(tmp_path):
     path = town(tmp_path, "PRV 12 0", controls="LINK v 35 IF NODE tower BELOW 2.5")
     imported, found = day_of(path, tmp_path)
     assert not found.fault and not imported.causes

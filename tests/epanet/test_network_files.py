@@ -100,7 +100,7 @@ READ = {
 
 
 @pytest.mark.parametrize("kind", READ)
-def test_what_epanet_reads_is_imported_with_its_heads(kind, tmp_path):
+def test_every_file_that_epanet_reads_is_imported_with_its_heads(kind, tmp_path):
     imported = import_network(written(tmp_path, READ[kind]))
     assert compared(imported, tmp_path).agrees
     if kind == "Windows text":
@@ -372,7 +372,7 @@ def test_emitters_that_feed_a_drained_town_in_epanet_are_named(tmp_path):
     assert found.compared[0].quantity == "levels" and found.compared[0].difference < 2e-3
 
 
-def test_a_tank_with_inlet_and_outlet_shuts_only_what_fills_it(tmp_path):
+def test_a_tank_with_inlet_and_outlet_shuts_only_its_inlet(tmp_path):
     text = """[JUNCTIONS]
 j 10 5
 [RESERVOIRS]
@@ -691,7 +691,7 @@ def test_the_command_prints_the_comparison_and_fails_at_an_unknown_difference(tm
     assert code == 1 and "cause unknown" in err and (tmp_path / "three.toml").is_file()
 
 
-def test_a_demand_that_nothing_supplies_is_said_with_epanets_heads(tmp_path):
+def test_a_demand_without_supply_is_reported_with_epanets_heads(tmp_path):
     text = MAIN.replace("a 10 20", "a 10 20\nb 5 3") + "p2 a b 100 100 110 0 Closed\n"
     imported = import_network(written(tmp_path, text + OPTIONS))
     found = self_check.check_start(imported, load(_case(imported, tmp_path)))

@@ -97,7 +97,7 @@ def test_averages_next_to_a_front_are_exact():
     assert pressure == approx(3e5 + high * share, rel=1e-9)
 
 
-def test_a_pulse_is_mirrored_as_images_say():
+def test_a_pulse_is_mirrored_as_by_images():
     case, found = solved(pulses.case())
     t = np.linspace(0.0, 0.249, 40)
     told = [pulses.pressure(37.0, s) for s in t]
@@ -148,7 +148,7 @@ def test_a_filling_chamber_is_a_parabola():
     assert found.probe(probe(case, "bottle.gauge_pressure"), t) == approx(1e7 - left, rel=1e-12)
 
 
-def test_two_tanks_level_as_the_closed_form_says():
+def test_two_tanks_level_by_the_closed_form():
     case, found = solved("cases/two-tanks.toml")
     high, low = (case.nodes[name] for name in ("high", "low"))
     [valve] = case.links.values()
@@ -183,7 +183,7 @@ COLUMNS = [(0.0, 1e4, 0.02), (0.05, 1e4, 0.02), (0.4, 1e4, 0.02), (-0.08, 1e4, 0
 
 
 @pytest.mark.parametrize(("initial", "drop", "factor"), COLUMNS)
-def test_a_rigid_column_moves_as_scipy_says(initial, drop, factor):
+def test_a_rigid_column_moves_as_by_scipy(initial, drop, factor):
     case, found = solved(column(initial, drop, factor, valve=False))
     area, t = scenes.area(0.2), np.linspace(0.0, 6.0, 13)
     loss = factor * 50.0 / 0.2 * scenes.RHO / (2 * area**2)
@@ -195,7 +195,7 @@ def test_a_rigid_column_moves_as_scipy_says(initial, drop, factor):
     assert found.probe(probe(case, "column.flow"), t) == approx(truth, rel=1e-8, abs=1e-10)
 
 
-def test_a_rigid_column_behind_a_valve_that_jumps_moves_as_scipy_says():
+def test_a_rigid_column_behind_a_valve_that_jumps_moves_as_by_scipy():
     case, found = solved(column(None, 1e4, 0.0, valve=True))
     area, cd = scenes.area(0.2), 0.01
     t = np.array([0.5, 1.5, 2.9, 3.1, 5.9])
@@ -308,7 +308,7 @@ def test_averages_of_a_polynomial_are_exact():
     assert found == approx(np.diff(edges**10) / 10 / np.diff(edges), rel=1e-12)
 
 
-def test_a_case_keeps_its_exact_solution_when_written_out(tmp_path):
+def test_a_case_retains_its_exact_solution_when_written_out(tmp_path):
     case = load("cases/gradual-closure.toml")
     (tmp_path / "again.toml").write_text(case.resolved(), encoding="utf-8")
     assert load(tmp_path / "again.toml") == case and load(tmp_path / "again.toml").exact.name == "rays"
@@ -372,7 +372,7 @@ def test_any_solution_on_any_scene_either_holds_or_is_refused_part_by_part(file,
     assert np.isfinite(found.probe(case.probes[0], np.array([case.numerics.start]))).all()
 
 
-def beside(name: str) -> dict:
+def unsupported_case(name: str) -> dict:
     """Case that a solution would support except for one link in a wrong place."""
     held = {"a": scenes.reservoir(3e5), "b": scenes.reservoir(2e5)}
     if name == "column":
@@ -388,7 +388,7 @@ def beside(name: str) -> dict:
 
 @pytest.mark.parametrize("name", ["column", "spring-mass"])
 def test_a_part_of_a_known_kind_in_the_wrong_place_is_refused(name):
-    refused(beside(name), "links.stray")
+    refused(unsupported_case(name), "links.stray")
 
 
 # laminar line -----------------------------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ def test_steady_flows_balance_gravity_friction_and_momentum(name, data):
     assert left[smooth][2:-2] == pytest.approx(right[smooth][2:-2], rel=2e-3, abs=2e-3)
 
 
-def test_the_jump_keeps_its_momentum_and_loses_head():
+def test_the_jump_conserves_momentum_and_loses_head():
     x = np.linspace(10.5, 12.5, 200001)
     flow = SOLUTIONS["bump"](x, 0.0, 0.18, 0.33, 2.0)
     k = int(np.argmax(np.diff(flow.depth)))
@@ -36,7 +36,7 @@ def test_the_jump_keeps_its_momentum_and_loses_head():
 
 
 @pytest.mark.parametrize("right", [0.001, 0.0])
-def test_a_dam_break_keeps_mass_and_momentum(right):
+def test_a_dam_break_conserves_mass_and_momentum(right):
     """Mass grows by nothing, momentum by g (hl^2 - hr^2) / 2 t, on a span that no wave has left."""
     x, t = np.linspace(0.0, 10.0, 200001), 6.0
     flow, mean = SOLUTIONS["dam-break"](x, t, 0.005, right, 5.0), lambda v: np.trapezoid(v, x)
@@ -53,7 +53,7 @@ def test_the_fan_of_dressler_without_friction_is_ritters():
     assert known.sum() > 50 and (slower.u < smooth.u)[known].all()
 
 
-def test_the_swinging_parabola_keeps_its_water_and_obeys_newton():
+def test_the_swinging_parabola_conserves_its_water_and_obeys_newton():
     """All water has one acceleration, -g d(surface)/dx; its volume is constant."""
     x, dt = np.linspace(0.0, 4.0, 40001), 1e-5
     volumes = []

@@ -15,7 +15,7 @@ from reference.delays import (
     SPEED,
     STOP,
     TRAVEL,
-    beside_jumps,
+    between_jumps,
     fork,
     main,
     pipe,
@@ -54,10 +54,10 @@ def test_an_instant_stop_is_exact_at_any_step(method):
     found = fvsolve.run(main(numerics={"method": method, **METHODS[method]}))
     assert found.reason == "finished" and found.ledger["mass"]["relative"] < 1e-14
     t, p = known(found, "gate.pressure")
-    away = beside_jumps(t, 0.5, 2.0 * TRAVEL)
+    away = between_jumps(t, 0.5, 2.0 * TRAVEL)
     assert p[0] + JUMP * square(t, 0.5, 4.0 * TRAVEL)[away] == pytest.approx(p[away], abs=1e-9 * JUMP)
     t, p = known(found, "main.pressure@0.5")
-    away = beside_jumps(t, 0.5 + 0.5 * TRAVEL, TRAVEL)
+    away = between_jumps(t, 0.5 + 0.5 * TRAVEL, TRAVEL)
     exact = 0.5 * (square(t, 0.5 + 0.5 * TRAVEL, 4.0 * TRAVEL) - square(t, 0.5 + 1.5 * TRAVEL, 4.0 * TRAVEL))
     exact += np.where((t > 0.5 + 0.5 * TRAVEL) & (t < 0.5 + 1.5 * TRAVEL), 0.5, 0.0)
     assert (p[0] + JUMP * exact)[away] == pytest.approx(p[away], abs=1e-9 * JUMP)
@@ -112,7 +112,7 @@ def test_friction_is_that_of_telegraphers(friction, exponent):
     assert errors[1] < 2e-3 and errors[1] < 0.15 * errors[0]
 
 
-def test_what_a_line_holds_is_what_travels_in_it():
+def test_content_of_a_line_is_the_travelling_flow():
     """The mass in a line by its balance equals the integral of both waves along the line."""
     smooth = {"time": [0.0, 0.2, 0.9, 9.0], "value": [FLOW, FLOW, 0.2 * FLOW, 0.2 * FLOW], "kind": "smooth"}
     case = main(
@@ -155,13 +155,13 @@ def test_lines_shorter_than_a_step_know_each_other():
 
 
 @pytest.mark.parametrize("case", [main(), short("delay-line", method="euler", step=0.02)], ids=["long", "short"])
-def test_tables_of_jumps_have_a_handle_whether_they_replace_tables_or_none(case):
+def test_tables_of_jumps_have_a_handle_with_and_without_replaced_tables(case):
     with fvsolve.build(fvsolve.load(case)).run_data() as data:
         assert data.handle is not None and np.any(with_slot(data.features, SLOT).sharp)
 
 
 @pytest.mark.parametrize("method", ["euler", "rk4", "gauss-4", "rodas-5p"])
-def test_stores_beside_lines_are_as_beside_cells(method):
+def test_stores_at_lines_act_as_at_cells(method):
     """A chamber and a tank at the ends of lines follow the solution with cells, under all kinds of methods."""
     nodes = {"lake": {"type": "reservoir", "pressure": 6e5}, "mid": {"type": "chamber", "volume": 0.5},
              "end": {"type": "junction"}, "pool": {"type": "tank", "area": 0.2, "level": 10.0}}  # fmt: skip
@@ -180,7 +180,7 @@ def test_stores_beside_lines_are_as_beside_cells(method):
 
 
 @pytest.mark.parametrize("method", ["rk4", "ssp-rk2", "trapezoid"])
-def test_what_a_jump_brings_a_store_within_a_step_is_not_lost(method):
+def test_a_jump_that_reaches_a_store_within_a_step_is_not_lost(method):
     """A chamber receives a jump within a step as with steps twenty times shorter.
 
     Without the correction between stages the error would be a tenth of the flow of a step.
@@ -279,7 +279,7 @@ def test_random_networks_do_not_grow():
 
 
 @pytest.mark.parametrize("control", [{"courant": 0.9, "method": "rk4"}, {"rtol": 1e-5, "method": "rodas-5p"}])
-def test_what_a_store_is_given_is_taken_from_its_own_line(control):
+def test_inflow_of_a_store_leaves_its_own_line(control):
     """The mass ledger closes at a chamber next to a delay line and a lake, by Courant number and by tolerance."""
     case = vessel("rk4", 0.01)
     del case["numerics"]["step"]
@@ -287,7 +287,7 @@ def test_what_a_store_is_given_is_taken_from_its_own_line(control):
     assert found.reason == "finished" and found.ledger["mass"]["relative"] < 1e-14
 
 
-def test_jumps_that_find_no_room_are_told(monkeypatch):
+def test_jumps_that_find_no_space_are_reported(monkeypatch):
     """A notice reports jumps that do not fit into the storage, here of two jumps per wave."""
     monkeypatch.setattr(history, "LEAST_JUMPS", 2)
     monkeypatch.setattr(history, "TOTAL_JUMPS", 2)
@@ -309,7 +309,7 @@ def test_auto_takes_cells_where_a_line_is_too_rough():
     assert mixed.reason == "finished" and mixed.ledger["mass"]["relative"] < 1e-13
 
 
-def test_check_says_how_pipes_are_followed(fvs, tmp_path):
+def test_check_states_how_pipes_are_modelled(fvs, tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(write(main()))
     code, said, _ = fvs("check", path, "--json")
@@ -327,7 +327,7 @@ BAD = {"law": ({"fluid": {"name": "Water", "law": "log"}}, 'law = "log" changes 
 
 
 @pytest.mark.parametrize("which", BAD)
-def test_a_line_that_cannot_be_one(which):
+def test_a_pipe_that_cannot_be_a_line(which):
     changes, message = BAD[which]
     case = main(1.0) | changes
     if which == "unsteady":
@@ -340,7 +340,7 @@ def test_a_line_that_cannot_be_one(which):
     assert message in str(raised.value)
 
 
-def test_what_knows_no_lines_says_so():
+def test_features_without_lines_are_refused_with_the_reason():
     case = main(1.0)
     model = fvsolve.build(fvsolve.load(case))
     for call in (lambda: model.rhs(0.0, model.start), lambda: model.jacobian(0.0, model.start)):
@@ -348,7 +348,7 @@ def test_what_knows_no_lines_says_so():
             call()
 
 
-def test_lines_are_linearised_as_cells_up_to_a_frequency_that_is_told():
+def test_lines_are_linearised_as_cells_up_to_a_stated_frequency():
     """The linearised cells of a line reflect a wave with the error 0.02 up to the stated frequency.
 
     The exact reflection by the lake is exp(-2 s tau) with the opposite sign of pressure.
@@ -376,7 +376,7 @@ def test_an_unknown_word_and_a_bad_share():
     assert 'did you mean "delay-line"?' in str(raised.value) and "numerics.delay_tolerance" in str(raised.value)
 
 
-def test_a_line_of_the_case_is_a_rung():
+def test_a_line_of_the_case_is_a_model_of_the_ladder():
     from fvsolve.studies.accuracy.model_hierarchy import level_keys, level_names
 
     case = fvsolve.load(main(1.0) | {"numerics": {"end": 1.0}})
@@ -385,7 +385,7 @@ def test_a_line_of_the_case_is_a_rung():
     }
 
 
-def test_stops_are_the_same_said_otherwise():
+def test_stops_stated_otherwise_are_the_same():
     """Units, a later start, and the key of the pipe instead of the case give the same run."""
     one = fvsolve.run(main(3.0))
     other = main(3.0, {"step": "40 ms"})
@@ -412,7 +412,7 @@ def test_a_start_from_rest_drives_every_part_of_a_pipe():
     assert fvsolve.build(fvsolve.load(case)).checks["pipes"]["one"]["line"] == "finite-volume"
 
 
-def test_steps_by_tolerance_beside_cells_of_a_quicker_pipe():
+def test_steps_by_tolerance_with_cells_of_a_quicker_pipe():
     """Lines shorter than a step agree with cells, next to a pipe with fast cells under error control."""
     case = short("delay-line", method="dormand-prince", rtol=1e-7)
     case["links"]["up"] |= {"pipe_model": "finite-volume", "cells": 400}
@@ -433,7 +433,7 @@ def opening(**numerics) -> dict:
     return scene(nodes, links, 0.68, numerics, ["links.main.flow@0", "links.main.flow@1"], 0.01)
 
 
-def test_a_line_at_rest_whose_flow_grows_states_the_velocity_for_its_stretches():
+def test_a_line_at_rest_with_growing_flow_states_the_velocity_for_its_stretches():
     """With this velocity as `delay_velocity` its flow is that of fine cells, and there is no notice."""
     cells = opening(scheme="weno5", method="ssp-rk3", courant=0.5)
     cells["links"]["main"]["cells"] = 400

@@ -30,7 +30,7 @@ def test_the_feature_of_the_page_runs_and_no_file_of_the_package_changes(home):
     assert OUTPUT in python(home, "-m", *COMMAND.split()).stdout.splitlines()
 
 
-def test_a_feature_of_others_works_beside_delay_lines_and_in_a_resumed_run(home):
+def test_a_feature_of_another_package_works_with_delay_lines_and_in_a_resumed_run(home):
     """A run in two parts has the counts of a run without a pause, but for records of the state in between."""
     text = """
 import fvsolve

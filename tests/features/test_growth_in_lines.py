@@ -12,7 +12,7 @@ from fvsolve.features.delay_lines.feature import lines_of
 from fvsolve.features.delay_lines.growth import ANGLES, interpolation_factor, reflection_factor
 
 
-def test_the_trapezoidal_rule_gives_back_what_comes():
+def test_the_trapezoidal_rule_reflects_the_incoming_wave():
     """S = (a cos(theta / 2) - 2 i sin(theta / 2)) / (a cos(theta / 2) + 2 i sin(theta / 2)), of modulus 1."""
     for a in (0.1, 1.0, 7.0):
         found = reflection_factor(method_named("trapezoid"), a, 5.0) / interpolation_factor(5.0)
@@ -54,7 +54,7 @@ def energy(case: dict) -> tuple[float, list]:
 @pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["euler", "implicit-midpoint", "rk4", "ssp-rk2", "trapezoid", "ssp-rk3"])
 @pytest.mark.parametrize("volume", [0.6, 0.15])
-def test_what_is_told_to_grow_grows(method, volume):
+def test_stores_with_a_notice_of_growth_grow(method, volume):
     """The energy after 30 s is 1000 times that after 1 s if a notice predicts growth, otherwise at most 1.2 times.
 
     The step is 0.24 or 0.96 of the filling time of the chamber. Jumps within steps add some energy, up to a seventh at

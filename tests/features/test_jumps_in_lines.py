@@ -95,7 +95,7 @@ DEVICES = {
 }  # fmt: skip
 
 
-def beside(device: str, numerics: dict, before: float, after: float) -> dict:
+def demand_near_device(device: str, numerics: dict, before: float, after: float) -> dict:
     """Case of a demand that changes at once, 100 m from an instantaneous device."""
     link, head = DEVICES[device]
     nodes = {"side": lake(head), "r": lake(50.0), "n": junction(), "m": junction(step(0.5, before, after))}
@@ -108,13 +108,13 @@ def beside(device: str, numerics: dict, before: float, after: float) -> dict:
 @pytest.mark.in_turn
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("method", METHODS)
-def test_a_device_acts_before_what_a_jump_brings_it_is_noted(device, method):
+def test_a_device_that_acts_before_the_arrival_of_a_jump_is_noted(device, method):
     """Devices switch at the arrival of a jump, with the events and extremes of cells of 2 m.
 
     Cells change the jump to a ramp, so a disc bursts there at its burst pressure; with lines it bursts at once.
     """
     demand = (0.04, 0.0) if device in ("relief-valve", "rupture-disc") else (0.0, 0.04)
-    case = beside(device, {"method": method, **METHODS[method]}, *demand)
+    case = demand_near_device(device, {"method": method, **METHODS[method]}, *demand)
     found, truth = fvsolve.run(case), fvsolve.run(in_cells(case, 2.0))
     if device == "rupture-disc":
         assert found.extremes["n.head"].maximum == pytest.approx(50.0)
@@ -128,7 +128,7 @@ def test_a_device_acts_before_what_a_jump_brings_it_is_noted(device, method):
 
 def test_a_device_behind_a_short_line():
     """A jump reaches a check valve through a line shorter than a step, with the extremes of characteristics."""
-    case = beside("check-valve", {"method": "euler", "step": 0.013}, 0.0, 0.04)
+    case = demand_near_device("check-valve", {"method": "euler", "step": 0.013}, 0.0, 0.04)
     case["nodes"]["q"] = junction()
     case["links"]["p"]["to"] = "q"
     case["links"]["stub"] = line("q", "m", 4.0)
@@ -201,7 +201,7 @@ def test_a_probe_reads_the_same_from_both_ends_of_a_line(share):
         assert one.envelope["main"][key] == pytest.approx(other.envelope["main"][key][::-1], abs=1e-4)
 
 
-def test_pulses_that_meet_between_two_places_of_a_line():
+def test_pulses_that_cross_between_two_places_of_a_line():
     """The envelope contains the sum of two pulses that cross inside a line with two stored places."""
 
     def stop(t):
@@ -268,7 +268,7 @@ def test_an_air_valve_lets_air_in_as_a_jump_arrives(method):
     same_extremes(found, truth, 2e-2)
 
 
-def test_auto_takes_cells_where_a_force_is_asked_for():
+def test_auto_takes_cells_where_a_force_is_requested():
     case = stub(8.0, {"method": "euler", "courant": 0.9}, 1.0)
     case["numerics"] |= {"pipe_model": "auto", "scheme": "muscl", "method": "ssp-rk3"}
     case["output"]["probes"] = ["main.force"]
@@ -278,7 +278,7 @@ def test_auto_takes_cells_where_a_force_is_asked_for():
 
 
 @pytest.mark.parametrize(("length", "ramp", "step"), [(9.0, 0.02, 0.01), (901.3, 0.005, 0.002)])
-def test_a_ramp_too_quick_for_the_steps_is_told(length, ramp, step):
+def test_a_ramp_too_quick_for_the_steps_is_reported(length, ramp, step):
     """A ramp too fast for the steps gives a notice of kind `lines`, and `auto` selects cells."""
     case = stub(2.0, {"method": "euler", "step": step}, 2.5)
     del case["links"]["short"], case["nodes"]["j"]
@@ -368,7 +368,7 @@ BOUNDED = [(stub(130.0, METHODS["euler"]), 100), (stub(130.0, METHODS["rodas-5p"
 
 
 @pytest.mark.parametrize("case, jumps_seen", BOUNDED)
-def test_bounds_by_which_cells_are_left_out_contain_all_waves(case, jumps_seen):
+def test_bounds_by_the_selection_of_cells_contain_all_waves(case, jumps_seen):
     """The bounds of the entries around a time contain each wave at any moment of it, beside its jumps too.
 
     In the short cases many of these times are before the first entry.

@@ -186,7 +186,7 @@ def test_a_viscosity_coolprop_does_not_have_is_none():
         (("Nitrogen", ROOM, ATM, "table"), {}, "law", "needs a liquid"),
     ],
 )
-def test_refusals_name_the_key_and_say_why(arguments, keys, key, words):
+def test_refusals_name_the_key_and_the_reason(arguments, keys, key, words):
     blamed, message = refusal(*arguments, **keys)
     assert (blamed, words in message) == (key, True), message
 
@@ -206,10 +206,10 @@ numbers = [water.density, *water.table.log_density.tolist()]
 print(json.dumps([numbers, "CoolProp" in sys.modules, "scipy" in sys.modules]))
 """
 
-    def ask():
+    def process_output():
         return json.loads(subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout)
 
-    cold, warm = ask(), ask()
+    cold, warm = process_output(), process_output()
     assert cold[1] is True
     assert warm[1:] == [False, False]
     assert cold[0] == warm[0], "the cache gives back the same bits"
@@ -229,7 +229,7 @@ def test_equal_questions_give_equal_fluids_and_unequal_ones_unequal(empty_cache)
 @pytest.mark.parametrize(
     "damage", [lambda text: "", lambda text: text[: len(text) // 2], lambda text: text.replace("998.2", "989.2", 1)]
 )
-def test_a_damaged_cache_file_is_asked_again(empty_cache, damage):
+def test_a_damaged_cache_file_is_computed_again(empty_cache, damage):
     density = properties("Water", ROOM, ATM).density
     (file,) = empty_cache.iterdir()
     file.write_text(damage(file.read_text()))
@@ -237,7 +237,7 @@ def test_a_damaged_cache_file_is_asked_again(empty_cache, damage):
     assert str(density) in file.read_text()
 
 
-def test_a_new_coolprop_asks_again(empty_cache, monkeypatch):
+def test_a_new_version_of_coolprop_is_evaluated_again(empty_cache, monkeypatch):
     properties("Water", ROOM, ATM)
     monkeypatch.setattr("fvsolve.core.fluid.coolprop.coolprop_version", lambda: "99.0")
     assert properties("Water", ROOM, ATM).source == "CoolProp 99.0"
@@ -267,7 +267,7 @@ def test_an_oil_has_its_grade_at_40_degC_and_viscosity_index_100(grade):
     assert h == approx(grade, rel=2e-3)
 
 
-def test_walthers_line_through_two_points_meets_a_measured_oil():
+def test_walthers_line_through_two_points_agrees_with_a_measured_oil():
     """An HLP 32 with mu = 17.02 mPa s exp(5.428 (50 - t) / (94.72 + t)): 3 % from 20 to 80 degC, 12 % at 0 degC."""
 
     def measured(t):
@@ -327,7 +327,7 @@ def test_an_oil_goes_by_the_spellings_of_the_field():
         ("ISO VC 46", 313.15, ATM, "log", "name", 'did you mean "ISO VG 46"?'),
     ],
 )
-def test_an_oil_outside_what_is_known_is_refused(name, temperature, pressure, law, key, text):
+def test_an_oil_outside_the_known_range_is_refused(name, temperature, pressure, law, key, text):
     with pytest.raises(FluidError) as caught:
         properties(name, temperature, pressure, law)
     assert caught.value.key == key and text in caught.value.message

@@ -45,7 +45,7 @@ def integral(f, low: float, high: float) -> float:
     )[0]
 
 
-def test_a_case_file_can_say_them_all_and_no_other():
+def test_a_case_file_can_name_exactly_these():
     (choice,) = FluidSpec.model_fields["law"].metadata
     assert tuple(choice.words) == tuple(LAWS) and len({one.code for one in LAWS.values()}) == len(LAWS)
 
@@ -89,7 +89,7 @@ def test_enthalpy_is_the_integral_of_specific_volume(name):
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_what_a_pipe_holds_leads_back_to_its_pressure(name):
+def test_content_of_a_pipe_leads_back_to_its_pressure(name):
     one = law(name)
     row, p = a_pipe(one), np.array(PRESSURES)
     m = one.density(p) * one.area(row, p)

@@ -221,7 +221,7 @@ def test_a_simple_wave_leaves_the_other_family_alone():
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_mass_is_kept_to_round_off_under_both_laws(law):
+def test_mass_is_conserved_to_round_off_under_both_laws(law):
     nodes = {"lake": reservoir(3 * AMBIENT), "gate": junction(scenes.step(1.0, 0.05, 0.0))}
     links = {"main": stiff_pipe("lake", "gate", LENGTH, DIAMETER, 100, friction=scenes.NO_FRICTION)}
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.8}
@@ -254,7 +254,7 @@ def test_under_the_table_law_a_stopped_stream_rises_along_the_isentrope_of_coolp
 
 
 @pytest.mark.parametrize("law", [{"law": "log"}, {"law": "mixture", "air_fraction": 0.01}])
-def test_a_valve_through_which_nothing_flows_is_solved_to_the_rounding_of_pressures(law):
+def test_a_valve_without_flow_is_solved_to_the_rounding_of_pressures(law):
     """A chamber behind a valve is in equilibrium with a flowing main; the rounding of its drop causes no flow."""
     rough = {"friction": {"model": "quasi-steady", "roughness": 1e-4}}
     nodes = {
@@ -306,7 +306,7 @@ def test_a_short_wide_pipe_starts_with_its_friction_and_the_jet_that_leaves_it(l
     assert still.max() <= 1e-9 * abs(model.checks["pipes"]["main"]["velocity"]) * 1000.0
 
 
-def test_heads_beyond_what_a_law_holds_are_refused_by_the_name_of_the_pipe():
+def test_heads_beyond_the_range_of_a_law_are_refused_by_the_name_of_the_pipe():
     fluid = {"name": "Water", "law": "table"}
     links = {"main": stiff_pipe("a", "b", 1.0, 2.0, 4, friction={"model": "quasi-steady", "factor": 0.01})}
     case = scene({"a": lake(1e6), "b": lake(0.0)}, links, 1.0, {}, ["main.flow"], 0.1, fluid=fluid)

@@ -221,13 +221,13 @@ BAD = {
 
 
 @pytest.mark.parametrize("keys, key, text", BAD.values(), ids=BAD)
-def test_what_does_not_mix_is_refused_by_key(keys, key, text):
+def test_features_that_do_not_combine_are_refused_by_key(keys, key, text):
     case = main({**OIL, **keys})
     error = refused(case)
     assert f"fluid.{key}" in str(error) and text in str(error)
 
 
-def test_gas_that_expands_too_far_for_the_scheme_is_told_what_follows_it():
+def test_gas_that_expands_too_far_for_the_scheme_is_reported_with_alternatives():
     nodes = {"up": reservoir(4e5), "g": junction(), "out": reservoir(2e5)}
     links = {"main": pipe("up", "g", 200.0, 0.3, 1000.0, 6), "gate": valve("g", "out", 0.01, ramp(0.1, 0.2, 1.0, 0.0))}
     fluid = {"name": "Water", "law": "mixture", "air_fraction": 1e-3}
@@ -238,7 +238,7 @@ def test_gas_that_expands_too_far_for_the_scheme_is_told_what_follows_it():
     assert result.ok
 
 
-def test_check_tells_the_wave_speed_with_the_gas_of_the_start():
+def test_check_states_the_wave_speed_with_the_gas_of_the_start():
     """Wood's speed in a rigid pipe: 1 / c^2 = d rho / dp = rho (1 / beta + gas / p) / V^2, per volume of liquid."""
     air, p, beta, rho = 5e-3, 5e5, 2.2e9, 1000.0
     fluid = {"name": "user", "density": rho, "bulk_modulus": beta, "viscosity": 1e-3, "vapor_pressure": 2300.0}

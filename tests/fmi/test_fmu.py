@@ -137,7 +137,7 @@ FOUND = {"another version": "the host has fvsolve 0.0.9", "no fvsolve": "fvsolve
 
 
 @pytest.mark.parametrize("before", BEFORE)
-def test_a_host_with_a_wrong_fvsolve_is_told_in_words(before, tmp_path):
+def test_a_host_with_a_wrong_fvsolve_gets_a_message(before, tmp_path):
     path, _ = write_fmu(fvsolve.load("two-tanks"), tmp_path / "two-tanks.fmu")
     code = f"{BEFORE[before]}\nimport fmpy\nfmpy.simulate_fmu({str(path)!r}, stop_time=2.0)"
     known = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}

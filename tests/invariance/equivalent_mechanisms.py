@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from invariance.result_comparison import Told
+from invariance.result_comparison import Outcome
 
 AXIAL = ("w", "joint_t", "angular_momentum_")  # axial vectors; POLAR: polar vectors
 POLAR = ("", "v", "a", "joint_f", "momentum_")
@@ -24,8 +24,8 @@ def part(probe: str) -> tuple[str, str, str]:
 
 def otherwise(case: dict) -> dict:
     """Case with its parts in reverse order, so that bodies precede their carriers."""
-    said = copy.deepcopy(case)
-    return said | {table: dict(reversed(said[table].items())) for table in ("nodes", "links")}
+    restated = copy.deepcopy(case)
+    return restated | {table: dict(reversed(restated[table].items())) for table in ("nodes", "links")}
 
 
 def later(value: Any, wait: float) -> Any:
@@ -41,9 +41,9 @@ def later(value: Any, wait: float) -> Any:
 
 
 def at_a_later_time(case: dict, wait: float) -> dict:
-    said = later(copy.deepcopy(case), wait)
-    said["numerics"] |= {"start": wait, "end": case["numerics"]["end"] + wait}
-    return said
+    restated = later(copy.deepcopy(case), wait)
+    restated["numerics"] |= {"start": wait, "end": case["numerics"]["end"] + wait}
+    return restated
 
 
 TEXT = {
@@ -67,22 +67,24 @@ def in_other_units(value: Any, key: str = "", kind: str = "") -> Any:
         if "period" in value:
             other = dict(value)
             for one in ("mean", "amplitude"):
-                other[one] = said(value[one], "travel" if key == "travel" else "attitude" if key == "angle" else key)
+                other[one] = restated_value(
+                    value[one], "travel" if key == "travel" else "attitude" if key == "angle" else key
+                )
             return other | {"period": f"{1e3 * value['period']!r} ms"}
         if key in ("points", "attitude"):
-            return {name: said(one, key) if name != "matrix" else one for name, one in value.items()}
+            return {name: restated_value(one, key) if name != "matrix" else one for name, one in value.items()}
         return {name: in_other_units(one, name, kind) for name, one in value.items()}
     if key == "angle":
-        return said(value, "attitude")
+        return restated_value(value, "attitude")
     if key == "rate" and kind in ("revolute", "ball", "free"):
         return [f"{60.0 / (2.0 * math.pi) * x!r} rpm" for x in value] if isinstance(value, list) else value
-    return said(value, key)
+    return restated_value(value, key)
 
 
-def said(value: Any, key: str) -> Any:
+def restated_value(value: Any, key: str) -> Any:
     factor = TEXT.get(key)
     if isinstance(value, list):
-        return [said(one, key) for one in value]
+        return [restated_value(one, key) for one in value]
     return value if factor is None or not isinstance(value, (int, float)) else f"{factor[0] * value!r} {factor[1]}"
 
 
@@ -185,7 +187,7 @@ def turned(case: dict, angle: float) -> dict:
     return other
 
 
-def as_turned(one: Told, angle: float):
+def as_turned(one: Outcome, angle: float):
     """Function that returns the expected values of a probe in the turned case, with turned vectors."""
     turn = Rotation.from_euler("Z", angle).as_matrix()
 

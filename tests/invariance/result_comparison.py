@@ -15,7 +15,7 @@ from invariance.random_scenes import IMPLICIT
 
 
 @dataclass
-class Told:
+class Outcome:
     """Outcome of a run: reason of its end, or "refused" if it did not start, and the rows of every probe."""
 
     ended: str
@@ -31,7 +31,7 @@ SCENES = {"built": 0, "dear": 0}
 FAIR, FIRST = 0.25, 2  # allowed share of costly cases, and number allowed in addition (0 of 550 were costly)
 
 
-def told(source, **more) -> Told:
+def outcome_of(source, **more) -> Outcome:
     """Outcome of a run; CaseErrors with the words of `REFUSALS` count as "refused", all others are raised.
 
     Cases with explicit steps much shorter than those of waves (notice `cost`) are not run, because they may take hours.
@@ -48,9 +48,9 @@ def told(source, **more) -> Told:
     except fvsolve.CaseError as error:
         if not all(any(words in str(fault) for words in REFUSALS) for fault in error.faults):
             raise
-        return Told("refused", np.empty(0), {})
+        return Outcome("refused", np.empty(0), {})
     ended = result.reason.split(" at ")[0]
-    return Told(ended, np.array(result.t), {str(p): np.array(result[str(p)]) for p in result.probes}, result)
+    return Outcome(ended, np.array(result.t), {str(p): np.array(result[str(p)]) for p in result.probes}, result)
 
 
 @contextmanager
@@ -95,7 +95,7 @@ def kind_of(name: str) -> str:
 
 
 def alike(
-    one: Told, other: Told, within: float = 0.0, name: Callable[[str], str] = str, change=None, later=0.0
+    one: Outcome, other: Outcome, within: float = 0.0, name: Callable[[str], str] = str, change=None, later=0.0
 ) -> None:
     """Assert that two runs have equal ends and rows, to the bit or `within` the greatest value of each quantity.
 

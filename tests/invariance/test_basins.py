@@ -12,7 +12,7 @@ from reference.scenes import WATER, reservoir, scene, step, valve
 
 import fvsolve
 from invariance.random_scenes import between
-from invariance.result_comparison import alike, told, with_frames
+from invariance.result_comparison import alike, outcome_of, with_frames
 
 LENGTH, WIDTH = 8.0, 4.0  # exact in binary, like the points of probes
 POINTS = [(1.25, 0.75), (4.0, 2.0), (6.5, 3.25)]
@@ -93,7 +93,7 @@ def basins(draw) -> dict:
 @given(drawing=basins())
 def test_in_a_mirror_or_turned(mirror, drawing):
     """A mirrored or turned basin agrees to rounding, because formulas are evaluated at mirrored points."""
-    one = told(basin("", drawing))
+    one = outcome_of(basin("", drawing))
     assert one.ended == "finished"
     assert max(np.ptp(values) for values in one.rows.values()) > 0.0
 
@@ -112,7 +112,7 @@ def test_in_a_mirror_or_turned(mirror, drawing):
         return -values if probe.split("@")[0] == {"x": "pool.u", "y": "pool.v"}.get(mirror) else values
 
     within = 10 * drawing["numerics"].get("rtol", 1e-10)
-    alike(one, told(basin(mirror, drawing)), within, name, sign)
+    alike(one, outcome_of(basin(mirror, drawing)), within, name, sign)
 
 
 @examples(10)
@@ -120,9 +120,9 @@ def test_in_a_mirror_or_turned(mirror, drawing):
 def test_again_and_with_frames(drawing, frames):
     """Field frames and earlier runs of the model do not change a bit."""
     case = basin("", drawing)
-    one = told(case)
+    one = outcome_of(case)
     case["output"]["fields"] = frames
     model = fvsolve.build(fvsolve.load(case))
     with with_frames():
-        alike(one, told(model))
-    alike(one, told(model))
+        alike(one, outcome_of(model))
+    alike(one, outcome_of(model))

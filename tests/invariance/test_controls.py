@@ -15,7 +15,7 @@ METHODS = ("dormand-prince", "radau-iia-5", "rodas-5p", "auto")
 
 
 @pytest.fixture(autouse=True)
-def beside_their_files(monkeypatch):
+def in_folder_of_cases(monkeypatch):
     monkeypatch.chdir(CASES)
 
 

@@ -12,7 +12,7 @@ from hypothesis_profiles import examples
 import fvsolve
 from invariance import equivalent_networks as equivalent
 from invariance.random_scenes import SEEDS, networks, shuffled
-from invariance.result_comparison import EXPERIMENTAL, alike, near, told
+from invariance.result_comparison import EXPERIMENTAL, alike, near, outcome_of
 
 pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)
 SMALL = 1e-9  # delay_tolerance; smaller jumps than a quarter of it are smoothed
@@ -46,10 +46,10 @@ def given_steps() -> st.SearchStrategy[dict]:
     return lines("delay-line").filter(lambda case: "rtol" not in case["numerics"])
 
 
-def told_lines(case: dict):
+def outcome_with_lines(case: dict):
     """Outcome of a run, or None if a delay line is not possible."""
     try:
-        return told(case)
+        return outcome_of(case)
     except fvsolve.CaseError as error:
         if not all("is not possible" in str(fault) for fault in error.faults):
             raise
@@ -66,20 +66,20 @@ def same(one, other, *how, **more) -> None:
 @examples(5)
 @given(case=lines())
 def test_run_again(case):
-    first = told_lines(case)
-    same(first, told_lines(case))
+    first = outcome_with_lines(case)
+    same(first, outcome_with_lines(case))
     if first is not None and first.result:
         model = fvsolve.build(fvsolve.load(case))
         fvsolve.run(model)
-        alike(first, told(model))
+        alike(first, outcome_of(model))
 
 
 @examples(4)
 @given(case=lines())
 def test_other_rows(case):
     """Common rows agree to the bit."""
-    few = told_lines(equivalent.changed(case, "output", every=1 / 16))
-    many = told_lines(equivalent.changed(case, "output", every=1 / 64))
+    few = outcome_with_lines(equivalent.changed(case, "output", every=1 / 16))
+    many = outcome_with_lines(equivalent.changed(case, "output", every=1 / 64))
     assert (few is None) == (many is None)
     if few is not None and few.result:
         assert few.ended == many.ended
@@ -93,23 +93,23 @@ def test_other_rows(case):
 @given(case=given_steps(), seed=SEEDS)
 def test_other_order(case, seed):
     nodes, links = shuffled(case["nodes"], seed), shuffled(case["links"], seed)
-    same(told_lines(case), told_lines(equivalent.reordered(case, nodes, links)), nearly(case))
+    same(outcome_with_lines(case), outcome_with_lines(equivalent.reordered(case, nodes, links)), nearly(case))
 
 
 @examples(4)
 @given(case=given_steps(), seed=SEEDS)
 def test_links_drawn_from_the_other_end(case, seed):
     other, how = equivalent.drawn_from_other_end(case, seed)
-    same(told_lines(case), told_lines(other), nearly(case), **how)
+    same(outcome_with_lines(case), outcome_with_lines(other), nearly(case), **how)
 
 
 @examples(3)
 @given(case=given_steps(), height=st.sampled_from([16.0, 1000.0]))
 def test_everything_higher(case, height):
-    same(told_lines(case), told_lines(equivalent.raised(case, height)), nearly(case))
+    same(outcome_with_lines(case), outcome_with_lines(equivalent.raised(case, height)), nearly(case))
 
 
 @examples(3)
 @given(case=given_steps())
 def test_other_units(case):
-    same(told_lines(case), told_lines(equivalent.in_other_units(case)), nearly(case))
+    same(outcome_with_lines(case), outcome_with_lines(equivalent.in_other_units(case)), nearly(case))

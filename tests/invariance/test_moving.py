@@ -17,7 +17,7 @@ from reference.scenes import scene
 import fvsolve
 from invariance import equivalent_mechanisms as equivalent
 from invariance.moving import METHODS, SCENES, machine, piston, stepped
-from invariance.result_comparison import Told, alike, broken_off_and_whole, told, with_frames
+from invariance.result_comparison import Outcome, alike, broken_off_and_whole, outcome_of, with_frames
 
 EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # warning of numba while it compiles
 pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings fail, such as of NaN values
@@ -43,9 +43,9 @@ SWINGS = (".rate", ".angle", ".travel")
 
 
 @cache
-def first(name: str, method: str) -> Told:
+def first(name: str, method: str) -> Outcome:
     """Outcome of the unchanged case, which must finish and must move."""
-    shown = told(SCENES[name](method))
+    shown = outcome_of(SCENES[name](method))
     assert shown.ended == "finished" and max(np.ptp(values) for values in shown.rows.values()) > 0.0
     return shown
 
@@ -63,8 +63,8 @@ def test_run_again_and_with_frames(name, method):
     model = fvsolve.build(fvsolve.load(case))
     unchanged = first(name, method)
     with with_frames():
-        alike(unchanged, told(model))
-    alike(unchanged, told(model))
+        alike(unchanged, outcome_of(model))
+    alike(unchanged, outcome_of(model))
 
 
 @pytest.mark.parametrize("name, method", mixed(1))
@@ -78,13 +78,18 @@ def test_broken_off_and_resumed(name, method):
 @pytest.mark.parametrize("name, method", mixed(2))
 def test_parts_in_the_reverse_order(name, method):
     """A body may precede its carrier in the file, and the mass of a moving wall its basin."""
-    alike(first(name, method), told(equivalent.otherwise(SCENES[name](method))), near(method))
+    alike(first(name, method), outcome_of(equivalent.otherwise(SCENES[name](method))), near(method))
 
 
 @pytest.mark.parametrize("name, method", with_methods(SCENES, 0))
 def test_at_a_later_time(name, method):
     """A delay changes results by rounding of times only, which enters differences of driven joints."""
-    alike(first(name, method), told(equivalent.at_a_later_time(SCENES[name](method), 64.0)), near(method), later=64.0)
+    alike(
+        first(name, method),
+        outcome_of(equivalent.at_a_later_time(SCENES[name](method), 64.0)),
+        near(method),
+        later=64.0,
+    )
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -92,7 +97,7 @@ def test_other_rows(name):
     """More rows do not change the common rows, because rows are interpolated between steps."""
     case = SCENES[name]()
     case["output"]["every"] /= 2.0
-    many, few = told(case), first(name, "rk4")
+    many, few = outcome_of(case), first(name, "rk4")
     for probe, values in few.rows.items():
         found = dict(zip(many.t, many.rows[probe], strict=True))
         assert [found[t] for t in few.t] == values.tolist()
@@ -104,14 +109,14 @@ def test_other_units(name, method):
     case = SCENES[name](method)
     other = case | {table: equivalent.in_other_units(case[table]) for table in ("nodes", "links")}
     assert other != case
-    alike(first(name, method), told(other), near(method))
+    alike(first(name, method), outcome_of(other), near(method))
 
 
 @pytest.mark.parametrize(
     "name, method", with_methods([name for name in IN_SPACE if not name.startswith(("carried", "full", "u-tube"))], 2)
 )
 def test_ends_of_links_swapped(name, method):
-    alike(first(name, method), told(equivalent.swapped(SCENES[name](method))), near(method))
+    alike(first(name, method), outcome_of(equivalent.swapped(SCENES[name](method))), near(method))
 
 
 @pytest.mark.parametrize("name, method", with_methods(IN_SPACE, 0))
@@ -119,20 +124,25 @@ def test_axes_the_other_way(name, method):
     def change(probe, values):
         return -values if probe.endswith(SWINGS) else values
 
-    alike(first(name, method), told(equivalent.reversed_axes(SCENES[name](method))), near(method), change=change)
+    alike(first(name, method), outcome_of(equivalent.reversed_axes(SCENES[name](method))), near(method), change=change)
 
 
 @pytest.mark.parametrize("name, method", with_methods(IN_SPACE, 1))
 def test_turned_about_the_vertical(name, method):
     one = spatial(first(name, method))
-    alike(one, told(equivalent.turned(SCENES[name](method), 0.7)), near(method), change=equivalent.as_turned(one, 0.7))
+    alike(
+        one,
+        outcome_of(equivalent.turned(SCENES[name](method), 0.7)),
+        near(method),
+        change=equivalent.as_turned(one, 0.7),
+    )
 
 
-def spatial(one: Told) -> Told:
+def spatial(one: Outcome) -> Outcome:
     """Outcome without probes of single vector components, because a rotation needs all three."""
     whole = {probe: values for probe, values in one.rows.items() if equivalent.part(probe)[1] == "-"
              or all(f"{probe[:-1]}{axis}" in one.rows for axis in "xyz")}  # fmt: skip
-    return Told(one.ended, one.t, whole, one.result)
+    return Outcome(one.ended, one.t, whole, one.result)
 
 
 @pytest.mark.parametrize("axis", [0, 1])
@@ -141,7 +151,7 @@ def test_in_a_mirror(name, method, axis):
     """A mirrored case gives mirrored results; a basin is then drawn from another corner."""
     case = SCENES[name](method)
     sizes = {one: node["size"] for one, node in case["nodes"].items() if node["type"] == "basin"}
-    alike(first(name, method), told(equivalent.mirrored(case, axis)), near(method),
+    alike(first(name, method), outcome_of(equivalent.mirrored(case, axis)), near(method),
           lambda probe: equivalent.in_mirror(probe, axis, sizes), equivalent.as_mirrored(axis))  # fmt: skip
 
 
@@ -159,15 +169,15 @@ def test_far_away(name):
         _, vector, axis = equivalent.part(probe)
         return values + by.get(axis, 0.0) if vector == "" else values
 
-    other = told(equivalent.shifted(SCENES[name](), [by["x"], by["y"], 0.0]))
-    alike(Told(one.ended, one.t, rows, one.result), other, ROUND, change=change)
+    other = outcome_of(equivalent.shifted(SCENES[name](), [by["x"], by["y"], 0.0]))
+    alike(Outcome(one.ended, one.t, rows, one.result), other, ROUND, change=change)
 
 
 @pytest.mark.in_turn
 @pytest.mark.parametrize("form", equivalent.FORMS)
 @pytest.mark.parametrize("name", ["machine", "loop", "carried", "rocking"])
 def test_attitudes_in_another_form(name, form):
-    alike(first(name, "rk4"), told(equivalent.attitudes(SCENES[name](), form)), ROUND)
+    alike(first(name, "rk4"), outcome_of(equivalent.attitudes(SCENES[name](), form)), ROUND)
 
 
 @pytest.mark.in_turn
@@ -183,14 +193,16 @@ def test_a_body_in_two_that_are_fixed_to_each_other(part, method):
     rows = {probe: values for probe, values in one.rows.items() if not probe.endswith(own)}
     if part == "kite":  # states of a free body refer to its centre of mass
         rows = {probe: values for probe, values in rows.items() if not probe.startswith("kite.momentum")}
-    alike(Told(one.ended, one.t, rows, one.result), told(equivalent.split(machine(method), part)), near(method))
+    alike(
+        Outcome(one.ended, one.t, rows, one.result), outcome_of(equivalent.split(machine(method), part)), near(method)
+    )
 
 
 @pytest.mark.in_turn
 @pytest.mark.parametrize("method", EACH)
 @pytest.mark.parametrize("law", ["", "linear", "log", "table"])
 def test_a_wall_of_a_mass_is_that_of_a_body_on_a_prismatic_joint(law, method):
-    alike(told(piston(method, law)), told(piston(method, law, by="body")), near(method))
+    alike(outcome_of(piston(method, law)), outcome_of(piston(method, law, by="body")), near(method))
 
 
 @pytest.mark.in_turn
@@ -222,7 +234,7 @@ def test_a_mass_on_a_cylinder_is_a_body_on_a_prismatic_joint(law, method):
     slides = {"kind": "prismatic", "axis": way, "travel": 0.3, "rate": 0.4}
     other = case({"m": body(20.0, [1, 1, 1], slides), "ground": {"type": "frame", "points": {"eye": [0, 0, 0]}}},
                  "ground.eye", "m", direction=way)  # fmt: skip
-    alike(told(one), told(other), near(method))
+    alike(outcome_of(one), outcome_of(other), near(method))
 
 
 WAVE = {"mean": 0.1, "amplitude": 0.2, "period": 0.9, "phase": 0.4}
@@ -238,10 +250,10 @@ SAID = {
 @pytest.mark.in_turn
 @pytest.mark.parametrize("method", EACH)
 @pytest.mark.parametrize("way", SAID)
-def test_what_drives_a_joint_in_other_words(way, method):
+def test_a_joint_driven_in_other_words(way, method):
     case = machine(method, signals={"swing": WAVE} if way == "shared" else {})
     case["nodes"]["base"]["joint"]["angle"] = SAID[way]
-    alike(first("machine", method), told(case), near(method))
+    alike(first("machine", method), outcome_of(case), near(method))
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -254,5 +266,5 @@ def test_a_slider_that_is_driven_by_a_power_or_by_its_table(method):
         nodes = {"cart": body(3.0, [1, 1, 1], {"kind": "prismatic", "axis": [1, 0, 0], "travel": travel}),
                  "bob": body(1.0, [0.1, 0.1, 0.1], {"kind": "revolute", "on": "cart", "axis": [0, 1, 0], "angle": 0.3},
                              centre_of_mass=[0, 0, -0.5])}  # fmt: skip
-        found.append(told(scene(nodes, {}, 1.0, stepped(method, 0.01), ["bob.angle", "cart.x"], 0.125)))
+        found.append(outcome_of(scene(nodes, {}, 1.0, stepped(method, 0.01), ["bob.angle", "cart.x"], 0.125)))
     alike(*found, 2e-5)

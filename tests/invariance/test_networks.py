@@ -17,7 +17,7 @@ import fvsolve
 from fvsolve.case.text import write
 from invariance import equivalent_networks as equivalent
 from invariance.random_scenes import SEEDS, networks, shuffled
-from invariance.result_comparison import EXPERIMENTAL, alike, near, told, with_frames
+from invariance.result_comparison import EXPERIMENTAL, alike, near, outcome_of, with_frames
 
 pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings fail, such as of NaN values
 
@@ -26,20 +26,20 @@ pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings
 @given(case=networks())
 def test_run_again(case):
     """A second run agrees to the bit, with a new model or with a used model."""
-    first = told(case)
-    alike(first, told(case))
+    first = outcome_of(case)
+    alike(first, outcome_of(case))
     if first.result:
         model = fvsolve.build(fvsolve.load(case))
         fvsolve.run(model)
-        alike(first, told(model))
+        alike(first, outcome_of(model))
 
 
 @examples(6)
 @given(case=networks())
 def test_other_rows(case):
     """Common rows agree to the bit, because rows are interpolated between steps and 1/32 s is exact in binary."""
-    few = told(equivalent.changed(case, "output", every=1 / 16))
-    many = told(equivalent.changed(case, "output", every=1 / 64))
+    few = outcome_of(equivalent.changed(case, "output", every=1 / 16))
+    many = outcome_of(equivalent.changed(case, "output", every=1 / 64))
     assert few.ended == many.ended
     assert set(few.t) <= set(many.t)
     for name, values in few.rows.items():
@@ -51,11 +51,11 @@ def test_other_rows(case):
 @examples(6)
 @given(case=networks(), frames=st.integers(1, 9))
 def test_other_frames(case, frames):
-    one = told(case)
+    one = outcome_of(case)
     if one.ended == "refused":
         return
     with with_frames():
-        alike(one, told(equivalent.changed(case, "output", fields=frames)))
+        alike(one, outcome_of(equivalent.changed(case, "output", fields=frames)))
 
 
 @examples(6)
@@ -66,7 +66,9 @@ def test_other_names(case):
     def call(name):
         return f"{'zyxw'[len(name) % 4]}{name[::-1]}"
 
-    alike(told(case), told(equivalent.renamed(case, call)), name=lambda probe: equivalent.called(probe, call))
+    alike(
+        outcome_of(case), outcome_of(equivalent.renamed(case, call)), name=lambda probe: equivalent.called(probe, call)
+    )
 
 
 @examples(6)
@@ -74,7 +76,7 @@ def test_other_names(case):
 def test_other_order(case, seed):
     """The order of parts changes sums over the links of a place by rounding only."""
     nodes, links = shuffled(case["nodes"], seed), shuffled(case["links"], seed)
-    alike(told(case), told(equivalent.reordered(case, nodes, links)), near(case))
+    alike(outcome_of(case), outcome_of(equivalent.reordered(case, nodes, links)), near(case))
 
 
 @examples(6)
@@ -82,14 +84,14 @@ def test_other_order(case, seed):
 def test_links_drawn_from_the_other_end(case, seed):
     """Reversed links give the same results with the opposite sign of flows."""
     other, how = equivalent.drawn_from_other_end(case, seed)
-    alike(told(case), told(other), near(case), **how)
+    alike(outcome_of(case), outcome_of(other), near(case), **how)
 
 
 @examples(6)
 @given(case=networks(), height=st.sampled_from([16.0, 1000.0, -3.7]))
 def test_everything_higher(case, height):
     """A common height changes results by rounding only."""
-    alike(told(case), told(equivalent.raised(case, height)), near(case))
+    alike(outcome_of(case), outcome_of(equivalent.raised(case, height)), near(case))
 
 
 @examples(6)
@@ -106,7 +108,7 @@ def test_without_profiles(case):
         bent = np.interp(x[0] + 0.37 * link["length"], x, z)
         return values - weight * (bent - (z[0] + 0.37 * (z[-1] - z[0])))
 
-    alike(told(equivalent.straight(case)), told(case), near(case), change=change)
+    alike(outcome_of(equivalent.straight(case)), outcome_of(case), near(case), change=change)
 
 
 @examples(6)
@@ -116,8 +118,8 @@ def test_limits_and_points_that_are_watched_change_nothing(case):
     limits = {"any": {"on": "pipes", "maximum": "1 GPa"},
               "quick": {"on": "pipes", "quantity": "velocity", "maximum": 1e3},
               "push": {"on": "pipes", "quantity": "force", "maximum": "1 GN"}}  # fmt: skip
-    watched = told(case | {"limits": limits})
-    alike(told(case), watched)
+    watched = outcome_of(case | {"limits": limits})
+    alike(outcome_of(case), watched)
     if watched.result and watched.result.ok:
         allowed = {"holds", "open"} if watched.result.marks else {"holds"}  # open below vapour pressure
         assert {one.state for one in watched.result.verdicts} <= allowed
@@ -127,15 +129,15 @@ def test_limits_and_points_that_are_watched_change_nothing(case):
 @given(case=networks())
 def test_other_units(case):
     """Conversion of units changes results by rounding only."""
-    alike(told(case), told(equivalent.in_other_units(case)), near(case))
+    alike(outcome_of(case), outcome_of(equivalent.in_other_units(case)), near(case))
 
 
 @examples(6)
 @given(case=networks())
 def test_two_copies_with_a_shut_valve_between(case):
     """Two copies of a network give the same results, except for rounding in norms and larger systems."""
-    one = told(case)
-    both = told(equivalent.twice(case, "n0"))
+    one = outcome_of(case)
+    both = outcome_of(equivalent.twice(case, "n0"))
     alike(one, both, near(case))
     alike(one, both, near(case), name=lambda probe: equivalent.called(probe, lambda part: f"{part}-too"))
 
@@ -144,7 +146,7 @@ def test_two_copies_with_a_shut_valve_between(case):
 @given(case=networks(), wait=st.sampled_from([64.0, 1000.0]))
 def test_at_a_later_time(case, wait):
     """A delay changes results by rounding of times, which enters steps and schedules."""
-    alike(told(case), told(equivalent.later(case, wait)), 1e3 * near(case), later=wait)
+    alike(outcome_of(case), outcome_of(equivalent.later(case, wait)), 1e3 * near(case), later=wait)
 
 
 @examples(6)
@@ -155,7 +157,7 @@ def test_a_denser_fluid(case):
     def twice(probe, values):
         return 2.0 * values if ".pressure" in probe else values
 
-    alike(told(equivalent.denser(case, 1.0)), told(equivalent.denser(case, 2.0)), near(case), change=twice)
+    alike(outcome_of(equivalent.denser(case, 1.0)), outcome_of(equivalent.denser(case, 2.0)), near(case), change=twice)
 
 
 @examples(6)
@@ -163,7 +165,7 @@ def test_a_denser_fluid(case):
 def test_a_demand_is_an_inflow_backwards(case):
     """A negative inflow equals a demand at a junction to the bit."""
     assume(any("demand" in node for node in case["nodes"].values()))
-    alike(told(case), told(equivalent.drawn_backwards(case)))
+    alike(outcome_of(case), outcome_of(equivalent.drawn_backwards(case)))
 
 
 @examples(6)
@@ -175,7 +177,7 @@ def test_the_resolved_file(case):
         resolved = tomllib.loads(fvsolve.load(case).resolved())
     except fvsolve.CaseError:
         return
-    alike(told(case), told(resolved))
+    alike(outcome_of(case), outcome_of(resolved))
 
 
 @examples(6)
@@ -188,4 +190,4 @@ def test_a_file_and_settings(case, tmp_path_factory):
     path.write_text(write(wrong))
     pipe = case["links"]["p0"]
     right = {"numerics.end": 1.0, "links.p0.length": pipe["length"], "links.p0.cells": pipe["cells"]}
-    alike(told(case), told(path, set=right))
+    alike(outcome_of(case), outcome_of(path, set=right))

@@ -13,7 +13,7 @@ from reference.scenes import junction, lake, pipe, ramp, scene, valve
 from fvsolve.core.steppers import METHODS
 from fvsolve.parts import KINDS
 from invariance.random_scenes import FRICTIONS, between, numerics, probes
-from invariance.result_comparison import told
+from invariance.result_comparison import outcome_of
 
 ONE, NONE = st.just(1.0), st.just(0.0)
 CRACKING = {"cracking_pressure": between(0.0, 5e3)}
@@ -198,7 +198,7 @@ def main(start: str, end: str) -> dict:
     return pipe(start, end, 60.0, 0.1, 1000.0, 4, friction={"model": "steady", "factor": 0.02})
 
 
-def made(places: dict, links: dict, settings: dict, end: float = 1.0) -> dict:
+def case_with_probes(places: dict, links: dict, settings: dict, end: float = 1.0) -> dict:
     case = scene(places, links, end, settings, probes(places, links), 0.05)
     case["output"]["fields"] = 0
     return case
@@ -230,7 +230,7 @@ PARTS = [("links", kind) for kind in LINKS] + [("nodes", kind) for kind in NODES
 @pytest.mark.parametrize("table, kind", PARTS)
 @examples(4)
 @given(data=st.data(), settings=numerics())
-def test_driven_one_way_then_the_other_the_ledger_closes(table, kind, data, settings):
+def test_with_flow_in_both_directions_the_ledger_closes(table, kind, data, settings):
     """The mass ledger closes and the run finishes while the upper lake falls below the lower lake and rises again."""
     part = data.draw((LINKS if table == "links" else NODES)[kind])
     places, links = data.draw(joined(table, part, settings))
@@ -239,7 +239,7 @@ def test_driven_one_way_then_the_other_the_ledger_closes(table, kind, data, sett
         {"time": [0.0, 0.3, 0.7], "value": [HEAD + 10.0, HEAD - 8.0, HEAD + 15.0], "kind": "step"},
         ramp(0.2, 0.4, HEAD - 8.0, HEAD + 15.0),
     ])))  # fmt: skip
-    shown = told(made(places, links, settings))
+    shown = outcome_of(case_with_probes(places, links, settings))
     if shown.ended == "refused":
         return
     assert shown.ended == "finished"
@@ -263,7 +263,7 @@ def test_at_rest_it_stays_at_rest(table, kind, data, settings):
         "junction": {"demand": 0.0}, "inflow": {"flow": 0.0}, "tank": {"level": HEAD}, "reservoir": {"head": HEAD},
     }.get(kind, {})  # fmt: skip
     part |= still
-    shown = told(made(*data.draw(joined(table, part, settings)), settings))
+    shown = outcome_of(case_with_probes(*data.draw(joined(table, part, settings)), settings))
     if shown.ended == "refused":
         return
     assert shown.ended == "finished"

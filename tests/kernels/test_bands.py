@@ -18,15 +18,15 @@ ENDS = 4  # numbers of a pipe in `out` for its ends
 def handles(slate: RunData, cuts: list[int]) -> list[np.ndarray]:
     """Handle of each band of pipes between cuts, with its own scratch, and the arrays that it needs."""
     tables, functions = slate.model.tables, slate.model.functions
-    found = []
+    results = []
     for first, last in zip(cuts, cuts[1:], strict=False):
         layout = tables.layout.copy()
         layout["ends"] += ENDS * first
         own = tables._replace(pipes=tables.pipes[first:last], layout=layout)
         written = slate.written._replace(scratch=slate.written.scratch.copy())
         made = (*own, *written, functions.calls, functions.hooks)
-        found.append((make_handle(made), made))  # the arrays of a handle must exist as long as it does
-    return found
+        results.append((make_handle(made), made))  # the arrays of a handle must exist as long as it does
+    return results
 
 
 @pytest.mark.in_turn
@@ -41,7 +41,7 @@ def test_bands_of_pipes_give_the_bits_of_all(law, cuts):
     slate = RunData(model)
     bands, whole = handles(slate, cuts), slate.handle
 
-    def found(each) -> tuple[np.ndarray, np.ndarray]:
+    def rates_and_out(each) -> tuple[np.ndarray, np.ndarray]:
         rates, beside = np.zeros(model.y_size), model.new_out()
         for phase in PHASES:
             for piece in model.functions.cast.functions(phase):
@@ -55,5 +55,5 @@ def test_bands_of_pipes_give_the_bits_of_all(law, cuts):
         ways = (lambda do: [do(one) for one in bands], lambda do: [do(one) for one in bands[::-1]],
                 lambda do: list(pool.map(do, bands)))  # fmt: skip
         for each in ways:
-            rates, beside = found(each)
+            rates, beside = rates_and_out(each)
             assert np.array_equal(rates, dydt) and np.array_equal(beside, out)

@@ -39,7 +39,7 @@ def adelaide():
     return fvsolve.run(CASE)
 
 
-def test_the_rig_s_plateau_cavities_and_second_pulse_are_met(adelaide):
+def test_the_plateau_cavities_and_second_pulse_of_the_rig_agree(adelaide):
     """Measured by Bergant and Simpson (1999): plateau to 3 %, durations to 5 %, peak of the second pulse to 10 %.
 
     The mean of that pulse is 12 % below the middle of the measured range; the goal of 10 % is missed.
@@ -56,7 +56,7 @@ def test_the_rig_s_plateau_cavities_and_second_pulse_are_met(adelaide):
     assert np.median(p[(t > down) & (t < up)]) == approx(BELOW / 1e3, abs=0.1)
 
 
-def test_the_summary_says_where_a_cavity_was_and_doubts_nothing(adelaide):
+def test_the_summary_states_the_place_of_a_cavity_without_doubts(adelaide):
     said = adelaide.summary
     assert said["marks"] == [] and said["ok"]
     (found,) = said["cavities"]
@@ -168,7 +168,7 @@ def test_cavities_at_a_summit_and_between_valves_keep_all_mass():
 
 
 @pytest.mark.parametrize("cell_time", [1e-3, 3e-3, 4e-3, 6e-3])
-def test_a_node_whose_balance_has_a_kink_is_closed_at_every_resolution(cell_time):
+def test_a_node_with_a_kink_in_its_balance_is_closed_at_every_resolution(cell_time):
     """An inflow stops below a hill; with cells of 4 ms Newton's method once alternated about the kink without end."""
     rub = {"model": "quasi-steady", "roughness": 1e-4}
     nodes = {
@@ -192,9 +192,7 @@ def test_a_node_whose_balance_has_a_kink_is_closed_at_every_resolution(cell_time
 @pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["ssp-rk2", "dormand-prince"])
 @pytest.mark.parametrize("reverse", [False, True])
-def test_a_demand_that_a_cavity_cannot_supply_ends_the_run_and_one_that_falls_with_the_pressure_does_not(
-    method, reverse
-):
+def test_a_demand_that_a_cavity_cannot_supply_ends_the_run_and_a_demand_by_pressure_does_not(method, reverse):
     """The valve before a summit shuts: the column beyond flows on, stops, and returns; the demand continues."""
     ends = ("hill", "far") if reverse else ("far", "hill")
     nodes = {"lake": lake(30.0, elevation=0.0), "gate": junction(elevation=0.0), "far": lake(25.0, elevation=0.0)}
@@ -215,7 +213,7 @@ def test_a_demand_that_a_cavity_cannot_supply_ends_the_run_and_one_that_falls_wi
     assert result.ok and abs(result.ledger["mass"]["relative"]) < 1e-12
 
 
-def test_a_pump_at_a_cavity_is_told_by_the_place_of_the_cavity():
+def test_a_pump_at_a_cavity_is_reported_by_the_place_of_the_cavity():
     curve = {"flow": [0.0, 0.03, 0.06], "head": [60.0, 50.0, 30.0]}
     nodes = {"low": lake(3.0, elevation=0.0), "high": lake(40.0, elevation=0.0)}
     nodes |= {name: junction(elevation=z) for name, z in (("foot", 0.0), ("eye", 2.0), ("out", 2.0))}
@@ -229,7 +227,7 @@ def test_a_pump_at_a_cavity_is_told_by_the_place_of_the_cavity():
     assert not result.ok and "a cavity at eye cannot supply" in result.reason and "suction" in result.reason
 
 
-def test_a_chamber_that_empties_into_a_cavity_keeps_all_mass():
+def test_a_chamber_that_empties_into_a_cavity_conserves_mass():
     case = network(end=0.4)
     case["nodes"]["pot"] = {"type": "chamber", "volume": 2e-3, "elevation": 15.0}
     case["links"]["neck"] = valve("hill", "pot", 1e-4)
@@ -239,7 +237,7 @@ def test_a_chamber_that_empties_into_a_cavity_keeps_all_mass():
     assert result["pot.gauge_pressure"].min() < 0.9 * BELOW
 
 
-def test_what_bounds_the_step_is_of_its_own_state_alone_and_no_table_is_written():
+def test_the_limit_of_a_step_depends_on_its_own_state_only_and_no_table_is_written():
     """A chamber softens as it empties; its greatest rate is equal in a repeated evaluation, after other states."""
     case = network()
     case["nodes"]["pot"] = {"type": "chamber", "volume": 2e-3, "elevation": 15.0}
@@ -297,7 +295,7 @@ def test_where_no_cavity_is_near_following_cavities_changes_nothing(beside) -> N
     assert fvsolve.run(case)["v.head"] == approx(followed["v.head"], rel=1e-9)
 
 
-def test_without_an_event_nothing_moves_by_one_bit():
+def test_without_an_event_no_bit_changes():
     case = network()
     case["links"]["tap"]["opening"] = 1.0
     model = fvsolve.build(fvsolve.load(case))
@@ -311,7 +309,7 @@ def test_the_numbers_dissipate_while_a_cavity_opens_and_closes():
     assert found.marks == []
 
 
-def test_a_run_can_be_told_to_stop_where_a_cavity_opens():
+def test_a_run_can_be_stopped_where_a_cavity_opens():
     result = fvsolve.run(CASE, set={"numerics.below_vapor": "stop", "links.main.cells": 40})
     assert not result.ok and "a cavity opened" in result.reason
     assert result.summary["t"] == approx(2 * 37.23 / 1319, rel=0.1)
@@ -337,7 +335,7 @@ def test_few_cells_for_a_cavity_are_a_note_with_the_error_they_make():
 
 
 @pytest.mark.parametrize("cells", [25, 50])
-def test_the_error_that_the_note_says_is_that_behind_a_stop(cells):
+def test_the_error_stated_by_the_note_is_that_behind_a_stop(cells):
     """A stopped column returns and separates; its cavity is too short by 0.5 to 1.5 times the stated error."""
     v0, back = 1.3, 2.0 * LENGTH / SPEED
     nodes = {"lake": reservoir(START), "gate": junction()}
@@ -354,7 +352,7 @@ def test_the_error_that_the_note_says_is_that_behind_a_stop(cells):
     assert short == approx(1.03 * cells**-0.7, rel=0.5)
 
 
-def test_a_line_over_a_summit_parts_there_and_meets_as_by_characteristics():
+def test_a_line_over_a_summit_separates_there_and_rejoins_as_by_characteristics():
     """Time, place, volume and collapse of the cavity agree, and the heads at five times."""
     rows, events = cavities.line(reaches=480, end=40.0)
     (opens, _, where), (meets, _, _) = events
@@ -371,7 +369,7 @@ def test_a_line_over_a_summit_parts_there_and_meets_as_by_characteristics():
             assert np.interp(time, t, result[probe]) == approx(truth, rel=0.01)
 
 
-def test_cavitation_alone_brings_what_it_needs_and_a_scene_that_says_otherwise_is_told_so_at_once():
+def test_cavitation_alone_sets_its_defaults_and_a_scene_that_contradicts_is_refused_at_once():
     """Cavitation sets law, air, scheme, method and Courant number, unless the case states them."""
     gate = {"lake": lake(20.0), "gate": junction({"time": [0.0, 0.05], "value": [0.02, 0.0], "kind": "step"})}
     case = scene(gate, {"main": pipe("lake", "gate", LENGTH, 0.1, SPEED, 20)}, 0.3, {}, ["gate.pressure"])
@@ -399,7 +397,7 @@ def upstream_gate(cells: int, end: float) -> dict:
     return scene(nodes, links, end, PLAIN, ["gate.head"], fluid=WATER)
 
 
-def test_a_cavity_at_an_end_is_not_squeezed_by_what_the_pipe_loses_at_the_start():
+def test_a_cavity_at_an_end_is_not_compressed_by_the_losses_of_the_start():
     """The head at the gate stays near that of vapour until the column returns."""
     vapor = (WATER["vapor_pressure"] - AMBIENT) / (WATER["density"] * 9.80665)
     truth = cavities.behind_a_gate(30.0, 25.0, 600.0, 0.2, 1100.0, 0.02, 0.5, 0.5, vapor, 200, 6.0)
@@ -463,7 +461,7 @@ AERATED = {**SOFT, "density": 998.2, "bulk_modulus": 2.18e9, "air_fraction": 1e-
 
 
 @pytest.mark.parametrize("fluid, speed, near", [(SOFT, None, 1e-9), (AERATED, None, 1e-9), (AERATED, 1319.0, 2e-5)])
-def test_the_state_between_the_waves_is_the_exact_one(fluid, speed, near):
+def test_the_state_between_the_waves_is_exact(fluid, speed, near):
     """Velocities between 200 pairs of liquid and foam: to 1e-9, in an elastic wall (nearly closed form) to 2e-5."""
     tables = resting_pipe(4, fluid, speed, scheme="upwind", method="euler").tables
     st, floats, pipe = tables.settings[0], tables.floats, tables.pipes[0]

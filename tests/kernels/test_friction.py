@@ -30,7 +30,7 @@ def test_the_drag_is_the_power_of_the_flow_over_three_hundred_decades(sign):
     assert max(abs(a / b - 1) for a, b in zip(found, wanted, strict=True)) < 2e-14
 
 
-def test_no_flow_has_no_drag_and_what_is_not_finite_stays_so():
+def test_zero_flow_has_no_drag_and_values_that_are_not_finite_stay_so():
     assert drag(FRICTION_HAZEN, 3.0, 2.0, 0.0, 1.0, 0.0) == 0.0
     assert not np.isfinite(power_of_square(np.inf)) and not np.isfinite(power_of_square(np.nan))
 
@@ -52,7 +52,7 @@ def rubbed(flows, leans, loss=0.0, rough=1.0):
     return 2.0 * dl
 
 
-def test_a_cell_of_one_flow_has_the_drag_of_that_flow_to_the_bit_at_any_place_of_a_pipe():
+def test_a_cell_with_uniform_flow_has_the_drag_of_that_flow_to_the_bit_at_any_place_of_a_pipe():
     """Vectors of cells, the last cells and a single cell round alike, so that steady states stay."""
     for n in (1, 3, 4, 7, 47):
         flow = 7.3 * 1.9 ** np.arange(n)

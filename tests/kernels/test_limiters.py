@@ -36,7 +36,7 @@ def pipe_scalars(code: int) -> np.ndarray:
     return found[1:-1]
 
 
-def one_face(code: int) -> np.ndarray:
+def single_face(code: int) -> np.ndarray:
     b, c, d = waves(3)
     return np.array([reconstruction.value_muscl(code, *three) for three in zip(b, c, d, strict=True)])
 
@@ -78,7 +78,7 @@ def shallow_sides(code: int, kerbs: float) -> np.ndarray:
 KERNELS = {
     "pipe": lambda code: pipe_faces(code, 0),
     "pipe, backward": lambda code: pipe_faces(code, 1),
-    "pipe ends, cavities": one_face,
+    "pipe ends, cavities": single_face,
     "scalars in pipes": pipe_scalars,
     "scalars on grids": carried,
     "liquid on grids": liquid_faces,
@@ -101,7 +101,7 @@ def test_a_code_that_is_no_limiter_gives_nan_and_never_another(kernel):
     assert np.any(np.isnan(KERNELS[kernel](NONE)))
 
 
-def test_a_pair_of_halves_is_two_slopes():
+def test_a_pair_of_half_slopes_is_two_slopes():
     """One division gives both half slopes."""
     a, b, c, d = (row - 2.0 for row in waves(4))
     for limiter in (reconstruction.minmod, reconstruction.van_leer, reconstruction.monotonized_central):
@@ -111,5 +111,5 @@ def test_a_pair_of_halves_is_two_slopes():
             assert two == pytest.approx(0.5 * reconstruction.slope(limiter, *four[2:]), rel=1e-15)
 
 
-def test_what_is_flat_has_no_slope():
+def test_constant_values_have_no_slope():
     assert_array_equal([limited(rec.FLAT, 1.0, 2.0), limited(rec.FLAT, -1.0, 2.0)], 0.0)

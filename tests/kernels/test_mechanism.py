@@ -92,7 +92,7 @@ def test_the_mass_matrix_of_random_trees_is_that_of_pinocchio(seed):
     assert (factor.T @ factor)[np.ix_(own, own)] == pytest.approx(truth, abs=1e-13 * np.abs(truth).max())
 
 
-def test_a_wall_beside_a_tree_leaves_its_mass_matrix_at_the_state_that_is_asked_for():
+def test_a_wall_at_a_tree_leaves_its_mass_matrix_at_the_given_state():
     """A slider that moves a wall, and a pendulum on it: M_12 = -m l cos(a)."""
     slider = {"type": "body", "mass": 5.0, "inertia": [1, 1, 1], "joint": {"kind": "prismatic", "axis": [1, 0, 0]}}
     hinge = {"kind": "revolute", "axis": [0, 1, 0], "on": "slider"}

@@ -54,7 +54,7 @@ def test_junctions_in_a_row_of_shut_valves_share_the_drop():
     assert result["Y.head"][late] == pytest.approx(30.0 + 20.0 / 3.0, rel=1e-9)
 
 
-def test_a_valve_that_all_but_shuts_keeps_its_junction_between_its_neighbours():
+def test_a_valve_that_almost_shuts_leaves_its_junction_between_its_neighbours():
     nodes = {"A": lake(50.0), "B": lake(40.0), "X": junction()}
     opening = ramp(1.0, 0.1, 1.0, 1e-12)
     links = {"v0": valve("A", "X", 1e-3, opening), "v1": valve("X", "B", 1e-3, opening)}
@@ -123,7 +123,7 @@ def test_a_valve_shuts_on_a_rigid_column_at_the_head_that_stops_it(numerics):
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("method", ["dormand-prince", "rodas-5p", "radau-iia-5"])
-def test_a_valve_does_so_beside_an_ideal_check_valve_that_is_shut(method, law, turned):
+def test_a_valve_does_so_next_to_an_ideal_check_valve_that_is_shut(method, law, turned):
     """An ideal check valve acts only after an event: the valve controls the column, and no event occurs."""
     nodes = {"A": lake(50.0), "B": lake(40.0), "X": junction()}
     column = {"type": "rigid-column", "from": "A", "to": "X", "length": 10.0, "diameter": 0.1}
@@ -207,7 +207,7 @@ def town(name: str, size: float) -> tuple[dict, dict]:
 
 
 @pytest.mark.parametrize("law", FLUIDS)
-def test_rates_of_one_town_do_not_hang_on_another_by_one_bit(law):
+def test_rates_of_separate_towns_are_independent_to_the_bit(law):
     """States of the second town deviate up to three times as much, so Newton's method needs more iterations there."""
 
     def built(*towns):

@@ -155,7 +155,7 @@ def test_decimals_near_a_line_mean_it():
     assert third.middle[third.patch("a")][:, 0] == approx([0.5, 5 / 6])
 
 
-def test_notes_tell_what_the_file_leaves_unsaid(tmp_path):
+def test_notes_state_defaults_that_the_file_leaves_out(tmp_path):
     plain = read(write(tmp_path / "plain.msh", [*SQUARE, (7, 7)], [TWO[0], TWO[1][::-1]]))
     assert plain.notes == (
         "points in the file that belong to no cell: 1 of 7, ignored",
@@ -190,7 +190,7 @@ def test_the_unit_of_a_file(tmp_path):
         read(bad, unit="mm")
 
 
-def test_formats_say_the_same(tmp_path):
+def test_formats_give_the_same_mesh(tmp_path):
     (tmp_path / "four.msh").write_text(MSH4)  # format of Gmsh's manual, with gaps between the numbers of points
     four = read(tmp_path / "four.msh")
     groups = {"in": [0, 3], "out": [2, 5]}
@@ -392,7 +392,7 @@ def test_files_that_hold_no_plane_mesh(tmp_path, capsys):
     assert capsys.readouterr() == ("", "")
 
 
-def test_a_group_without_lines_is_told(tmp_path):
+def test_a_group_without_lines_is_reported(tmp_path):
     (tmp_path / "four.msh").write_text(
         MSH4.replace('1 7 "in"', '1 7 "in"\n1 9 "rim"').replace("Names\n3\n", "Names\n4\n")
     )

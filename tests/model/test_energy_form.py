@@ -27,7 +27,7 @@ def pair(stiffness, hold=0.0):
     return scene(nodes, links, 1.0, {"method": "rk4", "step": 1e-3})
 
 
-def by_hand(stiffness, method, steps=1000):
+def greatest_stable_step(stiffness, method, steps=1000):
     """Greatest step of the relative motion at which no power of the step matrix exceeds 1000 in the energy norm [s]."""
     omega, rate = math.sqrt(2 * stiffness / MASS), 2 * DAMPING / MASS
     j = np.array([[0.0, omega], [-omega, -rate]])  # states sqrt(k / 2) (x_b - x_a), sqrt(m / 4) (v_b - v_a)
@@ -56,13 +56,13 @@ def system_of(case, method, at=None, steps=1000):
 @pytest.mark.parametrize("method", ["rk4", "ssp-rk3"])
 def test_two_masses_on_a_spring_fail_where_their_relative_motion_does(stiffness, hold, method):
     found = predicted_limit(system_of(pair(stiffness, hold), method)).step
-    assert found == pytest.approx(by_hand(stiffness, method), rel=2e-4)
+    assert found == pytest.approx(greatest_stable_step(stiffness, method), rel=2e-4)
 
 
 def test_two_free_masses_are_measured_as_predicted_and_no_implicit_step_of_theirs_fails():
     (row,) = stability(pair(1e6), methods=["rk4"], steps=300).rows
     assert abs(row.difference) < 0.005 and row.field_of_values <= row.predicted * (1 + 1e-4)
-    assert row.field_of_values > 0.0 and row.predicted == pytest.approx(by_hand(1e6, "rk4", 300), rel=2e-4)
+    assert row.field_of_values > 0.0 and row.predicted == pytest.approx(greatest_stable_step(1e6, "rk4", 300), rel=2e-4)
     for name in ("implicit-euler", "gauss-4"):
         assert math.isinf(predicted_limit(system_of(pair(1e6), name)).step)
         assert math.isinf(predicted_limit(system_of(pair(1e7, 0.1), name)).step)
@@ -83,7 +83,7 @@ def test_energy_changes_by_its_slope_along_the_flow_1(push):
         assert slope @ model.rhs(0.0, y) == pytest.approx(power, rel=1e-9, abs=1e-9)
 
 
-def test_masses_that_nothing_holds_are_idle_together_and_a_held_one_is_not():
+def test_free_masses_are_idle_together_and_a_supported_mass_is_not():
     free, held = (operating_point(pair(1e6, hold)).model for hold in (0.0, 0.1))
     form = energy_form(free)
     together = np.array([1.0, 0.0, 1.0, 0.0])
@@ -102,7 +102,7 @@ def test_a_closed_cylinder_neither_gains_nor_loses_energy_at_rest_or_moving(at):
     assert np.max(np.abs(e + e.T)) < 1e-6 * np.max(np.abs(e)) and np.linalg.eigvalsh(0.5 * (e + e.T))[-1] < 1e-4
 
 
-def test_an_idle_state_that_moves_what_has_energy_gets_the_least_weight():
+def test_an_idle_state_that_moves_an_energy_gets_the_least_weight():
     from scipy.sparse import csr_array
 
     form = form_of(csr_array(np.array([[0.0, 2.0]])), ("load",), np.array([0.1, 0.5]))
@@ -114,7 +114,7 @@ def test_an_idle_state_that_moves_what_has_energy_gets_the_least_weight():
     assert np.sort(np.linalg.eigvals(whole.seen(driven))) == pytest.approx(np.sort(np.linalg.eigvals(driven)))
 
 
-def test_the_greatest_growth_is_found_at_every_power_of_a_small_system():
+def test_the_greatest_growth_is_located_at_every_power_of_a_small_system():
     """The predicted limit covers all powers of a step, also in a norm in which the growth oscillates."""
     e, steps = np.array([[0.0, 1.0], [-40.0, 0.0]]), 300
     found = predicted_limit(DenseGrowth(method_named("euler"), e, steps)).step

@@ -119,7 +119,7 @@ def test_a_chain_hangs_at_its_least_potential_and_its_pin_is_shut():
     assert model.observe(fvsolve.initial_state(model)) == approx([0.0], abs=1e-14)
 
 
-def test_a_rod_on_a_ball_joint_points_along_its_weight_and_what_pulls_it():
+def test_a_rod_on_a_ball_joint_points_along_the_sum_of_weight_and_pull():
     pull = np.array([12.0, -7.0, 0.0])
     joint = {"kind": "ball", "attitude": {"roll": 0.4, "pitch": -0.3, "yaw": 0.8}}
     rod = body(2.0, [0.1, 0.1, 0.02], joint, centre_of_mass=[0, 0, -0.5], points={"end": [0, 0, -0.5]})
@@ -303,7 +303,7 @@ METHODS = {"dormand-prince": {"rtol": 1e-8}, "radau-iia-5": {"rtol": 1e-6}, "rod
 @pytest.mark.in_turn
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("scene", SCENES)
-def test_what_stands_in_balance_stays(scene, method):
+def test_bodies_in_balance_stay_at_rest(scene, method):
     probe = {"arm": "hand.tip.z", "chain": "two.tip.z", "plate": "plate.z"}.get(scene, "hull.angle")
     case = balanced(*SCENES[scene](), [probe], 2.0, method=method, **METHODS[method])
     result = fvsolve.run(case)
@@ -311,7 +311,7 @@ def test_what_stands_in_balance_stays(scene, method):
     assert np.ptp(result[probe]) <= (1e-10 if scene in ("hull", "modes") else 0.0)
 
 
-def by_hand(nodes: dict, model) -> dict:
+def with_stated_places(nodes: dict, model) -> dict:
     """Nodes with the positions of the equilibrium as stated values."""
     again = {name: {**node} for name, node in nodes.items()}
     for name, node in model.case.equilibrium_nodes.items():
@@ -327,13 +327,17 @@ def by_hand(nodes: dict, model) -> dict:
 @pytest.mark.in_turn
 @pytest.mark.parametrize("initial", ["steady", "equilibrium"])
 @pytest.mark.parametrize("scene", SCENES)
-def test_a_balance_is_the_same_scene_with_the_found_places_written_by_hand(scene, initial):
+def test_a_balance_is_the_same_scene_with_the_computed_places_written_explicitly(scene, initial):
     nodes, links = SCENES[scene]()
     case = balanced(nodes, links)
     model = built(case)
     assert model.case.equilibrium_nodes
     other = built(
-        {**case, "nodes": by_hand(case["nodes"], model), "numerics": {**case["numerics"], "initial": initial}}
+        {
+            **case,
+            "nodes": with_stated_places(case["nodes"], model),
+            "numerics": {**case["numerics"], "initial": initial},
+        }
     )
     if initial == "equilibrium":
         assert not [one for one in other.warnings if one.key in ("joint.angle", "joint.at")]
@@ -366,7 +370,7 @@ def test_the_order_of_a_file_its_axes_and_where_the_search_begins_do_not_matter(
         assert angles(built(balanced(*arm_on_springs(first, second)))) == approx(truth, abs=1e-12)
 
 
-def test_units_and_a_mirrored_scene_say_the_same():
+def test_units_and_a_mirrored_scene_give_the_same_balance():
     nodes, links = arm_on_springs()
     truth = angles(built(balanced(nodes, links)))
     hand = {**nodes["hand"], "joint": {**nodes["hand"]["joint"], "angle": "-22.9 deg"}}
@@ -389,7 +393,7 @@ def test_units_and_a_mirrored_scene_say_the_same():
 # stability of chambers, and faults ------------------------------------------------------------------------------
 
 
-def test_a_boom_on_shut_chambers_stays_where_it_is_stated_and_what_hangs_on_it_settles():
+def test_a_boom_on_shut_chambers_stays_at_its_stated_place_and_its_load_settles():
     crane = Crane()
     free = {"initial_pressure_A": None, "initial_pressure_B": None}
     links = {"lift": {key: one for key, one in (crane.links()["lift"] | free).items() if one is not None}}
@@ -408,7 +412,7 @@ def test_a_boom_on_shut_chambers_stays_where_it_is_stated_and_what_hangs_on_it_s
     assert np.ptp(result["boom.angle"]) == np.ptp(result["load.angle"]) == 0.0
 
 
-def test_a_pendulum_that_stands_stays_and_is_told_so():
+def test_a_standing_pendulum_stays_and_is_reported():
     model = built(balanced({"arm": pendulum(math.pi)}))
     (told,) = [one for one in model.warnings if one.key == "stability"]
     assert "equilibrium is unstable" in told.text and told.value == approx(math.sqrt(GRAVITY / 0.7), rel=1e-8)
@@ -452,7 +456,7 @@ def test_oil_that_is_shut_in_is_the_spring_of_both_chambers(law):
     assert at.fluid_stiffness(at.y) == approx(np.array([[crane.spring(law) * crane.lever**2]]), rel=1e-12)
 
 
-def test_what_nothing_holds_finds_no_balance_and_is_named():
+def test_a_body_without_support_has_no_balance_and_is_named():
     with pytest.raises(CaseError) as told:
         built(balanced({"stone": body(2.0, [1, 1, 1], {"kind": "free"})}))
     assert 'nodes.stone: "equilibrium" finds no position where the forces on stone balance: 19.61 N remain' in str(
@@ -468,7 +472,7 @@ def test_a_hull_that_would_turn_over_with_its_water_is_a_fault():
         built(balanced(nodes))
 
 
-def test_what_moves_at_a_stated_rate_is_a_fault_as_before():
+def test_motion_at_a_stated_rate_is_a_fault_as_before():
     with pytest.raises(CaseError, match="expects that nothing moves, but body arm turns at 2 rad/s"):
         built(balanced({"arm": pendulum(1.0, rate=2.0)}))
 
@@ -480,7 +484,7 @@ def test_a_piston_that_balance_would_take_beyond_its_stroke_is_a_fault_there():
         built(balanced(crane.nodes(), links))
 
 
-def test_bushings_and_preloads_count_from_what_is_stated():
+def test_bushings_and_preloads_count_from_stated_places():
     nodes = {"top": {"type": "frame", "points": {"a": [0, 0, 1.0]}},
              "bob": body(2.0, [1, 1, 1], {"kind": "prismatic", "axis": [0, 0, 1], "travel": 0.1})}  # fmt: skip
     links = {"rope": {"type": "spring", "from": "top.a", "to": "bob", "stiffness": 400.0, "preload": -5.0}}
@@ -496,7 +500,7 @@ def test_bushings_and_preloads_count_from_what_is_stated():
     assert stored == approx([2.0 * 30.0 * math.sin(0.5 * angle) ** 2], rel=1e-12)
 
 
-def test_a_mass_on_an_axis_goes_to_where_its_spring_holds_what_pushes_it():
+def test_a_mass_on_an_axis_goes_to_where_its_spring_balances_its_load():
     nodes = {"wall": {"type": "frame"}, "load": {"type": "mass", "mass": 4.0, "initial_position": 0.2}}
     links = {"coil": spring("wall", "load", 800.0, 0.3), "push": {"type": "force", "to": "load", "force": 100.0}}
     case = balanced(nodes, links, ["load.position"])
@@ -535,7 +539,7 @@ def test_studies_refine_no_cells_of_water_that_has_none(sloshing):
     assert found.rows
 
 
-def test_a_hull_swings_about_the_heel_that_was_found():
+def test_a_hull_oscillates_about_the_computed_heel():
     """w^2 = g sqrt((M z)^2 + (m y)^2) / J about the axis of the hull, with frozen water at any place."""
     model = built(balanced(hull("frozen", 0.6), probes=["hull.angle"]))
     mass = RHO * 1.6 * 0.4

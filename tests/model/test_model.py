@@ -69,7 +69,7 @@ def test_states_have_names_and_the_jacobian_is_the_slope_of_the_rhs():
     assert model.jacobian(0.0, y) @ direction == pytest.approx(slope, rel=1e-4, abs=1e-6 * np.max(np.abs(slope)))
 
 
-def test_check_tells_what_was_understood():
+def test_check_shows_the_computed_balance():
     checks = fvsolve.build(fvsolve.load(every_kind())).checks
     assert checks["nodes"]["lake"]["head"] == pytest.approx(60.0)
     assert checks["pipes"]["main"]["cells"] == 9
@@ -105,7 +105,7 @@ def test_advance_refuses_inputs_that_name_nothing_and_times_gone_by():
         fvsolve.advance(model, state, np.inf)
 
 
-def test_advance_stops_for_the_reason_for_which_a_run_stops():
+def test_advance_stops_for_the_same_reason_as_a_run():
     case = every_kind("log")
     case["nodes"]["gate"]["demand"] = {"time": [0.0, 0.1], "value": [0.002, 0.2]}
     case["numerics"]["below_vapor"] = "stop"
@@ -136,7 +136,7 @@ def test_advance_refuses_inputs_out_of_range(name, value, said):
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_a_reservoir_held_by_head_or_by_pressure_is_one_that_says_so(law):
+def test_a_reservoir_of_equal_head_or_pressure_is_stated_as_a_reservoir(law):
     """A reservoir held at a head or pressure by an input equals a reservoir with this head as its schedule."""
     given = every_kind(law)
     held = fvsolve.build(fvsolve.load(given))
@@ -292,7 +292,7 @@ def test_four_times_the_pipes_take_less_than_four_times_the_work(line):
     assert many < 3.8 * few  # work proportional to pairs of pipes gives 3.95 and more
 
 
-def test_a_ladder_of_like_halves_flows_alike_in_both():
+def test_a_ladder_of_two_like_branches_flows_alike_in_both():
     """A symmetric ladder with a large sparse system has no cross flow."""
     model = fvsolve.build(fvsolve.load(ladder(120, "finite-volume")))
     flow = dict(zip([p.name for p in model.pipes], model.tables.pipes["flow"], strict=True))

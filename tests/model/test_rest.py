@@ -34,7 +34,7 @@ SCHEMES = ["upwind", "muscl", "upwind5", "weno5", "central", "fromm", "linear-up
 @pytest.mark.parametrize(
     "friction", [ROUGH, {"model": "quasi-steady", "roughness": 2.6e-4}], ids=["steady", "quasi-steady"]
 )
-def test_a_looped_network_without_an_event_does_not_move_by_one_bit(scheme, friction):
+def test_a_looped_network_without_an_event_does_not_change_any_bit(scheme, friction):
     result = fvsolve.run(town(friction, {"scheme": scheme}))
     assert result.reason == "finished"  # linear-upwind is beyond its limit
     pipes, others = still_probes(result)
@@ -145,7 +145,7 @@ def test_the_mass_ledger_of_a_busy_network_closes(law, scheme):
     assert abs(balance) < 1e-12 * mass["initial"]
 
 
-def test_what_the_ledger_says_flowed_out_is_the_demand():
+def test_outflow_in_the_ledger_is_the_demand():
     nodes = {"lake": reservoir(1e6), "gate": junction(step(1.0, 0.05, 0.01))}
     links = {"main": pipe("lake", "gate", 500.0, 0.3, 1000.0, 20)}
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.9}
@@ -216,7 +216,7 @@ def test_a_jump_at_the_very_end_has_two_rows():
 @pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5"])
-def test_from_rest_a_pipe_between_two_lakes_starts_as_one_body_whichever_way_it_is_drawn(law, scheme):
+def test_from_rest_a_pipe_between_two_lakes_accelerates_as_a_rigid_body_in_either_direction(law, scheme):
     """A frictionless pipe starts with dq/dt = g A dH / L at all places."""
     area = np.pi / 4 * 0.3**2
     for ways in (("high", "low"), ("low", "high")):
@@ -282,7 +282,7 @@ def test_a_mass_and_a_wall_of_water_stand_on_shut_chambers(load, more, pressures
 
 
 @pytest.mark.parametrize("initial", ["steady", "equilibrium"])
-def test_masses_on_top_of_one_another_stand_on_a_cylinder_each(initial):
+def test_masses_stacked_on_cylinders_are_each_supported_by_their_own(initial):
     case = standing(-3000.0, initial)
     case["nodes"]["top"] = {**MASS, "initial_position": 0.2}
     case["links"] |= {"upper": jack("top", "load"), "more": {"type": "force", "to": "top", "force": -5000.0}}
@@ -293,7 +293,7 @@ def test_masses_on_top_of_one_another_stand_on_a_cylinder_each(initial):
     assert np.ptp(run["top.position"]) == np.ptp(run["load.position"]) == 0.0
 
 
-def test_a_mass_beside_a_body_stands_on_its_own_cylinder():
+def test_a_mass_next_to_a_body_is_supported_by_its_own_cylinder():
     case = standing(-9810.0)
     case["nodes"]["post"] = {"type": "frame", "points": {"foot": [0, 0, 0]}}
     case["nodes"]["box"] = {"type": "body", "mass": 50.0, "inertia": [1.0, 1.0, 1.0],
@@ -307,7 +307,7 @@ def test_a_mass_beside_a_body_stands_on_its_own_cylinder():
 
 
 @pytest.mark.parametrize("load", [-9810.0, 9810.0, 0.0])
-def test_behind_a_servo_valve_at_rest_one_chamber_is_at_half_the_supply_and_the_other_holds(load):
+def test_behind_a_servo_valve_at_rest_a_chamber_is_at_half_the_supply_and_the_opposite_chamber_balances(load):
     high, low = AMBIENT + 140e5, AMBIENT
     case = standing(load, "equilibrium", nodes={"high": reservoir(high), "low": reservoir(low)})
     case["links"]["spool"] = {"type": "spool-valve", "ports": {"P": "high", "T": "low", "A": "lift.A", "B": "lift.B"},

@@ -29,7 +29,7 @@ def faults_of(case: dict) -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("told", [sustained, lambda: restated(sustained())], ids=["as it is", "restated"])
-def test_a_valve_that_cannot_sustain_its_pressure_is_named_with_what_it_shuts_off(told):
+def test_a_valve_that_cannot_sustain_its_pressure_is_named_with_the_isolated_nodes(told):
     """It was a fault for each junction, without the name of the valve."""
     ((place, text),) = faults_of(told())
     assert place in ("nodes.j3", "nodes.j4")
@@ -46,7 +46,7 @@ def test_the_remedy_works_the_demand_falls_to_zero_with_the_pressure():
     assert run.ok and run["j4.head"][0] <= 180.0 + 1e-6
 
 
-def test_a_set_pressure_that_equals_the_head_of_the_source_is_valid_and_one_above_is_not():
+def test_a_set_pressure_equal_to_the_head_of_the_source_is_valid_and_a_higher_pressure_is_not():
     case = sustained(demand=0.0)
     assert fvsolve.run(case).ok  # without flow j2 has the head of the lake
     assert "above every source: lake has 250 m" in faults_of(sustained(0.0, 250.01))[0][1]

@@ -46,7 +46,7 @@ def test_shipped_cases_keep_to_their_pattern(path):
 
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
-def test_what_is_carried_keeps_to_its_pattern_beside_sides_and_corners_too(scheme):
+def test_advected_scalars_stay_within_their_pattern_at_sides_and_corners_too(scheme):
     settings = {"nodes.sheet.cells": [14, 12], "numerics.scheme": scheme}
     model, rng = fvsolve.build(fvsolve.load(CASES[0].parent / "swirl.toml", settings)), np.random.default_rng(0)
     assert stray(model, 0.2, model.scale * rng.normal(size=model.y_size)) < 1e-7
@@ -76,7 +76,7 @@ def test_scalars_that_decay_spread_and_pass_the_boundary_keep_to_their_pattern(p
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("mesh", ["grid", "holes", "triangles"])
-def test_a_lone_basin_keeps_to_its_pattern_with_scalars_and_without(tmp_path, mesh, scheme):
+def test_an_isolated_basin_stays_within_its_pattern_with_and_without_scalars(tmp_path, mesh, scheme):
     shape = {"size": [9.0, 6.0], "cells": [18, 12]}
     if mesh == "holes":
         shape["holes"] = [[3.0, 2.0, 4.5, 4.0]]
@@ -157,7 +157,7 @@ def test_differences_by_color_are_those_state_by_state(law, scheme):
 @pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["upwind", "upwind5", "muscl"])
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_what_slopes_store_is_what_they_supply(law, scheme):
+def test_storage_in_slopes_is_their_supply(law, scheme):
     """Slopes of the rates, weighted with the mass per state, add up to the slopes of the supplies."""
     for seed in (0, 2):  # with friction and without
         model, rng = random_model(seed, scheme, law), np.random.default_rng(seed)

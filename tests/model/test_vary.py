@@ -29,11 +29,11 @@ NAMES = [name for name in EVERY if name not in LARGE]
 
 
 @pytest.fixture(autouse=True)
-def beside_their_files(monkeypatch):
+def in_folder_of_cases(monkeypatch):
     monkeypatch.chdir(CASES)
 
 
-def said(model) -> dict[str, bytes]:
+def model_bytes(model) -> dict[str, bytes]:
     """Contents of a model as bytes."""
     tables = {name: table.tobytes() for name, table in zip(model.tables._fields, model.tables, strict=True)}
     for own in model.features:
@@ -47,10 +47,10 @@ def said(model) -> dict[str, bytes]:
     return tables | numbers | {"words": pickle.dumps(repr(words))}
 
 
-def told(make) -> tuple:
+def outcome_of(make) -> tuple:
     """Outcome of making a model: its contents, or its faults line by line."""
     try:
-        return "made", said(make())
+        return "made", model_bytes(make())
     except CaseError as error:
         return "faults", [str(fault) for fault in error.faults]
     except FvsolveError as error:
@@ -91,8 +91,8 @@ def compare(name: str, table: dict, done: set, every: bool, turn: int = 0) -> li
             continue
         for to in others(table, keys, value, far=True)[:1]:
             given = settings(table, keys, to)
-            anew = told(lambda given=given: fvsolve.build(fvsolve.load(table, given)))
-            if told(lambda given=given: fvsolve.vary(model, given)) != anew:
+            anew = outcome_of(lambda given=given: fvsolve.build(fvsolve.load(table, given)))
+            if outcome_of(lambda given=given: fvsolve.vary(model, given)) != anew:
                 wrong.append(f"{name}: {given}")
     return wrong
 
@@ -122,35 +122,35 @@ MOVES = [
 ]  # fmt: skip
 
 
-def test_runs_one_after_another_leave_nothing_to_each_other():
+def test_consecutive_runs_leave_nothing_to_each_other():
     """A sequence of variants gives runs equal to the bit to new runs: rows and summaries except times."""
     model = fvsolve.build(fvsolve.load("valve-closure", SMALL))
-    before = said(model)
+    before = model_bytes(model)
     for move in (*MOVES, *reversed(MOVES)):
         ours, fresh = fvsolve.run(fvsolve.vary(model, move)), fvsolve.run("valve-closure", SMALL | move)
         assert ours._table.tobytes() == fresh._table.tobytes(), move
         for key, value in fresh.summary.items():
             if key not in ("ended", "seconds", "seconds_setup", "cost"):
                 assert repr(ours.summary[key]) == repr(value), (move, key)
-    assert said(model) == before
+    assert model_bytes(model) == before
 
 
-def test_one_model_follows_from_another_that_was_varied_itself():
+def test_a_model_follows_from_a_model_that_was_varied_itself():
     model = fvsolve.build(fvsolve.load("valve-closure", SMALL))
     twice = fvsolve.vary(fvsolve.vary(model, {"links.valve.area": 0.001}), {"nodes.lake.head": 30.0})
     once = fvsolve.build(fvsolve.load("valve-closure", SMALL | {"links.valve.area": 0.001, "nodes.lake.head": 30.0}))
-    assert said(twice) == said(once)
+    assert model_bytes(twice) == model_bytes(once)
 
 
-def test_variants_of_one_model_with_unsteady_friction_do_not_share_its_states():
+def test_variants_of_a_model_with_unsteady_friction_do_not_share_its_states():
     more = SMALL | {"links.main.friction": {"model": "unsteady", "roughness": "0.26 mm"}}
     model = fvsolve.build(fvsolve.load("valve-closure", more))
-    before = said(model)
+    before = model_bytes(model)
     for area in (0.001, 0.0012):
         for key in ("links.valve.area", "links.valve.laminar_reynolds"):
             fresh = fvsolve.build(fvsolve.load("valve-closure", more | {key: area}))
-            assert said(fvsolve.vary(model, {key: area})) == said(fresh), (key, area)
-    assert said(model) == before
+            assert model_bytes(fvsolve.vary(model, {key: area})) == model_bytes(fresh), (key, area)
+    assert model_bytes(model) == before
 
 
 def test_sizes_of_restrictions_are_written_into_the_tables_that_were_there(monkeypatch):
@@ -160,7 +160,7 @@ def test_sizes_of_restrictions_are_written_into_the_tables_that_were_there(monke
     table["links"]["hole"] = {"type": "orifice", "from": "gate", "to": "sump", "diameter": "1 mm"}
     table["links"]["bleed"] = {"type": "orifice", "from": "lake", "to": "sump", "diameter": "2 mm"}
     model, room = fvsolve.build(fvsolve.load(table, SMALL)), sys.modules["fvsolve.core.model.build"]
-    before, found = said(model), []
+    before, found = model_bytes(model), []
     taken = room.with_new_sizes
     monkeypatch.setattr(room, "with_new_sizes", lambda *given: found.append(taken(*given)) or found[-1])
     for move, in_place in (
@@ -172,12 +172,12 @@ def test_sizes_of_restrictions_are_written_into_the_tables_that_were_there(monke
         ({"links.hole.diameter": "3 mm", "nodes.lake.head": 30.0}, False),
     ):
         ours = fvsolve.vary(model, move)
-        assert said(ours) == said(fvsolve.build(fvsolve.load(table, SMALL | move))), move
+        assert model_bytes(ours) == model_bytes(fvsolve.build(fvsolve.load(table, SMALL | move))), move
         assert (found[-1] is not None) == in_place, move
-        assert said(model) == before, move
+        assert model_bytes(model) == before, move
 
 
-def test_what_files_and_signals_say_is_read_again(tmp_path):
+def test_contents_of_files_and_signals_are_read_again(tmp_path):
     """`vary` reads files and signals again, because a file may have changed since the model was built."""
     closing = tmp_path / "closing.csv"
     closing.write_text("t [s],opening [-]\n0,1\n1,1\n1.5,0\n")
@@ -186,10 +186,12 @@ def test_what_files_and_signals_say_is_read_again(tmp_path):
     model = fvsolve.build(fvsolve.load(table, SMALL))
     closing.write_text("t [s],opening [-]\n0,1\n1,1\n1.2,0\n")
     moved = SMALL | {"nodes.lake.head": 30.0}
-    assert said(fvsolve.vary(model, {"nodes.lake.head": 30.0})) == said(fvsolve.build(fvsolve.load(table, moved)))
+    assert model_bytes(fvsolve.vary(model, {"nodes.lake.head": 30.0})) == model_bytes(
+        fvsolve.build(fvsolve.load(table, moved))
+    )
     driven = fvsolve.build(fvsolve.load("rigid-column"))
     for move in ({"signals.stroke.value": [1.0, 0.5]}, {"nodes.lake.head": 30.0}):
-        assert told(lambda move=move: fvsolve.vary(driven, move)) == told(
+        assert outcome_of(lambda move=move: fvsolve.vary(driven, move)) == outcome_of(
             lambda move=move: fvsolve.build(fvsolve.load("rigid-column", move))
         )
 
@@ -202,11 +204,11 @@ def test_faults_are_those_of_a_fresh_run():
         {"links.main.friction": {"model": "rough"}}, {"links.main.initial_flow": "1 m"},
         {"expect": {"max(x.y)": {"value": 1}}},
     ):  # fmt: skip
-        fresh = told(lambda move=move: fvsolve.build(fvsolve.load("valve-closure", SMALL | move)))
-        assert fresh[0] != "made" and told(lambda move=move: fvsolve.vary(model, move)) == fresh
+        fresh = outcome_of(lambda move=move: fvsolve.build(fvsolve.load("valve-closure", SMALL | move)))
+        assert fresh[0] != "made" and outcome_of(lambda move=move: fvsolve.vary(model, move)) == fresh
 
 
-def test_what_is_no_model_and_no_table_is_named():
+def test_arguments_that_are_no_model_and_no_table_are_named():
     with pytest.raises(FvsolveError, match="model = .*; expected a Model"):
         fvsolve.vary(fvsolve.load("valve-closure"), {"links.valve.area": 1.0})
     with pytest.raises(FvsolveError, match="expected a dict, for example"):
@@ -260,7 +262,7 @@ def test_a_run_leaves_its_model_as_it_was(scene):
     assert np.array_equal(model.rhs(model.case.numerics.start, model.start), rates)
 
 
-def test_nobody_writes_into_a_model():
+def test_a_model_is_read_only():
     model = built("check valve")
     for array in (*model.tables, model.scale, model.start, *model.profiles.values()):
         assert not array.flags.writeable
@@ -269,7 +271,7 @@ def test_nobody_writes_into_a_model():
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_runs_of_one_model_at_once_are_the_runs_alone(scene):
+def test_simultaneous_runs_of_a_model_are_the_separate_runs(scene):
     """Three threads with one model, one from another state, give the results of single runs."""
     model = built(scene)
     moved = model.start + 1e-3 * model.scale
@@ -290,7 +292,7 @@ def test_runs_of_one_model_at_once_are_the_runs_alone(scene):
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_runs_of_one_model_step_by_step_in_turn_are_the_runs_alone(scene):
+def test_interleaved_runs_of_a_model_are_the_separate_runs(scene):
     """Two runs of one model with alternating steps give the states of single runs."""
     model, states = built(scene), []
     moved = model.start + 1e-3 * model.scale
@@ -312,7 +314,7 @@ def begun(model: Model, y: np.ndarray) -> RunLoop:
     return loop
 
 
-def test_threads_that_ask_for_compiled_code_at_once_get_it():
+def test_threads_that_request_compiled_code_at_once_get_it():
     """Two threads of a new process compile at once and give equal results."""
     code = """
 import sys, threading, fvsolve
@@ -328,7 +330,7 @@ assert found[0] == found[1]
     subprocess.run([sys.executable, "-c", code, str(CASES / "check-valve-slam.toml")], check=True)
 
 
-def test_slates_of_one_model_share_no_array_that_is_written():
+def test_run_data_of_a_model_share_no_array_that_is_written():
     model = built("tracer in a basin")
     one, other = RunData(model), RunData(model)
     assert not any(np.shares_memory(a, b) for a, b in zip(one.written, other.written, strict=True))

@@ -106,7 +106,7 @@ def test_a_grid_of_frames_has_their_times_and_is_no_field(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["triangles", "mixed", "holes"])
-def test_a_pixel_has_the_cell_in_which_its_centre_lies(tmp_path, kind):
+def test_a_pixel_has_the_cell_that_contains_its_centre(tmp_path, kind):
     if kind == "holes":
         mesh = rectangle((3.0, 2.0), (6, 4), holes=[(1.0, 0.5, 2.0, 1.5)])
     else:

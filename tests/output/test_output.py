@@ -38,7 +38,7 @@ def folder(tmp_path_factory):
     return place
 
 
-def test_the_directory_holds_what_is_promised(folder):
+def test_the_directory_contains_the_documented_files(folder):
     names = {path.name for path in folder.iterdir()}
     assert names == {*("summary.json", "history.csv", "history.png", "envelope.csv", "envelope.png"),
                      *("fields.pvd", "fields", "case.toml", "restart.npz")}  # fmt: skip
@@ -115,12 +115,12 @@ def test_the_series_is_whole_after_every_frame(tmp_path):
         assert len(read_series(tmp_path / "fields.pvd")) == count
 
 
-def test_no_frames_where_none_are_asked_for(tmp_path):
+def test_no_frames_where_none_are_requested(tmp_path):
     fvsolve.run(branched(fields=0), out=tmp_path / "run")
     assert not (tmp_path / "run" / "fields.pvd").exists()
 
 
-def test_rows_are_not_kept_in_memory(tmp_path):
+def test_rows_are_not_stored_in_memory(tmp_path):
     columns = [UnitColumn(f"n{i}.pressure", "pressure", "Pa") for i in range(4)]
     history = HistoryFile(tmp_path / "history.csv", UnitColumn("t", "time", "s"), columns)
     history.start()
@@ -255,7 +255,7 @@ def test_a_chain_is_laid_out_straight_and_to_scale():
 
 
 @pytest.mark.parametrize("count", [30, network_layout.MAX_DENSE_NODES + 50])
-def test_a_network_is_laid_out_alike_every_time_with_no_two_nodes_in_one_place(count):
+def test_a_network_has_the_same_layout_every_time_with_no_two_nodes_in_the_same_place(count):
     links = {f"p{i}": (f"n{i}", f"n{(i * 7) // 10}") for i in range(1, count)}
     lengths = {name: 50.0 + 10.0 * (i % 7) for i, name in enumerate(links)}
     one, two = (network_layout.plan_positions(network(links), lengths) for _ in range(2))
@@ -330,7 +330,7 @@ def test_velocities_in_frames_are_along_axes_of_the_world_and_on_lines_along_tho
     ("fields", "out", "reason"),
     [(0, True, "fields is 0"), (2, False, "nothing was written"), (2, None, "the case has no ")],
 )
-def test_a_run_without_frames_says_the_one_reason(fields, out, reason, tmp_path):
+def test_a_run_without_frames_states_the_single_reason(fields, out, reason, tmp_path):
     stone = {"type": "body", "mass": 1.0, "inertia": [1.0, 1.0, 1.0]}
     weight = {"type": "mass", "mass": 1.0}
     coil = {"type": "spring", "from": "wall", "to": "weight", "stiffness": 1.0}

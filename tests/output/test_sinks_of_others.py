@@ -196,7 +196,7 @@ def test_a_name_that_cannot_be_used_is_explained_before_the_run(name, error, mes
     assert not (home / "run").exists()
 
 
-def test_without_installed_sinks_the_message_says_where_they_come_from():
+def test_without_installed_sinks_the_message_states_their_origin():
     with pytest.raises(CaseError, match="expected a package with entry points fvsolve.sinks"):
         fvsolve.load(tank("influx"))
     with pytest.raises(CaseError, match="no sink named 3"):

@@ -109,7 +109,7 @@ def test_under_log_the_fluid_in_the_vessel_is_squeezed_too():
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_a_bladder_empties_and_fills_again_where_its_precharge_says(law):
+def test_a_bladder_empties_and_fills_again_at_its_precharge(law):
     """Below the precharge the neck takes up the pressure; both switches are events, and the flow follows SciPy."""
     case = swing(-0.04, 2.5, law=law, gas_volume=None, precharge=5e5, probes=["a.pressure", "c.flow", "a.gas_volume"])
     del case["nodes"]["a"]["gas_volume"]
@@ -152,7 +152,7 @@ def test_its_energy_closes_and_it_gives_no_more_than_it_had(law):
         assert all((np.diff(loss) >= -1e-9).all() for loss in one.dissipated.values())
 
 
-def test_its_energy_at_the_start_is_what_it_can_give():
+def test_its_energy_at_the_start_is_its_available_energy():
     """Available energy of isothermal gas: p0 V0 ln(p0 / pa) minus the work against ambient pressure."""
     from fvsolve.core.model.energy_accounts import available_energy
 
@@ -169,14 +169,14 @@ def test_the_pattern_holds_every_coupling():
     assert not np.any((np.abs(model.jacobian(0.0, np.array([0.1, 0.3]))) > 1e-9) & ~pattern)
 
 
-def test_an_empty_start_is_said():
+def test_an_empty_start_is_reported():
     case = swing(0.0, 1.0, probes=["a.pressure"])
     case["nodes"]["a"] = {"type": "accumulator", "volume": 0.1, "precharge": 9e5}
     assert "a: empty at the start" in " ".join(one.text for one in model_of(case).warnings)
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_a_precharge_above_the_line_is_kept_until_the_line_exceeds_it(law):
+def test_a_precharge_above_the_line_stays_until_the_line_exceeds_it(law):
     """A full bladder leaves the neck, as stiff as its fluid, until the line exceeds the precharge, as in SciPy."""
     case = swing(0.0, 2.0, law=law, probes=["a.pressure", "c.flow", "a.gas_volume", "a.gas_pressure"])
     case["nodes"]["a"] = {"type": "accumulator", "volume": 0.1, "precharge": 9e5, "exponent": N}
@@ -214,7 +214,7 @@ def test_a_precharge_above_the_line_is_kept_until_the_line_exceeds_it(law):
         ({"connection": 3.0}, "is not a connection; expected { diameter, loss_in, loss_out }"),
     ],
 )
-def test_what_is_wrong_with_an_accumulator_is_said(wrong, said):
+def test_faults_of_an_accumulator_are_reported(wrong, said):
     case = swing(0.0, 1.0)
     given = case["nodes"]["a"] | wrong
     case["nodes"]["a"] = {key: value for key, value in given.items() if value is not None}
@@ -222,7 +222,7 @@ def test_what_is_wrong_with_an_accumulator_is_said(wrong, said):
 
 
 @pytest.mark.parametrize("precharge, switches, law", [(4.01e5, 3, "linear"), (4.01e5, 3, "log"), (7e5, 2, "linear")])
-def test_a_check_valve_beside_an_empty_bladder_opens_once(precharge, switches, law):
+def test_a_check_valve_next_to_an_empty_bladder_opens_once(precharge, switches, law):
     """The check valve opens where n^2 70 m reaches the lift of 28 m; afterwards its flow equals the outflow."""
     curve = {"flow": [0.0, 0.04, 0.06], "head": [70.0, 60.0, 45.0]}
     speed = {"time": [1.0, 1.5, 5.0, 6.0], "value": [1.0, 0.3, 0.3, 1.0]}
@@ -255,7 +255,7 @@ def crowding() -> dict:
     return scene(nodes, {"way": way}, 3.0, numerics, ["way.flow"], 0.1)
 
 
-def test_events_that_crowd_within_one_step_are_bounded_and_named():
+def test_events_that_crowd_within_a_step_are_bounded_and_named():
     result = fvsolve.run(crowding())
     ended = [said in result.reason for said in ("a changes its state without end", "way.flow has grown to")]
     assert not result.ok and any(ended)  # either reason: the step also exceeds Euler's limit

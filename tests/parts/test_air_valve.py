@@ -105,7 +105,7 @@ def test_it_opens_and_shuts_once_a_swing_and_its_ledger_is_closed():
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
 
 
-def test_it_opens_again_from_the_very_volume_at_which_it_shut():
+def test_it_opens_again_from_the_very_volume_at_closure():
     """Beside the shut check valve of a pump, its fluid volume is constant while it is shut."""
     curve = {"flow": [0.0, 0.04, 0.06], "head": [70.0, 60.0, 45.0]}
     friction = {"model": "quasi-steady", "roughness": 1e-4}
@@ -169,7 +169,7 @@ def test_its_norm_is_its_energy_to_second_order_and_its_pattern_holds():
     assert not np.any((np.abs(model.jacobian(0.0, y)) > 1e-9) & ~pattern)
 
 
-def test_open_at_the_start_it_says_so():
+def test_open_at_the_start_it_is_reported():
     links = {"m": pipe("lake", "v", 100.0, 0.1, 1000.0, 4), "n": pipe("v", "low", 100.0, 0.1, 1000.0, 4)}
     nodes = {"lake": lake(0.0), "v": {"type": "air-valve", "elevation": 2.0, "inlet": 0.05, "outlet": 0.05}}
     model = fvsolve.build(fvsolve.load(scene(nodes | {"low": lake(0.0)}, links, 1.0, {})))
@@ -187,7 +187,7 @@ def test_open_at_the_start_it_says_so():
         ({"discharge_coefficient": 1.5}, "out of range"),
     ],
 )
-def test_what_is_wrong_with_an_air_valve_is_said(wrong, said):
+def test_faults_of_an_air_valve_are_reported(wrong, said):
     case = drained()
     given = case["nodes"]["v"] | wrong
     case["nodes"]["v"] = {key: value for key, value in given.items() if value is not None}
@@ -224,7 +224,7 @@ def test_a_demand_follows_the_pressure_between_none_and_all():
         ({"minimum_pressure": 2e5}, "has no effect without `required_pressure`"),
     ],
 )
-def test_what_is_wrong_with_such_a_demand_is_said(wrong, said):
+def test_faults_of_such_a_demand_are_reported(wrong, said):
     nodes = {"lake": reservoir(5e5), "j": {"type": "junction", "demand": 0.001, **wrong}}
     assert said in str(refused(scene(nodes, {"gap": valve("lake", "j", 2e-4)}, 1.0, {"step": 0.1})))
 
@@ -277,14 +277,14 @@ def by_stages(case, speed: float | None = None):
     return max(off), (times["throttles"], parted), result
 
 
-def test_its_three_stages_follow_scipy_and_it_throttles_when_scipy_says():
+def test_its_three_stages_follow_scipy_and_it_throttles_at_the_time_of_scipy():
     off, (found, true), result = by_stages(staged())
     near = TIGHT["rtol"] * result.summary["steps"]
     assert off < near and found == pytest.approx(true, abs=near)
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
 
 
-def test_by_velocity_it_throttles_when_scipy_says_the_fluid_comes_so_quickly():
+def test_by_velocity_it_throttles_at_scipys_velocity_of_the_fluid():
     """At 0.35 m/s the velocity triggers throttling; at 0.01 m/s the air pressure does, because it rises later."""
     for speed in (0.35, 0.01):
         off, (found, true), result = by_stages(staged(switch=None, switch_velocity=speed), speed)
@@ -335,7 +335,7 @@ def test_staged_and_resumed_it_is_the_unbroken_run(tmp_path, end):
      ({"switch": None, "switch_velocity": 0.5, "throttled_outlet": None}, "switch_velocity: has no effect without"),
      ({"throttled_outlet": 0.03}, "does not throttle; expected less than `outlet`")],
 )  # fmt: skip
-def test_what_is_wrong_with_its_stages_is_said(more, said):
+def test_faults_of_its_stages_are_reported(more, said):
     case = staged(**more)
     assert said in str(refused(case))
 
@@ -413,6 +413,6 @@ def test_a_table_of_the_orifice_formula_gives_the_run_of_the_orifice():
         ("throttled_outlet", {"pressure": [0.1e5], "flow": [0.2]}, "does not throttle; expected less than `outlet`"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_with_a_table_of_a_maker_is_said(key, given, text):
+def test_faults_of_a_table_of_a_manufacturer_are_reported(key, given, text):
     more = {"switch": 0.1e5} if key == "throttled_outlet" else {}
     assert text in str(refused(drained(**{"inlet": 0.05, "outlet": 0.05, key: given, **more})))

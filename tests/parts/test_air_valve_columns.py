@@ -176,7 +176,7 @@ def test_given_steps_of_a_millisecond_follow_it_too(method, near):
     assert abs(result.ledger["mass"]["relative"]) < 1e-13
 
 
-def test_three_columns_are_one_flow_and_three():
+def test_three_columns_equal_a_single_column_at_two_joints():
     far = [fallen, lambda t: LOW, lambda t: 1.5e5]
     columns = [(50.0, DIAMETER), (80.0, DIAMETER), (30.0, 0.1)]
     loss = [FACTOR * length / d / (2 * RHO * area(d) ** 2) for length, d in columns]
@@ -236,7 +236,7 @@ def test_drawn_the_other_way_it_is_the_same_to_rounding():
         assert np.interp(one.t, two.t, two[name])[rows] == pytest.approx(-one[name][rows], abs=1e-9)
 
 
-def test_its_energy_closes_and_what_the_impact_took_is_booked():
+def test_its_energy_closes_and_the_loss_of_the_impact_is_accounted():
     """Impact loss (Carnot): M^2 / (2 rho sum(A / L)), with M the net mass flow into the summit before the impact."""
     exact, found = truth(), energy(summit({"method": "dormand-prince", "rtol": 1e-8}), port="low")
     assert abs(found.relative) < 1e-10 and found.port.passive
@@ -246,7 +246,7 @@ def test_its_energy_closes_and_what_the_impact_took_is_booked():
     assert lost == pytest.approx(0.5 * brought**2 / (RHO * exact.yields.sum()), rel=1e-6)
 
 
-class Kept:
+class LastRowSink:
     """Sink that keeps checkpoints, the last row and the summary."""
 
     def __init__(self):
@@ -269,7 +269,7 @@ def test_resumed_while_it_is_open_it_is_the_unbroken_run_bit_for_bit(monkeypatch
     at = import_module("fvsolve.core.solve.solve")
     monkeypatch.setattr(at, "CHECKPOINT_SECONDS", 0.0)
     case = fvsolve.load(summit({"method": "dormand-prince", "rtol": 1e-7}))
-    whole, rest, model = Kept(), Kept(), fvsolve.build(case)
+    whole, rest, model = LastRowSink(), LastRowSink(), fvsolve.build(case)
     at.solve(model, at.initial_state(model), whole)
     opened, shut = (event.time for event in whole.summary.events)
     state = next(one for one in whole.states if opened < one.t < shut)
@@ -316,7 +316,7 @@ def test_a_valve_before_it_that_shuts_lets_the_column_beyond_run_on_over_air(ope
     assert times(result)[0][1] <= 1.3 and result["one.flow"][-1] == 0.0 < 0.05 < result["two.flow"][-1]
 
 
-def test_a_gate_that_jumps_shut_beside_it_leaves_the_column_to_the_air():
+def test_a_gate_that_shuts_at_once_leaves_the_column_to_the_air():
     """A column that flows away from the gate runs on over air; a column that flows towards it stops at once."""
     away = {"k": gate("high", "v", 0.01, step(1.0, 1, 0)), "one": column("v", "low", 80.0)}
     result = fvsolve.run(summit(end=3.0, high=3e5, links=away, probes=["one.flow", "v.pressure"]))
@@ -327,7 +327,7 @@ def test_a_gate_that_jumps_shut_beside_it_leaves_the_column_to_the_air():
     assert result["v.pressure"][-1] == pytest.approx(3e5 - RHO * GRAVITY * HEIGHT, rel=1e-12)
 
 
-def test_at_the_end_of_one_column_it_fills_and_drains_it():
+def test_at_the_end_of_a_single_column_it_fills_and_drains_it():
     """The flow is zero until the pressure at the valve is below ambient; then the column drains from it."""
     drop = {"time": [0.0, 1.0, 2.0], "value": [2e5, 2e5, 0.9e5]}
     case = summit(end=4.0, high=drop, links={"one": column("high", "v")}, probes=["one.flow", "v.pressure"])
@@ -379,7 +379,7 @@ def test_where_a_valve_all_but_shuts_its_ledger_closes_under_linearly_implicit_s
 
 
 @pytest.mark.parametrize("opening", [step(1.0, 1, 0), ramp(1.0, 0.5, 1, 0)])
-def test_two_columns_at_a_junction_whose_last_valve_shuts_flow_on_as_one(opening):
+def test_two_columns_at_a_junction_flow_on_together_when_its_last_valve_shuts(opening):
     """The columns reach the steady flow of one column, without the fault "the demand cannot be supplied"."""
     nodes = {"j": junction(elevation=HEIGHT), "side": low(2e5)}
     links = {"one": column("high", "j"), "two": column("j", "low", 80.0), "k": gate("j", "side", 0.01, opening)}
@@ -390,7 +390,7 @@ def test_two_columns_at_a_junction_whose_last_valve_shuts_flow_on_as_one(opening
     assert RHO * result["one.flow"][-1] == pytest.approx(flow_through((50.0, 80.0), 3.2e5 - LOW), rel=1e-5)
 
 
-def test_columns_that_part_at_the_start_do_so_over_air_and_those_that_meet_are_one():
+def test_columns_that_separate_at_the_start_do_so_over_air_and_joined_columns_move_together():
     for flows, what in (((0.05, 0.1), ["opens", "shuts"]), ((0.1, 0.05), [])):
         links = {"one": column("high", "v", initial_flow=flows[0])}
         links["two"] = column("v", "low", 80.0, initial_flow=flows[1])

@@ -99,7 +99,7 @@ def test_a_tank_that_starts_full_starts_shut():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_at_rest_nothing_moves_by_one_bit(method):
+def test_at_rest_no_bit_changes(method):
     run = fvsolve.run(filling({"method": method}, 3.0, 3.0, full_level=4.0, empty_level=1.0))
     assert np.ptp(run["tower.level"]) == 0.0 and not run.summary["events"]
 

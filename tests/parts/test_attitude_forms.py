@@ -81,7 +81,7 @@ def test_forms_that_disagree_are_named_with_the_angle_between_them():
     }
 
 
-def test_a_length_that_is_not_one_is_divided_by_and_said():
+def test_a_direction_of_another_length_is_normalised_with_a_notice():
     one = read(axis=[1, 1, 0], angle="90 deg")
     assert notes(one) == [("axis", "the vector has length 1.41421, not 1, and is divided by this length")]
     wanted = Rotation.from_rotvec(np.pi / 2**1.5 * np.array([1, 1, 0]))
@@ -89,7 +89,7 @@ def test_a_length_that_is_not_one_is_divided_by_and_said():
     assert notes(read(euler_parameters=[0, 0, 0, -3]))[0][0] == "euler_parameters"
 
 
-def test_typed_digits_are_no_fault_but_said():
+def test_rounded_digits_are_a_notice_and_no_fault():
     typed = [[0.8660, -0.5, 0], [0.5, 0.8660, 0], [0, 0, 1]]
     one = read(matrix=typed)
     assert notes(one) == [
@@ -143,7 +143,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("what", BAD)
-def test_what_does_not_fit_is_named(what):
+def test_shapes_that_do_not_fit_are_named(what):
     given, wanted = BAD[what]
     found = faults(**given)
     assert {*found} == {f"attitude.{key}" for key in wanted}
@@ -172,12 +172,12 @@ def test_a_case_has_its_notes_and_faults_with_their_places():
     ]
 
 
-def test_no_table_is_told_what_is_wanted():
+def test_a_missing_table_is_reported_with_the_expected_form():
     with pytest.raises(ValidationError) as found:
         Stand.model_validate({"attitude": "30 deg"})
     assert "not a table; expected keys of angle, axis, euler_parameters" in str(found.value)
 
 
-def test_its_schema_says_its_keys():
+def test_its_schema_describes_its_keys():
     said = Stand.model_json_schema()["properties"]["attitude"]
     assert said["properties"]["matrix"]["minItems"] == 3 and not said["additionalProperties"]

@@ -54,7 +54,7 @@ def test_a_pendulum_shows_the_order_of_its_method():
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == approx(4.0, abs=0.2)
 
 
-def test_a_double_pendulum_moves_as_lagrange_by_hand():
+def test_a_double_pendulum_moves_by_lagranges_equations():
     """Two rods of length l with mass m in the middle; a and b are their angles to the vertical."""
     m, l, inertia = 1.5, 0.8, 0.09  # noqa: E741
     rod = {"inertia": [inertia, inertia, 0.0], "centre_of_mass": [0, 0, -l / 2], "points": {"end": [0, 0, -l]}}
@@ -103,7 +103,7 @@ def drift(method: str, step: float) -> float:
     return max(float(np.abs(result[one] / result[one][0] - 1.0).max()) for one in TURNS if abs(result[one][0]) > 0.1)
 
 
-def test_a_tumbling_body_keeps_energy_and_momentum_to_the_order_of_its_method():
+def test_a_tumbling_body_conserves_energy_and_momentum_to_the_order_of_its_method():
     """Rotation about the middle axis is unstable, so the body turns over; the drift by rk4 falls as h^4 or faster."""
     coarse, fine = drift("rk4", 0.04), drift("rk4", 0.02)
     assert coarse < 1e-5 and coarse / fine > 14.0
@@ -269,13 +269,13 @@ def test_springs_dampers_and_forces_push_along_the_line_between_points():
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_a_crane_on_shut_chambers_does_not_move_by_one_bit(law):
+def test_a_crane_on_shut_chambers_does_not_change_any_bit(law):
     result = run(Crane().case(10.0, ["boom.angle", "lift.A.pressure"], law))
     assert np.all(result["boom.angle"] == 0.0) and np.ptp(result["lift.A.pressure"]) == 0.0
 
 
 @pytest.mark.parametrize("stated", [("B",), ("A",), ()])
-def test_shut_chambers_that_state_no_pressure_hold_what_stands_on_them(stated):
+def test_shut_chambers_without_a_stated_pressure_support_their_load(stated):
     """The balance of the crane gives the pressure that is not stated; a valve closes chamber A, a plug chamber B."""
     crane = Crane()
     pressures = {"initial_pressure_A": crane.p_a, "initial_pressure_B": crane.p_b}
@@ -437,7 +437,7 @@ def test_a_slider_crank_moves_as_its_closed_form():
     assert energy_of == approx(energy_of[0], rel=2e-5)  # difference by the rod of 1 mg
 
 
-def test_a_linkage_in_balance_does_not_move_by_one_bit():
+def test_a_linkage_in_balance_does_not_change_any_bit():
     nodes, links = parallelogram(0.4)
     links["stay"] = {"type": "spring", "from": "ground.low", "to": "one.end", "stiffness": 1e3, "preload": 0.0}
     truth = fvsolve.build(fvsolve.load(held(links, nodes, 1.0, [])))
@@ -488,7 +488,7 @@ def test_a_crank_that_is_driven_gives_its_torque():
     {"time": [0, 1], "value": [0.0, 1.0]}, {"time": [0, 1], "value": [0.0, 1.0], "kind": "step"},
     {"start": 0.2, "duration": 0.5, "value": [0.0, 1.0], "exponent": 2.0},
 ])  # fmt: skip
-def test_what_drives_a_joint_may_not_jump_nor_its_rate(driven):
+def test_the_drive_of_a_joint_may_not_jump_nor_its_rate(driven):
     with pytest.raises(fvsolve.errors.CaseError, match="nodes.arm.joint.angle: drives the joint, .* jumps"):
         fvsolve.build(fvsolve.load(bodies({"arm": pendulum(driven)}, 1.0)))
 
@@ -546,7 +546,7 @@ def test_a_bushing_does_not_damp_a_common_rotation():
     assert result["disc.rate"] == approx(3.0, abs=1e-12) and result["l.force"] == approx(0.0, abs=1e-12)
 
 
-def test_a_bushing_between_two_free_bodies_keeps_their_momenta():
+def test_a_bushing_between_two_free_bodies_conserves_their_momenta():
     tree = random_tree(np.random.default_rng(12), 1, "free")
     other = random_tree(np.random.default_rng(13), 1, "free")["b0"]
     links = {"rubber": {"type": "bushing", "from": "b0.p", "to": "b1.p", "stiffness": 100.0, "damping": 1.0,
@@ -595,7 +595,7 @@ def test_the_ledger_of_energy_closes_to_the_order_of_its_method():
 
 
 @pytest.mark.parametrize("kind, place", [("joint", "arm"), ("drive", "cart"), ("bushing", "rubber")])
-def test_what_the_ledger_of_bodies_forgets_is_what_remains(kind, place, monkeypatch):
+def test_a_term_left_out_of_the_ledger_of_bodies_is_its_remainder(kind, place, monkeypatch):
     from fvsolve.core.model import energy_accounts
 
     honest, plain = energy(machine()), energy_accounts.Accounts.bodies
@@ -653,7 +653,7 @@ def test_a_scene_that_is_turned_about_the_vertical_moves_alike():
         assert here == approx(spin.apply(there), abs=1e-7)
 
 
-def test_bodies_that_are_fixed_to_each_other_are_one():
+def test_bodies_fixed_to_each_other_act_as_a_single_body():
     """Three rods in a chain of fixed joints swing as one body of their common mass, centre and inertia."""
     rng, places, rods = np.random.default_rng(11), [], {}
     turns = [np.eye(3), turn(rng), turn(rng)]
@@ -696,7 +696,7 @@ def test_no_rate_depends_on_a_state_that_the_pattern_has_not():
 
 
 @pytest.mark.parametrize("method, step", [("rk4", 2e-6), ("implicit-midpoint", 2e-6)])
-def test_a_run_broken_off_and_resumed_is_the_unbroken_one(method, step, tmp_path, monkeypatch):
+def test_a_run_interrupted_and_resumed_is_the_uninterrupted_run(method, step, tmp_path, monkeypatch):
     monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
     case = Crane().case(0.1, ["boom.angle", "lift.A.pressure"], "log", joint={"rate": 0.05}, method=method, step=step)
     calls = []
@@ -728,7 +728,7 @@ def test_linearised_a_locked_crane_swings_at_its_frequency_and_fails_where_predi
     assert found.measured == approx(found.predicted, rel=0.05)
 
 
-def test_a_body_whose_parameters_drift_says_so():
+def test_a_body_with_drifting_parameters_gives_a_notice():
     nodes = {"stone": STONE}
     result = run({**bodies(nodes, 8.0, [], method="rk4", step=0.2), **WEIGHTLESS})
     (told,) = [one for one in result.warnings if one.kind == "drift"]
@@ -747,7 +747,7 @@ def test_a_controller_may_hold_forces_on_bodies():
     assert rate == approx((-3.0 * 0.7 + 0.7) / (2.0 * 0.49) * 1e-4, rel=1e-6)
 
 
-def test_a_tree_far_from_the_origin_moves_as_one_near_it():
+def test_a_tree_far_from_the_origin_moves_as_a_tree_near_it():
     tree = random_tree(np.random.default_rng(2), 4, "free")
     model = [fvsolve.build(fvsolve.load(bodies(tree, 1.0)))]
     tree["b0"]["joint"]["at"] = [1e6, -2e6, 3e5]

@@ -12,7 +12,7 @@ from fvsolve.features.motion.kernels.tables import motion_of
 PROBES = ["arm.x"]
 
 
-def told(nodes: dict, links: dict | None = None, probes=()) -> str:
+def refusal_text(nodes: dict, links: dict | None = None, probes=()) -> str:
     with pytest.raises(CaseError) as caught:
         fvsolve.build(fvsolve.load(bodies(nodes, 1.0, probes, links)))
     return str(caught.value)
@@ -75,12 +75,12 @@ BAD = {
 @pytest.mark.parametrize("name", BAD)
 def test_a_bad_body_gets_its_message(name):
     nodes, message = BAD[name]
-    assert message in told(nodes)
+    assert message in refusal_text(nodes)
 
 
 def test_bodies_that_hang_in_a_loop_are_named():
     nodes = {name: body(1, [1, 1, 1], hinge(on=on)) for name, on in (("a", "c"), ("b", "a"), ("c", "b"))}
-    found = told({**nodes, "d": body(1, [1, 1, 1], hinge(on="c"))})
+    found = refusal_text({**nodes, "d": body(1, [1, 1, 1], hinge(on="c"))})
     assert (
         "is carried by itself: a on c on b on a; remove `on` from one of these bodies" in found
         and found.count("is carried by itself") == 1
@@ -114,43 +114,46 @@ def test_a_link_between_points_gets_its_message(name):
     links, message = LINKS[name]
     nodes = CRANE.nodes()
     nodes["ground"]["points"]["top"] = [0, 0, 0]
-    assert message in told(nodes, links)
+    assert message in refusal_text(nodes, links)
 
 
-def test_a_loop_that_is_not_closed_is_told_by_how_much_and_one_held_twice_by_which_pin():
+def test_an_open_loop_is_reported_with_its_gap_and_a_redundant_loop_with_its_pin():
     nodes, links = parallelogram()
     nodes["two"]["joint"]["at"] = [1.6, 0, 0]
-    assert "links.loop: two.end and coupler.end lie 0.1 m apart across the axis of the pin at the start" in told(
-        nodes, links
+    assert (
+        "links.loop: two.end and coupler.end lie 0.1 m apart across the axis of the pin at the start"
+        in refusal_text(nodes, links)
     )
     nodes, links = parallelogram()
     del links["loop"]["axis"]
     text = "links.loop: this pin is redundant: in some direction joints or other pins already hold its two points"
-    assert text in told(nodes, links)
+    assert text in refusal_text(nodes, links)
     nodes, links = parallelogram()
     nodes["two"]["joint"]["rate"] = 0.5
-    assert "links.loop: velocities at the start separate the two points of this pin at" in told(nodes, links)
+    assert "links.loop: velocities at the start separate the two points of this pin at" in refusal_text(nodes, links)
 
 
-def test_a_pin_that_opens_across_its_axis_in_one_direction_alone_is_refused():
+def test_a_pin_that_opens_across_its_axis_in_a_single_direction_is_refused():
     straight = {f"nodes.{name}.joint.angle": 0.0 for name in ("one", "two", "coupler")}
     with pytest.raises(CaseError, match="loop: velocities at the start separate the two points of this pin at 1.5 m/s"):
         fvsolve.build(fvsolve.load("four-bar", straight | {"nodes.coupler.joint.rate": 1.0}))
 
 
 def test_a_probe_that_a_joint_has_not_is_refused():
-    found = told(arm(), probes=["arm.travel", "arm.bob.roll", "arm.bop.x"])
+    found = refusal_text(arm(), probes=["arm.travel", "arm.bob.roll", "arm.bop.x"])
     assert 'arm is a body, which has no "travel"' in found and 'arm.bob is a point, which has no "roll"' in found
     assert 'no part named "arm.bop"' in found
 
 
-def test_all_that_is_wrong_is_said_at_once():
-    found = told({**arm(mass=0, inertia=[1, 1, 9]), "b": body(1, [1, 1, 1], {"kind": "revolute", "on": "nobody"})})
+def test_all_faults_of_bodies_are_reported_at_once():
+    found = refusal_text(
+        {**arm(mass=0, inertia=[1, 1, 9]), "b": body(1, [1, 1, 1], {"kind": "revolute", "on": "nobody"})}
+    )
     for message in ("mass", "are not possible", "axis is missing"):
         assert message in found
 
 
-def test_a_body_at_fault_is_no_fault_of_what_names_it():
+def test_a_faulty_body_is_no_fault_of_parts_that_name_it():
     """Bodies on it or on its points, links between points, tanks and basins on it, and probes add no faults."""
     nodes = {
         **arm(mass=0), "b": body(1, [1, 1, 1], hinge(on="arm.bob")), "c": body(1, [1, 1, 1], hinge(on="arm")),
@@ -162,7 +165,7 @@ def test_a_body_at_fault_is_no_fault_of_what_names_it():
     links = {"s": {"type": "spring", "from": "ground.eye", "to": "arm.bob", "stiffness": 1.0},
              "pin": {"type": "pin", "from": "ground.eye", "to": "arm.bob"},
              "duct": {"type": "rigid-column", "from": "p", "to": "q", "length": 2.0, "diameter": 0.1}}  # fmt: skip
-    found = told(nodes, links, ["arm.x", "arm.bob.x", "b.angle"])
+    found = refusal_text(nodes, links, ["arm.x", "arm.bob.x", "b.angle"])
     assert found == "case: 1 fault\n  nodes.arm.mass: 0 is out of range; expected a value above 0"
 
 
@@ -172,7 +175,7 @@ def test_an_axis_that_is_not_of_unit_length_is_divided_by_it_and_noted():
     assert motion_of(model).body_table[0]["axis"].tolist() == [0.0, 1.0, 0.0]
 
 
-def test_what_moves_at_the_start_is_said():
+def test_motion_at_the_start_is_reported():
     case = bodies(arm(joint=hinge(angle=1.0, rate=2.0)), 1.0)
     model = fvsolve.build(fvsolve.load(case))
     assert model.steady["moving"] == ["body arm turns at 2 rad/s", "body arm accelerates at 11.79 rad/s2"]
@@ -267,7 +270,7 @@ TOLD = """all.toml: 11 faults
   line 58: links.s.to: no place named "boom.eye"; places are a, arm, b, boom, c, flume.lid, ground, ground.far, ground.lug, lift.A, lift.B; did you mean "boom"?"""  # noqa: E501
 
 
-def test_all_that_is_wrong_with_what_moves_is_said_at_once_with_its_lines_and_nothing_else(tmp_path):
+def test_all_faults_of_moving_parts_are_reported_at_once_with_their_lines_and_nothing_else(tmp_path):
     (tmp_path / "all.toml").write_text(ALL.lstrip())
     assert str(refused(tmp_path / "all.toml")) == TOLD
 
@@ -485,7 +488,7 @@ def test_a_bad_file_gets_its_message(name, tmp_path):
     assert message in str(refused(tmp_path / "scene.toml"))
 
 
-def test_what_has_no_masses_loads_none_of_their_kernels(tmp_path):
+def test_a_case_without_masses_loads_none_of_their_kernels(tmp_path):
     """A case without masses does not import `mass_dynamics` and has no states of masses."""
     import subprocess
     import sys

@@ -46,11 +46,11 @@ def test_walls_of_ductile_iron_are_those_that_a_maker_prints(size, outer, nine, 
 
 
 @pytest.mark.parametrize(("size", "bar"), BEARS.items())
-def test_k9_bears_what_a_maker_prints(size, bar):
+def test_k9_has_the_pressure_printed_by_a_manufacturer(size, bar):
     assert round(1e-5 * class_size("K9", f"DN{size}", "ductile-iron").pressure) == bar
 
 
-def test_c_classes_are_the_pressure_that_their_least_wall_bears():
+def test_c_classes_are_the_pressure_of_their_least_wall():
     for outer, walls in ductile().values():
         for number, wall in walls.items():
             assert 20.0 * wall * 420.0 / ((outer - wall) * 3.0) >= number - 0.75  # walls in steps of 0.1 mm
@@ -80,7 +80,7 @@ def lame(ratio: float, nu: float, held: str) -> float:
 
 
 @pytest.mark.parametrize("held", ["joints", "upstream", "anchored"])
-def test_a_thick_wall_gives_way_as_lame_says(held):
+def test_a_thick_wall_expands_by_lame(held):
     for ratio in (2.0, 8.0, 24.9):
         wall = Wall(youngs_modulus=1e9, thickness=1.0 / ratio, poisson_ratio=0.45)
         assert restraint_factor(held, 1.0, wall) == approx(lame(ratio, 0.45, held), rel=1e-13)
@@ -89,7 +89,7 @@ def test_a_thick_wall_gives_way_as_lame_says(held):
     assert restraint_factor(held, 1.0, thin) == approx(expected) == approx(lame(1e4, 0.3, held), rel=1e-3)
 
 
-def test_without_restraint_the_wave_speed_is_the_old_one_to_the_bit():
+def test_without_restraint_the_wave_speed_is_the_previous_value_to_the_bit():
     case = read(diameter=0.3, wall={"youngs_modulus": 2e9, "thickness": 0.03, "poisson_ratio": 0.4})
     fluid = case.properties
     assert case.wave_speed("main") == math.sqrt(1.0 / (1.0 / fluid.bulk_modulus + 0.3 / (2e9 * 0.03)) / fluid.density)
@@ -115,7 +115,7 @@ def test_every_figure_names_the_page_it_was_read_on():
     assert materials()["PE100"].figures["youngs_modulus"].used == 1.3e9  # the greatest of the sources
 
 
-def test_the_pipe_says_whose_figures_it_has_and_reads_back():
+def test_the_pipe_states_the_source_of_its_figures_and_reads_back():
     case = read(**{"material": "ductile-iron", "class": "K9"}, nominal="DN300", friction={"model": "quasi-steady"})
     found = case.links["main"]
     assert found.wall.youngs_modulus == 166.7e9 and found.friction.roughness == approx(0.125e-3)
@@ -123,7 +123,7 @@ def test_the_pipe_says_whose_figures_it_has_and_reads_back():
     assert load(case.table()) == case
 
 
-def test_what_the_file_says_itself_stands():
+def test_values_stated_in_the_file_take_precedence():
     own = {"youngs_modulus": 165e9, "thickness": 0.009}
     case = read(**{"material": "ductile-iron", "class": "K9"}, nominal="DN300", wall=own, allowable_pressure="30 barg",
                 friction={"model": "quasi-steady", "roughness": 1e-3}, source="own tests")  # fmt: skip
@@ -132,7 +132,7 @@ def test_what_the_file_says_itself_stands():
     assert (found.allowable_pressure, found.source) == (30e5, "own tests")
 
 
-def test_what_was_not_read_is_refused_and_asked_for():
+def test_figures_that_were_not_read_are_refused_and_requested():
     for more, said in [
         ({"material": "stel", "diameter": 0.3}, 'unknown material "stel"; did you mean "steel"'),
         ({"material": "PEX", "diameter": 0.3}, "the catalogue has no data of PEX; leave `material` out"),
@@ -153,7 +153,7 @@ def test_what_was_not_read_is_refused_and_asked_for():
         assert len(caught.value.faults) <= 2
 
 
-def test_a_limit_takes_its_share_of_what_the_class_bears():
+def test_a_limit_takes_its_share_of_the_pressure_of_the_class():
     settings = {"limits.class": {"on": "pipes", "class_fraction": 0.5}, "numerics.end": 5.0, "expect": {}}
     [found] = fvsolve.run("plastic-main", settings).verdicts
     assert found.limit == approx(8.0) and not found.ok and found.place == "lower"  # bar, half of PN16
@@ -180,14 +180,14 @@ def test_nominal_sizes_are_those_of_the_printed_table(size, schedule):
     assert inner == approx((outer - 2 * wall) * 1e-3, abs=1e-4)
 
 
-def test_dn_and_nps_are_two_names_of_one_size():
+def test_dn_and_nps_are_two_names_of_a_size():
     for dn, nps in (("DN 100", "NPS 4"), ("dn32", "nps 1.25"), ("DN600", "NPS 24")):
         assert pipe_bore(dn, "40") == pipe_bore(nps, "40")
     assert pipe_bore("NPS 4", "80")[0] == nearest_pipe(NPS=4, schedule="80")[1]
 
 
 @pytest.mark.parametrize("name", FITTINGS)
-def test_fittings_lose_what_crane_prints(name):
+def test_fittings_have_the_losses_printed_by_crane(name):
     d = 0.10226
     if name == "entrance":
         assert fittings_loss([name], d) == 0.5
@@ -206,7 +206,7 @@ def line(**keys) -> dict:
     return scene(nodes, {"line": column}, 0.1, {}, ["line.flow"], 0.05)
 
 
-def test_a_line_with_fittings_carries_what_their_losses_let_through(tmp_path):
+def test_a_line_with_fittings_carries_the_flow_of_their_losses(tmp_path):
     """q = A sqrt(2 dp / (rho K)); the resolved case contains the numbers and gives the same flow."""
     case = line(nominal="DN100", fittings=["entrance", "elbow-90", "elbow-90", "globe-valve"], minor_loss=1.0)
     result = fvsolve.run(case, out=tmp_path / "out")
@@ -245,7 +245,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("keys, key, text", BAD.values(), ids=BAD)
-def test_a_name_that_means_nothing_is_one_fault_with_a_remedy(keys, key, text):
+def test_an_unknown_name_is_a_single_fault_with_a_remedy(keys, key, text):
     error = refused(line(**keys))
     assert len(error.faults) == 1
     assert key in str(error) and text in str(error)
@@ -268,6 +268,6 @@ def nearest(inches: str) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("said", ["NPS 1/0", "NPS 1/", "NPS /2", "NPS 1--1/2", "NPS 1/2/4", "NPS 1-1.5", "NPS -1/2"])
-def test_what_is_no_fraction_is_no_size(said):
+def test_an_invalid_fraction_is_no_size(said):
     with pytest.raises(ValueError, match="is not a nominal size"):
         pipe_bore(said, "40")

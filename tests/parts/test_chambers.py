@@ -159,7 +159,7 @@ SIZES = {
 
 @pytest.mark.parametrize("kind", ["valve", "orifice"])
 @pytest.mark.parametrize("name", SIZES)
-def test_a_valve_passes_what_its_size_says_both_ways(name, kind):
+def test_a_valve_passes_the_flow_of_its_size_in_both_directions(name, kind):
     size, flow_area = SIZES[name]
     nodes = {"a": reservoir(3e5), "b": reservoir(2e5), "c": reservoir(4.5e5)}
     links = {

@@ -90,7 +90,7 @@ def test_at_a_jump_it_stops_the_flow_at_once(law):
     assert result["a.pressure"][after] == pytest.approx(5.9e5 - 1000.0 / area(0.3) * first, rel=near)
 
 
-def test_what_a_jump_shuts_and_opens_is_listed_once():
+def test_valves_that_a_jump_shuts_and_opens_are_listed_once():
     """Each jump of the lake gives one event of the check valve and one of the check valve of the pump."""
     fall = reservoir({"time": [0.0, 1.0, 2.0], "value": [3e5, 1e5, 3e5], "kind": "step"})
     nodes = {"pump": fall, "a": junction(), "b": junction(), "town": reservoir(2e5)}
@@ -170,7 +170,7 @@ def test_at_rest_it_rests(name):
 
 
 @pytest.mark.parametrize("head, shut", [(58.0, False), (30.0, True)])
-def test_steady_states_find_which_are_shut(head, shut):
+def test_steady_states_find_the_shut_valves(head, shut):
     """The check valve of the lower lake is shut at a head of 30 m and open at 58 m; that of the higher lake is open."""
     nodes = {"low": lake(head), "high": lake(60.0), "a": junction(), "b": junction(), "town": junction(0.02)}
     nodes["lake"] = lake(45.0)
@@ -192,7 +192,7 @@ def slam():
     return lifted_valves.slam(head, g, z, 1.0, far, 2e3, 0.2, 4.5, [0.5, 1.0])
 
 
-def test_a_disc_that_shuts_late_slams_as_waves_and_its_own_equation_say():
+def test_a_disc_that_shuts_late_slams_by_waves_and_its_own_equation():
     t, (x, m, _), events = slam()
     result = fvsolve.run(CASES / "check-valve-slam.toml", set={"links.main.cells": 240})
     found, slammed = [e["time"] for e in result.summary["events"]], events[1][0]
@@ -206,7 +206,7 @@ def test_a_disc_that_shuts_late_slams_as_waves_and_its_own_equation_say():
 @pytest.mark.parametrize("method, courant, near", [("implicit-euler", 1.0, 0.05), ("implicit-euler", 2.0, 0.1),
                                                    ("trapezoid", 1.0, 7e-3), ("alexander-2", 2.0, 7e-3),
                                                    ("gauss-4", 2.0, 2e-3)])  # fmt: skip
-def test_a_disc_that_slams_within_a_given_implicit_step_is_led_to_its_seat(method, courant, near):
+def test_a_disc_that_slams_within_a_given_implicit_step_is_placed_on_its_seat(method, courant, near):
     """A long implicit step in which the disc shuts ends with the lift 0.
 
     The equation of the lift has a solution near zero and one far below it, and in longer steps only the latter.
@@ -296,7 +296,7 @@ def assert_leaves(case, name, disc, felt):
 @pytest.mark.in_turn
 @pytest.mark.parametrize("disc", [LAG, SWING])
 @pytest.mark.parametrize("method", METHODS)
-def test_a_disc_and_the_column_that_it_holds_leave_its_seat_as_their_equations_say(method, disc):
+def test_a_disc_and_its_supported_column_leave_its_seat_by_their_equations(method, disc):
     """Lift and flow start as powers of time, and the rate of their coupling is infinite at first."""
     assert_leaves(*held_column("check-valve", False, disc, METHODS[method]), disc, "drop")
 
@@ -400,7 +400,7 @@ def test_a_column_that_slams_its_disc_shut_is_followed_under_every_law(numerics,
         [LAG, SWING],
     ),
 )
-def test_steps_of_given_length_do_not_leap_over_a_slam(method, step, law, disc):
+def test_steps_of_given_length_do_not_pass_over_a_slam(method, step, law, disc):
     """The lift ends as the power 1/3 or 2/3 of the time left, so the step that contains the slam is divided."""
     result, _ = slammed(disc, law, {"method": method, "step": step}, 3.6)
     (shuts,) = result.summary["events"]
@@ -590,7 +590,7 @@ def test_resumed_it_is_the_unbroken_run_to_the_bit(tmp_path, end):
      ({"deceleration": 3.0}, "is not a table"),
      ({"diameter": None, "loss_coefficient": None, "Kv": 100.0}, "the velocities of this curve refer to a bore")],
 )  # fmt: skip
-def test_what_is_wrong_with_its_curve_is_said(wrong, said):
+def test_faults_of_its_curve_are_reported(wrong, said):
     case = slam_curve_column(3.0, TIGHT)
     given = case["links"]["check"] | wrong
     case["links"]["check"] = {key: value for key, value in given.items() if value is not None}

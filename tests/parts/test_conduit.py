@@ -46,7 +46,7 @@ METHODS = [{"method": "ssp-rk2"}, {"method": "rk4"}, {"method": "radau-iia-3", "
 @pytest.mark.parametrize("scheme", ["upwind", "muscl"])
 @pytest.mark.parametrize("numerics", METHODS, ids=lambda keys: keys["method"])
 @pytest.mark.parametrize("level", [0.05, 0.45, 0.9, 3.0])
-def test_water_at_rest_does_not_move_by_one_bit(level, numerics, scheme):
+def test_water_at_rest_does_not_change_any_bit(level, numerics, scheme):
     """On a slope through the crown, with a dry end, and full."""
     case = two_tanks(level, level, inverts=[0.8, 0.0])
     case["numerics"] |= {"end": 5.0, "scheme": scheme, **numerics}
@@ -241,7 +241,7 @@ def test_a_chain_starts_in_steady_flow(name, turned):
 
 
 @pytest.mark.parametrize("numerics", METHODS, ids=lambda keys: keys["method"])
-def test_a_chain_starts_in_one_backwater(numerics):
+def test_a_chain_starts_in_a_continuous_backwater(numerics):
     """Depths of all three conduits are those of gradually varied flow in one pipe, for each method."""
     up, down, branches, _ = CHAINS["mild"]
     case = chain(20, up, down, False, branches)
@@ -354,7 +354,7 @@ def test_it_drains_over_a_free_overfall():
 
 @pytest.mark.parametrize("method", ["ssp-rk2", "tr-bdf2", "rodas-4"])
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_demand_above_critical_outflow_is_named_with_what_is_available(method, turned):
+def test_a_demand_above_critical_outflow_is_named_with_the_available_flow(method, turned):
     """Half full at rest: critical outflow has phi(h) + c(h) = phi(D / 2), phi by quadrature of sqrt(g T / A)."""
     d, g = 0.4, 9.80665
     wave = lambda h: np.sqrt(g * exact_section.width(h, d) / exact_section.area(h, d))  # noqa: E731
@@ -396,7 +396,7 @@ def series_error(cells: int) -> float:
     return max(abs(two[level] - one[level]).max() for level in ("a.level", "b.level"))
 
 
-def test_two_in_series_are_one():
+def test_two_in_series_equal_a_single_conduit():
     errors = [series_error(cells) for cells in (20, 80)]
     assert errors[0] < 4e-3 and errors[1] < 1e-3
 

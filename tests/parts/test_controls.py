@@ -38,7 +38,7 @@ def solved(rates, y, times):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_level_held_by_pi_is_that_of_hand_written_equations(method):
+def test_a_level_controlled_by_pi_follows_the_explicit_equations(method):
     outlet = {"time": [10.0, 11.0], "value": [0.5, 0.7]}
 
     def rates(t, y, k):
@@ -53,7 +53,7 @@ def test_a_level_held_by_pi_is_that_of_hand_written_equations(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_pid_with_limits_and_tracking_is_that_of_hand_written_equations(method):
+def test_pid_with_limits_and_tracking_follows_the_explicit_equations(method):
     gain, ti, td, n, b, c, tt = 1.5, 60.0, 8.0, 6.0, 0.7, 0.3, 25.0
     steps = {"time": [0.0, 20.0, 120.0], "value": [4.0, 4.6, 4.2], "kind": "step"}
     control = pi(steps, gain, ti, derivative_time=td, derivative_filter=n, setpoint_weight=b, derivative_weight=c,
@@ -113,7 +113,7 @@ def lagged() -> list[float]:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_formula_of_level_and_lagged_level_is_that_of_hand_written_equations(method):
+def test_a_formula_of_level_and_lagged_level_follows_the_explicit_equations(method):
     formula = "min(0.6, max(0.1, 0.25 + 1.5*(4 - h) + 0.2*e)) + 0.02*sin(t/7)*where(t < 50, 1, 0)"
     controls = {
         "act": {"type": "function", "inputs": {"h": "tower.level", "e": "controls.lag"}, "formula": formula},
@@ -185,7 +185,7 @@ def moving_case(law):
 @pytest.mark.in_turn
 @pytest.mark.parametrize("law", LAWS, ids=["linear", "log", "table"])
 @pytest.mark.parametrize("method", ["ssp-rk3", *METHODS])
-def test_a_loop_at_rest_does_not_move_by_one_bit(method, law):
+def test_a_loop_at_rest_does_not_change_any_bit(method, law):
     case = fvsolve.load(moving_case(law), {"numerics.method": method})
     case = fvsolve.load(case, {"controls.back.formula": "1.2 + 0*t", "output.every": 0.1})
     assert fvsolve.build(case).steady["moving"] == []
@@ -320,7 +320,7 @@ def test_explicit_and_implicit_methods_agree_on_a_pump_a_pipe_and_a_filter_under
 
 
 @pytest.mark.parametrize("law", LAWS, ids=["linear", "log", "table"])
-def test_the_pattern_of_the_jacobian_contains_what_blocks_read_and_drive(law):
+def test_the_pattern_of_the_jacobian_contains_inputs_and_targets_of_blocks(law):
     for case in (moving_case(law), tower({"control": "hold"}, 0.5, controls={"hold": pi(4.0, filter=3.0)})):
         model = fvsolve.build(fvsolve.load(case))
         pattern = jacobian_pattern(model).toarray()[: model.y_size].astype(bool)

@@ -82,7 +82,7 @@ def test_other_methods_and_schemes_find_the_same(numerics):
 
 
 @pytest.mark.parametrize(("law", "cells"), [("log", 40), ("table", 40), ("mixture", 160)])
-def test_under_other_laws_small_waves_are_those_of_the_linear_one(law, cells):
+def test_under_other_laws_small_waves_are_those_of_the_linear_law(law, cells):
     fluid = {"name": "Water", "temperature": 293.15, "law": "linear"}
     of_law = {**fluid, "law": law} | ({"air_fraction": 1e-7, "cavitation": True} if law == "mixture" else {})
     found = []
@@ -122,26 +122,26 @@ def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme, law):
     assert stray(model, 0.3, random_state(model, rng)) < 1e-7
 
 
-def told(cells: int, law: str) -> dict:
+def falling_line(cells: int, law: str) -> dict:
     """Return a case of a falling line, in which swelling of the bore also stores potential energy."""
     case = line(cells, end=2.0)
     case["nodes"]["gate"]["elevation"], case["fluid"]["law"] = -30.0, law
     return case
 
 
-def test_its_energy_is_booked_and_never_made():
+def test_its_energy_is_accounted_and_never_created():
     """The remainder falls with the order of the scheme, so stored and dissipated energies are complete."""
     found = []
     for cells in (30, 60):
-        found.append(energy(told(cells, "linear")))
+        found.append(energy(falling_line(cells, "linear")))
     assert found[1].relative < 2e-6 and found[1].relative < found[0].relative / 8.0
     taken = np.array(found[1].dissipated["main creep"])
     assert taken[-1] > 0.0 and np.all(np.diff(taken) >= 0.0)
 
 
-def test_under_other_laws_too_and_what_a_law_leaves_has_a_line_of_its_own():
+def test_under_other_laws_too_and_the_residual_of_a_law_has_a_line_of_its_own():
     """The law loss belongs to liquid of reference density in the wider bore; the scheme loss falls with the cells."""
-    linear, *other = [energy(told(cells, law)) for cells, law in ((60, "linear"), (30, "log"), (60, "log"))]
+    linear, *other = [energy(falling_line(cells, law)) for cells, law in ((60, "linear"), (30, "log"), (60, "log"))]
     taken = np.array(other[1].dissipated["main creep"])
     assert taken[-1] == approx(linear.dissipated["main creep"][-1], rel=0.02) and np.all(np.diff(taken) >= 0.0)
     left = [one.scheme["main"][-1] for one in other]
@@ -152,7 +152,7 @@ def test_under_other_laws_too_and_what_a_law_leaves_has_a_line_of_its_own():
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_what_the_wall_holds_is_part_of_what_could_be_had(law):
+def test_energy_stored_in_the_wall_is_part_of_the_available_energy(law):
     cases = [line(10, end=0.1, creep=creep) for creep in (ELEMENTS, None)]
     held = [energy(case | {"fluid": case["fluid"] | {"law": law}}).at_start["main"] for case in cases]
     volume, elastic = area(BORE) * LENGTH, 1e6 - 101325.0
@@ -190,7 +190,7 @@ def test_without_an_event_no_bit_moves(law):
     assert np.all(run["gate.pressure"] == run["gate.pressure"][0])
 
 
-def test_a_resumed_run_is_the_unbroken_one_to_the_bit(tmp_path):
+def test_a_resumed_run_is_the_uninterrupted_run_to_the_bit(tmp_path):
     whole = fvsolve.run(line(20, end=1.0))
     fvsolve.run(line(20, end=0.5), out=tmp_path / "half", pictures=False)
     later = fvsolve.run(line(20, end=1.0), out=tmp_path / "half", resume=True, pictures=False)
@@ -237,7 +237,7 @@ def test_laminar_friction_that_remembers_and_a_wall_that_creeps_are_exact_togeth
     assert np.max(np.abs(run["gate.pressure"] - probe(0, run.t))) < 1e-3 * jump
 
 
-def test_the_exact_line_wants_a_wall_that_creeps():
+def test_the_exact_line_requires_a_wall_that_creeps():
     refused({**line(9, creep=None), "exact": {"name": "creeping-line"}}, "needs a wall with creep")
 
 

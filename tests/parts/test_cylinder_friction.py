@@ -168,7 +168,7 @@ def test_restated_friction_moves_alike(what, case):
     assert [t for t, _ in events_of(other)] == pytest.approx([t for t, _ in events_of(one)], abs=END * EXACT)
 
 
-def test_a_cylinder_whose_case_moves_has_the_same_friction():
+def test_a_cylinder_with_a_moving_case_has_the_same_friction():
     """Rod on the frame, case on the mass: it moves backward, and tears off backward."""
     nodes = fed()["nodes"]
     nodes["ground"]["initial_position"] = 2.0 * JACK.x

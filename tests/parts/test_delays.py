@@ -34,7 +34,7 @@ def test_an_integrator_behind_a_delay_is_the_polynomials_of_the_method_of_steps(
 
 
 @pytest.mark.parametrize("method", ["dormand-prince", "radau-iia-5", "rodas-5p"])
-def test_the_loop_swings_from_one_percent_above_its_limit_on(method):
+def test_the_loop_grows_from_1_percent_above_its_limit(method):
     """K = pi / (2 tau), by the roots of s + K exp(-s tau)."""
     for factor, grows in ((0.99, False), (1.01, True)):
         run = fvsolve.run(delayed_loop(factor * pi / (2 * TAU), end=100.0, method=method, rtol=1e-8))
@@ -132,7 +132,7 @@ def test_a_delay_that_acts_at_samples_holds_the_input_of_a_delay_before_each():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_two_delays_in_series_are_one_of_their_sum_in_any_order_of_blocks(method):
+def test_two_delays_in_series_equal_a_delay_of_their_sum_in_any_order_of_blocks(method):
     whole = delayed_loop(2.0)
     controls = whole["controls"]
     halves = controls | {"half": {"type": "delay", "input": "controls.plant", "delay": 0.3, "initial": 1.0},
@@ -193,7 +193,7 @@ def test_a_killed_and_resumed_run_with_delays_is_the_unbroken_run(tmp_path):
     same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 1100.0))
 
 
-def test_what_needs_all_inputs_in_the_state_is_refused():
+def test_features_that_need_all_inputs_in_the_state_are_refused():
     model = fvsolve.build(fvsolve.load(delayed_loop()))
     with pytest.raises(FvsolveError, match="control of type delay"):
         model.rhs(0.0, model.start)

@@ -89,7 +89,7 @@ def drive(**changes):
     return scene(nodes | changes.pop("nodes", {}), links | changes.pop("links", {}), 2.0, probes, **changes)
 
 
-def drive_by_hand():
+def drive_by_scipy():
     """(time at which the motor tears off, pressure, speed at 2 s) by SciPy."""
 
     def rhs(t, y, slips):
@@ -109,7 +109,7 @@ def drive_by_hand():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_hydrostatic_drive_is_that_of_scipy(method):
-    torn, (pressure, speed) = drive_by_hand()
+    torn, (pressure, speed) = drive_by_scipy()
     run = runs(drive(), method)
     assert [(e["name"], e["what"]) for e in run.summary["events"]] == [("motor", "slips forward")]
     assert run.summary["events"][0]["time"] == pytest.approx(torn, abs=2.0 * EXACT)
@@ -289,7 +289,7 @@ def load_sensing(compensator=None, **more):
     return scene(nodes, links, 1.4, ["high.pressure", "load.pressure", "pump.setting", "pump.flow"], **more)
 
 
-def load_sensing_by_hand(start, limit=True, sense=True):
+def load_sensing_by_scipy(start, limit=True, sense=True):
     """States (pressures, setting) at the end by SciPy, piece by piece of the openings."""
 
     def root(x):
@@ -322,7 +322,7 @@ def test_a_compensated_pump_is_that_of_scipy(method, limit, sense):
     own |= {"senses": "load", "margin": 20e5} if sense else {}
     run = runs(load_sensing(own), method)
     probes = ("high.pressure", "load.pressure", "pump.setting")
-    exact = load_sensing_by_hand([run[probe][0] for probe in probes], limit, sense)
+    exact = load_sensing_by_scipy([run[probe][0] for probe in probes], limit, sense)
     assert len(run.summary["events"]) >= 4
     for probe, value in zip(probes, exact, strict=True):
         assert run[probe][-1] == pytest.approx(value, rel=20.0 * EXACT), probe
@@ -494,7 +494,7 @@ def test_the_shipped_drive_is_that_of_dalemberts_waves():
         assert torn == pytest.approx(times, abs=2e-7)
 
 
-def winch_by_hand(start, end):
+def winch_by_scipy(start, end):
     """State (pressures, setting, speed) of the shipped load-sensing pump at `end`, from its state at the start."""
     d1, d2, area = 28.0 * CC, 60.0 * CC, 0.61 * pi / 4.0 * 6e-3**2
     leak1, leak2 = d1 * W1 * 0.05 / 200e5, 0.01 / 6e9
@@ -523,5 +523,5 @@ def winch_by_hand(start, end):
 def test_the_shipped_load_sensing_pump_is_that_of_scipy(method):
     run = runs(CASES / "load-sensing.toml", method, **{"numerics.rtol": 1e-11, "output.units": {}})
     probes = ("supply.pressure", "load.pressure", "pump.setting", "drum.speed")
-    exact = winch_by_hand([run[probe][0] for probe in probes], 3.0)
+    exact = winch_by_scipy([run[probe][0] for probe in probes], 3.0)
     assert [run[probe][-1] for probe in probes] == pytest.approx(exact, rel=1e-8)

@@ -213,7 +213,7 @@ def with_a_hydrant(case: dict) -> dict:
     return case
 
 
-def beside_a_fixed_demand(case: dict) -> dict:
+def with_fixed_demand(case: dict) -> dict:
     """The same town with a demand at c that does not depend on pressure, at a lower place than b."""
     case["nodes"]["c"] = junction(2e-3, elevation=6.0)
     return case
@@ -225,10 +225,10 @@ def under_the_law_log(case: dict) -> dict:
 
 @pytest.mark.parametrize(
     ("change", "head", "unsupplied"),
-    [(with_leaks, 8.0, []), (with_a_hydrant, 8.0 + 1e5 / 9806.65, []), (beside_a_fixed_demand, 6.0, ["b, c"]),
+    [(with_leaks, 8.0, []), (with_a_hydrant, 8.0 + 1e5 / 9806.65, []), (with_fixed_demand, 6.0, ["b, c"]),
      (under_the_law_log, 8.0, ["b, c"])],
 )  # fmt: skip
-def test_what_draws_from_a_dry_tower_drains_the_town_to_the_lowest_level_of_outflow(change, head, unsupplied):
+def test_outflow_from_a_dry_tower_drains_the_town_to_the_lowest_level_of_outflow(change, head, unsupplied):
     case = change(supplied_by_a_tower())
     for told in (case, restated(case)):
         run = fvsolve.run(told)

@@ -42,7 +42,7 @@ RIGHT = {
 
 
 @pytest.mark.parametrize("text", RIGHT)
-def test_a_formula_is_what_mathematics_says(text):
+def test_a_formula_has_its_mathematical_value(text):
     assert values(text) == approx(of_points(RIGHT[text]), rel=1e-14, abs=1e-15)
 
 
@@ -82,7 +82,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("text", REFUSED, ids=range(len(REFUSED)))
-def test_what_formulas_do_not_have_is_refused_with_the_nearest_form(text):
+def test_unknown_functions_of_formulas_are_refused_with_the_nearest_form(text):
     with pytest.raises(ValueError, match=REFUSED[text]):
         values(text)
 
@@ -91,7 +91,7 @@ def test_what_formulas_do_not_have_is_refused_with_the_nearest_form(text):
     ("+".join(["x"] * 1200), lambda x: 1200.0 * x), ("-".join(["x"] * 1200), lambda x: -1198.0 * x),
     ("1" + "*x/x" * 600, lambda x: np.ones_like(x)),
 ], ids=["sum", "difference", "product"])  # fmt: skip
-def test_a_formula_of_many_terms_is_read(text, rule):
+def test_a_long_formula_is_read(text, rule):
     """A formula of 1200 terms is read, more than the 1000 calls within calls that Python allows."""
     x = np.array([1.0, 2.0, 0.5])
     assert SpatialFieldKey("length").read(text, ReadContext()).at(x, x) == approx(rule(x), rel=1e-13)
@@ -129,7 +129,7 @@ WAYS = {  # every key that takes formulas, with a fault only at the points of th
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_wherever_a_formula_is_taken_its_fault_is_one_of_the_case(way):
+def test_a_fault_of_any_formula_is_a_fault_of_the_case(way):
     given = {"physics": "transport"} if "velocity" in WAYS[way] else {"level": 1.0}
     pool = {"type": "basin", "size": [1.0, 1.0], "cells": [4, 4], **given, **WAYS[way]}
     case = scene({"pool": pool}, {}, 1.0, {"method": "ssp-rk2", "courant": 0.5}, [], 0.1) | {"scalars": {"dye": {}}}

@@ -29,7 +29,7 @@ def sampled(text):
 
 
 @pytest.mark.parametrize("text", POLES)
-def test_a_pole_between_samples_is_found_at_its_time(text):
+def test_a_pole_between_samples_is_located_at_its_time(text):
     with np.errstate(all="ignore"):
         found = find_pole(*sampled(text))
     places = [POLES[text] + 2 * math.pi * k for k in range(3)] + [math.pi - POLES[text]]

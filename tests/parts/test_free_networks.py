@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from reference.jacobians import stray
-from reference.refusals import said
+from reference.refusals import messages_of
 from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, scene
 from reference.u_tubes import BORE, DEPTH, HALF, LEVEL, ROLL, TANK, u_tube
 from scipy.integrate import solve_ivp
@@ -53,8 +53,8 @@ def hull_and_water():
         action += RHO * size * sp.integrate(sp.expand(square / 2 - GRAVITY * where[1]), (s, low, high))
     left = [action.diff(one.diff(t)).diff(t).doit() - action.diff(one) for one in (angle, z)]
     a, b, c, x, v, w = sp.symbols("a b c x v w")
-    said = ((angle.diff(t, 2), c), (z.diff(t, 2), w), (angle.diff(t), b), (z.diff(t), v), (angle, a), (z, x))
-    for old, new in said:
+    derivatives = ((angle.diff(t, 2), c), (z.diff(t, 2), w), (angle.diff(t), b), (z.diff(t), v), (angle, a), (z, x))
+    for old, new in derivatives:
         left = [one.subs(old, new) for one in left]
     matrix = sp.Matrix(2, 2, lambda i, j: left[i].diff((c, w)[j]))
     right = sp.Matrix([-one.subs({c: 0, w: 0}) for one in left])
@@ -89,7 +89,7 @@ def test_a_free_hull_and_the_water_in_its_u_tube_obey_lagrange(way, truth):
     assert run["port.level"] - LEVEL == pytest.approx(rise, abs=1e-6)
 
 
-def test_a_cart_with_a_u_tube_on_rails_keeps_the_momentum_of_the_whole():
+def test_a_cart_with_a_u_tube_on_rails_conserves_the_total_momentum():
     case = u_tube(minor_loss=0.0, route=[[0, HALF, -DEPTH - 0.5], [0, -HALF, -DEPTH - 0.5]], length=9.5)
     slides = {"kind": "prismatic", "axis": [0, 1, 0], "travel": 0.0, "rate": 0.3}
     case["links"]["duct"]["length"] = 9.5
@@ -166,7 +166,7 @@ def of_all(case, run):
     return np.array(found)
 
 
-def test_a_body_on_a_ball_keeps_its_energy_and_its_spin_about_the_vertical_with_all_that_flows():
+def test_a_body_on_a_ball_conserves_its_energy_and_its_spin_about_the_vertical_with_all_flows():
     case = oblique(BALL)
     run = fv.run(case)
     kinetic, energy, about = of_all(case, run)[:, [0, 1, 7]].T
@@ -179,7 +179,7 @@ TURNED = {"kind": "revolute", "axis": [1, 0.3, -0.2], "angle": ROLL}
 
 
 @pytest.mark.parametrize("joint", [BALL, TURNED], ids=["ball", "driven"])
-def test_what_a_joint_holds_is_the_rate_of_all_momentum_less_the_weight(joint):
+def test_force_in_a_joint_is_the_rate_of_all_momentum_less_the_weight(joint):
     case = oblique(joint)
     held = [f"hull.joint_{one}{axis}" for one in "ft" for axis in "xyz"]
     case["output"]["probes"] += held
@@ -356,7 +356,7 @@ def drift(case):
 @pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("tanks", [False, True])
-def test_a_rig_on_rails_keeps_its_momentum_while_a_valve_shuts_between_its_pipes(tanks, law):
+def test_a_rig_on_rails_conserves_its_momentum_while_a_valve_shuts_between_its_pipes(tanks, law):
     case = rig(RAILS, law, tanks, gravity=GRAVITY if tanks else 1e-12)
     run = fv.run(case)
     assert np.ptp(run["gate.flow"]) > 1e-3 and np.ptp(run["rig.vx"]) > 1e-5
@@ -365,7 +365,7 @@ def test_a_rig_on_rails_keeps_its_momentum_while_a_valve_shuts_between_its_pipes
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_a_rig_in_free_flight_keeps_all_momenta_to_the_order_of_steps_and_cells(law):
+def test_a_rig_in_free_flight_conserves_all_momenta_to_the_order_of_steps_and_cells(law):
     found = [drift(rig(FLIES, law, cells=cells, step=step)) for cells, step in ((8, 2e-4), (8, 1e-4), (16, 1e-4))]
     straight, spun = ([np.max(most[part]) for most, _ in found] for part in (slice(0, 3), slice(3, 6)))
     size = np.linalg.norm(found[0][1][3:])
@@ -402,7 +402,7 @@ def test_a_light_body_with_a_pipe_is_stepped_as_its_waves_brake_it():
     assert not fv.run(case).ok  # beyond the limit of rk4, 2.785
 
 
-def test_a_duct_most_of_which_is_a_pipe_is_the_rigid_column_that_it_was(truth):
+def test_a_duct_that_is_mostly_a_pipe_is_the_former_rigid_column(truth):
     case = free()
     ends = {"port": HALF, "starboard": -HALF}
     for name, y in ends.items():
@@ -424,35 +424,35 @@ def test_a_duct_most_of_which_is_a_pipe_is_the_rigid_column_that_it_was(truth):
     ({"nodes": {"port": {"height": 2.0}}}, "nodes.port.height", "the reaction of the spilled water"),
     ({"nodes": {"port": {"area": {"level": [0, 1], "area": [1, 2]}}}}, "nodes.port.area", "a constant area"),
 ])  # fmt: skip
-def test_what_a_free_body_does_not_feel_is_refused_by_name(change, place, text):
+def test_features_without_effect_on_a_free_body_are_refused_by_name(change, place, text):
     case = free()
     for group, tables in change.items():
         for name, one in tables.items():
             case[group][name] = one if group == "fluid" else {**case[group][name], **one}
-    assert text in said(case)[place]
+    assert text in messages_of(case)[place]
 
 
-def test_a_pipe_at_a_tank_of_a_free_body_and_a_column_led_by_a_valve_are_refused_by_name():
+def test_a_pipe_at_a_tank_of_a_free_body_and_a_column_controlled_by_a_valve_are_refused_by_name():
     case = free()
     case["links"]["duct"] |= {"type": "pipe", "wave_speed": 1000.0}
-    assert "expected a rigid-column at the tank" in said(case)["links.duct"]
+    assert "expected a rigid-column at the tank" in messages_of(case)["links.duct"]
     case = free()
     case["nodes"]["mouth"] = {"type": "junction", "on": "hull", "at": [0, HALF, -DEPTH]}
     case["links"]["duct"][next(key for key in ("from", "to") if case["links"]["duct"][key] == "port")] = "mouth"
     case["links"]["gate"] = {"type": "valve", "from": "port", "to": "mouth", "area": 0.1, "discharge_coefficient": 1.0}
-    found = said(case)
+    found = messages_of(case)
     assert "neither the flow of a valve nor the tank has inertia" in found["links.gate"]
     assert "at mouth this column joins only valves and columns" in found["links.duct"]
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_what_bodies_and_pipes_feel_of_each_other_is_in_the_pattern(law):
+def test_couplings_of_bodies_and_pipes_are_in_the_pattern(law):
     model, rng = build(fv.load(rig(FLIES, law, gravity=GRAVITY, cells=6))), np.random.default_rng(1)
     assert stray(model, 0.1, model.scale * rng.normal(size=model.y_size)) < 1e-9
 
 
 @pytest.mark.parametrize("joint", ["revolute", "ball"])
-def test_what_bodies_and_columns_feel_of_each_other_is_in_the_pattern(joint):
+def test_couplings_of_bodies_and_columns_are_in_the_pattern(joint):
     case = free(minor_loss=2.0)
     case["nodes"]["hull"]["joint"] = {"kind": joint} | ({"axis": [1, 0, 0]} if joint == "revolute" else {})
     case["output"]["probes"].remove("hull.angle")
@@ -461,7 +461,7 @@ def test_what_bodies_and_columns_feel_of_each_other_is_in_the_pattern(joint):
     assert stray(model, 0.0, model.scale * rng.normal(size=model.y_size)) < 1e-9
 
 
-def test_tall_arms_on_a_hull_of_no_weight_are_told():
+def test_tall_arms_on_a_hull_without_weight_are_reported():
     case = free()
     case["nodes"]["hull"] |= {"mass": 1.0, "inertia": [1.0] * 3}
     for name in ("port", "starboard"):

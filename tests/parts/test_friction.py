@@ -111,7 +111,7 @@ def test_loss_from_roughness_is_that_of_the_fluids_package(reynolds, model):
     assert 1e6 - result["gate.pressure"][0] == pytest.approx(lost, rel=1e-6, abs=1e-8)
 
 
-def test_hazen_williams_loss_is_the_textbook_one():
+def test_hazen_williams_loss_is_the_textbook_value():
     q, diameter, length, coefficient = 0.1, 0.3, 500.0, 110.0
     nodes = {"lake": lake(100.0), "gate": junction(q)}
     friction = {"model": "hazen-williams", "coefficient": coefficient}
@@ -165,7 +165,7 @@ def peaks(t: np.ndarray, p: np.ndarray, halves: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("scheme", ["muscl", "weno5", "upwind5"])
-def test_peaks_decay_as_the_fine_characteristics_say(scheme):
+def test_peaks_decay_as_by_fine_characteristics(scheme):
     factor = 0.3  # large, for a clear decay
     friction = {"model": "quasi-steady", "factor": factor}
     case = wylie(step(0.5, 1.0, 0.0), 600, friction, end=12.0, scheme=scheme, method="ssp-rk3")
@@ -377,7 +377,7 @@ def test_a_sum_of_exponentials_is_the_printed_function_over_all_times_that_are_r
 
 
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5, 1e-6])
-def test_a_wave_of_any_frequency_that_cells_resolve_meets_the_friction_within_the_accuracy(accuracy):
+def test_a_wave_of_any_resolved_frequency_has_the_friction_within_the_accuracy(accuracy):
     for weighting, transform in (("zielke", unsteady_terms.zielke), ("vardy-brown", None)):
         m, n, highest = unsteady_terms.terms(weighting, 1e5, 0.0, 1e-6, 1e-2, accuracy)
         s = 1j * np.geomspace(100.0, highest, 500)  # from 1 / span of the run
@@ -389,7 +389,7 @@ def test_a_wave_of_any_frequency_that_cells_resolve_meets_the_friction_within_th
         assert (1.0 / (s[:, None] + n)) @ m / value == approx(np.ones(s.size), abs=accuracy)
 
 
-def test_which_function_is_taken_follows_the_flow_of_the_start_unless_the_case_says():
+def test_the_weighting_function_follows_the_initial_flow_unless_the_case_states_it():
     def taken(reynolds, **friction):
         case = line(0.005, 5, reynolds=reynolds)
         case["links"]["main"]["friction"] |= friction
@@ -470,7 +470,7 @@ def test_other_methods_and_schemes_find_the_same(change):
 
 
 @pytest.mark.parametrize("law", ["log", "table"])
-def test_under_other_laws_it_is_the_same_but_for_what_density_changes(law):
+def test_under_other_laws_it_is_the_same_except_for_the_effect_of_density(law):
     case = line(0.02, 60, end=1.5)
     fluid = {**case["fluid"], "bulk_modulus": 1e9, "law": "log"}
     if law == "table":
@@ -500,7 +500,7 @@ def test_a_rigid_column_in_its_place_has_no_memory():
 # a main -------------------------------------------------------------------------------------------------------------
 
 
-def test_a_main_keeps_to_the_first_plateau_and_converges_from_one_side():
+def test_a_main_stays_at_the_first_plateau_and_converges_from_a_single_side():
     """Heads stay below 326 ft, the sum of 45.116 m, Joukowsky's jump and the friction head.
 
     Other programs give 353 ft to 590 ft, and more with half the step.
@@ -530,7 +530,7 @@ def test_its_energy_is_booked(law):
     assert float(found[1].dissipated["main friction"][-1]) > 0.0
 
 
-def test_what_it_remembers_of_the_start_is_part_of_what_could_be_had():
+def test_energy_in_the_memory_of_friction_is_part_of_the_available_energy():
     """Relaxation terms of a steady laminar flow add 1/3 of its kinetic energy to the available energy."""
     case = line(0.05, 10, "step", end=1.0)
     with_, without = case, line(0.05, 10, "step", end=1.0)
@@ -584,7 +584,7 @@ def test_faults(friction, kind, words):
     refused(case, words)
 
 
-def test_a_weighting_at_a_reynolds_number_wants_one():
+def test_a_weighting_by_reynolds_number_requires_a_reynolds_number():
     case = line(0.02, 9)
     case["nodes"]["gate"]["demand"] = 0.0
     case["links"]["main"]["friction"] = {"model": "unsteady", "roughness": 1e-5, "weighting": "vardy-brown"}
@@ -606,7 +606,7 @@ def test_it_needs_a_viscosity():
      (lambda case: case["links"]["main"].update(friction={"model": "none"}), 'needs friction with model = "unsteady"'),
      (lambda case: case["nodes"]["lake"].update(pressure={"time": [0, 1], "value": [1e6, 2e6]}), "constant pressure")],
 )  # fmt: skip
-def test_the_exact_line_refuses_what_it_is_not(change, words):
+def test_the_exact_line_refuses_other_scenes(change, words):
     case = {**line(0.02, 9), "exact": {"name": "laminar-line"}}
     change(case)
     refused(case, words)

@@ -406,7 +406,7 @@ def test_the_energy_of_friction_follows_the_viscosity():
     assert fvsolve.run(case).ledger["temperature"]["heat"]["a"] != book["heat"]["a"]
 
 
-def test_steady_friction_keeps_the_viscosity_of_the_start_and_says_so():
+def test_steady_friction_retains_the_viscosity_of_the_start_with_a_notice():
     case = hammer(friction={"model": "steady", "roughness": 1e-5})
     case["fluid"]["viscosity"] = {"law": "astm-d341", "points": VG46}
     notes = [notice.text for notice in fvsolve.build(fvsolve.load(case)).warnings]
@@ -482,7 +482,7 @@ def test_all_losses_of_a_displacement_machine_heat_the_fluid(kind, drive):
 
 
 @pytest.mark.parametrize("drive", ["speed", "inertia"])
-def test_the_pattern_of_the_jacobian_has_what_heats_by_a_machine(drive):
+def test_the_pattern_of_the_jacobian_has_the_heat_of_a_machine(drive):
     model, rng = fvsolve.build(fvsolve.load(circuit("motor", drive))), np.random.default_rng(1)
     assert stray(model, 0.0, model.scale * rng.normal(scale=0.1, size=model.y_size)) < 1e-7
 
@@ -569,7 +569,7 @@ FAULTS = [
 @pytest.mark.parametrize(
     "keys, value, said", FAULTS, ids=[f"{'.'.join(keys)}-{k}" for k, (keys, *_) in enumerate(FAULTS)]
 )
-def test_what_cannot_be_is_refused(keys, value, said):
+def test_impossible_settings_are_refused(keys, value, said):
     nodes = {"air": {"type": "ambient", "temperature": 290.0}, "lake": reservoir(AMBIENT)}
     links = {"cooler": {"type": "heat-exchanger", "from": "high", "to": "air", "conductance": 5.0},
              "leak": valve("sump", "lake", 1e-6)}  # fmt: skip
@@ -594,7 +594,7 @@ def test_a_temperature_that_nothing_heats_is_noted():
     assert not any("heats or cools" in text for text in notes)
 
 
-def test_all_faults_are_said_at_once():
+def test_all_faults_are_reported_at_once():
     case = unit()
     case["scalars"]["temperature"] |= {"heat_from": ["pomp", "throtle"]}
     case["links"]["cooler"] = {"type": "heat-exchanger", "from": "sump", "to": "nowhere", "effectiveness": 2.0}

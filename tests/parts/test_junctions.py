@@ -55,7 +55,7 @@ TEE = {
 
 
 @pytest.mark.parametrize("pipes", [SERIES, TEE], ids=["series", "three-way with a dead end"])
-def test_pipes_whose_cells_take_the_same_time_are_exact_at_courant_one(pipes):
+def test_pipes_of_cells_with_equal_times_are_exact_at_courant_1(pipes):
     q, shut, dt = 0.05, 0.1, next(iter(pipes.values()))
     dt = dt[2] / dt[5] / dt[4]
     places = sorted({p for row in pipes.values() for p in row[:2]} - {"lake"})
@@ -155,7 +155,7 @@ def test_the_order_through_a_junction_is_the_scheme_s_own(scheme):
     assert observed_order(errors, [2.0, 1.0]) == pytest.approx(order, abs=0.2)
 
 
-def test_muscl_keeps_its_order_through_a_junction_in_the_mean():
+def test_muscl_retains_its_order_through_a_junction_in_the_mean():
     errors = [scatter(n, "muscl", {"method": "ssp-rk3", "courant": 0.5}) for n in (100, 200)]
     assert observed_order(errors, [2.0, 1.0]) == pytest.approx(2.0, abs=0.35)
 
@@ -169,7 +169,7 @@ def test_a_dead_end_doubles_a_wave():
     assert result["gate.pressure"][plateau] == pytest.approx(1.4 * SUPPLY, rel=1e-12)
 
 
-def test_a_valve_between_pipes_reflects_and_passes_what_its_equation_says():
+def test_a_valve_between_pipes_reflects_and_passes_by_its_equation():
     """At Courant number 1 the flow solves p1 - p2 - 2 Z m = (m / K)^2 at every step."""
     d, a, flow_area, dt = 0.3, 1000.0, 0.01, 0.005
     nodes = {"lake": reservoir(SUPPLY), "a": junction(), "b": junction(), "sea": reservoir(0.5 * SUPPLY)}
@@ -188,7 +188,7 @@ def test_a_valve_between_pipes_reflects_and_passes_what_its_equation_says():
     assert result["b.pressure"][first] == pytest.approx(0.5 * SUPPLY + z * k * root, rel=1e-12)
 
 
-def test_valves_in_a_bunch_act_as_one_of_their_areas():
+def test_valves_in_parallel_act_as_a_valve_of_their_areas():
     def run(areas):
         nodes = {"lake": reservoir(SUPPLY), "gate": junction(), "air": reservoir(AMBIENT)}
         links = {"main": pipe("lake", "gate", 200.0, 0.3, 1000.0, 20)}
@@ -198,7 +198,7 @@ def test_valves_in_a_bunch_act_as_one_of_their_areas():
     assert run([0.001, 0.0005, 0.0025]) == pytest.approx(run([0.004]), abs=1e-9 * SUPPLY)
 
 
-def test_valves_in_series_act_as_one_of_their_summed_drops():
+def test_valves_in_series_act_as_a_valve_of_their_summed_drops():
     def run(areas):
         names = ["gate", *(f"n{i}" for i in range(len(areas) - 1)), "air"]
         nodes = {"lake": reservoir(SUPPLY), **{n: junction() for n in names[:-1]}, "air": reservoir(AMBIENT)}
@@ -256,7 +256,7 @@ def ended(cells: int, reflection: float, scheme: str) -> dict:
 
 
 @pytest.mark.parametrize("scheme", LINEAR)
-def test_no_mode_grows_in_one_pipe_of_1_to_64_cells_whatever_its_end_reflects(scheme):
+def test_no_mode_grows_in_a_pipe_of_1_to_64_cells_at_any_reflection_of_its_end(scheme):
     worst = {
         (cells, reflection): growth(ended(cells, reflection, scheme))
         for cells in (*range(1, 13), 16, 23, 32, 64)
@@ -314,7 +314,7 @@ def random_network(rng: np.random.Generator, dt: float) -> tuple[dict, dict, fri
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_random_networks_with_loops_and_outlets_are_exact_at_courant_one(seed):
+def test_random_networks_with_loops_and_outlets_are_exact_at_courant_1(seed):
     dt = 0.004
     nodes, links, exact = random_network(np.random.default_rng(seed), dt)
     places = ["n1", "n2", "n3", "n4"]

@@ -134,7 +134,7 @@ def test_a_tank_empties_through_a_linear_curve_exponentially(method, law):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_tank_empties_past_a_point_by_one_exponential_after_the_other(method):
+def test_a_tank_empties_past_a_point_by_two_exponentials_in_turn(method):
     """Above 4 m the loss is 1 m and 300 s/m2 of flow beyond 10 l/s, below it 100 s/m2."""
     points = {"flow": [0.0, 0.01, 0.03], "head": [0.0, 1.0, 7.0]}
     nodes, links = {"a": tank(2.0, 4.0), "b": lake(0.0)}, {"part": curve("a", "b", points)}
@@ -238,7 +238,7 @@ def test_no_rate_depends_on_a_state_outside_its_pattern(law):
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("loss", [POINTS, FLAT], ids=["points", "constant"])
-def test_at_rest_nothing_moves_by_one_bit(loss, law):
+def test_at_rest_no_bit_changes(loss, law):
     nodes = {"a": tank(2.0, 5.0), "mid": junction(), "b": tank(3.0, 5.0)}
     links = {"part": curve("a", "mid", loss), "main": quick("mid", "b")}
     fluid = {**WATER, "law": law}

@@ -88,7 +88,7 @@ def test_other_encodings_of_spreadsheets_are_read(encoding, tmp_path):
     "too great a number": ("t,H\n0,1e999\n", '"1e999" is not a number'),
     "one name twice": ("t,H,H\n0,1,2\n", None),
 }.items())  # fmt: skip
-def test_what_may_be_misread_is_refused_with_its_line(text, words, tmp_path):
+def test_ambiguous_files_are_refused_with_their_line(text, words, tmp_path):
     text, words = words
     if words:
         assert words in refusal(tmp_path / "rig.csv", text)
@@ -164,7 +164,7 @@ def test_velocities_are_read_alike(text, tmp_path):
 
 @pytest.mark.parametrize("sign", [" ", "9", ",", "\n", "#", "a", "[", "(m) "])
 @pytest.mark.parametrize("place", ["alone", "header", "rows"])
-def test_a_megabyte_of_one_sign_is_read_or_refused_in_bounded_time(sign, place, tmp_path):
+def test_a_megabyte_of_equal_characters_is_read_or_refused_in_bounded_time(sign, place, tmp_path):
     """100 kB of blanks in a header took minutes, digits before a letter as long."""
     fill, start = sign * 10**6, time.process_time()
     texts = {"alone": fill, "header": f"t{fill}b,h\n0,1\n1,2\n", "rows": f"t,h\n0,1\n1,{fill}x\n"}
@@ -175,5 +175,5 @@ def test_a_megabyte_of_one_sign_is_read_or_refused_in_bounded_time(sign, place, 
     assert time.process_time() - start < 5.0
 
 
-def test_a_file_of_very_many_columns_is_refused(tmp_path):
+def test_a_file_of_too_large_a_number_of_columns_is_refused(tmp_path):
     assert "has 10001 columns; expected at most 4096" in refusal(tmp_path / "rig.csv", "a," * 10**4 + "b\n" * 2)

@@ -58,7 +58,7 @@ def test_a_closed_cylinder_of_a_real_fluid_swings_by_its_isentropic_modulus():
     assert 2 * math.pi / period == approx(math.sqrt(spring / jack.mass), rel=1e-4)
 
 
-def test_a_closed_cylinder_keeps_the_exact_period_of_its_log_law():
+def test_a_closed_cylinder_has_the_exact_period_of_its_log_law():
     """p = p0 - beta ln(V / V0); the period of large oscillations is computed by quadrature."""
     jack = Jack(pressures=(60e6, 60e6 * 12 / 8), v=22.0, dead=(2e-5, 2e-5), stroke=0.2)
     period, low, high = jack.closed_period()
@@ -119,7 +119,7 @@ def test_a_servo_cylinder_follows_the_trajectory_of_scipy(law, method, rtol):
 
 @pytest.mark.parametrize("side", ["from air", "plugged"])
 @pytest.mark.parametrize("law", LAWS)
-def test_a_cylinder_open_to_the_air_on_both_sides_does_not_move_by_one_bit(law, side):
+def test_a_cylinder_open_to_the_air_on_both_sides_does_not_change_any_bit(law, side):
     jack = Jack(
         law, leakage=1e-12, friction=100.0, extra={"initial_pressure_A": AMBIENT, "initial_pressure_B": AMBIENT}
     )
@@ -133,7 +133,7 @@ def test_a_cylinder_open_to_the_air_on_both_sides_does_not_move_by_one_bit(law, 
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_a_piston_in_balance_does_not_move_by_one_bit(law):
+def test_a_piston_in_balance_does_not_change_any_bit(law):
     """Equilibrium of pressures on unequal areas, a loaded spring and a closed spool valve."""
     jack = Jack(law, stiffness=5e4, free=0.05, extra={"initial_pressure_A": AMBIENT + 60e5 + 2500 / 12e-4})
     jack.pressures = (0.0, AMBIENT + 90e5)
@@ -141,7 +141,7 @@ def test_a_piston_in_balance_does_not_move_by_one_bit(law):
     assert np.all(states(result) == states(result)[:, :1])
 
 
-def test_what_moves_is_said_and_equilibrium_refuses_it():
+def test_motion_is_reported_and_equilibrium_refuses_it():
     jack = Jack(pressures=(AMBIENT + 10e5, AMBIENT), v=0.5)
     case = scene(jack.nodes(), jack.links(), 1.0, CLOSE, PROBES, 0.1, fluid=jack.fluid())
     moving = fvsolve.build(fvsolve.load(case)).checks["moving"]
@@ -183,7 +183,7 @@ def density(p):
     return RHO * np.exp((p - AMBIENT) / BETA)
 
 
-def test_a_closed_cylinder_on_a_spring_keeps_its_energy():
+def test_a_closed_cylinder_on_a_spring_conserves_its_energy():
     jack = Jack(pressures=(60e5, 90e5), v=3.0, stiffness=3e5, free=0.12)
     result = run(jack, 0.05, rtol=1e-12)
     p_a, p_b, x, v = states(result)
@@ -192,7 +192,7 @@ def test_a_closed_cylinder_on_a_spring_keeps_its_energy():
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_rod_and_case_feel_equal_and_opposite_forces(law):
+def test_rod_and_case_have_equal_and_opposite_forces(law):
     """A cylinder between two free masses keeps their momentum and its fluid mass to rounding."""
     jack = Jack(law, pressures=(90e5, 20e5), friction=50.0)
     nodes = {"ground": {"type": "mass", "mass": 35.0, "initial_velocity": 0.2}}
@@ -206,7 +206,7 @@ def test_rod_and_case_feel_equal_and_opposite_forces(law):
 
 
 @pytest.mark.parametrize("method", ["rk4", "euler", "radau-iia-5"])
-def test_mass_is_kept_with_moving_volumes_over_many_steps(method):
+def test_mass_is_conserved_with_moving_volumes_over_thousands_of_steps(method):
     jack = Jack(pressures=(60e5, 80e5), leakage=2e-13)
     case = scene({**jack.nodes(), **SUPPLY}, {**jack.links(), "spool": spool(1e-5, 0.6)}, 0.05,
                  {"method": method, "step": 1e-5 if method == "radau-iia-5" else 1e-6}, PROBES, 1e-2,
@@ -240,7 +240,7 @@ SWINGS = {
 
 
 @pytest.mark.parametrize("kind", SWINGS)
-def test_a_spool_opens_one_pair_of_edges_on_each_side_of_zero(kind):
+def test_a_spool_opens_a_pair_of_edges_on_each_side_of_zero(kind):
     """Flows follow the positive and the negative part of the position; each zero crossing is a step boundary."""
     nodes = {"P": reservoir(5e6), "T": reservoir(1e5), "A": reservoir(3e6), "B": reservoir(2e6)}
     ports = {port: port for port in "PTAB"}
@@ -349,7 +349,7 @@ def test_a_mass_that_rests_on_a_stop_stays():
     assert result["stop.force"] == approx(250.0)
 
 
-def test_a_piston_beyond_its_stroke_is_marked_and_one_without_room_ends_the_run():
+def test_a_piston_beyond_its_stroke_is_marked_and_a_piston_without_space_ends_the_run():
     jack = Jack("linear", v=50.0, stroke=0.12, dead=(6e-5, 1e-4))
     nodes = {"air": reservoir(AMBIENT)}
     links = {end: {"type": "orifice", "from": "air", "to": f"cyl.{end}", "area": 3e-3} for end in "AB"}
@@ -383,7 +383,7 @@ def test_a_controller_may_hold_spool_and_force():
         fvsolve.advance(model, fvsolve.initial_state(model), 0.02, {"spool.position": 2.0})
 
 
-def test_a_run_with_bodies_broken_off_and_resumed_is_the_unbroken_one(tmp_path, monkeypatch):
+def test_a_run_with_bodies_interrupted_and_resumed_is_the_uninterrupted_run(tmp_path, monkeypatch):
     monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
     jack = Jack(pressures=(60e5, 80e5), leakage=2e-13)
     links = {**jack.links(), "spool": spool(1e-5, 0.6)}

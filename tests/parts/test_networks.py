@@ -146,7 +146,7 @@ def test_a_motor_starts_as_its_closed_form(method):
 
 
 @pytest.mark.parametrize("method, long", [("euler", 0.1), ("rk4", 0.01), ("rk4", 0.1), ("rodas-5p", 0.1)])
-def test_a_run_with_a_step_too_long_for_a_motor_says_so(method, long):
+def test_a_run_with_a_step_too_long_for_a_motor_gives_a_notice(method, long):
     """rk4 is stable below 7 ms here; 4 ms is within its limit and right."""
     run = fvsolve.run(motor(), {"numerics.method": method, "numerics.step": long})
     assert not run.ok and exit_code(run) != 0 and run.warnings[0].place == "motor.current"
@@ -344,7 +344,7 @@ def test_a_bearing_without_friction_does_nothing():
     assert np.array(found["a.speed"]) == pytest.approx(7.0, rel=1e-15)
 
 
-def test_a_misspelt_type_in_a_network_does_not_ask_for_a_fluid():
+def test_a_misspelt_type_in_a_network_does_not_require_a_fluid():
     case = shafts({"bearing": two_port("bearing", "a", "frame", damping=0.0)}, ["a.speed"])
     case["links"]["drive"], case["nodes"]["c"] = {"type": "toque", "to": "a"}, {"type": "shft"}
     case.pop("fluid", None)
@@ -354,7 +354,7 @@ def test_a_misspelt_type_in_a_network_does_not_ask_for_a_fluid():
 
 
 @pytest.mark.parametrize("ratio", [5.0, -5.0])
-def test_a_gear_joins_two_inertias_to_one_state(ratio):
+def test_a_gear_joins_two_inertias_to_a_single_state(ratio):
     links = {
         "gear": two_port("gear", "a", "b", ratio=ratio), "drive": {"type": "torque", "to": "a", "torque": 3.0},
         "bearing": two_port("bearing", "b", "frame", damping=0.05),
@@ -372,7 +372,7 @@ def test_a_gear_joins_two_inertias_to_one_state(ratio):
                                           rel=1e-12)  # fmt: skip
 
 
-def test_a_gear_of_one_to_one_and_a_shaft_in_two_halves_change_nothing():
+def test_a_gear_of_ratio_1_and_a_divided_shaft_change_nothing():
     drive = {"type": "torque", "to": "a", "torque": {"formula": "3*sin(9*t)", "unit": "N m"}}
     spring = {"stiffness": 50.0, "damping": 0.2}
     whole = {"spring": two_port("torsion-spring", "a", "b", **spring), "drive": drive}
@@ -604,7 +604,7 @@ def test_an_unstated_temperature_starts_in_equilibrium():
     assert runs(room)["body.temperature"][0] == pytest.approx(293.15, abs=1e-12)
 
 
-def test_the_loss_of_a_resistor_heats_what_it_names():
+def test_the_loss_of_a_resistor_heats_its_target():
     nodes = GROUND | {"a": {"type": "terminal"}, "body": {"type": "heat-capacity", "heat_capacity": 50.0,
                       "initial_temperature": 300.0}, "room": {"type": "ambient", "temperature": 300.0}}  # fmt: skip
     links = {"source": two_port("voltage-source", "gnd", "a", voltage=10.0),
@@ -803,7 +803,7 @@ def test_a_run_with_switches_resumes_to_the_bit(tmp_path):
     same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 0.4))
 
 
-def test_advance_in_parts_keeps_clutch_and_inputs():
+def test_advance_in_parts_retains_clutch_and_inputs():
     model = fvsolve.build(fvsolve.load(clutched(numerics={"method": "dormand-prince"})))
     state = fvsolve.initial_state(model)
     for k in range(8):

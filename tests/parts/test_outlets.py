@@ -112,7 +112,7 @@ PAIRS = [
 
 
 @pytest.mark.parametrize("outlet, method", PAIRS)
-def test_a_way_out_of_a_soft_place_takes_nothing_in_and_lets_out_what_its_law_says(outlet, method):
+def test_an_outlet_at_a_compliant_node_lets_nothing_in_and_discharges_by_its_law(outlet, method):
     numerics = {"method": method, "step": 0.005} if method in FIXED else {"method": method}
     result = fvsolve.run(ball(outlet, numerics))
     way = result.ledger["mass"]["nodes"][f"{OUTSIDE[outlet]}.outside"]
@@ -125,7 +125,7 @@ def test_a_way_out_of_a_soft_place_takes_nothing_in_and_lets_out_what_its_law_sa
 @pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["auto", "radau-iia-5", "rodas-4", "rk4"])
 @pytest.mark.parametrize("outlet", LAWS)
-def test_so_it_is_with_a_fluid_whose_density_follows_the_pressure(outlet, method):
+def test_the_same_holds_with_a_fluid_of_variable_density(outlet, method):
     numerics = {"method": method, "step": 0.005} if method in FIXED else {"method": method}
     result = fvsolve.run(ball(outlet, numerics, "log"))
     way = result.ledger["mass"]["nodes"][f"{OUTSIDE[outlet]}.outside"]
@@ -162,7 +162,7 @@ def passed(outlet: str) -> float:
 
 @pytest.mark.parametrize("method", [*ADAPTIVE, *FIXED])
 @pytest.mark.parametrize("outlet", LAWS)
-def test_what_leaves_without_a_state_is_what_its_law_says(outlet, method):
+def test_outflow_without_a_state_follows_its_law(outlet, method):
     nodes = {
         "lake": reservoir({"time": SWINGS[0], "value": [AMBIENT + p for p in SWINGS[1]]}),
         "town": junction(0.02, **NEED),
@@ -279,7 +279,7 @@ def test_a_line_sucks_at_a_leak_and_the_run_goes_on():
         assert abs(result.ledger["mass"]["relative"]) < 1e-12
 
 
-def test_two_leaks_on_one_junction_share_what_a_valve_brings():
+def test_two_leaks_on_a_junction_share_the_flow_of_a_valve():
     """Pressure of a junction at which only a valve and two leaks balance."""
     nodes = {"lake": reservoir(AMBIENT + 4e5), "a": junction()}
     links = {"gap": valve("lake", "a", 1e-4), "one": leak("a", 1e-6), "two": leak("a", 1e-9, 1.2)}
@@ -293,7 +293,7 @@ def test_two_leaks_on_one_junction_share_what_a_valve_brings():
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_what_leaks_is_dissipated_and_the_ledger_closes(law):
+def test_leakage_is_dissipated_and_the_ledger_closes(law):
     nodes = {"t": tank(0.5, 4.0), "g": junction()}
     links = {"line": pipe("t", "g", 10.0, 0.05, 1000.0, 10), "hole": leak("g", 1e-6)}
     one = energy(scene(nodes, links, 0.3, {"method": "rk4", "scheme": "upwind5"}, fluid=WATER | {"law": law}))
@@ -311,7 +311,7 @@ def test_what_leaks_is_dissipated_and_the_ledger_closes(law):
         ({"from": "lake"}, "lake is a reservoir"),
     ],
 )
-def test_what_is_wrong_with_a_leak_is_said(wrong, said):
+def test_faults_of_a_leak_are_reported(wrong, said):
     nodes = {"t": tank(0.5, 4.0), "lake": reservoir(2e5)}
     links = {"gap": valve("lake", "t", 1e-3), "hole": leak("t", 1e-6) | wrong}
     assert said in str(refused(scene(nodes, links, 1.0, {})))
@@ -364,7 +364,7 @@ METHODS = [{"method": "dormand-prince", "rtol": 1e-10}, {"method": "radau-iia-5"
 @pytest.mark.parametrize("more", [{}, {"to": "sump"}], ids=["ambient", "place"])
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("numerics", METHODS, ids=lambda one: one["method"])
-def test_it_bursts_when_the_level_says_and_lets_out_what_the_root_says(numerics, law, more):
+def test_it_bursts_at_the_computed_level_and_discharges_by_the_square_root(numerics, law, more):
     result = fvsolve.run(filled(numerics, law, **more))
     ((event),) = result.summary["events"]
     when = SECTION / FILL * (BURST / (RHO * GRAVITY) - 3.0)
@@ -384,7 +384,7 @@ def test_it_bursts_when_the_level_says_and_lets_out_what_the_root_says(numerics,
 @pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log", "mixture"])
 @pytest.mark.parametrize("turned", [False, True], ids=["along", "against"])
-def test_a_wave_bursts_it_as_it_arrives_and_the_line_gives_what_its_impedance_says(law, turned):
+def test_a_wave_bursts_it_on_arrival_and_the_line_supplies_by_its_impedance(law, turned):
     """The jump rho a v arrives after L / a; then p = 5e5 + rho a v - Z q / 2 = ambient + rho / 2 (q / CdA)^2."""
     v, speed, bore = 1.0, 1000.0, 0.2
     ends = ("gate", "far") if turned else ("far", "gate")
@@ -443,7 +443,7 @@ def test_placed_by_chainage_it_stands_off_the_pipe():
     [({"burst_pressure": -1.0}, "out of range"), ({"burst_pressure": 2e4}, "would burst the disc; raise `burst_"),
      ({"from": "nowhere"}, "nowhere"), ({"area": None}, "needs area or diameter")],
 )  # fmt: skip
-def test_what_is_wrong_with_a_disc_is_said(wrong, said):
+def test_faults_of_a_disc_are_reported(wrong, said):
     case = filled({"rtol": 1e-6})
     given = case["links"]["disc"] | wrong
     case["links"]["disc"] = {key: value for key, value in given.items() if value is not None}
@@ -472,7 +472,7 @@ def gauge_with(flow: float) -> float:
     return RHO * GRAVITY * 40.0 - 0.02 * 800.0 / 0.15 * RHO * velocity**2 / 2.0
 
 
-def test_a_hydrant_draws_its_flow_or_what_leaves_its_residual_pressure():
+def test_a_hydrant_draws_its_flow_or_the_flow_at_its_residual_pressure():
     run = fvsolve.run(street(flow=0.02, residual_pressure=AMBIENT + 1.4e5))
     assert run["fire.flow"] == pytest.approx(0.02, rel=1e-12)
     assert run["fire.gauge_pressure"] == pytest.approx(gauge_with(0.02), rel=1e-9)

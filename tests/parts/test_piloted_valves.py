@@ -565,7 +565,7 @@ def test_the_page_selects_the_higher_pressure():
     assert (result["select.position"][0], result["select.position"][-1]) == (0.0, 1.0)
 
 
-def test_the_page_keeps_a_flow_while_the_load_triples():
+def test_flow_of_the_page_stays_while_the_load_triples():
     flow = circuit("Pressure compensator and two-way flow control")["meter.flow"]
     assert np.ptp(flow) < 0.03 * flow[0]
 
@@ -601,7 +601,7 @@ def test_the_page_has_a_brake_valve():
     {"method": "tr-bdf2", "rtol": 1e-6},
     {"method": "dormand-prince", "rtol": 1e-6},
 ])  # fmt: skip
-def test_a_counterbalance_valve_whose_flow_reverses_at_half_lift_changes_its_mode_once_each_time(disc, method):
+def test_a_counterbalance_valve_with_reversing_flow_at_half_lift_changes_its_mode_once_each_time(disc, method):
     """At a drop of zero the flow changes with the last digits of the pressures, and so does its sign in each mode."""
     heads = {"time": [0.0, 0.3, 0.5, 0.8], "value": [30.0, 30.0, 12.0, 35.0]}
     nodes = {"up": lake(heads), "down": lake(20.0), "a": junction(), "b": junction()}

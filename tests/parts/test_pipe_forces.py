@@ -72,7 +72,7 @@ def test_the_ledger_of_momentum_closes(law: str, friction: dict, method: str) ->
         assert abs(lost) > 1.0
 
 
-def test_ends_and_wall_bear_what_the_momentum_loses() -> None:
+def test_ends_and_wall_carry_the_lost_momentum() -> None:
     """Under the law `linear` the force is the change of A (p_to - p_from) plus wall friction since the start."""
     case, cells = throttled("linear", ROUGH), [(k + 0.5) / 10 for k in range(10)]
     case["output"]["probes"] += [f"main-2.pressure@{x}" for x in (0, 1)] + [f"main-2.flow@{x}" for x in cells]
@@ -100,7 +100,7 @@ def test_a_limit_on_force_is_held_against_every_step_and_leg() -> None:
     assert back.ok == (FORCE < 9e4) and back.value == pytest.approx(FORCE)
 
 
-def test_what_has_no_force_is_named() -> None:
+def test_parts_without_a_force_are_named() -> None:
     with pytest.raises(fvsolve.CaseError, match="a probe reads its force"):
         fvsolve.run(shut(), set={"numerics.pipe_model": "delay-line", "numerics.method": "rk4"})
     case = shut()

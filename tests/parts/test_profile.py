@@ -184,7 +184,7 @@ def test_x_y_and_z_give_the_way_and_files_read_as_lists(tmp_path) -> None:
         ({"file": "nowhere.csv"}, "there is no such file"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_named(change, told: str) -> None:
+def test_faults_are_named(change, told: str) -> None:
     error = refused(line(profiled(change)))
     assert told in str(error)
     assert "links.main.profile" in str(error)

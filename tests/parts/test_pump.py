@@ -64,7 +64,7 @@ def test_a_straight_curve_of_three_points_has_a_slope_at_no_flow(lift):
 
 @pytest.mark.parametrize("curve, f", CURVES, ids=["one", "three", "four", "polynomial"])
 @pytest.mark.parametrize("speed", [1.0, 0.9])
-def test_operating_point_is_where_curve_and_system_meet(curve, f, speed):
+def test_operating_point_is_where_curve_and_system_intersect(curve, f, speed):
     found = fvsolve.build(fvsolve.load(rising(20.0, curve=curve, speed=speed)))
     q = system(lambda q: f(q, speed), 20.0)
     row = found.tables.valves[0]
@@ -228,7 +228,7 @@ def test_flows_and_heads_lie_on_the_curves(seed, law):
     assert len(result.summary["events"]) <= 24
 
 
-def test_two_pumps_in_parallel_of_which_one_is_too_weak_stand_as_a_steady_state():
+def test_two_pumps_in_parallel_with_a_too_weak_pump_stop_as_a_steady_state():
     """The check valve of the weak pump is shut at the start and opens after the strong pump stops."""
     strong, weak = {"flow": [0.1], "head": [50.0]}, {"flow": [0.05], "head": [20.0]}
     speed = {"time": [1.0, 2.0], "value": [1.0, 0.0]}
@@ -314,7 +314,7 @@ def rounded(by: float) -> dict:
 
 
 @pytest.mark.parametrize("by", [1e-16, -4e-16, 1e-9, -1e-7])
-def test_ends_of_a_suter_table_that_differ_by_rounding_are_one(by):
+def test_ends_of_a_suter_table_that_differ_by_rounding_are_equal(by):
     case = scene({"sump": lake(0.0), "top": lake(20.0)}, {"pump": pump("sump", "top", **rounded(by))}, 1.0, {})
     table = fvsolve.load(case).links["pump"].suter
     assert table.head[0] == table.head[-1] and table.torque[0] == table.torque[-1]
@@ -334,7 +334,7 @@ def notes(nodes: dict, start: str, end: str, **keys) -> list:
 WATERS = {"sump": lake(0.0), "out": junction(), "top": lake(20.0)}
 
 
-def test_a_pump_drawn_backwards_is_asked_about_and_one_that_lifts_is_not():
+def test_a_pump_drawn_backwards_is_questioned_and_a_pump_that_lifts_is_not():
     assert notes(WATERS, "sump", "out", curve=ONE) == []
     ((key, text),) = notes(WATERS, "out", "sump", curve=ONE)
     assert key == "from" and "the lowest water level" in text and "check its direction" in text
@@ -346,14 +346,14 @@ def test_a_pump_drawn_backwards_is_asked_about_and_one_that_lifts_is_not():
 
 
 @pytest.mark.parametrize("flow, unit", [(20.0, "l/s"), (2000.0, "m3/h"), (20000.0, "l/min")])
-def test_a_rated_flow_too_quick_for_the_pipes_beside_it_is_asked_about(flow, unit):
+def test_a_rated_flow_too_quick_for_the_adjacent_pipes_is_questioned(flow, unit):
     said = notes(WATERS, "sump", "out", curve={"flow": [flow], "head": [50.0]})
     assert [key for key, _ in said] == ["curve"] and f'did you mean "{flow:.4g} {unit}"?' in said[0][1]
     assert notes(WATERS, "sump", "out", curve={"flow": [1.0], "head": [50.0]}) == []
 
 
 @pytest.mark.parametrize("flow, asked", [("0.03 l/s", True), ("0.1 m3/h", True), ("2 l/s", False)])
-def test_a_rated_flow_that_hardly_moves_in_the_pipes_beside_it_is_asked_about(flow, asked):
+def test_a_rated_flow_too_slow_for_the_adjacent_pipes_is_questioned(flow, asked):
     said = notes(WATERS, "sump", "out", curve={"flow": [flow], "head": [50.0]})
     assert [key for key, _ in said] == ["curve"] * asked and all("mean another unit?" in text for _, text in said)
 
@@ -370,7 +370,7 @@ def test_a_rated_flow_that_hardly_moves_in_the_pipes_beside_it_is_asked_about(fl
         ({"shaft_power": {"flow": [0.1], "power": ["65 kW"]}}, None),
     ],
 )
-def test_an_inertia_or_a_power_far_from_what_the_rated_point_says_is_noted_once(keys, says):
+def test_an_inertia_or_a_power_far_from_the_rated_point_is_noted_once(keys, says):
     said = notes(WATERS, "sump", "out", curve=ONE, rated_speed="1480 rpm", **keys)
     assert [key for key, _ in said] == ([] if says is None else [*keys][:1])
     assert says is None or says in said[0][1]

@@ -73,7 +73,7 @@ def test_energy_and_cost_at_a_constant_flow_are_power_times_time(method, speed):
     assert {key: found["total"][key] for key in SUMS} == pytest.approx({key: known[key] for key in SUMS}, rel=1e-12)
 
 
-def test_a_pump_whose_way_is_shut_uses_no_energy():
+def test_a_pump_with_a_shut_route_uses_no_energy():
     """A pump runs half of the time; its valve is shut during the other half, at an event between steps."""
     case = gated(lift())
     found, run = use(case)
@@ -83,7 +83,7 @@ def test_a_pump_whose_way_is_shut_uses_no_energy():
     assert found["pumps"]["p"]["mean_power"] == pytest.approx(power, rel=1e-9)
 
 
-def test_the_greatest_power_of_all_pumps_is_that_at_one_time():
+def test_the_greatest_power_of_all_pumps_is_that_at_a_common_time():
     """Pumps that run one after the other: the demand charge is for the greater power alone."""
     case = lift(charges={"demand_charge": 3.0})
     case["links"]["q"] = {**case["links"]["p"], "to": "heel", "speed": {"time": [0.0, 2000.0], "value": [0.0, 1.05],

@@ -66,7 +66,7 @@ def torque(n, q):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_table_goes_round_is_one_at_the_rated_point_and_resists_where_the_pump_stands(name):
+def test_a_table_is_periodic_equals_1_at_the_rated_point_and_resists_at_standstill(name):
     wh, wb = (np.array(row) for row in suter_tables()[name])
     assert len(wh) == len(wb) == 89 and wh[0] == wh[-1] and wb[0] == wb[-1]
     assert 2.0 * wh[55] == 2.0 * wb[55] == approx(1.0)
@@ -128,7 +128,7 @@ def test_drawn_the_other_way_it_is_the_same():
     ],
     ids=["efficiency", "power", "points", "polynomial"],
 )
-def test_head_and_torque_meet_at_both_ends_of_every_curve(given):
+def test_head_and_torque_are_continuous_at_both_ends_of_every_curve(given):
     keys = {**SHAFT, **given}
     if "shaft_power" in given:
         keys.pop("efficiency")
@@ -147,14 +147,14 @@ def test_head_and_torque_meet_at_both_ends_of_every_curve(given):
             assert law.is_off_curve(floats, curve, n, out) and not law.is_off_curve(floats, curve, n, inside)
 
 
-def test_energy_is_never_made_while_it_runs_down_and_back():
+def test_energy_is_never_created_in_a_run_down_and_back():
     from fvsolve.studies.energy_balance import energy
 
     found = energy(column(30.0, 8.0, ["pump.flow"], **SHAFT, trip=1.0))
     assert found.relative < 1e-7 and min(np.diff(found.dissipated["pump"])) > 0.0
 
 
-def test_without_an_inertia_it_is_estimated_and_said():
+def test_without_an_inertia_it_is_estimated_with_a_notice():
     """The estimate from 61.3 kW at 1432 rpm gives a notice; a given inertia gives none."""
     keys = {key: value for key, value in SHAFT.items() if key != "inertia"}
     power, speed = TORQUE * OMEGA / 1e3, OMEGA * 30.0 / math.pi / 1e3

@@ -42,7 +42,7 @@ def suter(table, n, q):
     return (n * n + v * v) * np.interp(math.pi + math.atan2(v, n), np.linspace(0, 2 * math.pi, len(table)), table)
 
 
-def test_a_lone_shaft_runs_down_as_one_over_time():
+def test_an_isolated_shaft_runs_down_as_1_over_time():
     """At no flow the torque is T0 n^2, so 1 / n = 1 + T0 (t - trip) / (J omega)."""
     nodes = {"sump": lake(0.0), "top": lake(100.0)}
     keys = {**SHAFT, "trip": 1.0, "check_valve": True}
@@ -134,7 +134,7 @@ def test_trip_against_a_pipe_follows_its_characteristic():
     assert result["out.head"][after] == approx([head(one, flow(one)) for one in n], abs=1e-6)
 
 
-def test_order_of_a_method_is_kept_across_the_trip():
+def test_order_of_a_method_is_retained_across_the_trip():
     probes = ["pump.flow", "pump.speed"]
     final = []
     for size in (0.1, 0.05, 0.025):

@@ -108,7 +108,7 @@ loop_rates.guess = [50.0, 45.0, 45.0]
 
 
 @pytest.mark.parametrize("method", ["dormand-prince", "radau-iia-5"])
-def test_tanks_behind_a_loop_of_pipes_follow_hand_written_equations(method):
+def test_tanks_behind_a_loop_of_pipes_follow_explicit_equations(method):
     run = fvsolve.run(loop(), {"numerics.method": method})
     first = solve_ivp(loop_rates, (0.0, 3600.0 - 1e-9), [3.0, 2.0], "DOP853", rtol=1e-11, atol=1e-12)
     last = solve_ivp(loop_rates, (3600.0, 7200.0), first.y[:, -1], "DOP853", rtol=1e-11, atol=1e-12)
@@ -222,7 +222,7 @@ def test_a_pipe_with_waves_comes_to_the_same_flow():
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("friction", [HAZEN, *FRICTIONS[-2:]], ids=lambda one: one["model"])
-def test_at_rest_nothing_moves_by_one_bit(method, law, friction):
+def test_at_rest_no_bit_changes(method, law, friction):
     case = loop(friction, 600.0, {"rtol": 1e-8}, fluid={**WATER, "law": law})
     for node in case["nodes"].values():
         if node["type"] == "junction":
@@ -269,7 +269,7 @@ def test_a_killed_run_resumes_to_the_bit(tmp_path):
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_pressure_is_linear_along_the_pipe_and_flow_is_one(law):
+def test_pressure_is_linear_along_the_pipe_and_flow_is_uniform(law):
     probes = [f"main.{q}@{x}" for q in ("pressure", "gauge_pressure", "head") for x in (0, 0.25, 1)]
     probes += ["main.flow@0.7", "main.velocity@0.3", "upper.pressure", "lower.pressure", "lower.head"]
     case = two_tanks(probes=probes)
@@ -352,7 +352,7 @@ def test_scalars_a_force_and_bodies_are_refused_by_name():
         fvsolve.build(fvsolve.load(two_tanks(rough) | {"fluid": fluid}))
 
 
-def test_all_faults_of_a_pipe_are_told_at_once():
+def test_all_faults_of_a_pipe_are_reported_at_once():
     link = pipe("upper", "lower", friction={"model": "unsteady", "roughness": 1e-4}, initial_flow=1e-3)
     with pytest.raises(CaseError) as caught:
         fvsolve.load(two_tanks() | {"links": {"main": link}})

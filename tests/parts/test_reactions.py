@@ -96,7 +96,7 @@ def test_robertsons_kinetics_are_those_of_scipy(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_sums_that_equations_keep_are_kept_in_any_units(method):
+def test_sums_conserved_by_equations_are_conserved_in_any_units(method):
     """Atoms of two coupled reactions in mg/l, mmol/l and mol/m3, with decay of none, stay to rounding."""
     scalars = {"N": {"unit": "mg/l", "molar_mass": "14.007 g/mol", "initial": 28.0, "composition": {"N": 1}},
                "H": {"unit": "mmol/l", "initial": 7.0, "composition": {"H": 1}},
@@ -209,7 +209,7 @@ def test_cells_of_a_basin_react():
     assert result.ledger["A"]["reacted"] == approx(-2.0 * result.ledger["P"]["reacted"], rel=1e-14)
 
 
-def test_a_given_velocity_carries_what_reacts_and_no_coupling_is_missing():
+def test_a_given_velocity_carries_reacting_scalars_and_no_coupling_is_missing():
     patches = {"inlet": {"side": "west", "scalars": {"A": 2.0}}, "outlet": {"side": "east"}}
     sheet = {"type": "basin", "physics": "transport", "size": ["1 m", "1 m"], "cells": [6, 4],
              "velocity": {"u": "0.5"}, "scalars": {"A": "1 + x"}, "patches": patches}  # fmt: skip
@@ -326,7 +326,7 @@ FAULTS = [
 
 
 @pytest.mark.parametrize("keys, value, said", FAULTS, ids=[f"{k[-1]}-{i}" for i, (k, *_) in enumerate(FAULTS)])
-def test_what_cannot_be_is_refused(keys, value, said):
+def test_impossible_reactions_are_refused(keys, value, said):
     scalars = {"A": {**MOLES, "composition": {"Cl": 1}}, "B": {**MOLES, "composition": {"Na": 1}},
                "P": {**MOLES, "composition": {"Na": 1, "Cl": 1}}}  # fmt: skip
     case = stirred(scalars, {"r": {"equation": "A + B -> P", "forward": 1.0}})

@@ -167,7 +167,7 @@ def line(kind, given, **more):
 @pytest.mark.parametrize(
     "kind, given", [("pressure-reducing", 4e5), ("pressure-sustaining", 7e5), ("flow-control", 0.1)]
 )
-def test_at_the_start_nothing_moves_by_one_bit(kind, given, law):
+def test_at_the_start_no_bit_changes(kind, given, law):
     case = line(kind, given)
     case["fluid"] = {**WATER, "law": law}
     model = fvsolve.build(fvsolve.load(case))
@@ -208,7 +208,7 @@ def test_a_pipe_that_shut_valves_cut_off_rests_at_the_head_behind_an_open_valve(
     assert run["pocket.pressure"] == pytest.approx(checks["town"]["pressure"], rel=1e-9)
 
 
-def test_one_that_throttles_dissipates():
+def test_a_throttling_valve_dissipates():
     found = energy(filled(0.05, {"method": "dormand-prince", "rtol": 1e-10}))
     assert found.relative < 1e-8 and np.all(np.diff(found.dissipated["prv pressure reducing"]) > -1e-6)
 
@@ -300,7 +300,7 @@ def shutting_ends(kind):
                                       {"method": "rk4", "step": 1e-3}])  # fmt: skip
 @pytest.mark.parametrize("kind", ["pressure-reducing", "pressure-sustaining"])
 @pytest.mark.parametrize("after", [False, True])
-def test_it_leaves_its_seat_with_the_column_that_it_holds_as_their_equations_say(kind, after, law, numerics):
+def test_it_leaves_its_seat_with_its_supported_column_by_their_equations(kind, after, law, numerics):
     """Lift and flow start as the square of time, and the rate of their coupling is infinite at first."""
     case, name = held_column(kind, after, opening_ends(kind), law, numerics)
     result, at = fvsolve.run(case), (2.8, 3.0, 3.2, 4.0, 6.0)
@@ -359,7 +359,7 @@ CASES = [(TIGHT, "linear", False), (TIGHT, "log", True), (TIGHT, "mixture", Fals
 
 
 @pytest.mark.parametrize("numerics, law, turned", CASES)
-def test_it_is_the_valve_whose_schedule_says_what_it_does(numerics, law, turned):
+def test_it_is_a_valve_with_the_schedule_of_its_action(numerics, law, turned):
     own = fvsolve.run(main({"sav": anticipating("mid", to="sump", low_set=3e5)}, numerics, law, turned))
     events = [(event["what"], event["time"]) for event in own.summary["events"] if event["name"] == "sav"]
     assert [what for what, _ in events] == ["opens", "is fully open", "begins to shut", "is shut"]
@@ -406,7 +406,7 @@ def test_tripped_it_drains_a_tank_by_the_integral_of_its_opening(numerics, law):
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
 
 
-def test_a_high_pressure_opens_it_for_as_long_as_it_lasts_whatever_hold_says():
+def test_a_high_pressure_opens_it_for_its_duration_with_any_hold():
     """A constant inflow fills the tank to high_set repeatedly; the event times of a cycle follow SciPy."""
     high = LEVEL + 0.5
     result = fvsolve.run(vessel(LUMPED[0], end=60.0, fill=FILL, high_set=AMBIENT + RHO * GRAVITY * high))
@@ -465,7 +465,7 @@ def test_its_energy_closes_and_it_only_dissipates():
      ({"trip": -3.0}, "lies before the start"), ({"low_set": 4e5, "high_set": 3e5}, "is not above low_set"),
      ({"senses": "tt"}, 'unknown place of the fluid "tt"'), ({"closing_time": None}, "closing_time is missing")],
 )  # fmt: skip
-def test_what_is_wrong_with_one_is_said(wrong, said):
+def test_its_faults_are_reported(wrong, said):
     case = vessel({"rtol": 1e-6}, trip=1.0)
     given = case["links"]["sav"] | wrong
     case["links"]["sav"] = {key: value for key, value in given.items() if value is not None}

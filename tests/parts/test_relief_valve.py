@@ -94,7 +94,7 @@ def main(numerics, law="linear", **more):
 
 
 @pytest.mark.parametrize("set_pressure, opening", [(9e5, "lifting"), (3e6, "shut"), (7e5, "full")])
-def test_the_surge_ends_where_the_characteristic_meets_the_valve(set_pressure, opening):
+def test_the_surge_ends_at_the_intersection_of_characteristic_and_valve(set_pressure, opening):
     more = {"set_pressure": set_pressure} | ({"flow_area": 1e-3} if opening == "full" else {})
     result = fvsolve.run(main(SMOOTH, **more))
     gate, first = 2.0 * RHO * 0.004**2, math.sqrt(2.0 * RHO * 0.004**2 * 5e5)
@@ -196,7 +196,7 @@ def test_order_is_not_lost_at_a_located_switch():
 
 
 @pytest.mark.parametrize("disc", [{}, *DISCS.values()], ids=["none", *DISCS])
-def test_open_at_the_start_it_says_so_and_nothing_moves(disc):
+def test_open_at_the_start_it_is_reported_and_nothing_moves(disc):
     case = main(SMOOTH, set_pressure=3e5, flow_area=2e-3, **disc)
     case["links"]["gate"]["opening"] = 1.0
     model = fvsolve.build(fvsolve.load(case))

@@ -53,7 +53,7 @@ def test_values_are_those_without_a_wall_at_times_divided_by_r(method):
     assert found[0].max() > 0.6 and found[1] == approx(found[0], abs=1e-12)
 
 
-def test_a_factor_of_one_is_to_the_bit_no_factor():
+def test_a_factor_of_1_is_to_the_bit_no_factor():
     cases = [hammer("muscl", {"model": "quasi-steady", "roughness": 1e-4}, initial=0.2, decay=0.1) for _ in range(2)]
     cases[0]["nodes"] = cases[1]["nodes"] = {**cases[0]["nodes"], "lake": reservoir(5e5, scalars={"dye": 1.0})}
     del cases[0]["links"]["b"]["retardation"]
@@ -243,7 +243,7 @@ def test_the_limit_of_steps_by_transport_is_r_times_as_long():
     assert limits[0] == approx(2.0 * limits[1], rel=1e-12)
 
 
-def test_a_run_interrupted_and_resumed_is_the_unbroken_one(tmp_path, monkeypatch):
+def test_a_run_interrupted_and_resumed_is_the_uninterrupted_run(tmp_path, monkeypatch):
     monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), "CHUNK_SECONDS", 0.0)
     nodes = {"lake": given(dye=step(1.0, 0.0, 1.0)), "tap": junction(FLOW)}
     case = case_of(nodes, {"a": line("lake", "tap", 4.0, 100, **SLOWER)}, 4.0, decay=0.1)
@@ -282,7 +282,7 @@ FAULTS = [
 @pytest.mark.parametrize(
     "keys, value, said", FAULTS, ids=[f"{'.'.join(keys)}-{k}" for k, (keys, *_) in enumerate(FAULTS)]
 )
-def test_what_cannot_be_is_refused(keys, value, said):
+def test_impossible_settings_are_refused(keys, value, said):
     case = copy.deepcopy(heat(STEEL))
     fvsolve.build(fvsolve.load(case))
     table = case

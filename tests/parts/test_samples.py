@@ -26,7 +26,7 @@ def test_a_sampled_pi_on_two_lags_is_its_difference_equation(method):
         assert value_at(run, "controls.plant.output", 0.1 * (k + 1)) == pytest.approx(x[0], abs=EXACT)
 
 
-def test_a_sampled_loop_grows_from_one_percent_above_its_limit_on():
+def test_a_sampled_loop_grows_from_1_percent_above_its_limit():
     for factor, grows in ((0.99, False), (1.01, True)):
         run = fvsolve.run(two_lags(factor * LIMIT, 40.0))
         deviation, t = np.abs(np.array(run["controls.plant.output"]) - 1.0), np.array(run.t)

@@ -56,7 +56,7 @@ def test_a_smooth_front_moves_at_the_speed_of_the_flow_and_through_a_junction(sc
 
 
 @pytest.mark.parametrize("limiter", ["minmod", "van-leer", "monotonized-central"])
-def test_a_sharp_plug_stays_between_what_was_given(limiter):
+def test_a_sharp_plug_stays_between_the_given_values(limiter):
     plug = {"time": [0.0, 1.0, 3.0], "value": [0.2, 0.9, 0.2], "kind": "step"}
     nodes = {"lake": given(dye=plug), "mid": junction(), "tap": junction(FLOW)}
     links = {"a": line("lake", "mid", 5.0, 50), "b": line("mid", "tap", 5.0, 50)}
@@ -110,7 +110,7 @@ def test_nodes_without_volume_pass_on_at_once_in_the_order_of_the_flow():
     assert result["c.dye"][0] == approx(mixed, rel=1e-9) and result["d.dye"][0] == approx(mixed, rel=1e-9)
 
 
-def test_what_a_pump_turns_round_without_volume_is_mixed_too():
+def test_flow_reversed_by_a_pump_without_volume_is_mixed_too():
     """Two streams, and a pump that circulates between two nodes: values solve two balances by mass."""
     nodes = {"one": inflow(0.002, dye=1.0), "two": inflow(0.001, dye=4.0), "sea": given()}
     curve = {"flow": [0.0, 0.01, 0.02], "head": [10.0, 8.0, 3.0]}
@@ -146,7 +146,7 @@ def test_diffusion_alone_through_a_junction_is_a_straight_line():
     assert found["b"]["dye"] == approx(0.5 - 0.5 * (np.arange(20) + 0.5) / 20, abs=1e-10)
 
 
-def test_what_stands_decays_exponentially_towards_ambient():
+def test_stagnant_water_decays_exponentially_towards_ambient():
     nodes = {"left": given(), "stop": junction(), "box": chamber(0.5, AMBIENT, scalars={"dye": 80.0})}
     links = {"a": line("left", "stop", 1.0, 10), "shut": valve("stop", "box", 0.01, opening=0.0)}
     numerics = {"method": "rk4"}
@@ -166,7 +166,7 @@ def test_decay_on_the_way_is_that_of_the_time_it_takes():
     assert errors[1] < 2e-3 and errors[0] / errors[1] > 3.0
 
 
-def test_a_stirred_chamber_follows_what_comes_in():
+def test_a_stirred_chamber_follows_the_inflow():
     """c' = q / V (c_in - c) in a stirred chamber without pipes."""
     nodes = {"feed": inflow(1e-3, dye=4.0), "box": chamber(0.02, scalars={"dye": 1.0}), "sea": given()}
     links = {"in": valve("feed", "box", 1e-4), "out": valve("box", "sea", 1e-4)}
@@ -178,7 +178,7 @@ def test_a_stirred_chamber_follows_what_comes_in():
     assert result.ledger["dye"]["relative"] < 1e-12
 
 
-def test_a_tank_that_fills_holds_the_mean_of_what_came_and_spills_what_it_holds():
+def test_a_tank_that_fills_contains_the_mean_of_the_inflow_and_spills_its_content():
     nodes = {"feed": inflow(0.01, dye=2.0), "pool": tank(0.5, 1.0, scalars={"dye": 1.0}, height=1.4)}
     case = case_of(nodes, {"in": line("feed", "pool", 1.0, 10, scalars={"dye": 2.0})}, 30.0, {"method": "rk4"},
                    ["pool.dye", "pool.level"])  # fmt: skip
@@ -194,7 +194,7 @@ def test_a_tank_that_fills_holds_the_mean_of_what_came_and_spills_what_it_holds(
     assert result.ledger["dye"]["by_node"]["pool"] < 0.0 and result.ledger["dye"]["relative"] < 1e-12
 
 
-def test_a_dry_tank_passes_on_what_comes_and_what_is_made_up_and_keeps_none():
+def test_a_dry_tank_passes_on_inflow_and_make_up_and_stores_none():
     feed, draw = 1e-3, 2e-3
     nodes = {"feed": inflow(feed, dye=3.0), "pool": tank(0.1, 0.2, scalars={"dye": 1.0}), "drain": junction(draw)}
     links = {"in": valve("feed", "pool", 1e-3), "out": valve("pool", "drain", 1e-2)}
@@ -231,7 +231,7 @@ def test_a_uniform_value_stays_uniform_through_water_hammer(scheme, model):
     assert found["nodes"]["box"]["dye"] == approx(0.7, rel=1e-13)
 
 
-def test_flow_that_turns_brings_back_what_went_and_the_book_closes():
+def test_flow_that_reverses_returns_the_same_values_and_the_ledger_closes():
     case = hammer("muscl", {"model": "none"}, initial=0.0, diffusivity=0.01, decay=0.3, ambient=0.1)
     case["nodes"] = {**HAMMER, "lake": reservoir(ramp(0.3, 0.2, 5e5, 1e5), scalars={"dye": ramp(0.0, 0.3, 1.0, 2.0)}),
                      "sea": reservoir(ramp(0.3, 0.2, 1e5, 5e5), scalars={"dye": 3.0})}  # fmt: skip
@@ -243,15 +243,15 @@ def test_flow_that_turns_brings_back_what_went_and_the_book_closes():
     assert book["relative"] < 1e-12
 
 
-def test_a_pipe_told_from_its_other_end_carries_the_same():
-    def told(back: bool) -> np.ndarray:
+def test_a_pipe_stated_from_its_opposite_end_carries_the_same():
+    def dye_at_end(back: bool) -> np.ndarray:
         ends = ("tap", "lake") if back else ("lake", "tap")
         nodes = {"lake": given(dye=step(1.0, 0.0, 1.0)), "tap": junction(ramp(2.0, 2.0, FLOW, -0.5 * FLOW))}
         found = at_end(case_of(nodes, {"a": line(*ends, 4.0, 40)}, 6.0, diffusivity=1e-3))[1]["a"]["dye"]
         return found[::-1] if back else found
 
-    assert told(False).max() > 0.5
-    assert told(True) == approx(told(False), abs=1e-12)
+    assert dye_at_end(False).max() > 0.5
+    assert dye_at_end(True) == approx(dye_at_end(False), abs=1e-12)
 
 
 def test_where_nothing_flows_values_are_defined():
@@ -265,7 +265,7 @@ def test_where_nothing_flows_values_are_defined():
     assert np.array_equal(found["a"]["dye"], np.ones(4)) and np.array_equal(found["b"]["dye"], np.full(4, 2.0))
 
 
-def test_results_name_it_and_the_written_case_says_it_again(tmp_path):
+def test_results_name_it_and_the_written_case_states_it_again(tmp_path):
     nodes = {"lake": given(dye=step(1.0, 0.0, 1.0)), "tap": junction(FLOW)}
     case = case_of(nodes, {"a": line("lake", "tap", 4.0, 40)}, 4.0, unit="mg/l")
     case["output"]["fields"] = 4
@@ -279,7 +279,7 @@ def test_results_name_it_and_the_written_case_says_it_again(tmp_path):
     assert np.array_equal(again["tap.dye"], result["tap.dye"])
 
 
-def test_a_run_interrupted_and_resumed_is_the_unbroken_one_ledger_too(tmp_path, monkeypatch):
+def test_a_run_interrupted_and_resumed_is_the_uninterrupted_run_with_its_ledger(tmp_path, monkeypatch):
     monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), "CHUNK_SECONDS", 0.0)
     nodes = {"lake": given(dye=step(1.0, 0.0, 1.0)), "tap": junction(FLOW)}
     case = case_of(nodes, {"a": line("lake", "tap", 4.0, 200)}, 4.0, decay=0.1)
@@ -317,7 +317,7 @@ def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme):
         assert max(stray(model, t, random_state(model, rng)) for t in (0.0, 0.1, 0.2)) < 1e-9
 
 
-def test_a_controller_sets_what_flows_in_also_beyond_what_the_case_says():
+def test_a_controller_sets_the_inflow_also_beyond_the_range_of_the_case():
     nodes = {"lake": given(dye=1.0), "tap": junction(FLOW)}
     model = fvsolve.build(fvsolve.load(case_of(nodes, {"a": line("lake", "tap", 1.0, 20)}, 9.0)))
     state = fvsolve.advance(model, fvsolve.initial_state(model), 3.0)
@@ -345,7 +345,7 @@ FAULTS = [
 
 
 @pytest.mark.parametrize("keys, value, said", FAULTS, ids=[".".join(keys) for keys, *_ in FAULTS])
-def test_what_cannot_be_is_refused(keys, value, said):
+def test_impossible_settings_are_refused(keys, value, said):
     nodes = {"lake": given(dye=1.0), "tap": junction(), "pool": tank(1.0, 0.1)}
     case = case_of(nodes, {"a": line("lake", "tap"), "v": valve("tap", "pool", 1e-3)}, 1.0)
     fvsolve.load(case)
@@ -358,7 +358,7 @@ def test_what_cannot_be_is_refused(keys, value, said):
 
 @pytest.mark.parametrize("method", ["bogacki-shampine", "radau-iia-5", "rodas-4"])
 @pytest.mark.parametrize("given", [{"courant": 0.5}, {"step": 0.25}, {"rtol": 1e-4}], ids=["courant", "step", "rtol"])
-def test_still_water_with_a_scalar_keeps_it(given, method):
+def test_still_water_with_a_scalar_retains_it(given, method):
     """Nothing moves, so no wave sets a step: the rate of waves is zero, and no feature may divide by it."""
     pool = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [4, 4],
             "velocity": {"u": 0, "v": 0}, "scalars": {"dye": 1.0}}  # fmt: skip

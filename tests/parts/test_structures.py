@@ -218,7 +218,7 @@ def ponds(link, levels, numerics, end, every=None, **top):
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method["method"])
 @pytest.mark.parametrize("name", PONDS)
-def test_ponds_come_to_equal_levels_as_scipy_says(name, method):
+def test_ponds_reach_equal_levels_as_by_scipy(name, method):
     link, law, levels, end = PONDS[name]
     result = fvsolve.run(ponds(link, levels, method, end))
     found = solve_ivp(lambda t, z: law(*z) * np.array([-1.0, 1.0]) / AREAS, (0.0, end), levels, method="LSODA",
@@ -347,7 +347,7 @@ def test_inputs_of_a_linear_model():
 
 
 @pytest.mark.parametrize("link", [SPILL, SLUICE, UNDER, LID], ids=lambda link: link["type"])
-def test_a_structure_that_water_never_reaches_gives_one_notice(link):
+def test_a_structure_that_water_never_reaches_gives_a_single_notice(link):
     def notices(level: float) -> list[str]:
         nodes = {"a": lake({"time": [0.0, 1.0], "value": [-1.0, level]}), "b": lake(-1.0)}
         model = fvsolve.build(fvsolve.load(scene(nodes, {"x": {**link, **ENDS}}, 1.0, METHODS[0])))
@@ -359,7 +359,7 @@ def test_a_structure_that_water_never_reaches_gives_one_notice(link):
 @pytest.mark.parametrize(
     "opening, above", [(1.9, False), (2.1, True), ({"time": [0.0, 1.0], "value": [2.1, 1.9]}, False)]
 )
-def test_a_gate_that_no_head_of_its_reservoirs_reaches_gives_one_notice(opening, above):
+def test_a_gate_that_no_head_of_its_reservoirs_reaches_gives_a_single_notice(opening, above):
     nodes = {"a": lake({"time": [0.0, 1.0], "value": [1.0, 2.0]}), "b": lake(0.5)}
     gate = {**SLUICE, **ENDS, "sill": 0.0, "opening": opening}
     texts = [n.text for n in fvsolve.build(fvsolve.load(scene(nodes, {"x": gate}, 1.0, METHODS[0]))).warnings]

@@ -121,7 +121,7 @@ def limited() -> list[float]:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_rate_limit_is_that_of_hand_written_equations(method):
+def test_a_rate_limit_follows_explicit_equations(method):
     demand = {"type": "function", "formula": "0.3 + where(t < 5, 0, 0.5) - where(t < 60, 0, 0.6)"}
     limit = {"type": "rate-limit", "input": "controls.demand", "rising": "0.02 1/s", "falling": 0.01,
              "time_constant": 2.0}  # fmt: skip
@@ -185,7 +185,7 @@ def test_a_relay_without_hysteresis_is_refused_with_its_remedy():
     assert run.reason.endswith("set the thresholds of the block farther apart, or give it a `filter`")
 
 
-def test_a_latch_keeps_its_state_at_the_start_beside_comparisons_of_levels():
+def test_a_latch_retains_its_state_at_the_start_with_comparisons_of_levels():
     """Its inputs are comparisons that are false at the start: nothing is reset before the level passes 4.5 m."""
     controls = {
         "full": {"type": "function", "inputs": {"h": "tower.level"}, "formula": "(h > 4.5)"},

@@ -94,7 +94,7 @@ def test_a_drained_tank_stays_within_the_laminar_width_and_does_not_chatter():
     assert np.max(np.abs(result["hole.flow"][result.t > 120.0])) < laminar_flow(OUTLET)
 
 
-def test_a_tank_whose_outfall_rises_and_falls_turns_the_flow_round():
+def test_a_tank_with_a_rising_and_falling_outfall_reverses_the_flow():
     """The outfall is chosen so that the root of the drop is S cos(w t) and the level h0 - K S sin(w t) / w."""
     section, level, root, period = 4.0, 3.0, 0.8, 240.0
     speed, w = OUTLET * math.sqrt(2 * GRAVITY) / section, 2 * math.pi / period
@@ -291,7 +291,7 @@ def test_the_turns_of_a_mass_oscillation_are_the_closed_ones(losses):
     assert abs(result.ledger["mass"]["relative"]) < 1e-14
 
 
-def test_the_head_beside_the_tank_is_its_level_and_the_loss():
+def test_the_head_at_the_tank_is_its_level_and_the_loss():
     result = fvsolve.run(swing((1.0, 1.5)))
     flow = result["c.flow"]
     loss = np.where(flow > 0, 1.0, -1.5) * flow**2 / (2 * GRAVITY * area(THROAT) ** 2)
@@ -317,7 +317,7 @@ def test_a_tank_behind_a_pipe_starts_at_rest_and_stays():
         assert not np.any((np.abs(model.jacobian(0.0, np.zeros(model.y_size))) > 1e-6) & ~pattern)
 
 
-def test_marks_and_what_moves_name_the_tank_itself():
+def test_marks_and_moving_parts_name_the_tank_itself():
     """Marks, notices and moving parts name the tank, without its inner node; an outlet below its bottom drains it."""
     nodes = {"t": {"type": "tank", "area": 1.0, "level": 0.5,
                    "connection": {"diameter": 0.2, "loss_in": 1.0, "loss_out": 1.0}}, "air": lake(-0.5)}  # fmt: skip

@@ -120,7 +120,7 @@ CHART = [
 
 
 @pytest.mark.parametrize("curve, point", [(0, 1), (0, 2), (1, 0), (1, 1)])
-def test_a_point_of_the_chart_is_what_the_turbine_does(curve, point):
+def test_a_point_of_the_chart_is_the_operation_of_the_turbine(curve, point):
     one = CHART[curve]
     n11, q11, eta = (one[key][point] for key in ("unit_speed", "unit_flow", "efficiency"))
     head = (300.0 * D / n11) ** 2
@@ -257,7 +257,7 @@ def test_an_s_between_given_pressures_starts_at_the_greatest_flow_and_is_noted()
     assert not fvsolve.run(direct(HEAD, hill_chart=CHART, speed="300 rpm")).warnings
 
 
-def test_said_another_way_it_is_the_same(tmp_path):
+def test_stated_otherwise_it_is_the_same(tmp_path):
     """Equivalent input: other orders of curves and points, other units, and a file."""
     numerics = {"method": "rk4", "step": 0.05}
     first = fvsolve.run(plant(numerics, 4.0, inertia=INERTIA, trip=1.0, opening=VANES, hill_chart=CHART))

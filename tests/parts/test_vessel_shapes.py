@@ -71,7 +71,7 @@ def at_start(model) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("degrees", [0.0, 0.05, 1.0, 20.0, 45.0, 75.0, 89.99])
-def test_what_a_cylinder_holds_below_a_level_is_the_quadrature_of_its_sections(degrees):
+def test_volume_of_a_cylinder_below_a_level_is_the_quadrature_of_its_sections(degrees):
     radius, length, slope = 1.1, 5.3, math.radians(degrees)
     top, whole = length * math.sin(slope) + 2.0 * radius * math.cos(slope), math.pi * radius**2 * length
     kind = law_vessel.HORIZONTAL_CYLINDER if degrees == 0.0 else law_vessel.INCLINED_CYLINDER
@@ -91,7 +91,7 @@ def test_what_a_cylinder_holds_below_a_level_is_the_quadrature_of_its_sections(d
     assert law_vessel.volume_below(shape, 0, top) == pytest.approx(whole, rel=1e-12)
 
 
-def test_a_cylinder_that_barely_slopes_or_leans_is_that_which_lies_or_stands():
+def test_a_cylinder_of_small_inclination_approaches_a_horizontal_or_an_upright_cylinder():
     for slope, near in ((0.0, 3e-6), (90.0, 89.9999)):
         found = [at_start(model_of(swing(0.0, 1.0, slope=f"{one:.12f} deg", level=0.2))) for one in (slope, near)]
         assert found[0] == pytest.approx(found[1], rel=1e-5)
@@ -163,7 +163,7 @@ def test_its_energy_closes_and_its_compressor_supplies(law, more):
     assert sum(one.supplied["a"]) > 0.0 and one.at_start["a"] > 0.0
 
 
-def test_its_level_says_how_much_gas_there_is_and_its_gas_pressure_holds():
+def test_its_level_gives_the_volume_of_gas_and_its_gas_pressure_holds():
     """A level and the gas volume that it leaves give equal starts; a given gas pressure is kept."""
     model = model_of(swing(0.0, 1.0))
     gas, first = at_start(model)
@@ -225,14 +225,14 @@ def test_resumed_its_compressor_runs_on(tmp_path, end):
     assert result.summary["events"] == whole.summary["events"]
 
 
-def test_a_level_above_its_start_at_the_start_has_it_run_and_one_between_does_not():
+def test_a_level_above_its_start_at_the_start_lets_it_run_and_a_level_between_does_not():
     for stop, start, runs in ((0.3, 0.6, True), (0.6, 0.9, False)):
         compressor = {"start": start, "stop": stop, "flow": 1e-4}
         result = fvsolve.run(pumped(0.0, 1.0, compressor=compressor))
         assert (result["a.gas_pressure"][-1] > P0 * (1.0 + 1e-6)) == runs
 
 
-def test_an_empty_vessel_says_so_and_fills_again():
+def test_an_empty_vessel_gives_a_notice_and_fills_again():
     result = fvsolve.run(swing(-0.04, 4.0, {"rtol": 1e-8}, level=0.02, probes=["a.level", "a.gas_pressure"]))
     texts = [event["what"] for event in result.summary["events"]]
     assert result.ok and texts[:2] == ["is empty", "holds fluid again"]
@@ -248,7 +248,7 @@ def test_the_pattern_holds_every_coupling():
         assert not np.any((np.abs(model.jacobian(0.0, np.array([0.1, 0.3, 0.01]))) > 1e-9) & ~pattern)
 
 
-def test_its_norm_is_what_its_energy_is_bent_by():
+def test_its_norm_is_the_curvature_of_its_energy():
     """The squared energy norm of a small deviation is the mean energy of the deviation and its opposite."""
     model = model_of(swing(0.0, 1.0, compressor={"start": 0.5, "stop": 0.1, "flow": 1e-3}))
     names, y = list(model.state_names), np.zeros(model.y_size)
@@ -305,7 +305,7 @@ def test_limits_and_claims_look_at_its_level():
         ({"inclination": 0.2}, "slope"),
     ],
 )
-def test_what_is_wrong_with_a_shape_is_said(wrong, said):
+def test_faults_of_a_shape_are_reported(wrong, said):
     case = swing(0.0, 1.0)
     given = case["nodes"]["a"] | wrong
     case["nodes"]["a"] = {key: value for key, value in given.items() if value is not None}
@@ -314,7 +314,7 @@ def test_what_is_wrong_with_a_shape_is_said(wrong, said):
     assert said in str(error.value)
 
 
-def test_all_that_is_wrong_is_said_at_once_and_a_vessel_without_a_shape_has_no_level():
+def test_all_faults_are_reported_at_once_and_a_vessel_without_a_shape_has_no_level():
     case = swing(0.0, 1.0, slope=2.0, gas_volume=0.2, compressor={"start": 0.1, "stop": 0.2, "flow": -1.0})
     error = refused(case)
     assert all(key in str(error) for key in ("gas_volume", "compressor.flow"))
@@ -323,7 +323,7 @@ def test_all_that_is_wrong_is_said_at_once_and_a_vessel_without_a_shape_has_no_l
     refused(bare, "level")
 
 
-def test_a_valve_beside_it_carries_what_both_heads_leave():
+def test_a_valve_at_its_node_carries_the_flow_of_both_heads():
     """Two isolated vessels equalise until gas pressure plus weight of the fluid are equal at the valve."""
     nodes = {"a": vessel("upright"), "b": vessel("lying", initial_pressure=4e5)}
     nodes["a"]["initial_pressure"] = P0

@@ -77,7 +77,7 @@ def worst(result, jump: float, shut: float, turned: bool = False) -> float:
 
 @pytest.mark.parametrize("velocity", [1e-4, 1e-2, 0.3, 2.0])
 @pytest.mark.parametrize("how", ["initial_flow", "demand", "valve"])
-def test_upwind_with_euler_at_courant_one_is_exact(velocity, how):
+def test_upwind_with_euler_at_courant_1_is_exact(velocity, how):
     case, jump = shut_pipe(velocity, how)
     shut = 0.0 if how == "initial_flow" else SHUT
     assert worst(fvsolve.run(case), jump, shut) < 1e-10
@@ -116,7 +116,7 @@ def test_history_has_two_rows_at_the_jump():
 
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
-def test_every_scheme_keeps_the_plateau(scheme):
+def test_every_scheme_retains_the_plateau(scheme):
     case, jump = shut_pipe(1.0, "demand", scheme=scheme, method="ssp-rk3", courant=0.8)
     case["links"]["main"]["cells"] = 400
     result = fvsolve.run(case)
@@ -237,7 +237,7 @@ def chamber(flow, **numerics):
 
 
 @pytest.mark.parametrize("method", ["dormand-prince", "radau-iia-5", "rodas-4"])
-def test_what_a_wave_brings_is_its_integral(method):
+def test_the_volume_of_a_wave_is_its_integral(method):
     case = chamber(WAVE, rtol=1e-8, method=method)
     result = run(case)
     w, phase = 2 * math.pi / 0.4, math.pi / 6
@@ -245,7 +245,7 @@ def test_what_a_wave_brings_is_its_integral(method):
     assert result["tank.pressure"] == pytest.approx(AMBIENT + BULK * volume / 2.0, rel=1e-6)
 
 
-def test_a_wave_said_by_a_signal_in_other_units_is_the_same_to_the_bit():
+def test_a_wave_stated_by_a_signal_in_other_units_is_the_same_to_the_bit():
     said = chamber({"signal": "swing"}, rtol=1e-8)
     said["signals"] = {"swing": {"phase": math.pi / 6, "period": "400 ms", "amplitude": "18 m3/h", "mean": "36 m3/h"}}
     assert np.array_equal(run(said)["tank.pressure"], run(chamber(WAVE, rtol=1e-8))["tank.pressure"])

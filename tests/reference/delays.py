@@ -59,7 +59,7 @@ def square(t, first: float, period: float) -> np.ndarray:
     return np.where(t < first, 0.0, np.where(np.floor((t - first) / (0.5 * period) + 1e-9) % 2 == 0, 1.0, -1.0))
 
 
-def beside_jumps(t, first: float, spacing: float) -> np.ndarray:
+def between_jumps(t, first: float, spacing: float) -> np.ndarray:
     """True at times that differ from all times of jumps, first + k spacing."""
     share = (t - first) / spacing
     return np.abs(share - np.round(share)) > 1e-6

@@ -21,7 +21,7 @@ def lossless(cells: int, scheme: str, method: str, h: float, steps: int = 1):
     return study_model(scene(nodes, links, steps * h, numerics, ["end.pressure"], steps * h))
 
 
-def one_step(method: str, matrix: np.ndarray) -> np.ndarray:
+def step_matrix(method: str, matrix: np.ndarray) -> np.ndarray:
     """R(h J) of an explicit method by its tableau: 1 + b^T (1 - z A)^-1 1 z is a polynomial."""
     powers, found = np.eye(len(matrix)), np.zeros_like(matrix)
     for coefficient in stability_function(method_named(method)).numerator.coefficients:
@@ -39,7 +39,7 @@ def scaled(model, jacobian: np.ndarray) -> np.ndarray:
 def growth(method: str, matrix: np.ndarray, steps: int) -> float:
     """Norm ||R(h J)^n|| after n steps."""
     with np.errstate(all="ignore"):
-        power = np.linalg.matrix_power(one_step(method, matrix), steps)
+        power = np.linalg.matrix_power(step_matrix(method, matrix), steps)
     return float(np.linalg.norm(power, 2)) if np.all(np.isfinite(power)) else math.inf
 
 

@@ -12,8 +12,8 @@ def pairs(*lists) -> list[tuple]:
         left.update(((i, a), (j, b)) for a, b in product(indices(lists[i]), indices(lists[j])))
     rows = []
     while left:
-        best = max(product(*map(indices, lists)), key=lambda row: len(left & met(row)))
-        left -= met(best)
+        best = max(product(*map(indices, lists)), key=lambda row: len(left & pairs_of(row)))
+        left -= pairs_of(best)
         rows.append(tuple(values[k] for values, k in zip(lists, best, strict=True)))
     return rows
 
@@ -22,7 +22,7 @@ def indices(values) -> range:
     return range(len(values))
 
 
-def met(row: tuple) -> set:
+def pairs_of(row: tuple) -> set:
     return set(combinations(enumerate(row), 2))
 
 

@@ -12,6 +12,6 @@ def refused(case, match: str | None = None, **more) -> fvsolve.CaseError:
     return caught.value
 
 
-def said(case):
+def messages_of(case):
     """Return the faults of a case: place -> message."""
     return {fault.place: fault.message for fault in refused(case).faults}

@@ -25,7 +25,7 @@ def valve_pipe(gradient=lambda m: 0.0 * m) -> ValvePipe:
     return ValvePipe(L, D, A, RHO, gradient, 1.1e6, 1e5, closing)
 
 
-def test_observed_order_of_a_made_up_error_is_its_order():
+def test_observed_order_of_a_constructed_error_is_its_order():
     h = np.array([0.4, 0.2, 0.1])
     assert observed_order(3.0 * h**2.5, h) == approx(2.5, abs=1e-12)
 
@@ -71,7 +71,7 @@ def test_gradients_are_the_textbook_ones():
     assert hazen_williams(c, D, RHO)(m) / (RHO * 9.80665) == approx(per_metre, rel=5e-3)
 
 
-def test_rays_through_a_junction_scatter_as_impedances_say():
+def test_rays_through_a_junction_scatter_by_impedances():
     pipes = {"one": Pipe("a", "mid", 100.0, 0.3, 1000.0), "two": Pipe("mid", "b", 300.0, 0.2, 1100.0),
              "three": Pipe("mid", "c", 300.0, 0.25, 900.0)}  # fmt: skip
     rays = Rays(RHO, pipes, {"a": step(0.01, 0.0, 1.0), "b": held(0.0), "c": held(0.0)})
@@ -185,7 +185,7 @@ def test_filling_form_agrees_with_integration():
     assert vessels.filling(0.2, 1e9, 1e-5, RHO, 1e6, [0.5])[0] == approx(run.y[0, -1], rel=1e-9)
 
 
-def test_network_characteristics_are_those_of_one_pipe():
+def test_network_characteristics_are_those_of_a_single_pipe():
     case = valve_pipe(darcy(0.02, D, RHO))
     m, k = case.steady_mass_flow(), float(darcy(0.02, D, RHO)(np.float64(1.0)))
     line = Line("lake", "gate", L, D, k)
@@ -222,7 +222,7 @@ def rusanov(rho: np.ndarray, flux: np.ndarray, dx: float, end: float) -> tuple[n
 
 
 @pytest.mark.parametrize("left, right", [((1.3e5, 0.0), (1e5, 0.0)), ((1e5, -1.0), (1.1e5, 1.0))])
-def test_the_exact_riemann_solution_is_what_a_crude_scheme_converges_to(left, right):
+def test_the_exact_riemann_solution_is_the_limit_of_a_crude_scheme(left, right):
     riemann, errors = Riemann(SOFT, left, right), []
     for cells in (800, 1600):
         x = (np.arange(cells) + 0.5) / cells * 40 - 20
@@ -234,7 +234,7 @@ def test_the_exact_riemann_solution_is_what_a_crude_scheme_converges_to(left, ri
     assert observed_order(errors, [2.0, 1.0]) > 0.4
 
 
-def test_the_simple_wave_is_what_a_crude_scheme_converges_to():
+def test_the_simple_wave_is_the_limit_of_a_crude_scheme():
     def velocity(x):
         return 2.0 * np.exp(-(((x - 15) / 3) ** 2))
 

@@ -156,7 +156,7 @@ def followed(x, y):
     return rate(lambda h: phi(x + h * u, y + h * v, T + h), 0.0)
 
 
-def test_a_control_volume_that_moves_is_not_the_one_of_matter_73_to_75(material):
+def test_a_control_volume_that_moves_differs_from_a_material_volume_73_to_75(material):
     """The rate of a volume V_c with arbitrary motion, printed in (73) to (75), is not that of the material volume."""
     whole = rate(lambda t: inside(lambda x, y: phi(x, y, t), corners(t)), T)
     assert abs(whole - material) > 0.05 * abs(material)
@@ -167,7 +167,7 @@ def test_a_volume_that_stands_76(material):
     assert_allclose(fixed, material - around(lambda x, y: carried(x, y, T), corners(T)), rtol=1e-8)
 
 
-def test_areas_of_a_quadrilateral_grow_by_what_its_sides_sweep():
+def test_areas_of_a_quadrilateral_grow_by_the_sweep_of_its_sides():
     """Geometric conservation law: (71) with phi = 1."""
     whole = rate(lambda t: inside(lambda x, y: np.ones_like(x), corners(t)), T)
     assert_allclose(whole, around(lambda x, y: np.ones_like(x), corners(T), SPEEDS), rtol=1e-11)

@@ -113,7 +113,7 @@ def test_the_peak_of_a_million_rows_is_in_the_page_to_the_last_bit(closure):
         assert t[v.argmax()] == table[table[:, k].argmax(), 0] and t[v.argmin()] == table[table[:, k].argmin(), 0]
 
 
-def test_a_report_of_many_long_sections_probes_and_frames_stays_below_six_megabytes(tmp_path):
+def test_a_report_of_dozens_of_long_sections_probes_and_frames_stays_below_six_megabytes(tmp_path):
     case = line(0.02, fields=100)
     case["links"]["main"]["cells"] = 4000
     case["output"] |= {"every": 1e-5, "probes": [f"main.head@{k / 200}" for k in range(200)]}
@@ -160,7 +160,7 @@ def test_lines_of_a_section_are_those_of_the_envelope(closure):
     assert figure["moving"]["heads"][0] == pytest.approx(envelope["initial_head"], rel=1e-5)
 
 
-def test_a_run_that_stopped_says_so_before_anything_else(tmp_path):
+def test_a_run_that_stopped_states_it_before_anything_else(tmp_path):
     def enough(t, seconds, steps):
         raise KeyboardInterrupt
 
@@ -206,16 +206,16 @@ def test_verdicts_stand_first_those_that_fail_before_others(closure):
     assert "The limit does not hold. class" in passed and "FAILS 13.5 4" in passed
 
 
-def test_what_is_no_number_is_none_in_the_page():
+def test_values_that_are_no_numbers_are_none_in_the_page():
     assert script_json({"a": [1.0, float("nan")], "b": "<"}) == '{"a":[1.0,null],"b":"\\u003c"}'
 
 
-def test_without_stored_fields_the_page_says_why_nothing_moves(tmp_path):
+def test_without_stored_fields_the_page_gives_the_reason_for_no_motion(tmp_path):
     found = read(fvsolve.run(line(0.2, fields=0), out=tmp_path / "run", pictures=False))
     assert "No fields were stored" in found.text and "moving" not in found.figures["section-0"]
 
 
-def test_a_report_of_what_is_no_run_says_what_is_there(closure, tmp_path, monkeypatch):
+def test_a_report_of_no_run_lists_the_contents_of_the_folder(closure, tmp_path, monkeypatch):
     with pytest.raises(fvsolve.RunError, match=r"nowhere does not exist; expected a run directory"):
         write_report(tmp_path / "nowhere")
     with pytest.raises(fvsolve.RunError, match="does not hold a finished run"):
@@ -239,7 +239,7 @@ def test_a_report_of_what_is_no_run_says_what_is_there(closure, tmp_path, monkey
         write_report(closure.directory, tmp_path / "report.html", xlsx=True)
 
 
-def test_a_directory_of_another_version_is_named_with_what_it_lacks(closure, tmp_path):
+def test_a_directory_of_another_version_is_named_with_its_missing_files(closure, tmp_path):
     """Each required field is removed in turn, and the error names it."""
     out = tmp_path / "old"
     shutil.copytree(closure.directory, out)
@@ -317,7 +317,7 @@ def boxes(said: str) -> dict[str, str]:
     return {head: re.sub("<[^>]*>", "", rest) for head, rest in found}
 
 
-def test_a_run_stands_under_one_head_and_leads_to_its_own_page(taps) -> None:
+def test_a_run_is_under_a_single_head_and_leads_to_its_own_page(taps) -> None:
     """A run that fails a limit is not listed as open, even if another of its limits is open."""
     said = (taps / "report.html").read_text(encoding="utf-8")
     states = {
@@ -337,7 +337,7 @@ def test_a_run_stands_under_one_head_and_leads_to_its_own_page(taps) -> None:
         assert href == f"{name.replace(' with ', '.')}/report.html" and "Model as understood" in text
 
 
-def test_what_is_changed_stands_there_as_it_is_written(taps) -> None:
+def test_changed_keys_are_shown_as_written(taps) -> None:
     text = Read((taps / "report.html").read_text(encoding="utf-8")).text
     shut = 'fast links.tap.opening { start = "0.5 s", duration = "0.1 s", value = [1.0, 0.0] }'
     assert shut in text and "{'" not in text
@@ -357,7 +357,7 @@ def test_the_workbook_of_a_study_has_the_envelope_of_each_run(taps) -> None:
     assert sheet.count("<row ") == 1 + len(envelope["distance"])
 
 
-def test_a_study_without_limits_says_so(tmp_path) -> None:
+def test_a_study_without_limits_states_their_absence(tmp_path) -> None:
     (tmp_path / "main.toml").write_text(write(throttled() | {"limits": {}}))
     (tmp_path / "taps.toml").write_text(STUDY)
     scenarios.study(tmp_path / "taps.toml", tmp_path / "out")

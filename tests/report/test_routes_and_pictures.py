@@ -40,7 +40,7 @@ def main(tmp_path_factory):
     return fvsolve.run(case, out=tmp_path_factory.mktemp("runs") / "main", pictures=False)
 
 
-def test_a_route_is_the_section_and_its_chainage_runs_through_what_stands_between_its_pipes(main):
+def test_a_route_is_the_section_and_its_chainage_continues_through_parts_between_its_pipes(main):
     (way,) = section_paths(main)
     assert (way.name, way.begin, way.end) == ("line", 2000.0, 2800.0)
     assert way.places == [("lake", 2000.0), ("a", 2500.0), ("b", 2500.0), ("gate", 2800.0)]
@@ -66,7 +66,7 @@ def test_a_pipe_that_is_cut_has_a_section_where_no_route_has_all_of_it(tmp_path)
         assert [way.name for way in found] == named
 
 
-def test_limits_are_lines_and_what_passes_one_is_marked_where_it_is_worst(main):
+def test_limits_are_lines_and_exceedances_are_marked_at_their_worst_place(main):
     one = section_of(main, section_paths(main)[0])
     bar = 1e6 / (RHO * GRAVITY)
     assert one.lines["class, maximum"] == pytest.approx(one.along["elevation"] + bar, rel=1e-9)
@@ -127,7 +127,7 @@ def closure(tmp_path_factory):
     return fvsolve.run(case, out=tmp_path_factory.mktemp("runs") / "closure", pictures=False)
 
 
-def test_what_is_asked_for_is_drawn(closure, tmp_path):
+def test_requested_items_are_drawn(closure, tmp_path):
     from matplotlib.image import imread
 
     def drawn(**asked):
@@ -139,7 +139,7 @@ def test_what_is_asked_for_is_drawn(closure, tmp_path):
         assert np.ptp(imread(tmp_path / name)[..., :3], axis=(0, 1)).min() > 0.5
 
 
-def test_names_that_are_none_are_told_at_once_with_what_was_meant(closure, fvs):
+def test_unknown_names_are_reported_at_once_with_the_nearest_names(closure, fvs):
     code, _, said = fvs(
         "plot", closure.directory, "--probes", "gate.had,valve.flow", "--phase", "valve.flow", "--route", "mian"
     )

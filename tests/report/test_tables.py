@@ -57,7 +57,7 @@ def test_rows_too_coarse_for_the_waves_are_refused() -> None:
     assert cycles(result, ["still.pressure"])[0]["cycles"] == []
 
 
-def test_the_command_says_how_long_it_lasts(fvs, tmp_path, monkeypatch) -> None:
+def test_the_command_states_the_duration(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "swung.toml").write_text(write(swung()))
     fvs("run", "swung.toml", "--no-pictures")
@@ -80,7 +80,7 @@ def test_the_command_says_how_long_it_lasts(fvs, tmp_path, monkeypatch) -> None:
     assert fvs("fatigue", "runs/nowhere")[0] == 2
 
 
-def test_what_has_no_cycles_is_named() -> None:
+def test_series_without_cycles_are_named() -> None:
     with pytest.raises(FvsolveError, match='did you mean "swung.pressure"'):
         cycles(fvsolve.run(swung()), ["swung.presure"])
 
@@ -112,7 +112,7 @@ def test_sections_are_the_longest_ways_and_run_down_the_head(fork):
     assert longest.places == [("high", 0.0), ("a", 400.0), ("b", 700.0), ("low", 1200.0)]
 
 
-def test_a_section_is_one_line_along_its_chainage(fork):
+def test_a_section_is_a_single_line_along_its_chainage(fork):
     one = section_of(fork, section_paths(fork)[0])
     assert one.chainage == pytest.approx(25.0 + 50.0 * np.arange(24))  # all cells are 50 m long
     points = [0.0, 400.0, 700.0, 1200.0], [0.0, 10.0, 20.0, 5.0]
@@ -130,7 +130,7 @@ def test_numbers_of_a_column_are_aligned_on_their_points():
     assert ReportTable("", ("name", "length"), [["a", 1.0], ["b", None]]).numeric == [False, True]
 
 
-def test_what_pipes_bear_and_whose_figures_these_are_stands_in_a_table_of_its_own(tmp_path):
+def test_rated_pressures_of_pipes_and_their_sources_are_a_table_of_their_own(tmp_path):
     units = {"output.units": {"pressure": "barg", "length": "mm"}, "numerics.end": 0.1, "expect": {}}
     found = walls(fvsolve.run("plastic-main", set=units, out=tmp_path / "run", pictures=False))
     assert found.units[:3] == ("", "bar", "mm") and [row[0] for row in found.rows] == ["upper", "lower"]

@@ -88,7 +88,7 @@ def test_other_laws_compile_no_more_for_two_tanks(law, compiling):
     assert files(fvsolve.build(fvsolve.load(case))) & ALL == set()
 
 
-def test_each_room_is_compiled_where_it_is_used(compiling):
+def test_each_folder_is_compiled_where_it_is_used(compiling):
     assert files(fvsolve.build(fvsolve.load(line()))) & ALL == PIPES - {"fused_step"}
     found = files(fvsolve.build(fvsolve.load(tanks(method="implicit-euler", step=0.1))))
     assert found & ALL == {"newton", "dirk", "structure", "linear_dense"}
@@ -106,7 +106,7 @@ def test_each_room_is_compiled_where_it_is_used(compiling):
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_a_scene_without_pipes_has_the_rates_that_it_has_beside_a_pipe(law):
+def test_a_scene_without_pipes_has_the_same_rates_as_with_a_pipe(law):
     """The second case adds a pipe at rest, from a reservoir to a junction behind a shut valve."""
     alone = tanks() | {"fluid": {**tanks()["fluid"], "law": law}}
     nodes = alone["nodes"] | {"a": reservoir(101325.0 + 9806.65 * 4.0), "b": junction()}
@@ -145,7 +145,7 @@ def pool(physics: str, links: bool, law: str = "linear", **numerics) -> dict:
 
 
 @pytest.mark.parametrize(("physics", "law"), [("transport", "linear"), ("free-surface", "linear"), ("liquid", "log")])
-def test_a_basin_alone_has_the_rates_that_it_has_beside_a_link(physics, law):
+def test_an_isolated_basin_has_the_same_rates_as_with_a_link(physics, law):
     alone, both = (fvsolve.build(fvsolve.load(pool(physics, links, law))) for links in (False, True))
     assert alone.functions.cast.alone and not both.functions.cast.alone
     y = fvsolve.initial_state(alone).y
@@ -161,7 +161,7 @@ def test_a_basin_compiles_no_links_and_no_other_scheme(compiling):
     assert weno5 & (network | fifth) == fifth | {"reconstruction"}
 
 
-def test_the_rates_are_called_no_more_often_than_the_steps_ask_for():
+def test_the_rates_are_called_no_more_often_than_the_steps_require():
     loop = RunLoop(fvsolve.build(fvsolve.load(tanks(method="rk4", step=0.1))))
     loop.begin(10.0, 1e308)
     loop.run(1e308)

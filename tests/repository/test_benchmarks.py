@@ -14,7 +14,7 @@ BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 
 
 @pytest.fixture(autouse=True)
-def found(monkeypatch):
+def benchmark_modules(monkeypatch):
     """Import modules of benchmarks/ instead of test folders with equal names, and undo this after the test."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     names = [path.stem for path in BENCHMARKS.glob("*.py")]
@@ -45,17 +45,17 @@ def test_mechanisms_call_rates_in_a_loop():
     assert slate is not None and np.abs(dydt).max() > 0.0
 
 
-def test_bands_of_delay_lines_hold_what_eight_times_the_resolution_gives():
+def test_bands_of_delay_lines_contain_the_result_of_eight_times_the_resolution():
     """Each band is at least the difference to eight times the resolution, for each of the three step controls."""
     import line_bands
 
-    found, controls = [], set()
+    listed, controls = [], set()
     for k in (0, 1, 2, 3, 5, 6):
         scene = line_bands.network(np.random.default_rng([1, k]))
         controls |= {"courant", "step", "rtol"} & scene["numerics"].keys()
-        found += line_bands.bands(scene)
+        listed += line_bands.bands(scene)
     assert controls == {"courant", "step", "rtol"}
-    assert len(found) > 60 and all(off <= band for _, band, off in found)
+    assert len(listed) > 60 and all(off <= band for _, band, off in listed)
 
 
 def test_networks_that_are_written_twice_have_equal_extremes():
@@ -124,7 +124,7 @@ def test_every_script_has_quick():
         assert "parser(__doc__)" in text and ".quick" in text and "sys.argv" not in text, path.name
 
 
-def test_quick_says_that_its_figures_are_no_measurement(capsys):
+def test_quick_states_that_its_figures_are_no_measurement(capsys):
     import measure
 
     assert measure.parser("A table.").parse_args(["--quick"]).quick
@@ -180,18 +180,18 @@ def test_equal_dumps_have_no_difference(dumps):
 
 
 @pytest.mark.parametrize("place", [("start", "dydt"), (SUMMARY, "extremes", "gate.pressure", "least")])
-def test_one_bit_is_a_difference(place, dumps):
+def test_a_single_bit_is_a_difference(place, dumps):
     new = run()
     new[place] = np.nextafter(new[place], 3.0)
-    (found,) = dumps.compare(run(), new, dumps.Names())
-    assert found.place.startswith("/".join(place)) and found.old != found.new and "0x1." in found.old
+    (listed,) = dumps.compare(run(), new, dumps.Names())
+    assert listed.place.startswith("/".join(place)) and listed.old != listed.new and "0x1." in listed.old
 
 
-def test_the_first_number_that_differs_is_said(dumps):
+def test_the_first_number_that_differs_is_reported(dumps):
     new = run()
     new["start", "dydt"] = np.array([[1.0, 0.0], [np.nan, 3.0]])
-    (found,) = dumps.compare(run(), new, dumps.Names())
-    assert found == ("start/dydt[0, 1] and 1 more", "-0.0 (-0x0.0p+0)", "0.0 (0x0.0p+0)")
+    (listed,) = dumps.compare(run(), new, dumps.Names())
+    assert listed == ("start/dydt[0, 1] and 1 more", "-0.0 (-0x0.0p+0)", "0.0 (0x0.0p+0)")
 
 
 def test_kinds_of_numbers_and_shapes_count(dumps):
@@ -228,7 +228,7 @@ def test_a_name_of_the_map_hides_no_number(dumps):
     ]
 
 
-def test_names_that_change_places_are_told_apart(dumps):
+def test_names_that_change_places_are_distinguished(dumps):
     names = dumps.Names(["public\ta\tb", "public\tb\ta"])
     assert dumps.compare({("a",): 1, ("b",): 2}, {("b",): 1, ("a",): 2}, names) == []
     assert len(dumps.compare({("a",): 1, ("b",): 2}, {("a",): 1, ("b",): 2}, names)) == 2
@@ -241,17 +241,17 @@ def test_texts_for_people_may_have_other_words(dumps):
     assert len(dumps.compare(run(), new | {(SUMMARY, "expectations", "0", "text"): "max(x)"}, dumps.Names())) == 1
 
 
-def test_names_of_python_are_found_from_both_ends(dumps):
+def test_names_of_python_are_located_from_both_ends(dumps):
     names = dumps.Names(["member\tModel.evaluate\tModel.rates", "name\trates\tslopes"])
     assert names.spellings("rates") == ["rates", "slopes", "evaluate"]
     assert names.unused() == []
 
 
-def test_a_faulty_map_says_all_its_faults(dumps):
+def test_a_faulty_map_states_all_its_faults(dumps):
     lines = ["public\ta", "public\ta.b\tc", "word\ta\tb", "public\ta\tb", "public\ta\tc"]
-    with pytest.raises(ValueError) as found:
+    with pytest.raises(ValueError) as listed:
         dumps.Names(lines)
-    assert [line.partition(":")[0] for line in str(found.value).splitlines()] == [
+    assert [line.partition(":")[0] for line in str(listed.value).splitlines()] == [
         "line 1",
         "line 2",
         "line 3",

@@ -24,7 +24,7 @@ def test_the_promised_cases_are_there():
 
 
 @pytest.mark.parametrize("path", PATHS, ids=lambda p: p.stem)
-def test_a_shipped_case_keeps_its_claims(path):
+def test_a_shipped_case_satisfies_its_claims(path):
     written = tomllib.loads(path.read_text(encoding="utf-8"))
     assert written.get("title") and written.get("expect")
     assert {"scheme", "method"} <= written["numerics"].keys()  # a change of a default must not change results
@@ -83,7 +83,7 @@ def rates(t, y, fluid, viscosity):
     return [*rise, v, force / MASS]
 
 
-def test_the_drive_moves_as_scipy_says():
+def test_the_drive_moves_as_by_scipy():
     result = fvsolve.run(CASE)
     fluid, viscosity = oil()
     start = [*START, 0.06, 0.0]

@@ -101,7 +101,7 @@ def faults_of_usage(text: str) -> list[str]:
     return [f"unknown option {word}" for word in given if word not in known] + wrong_choices(words)
 
 
-def found(of, page) -> list:
+def page_parameters(of, page) -> list:
     name = page.relative_to(TOP).as_posix()
     return [
         pytest.param(text, id=f"{name}: {text[:80]}") for text in dict.fromkeys(of(page.read_text(encoding="utf-8")))
@@ -109,12 +109,12 @@ def found(of, page) -> list:
 
 
 # tests/repository/test_extending_page.py runs those of commands of another package
-LINES = [one for page in PAGES if page.stem != "extending" for one in found(complete_commands, page)]
-USAGES = [one for page in PAGES for one in found(usage_texts, page)]
+LINES = [one for page in PAGES if page.stem != "extending" for one in page_parameters(complete_commands, page)]
+USAGES = [one for page in PAGES for one in page_parameters(usage_texts, page)]
 
 
 @pytest.mark.parametrize("line", LINES)
-def test_a_command_of_a_page_is_one_that_the_program_reads(line):
+def test_a_command_of_a_page_is_accepted_by_the_program(line):
     assert faults_of_command(line) == []
 
 
@@ -123,7 +123,7 @@ def test_commands_and_options_in_sentences_are_those_of_the_program(text):
     assert faults_of_usage(text) == []
 
 
-def test_the_commands_of_the_pages_are_found_and_their_faults_are_seen():
+def test_the_commands_of_the_pages_and_their_faults_are_detected():
     assert len(LINES) > 150 and len(USAGES) > 300
     texts = [one.values[0] for one in USAGES]
     assert any("--goal minimum|maximum" in text for text in texts) and "--goal maximum" in texts

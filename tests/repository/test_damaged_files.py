@@ -147,7 +147,7 @@ def shorter(key: str):
 
 
 @pytest.mark.parametrize("key", ["t", "y", "memory.run", "memory.state", "counts", "identity"])
-def test_the_array_that_is_cut_by_one_or_gone_is_named_with_its_file(key, stopped, tmp_path):
+def test_the_array_that_is_shortened_or_absent_is_named_with_its_file(key, stopped, tmp_path):
     case, out = copied(stopped, tmp_path)
     with np.load(out / "restart.npz") as file:
         kept = {key: file[key] for key in file.files}
@@ -240,7 +240,7 @@ def test_counts_that_no_run_has_are_refused_even_with_a_right_digest(name, stopp
 
 
 @pytest.mark.parametrize("name", ["history.csv", "fields.pvd", "restart.npz"])
-def test_a_finished_run_whose_files_do_not_fit_its_checkpoint_loses_nothing(name, stopped, tmp_path):
+def test_a_finished_run_with_files_that_do_not_fit_its_checkpoint_loses_nothing(name, stopped, tmp_path):
     """A later end continues a finished run from its checkpoint; a refusal comes before its results are deleted."""
     case, out = copied(stopped, tmp_path)
     assert fvsolve.run(case, out=out, resume=True).ok
@@ -312,7 +312,7 @@ def test_an_envelope_that_was_written_and_is_gone_is_named(stopped, tmp_path):
         result.envelope  # noqa: B018
 
 
-def test_points_of_a_study_that_are_damaged_are_made_anew(tmp_path):
+def test_damaged_points_of_a_study_are_computed_again(tmp_path):
     case, vary = json.loads(json.dumps(branched(fields=0))), {"links.valve.area": [0.004, 0.005]}
     case["numerics"] |= {"end": 0.05}
     before = sweep(case, vary, out=tmp_path)

@@ -139,7 +139,7 @@ def test_files_and_folders_of_a_user_are_read_by_their_headers(index, tmp_path, 
         index.load("plug")
 
 
-def test_packages_in_zip_files_are_found_and_a_second_copy_of_a_package_is_not(index, tmp_path, monkeypatch):
+def test_packages_in_zip_files_are_located_and_a_second_copy_of_a_package_is_not(index, tmp_path, monkeypatch):
     offered(tmp_path, monkeypatch, "gadget_old", {"old": "gadget_old:x"}, __init__="x = 1\n")
     home = install(tmp_path / "newer", "gadget_old", {"gadget_old/__init__.py": "x = 2\n"},
                    {GROUP: {"new": "gadget_old:x"}})  # fmt: skip

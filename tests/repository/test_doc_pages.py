@@ -69,7 +69,7 @@ def test_a_tutorial_asserts_its_check_and_the_answer_to_its_change(page):
 
 
 @pytest.mark.parametrize("page", RUN_PAGES, ids=lambda path: path.stem)
-def test_a_page_does_what_it_says(page, fvs, tmp_path, monkeypatch):
+def test_a_page_does_as_it_states(page, fvs, tmp_path, monkeypatch):
     """Append blocks with a file name to the file, run the commands in order, and compare their output with the page."""
     for library in LIBRARIES.get(page.stem, ()):
         pytest.importorskip(library)
@@ -118,7 +118,7 @@ def is_test(command: str) -> bool:
 
 
 @pytest.fixture
-def beside(tmp_path) -> Path:
+def copied_files(tmp_path) -> Path:
     """Folder with copies of the files that the commands overwrite."""
     for name in ("docs/parts.md", "cases/schema.json", "pyproject.toml"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
@@ -127,14 +127,14 @@ def beside(tmp_path) -> Path:
 
 
 @pytest.mark.parametrize("command", [one for one in commands() if not is_test(one) and not one.startswith(HEAVY)])
-def test_a_command_of_the_pages_does_what_it_says(command, beside):
+def test_a_command_of_the_pages_does_as_it_states(command, copied_files):
     """Commands that write the schema and the key tables leave both files unchanged."""
     paths = [str(Path(sys.executable).parent), os.environ["PATH"]]
     known = os.environ | {"PATH": os.pathsep.join(paths), "PYTHONPATH": str(TOP), "MPLBACKEND": "Agg"}
-    done = subprocess.run(["bash", "-c", command], cwd=beside, env=known, capture_output=True, text=True)
+    done = subprocess.run(["bash", "-c", command], cwd=copied_files, env=known, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     for name in ("docs/parts.md", "cases/schema.json"):
-        assert (beside / name).read_text(encoding="utf-8") == (TOP / name).read_text(encoding="utf-8")
+        assert (copied_files / name).read_text(encoding="utf-8") == (TOP / name).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("command", [one for one in commands() if is_test(one)])
@@ -143,15 +143,15 @@ def test_the_tests_that_the_pages_run_are_there(command):
     assert all((TOP / file).exists() for file in files)
 
 
-def test_two_tanks_without_jit_are_the_same_bytes(beside):
+def test_two_tanks_without_jit_are_the_same_bytes(copied_files):
     """Debugging without JIT writes the bytes of the compiled run, as docs/developing.md states; levels meet at 57 s."""
     short, written = ("nodes.high.level=3.05", "nodes.low.level=2.9", "numerics.end=60", "expect={}"), []
     for off in ("0", "1"):
         command = [sys.executable, "-m", "fvsolve", "run", "two-tanks", "--out", f"runs/{off}"]
         command += [word for one in short for word in ("--set", one)]
         known = os.environ | {"NUMBA_DISABLE_JIT": off, "PYTHONPATH": str(TOP), "MPLBACKEND": "Agg"}
-        subprocess.run(command, cwd=beside, env=known, check=True, capture_output=True)
-        written.append((beside / "runs" / off / "history.csv").read_bytes())
+        subprocess.run(command, cwd=copied_files, env=known, check=True, capture_output=True)
+        written.append((copied_files / "runs" / off / "history.csv").read_bytes())
     assert written[0] == written[1]
 
 
@@ -221,7 +221,7 @@ def test_the_forms_of_the_page_are_read(form):
     assert np.allclose(read.rotation @ read.rotation.T, np.eye(3), atol=1e-15) and not [*read.unusual()]
 
 
-def test_lines_of_python_about_attitudes_print_what_stands_below_them():
+def test_lines_of_python_about_attitudes_print_the_text_below_them():
     assert printed_otherwise(python_of(ATTITUDES)) == ""
 
 
@@ -280,18 +280,18 @@ def of(*keys: str) -> list:
     return [pytest.param(one, id=one.title) for one in some]
 
 
-def test_every_equation_has_one_entry_in_their_order():
+def test_every_equation_has_an_entry_in_their_order():
     assert [number for one in ENTRIES for number in one.numbers] == [*EQUATIONS]
 
 
-def test_every_statement_of_sections_2_to_5_has_one():
+def test_every_statement_of_sections_2_to_5_has_an_entry():
     titles = [one.title for one in ENTRIES if one.section[0] in "2345" and not one.numbers]
     assert len({word: [title for title in titles if word in title] for word in STATEMENTS}) == len(titles)
     assert all(any(word in title for title in titles) for word in STATEMENTS)
 
 
 @pytest.mark.parametrize("entry", of("where"))
-def test_an_entry_says_where_it_lives_and_what_proves_it_or_that_it_is_not_modelled(entry):
+def test_an_entry_states_its_place_and_its_proof_or_that_it_is_not_modelled(entry):
     assert {*entry.fields} <= {"where", "run", "test"}
     if entry.modelled:
         assert "test" in entry.fields
@@ -352,7 +352,7 @@ def test_a_command_of_the_page_runs(entry, fvs, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("entry", of("python"))
-def test_lines_of_python_print_what_stands_below_them(entry):
+def test_lines_of_python_print_the_text_below_them(entry):
     assert entry.python.startswith(">>>")
     assert printed_otherwise(entry.python) == ""
 

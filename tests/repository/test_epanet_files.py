@@ -97,7 +97,7 @@ def test_the_counts_add_up(files):
     assert files.counts(rows, 9) == expected
 
 
-def test_a_late_switch_is_no_difference_of_heads_but_a_lasting_one_is(files):
+def test_a_late_switch_is_no_difference_of_heads_and_a_permanent_difference_is(files):
     times, names = 150.0 + 300.0 * np.arange(6), ["a", "b"]
     apart = np.zeros((6, 2))
     apart[2, 0] = 8.0  # one row, at a switch
@@ -178,7 +178,7 @@ def test_epanets_own_values_come_from_the_original_file_in_si(files, tmp_path):
         engine.start(path, version)
 
 
-def test_epanets_day_follows_a_tank_to_its_end_and_says_from_when_a_demand_is_cut_off(files, tmp_path):
+def test_epanets_day_follows_a_tank_to_its_end_and_states_the_time_of_an_interrupted_demand(files, tmp_path):
     """A tank of 4 m with 100 m2 loses 10 l/s, so it is empty at 40 000 s; the demand behind it then has no source."""
     engine = files.epanet_engine
     version = next((version for version in engine.LIBRARIES if engine.library(version)), None)

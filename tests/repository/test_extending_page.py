@@ -27,7 +27,7 @@ def home(tmp_path_factory) -> Path:
 
 
 @pytest.mark.parametrize("commands, output", RUNS, ids=[commands.splitlines()[0] for commands, _ in RUNS])
-def test_the_commands_of_the_page_print_what_it_shows(commands, output, home):
+def test_the_commands_of_the_page_print_its_text(commands, output, home):
     done = ""
     for line in commands.splitlines():
         program, *words = shlex.split(line)

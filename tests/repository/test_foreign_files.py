@@ -146,7 +146,7 @@ OWNER = pytest.param("owner", marks=pytest.mark.skipif(not ROOT_USER, reason="on
 @POSIX
 @pytest.mark.parametrize("how", ["all", "group", OWNER])
 @pytest.mark.parametrize("below", ["", "code", "code/{hash}", "code/{hash}/{machine}"])
-def test_a_cache_that_others_can_write_is_refused_in_one_line(how, below, tmp_path):
+def test_a_cache_that_others_can_write_is_refused_in_a_single_line(how, below, tmp_path):
     cache = tmp_path / "cache"
     assert python(FOLDER, FVSOLVE_CACHE=str(cache)).returncode == 0
     machine = jit.code_folder()

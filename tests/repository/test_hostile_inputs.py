@@ -70,7 +70,7 @@ def test_a_message_lists_fifty_faults_and_counts_the_others(tmp_path):
     ('t = """\n' + "a." * 100 + '\n"""', None), ("x = [" + "1.5, " * 100 + "]", None), ('t = "a' + ".b" * 100, None),
     ('t = "\\"' + ".b" * 100 + '"', None), ("t = '''" + ".b" * 100 + "''''", None), ("", None),
 ])  # fmt: skip
-def test_keys_of_many_names_are_found_before_the_text_is_parsed(text, line):
+def test_long_keys_are_detected_before_the_text_is_parsed(text, line):
     assert find_long_key(text, 40) == line
 
 
@@ -86,7 +86,7 @@ def test_impossible_numbers_are_refused_by_name(key, value, tmp_path):
     assert error.value.faults[0].place.startswith(key)
 
 
-def test_overrides_of_many_names_are_refused(tmp_path):
+def test_long_overrides_are_refused(tmp_path):
     (tmp_path / "case.toml").write_text(hostile_inputs.SCENE)
     with pytest.raises(CaseError, match="has more than 40 names"):
         fvsolve.load(tmp_path / "case.toml", set={"a." * 20_000 + "a": 1})
@@ -135,7 +135,7 @@ def test_the_judge_sees_an_error_a_long_time_and_much_memory(tmp_path, monkeypat
     assert harm(item, tmp_path)[1].endswith(" GB")
 
 
-def test_mutants_change_what_their_names_say():
+def test_mutants_change_the_place_of_their_names():
     draw = random.Random(0)
     source, folder = hostile_inputs.tables()["valve-closure"]
     assert isinstance(folder, Path)

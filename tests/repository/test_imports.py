@@ -119,5 +119,5 @@ def test_no_file_of_tests_imports_a_test_module():
         "def f():\n    from repository.test_imports import circle",
     ],
 )
-def test_an_import_of_a_test_module_is_found(text):
+def test_an_import_of_a_test_module_is_detected(text):
     assert imported_tests(text) == ["test_imports"]

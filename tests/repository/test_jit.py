@@ -64,7 +64,7 @@ for function in (sum_of_squares, sum_of_cubes):
 """
 
 
-def test_second_process_needs_no_numba_and_an_edit_elsewhere_is_noticed(package):
+def test_second_process_needs_no_numba_and_an_edit_in_another_module_is_noticed(package):
     assert python(package, PROBE) == ["12.0", "True", "1"]
     assert python(package, PROBE) == ["12.0", "False", "False"]
     (package / "kernels" / "law.py").write_text(LAW.format(factor=3.0))
@@ -121,7 +121,7 @@ print(store.IN_USE, run.ok, run.summary["steps"], run.si("low.level").tobytes().
 PRIVATE = re.compile(r"numba\.(core|np|extending|misc|_\w+)|_numba_type_|\b(lib|context|builder)\.call_conv\b")
 
 
-def test_only_one_folder_depends_on_private_names_of_numba():
+def test_only_the_folder_compile_depends_on_private_names_of_numba():
     users = {path for path in cache_folders.PACKAGE.rglob("*.py") if PRIVATE.search(path.read_text(encoding="utf-8"))}
     assert {path.parent.name for path in users} == {"compile"} and len(users) >= 3
 
@@ -158,7 +158,7 @@ print('numba' in sys.modules)
     assert python(package, code) == ["7.0", "7.0", "False"]
 
 
-def test_specialisations_of_one_template_are_stored_each_under_its_own_name(package):
+def test_specialisations_of_a_template_are_stored_each_under_its_own_name(package):
     """The second process loads both without numba; without the store they come from numba's own cache."""
     (package / "kernels" / "powers.py").write_text(POWERS)
     assert python(package, SPECIALISED) == ["14.0", "38.0", "True", "0", "1", "0", "1"]
@@ -242,7 +242,7 @@ def test_code_of_other_sources_is_named(package):
     }.values(),
     ids=["another machine", "a helper that is gone", "a helper not declared"],
 )
-def test_what_cannot_be_called_is_refused_by_name_and_compiled_again(package, changes, named):
+def test_functions_that_cannot_be_called_are_refused_by_name_and_compiled_again(package, changes, named):
     python(package, PROBE)
     forged(package, **changes)
     said = python(package, PROBE, told=named)
@@ -250,7 +250,7 @@ def test_what_cannot_be_called_is_refused_by_name_and_compiled_again(package, ch
     assert python(package, PROBE) == ["12.0", "False", "False"]
 
 
-def test_old_generations_are_deleted_and_the_newest_few_kept(package):
+def test_old_generations_are_deleted_except_the_newest(package):
     for generation in range(6):
         (package / "units.py").write_text(f"GENERATION = {generation}\n")
         python(package, "from fvsolve import jit; jit.code_folder()")
@@ -293,7 +293,7 @@ print(either(True, 0.0), either(False, 0.0))
     assert python(package, code) == ["1.0", "2.0"]
 
 
-def test_cache_folder_falls_back_when_the_stated_one_is_not_writable(package, tmp_path):
+def test_cache_folder_falls_back_when_the_stated_folder_is_not_writable(package, tmp_path):
     (tmp_path / "file").touch()
     code = "from fvsolve.jit import cache_folder; print(cache_folder())"
     assert python(package, code, FVSOLVE_CACHE=str(tmp_path / "stated")) == [str(tmp_path / "stated")]
@@ -302,7 +302,7 @@ def test_cache_folder_falls_back_when_the_stated_one_is_not_writable(package, tm
     assert fallback.parent == tmp_path and fallback.name.startswith("fvsolve-cache")
 
 
-def test_only_rooms_that_are_hashed_compile():
+def test_only_hashed_folders_compile():
     """Functions of the core are hashed together; those of a feature are in its folder `kernels` or in laws of parts."""
     users = {path for path in cache_folders.PACKAGE.rglob("*.py") if "njit" in path.read_text(encoding="utf-8")}
     features = cache_folders.PACKAGE / "features"
@@ -310,7 +310,7 @@ def test_only_rooms_that_are_hashed_compile():
     assert users <= hashed, "njit outside of the hashed sources would never be cached"
 
 
-def test_what_declares_or_lowers_compiles_nothing():
+def test_declarations_and_lowerings_compile_nothing():
     """Of parts only laws are hashed, of basins only compiled files; edits elsewhere keep the compiled code."""
     hashed = {path.relative_to(cache_folders.PACKAGE) for path in cache_folders.compiled_sources()}
     assert Path("core/basins/liquid/grid_linear.py") in hashed and Path("core/basins/basin_scalars.py") in hashed
@@ -333,7 +333,7 @@ def test_a_compiled_function_of_declared_arguments_takes_no_others():
             solve(whole, wrong, numbers)
 
 
-def test_the_second_process_compiles_what_is_then_taken_from_the_store(monkeypatch):
+def test_code_compiled_by_the_second_process_is_then_taken_from_the_store(monkeypatch):
     """The code for the second process runs, and the name that decides to skip it is that of a function in the store."""
     from fvsolve.core.kernels import compiled_functions
     from fvsolve.core.steppers import integrator

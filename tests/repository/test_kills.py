@@ -67,7 +67,7 @@ def test_a_run_that_is_killed_is_continued_with_equal_rows(finished, tmp_path_fa
 
 @given(share=st.floats(0.3, 1.0))
 @examples(4)
-def test_a_report_that_is_killed_leaves_the_old_page_or_the_new_one(finished, fvs, tmp_path_factory, share):
+def test_a_report_that_is_killed_leaves_the_old_or_the_new_page(finished, fvs, tmp_path_factory, share):
     out = tmp_path_factory.mktemp("killed") / "run"
     shutil.copytree(finished / "run", out)
     killed(share * LONGEST, "report", out, "--xlsx")
@@ -79,7 +79,7 @@ def test_a_report_that_is_killed_leaves_the_old_page_or_the_new_one(finished, fv
 
 @given(share=st.floats(0.3, 1.0))
 @examples(3)
-def test_a_sweep_that_is_killed_keeps_its_finished_points(finished, fvs, tmp_path_factory, share):
+def test_a_sweep_that_is_killed_retains_its_finished_points(finished, fvs, tmp_path_factory, share):
     out = tmp_path_factory.mktemp("killed") / "sweep"
     command = ("sweep", finished / "case.toml", "--set", "links.valve.area=0.003,0.004,0.005,0.006", "--out", out)
     killed(share * LONGEST, *command)
@@ -103,7 +103,7 @@ with replacing(sys.argv[1]) as fresh, open(fresh, "w") as file:
 """
 
 
-def test_a_kill_within_a_write_leaves_the_old_file_and_what_is_left_over_is_removed(tmp_path):
+def test_a_kill_within_a_write_leaves_the_old_file_and_leftovers_are_removed(tmp_path):
     write_file(tmp_path / "a.html", "old")
     with subprocess.Popen([sys.executable, "-c", WRITER, str(tmp_path / "a.html")], stdin=subprocess.PIPE,
                           stdout=subprocess.PIPE) as process:  # fmt: skip
@@ -118,7 +118,7 @@ def test_a_kill_within_a_write_leaves_the_old_file_and_what_is_left_over_is_remo
     assert [path.name for path in tmp_path.iterdir()] == ["a.html"]
 
 
-def test_a_new_file_keeps_rights_and_links_and_devices_stay(tmp_path):
+def test_a_new_file_retains_rights_and_links_and_devices_stay(tmp_path):
     target = tmp_path / "target.csv"
     target.write_text("old")
     target.chmod(0o640)

@@ -55,7 +55,7 @@ def test_times_that_are_none_are_refused(t, model):
         advance(model, initial_state(model), t)
 
 
-def test_what_means_the_same_is_taken(model):
+def test_equivalent_values_are_accepted(model):
     y = model.start
     wanted = model.rhs(0.0, y)
     for same in (list(y), y.astype(np.float32) * 0 + y, np.repeat(y, 2)[::2]):
@@ -63,7 +63,7 @@ def test_what_means_the_same_is_taken(model):
     assert np.array_equal(State(0, list(y)).y, y)
 
 
-def test_other_doors_are_as_wary(model):
+def test_other_public_functions_are_as_strict(model):
     start = initial_state(model)
     with pytest.raises(FvsolveError, match="waves has shape"):
         model.cell_pressure(0, np.zeros(3))
@@ -111,7 +111,7 @@ class Mine(Exception):
 
 
 @pytest.mark.parametrize("error", [Mine, ValueError, StopIteration, FvsolveError, SystemExit])
-def test_what_progress_raises_reaches_the_caller(error, tmp_path):
+def test_exceptions_of_progress_reach_the_caller(error, tmp_path):
     def progress(*_):
         raise error("mine")
 
@@ -134,10 +134,10 @@ def test_a_state_that_is_not_finite_is_refused_with_the_name_of_the_first(value,
     y = model.start.copy()
     y[[5, 9]] = value
     state = State(0.0, y)
-    doors = [partial(door, 0.0, y) for door in (model.rhs, model.evaluate, model.jacobian, model.observe)]
-    doors += [lambda: model.observe(state), lambda: advance(model, state, 0.1)]
-    doors += [lambda: fvsolve.solve(model, state, object())]
-    for door in doors:
+    calls = [partial(door, 0.0, y) for door in (model.rhs, model.evaluate, model.jacobian, model.observe)]
+    calls += [lambda: model.observe(state), lambda: advance(model, state, 0.1)]
+    calls += [lambda: fvsolve.solve(model, state, object())]
+    for door in calls:
         with pytest.raises(FvsolveError) as error:
             door()
         assert f"y[5] = {value}, {model.state_names[5]};" in str(error.value)
@@ -150,7 +150,7 @@ PLAIN = {"t": 0.0, "until": 0.0, "y0": [1.0], "source": "valve-closure", "direct
          "text": "0 |\n--+--\n  | 1", "elevation": 0.0, "pressure": 1e5}  # fmt: skip
 
 
-def doors(model):
+def public_functions(model):
     """Functions of `fvsolve`, methods of Model, and State, by name."""
     names = [name for name in fvsolve.__all__ if not isinstance(getattr(fvsolve, name), type)]
     found = {name: getattr(fvsolve, name) for name in names} | {"State": State}
@@ -213,7 +213,7 @@ def there(model):
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_doors_of_results_and_studies_take_what_they_name_and_refuse_all_else(name, there, tmp_path, monkeypatch):
+def test_results_and_studies_accept_their_documented_arguments_and_refuse_all_else(name, there, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     make, plain = OTHERS[name]
     door, bad = make(there), []
@@ -234,7 +234,7 @@ def test_doors_of_results_and_studies_take_what_they_name_and_refuse_all_else(na
 @pytest.mark.parametrize("given, words", [
     ("gate.presure", 'did you mean "gate.pressure"'), (3, "no probe 3"),
 ])  # fmt: skip
-def test_a_result_suggests_the_probe_that_was_meant(given, words, there):
+def test_a_result_suggests_the_nearest_probe(given, words, there):
     for door in (there.result.column, there.result.si):
         with pytest.raises(FvsolveError, match=words):
             door(given)
@@ -247,7 +247,7 @@ def test_a_picture_that_cannot_be_written_is_named(there, tmp_path):
                 plot(tmp_path / name)
 
 
-def test_a_study_says_what_is_wrong_with_what_it_is_given():
+def test_a_study_states_the_fault_of_its_argument():
     for study, given, words in (
         (studies.sweep, {"vary": {"nodes.pond.level": 3}}, "expected a table of lists"),
         (studies.failure_map, {"key": ["links.main.cells"]}, "expected a key and its values"),
@@ -266,11 +266,11 @@ def test_a_study_says_what_is_wrong_with_what_it_is_given():
             studies.sweep_positive_real(bad, 0.0, 1.0)
 
 
-def test_every_door_says_what_it_wants(model, tmp_path, monkeypatch):
+def test_every_public_function_states_its_expectation(model, tmp_path, monkeypatch):
     """Each argument of each public function accepts a wrong value or raises an error of fvsolve with a text."""
     monkeypatch.chdir(tmp_path)
     bad = []
-    for name, door in doors(model).items():
+    for name, door in public_functions(model).items():
         wanted = inspect.signature(door).parameters.values()
         there = {one.name: WHAT_IS_THERE[one.name](model) if one.name in WHAT_IS_THERE else PLAIN.get(one.name)
                  for one in wanted if one.default is one.empty}  # fmt: skip

@@ -71,7 +71,7 @@ PAGES = {page.name: page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_what_a_page_names_can_be_imported_from_where_it_says(page):
+def test_names_of_a_page_can_be_imported_from_the_stated_place(page):
     imports = re.findall(r"from (fvsolve[\w.]*) import \(?([\w, ]+)", PAGES[page])
     named = [(room, name.strip()) for room, names in imports for name in names.split(",") if name.strip()]
     named += [text.rpartition(".")[::2] for text in re.findall(r"`(fvsolve(?:\.[a-zA-Z_]\w*)+)", PAGES[page])]

@@ -23,12 +23,13 @@ ROW = "0 |\n1 | 1\n--+--\n | 1/2 1/2\n"
 
 
 @functools.cache
-def made(kind: str):
+def object_of(kind: str):
     """Object of one of the kinds, which the tests of this module share."""
     if kind == "State":
-        return advance(made("Model"), initial_state(made("Model")), 1.0)
+        return advance(object_of("Model"), initial_state(object_of("Model")), 1.0)
     return {
-        "Case": lambda: load(CASE), "Model": lambda: build(made("Case")), "Result": lambda: run(made("Model")),
+        "Case": lambda: load(CASE), "Model": lambda: build(object_of("Case")),
+        "Result": lambda: run(object_of("Model")),
         "Order": lambda: order(CASE, {"numerics.step": 4.0}, refine="time", levels=3, methods="rk4"),
         "Sweep": lambda: sweep(CASE, {"numerics.rtol": [1e-4, 1e-5]}),
         "Chart": lambda: chart(CASE, methods=["rk4"], step=[4.0, 2.0]),
@@ -40,7 +41,7 @@ KINDS = ["Case", "Model", "State", "Result", "Order", "Sweep", "Chart"]
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_object_has_a_line_a_table_and_a_picture(kind, tmp_path):
-    one = made(kind)
+    one = object_of(kind)
     line, page = repr(one), one._repr_html_()
     assert line.startswith(f"<{kind} ") and len(line) < 160 and "\n" not in line
     assert "<table>" in page and line.replace("<", "&lt;").partition(" ")[0] in page
@@ -54,16 +55,16 @@ def test_every_object_has_a_line_a_table_and_a_picture(kind, tmp_path):
 
 def test_a_notebook_shows_the_table_alone_if_nothing_can_be_drawn(monkeypatch):
     for kind in KINDS:
-        monkeypatch.setattr(type(made(kind)), "plot", lambda *_: importlib.import_module("no_matplotlib"))
-        page = made(kind)._repr_html_()
+        monkeypatch.setattr(type(object_of(kind)), "plot", lambda *_: importlib.import_module("no_matplotlib"))
+        page = object_of(kind)._repr_html_()
         assert "<table>" in page and "<img" not in page
 
 
 def test_tables_hold_the_numbers():
-    assert made("State").frame()["y"].to_numpy() == pytest.approx(made("State").y, abs=0.0)
-    assert list(made("Model").frame()["state"]) == made("Model").state_names
-    assert list(made("Sweep").frame()["numerics.rtol"]) == [1e-4, 1e-5]
-    assert len(made("Order").frame()) == 3 and len(made("Chart").frame()) == len(made("Chart").points)
+    assert object_of("State").frame()["y"].to_numpy() == pytest.approx(object_of("State").y, abs=0.0)
+    assert list(object_of("Model").frame()["state"]) == object_of("Model").state_names
+    assert list(object_of("Sweep").frame()["numerics.rtol"]) == [1e-4, 1e-5]
+    assert len(object_of("Order").frame()) == 3 and len(object_of("Chart").frame()) == len(object_of("Chart").points)
 
 
 def test_names_in_a_notebook_are_text_and_no_markup():
@@ -123,15 +124,17 @@ def test_a_misspelled_run_directory_is_named(tmp_path, monkeypatch):
 def test_a_tableau_from_arrays_is_that_of_its_text():
     text = tableau("shown-text", ROW)
     for a in ([[0, 0], [1, 0]], np.array([[0.0, 0.0], [1.0, 0.0]])):
-        made = tableau("shown-array", a, [Fraction(1, 2), Fraction(1, 2)], [0, 1])
-        assert np.array_equal(made.a, text.a) and np.array_equal(made.b, text.b) and np.array_equal(made.c, text.c)
-        assert (made.order, made.stages) == (text.order, text.stages) == (2, 2)
+        method = tableau("shown-array", a, [Fraction(1, 2), Fraction(1, 2)], [0, 1])
+        assert (
+            np.array_equal(method.a, text.a) and np.array_equal(method.b, text.b) and np.array_equal(method.c, text.c)
+        )
+        assert (method.order, method.stages) == (text.order, text.stages) == (2, 2)
     assert tableau("shown-array", A=[[0, 0], [0.5, 0]], b=[0.0, 1.0]).order == 2  # c defaults to the row sums
     pair = tableau("shown-array", [[0, 0], [1, 0]], [[0.5, 0.5], [1.0, 0.0]], [0.0, 1.0])
     assert pair.adaptive and (pair.order, pair.error_order) == (2, 1)
 
 
-def test_a_tableau_of_third_parts_in_floating_point_keeps_its_order():
+def test_a_tableau_of_third_parts_in_floating_point_retains_its_order():
     a = [[0, 0, 0], [1 / 3, 0, 0], [0, 2 / 3, 0]]
     assert tableau("shown-heun", a, [1 / 4, 0, 3 / 4]).order == METHODS["heun"].order == 3
 
@@ -165,7 +168,7 @@ def test_a_response_at_a_number_is_a_number():
     assert found([1j])[0] == found(1j)
 
 
-def test_the_version_is_said(fvs):
+def test_the_version_is_printed(fvs):
     code, out, _ = fvs("--version")
     assert code == 0 and out.strip() == f"fvsolve {fvsolve.__version__}"
     assert files("fvsolve").joinpath("py.typed").is_file()
@@ -173,7 +176,7 @@ def test_the_version_is_said(fvs):
                           capture_output=True, text=True).stdout.strip() == fvsolve.__version__  # fmt: skip
 
 
-def test_the_first_run_on_a_machine_says_that_it_compiles(fvs, tmp_path, monkeypatch):
+def test_the_first_run_on_a_machine_states_that_it_compiles(fvs, tmp_path, monkeypatch):
     from fvsolve import jit
     from fvsolve.cli import app
 

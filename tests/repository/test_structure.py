@@ -155,7 +155,7 @@ def test_imports_in_functions_and_for_type_checks_are_counted(tmp_path, monkeypa
     assert structure.circles(structure.imports("circle_of_three")) == [names]
 
 
-def test_a_limit_that_is_moved_away_from_its_goal_is_found():
+def test_a_limit_that_is_moved_away_from_its_goal_is_detected():
     source = 'LIMITS = {"a": Limit(limit=9, goal=5, slack=0), "b": Limit(limit=1.5, goal=4, slack=0)}\n'
     before = structure.limits_in(source)
     assert before == {"a": Limit(9, 5, 0), "b": Limit(1.5, 4, 0)}

@@ -28,7 +28,7 @@ import fvsolve
 OTHERS = {"repository", "invariance", "reference"}  # tests of several packages or of none
 
 
-def test_every_folder_of_tests_is_a_package_or_one_of_three_others():
+def test_every_folder_of_tests_is_a_package_or_an_exception():
     tests = folders.CASES.parent / "tests"
     stand = {path.parent.relative_to(tests).as_posix() for path in tests.rglob("test_*.py")}
     stages = [PACKAGE, *(PACKAGE / name for name in ("core", "exchange", "report", "studies"))]
@@ -90,14 +90,14 @@ PACKAGE = Path(fvsolve.__file__).parent
 
 
 @pytest.mark.parametrize("fault", planted_faults.FAULTS, ids=lambda fault: fault.path)
-def test_each_fault_changes_one_place_and_still_compiles(fault):
+def test_each_fault_changes_a_single_place_and_still_compiles(fault):
     text = (PACKAGE / fault.path).read_text(encoding="utf-8")
     planted = fault.planted(text)
     assert planted != text
     compile(planted, fault.path, "exec")
 
 
-def test_there_are_enough_and_each_folder_of_the_package_has_one():
+def test_there_are_enough_and_each_folder_of_the_package_has_a_fault():
     folders = {path.parent.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py")}
     folders -= {Path("data")}  # printed tables, and one function that reads them
     folders -= {Path("features"), Path("exchange")}  # a docstring

@@ -1,4 +1,4 @@
-"""Names and texts of the package: forbidden words do not occur, and docstrings begin with a verb or a noun.
+"""Names and texts of the package and of tests: forbidden words do not occur, docstrings begin with a verb or a noun.
 
 No two classes of the package have equal names, so a search finds one definition.
 """
@@ -29,11 +29,13 @@ PUBLIC = frozenset({"what", "found", "told", "rungs", "kept", "why"})  # fields 
 OPENINGS = re.compile(r"(What|Which|Whether|That|As|The same)\b")
 
 
+TESTS = Path(__file__).parents[1]
+DEFINED = re.compile(r"^ *(?:def|class) (\w+)", re.MULTILINE)
 PATHS = sorted(PACKAGE.rglob("*.py"))
 
 
 @functools.cache
-def found() -> dict[str, list[tuple[str, str]]]:
+def package_words() -> dict[str, list[tuple[str, str]]]:
     """Identifiers, docstrings and other texts of all modules, each with its place."""
     lists: dict[str, list[tuple[str, str]]] = {"names": [], "docstrings": [], "texts": []}
     gc.disable()  # half of the time, with a million nodes
@@ -86,8 +88,8 @@ def texts(nodes: list[ast.AST]):
 
 
 def test_no_identifier_has_a_forbidden_word():
-    wrong = [(place, name) for place, name in found()["names"] if words(name) & IN_NAMES and name not in PUBLIC]
-    assert wrong == [] and len(found()["names"]) > 10000
+    wrong = [(place, name) for place, name in package_words()["names"] if words(name) & IN_NAMES and name not in PUBLIC]
+    assert wrong == [] and len(package_words()["names"]) > 10000
 
 
 def test_no_module_has_a_forbidden_word_in_its_name():
@@ -95,16 +97,25 @@ def test_no_module_has_a_forbidden_word_in_its_name():
     assert [name for name in names if words(name) & IN_NAMES] == []
 
 
+def test_no_test_nor_helper_of_tests_has_a_forbidden_word_in_its_name():
+    """The names of test modules, of tests and of the functions and classes that they share."""
+    paths = sorted(TESTS.rglob("*.py"))
+    defined = [(path, name) for path in paths for name in DEFINED.findall(path.read_text(encoding="utf-8"))]
+    listed = [(path.relative_to(TESTS).as_posix(), name) for path, name in defined + [(one, one.stem) for one in paths]]
+    assert len(listed) > 5000
+    assert [(place, name) for place, name in listed if words(name) & IN_NAMES] == []
+
+
 def test_no_message_nor_help_has_a_forbidden_word():
-    assert [(place, text) for place, text in found()["texts"] if IN_TEXTS.search(text)] == []
+    assert [(place, text) for place, text in package_words()["texts"] if IN_TEXTS.search(text)] == []
 
 
 def test_an_expectation_follows_its_fault_in_the_same_sentence():
-    assert [(place, text) for place, text in found()["texts"] if FULL_STOP.search(text)] == []
+    assert [(place, text) for place, text in package_words()["texts"] if FULL_STOP.search(text)] == []
 
 
 def test_no_docstring_begins_with_a_relative_clause():
-    assert [(place, text) for place, text in found()["docstrings"] if OPENINGS.match(text)] == []
+    assert [(place, text) for place, text in package_words()["docstrings"] if OPENINGS.match(text)] == []
 
 
 def doubles(sources: dict[str, str]) -> dict[str, list[str]]:
@@ -119,13 +130,13 @@ def doubles(sources: dict[str, str]) -> dict[str, list[str]]:
         for one in ast.walk(ast.parse(text)) if any(often[name] > 1 for name in named[home]) else ():
             if isinstance(one, ast.ClassDef):
                 homes[one.name].append(home)
-    return {name: found for name, found in homes.items() if len(set(found)) > 1}
+    return {name: repeated for name, repeated in homes.items() if len(set(repeated)) > 1}
 
 
 def test_a_class_name_is_used_once():
     top = Path(fvsolve.__file__).parent
-    found = doubles({str(path.relative_to(top)): path.read_text(encoding="utf-8") for path in top.rglob("*.py")})
-    assert not found
+    repeated = doubles({str(path.relative_to(top)): path.read_text(encoding="utf-8") for path in top.rglob("*.py")})
+    assert not repeated
 
 
 def test_a_double_is_seen():

@@ -136,7 +136,7 @@ def test_a_limiter_that_depends_on_direction_runs_in_pipes_and_is_refused_in_bas
         basins.model_of(pool("water", "third"))
 
 
-def test_its_order_is_two_in_smooth_flow_and_one_if_phi_of_one_is_not_one():
+def test_its_order_is_2_in_smooth_flow_and_1_if_phi_of_1_is_not_1():
     fvsolve.register_limiter("mine", monotonized_central)
     fvsolve.register_limiter("half", lambda r: 0.5 * van_leer(r))
     for name, expected in (("mine", 2.0), ("half", 1.0)):
@@ -203,7 +203,7 @@ print(float(fvsolve.run(%r)["a.pressure"].sum()), "numba" in sys.modules)
 """
 
 
-def test_an_edited_file_counts_in_the_next_process_and_an_unchanged_one_compiles_nothing(tmp_path):
+def test_an_edited_file_counts_in_the_next_process_and_an_unchanged_file_compiles_nothing(tmp_path):
     code = RESTART % (main("mine"),)
     found = []
     for factor in ("2.0", "2.0", "0.0"):
@@ -234,7 +234,7 @@ def test_a_file_can_be_named_for_the_command_line(tmp_path):
         run_python(tmp_path, code, FVSOLVE_LIMITERS="sharp=none.py:phi")
 
 
-def test_an_installed_package_can_offer_one(tmp_path):
+def test_an_installed_package_can_offer_a_limiter(tmp_path):
     (tmp_path / "mine.py").write_text("def phi(r):\n    return max(0.0, min(1.0, r))\n")
     info = tmp_path / "mine-1.dist-info"
     info.mkdir()
@@ -261,7 +261,7 @@ TABLE = [1.0, 2.0]
         ("mine", math.atan, "is a builtin_function_or_method; expected a Python function"),
     ],
 )
-def test_what_is_no_limiter_is_refused(name, function, words):
+def test_invalid_limiters_are_refused(name, function, words):
     before = dict(LIMITERS)
     with pytest.raises(FvsolveError, match=words):
         fvsolve.register_limiter(name, function)
@@ -283,7 +283,7 @@ def test_a_function_that_numba_cannot_compile_is_refused_with_its_reason():
         basins.model_of(main("mine"))
 
 
-def test_other_names_of_modules_and_functions_of_functions_are_found():
+def test_other_names_of_modules_and_functions_of_functions_are_located():
     """Closures, constants, members of numpy and compiled functions keep their values."""
     import numba
 

@@ -50,13 +50,13 @@ def test_weights_are_exact_for_their_degree_and_no_more(name):
         assert apart < 1e-12 if degree <= one.degree else apart > 1e-3
 
 
-def test_a_scheme_is_one_entry():
+def test_a_scheme_is_a_single_entry():
     """The weights of a new scheme, kappa = 1/2 of van Leer's family, give all its properties."""
     one = Scheme("quick-like", weights=tuple(Fraction(w, 8) for w in (0, -1, 6, 3, 0)))
     assert (one.order, tuple(one.reach), one.limited, one.plane) == (2, (2, 1, 1, 2), False, "muscl")
 
 
-def test_shorter_schemes_have_room():
+def test_shorter_schemes_have_space():
     """Schemes that read five cells have a scheme of lower order for pipes with fewer cells; others have none."""
     for one in SCHEMES.values():
         assert bool(one.shorter) == (one.degree + 1 >= LEAST_CELLS)
@@ -178,11 +178,11 @@ def friction_order(scheme: str, cells: int, through: float, reversing: bool) -> 
 
 
 @pytest.mark.parametrize("scheme, order", [("fromm", 2), ("upwind3", 3)])
-def test_friction_keeps_the_order_where_the_flow_keeps_its_sign(scheme, order):
+def test_friction_retains_the_order_where_the_flow_retains_its_sign(scheme, order):
     assert friction_order(scheme, 100, 0.2, reversing=False) == pytest.approx(order, abs=0.3)
 
 
-def test_friction_keeps_order_four_at_least_under_the_fifth_order_scheme():
+def test_friction_retains_order_four_at_least_under_the_fifth_order_scheme():
     assert friction_order("upwind5", 50, 0.2, reversing=False) > 3.8
 
 
@@ -190,7 +190,7 @@ def test_the_kink_of_the_friction_law_costs_the_fifth_order_scheme_no_more_than_
     assert friction_order("upwind5", 100, 0.0, reversing=True) > 2.5
 
 
-def test_an_error_controlled_run_meets_its_tolerance_in_proportion():
+def test_an_error_controlled_run_satisfies_its_tolerance_in_proportion():
     """A tolerance 100 times smaller makes the error on the cells of the bump at least 20 times smaller."""
     cells, errors = 60, []
     for rtol in (1e-5, 1e-7):

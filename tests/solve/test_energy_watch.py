@@ -23,7 +23,7 @@ SPEED, LENGTH, DIAMETER, FLOW = 1000.0, 500.0, 0.2, 0.01
 RETURN = 1.1  # time at which the flow of `ringing` is -FLOW, under the pressure of the start [s]
 
 
-def said(result) -> list:
+def energy_notices(result) -> list:
     return [one for one in result.warnings if one.kind == "energy"]
 
 
@@ -55,16 +55,16 @@ def test_energy_that_nothing_supplies_is_named_with_its_amount(monkeypatch):
     wave = 0.5 * 1000.0 * LENGTH * FLOW**2 / area(DIAMETER)  # before: steady flow; after: wave with the deviation
     amplified(monkeypatch, 1.5, RETURN)
     result = fvsolve.run(ringing())
-    (notice,) = said(result)
+    (notice,) = energy_notices(result)
     assert not result.ok and not notice.ok and notice.place == "main" and result.reason == "finished"
     assert notice.limit < notice.value == pytest.approx(3.0 * wave, rel=0.05)
 
 
 @pytest.mark.parametrize("factor", [1.0, 0.5])
-def test_a_run_that_keeps_or_loses_energy_is_ok(monkeypatch, factor):
+def test_a_run_that_conserves_or_loses_energy_is_ok(monkeypatch, factor):
     amplified(monkeypatch, factor, RETURN)
     result = fvsolve.run(ringing())
-    assert not said(result) and all(one.kind != "energy" for one in result.warnings)
+    assert not energy_notices(result) and all(one.kind != "energy" for one in result.warnings)
 
 
 def watched(case: dict, threads: int = 1) -> EnergyWatch:
@@ -86,7 +86,7 @@ def test_energy_from_reservoirs_is_mass_times_pressure_over_density():
     assert watch.record[ERROR] < 1e-9 * watch.supplied.sum()  # error bound: the pressure is constant
 
 
-def test_a_tank_that_drains_releases_what_it_stores():
+def test_a_tank_that_drains_releases_its_stored_energy():
     """From 3 m to the level h a tank of 1 m2 releases rho g (9 - h^2) / 2, and nothing is supplied to it."""
     nodes = {"high": tank(1.0, 3.0), "out": reservoir(101325.0)}
     links = {"way": valve("high", "out", 0.01)}
@@ -106,7 +106,7 @@ def test_levels_that_oscillate_are_no_gain_of_energy(method):
     step = period / (2e4 if method == "euler" else 400.0)
     case = scene(nodes, links, 3.0 * period, {"method": method, "step": step, "initial": "rest"}, ["one.level"], period)
     result = fvsolve.run(case)
-    assert result.ok and not said(result)
+    assert result.ok and not energy_notices(result)
 
 
 def test_the_watch_takes_few_states_of_a_long_run():
@@ -115,7 +115,7 @@ def test_the_watch_takes_few_states_of_a_long_run():
     assert 6 <= watched(case).record[STATES] <= 15
 
 
-def test_sources_whose_energy_varies_are_watched_more_often():
+def test_sources_of_variable_energy_are_watched_more_often():
     """A chamber behind a reservoir that oscillates: its energy per mass varies, so the interval doubles later."""
     pressure = {"mean": 2e5, "amplitude": 1e4, "period": 1.0}
     nodes = {"source": reservoir(pressure), "vessel": chamber(0.1, 2e5)}

@@ -27,7 +27,7 @@ GIVEN = [
 AUTO = [{"method": "auto", "rtol": 1e-7}]
 
 
-def said(numerics: dict) -> str:
+def settings_text(numerics: dict) -> str:
     return " ".join(str(value) for value in numerics.values())
 
 
@@ -65,12 +65,12 @@ def agrees(result, wanted, near: float) -> None:
 
 @pytest.mark.in_turn
 @pytest.mark.parametrize("build", [harbour, jack])
-@pytest.mark.parametrize("numerics", RTOL + AUTO, ids=said)
+@pytest.mark.parametrize("numerics", RTOL + AUTO, ids=settings_text)
 def test_error_control_ends_where_the_explicit_run_does(build, numerics, explicit):
     agrees(fvsolve.run(build(**numerics)), explicit[build], 5e-5)
 
 
-@pytest.mark.parametrize("numerics", GIVEN, ids=said)
+@pytest.mark.parametrize("numerics", GIVEN, ids=settings_text)
 def test_given_steps_end_near_it_and_the_ledger_closes(numerics, explicit):
     near = {"implicit-euler": 0.1, "trapezoid": 0.05}.get(numerics["method"], 0.015)  # order 1; ringing
     agrees(fvsolve.run(harbour(**numerics)), explicit[harbour], near)
@@ -81,8 +81,8 @@ def test_given_steps_move_a_cylinder_and_keep_its_oil(method, near, explicit):
     agrees(fvsolve.run(jack(method=method, step=2e-5)), explicit[jack], near)
 
 
-@pytest.mark.parametrize("numerics", [*RTOL, *GIVEN, *AUTO], ids=said)
-def test_a_looped_network_without_an_event_does_not_move_by_one_bit(numerics):
+@pytest.mark.parametrize("numerics", [*RTOL, *GIVEN, *AUTO], ids=settings_text)
+def test_a_looped_network_without_an_event_does_not_change_any_bit(numerics):
     case = town(ROUGH, {})
     case["numerics"] = {"end": 60.0, "scheme": "muscl", **numerics}
     result = fvsolve.run(case)
@@ -108,7 +108,7 @@ def test_twenty_travel_times_a_step_is_no_limit_for_implicit_methods(method):
 
 
 @pytest.mark.parametrize(
-    "numerics", [{"method": "radau-iia-5", "rtol": 1e-7}, {"method": "esdirk-4", "step": 0.01}], ids=said
+    "numerics", [{"method": "radau-iia-5", "rtol": 1e-7}, {"method": "esdirk-4", "step": 0.01}], ids=settings_text
 )
 def test_dense_banded_and_sparse_algebra_give_the_same_run(numerics):
     runs = [fvsolve.run(harbour(linear_algebra=kind, **numerics)) for kind in ("dense", "banded", "sparse")]
@@ -122,8 +122,8 @@ EVENTS = [{"method": name, "rtol": 1e-8} for name in ("radau-iia-5", "rodas-5p",
 EVENTS += [{"method": name, "step": 0.05} for name in ("gauss-4", "trapezoid")]
 
 
-@pytest.mark.parametrize("numerics", EVENTS, ids=said)
-def test_a_tank_runs_dry_when_torricelli_says(numerics):
+@pytest.mark.parametrize("numerics", EVENTS, ids=settings_text)
+def test_a_tank_runs_dry_at_torricellis_time(numerics):
     slope = 0.01 * math.sqrt(2 * GRAVITY) / 2.0
     dry = 2 * (math.sqrt(3.5) - math.sqrt(2.0)) / slope
     nodes = {"basin": tank(2.0, 1.5, elevation=10.0), "air": reservoir(AMBIENT, elevation=8.0)}
@@ -136,7 +136,7 @@ def test_a_tank_runs_dry_when_torricelli_says(numerics):
     assert result.ledger["mass"]["relative"] < 1e-13
 
 
-@pytest.mark.parametrize("numerics", EVENTS, ids=said)
+@pytest.mark.parametrize("numerics", EVENTS, ids=settings_text)
 def test_a_tank_spills_from_the_moment_it_is_full(numerics):
     nodes = {"basin": tank(2.0, 1.0, height=1.5), "spring": {"type": "inflow", "flow": 0.02}}
     case = scene(nodes, {"pipe": valve("spring", "basin", 0.05)}, 100.0, numerics, ["basin.level"], 1.0)
@@ -148,7 +148,9 @@ def test_a_tank_spills_from_the_moment_it_is_full(numerics):
 
 
 @pytest.mark.parametrize(
-    "numerics", [{"method": name, "rtol": 3e-7} for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "auto")], ids=said
+    "numerics",
+    [{"method": name, "rtol": 3e-7} for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "auto")],
+    ids=settings_text,
 )
 def test_dead_at_a_random_moment_and_resumed_is_the_unbroken_run(tmp_path, numerics):
     seed = random.randrange(10**6)
@@ -187,7 +189,7 @@ BALL = {  # rtol, method: errors at the end as measured, of the position [m] and
 
 
 @pytest.mark.parametrize("rtol, method", BALL)
-def test_a_ball_on_a_damped_stop_bounces_as_solve_ivp_says(rtol, method):
+def test_a_ball_on_a_damped_stop_bounces_as_by_solve_ivp(rtol, method):
     """A ball on a damped stop follows free flight and SciPy's contact.
 
     The force of the damper starts with a jump, which difference quotients must not treat as a slope.
@@ -236,7 +238,9 @@ def test_a_tank_that_runs_dry_through_another_does_not_stop_newton(rtol):
 
 
 @pytest.mark.parametrize(
-    "numerics", [{"method": name, "rtol": 1e-6} for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "auto")], ids=said
+    "numerics",
+    [{"method": name, "rtol": 1e-6} for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "auto")],
+    ids=settings_text,
 )
 def test_a_scene_without_a_state_runs_as_any_other(numerics):
     nodes = {"high": reservoir(3e5), "low": reservoir(1e5)}
@@ -265,7 +269,7 @@ def set_free() -> tuple[float, float]:
 @pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["radau-iia-5", "radau-iia-9"])
 @pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-8, 1e-9, 1e-10])
-def test_no_step_passes_what_a_valve_sets_free_as_it_shuts(method, rtol, set_free):
+def test_no_step_passes_the_motion_that_a_shutting_valve_releases(method, rtol, set_free):
     """The step to the closure of a spool valve includes the effect of the closure on the load.
 
     All stages of this step may be earlier than the closure; the velocity then was wrong by 7e-6 m/s at any tolerance.
@@ -298,7 +302,7 @@ def basin_between_a_tank_and_a_pipe(rtol: float) -> dict:
     }  # fmt: skip
 
 
-def test_a_pool_between_a_tank_and_a_pipe_needs_steps_as_its_tolerance_asks():
+def test_a_pool_between_a_tank_and_a_pipe_needs_steps_of_its_tolerance():
     """At a tolerance of 1e-8 Newton's method once failed in nearly every step, and the run had no end."""
     loose, tight = (fvsolve.run(basin_between_a_tank_and_a_pipe(rtol)) for rtol in (1e-6, 1e-8))
     assert loose.ok and tight.ok
@@ -307,7 +311,7 @@ def test_a_pool_between_a_tank_and_a_pipe_needs_steps_as_its_tolerance_asks():
         assert tight[probe] == pytest.approx(loose[probe], abs=1e-5 * np.ptp(loose[probe]))
 
 
-def test_a_run_whose_steps_no_longer_advance_ends_with_the_reason(monkeypatch):
+def test_a_run_with_steps_that_no_longer_advance_ends_with_the_reason(monkeypatch):
     """With the whole run as the least advance of 20 attempts every run counts as stalled; given steps never do."""
     module = import_module("fvsolve.core.solve.solve")
     for name, value in {"STALLED_ATTEMPTS": 20, "STALLED_ADVANCE": 1.0, "CHUNK_SECONDS": 0.0, "FIRST_CHUNK": 1}.items():

@@ -11,7 +11,7 @@ import fvsolve
 PROBES = ["x.head", "y.pressure", "a.head", "xy.pressure@0.5", "t.level"]
 
 
-def beside_a_high_lake(opening=0.0, demand=None) -> dict:
+def pipe_near_high_lake(opening=0.0, demand=None) -> dict:
     """Pipe xy between shut valves to a town at 50 m and to a lake at 900 m: equal leaks would give it 474 m."""
     nodes = {"lake": lake(50.0), "a": junction(1e-3, elevation=0.0), "x": junction(elevation=0.0),
              "y": junction(demand, elevation=0.0), "hill": lake(900.0),
@@ -34,7 +34,7 @@ def with_waves(case: dict) -> dict:
 @pytest.mark.parametrize("waves", [False, True], ids=["quasi-steady", "waves"])
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_part_between_shut_valves_has_no_extremes_and_no_verdict(tmp_path, waves, turned):
-    case = beside_a_high_lake()
+    case = pipe_near_high_lake()
     case = restated(case) if turned else case
     run = fvsolve.run(with_waves(case) if waves else case, out=tmp_path / "out")
     for probe in ("x.head", "y.pressure", "xy.pressure@0.5"):
@@ -50,7 +50,7 @@ def test_a_part_between_shut_valves_has_no_extremes_and_no_verdict(tmp_path, wav
 
 def test_a_part_that_is_joined_for_a_time_has_the_extremes_of_that_time():
     """Its valve shuts at 50 s: before, its head is that of the town; later no row counts."""
-    case = beside_a_high_lake({"time": [0.0, 50.0], "value": [1.0, 0.0], "kind": "step"})
+    case = pipe_near_high_lake({"time": [0.0, 50.0], "value": [1.0, 0.0], "kind": "step"})
     run = fvsolve.run(case)
     assert run.extremes["x.head"].maximum < 50.0 and run.extremes["x.head"].t_max <= 50.0
     assert run["x.head"][-1] > 400.0
@@ -61,7 +61,7 @@ def test_a_part_that_is_joined_for_a_time_has_the_extremes_of_that_time():
 
 
 def test_a_demand_that_is_not_supplied_fails_a_limit_of_pressure():
-    case = beside_a_high_lake({"time": [0.0, 50.0], "value": [1.0, 0.0], "kind": "step"}, demand=1e-4)
+    case = pipe_near_high_lake({"time": [0.0, 50.0], "value": [1.0, 0.0], "kind": "step"}, demand=1e-4)
     run = fvsolve.run(case)
     (verdict,) = run.verdicts
     assert not verdict.ok and verdict.place in ("x", "y") and verdict.value == pytest.approx(0.0, abs=1e-6)

@@ -48,7 +48,7 @@ def test_an_explicit_method_makes_up_none_either():
 
 
 @pytest.mark.parametrize("method", [*ADAPTIVE, *FIXED])
-def test_what_spills_and_what_is_made_up_are_rows_of_their_own(method):
+def test_spill_and_make_up_are_rows_of_their_own(method):
     flow = {"time": [0.0, 100.0], "value": [0.01, -0.03], "kind": "step"}
     nodes = {"mouth": {"type": "inflow", "flow": flow}, "vat": tank(1.0, 1.9, height=2.0)}
     links = {"way": {"type": "valve", "from": "mouth", "to": "vat", "diameter": 0.1}}
@@ -66,7 +66,7 @@ def test_what_spills_and_what_is_made_up_are_rows_of_their_own(method):
 
 
 @pytest.mark.parametrize("method", [*ADAPTIVE, *FIXED])
-def test_a_dry_tank_fills_again_and_a_full_one_empties(method):
+def test_a_dry_tank_fills_again_and_a_full_tank_empties(method):
     """A tank of 300 l under triangular flows of 500 l in turn spills and runs dry by exact amounts."""
     times = [0.0, *np.arange(25.0, 400.0, 50.0).tolist(), 400.0]
     flow = {"time": times, "value": [0.0, *(4 * [0.02, -0.02]), 0.0]}
@@ -78,7 +78,7 @@ def test_a_dry_tank_fills_again_and_a_full_one_empties(method):
 
 
 @pytest.mark.parametrize("method", [*ADAPTIVE, *FIXED])
-def test_what_swings_to_and_fro_counts_on_both_sides(method):
+def test_flow_to_and_fro_counts_on_both_sides(method):
     """A column between a lake and a tank carries 2 z0 A in each direction per period.
 
     The level is z = z0 cos(w t) with w^2 = g A_c / (L A).
@@ -95,7 +95,7 @@ def test_what_swings_to_and_fro_counts_on_both_sides(method):
     assert mass["inflow"] == pytest.approx(each, rel=near) and mass["outflow"] == pytest.approx(each, rel=near)
 
 
-def test_a_reservoir_that_waves_reach_counts_what_its_pipe_says():
+def test_a_reservoir_reached_by_waves_counts_the_flow_of_its_pipe():
     case = scene(
         {"lake": reservoir("5 barg"), "gate": scenes.junction(), "air": reservoir(AMBIENT)},
         {"main": {"type": "pipe", "from": "lake", "to": "gate", "length": 500.0, "diameter": 0.3, "wave_speed": 1000.0,
@@ -110,7 +110,7 @@ def test_a_reservoir_that_waves_reach_counts_what_its_pipe_says():
 
 
 @pytest.mark.parametrize("method", [*ADAPTIVE, "rk4"])
-def test_what_a_scene_without_a_state_passes_is_as_accurate_as_its_tolerance(method):
+def test_the_throughput_of_a_scene_without_a_state_is_as_accurate_as_its_tolerance(method):
     """The ledger of a case without states equals the integral of its flow.
 
     The supply pressure falls, so that a pressure-dependent demand gets all, a part and none of its flow (Wagner).
@@ -166,7 +166,7 @@ SEESAW, GAUGES = [0.0, 100.0, 200.0, 300.0, 400.0], [3e4, -3e4, 3e4, -3e4, 1e4]
 
 
 @pytest.mark.parametrize("method", [*ADAPTIVE, "esdirk-3", "rk4", "trapezoid", "gauss-4"])
-def test_what_a_dry_tank_is_asked_for_is_as_accurate_as_what_it_holds(method):
+def test_the_deficit_of_a_dry_tank_is_as_accurate_as_its_content(method):
     """The made-up amount of a dry tank is accurate although no state depends on it.
 
     Its quadrature therefore has error control, and steps are short where a flow starts as a root.
@@ -201,7 +201,7 @@ ISLAND = [[1.0, 1.0, 2.0, 2.0]]
 @pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["dormand-prince", "auto", "rodas-5p", "radau-iia-5", "tr-bdf2", "esdirk-4"])
 @pytest.mark.parametrize("more", [{}, {"holes": ISLAND}], ids=["grid", "faces"])
-def test_a_patch_that_runs_dry_books_what_it_has_and_what_is_made_up(method, more):
+def test_a_patch_that_runs_dry_accounts_its_content_and_its_make_up(method, more):
     result = sucked(method, **more)
     mass, flowed = result.ledger["mass"], 1000.0 * np.trapezoid(result["tap.flow"], result.t)
     fine, first = (sucked("dormand-prince", *how, **more).ledger["mass"] for how in (("muscl", 1e-9), ("upwind",)))

@@ -35,7 +35,7 @@ def signed_root(head):
     return math.copysign(math.sqrt(abs(head) / LOSS), head)
 
 
-def test_a_reducing_valve_that_acts_at_once_keeps_its_set_pressure():
+def test_a_reducing_valve_that_acts_at_once_holds_its_set_pressure():
     """The pressure behind the valve is given, so two pipes and the tank remain: their equation is solved by SciPy."""
     found, demand = run(town(reducing())), 0.01
 
@@ -56,21 +56,21 @@ def test_a_reducing_valve_that_acts_at_once_keeps_its_set_pressure():
     assert found.summary["steps"] < 100
 
 
-def test_a_flow_control_valve_that_acts_at_once_keeps_its_set_flow():
+def test_a_flow_control_valve_that_acts_at_once_holds_its_set_flow():
     valve = {"type": "flow-control", "set_flow": 0.02, "time_constant": 0.0}
     found = run(town(valve))
     assert found["v.flow"] == pytest.approx(np.full(found.t.size, 0.02), abs=1e-9)
     assert found["tower.level"] == pytest.approx(3.0 + (0.02 - 0.01) * found.t / 50.0, abs=1e-6)
 
 
-def test_a_sustaining_valve_that_acts_at_once_keeps_the_pressure_before_it():
+def test_a_sustaining_valve_that_acts_at_once_holds_the_upstream_pressure():
     valve = {"type": "pressure-sustaining", "set_pressure": AMBIENT + 70.0 * RHO * G, "time_constant": 0.0}
     found = run(town(valve, end=15000.0))
     assert found["a.head"] == pytest.approx(np.full(found.t.size, 70.0), abs=1e-9)
     assert found["v.flow"] == pytest.approx(np.full(found.t.size, signed_root(10.0)), abs=1e-9)
 
 
-def test_a_valve_that_acts_at_once_opens_and_shuts_as_a_fast_one():
+def test_a_valve_that_acts_at_once_opens_and_shuts_as_a_fast_valve():
     """Its states are those of a valve with a short time constant, and their changes have the same times."""
     found = run(town(reducing(), source=FALLING))
     fast = run(town(reducing(time_constant=0.05), source=FALLING, method="radau-iia-5"))
@@ -101,7 +101,7 @@ def test_a_valve_acts_at_once_only_between_pipes_without_waves():
         fvsolve.build(fvsolve.load(case))
 
 
-def test_two_valves_that_act_at_once_cannot_hold_one_node():
+def test_two_valves_that_act_at_once_cannot_hold_the_same_node():
     case = town(reducing())
     case["links"]["v2"] = {"from": "a", "to": "b", **SIZE, **reducing()}
     with pytest.raises(fvsolve.CaseError, match="both hold the pressure at b"):
@@ -193,7 +193,7 @@ def test_the_sparse_elimination_solves_random_matrices():
         assert x == pytest.approx(np.linalg.solve(full, right), rel=1e-10)
 
 
-def test_a_demand_opens_the_check_valve_behind_which_it_is_isolated():
+def test_a_demand_opens_the_check_valve_that_isolates_it():
     """A valve shuts at once what supplies the demand, and a check valve from a lower lake opens at the same moment."""
     case = town(reducing())
     case["nodes"] |= {"j": {"type": "junction", "demand": 0.005, "elevation": 0.0},
@@ -212,7 +212,7 @@ def test_a_demand_opens_the_check_valve_behind_which_it_is_isolated():
         assert found[name][after] == pytest.approx(np.full(after.sum(), last), abs=1e-9)
 
 
-def test_an_inflow_opens_the_check_valve_behind_which_it_is_isolated():
+def test_an_inflow_opens_the_check_valve_that_isolates_it():
     """A valve shuts at once what takes the inflow, and a check valve to a higher lake opens at the same moment."""
     case = town(reducing())
     case["nodes"] |= {"j": {"type": "junction", "demand": -0.005, "elevation": 0.0},
@@ -262,7 +262,7 @@ def side_by_side(method, rtol, pattern, length=20.0):
 
 
 @pytest.mark.parametrize("rtol, within", [(1e-6, 1e-4), (1e-8, 2e-5)])
-def test_tanks_side_by_side_move_as_one_in_few_steps(rtol, within):
+def test_parallel_tanks_move_as_a_single_tank_in_few_steps(rtol, within):
     """Two tanks at one level: the flow between them has a steep slope there. Inflow and areas give its size."""
     pattern = [0.02 * math.sin(0.7 * k) + 0.002 for k in range(24)]
     found = run(side_by_side("auto", rtol, pattern))
@@ -280,7 +280,7 @@ def test_tanks_side_by_side_move_as_one_in_few_steps(rtol, within):
 @pytest.mark.parametrize(
     "method, rtol", [("rodas-5p", 1e-6), ("rodas-5p", 1e-5), ("radau-iia-5", 1e-5), ("auto", 1e-6)]
 )
-def test_a_trickle_between_tanks_at_one_level_takes_few_steps(method, rtol, sign, law):
+def test_a_trickle_between_tanks_at_a_common_level_takes_few_steps(method, rtol, sign, law):
     """Below the drop that no tolerance shows the law of the pipe is smooth: rodas-5p took 13 420 steps."""
     case = side_by_side(method, rtol, [1e-4] * 4)
     case["numerics"]["end"], case["fluid"] = 7200.0, {**WATER, "law": law}
@@ -292,7 +292,7 @@ def test_a_trickle_between_tanks_at_one_level_takes_few_steps(method, rtol, sign
     assert found.summary["steps"] < 60
 
 
-def test_an_event_is_found_in_few_attempts_where_another_jumps_beyond_it():
+def test_an_event_is_located_in_few_attempts_where_another_jumps_beyond_it():
     """A pump stops at a level; within the same long step another tank would overflow its altitude valve.
 
     The event functions of that valve jump, so the Illinois rule alone, or bisection, needs 40 attempts.

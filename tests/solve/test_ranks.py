@@ -89,7 +89,7 @@ def of_two(tmp_path_factory) -> Path:
 
 
 @pytest.mark.parametrize("many", [2, 3])
-def test_ranks_give_the_bits_of_one_process(tmp_path, many, request):
+def test_ranks_give_the_bits_of_a_single_process(tmp_path, many, request):
     names, folder = (NAMES[::3], request.getfixturevalue("of_two")) if many == 2 else (NAMES, tmp_path)
     if many == 3:
         alone_and_by_ranks(3, {name: drawing(name, 2) for name in names}, folder)
@@ -99,13 +99,13 @@ def test_ranks_give_the_bits_of_one_process(tmp_path, many, request):
         assert said["threads"] == many and one["threads"] == 1
 
 
-def test_growth_without_end_stops_all_ranks_at_the_step_of_one(of_two):
+def test_growth_without_end_stops_all_ranks_at_the_same_step(of_two):
     one, said = (json.loads((of_two / kind / "grows" / "summary.json").read_text()) for kind in ("one", "ranks"))
     assert said["threads"] == 2 and "has grown" in said["reason"]
     assert (said["steps"], said["reason"]) == (one["steps"], one["reason"])
 
 
-def test_frames_that_ranks_write_are_those_of_one_process_to_who_reads_them(of_two):
+def test_frames_written_by_ranks_read_as_those_of_a_single_process(of_two):
     """A VTK reader finds one basin in the frames of several ranks, equal to that of one process, with its unit."""
     names = sorted(path.name for path in (of_two / "ranks" / "a dye" / "fields").iterdir())
     assert names == [f"sheet{part}-00000{k}.{kind}" for part, kind in (("", "pvtu"), (".0", "vtu"), (".1", "vtu"))
@@ -120,7 +120,7 @@ def test_frames_that_ranks_write_are_those_of_one_process_to_who_reads_them(of_t
     assert np.array_equal(two["dye"], one["dye"])
 
 
-def test_a_run_of_three_ranks_is_resumed_by_two_and_by_one(tmp_path):
+def test_a_run_of_3_ranks_is_resumed_by_2_and_by_1(tmp_path):
     case = with_maxima(water(end=0.15, step=1e-3), "pool")
     whole = fvsolve.run(case, out=tmp_path / "whole", pictures=False)
     stopping = SCRIPT.replace("pictures=False", "progress=stop, pictures=False").replace("import json", """
@@ -173,7 +173,7 @@ for name""", 1)  # fmt: skip
     assert found.returncode != 0 and "rank 1: MemoryError: planted" in found.stderr
 
 
-def test_more_ranks_than_rows_threads_of_ranks_and_a_fault_are_said_once(tmp_path, monkeypatch):
+def test_more_ranks_than_rows_threads_of_ranks_and_a_fault_are_reported_once(tmp_path, monkeypatch):
     case = water(basin={"cells": [8, 2], "patches": {}}, link=None)
     found = ranks(3, sys.executable, "-c", SCRIPT, json.dumps({"run": case}), tmp_path / "a")
     assert found.returncode != 0 and found.stderr.count("; expected at most 2") == 1
@@ -190,6 +190,6 @@ def test_mpi_without_mpi4py_is_named(tmp_path):
     assert 'pip install "fvsolve[mpi]"' in found.stderr
 
 
-def test_what_one_process_steps_rank_0_steps_alone(of_two):
+def test_a_run_of_a_single_process_is_stepped_by_rank_0_alone(of_two):
     said = json.loads((of_two / "ranks" / "implicit" / "summary.json").read_text())
     assert said["threads"] == 1 and "threads = 2, but one thread is used" in json.dumps(said["warnings"])

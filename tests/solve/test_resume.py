@@ -150,7 +150,7 @@ def often(monkeypatch) -> None:
         (dict(rtol=1e-4, method="rodas-5p"), dict(rtol=1e-6, method="rodas-5p")),
     ],
 )
-def test_a_run_continues_with_other_steps_and_says_so(tmp_path, often, first, second):
+def test_a_run_continues_with_other_steps_and_a_notice(tmp_path, often, first, second):
     """From the state of the checkpoint on, the result is that of the new steps alone."""
     out = tmp_path / "run"
     begun = fvsolve.run(branched(), set=ends_at(0.5, **first), out=out, pictures=False)
@@ -173,7 +173,7 @@ def test_a_run_continues_with_other_steps_and_says_so(tmp_path, often, first, se
     assert result["gate.pressure"][-1] == pytest.approx(seen["gate.pressure"], rel=1e-4 if "rtol" in second else 1e-9)
 
 
-def test_every_change_of_steps_is_kept(tmp_path, often):
+def test_every_change_of_steps_is_stored(tmp_path, often):
     for end, courant in ((0.4, 0.8), (0.6, 0.4), (0.8, 0.4), (1.0, 0.6)):
         result = fvsolve.run(branched(), set=ends_at(end, courant=courant), out=tmp_path, resume=True, pictures=False)
     first, second = result.summary["continued"]
@@ -236,7 +236,7 @@ def test_a_history_that_lost_rows_is_refused_with_a_remedy(tmp_path):
         fvsolve.run(branched(), out=tmp_path / "run", resume=True)
 
 
-def test_what_was_seen_of_a_basin_before_is_known_after(tmp_path):
+def test_observations_of_a_basin_before_a_break_are_known_after_it(tmp_path):
     """A resumed run keeps the greatest rates and the shortest waves so far, from which notices are made at its end."""
     case = alone(basin((40.0, 20.0), (16, 8), 0.2, start={"level": "where(x < 20, 0.2, 0.1)"}), 6.0, step=0.05)
     case["numerics"].pop("courant", None)
@@ -274,7 +274,7 @@ class Keeping(MemorySink):
     [{"fields": 40, "every": 1.0}, {"fields": 80, "every": 1.0}, {"fields": 0, "every": 5e-5}],
     ids=["a frame at each step", "two frames in each step", "more rows in a step than are held"],
 )
-def test_a_run_whose_steps_all_write_pauses_and_goes_on_from_there(output, monkeypatch):
+def test_a_run_that_writes_at_every_step_pauses_and_goes_on_from_there(output, monkeypatch):
     monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
     case = branched()
     case["numerics"] = {"end": 2.0, "scheme": "upwind", "method": "implicit-midpoint", "step": 0.05}

@@ -130,7 +130,7 @@ WAYS += [{"method": name, "rtol": 1e-8} for name in ("dormand-prince", "rodas-5p
 ROUNDINGS = (-5, -2, -1, 0, 1, 2, 5)
 
 
-def beside(t: float, roundings: int) -> float:
+def rounded_time(t: float, roundings: int) -> float:
     for _ in range(abs(roundings)):
         t = float(np.nextafter(t, math.copysign(math.inf, roundings)))
     return t
@@ -149,11 +149,11 @@ def filling(at: float, kind: str, numerics: dict) -> dict:
 @pytest.mark.in_turn
 @pytest.mark.parametrize("kind", ["kink", "jump"])
 @pytest.mark.parametrize("numerics", WAYS, ids=lambda way: " ".join(map(str, way.values())))
-def test_a_break_beside_a_boundary_is_as_good_as_on_it(kind, numerics):
+def test_a_break_near_a_boundary_is_as_good_as_on_it(kind, numerics):
     ends = []
     for roundings in ROUNDINGS:
         for boundary in (0.01, 0.02):
-            case = filling(beside(boundary, roundings), kind, numerics)
+            case = filling(rounded_time(boundary, roundings), kind, numerics)
             result = fvsolve.run(case)
             assert result.ok, result.reason
             model = fvsolve.build(fvsolve.load(case))

@@ -31,7 +31,7 @@ from fvsolve.studies import scenarios, sweep
 MAIN = "cases/valve-closure.toml"
 
 
-def said(result, kind: str) -> list:
+def notices_of(result, kind: str) -> list:
     return [one for one in result.warnings if one.kind == kind]
 
 
@@ -66,11 +66,11 @@ def test_the_main_case_beyond_its_limit_is_not_ok_grown_or_not(setting, fvs, tmp
     assert [one for one in before["warnings"] if one["kind"] == "step-limit"] == [limit]
 
 
-def test_what_grows_without_end_stops_and_the_ledger_says_so_too():
+def test_growth_without_end_stops_and_the_ledger_reports_it_too():
     found = fvsolve.run(MAIN, set={"numerics.step": 0.1, "output.fields": 0})
     assert found.reason.startswith("stopped: ") and "has grown to" in found.reason
-    assert [one.ok for one in said(found, "growth")] == [False]
-    assert [one.ok for one in said(found, "ledger")] == [False]
+    assert [one.ok for one in notices_of(found, "growth")] == [False]
+    assert [one.ok for one in notices_of(found, "ledger")] == [False]
 
 
 @pytest.mark.parametrize("pair", ["upwind euler", "upwind rk4"])
@@ -79,7 +79,7 @@ def test_exactly_at_the_limit_is_sound_and_just_beyond_it_is_not(pair):
     limit = advection_limit(scheme, method).limit
     for factor, ok in ((1.0, True), (1.001, False)):
         result = fvsolve.run(closing(scheme=scheme, method=method, courant=factor * limit))
-        assert result.ok is ok and len(said(result, "step-limit")) == (not ok), (factor, result.warnings)
+        assert result.ok is ok and len(notices_of(result, "step-limit")) == (not ok), (factor, result.warnings)
 
 
 @pytest.mark.parametrize("cells", [20, 40, 80, 200])
@@ -94,16 +94,16 @@ def test_the_ends_of_a_pipe_of_any_length_reduce_the_limit_of_wide_stencils(pair
     case = closing(cells, scheme=scheme, method=method, courant=long)
     case["numerics"]["end"] = 20.0
     beyond = fvsolve.run(case)
-    (notice,) = said(beyond, "step-limit")
+    (notice,) = notices_of(beyond, "step-limit")
     assert limit < long and not beyond.ok and notice.limit == pytest.approx(limit, rel=1e-9)
     assert "with reflections at the ends" in notice.text and np.ptp(beyond["gate.pressure"]) > 10.0 * jump
 
 
-def test_a_limit_said_as_a_step_is_that_of_its_courant_number():
+def test_a_limit_stated_as_a_step_is_that_of_its_courant_number():
     case = closing(scheme="upwind", method="euler", courant=1.2)
-    (by_courant,) = said(fvsolve.run(case), "step-limit")
+    (by_courant,) = notices_of(fvsolve.run(case), "step-limit")
     case["numerics"].pop("courant")
-    (by_step,) = said(fvsolve.run(case | {"numerics": {**case["numerics"], "step": 1.2 / 40}}), "step-limit")
+    (by_step,) = notices_of(fvsolve.run(case | {"numerics": {**case["numerics"], "step": 1.2 / 40}}), "step-limit")
     assert (by_step.key, by_courant.key) == ("step", "courant")
     assert by_step.value == pytest.approx(by_courant.value, rel=1e-12) and by_step.limit == by_courant.limit
     assert "give numerics.step = 0.025 s or less" in by_step.text
@@ -132,17 +132,17 @@ def test_slow_growth_that_no_run_of_this_length_shows_is_left_in_peace():
 @pytest.mark.parametrize("beta", [1e5, 1e6, 1e7])
 def test_soft_fluids_pass(beta):
     result = fvsolve.run(closing(beta=beta, scheme="upwind", method="euler", courant=1.0))
-    assert result.ok and not said(result, "growth")
+    assert result.ok and not notices_of(result, "growth")
     jump = 1e-3 / (math.pi / 4 * 0.3**2) * 1000.0 * math.sqrt(beta / 1000.0)
     assert result.extremes["gate.pressure"].maximum == pytest.approx(201325.0 + jump, rel=1e-9)
 
 
-def test_water_at_a_step_beyond_its_limit_is_said_by_check_and_run(fvs):
+def test_water_at_a_step_beyond_its_limit_is_reported_by_check_and_run(fvs):
     found = json.loads(fvs("check", "sloshing-tank", "--set", "numerics.courant=2.2", "--json")[1])
     (one,) = [w for w in found["warnings"] if w["kind"] == "step-limit"]
     assert one["place"] == "nodes.tank" and one["value"] == 2.2 and one["limit"] == pytest.approx(2.0, rel=1e-6)
     result = fvsolve.run("cases/sloshing-tank.toml", set={"numerics.courant": 2.2, "numerics.end": 2.5, "expect": {}})
-    assert not result.ok and said(result, "step-limit")
+    assert not result.ok and notices_of(result, "step-limit")
     assert fvsolve.run("cases/sloshing-tank.toml", set={"numerics.courant": 1.9, "numerics.end": 2.5, "expect": {}}).ok
 
 
@@ -158,7 +158,7 @@ def test_water_that_gets_deeper_in_a_run_is_watched_at_fixed_steps():
     model = model_of(case)
     assert not step_limits(model)
     result = fvsolve.run(case)
-    assert not result.ok and said(result, "step-limit") + said(result, "growth")
+    assert not result.ok and notices_of(result, "step-limit") + notices_of(result, "growth")
 
 
 @pytest.mark.parametrize("scheme, method", [("upwind", "euler"), ("upwind5", "rk4"), ("fromm", "ssp-rk3")])
@@ -211,7 +211,7 @@ def test_a_planted_leak_is_not_ok():
     )
 
 
-def test_relative_is_over_what_came_in_where_a_scene_starts_empty():
+def test_the_relative_remainder_is_over_the_inflow_where_a_scene_starts_empty():
     tank = {"type": "tank", "area": 1.0, "level": 0.0, "elevation": 0.0}
     nodes = {"feed": {"type": "inflow", "flow": 0.01, "elevation": 0.0}, "tank": tank}
     link = {"type": "valve", "from": "feed", "to": "tank", "area": 0.1}
@@ -229,14 +229,14 @@ def test_rows_of_a_sweep_hold_the_warnings(tmp_path):
     assert rows[0]["warnings"] == "" and "Courant number 1.1" in rows[1]["warnings"]
 
 
-def test_what_must_not_be_exceeded_follows_the_start_and_what_is_given():
+def test_the_bound_of_growth_follows_the_start_and_the_given_values():
     """The growth check stops a run above its threshold, which is at least 1e6 kg/s for an initial flow of 1 kg/s."""
     watch = RunChecks(RunData(model_of(closing(scheme="upwind", method="euler", courant=1.0))))
     assert watch.largest == pytest.approx(np.full(watch.largest.size, watch.largest[0])) and watch.largest[0] >= 1e6
     assert not watch.check(0.0, 0.99 * watch.largest) and watch.check(0.0, 1.01 * watch.largest).startswith("stopped: ")
 
 
-def test_what_grows_without_pipes_is_stopped_too():
+def test_growth_without_pipes_is_stopped_too():
     """Steps beyond the limit of a mass on a spring, or of a chamber at a rigid column, stop the run."""
     fixed = {"method": "rk4", "step": 0.03}
     body = {"type": "mass", "mass": 10.0, "initial_position": 0.01}
@@ -250,7 +250,9 @@ def test_what_grows_without_pipes_is_stopped_too():
     squeezed = scene(nodes, links, 100.0, {"method": "euler", "step": 0.5}, ["v.pressure"], 1.0)
     for case in (swings, squeezed):
         result = fvsolve.run(case)
-        assert not result.ok and (said(result, "growth") or "not finite" in result.reason), result.summary["warnings"]
+        assert not result.ok and (notices_of(result, "growth") or "not finite" in result.reason), result.summary[
+            "warnings"
+        ]
 
 
 def chattering(step: float) -> dict:
@@ -265,11 +267,11 @@ def chattering(step: float) -> dict:
     return scene(nodes, {"check": link}, 3.0, {"method": "rk4", "step": step}, ["check.flow"], 0.1)
 
 
-def test_events_that_crowd_within_one_step_are_bounded_where_nothing_grows():
+def test_events_that_crowd_within_a_step_are_bounded_where_nothing_grows():
     """A run with 3000 events in a step of 1 s stops with the name of the valve; steps of 0.1 s finish."""
     result = fvsolve.run(chattering(1.0))
     model = model_of(chattering(1.0))
-    assert "check changes its state without end" in result.reason and not result.ok and not said(result, "growth")
+    assert "check changes its state without end" in result.reason and not result.ok and not notices_of(result, "growth")
     times = [event["time"] for event in result.summary["events"]]
     assert len(times) == MOST_EVENTS_IN_SPAN + 4 * model.shapes.armed and times[-1] - times[0] < 1.0
     finer = fvsolve.run(chattering(0.1))
@@ -334,7 +336,7 @@ def test_growth_is_seen_within_sixteen_steps():
     case = closing(scheme="upwind", method="euler", courant=1.02)
     case["numerics"]["end"] = 100.0
     result = fvsolve.run(case)
-    (grown,) = said(result, "growth")
+    (grown,) = notices_of(result, "growth")
     assert result.summary["steps"] % GROWTH_CHECK_STEPS == 0
     assert 1.0 < grown.value / grown.limit <= 1.04**GROWTH_CHECK_STEPS
     assert f"{GROWTH_LIMIT * grown.value / grown.limit:.3g}" in grown.text
@@ -344,7 +346,7 @@ def test_a_run_beyond_a_limit_that_does_not_grow_stays_in_the_loop(returns):
     case = closing(scheme="upwind", method="euler", courant=1.0 + 1e-8)
     case["numerics"]["end"] = 100.0
     result = fvsolve.run(case)
-    assert said(result, "step-limit") and not said(result, "growth")
+    assert notices_of(result, "step-limit") and not notices_of(result, "growth")
     assert returns["returns"] < result.summary["steps"] / (4 * GROWTH_CHECK_STEPS)
 
 
@@ -354,7 +356,7 @@ def test_threads_stop_at_the_same_step(returns):
     one, three = (fvsolve.run(case, threads=many) for many in (1, 3))
     assert [one.summary["threads"], three.summary["threads"]] == [1, 3] and returns["returns"] < 10
     assert one.summary["steps"] % GROWTH_CHECK_STEPS == 0 and one.summary["steps"] == three.summary["steps"]
-    assert said(one, "growth") == said(three, "growth") != []
+    assert notices_of(one, "growth") == notices_of(three, "growth") != []
 
 
 LARGEST = 1e4  # [m], far above true heads: a closure from 2 m/s gives 200 m by Joukowsky
@@ -387,11 +389,11 @@ def numbers(value) -> list[float]:
 @pytest.mark.parametrize("step", [0.02, 0.2])
 def test_extremes_margins_and_claims_are_no_numbers(step: float, scheme: str) -> None:
     result = fvsolve.run(blown(step, scheme))
-    said = result.summary
-    assert not result.ok and said["invalid_from"] is not None and said["invalid_from"] <= said["t"]
-    heads = [one for key in ("extremes", "verdicts", "expectations") for one in numbers(said[key])]
+    summary = result.summary
+    assert not result.ok and summary["invalid_from"] is not None and summary["invalid_from"] <= summary["t"]
+    heads = [one for key in ("extremes", "verdicts", "expectations") for one in numbers(summary[key])]
     assert max(map(abs, heads)) <= 1e29  # tolerance of the expectations
-    assert max(map(abs, numbers({name: one for name, one in said["extremes"].items() if "head" in name}))) < LARGEST
+    assert max(map(abs, numbers({name: one for name, one in summary["extremes"].items() if "head" in name}))) < LARGEST
     assert {one.state for one in result.expectations} == {"open"}
     states = {one.name: one.state for one in result.verdicts}
     assert states["top"] == states["low"] == "open"
@@ -399,15 +401,15 @@ def test_extremes_margins_and_claims_are_no_numbers(step: float, scheme: str) ->
     assert result.extremes["lake.pressure"].maximum is not None  # constant pressure
 
 
-def test_all_that_is_printed_says_from_when(fvs, tmp_path, monkeypatch) -> None:
+def test_all_printed_notices_state_their_first_time(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(write(blown()))
     status, text, _ = fvs("run", "scene.toml", "--no-pictures", "--out", "run")
     assert status == 1 and text.count("not valid from t = ") >= 6
     assert "e+1" not in text.replace("1e+60", "").partition("note:")[0]
-    said = json.loads((tmp_path / "run" / "summary.json").read_text())
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert fvs("report", "run", "--xlsx")[0] == 0
-    assert f"not valid from t = {said['invalid_from']:.6g} s on" in (tmp_path / "run" / "report.html").read_text()
+    assert f"not valid from t = {summary['invalid_from']:.6g} s on" in (tmp_path / "run" / "report.html").read_text()
     (tmp_path / "two.toml").write_text('case = "scene.toml"\n[events.close]\n')
     found = scenarios.study(tmp_path / "two.toml", tmp_path / "out")
     assert not found.ok and found.holds == [] and "not valid from t = " in fvs("study", "two.toml", "--out", "out")[1]

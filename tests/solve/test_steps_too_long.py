@@ -28,7 +28,7 @@ def ramp(start: float, duration: float, end: float) -> dict:
     return {"start": start, "duration": duration, "value": [1.0, end]}
 
 
-def limit_said(result) -> list:
+def limit_notices(result) -> list:
     return [one for one in result.warnings if one.kind == "step-limit"]
 
 
@@ -45,7 +45,7 @@ def test_steps_longer_than_a_segment_or_than_the_run_are_not_ok_and_the_greatest
     opening, method, key, value, limit
 ):
     result = fvsolve.run(closing(opening, method=method, **{key: value}))
-    (notice,) = limit_said(result)
+    (notice,) = limit_notices(result)
     assert result.reason == "finished" and not result.ok and not notice.ok and notice.key == key
     if limit is None:
         assert "waves grow at every Courant number" in notice.text and "ssp-rk3" in notice.text
@@ -53,10 +53,10 @@ def test_steps_longer_than_a_segment_or_than_the_run_are_not_ok_and_the_greatest
     named = float(notice.text.rpartition("= ")[2].split()[0])
     assert 0.999 * limit <= named <= limit
     mended = fvsolve.run(closing(opening, method=method, **{key: named}))
-    assert mended.ok and not limit_said(mended)
+    assert mended.ok and not limit_notices(mended)
 
 
-def test_the_steps_of_a_run_end_at_breaks_and_at_least_one_is_taken():
+def test_the_steps_of_a_run_end_at_breaks_and_at_least_a_single_step_is_taken():
     model = model_of(closing(ramp(1.0, 0.05, 0.5), method="euler", step=10.0))
     steps = steps_of(model, first_step(model))
     assert (steps.given, steps.longest, steps.count) == (10.0, 1.0, 3.0)

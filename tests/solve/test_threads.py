@@ -22,7 +22,7 @@ from fvsolve.errors import FvsolveError
 DYED_MESH = {"cells": [60, 48], "holes": [[1.8, 1.25, 2.6, 1.875]]}
 
 
-class Kept(MemorySink):
+class FrameSink(MemorySink):
     """Sink in memory that also keeps field frames."""
 
     takes_fields = True
@@ -31,11 +31,11 @@ class Kept(MemorySink):
         self.frames = [*getattr(self, "frames", []), values]
 
 
-def told(case, threads: int, state=None):
+def result_bytes(case, threads: int, state=None):
     """Bytes of all results of a run, and its summary."""
     case = case | {"output": case["output"] | {"fields": 3}}
     model = fvsolve.build(fvsolve.load(case))
-    sink, state = Kept(model), state or initial_state(model)
+    sink, state = FrameSink(model), state or initial_state(model)
     sink.begin(model, state)
     run = Run(model, state, sink, None, threads)
     summary = run.go()
@@ -49,12 +49,12 @@ def told(case, threads: int, state=None):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_any_number_of_threads_gives_the_bits_of_one(name):
+def test_any_number_of_threads_gives_the_same_bits(name):
     case = SCENES[name]
     assert not single_thread_reason(fvsolve.build(fvsolve.load(case)))
-    bits, one = told(case, 1)
+    bits, one = result_bytes(case, 1)
     for threads in (2, 3, 4):
-        found, summary = told(case, threads)
+        found, summary = result_bytes(case, threads)
         assert found == bits, threads
         assert summary.threads == threads and summary.ledgers == one.ledgers
 
@@ -67,23 +67,23 @@ FORMED = ("muscl, ssp-rk2", "muscl, a limiter of its own, rk4", "upwind5, ssp-rk
 @pytest.mark.in_turn
 @pytest.mark.parametrize("name", FORMED)
 @pytest.mark.parametrize("cells", [1, 20, 10**6])
-def test_stages_formed_beside_rates_have_the_bits_of_those_formed_after_all(name, cells, monkeypatch):
+def test_stages_formed_with_rates_have_the_bits_of_those_formed_after_all(name, cells, monkeypatch):
     """Blocked stages have the bits of whole stages, for several block sizes and numbers of threads."""
-    bits, _ = told(SCENES[name], 1)
+    bits, _ = result_bytes(SCENES[name], 1)
     here = importlib.import_module("fvsolve.core.solve.partition")
     monkeypatch.setattr(here, "LEAST_STATES", 0)
     monkeypatch.setattr(here, "CACHED_CELLS", cells)
     model = fvsolve.build(fvsolve.load(SCENES[name]))
     assert RunLoop(model).stepper.structure.size > 0
-    assert told(SCENES[name], 1)[0] == bits
-    assert told(SCENES[name], 3)[0] == bits
+    assert result_bytes(SCENES[name], 1)[0] == bits
+    assert result_bytes(SCENES[name], 3)[0] == bits
 
 
-def test_as_many_threads_as_rows():
-    assert told(water(), 12)[0] == told(water(), 1)[0]
+def test_number_of_threads_may_equal_that_of_rows():
+    assert result_bytes(water(), 12)[0] == result_bytes(water(), 1)[0]
 
 
-def test_two_basins_and_one_that_each_steps_whole():
+def test_two_basins_with_a_basin_that_each_thread_steps_as_a_whole():
     """Several basins give equal bits, although each thread computes all cells of a small mesh that is not a grid."""
     case = water()
     case["nodes"]["round"] = {"type": "basin", "size": [2.0, 2.0], "cells": [6, 6], "holes": [[0.0, 0.0, 1.0, 1.0]],
@@ -93,8 +93,8 @@ def test_two_basins_and_one_that_each_steps_whole():
     for name in ("round", "other"):
         case["links"][name] = VALVE | {"from": f"{name}.near", "to": "pool.near"}
     case = with_maxima(case, "pool", "round", "other")
-    bits, _ = told(case, 1)
-    found, summary = told(case, 3)
+    bits, _ = result_bytes(case, 1)
+    found, summary = result_bytes(case, 3)
     assert found == bits
     (notice,) = [one for one in summary.warnings if one.kind == "threads"]
     why = "round: its mesh is not a full rectangle and has fewer than 2048 cells"
@@ -145,7 +145,7 @@ def test_bands_that_do_not_wait_for_each_other_are_seen():
     assert any(stepped(case, 2, race) != whole for _ in range(5))
 
 
-def test_handles_of_threads_are_made_again_only_where_an_array_has_grown():
+def test_handles_of_threads_are_formed_again_only_where_an_array_has_grown():
     """A run pauses many times; a handle for each pause would fill the memory."""
     model = fvsolve.build(fvsolve.load(water(end=1.0)))
     loop = RunLoop(model, threads=2)
@@ -208,7 +208,7 @@ ALONE = {
 
 
 @pytest.mark.parametrize("name", ALONE)
-def test_what_one_thread_steps_is_said(name):
+def test_work_of_a_single_thread_is_reported(name):
     case, why = ALONE[name]
     model = fvsolve.build(fvsolve.load(case))
     assert why in single_thread_reason(model) and divisible_rows(model)["most"] == 1
@@ -231,6 +231,6 @@ def test_more_threads_than_rows_are_named():
         fvsolve.run(water(basin=MESH), threads=13)
 
 
-def test_check_says_what_can_be_shared_out(fvs):
+def test_check_states_the_shareable_parts(fvs):
     assert "threads: up to 50 share 50 rows of tank" in fvs("check", "dam-break")[1]
     assert "threads: 1; plain: its mesh is not a full rectangle" in fvs("check", "flooding")[1]

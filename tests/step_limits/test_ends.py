@@ -54,7 +54,7 @@ def courant_limit(scheme: str, cells: int, method: str) -> float:
 
 
 @pytest.mark.parametrize("scheme", ["linear-upwind", "fromm", "central", "upwind3", "upwind5"])
-def test_the_factor_is_what_the_ends_ask_for_and_no_more(scheme):
+def test_the_factor_is_exactly_that_of_the_ends(scheme):
     inside = 0.9 * min(1.0, advection_limit(scheme, "ssp-rk3").limit)
     for cells in range(1, 13):
         asked = max(1.0, inside / courant_limit(scheme, cells, "ssp-rk3"))
@@ -63,7 +63,7 @@ def test_the_factor_is_what_the_ends_ask_for_and_no_more(scheme):
 
 
 @pytest.mark.parametrize("scheme", WEIGHTS)
-def test_a_short_pipe_decays_below_its_limit_and_grows_beyond_it_and_is_told_so(scheme):
+def test_a_short_pipe_decays_below_its_limit_and_grows_beyond_it_with_a_notice(scheme):
     """The limit of a short pipe between reflecting ends separates decay and growth of the powers of its step.
 
     The ends are two lakes, or a lake and an inflow.
@@ -78,7 +78,7 @@ def test_a_short_pipe_decays_below_its_limit_and_grows_beyond_it_and_is_told_so(
 
 
 @pytest.mark.parametrize("limiter", ["minmod", "van-leer", "monotonized-central"])
-def test_a_limiter_bears_a_little_more_than_what_it_is_where_all_is_smooth(limiter):
+def test_a_limiter_tolerates_a_little_more_than_its_smooth_limit(limiter):
     """With a limiter noise does not grow below the limit of `fromm`, and grows at 1.5 times this limit."""
     rng = np.random.default_rng(5)
     for cells in (2, 3, 4, 5, 8):
@@ -96,7 +96,7 @@ def test_a_limiter_bears_a_little_more_than_what_it_is_where_all_is_smooth(limit
             assert [one.ok for one in step_limits(model)] == ([False] if grows else [])
 
 
-def test_a_short_pipe_whose_waves_do_not_come_back_is_but_doubtful():
+def test_a_short_pipe_without_returning_waves_is_only_doubtful():
     """Four cells at Courant number 0.55 grow between two lakes; between long pipes the notice does not fail the run."""
     found = []
     for far in (False, True):
@@ -115,7 +115,7 @@ def test_a_short_pipe_whose_waves_do_not_come_back_is_but_doubtful():
 
 @pytest.mark.parametrize("cells", [5, 12, 30, 39])
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_proved_limit_is_one_of_few_cells_too_grown_or_not(cells, turned):
+def test_a_proved_limit_of_few_cells_separates_growth(cells, turned):
     """The proved limit 1 of upwind with Euler also holds for few cells, before growth is visible.
 
     Twenty steps at Courant number 1.05 multiply the shortest wave by seven.
@@ -130,7 +130,7 @@ def test_a_proved_limit_is_one_of_few_cells_too_grown_or_not(cells, turned):
     assert found == [(True, []), (False, [("links.main", pytest.approx(1.0))])]
 
 
-def test_upwind_keeps_its_step_so_that_courant_one_stays_exact():
+def test_upwind_retains_its_step_so_that_courant_1_stays_exact():
     assert not SCHEMES["upwind"].end_factors
     assert all(end_rate_factor("upwind", cells) == 1.0 for cells in range(1, 20))
 

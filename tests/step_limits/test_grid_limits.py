@@ -132,7 +132,7 @@ def stepped(weights, method, courant: Fraction, u: Fraction) -> Fraction:
 @pytest.mark.in_turn
 @pytest.mark.parametrize("method", DISTINCT)
 @pytest.mark.parametrize("scheme", WEIGHTS)
-def test_exact_steps_of_exact_waves_do_not_grow_below_the_limit_and_one_does_above(scheme, method):
+def test_exact_steps_of_exact_waves_do_not_grow_below_the_limit_and_a_wave_does_above(scheme, method):
     found, weights = advection_limit(scheme, method), weights_of(scheme)
     slack = Fraction(1, 10**35) if found.digits else 0  # for rounded published digits
     near = Fraction(math.tan(min(found.theta, 3.1) / 2)).limit_denominator(4096)
@@ -162,7 +162,7 @@ def test_the_symbol_is_that_of_the_compiled_weights(scheme):
 # ---- stability above a Courant number
 
 
-def test_downwind_differences_with_implicit_euler_are_stable_from_one_on():
+def test_downwind_differences_with_implicit_euler_are_stable_from_1_on():
     """|1 - nu z|^2 - 1 = 2 nu (nu - 1)(1 - cos theta), so implicit Euler is stable from nu = 1 on."""
     found = limit_of(down, "downwind", "implicit-euler")
     assert found.limit == 0.0 and found.stable == ((pytest.approx(1.0, rel=1e-11), math.inf),) and found.proved
@@ -234,7 +234,7 @@ def test_a_square_that_touches_zero_at_a_corner_is_not_negative():
 
 @examples(60)
 @given(st.lists(st.lists(st.integers(-5, 5), min_size=4, max_size=4), min_size=3, max_size=4), st.integers(0, 40))
-def test_a_point_that_is_found_is_negative_and_where_none_is_there_is_none(g, lift):
+def test_a_located_point_is_negative_and_where_none_is_located_none_exists(g, lift):
     g = [list(row) for row in g]
     g[0][0] += lift
     found = negative_point(g, Fraction(0), Fraction(2))
@@ -249,7 +249,7 @@ def test_a_point_that_is_found_is_negative_and_where_none_is_there_is_none(g, li
 
 
 @pytest.fixture
-def said(monkeypatch, capsys, tmp_path):
+def command_in_folder(monkeypatch, capsys, tmp_path):
     """Function that runs a command in an empty directory and returns exit code, standard output and standard error."""
     monkeypatch.chdir(tmp_path)
 
@@ -266,16 +266,18 @@ def said(monkeypatch, capsys, tmp_path):
     return run
 
 
-def test_the_table_has_every_scheme_and_every_method(said):
-    code, out, _ = said("stability")
+def test_the_table_has_every_scheme_and_every_method(command_in_folder):
+    code, out, _ = command_in_folder("stability")
     assert code == 0
     assert all(name in out for name in (*WEIGHTS, *EXPLICIT, *IMPLICIT))
     row = next(line.split() for line in out.splitlines() if line.startswith("ssp-rk2"))
     assert row[1:3] == ["1.0000000", "s"] and "0.8735805" in row and row.count("none") == 2
 
 
-def test_json_says_what_python_says(said):
-    code, out, _ = said("stability", "--scheme", "upwind3,central", "--method", "ssp-rk3,gauss-4", "--json")
+def test_json_equals_the_result_of_python(command_in_folder):
+    code, out, _ = command_in_folder(
+        "stability", "--scheme", "upwind3,central", "--method", "ssp-rk3,gauss-4", "--json"
+    )
     found = json.loads(out)
     assert code == 0 and found.keys() == {"limits", "measured", "limited"}
     assert found["limits"] == json.loads(
@@ -284,12 +286,12 @@ def test_json_says_what_python_says(said):
     assert [one["limit"] for one in found["limits"]][2:] == [None, None]
 
 
-def test_one_pair_is_explained(said):
-    _, out, _ = said("stability", "--scheme", "upwind3", "--method", "ssp-rk2")
+def test_a_single_pair_is_explained(command_in_folder):
+    _, out, _ = command_in_folder("stability", "--scheme", "upwind3", "--method", "ssp-rk2")
     assert "0.8735804647" in out and "longest waves" in out and "thousandfold in 1.137e+06 steps" in out
-    _, out, _ = said("stability", "--scheme", "upwind3", "--method", "gauss-4")
+    _, out, _ = command_in_folder("stability", "--scheme", "upwind3", "--method", "gauss-4")
     assert "stable at every Courant number" in out
-    _, out, _ = said("stability", "--scheme", "central", "--method", "euler")
+    _, out, _ = command_in_folder("stability", "--scheme", "central", "--method", "euler")
     assert "grows at every step" in out
 
 
@@ -304,8 +306,8 @@ def test_one_pair_is_explained(said):
         (("--steps", "1"), "expected 10 or more"),
     ],
 )
-def test_what_cannot_be_asked_is_refused(said, words, wanted):
-    code, out, err = said("stability", *words)
+def test_impossible_requests_are_refused(command_in_folder, words, wanted):
+    code, out, err = command_in_folder("stability", *words)
     assert (code, out) == (2, "") and wanted in err
 
 
@@ -315,7 +317,7 @@ def test_a_scheme_without_fixed_weights_has_no_exact_limit():
 
 
 @pytest.mark.parametrize("courant", [0.1, 0.3, 1.7])
-def test_growth_is_quoted_where_it_is_asked_for(courant, said):
+def test_growth_is_quoted_on_request(courant, command_in_folder):
     """The growth at a given Courant number is stated; Euler with central differences has |R(iy)|^2 = 1 + nu^2."""
     one = advection_limit("central", "euler", courant)
     assert one.courant == courant and one.growth == pytest.approx(math.hypot(1, courant) - 1, rel=1e-12)
@@ -323,7 +325,7 @@ def test_growth_is_quoted_where_it_is_asked_for(courant, said):
     for scheme, method in (("central", "rk4"), ("upwind5", "gauss-4")):
         still = advection_limit(scheme, method, courant)
         assert still.growth == 0.0 and still.steps is None
-    _, out, _ = said("stability", "--scheme", "upwind5", "--method", "gauss-4", "--courant", str(courant))
+    _, out, _ = command_in_folder("stability", "--scheme", "upwind5", "--method", "gauss-4", "--courant", str(courant))
     assert f"at Courant number {courant:g} no wave grows" in out
 
 
@@ -346,7 +348,7 @@ def test_growth_a_step_is_the_greatest_amplification():
     assert growth == pytest.approx(math.sqrt(1.25) - 1, rel=1e-12) and theta == pytest.approx(math.pi / 2, abs=1e-6)
 
 
-def test_the_page_shows_what_is_computed():
+def test_the_page_shows_computed_values():
     """The first table of docs/stability-grid.md contains the computed limits, and the letters of their waves."""
     page = folders.page("stability-grid")
     rows = [
@@ -380,6 +382,6 @@ def test_all_keys_of_a_limit_are_on_the_page():
 )
 def test_check_warns_of_a_courant_number_beyond_the_limit(fvs, numerics, word):
     words = [part for one in numerics for part in ("--set", f"numerics.{one}")]
-    said = json.loads(fvs("check", "valve-closure", *words, "--json")[1])["warnings"]
-    found = [one["text"] for one in said if one["kind"] == "step-limit"]
+    warnings = json.loads(fvs("check", "valve-closure", *words, "--json")[1])["warnings"]
+    found = [one["text"] for one in warnings if one["kind"] == "step-limit"]
     assert len(found) == (word is not None) and all(word in text for text in found)

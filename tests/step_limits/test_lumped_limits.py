@@ -27,7 +27,7 @@ def hole(start: str, end: str, diameter: float, opening=1.0) -> dict:
     return {"type": "orifice", "from": start, "to": end, "diameter": diameter, "opening": opening}
 
 
-def said(notices, kind: str) -> list:
+def notices_of(notices, kind: str) -> list:
     return [one for one in notices if one.kind == kind]
 
 
@@ -60,7 +60,7 @@ def test_the_limit_of_a_damped_swing_is_that_of_its_eigenvalues(method):
         right = 0.01 * np.exp(-60.0 * t) * (np.cos(w * t) + 60.0 / w * np.sin(w * t))
         wrong = np.mean(np.abs(result["load.position"] - right)) / 0.01
         assert result.ok is bool(wrong < 0.05 and not grows)  # Euler is wrong: nearly no decay at its limit
-        assert grows or np.abs(result["load.position"]).max() == 0.01 and not said(result.warnings, "step-limit")
+        assert grows or np.abs(result["load.position"]).max() == 0.01 and not notices_of(result.warnings, "step-limit")
         if grows and result.reason == "finished":
             assert np.abs(result["load.position"]).max() > 100.0
         if grows:
@@ -68,7 +68,7 @@ def test_the_limit_of_a_damped_swing_is_that_of_its_eigenvalues(method):
 
 
 @pytest.mark.parametrize("given, rate", [({"decay": 400.0}, 400.0), ({"diffusivity": 1e4}, 4e4 / 100.0)])
-def test_what_a_pipe_carries_has_the_limit_of_the_real_axis(given, rate):
+def test_diffusion_in_a_pipe_has_the_limit_of_the_real_axis(given, rate):
     """The limit of rk4 for decay at 400 1/s is 2.7853 / 400 s = 6.963 ms.
 
     The rate of the shortest wave under a diffusivity of 1e4 m2/s is equal.
@@ -109,7 +109,7 @@ def test_friction_that_brakes_quicker_than_waves_cross_a_cell_is_foretold(scheme
     for factor, grows in ((0.98, False), (1.1, True)):
         assert [x.ok for x in step_limits(model_of(capillary(factor * bears, scheme)))] == ([False] if grows else [])
         result = fvsolve.run(capillary(factor * bears, scheme))
-        grown = bool(said(result.warnings, "growth")) or "not finite" in result.reason
+        grown = bool(notices_of(result.warnings, "growth")) or "not finite" in result.reason
         assert result.ok is not grows and grown is grows
 
 
@@ -124,12 +124,12 @@ def test_friction_that_remembers_has_a_limit_of_its_own():
             nodes, links, 6.0, {"scheme": "upwind", "method": "rk4", "step": h}, ["line.flow"], 0.1, fluid=fluid
         )
         before, result = step_limits(model_of(case)), fvsolve.run(case)
-        found.append(([(x.place, x.ok) for x in before], result.ok, bool(said(result.warnings, "growth"))))
+        found.append(([(x.place, x.ok) for x in before], result.ok, bool(notices_of(result.warnings, "growth"))))
     beyond = ([("line.memory", False)], False, True)
     assert found == [beyond, ([], True, False), beyond]
 
 
-def test_what_spreads_in_a_basin_has_the_limit_of_its_shortest_wave():
+def test_diffusion_in_a_basin_has_the_limit_of_its_shortest_wave():
     """Diffusion in 8 x 8 cells of 1/8 m between walls has the greatest rate 4 D cos^2(pi / 16) (64 + 64) 1/s."""
     spreads, limit = 0.01, 2.785293563 / (4 * 0.01 * 128 * math.cos(math.pi / 16) ** 2)
     dye = "exp(-100*((x-0.3)^2+(y-0.5)^2))"
@@ -142,7 +142,7 @@ def test_what_spreads_in_a_basin_has_the_limit_of_its_shortest_wave():
         case["scalars"] = {"dye": {"diffusivity": spreads}}
         before, result = step_limits(model_of(case)), fvsolve.run(case)
         assert [one.ok for one in before] == ([False] if grows else []) and result.ok is not grows
-        assert bool(said(result.warnings, "growth")) is grows
+        assert bool(notices_of(result.warnings, "growth")) is grows
         if grows:
             assert before[0].limit == pytest.approx(limit, rel=1e-2) and before[0].place == "pool.dye"
 
@@ -154,7 +154,7 @@ def vessel(end: float, first=1.0, second=1.0, pressure=None, volume=0.01, **nume
     return scene(nodes, links, end, numerics, ["c.pressure"], end / 100)
 
 
-def beside_a_pipe(end: float, **numerics) -> dict:
+def chamber_on_main(end: float, **numerics) -> dict:
     """Case of a chamber of 1 l behind an orifice at the end of a main."""
     nodes = {"lake": lake(50.0), "t": junction(), "c": chamber(0.001), "low": reservoir(2e5)}
     links = {
@@ -169,7 +169,7 @@ SWINGS = {
     "moved at the start": lambda **n: vessel(2.0, pressure=5e5, **n),
     "narrowed slowly": lambda **n: vessel(2.0, second=ramp(0.5, 1.0, 1.0, 0.8), **n),
     "opened at once": lambda **n: vessel(2.0, first=step(1.0, 0.0, 1.0), **n),
-    "behind a pipe": lambda **n: beside_a_pipe(1.5, **n),
+    "behind a pipe": lambda **n: chamber_on_main(1.5, **n),
 }
 
 
@@ -182,15 +182,15 @@ def test_a_vessel_that_swings_between_wrong_pressures_is_not_ok(how, method):
     """
     result = fvsolve.run(SWINGS[how](method=method, step=7.5e-3))
     assert result.reason == "finished" and np.ptp(result["c.pressure"]) > 1e7 and not result.ok
-    assert [one.ok for one in said(result.warnings, "step-error")] == [False]
+    assert [one.ok for one in notices_of(result.warnings, "step-error")] == [False]
     (before,) = step_limits(model_of(SWINGS[how](method=method, step=7.5e-3)))
     assert not before.ok and before.place == "c.mass" and "or less" in before.text
 
 
 @pytest.mark.parametrize("how", ["narrowed slowly", "opened at once"])
-def test_at_a_step_that_holds_the_same_vessel_is_right_and_nothing_is_said(how):
+def test_at_a_stable_step_the_same_vessel_is_right_without_a_notice(how):
     result = fvsolve.run(SWINGS[how](method="rk4", step=2e-5))
-    assert result.ok and not said(result.warnings, "step-error") and not said(result.warnings, "step-limit")
+    assert result.ok and not notices_of(result.warnings, "step-error") and not notices_of(result.warnings, "step-limit")
     right = fvsolve.run(SWINGS[how](**{k: v for k, v in EXACT.items() if k != "scheme"}))
     at = np.searchsorted(result.t, right.t[-1])
     assert result["c.pressure"][at] == pytest.approx(right["c.pressure"][-1], rel=1e-6)
@@ -206,17 +206,17 @@ def draining(method: str, parts: float) -> tuple:
 
 
 @pytest.mark.parametrize("parts, verdict", [(0.5, [False]), (2, [False]), (8, [True]), (60, [])])
-def test_implicit_steps_that_are_too_long_are_told_though_nothing_grows(parts, verdict):
+def test_implicit_steps_that_are_too_long_are_reported_though_nothing_grows(parts, verdict):
     """Steps of implicit Euler that are too long for a draining tank give a notice and fail the run."""
     result, wrong = draining("implicit-euler", parts)
-    assert result.reason == "finished" and [one.ok for one in said(result.warnings, "step-error")] == verdict
+    assert result.reason == "finished" and [one.ok for one in notices_of(result.warnings, "step-error")] == verdict
     assert result.ok is (False not in verdict) and (wrong > 0.1 or result.ok) and (wrong < 0.05 or not result.ok)
 
 
 @pytest.mark.parametrize("method", ["trapezoid", "radau-iia-3"])
-def test_a_parabola_is_right_by_two_steps_of_second_order_and_nothing_is_said(method):
+def test_a_parabola_is_right_by_two_steps_of_second_order_without_a_notice(method):
     result, wrong = draining(method, 2)
-    assert wrong < 1e-9 and result.ok and not said(result.warnings, "step-error")
+    assert wrong < 1e-9 and result.ok and not notices_of(result.warnings, "step-error")
 
 
 WASHED = [
@@ -228,7 +228,7 @@ WASHED = [
 
 
 @pytest.mark.parametrize("method, courant, verdict", WASHED)
-def test_waves_that_implicit_steps_wash_out_are_told(method, courant, verdict):
+def test_waves_damped_by_implicit_steps_are_reported(method, courant, verdict):
     """A frictionless wave of amplitude rho a u that long implicit steps damp gives a notice."""
     nodes = {"lake": lake(100.0), "end": junction(step(0.1, 0.05, 0.0))}
     links = {"main": pipe("lake", "end", 1000.0, 0.3, 1000.0, 50)}
@@ -237,13 +237,16 @@ def test_waves_that_implicit_steps_wash_out_are_told(method, courant, verdict):
     swing, still = 1e6 * 0.05 / (math.pi / 4 * 0.3**2), result["end.pressure"][0]
     right = np.where(result.t < 0.1, 0.0, np.where((result.t - 0.1) % 4.0 < 2.0, swing, -swing))
     wrong = np.mean(np.abs(result["end.pressure"] - still - right)) / (2.0 * swing)
-    told = said(result.warnings, "step-error")
-    assert [one.ok for one in told] == verdict and {one.place for one in told} <= {"main.forward", "main.backward"}
+    notice = notices_of(result.warnings, "step-error")
+    assert [one.ok for one in notice] == verdict and {one.place for one in notice} <= {
+        "main.forward",
+        "main.backward",
+    }
     assert wrong < 0.03 if not verdict else wrong > 0.1
-    assert result.ok is (False not in verdict) and all(one.key == "courant" for one in told)
+    assert result.ok is (False not in verdict) and all(one.key == "courant" for one in notice)
 
 
-def test_waves_of_a_hundred_times_joukowskys_pressure_that_do_not_reach_what_counts_as_growth_are_told():
+def test_waves_of_a_hundred_times_joukowskys_pressure_below_the_threshold_of_growth_are_reported():
     """Spurious waves of 120 MPa by weno5 with rodas-4 give a notice, although they stay below the growth check.
 
     The linearised scheme grows until its weights change.
@@ -252,13 +255,13 @@ def test_waves_of_a_hundred_times_joukowskys_pressure_that_do_not_reach_what_cou
     links = {"main": pipe("lake", "end", 1000.0, 0.3, 1000.0, 50, friction={"model": "quasi-steady", "factor": 0.02})}
     numerics = {"scheme": "weno5", "method": "rodas-4", "step": 0.6}
     result = fvsolve.run(scene(nodes, links, 8.1, numerics, ["end.pressure"], 0.05))
-    (told,) = said(result.warnings, "step-error")
-    assert np.ptp(result["end.pressure"]) > 1e7 and not result.ok and not told.ok and told.value > 1.0
+    (notice,) = notices_of(result.warnings, "step-error")
+    assert np.ptp(result["end.pressure"]) > 1e7 and not result.ok and not notice.ok and notice.value > 1.0
 
 
-def test_what_never_moves_is_ok_and_told_of_the_limit_all_the_same():
+def test_a_constant_state_is_ok_with_a_notice_of_the_limit():
     result = fvsolve.run(vessel(1.0, method="euler", step=0.01))
-    (one,) = said(result.warnings, "step-limit")
+    (one,) = notices_of(result.warnings, "step-limit")
     assert result.ok and one.ok and "this run shows no growth" in one.text and np.ptp(result["c.pressure"]) < 1.0
 
 
@@ -268,11 +271,11 @@ def test_chatter_about_a_drop_of_zero_that_is_too_small_to_matter_is_left_in_pea
     result = fvsolve.run(
         scene(nodes, {"way": hole("one", "two", 0.03)}, 4000.0, {"method": "euler", "step": 1.0}, ["one.level"], 40.0)
     )
-    assert result.ok and not said(result.warnings, "step-error") and not said(result.warnings, "step-limit")
+    assert result.ok and not notices_of(result.warnings, "step-error") and not notices_of(result.warnings, "step-limit")
     assert result["one.level"][-1] == pytest.approx(2.5, abs=1e-5)
 
 
-def test_two_bladders_and_a_column_are_told_by_check_that_euler_never_holds():
+def test_two_bladders_and_a_column_are_reported_by_check_as_unstable_with_euler():
     nodes = {
         name: {"type": "accumulator", "volume": volume, "precharge": 4.877e5, "initial_pressure": pressure}
         for name, volume, pressure in (("a", 0.00499, 1.2e6), ("b", 0.9755, 2.57e5))
@@ -336,7 +339,7 @@ def drawn(rng) -> tuple[dict, dict[str, float]]:
     return scene(nodes, links, steps * h, numerics | {"step": h}, list(spread), 3 * h), spread
 
 
-def test_a_resumed_run_remembers_what_was_seen(tmp_path, monkeypatch):
+def test_a_resumed_run_retains_its_observations(tmp_path, monkeypatch):
     case = SWINGS["moved at the start"](method="rk4", step=2.0 / 20000, volume=0.002)
     unbroken = fvsolve.run(case)
     monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
@@ -348,13 +351,13 @@ def test_a_resumed_run_remembers_what_was_seen(tmp_path, monkeypatch):
     assert fvsolve.run(case, out=tmp_path / "run", progress=enough).reason.startswith("interrupted")
     resumed = fvsolve.run(case, out=tmp_path / "run", resume=True)
     assert resumed.reason == "finished" and resumed.warnings == unbroken.warnings
-    assert said(resumed.warnings, "step-error")
+    assert notices_of(resumed.warnings, "step-error")
 
 
 MASS, STIFF, END = 2.0, 32.0, 200.0  # mass [kg] and stiffness [N/m] of an oscillator with 4 rad/s; end [s]
 
 
-def beside_a_pond(nodes, links, probes, method="ssp-rk2", **numerics):
+def with_pond(nodes, links, probes, method="ssp-rk2", **numerics):
     """Case of oscillating parts and a basin at rest, whose waves determine the step."""
     pond = {"type": "basin", "size": [4.0, 1.0], "cells": [16, 1], "level": 1.0}
     more = numerics or {"courant": 0.8}
@@ -366,7 +369,7 @@ def sprung(damping=0.0, **more):
     links = {"s": {"type": "spring", "from": "ground", "to": "m", "stiffness": STIFF}}
     if damping:
         links["d"] = {"type": "damper", "from": "ground", "to": "m", "damping": damping}
-    return beside_a_pond(nodes, links, ["m.velocity", "m.position"], **more)
+    return with_pond(nodes, links, ["m.velocity", "m.position"], **more)
 
 
 def grown(result) -> float:
@@ -374,15 +377,15 @@ def grown(result) -> float:
     return math.hypot(result["m.velocity"][-1], math.sqrt(STIFF / MASS) * result["m.position"][-1]) / 0.1
 
 
-def told(case):
+def swings_and_result(case):
     """Notices of oscillations, and result of the run."""
     result = fvsolve.run(case)
     return [one for one in result.warnings if one.kind == "swing"], result
 
 
-def test_a_swing_that_ssp_rk2_feeds_is_told_with_by_how_much_it_grows():
+def test_an_oscillation_amplified_by_ssp_rk2_is_reported_with_its_growth():
     """A notice states the growth of an oscillator under ssp-rk2, sqrt(1 + (w h)^4 / 4) per step."""
-    (one,), result = told(sprung())
+    (one,), result = swings_and_result(sprung())
     h = END / result.summary["steps"]
     wanted = (1.0 + (math.sqrt(STIFF / MASS) * h) ** 4 / 4.0) ** (0.5 * END / h)
     assert 1.05 < wanted < 1.2
@@ -395,27 +398,27 @@ def test_a_swing_that_ssp_rk2_feeds_is_told_with_by_how_much_it_grows():
     )
 
 
-def test_what_it_asks_for_helps():
-    (one,), _ = told(sprung())
+def test_the_recommended_step_helps():
+    (one,), _ = swings_and_result(sprung())
     courant = float(one.text.partition("numerics.courant = ")[2].partition(",")[0])
-    _, result = told(sprung(courant=courant))
+    _, result = swings_and_result(sprung(courant=courant))
     assert grown(result) == pytest.approx(1.01, abs=1e-4)
-    assert not told(sprung(method="ssp-rk3"))[0] and not told(sprung(method="rk4"))[0]
+    assert not swings_and_result(sprung(method="ssp-rk3"))[0] and not swings_and_result(sprung(method="rk4"))[0]
 
 
-def test_what_is_damped_and_what_is_wrong_by_far():
-    assert not told(sprung(damping=0.05))[0]
-    (one,), _ = told(sprung(method="euler", courant=0.05))
+def test_damped_and_far_too_wrong_runs():
+    assert not swings_and_result(sprung(damping=0.05))[0]
+    (one,), _ = swings_and_result(sprung(method="euler", courant=0.05))
     assert not one.ok and one.value > 10.0
 
 
-def test_a_body_that_swings_is_one_and_check_says_so_too(tmp_path, fvs):
+def test_an_oscillating_body_is_reported_also_by_check(tmp_path, fvs):
     from fvsolve.case.text import write
 
-    case = beside_a_pond({"arm": pendulum(0.1)}, {}, ["arm.angle"])
-    (one,), result = told(case)
+    case = with_pond({"arm": pendulum(0.1)}, {}, ["arm.angle"])
+    (one,), result = swings_and_result(case)
     late = np.abs(result["arm.angle"][result.t > END - 4.0]).max() / 0.1
     assert one.place.startswith("arm.") and late == pytest.approx(one.value, rel=5e-3)
     (tmp_path / "arm.toml").write_text(write(case))
-    code, said, _ = fvs("check", tmp_path / "arm.toml")
-    assert code == 0 and "an oscillation at 0.59" in said
+    code, printed, _ = fvs("check", tmp_path / "arm.toml")
+    assert code == 0 and "an oscillation at 0.59" in printed

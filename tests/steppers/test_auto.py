@@ -54,7 +54,7 @@ def test_it_turns_implicit_where_the_scene_turns_stiff_and_back_where_that_ends(
     assert result.summary["steps"] < 0.2 * servo(method="dormand-prince", rtol=1e-6).summary["steps"]
 
 
-def test_what_it_says_of_the_rate_and_the_step_fits_together():
+def test_stated_rate_and_step_agree():
     """The reported rate times the reported step of explicit methods is between 0.5 and 10."""
     for case in ("chamber-chain", "pipe-tiny-chamber"):
         result = fvsolve.run(CASES / f"{case}.toml", set={"numerics.method": "auto", "numerics.rtol": 1e-6})

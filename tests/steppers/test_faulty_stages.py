@@ -72,7 +72,7 @@ def test_given_steps_end_at_a_faulty_stage_as_at_a_faulty_state(method):
     assert abs(result.ledger["mass"]["relative"]) < 1e-14
 
 
-def test_a_method_whose_stages_miss_the_fault_does_not_stop():
+def test_a_method_with_stages_that_miss_the_fault_does_not_stop():
     assert fvsolve.run(pulse("ssp-rk2")).ok
 
 
@@ -90,7 +90,7 @@ def functions_with_gap(functions):
 
 @pytest.mark.parametrize("silent", [False, True], ids=["status", "nan"])
 @pytest.mark.parametrize("name", EXPLICIT + IMPLICIT)
-def test_error_control_rejects_a_step_whose_end_has_no_valid_rates(name, silent, functions_with_gap):
+def test_error_control_rejects_a_step_with_invalid_rates_at_its_end(name, silent, functions_with_gap):
     """The gap is at the end of the first step; the stages of Rosenbrock methods are not there."""
 
     def run(at: float, budget: float):

@@ -91,11 +91,11 @@ SCENES = [
 ]
 
 
-def said(given) -> str:
+def settings_text(given) -> str:
     return given.__name__ if callable(given) else " ".join(str(one) for one in given.values())
 
 
-@pytest.mark.parametrize("at", range(len(SCENES)), ids=["-".join(map(said, one)) for one in SCENES])
+@pytest.mark.parametrize("at", range(len(SCENES)), ids=["-".join(map(settings_text, one)) for one in SCENES])
 def test_newton_finds_every_stage_and_parts_listed_the_other_way_round_take_the_same_steps(at):
     build, numerics = SCENES[at]
     case = build(**numerics)

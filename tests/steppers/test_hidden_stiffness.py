@@ -17,7 +17,7 @@ A = np.array([
 ])  # fmt: skip
 
 
-def found_in(rates, start, lengths, size=1e-6):
+def windows_in(rates, start, lengths, size=1e-6):
     """Ends of windows at which steps of Dormand and Prince have returned; rates : function (t, y) -> float64[n]"""
     y, t, found = np.array(start, dtype=float), 0.0, []
     run = SimpleNamespace(
@@ -36,17 +36,17 @@ def found_in(rates, start, lengths, size=1e-6):
     return any(found)
 
 
-def bent(t, y):
+def steep_tanks(t, y):
     """Flow between two tanks near one level, steep at zero, beside a tank that fills steadily."""
     flow = math.copysign(abs(y[0]) ** 0.54, y[0]) if abs(y[0]) > 1e-3 else y[0] / 1e-3**0.46
     return np.array([-flow, flow, 5.0])
 
 
 @pytest.mark.parametrize("length", [0.35, 0.3, 0.25])
-def test_a_cycle_that_repeats_itself_is_found(length):
+def test_a_cycle_that_repeats_itself_is_detected(length):
     """The difference of levels stays where stages cancel each other, though its rate is not zero."""
-    linear = found_in(lambda t, y: np.array([-y[0]]), [1e-3], [0.1] * 100)
-    assert found_in(bent, [0.01, 0.0, 0.0], [length] * 200) and not linear
+    linear = windows_in(lambda t, y: np.array([-y[0]]), [1e-3], [0.1] * 100)
+    assert windows_in(steep_tanks, [0.01, 0.0, 0.0], [length] * 200) and not linear
 
 
 SMOOTH = {
@@ -65,4 +65,4 @@ SMOOTH = {
 def test_steps_that_follow_a_solution_do_not_return(name, pace):
     rates, start = SMOOTH[name]
     steady, varied = [pace] * 200, [pace * (1.0 + 0.6 * math.sin(2.0 * k)) for k in range(200)]
-    assert not found_in(rates, start, steady) and not found_in(rates, start, varied)
+    assert not windows_in(rates, start, steady) and not windows_in(rates, start, varied)

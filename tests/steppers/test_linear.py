@@ -41,7 +41,7 @@ def solved(structure: Structure, values: np.ndarray, shift, b: np.ndarray) -> np
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("n, m", [(1, 0), (2, 1), (5, 0), (12, 3), (40, 2)])
 @pytest.mark.parametrize("shift", [30.0, 20.0 + 25.0j])
-def test_what_is_solved_is_the_shifted_matrix(kind, n, m, shift):
+def test_the_solved_matrix_is_the_shifted_matrix(kind, n, m, shift):
     structure = Structure(pattern_of(n, m), kind)
     values, dense = values_on(structure)
     b = np.random.default_rng(1).normal(size=n)
@@ -83,7 +83,7 @@ def test_rows_are_exchanged_all_along_a_band(width):
     assert solved(structure, values, 0.0, b) == pytest.approx(np.linalg.solve(-dense, b), rel=1e-8)
 
 
-def test_sparse_refuses_what_needs_an_exchange_of_rows():
+def test_sparse_refuses_matrices_that_need_an_exchange_of_rows():
     structure = Structure(np.ones((3, 3), dtype=bool), "sparse")
     factor, _ = structure.functions()
     assert factor(structure.shape, np.array([1.0, 0, 0, 0, 1, 0, 0, 0, 1]), 1.0, np.zeros(structure.store_size)) > 0
@@ -153,7 +153,7 @@ def test_the_kind_is_chosen_by_size_and_crowding():
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("number", [float, complex])
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_what_is_not_a_number_is_never_hidden(kind, number, bad):
+def test_values_that_are_not_a_number_are_never_hidden(kind, number, bad):
     structure = Structure(pattern_of(6, 1, density=0.5), kind)
     factor, _ = structure.functions(number is complex)
     store = np.zeros(structure.store_size, dtype=number)
@@ -187,7 +187,7 @@ def test_a_kind_that_does_not_exist_is_refused():
 
 
 @pytest.mark.parametrize("n, m, density", [(1, 0, 1.0), (7, 2, 0.3), (60, 5, 0.05), (60, 5, 1.0)])
-def test_columns_of_one_color_share_no_row(n, m, density):
+def test_columns_of_equal_color_share_no_row(n, m, density):
     structure = Structure(pattern_of(n, m, density))
     dense = structure.pattern.toarray()
     assert structure.colors.min() == 0
@@ -202,7 +202,7 @@ def test_a_band_needs_no_more_colors_than_its_width():
 
 
 @pytest.mark.parametrize("n, m, density", [(1, 0, 1.0), (7, 2, 0.3), (40, 4, 0.1)])
-def test_differences_meet_the_slopes(n, m, density):
+def test_differences_agree_with_the_slopes(n, m, density):
     """Difference quotients of the sine of a linear map, and of its ledger, equal the exact slopes."""
     structure = Structure(pattern_of(n, m, density))
     _, a = values_on(structure)

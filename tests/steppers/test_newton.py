@@ -53,7 +53,7 @@ def linear(t, y):
 
 
 @pytest.mark.parametrize("name", IMPLICIT)
-def test_a_linear_problem_needs_one_jacobian_for_all_fixed_steps(name):
+def test_a_linear_problem_needs_a_single_jacobian_for_all_fixed_steps(name):
     """Fixed steps of a linear problem need one Jacobian, and factors for two lengths, because the last step is rounded.
 
     Rosenbrock methods need a Jacobian and factors in every step.
@@ -86,7 +86,7 @@ def lands(t, y):
 
 
 @pytest.mark.parametrize("h", [0.1, 0.03, 0.01])
-def test_no_step_is_taken_on_what_newton_did_in_the_last_one(h):
+def test_no_step_depends_on_the_iterations_of_newton_in_the_last_step(h):
     """Each step solves y+ = y + h f(y+) of implicit Euler, if each output is one step."""
     t, counts = h * np.arange(int(1.2 / h) + 1), {}
     y = integrate(lands, [1.0, 1.0], t, "implicit-euler", step=h, counts=counts)
@@ -114,7 +114,7 @@ def test_error_control_passes_a_jump_of_the_rates(name):
 
 
 @pytest.mark.parametrize("name", [name for name in ITERATED if METHODS[name].stages < 5])
-def test_a_fixed_step_passes_it_within_one_step(name):
+def test_a_fixed_step_passes_it_within_a_single_step(name):
     found = integrate(jumps, [1.0, 1.0], [0.0, 2.5], name, step=0.01)[-1]
     assert found[1] == pytest.approx(JUMPED, abs=0.01 * 99.0 + 0.01)
 
@@ -126,7 +126,7 @@ def ends(t, y):
 
 
 @pytest.mark.parametrize("name, settings", [row for row in SETTINGS if row[0] in ITERATED])
-def test_where_no_step_is_short_enough_the_error_says_when_and_in_what(name, settings):
+def test_where_no_step_is_short_enough_the_error_states_the_time_and_the_variable(name, settings):
     with pytest.raises(FvsolveError, match=rf"{name} stopped at t = 0\.5: Newton did not converge, worst in y\[1\]"):
         integrate(ends, [1.0, 1.0, 0.0], [0.0, 1.0], name, **settings)
 
@@ -138,7 +138,7 @@ def test_a_rosenbrock_method_stops_there_too(name):
             integrate(ends, [1.0, 1.0, 0.0], [0.0, 1.0], name, **settings)
 
 
-def test_what_f_raises_reaches_the_caller_from_within_newton_too():
+def test_exceptions_of_f_reach_the_caller_from_within_newton_too():
     def broken(t, y):
         if t > 0.3:
             raise KeyError("no such valve")
@@ -163,16 +163,16 @@ def sucked_dry(**numerics) -> dict:
     [{"method": "radau-iia-5"}, {"method": "esdirk-4"}, {"method": "trapezoid", "step": 1e-3}],
     ids=lambda numerics: numerics["method"],
 )
-def test_a_run_says_when_and_in_what_newton_failed_and_keeps_everything_up_to_there(numerics, tmp_path):
+def test_a_run_states_time_and_variable_of_a_failure_of_newton_and_retains_everything_up_to_there(numerics, tmp_path):
     case = sucked_dry(**numerics)
     result = fvsolve.run(case, out=tmp_path / "run")
     assert not result.ok
     assert result.reason.startswith("stopped: Newton did not converge at t = 0.100223 s, however short the step")
     assert "worst in pot.mass; check the parts there for jumps" in result.reason
     assert result.summary["newton_failures"] > 10
-    kept = fvsolve.open_run(tmp_path / "run")
-    assert kept.reason == result.reason and kept.t == pytest.approx(0.005 * np.arange(21))
-    assert np.all(np.isfinite(kept["pot.pressure"]))
+    stored = fvsolve.open_run(tmp_path / "run")
+    assert stored.reason == result.reason and stored.t == pytest.approx(0.005 * np.arange(21))
+    assert np.all(np.isfinite(stored["pot.pressure"]))
 
 
 @njit
@@ -194,7 +194,7 @@ def test_loose_tolerances_of_radau_do_not_cost_more_calls_than_tight_ones(name, 
     assert np.abs((found[1e-3] - found[1e-7]) / sizes).max() < error
 
 
-def test_a_summary_counts_what_newton_did():
+def test_a_summary_counts_the_work_of_newton():
     case = sucked_dry(method="radau-iia-5", rtol=1e-6) | {"numerics": {"end": 0.05, "method": "radau-iia-5"}}
     said = fvsolve.run(case).summary
     assert said["methods"] == [{"time": 0.0, "method": "radau-iia-5", "why": "given by numerics.method"}]
@@ -206,19 +206,19 @@ def test_a_summary_counts_what_newton_did():
 
 
 @pytest.mark.parametrize("name", ["radau-iia-5", "esdirk-4"])
-def test_what_is_remembered_twice_has_no_factors_either(name):
+def test_a_state_remembered_twice_has_no_factors_either(name):
     """A resumed state that is stored again before a step gives the same steps as the original state."""
     model = fvsolve.build(fvsolve.load(CASES / "cylinder-servo.toml", set={"numerics.method": name}))
     loop = RunLoop(model)
     loop.begin(0.01, 1e308)
     assert loop.run(30) == loop_records.BUDGET_SPENT
-    memory, states = kept(loop), []
+    memory, states = restart_copies(loop), []
     for _ in range(2):  # stored and restored
         again = RunLoop(model)
         for name, view in again.stepper.restart_arrays().items():
             view[...] = memory[name]
         again.stepper.after_restore()
-        memory = kept(again)
+        memory = restart_copies(again)
     assert again.stepper.newton["shift"] == -loop.stepper.newton["shift"] < 0.0  # negative shift: factors are missing
     again.now[:], again.armed[:] = loop.now, loop.armed
     for one in (loop, again):
@@ -228,5 +228,5 @@ def test_what_is_remembered_twice_has_no_factors_either(name):
     assert np.array_equal(*states) and loop.stepper.counts() == again.stepper.counts()
 
 
-def kept(loop) -> dict[str, np.ndarray]:
+def restart_copies(loop) -> dict[str, np.ndarray]:
     return {name: view.copy() for name, view in loop.stepper.restart_arrays().items()}

@@ -28,7 +28,7 @@ def peak(level):
 
 @pytest.mark.parametrize("method", FEW)
 @pytest.mark.parametrize("level", [0.0, 0.5, 0.999, 1.0 - 1e-6])
-def test_events_of_a_circle_are_found_at_their_times(method, level):
+def test_events_of_a_circle_are_located_at_their_times(method, level):
     """No crossing is missed, also of peaks that rise above a level for 3 ms between steps of 0.1 to 1 s."""
     function, times = peak(level)
     times = times[times > 0.0]  # a zero at the start is not an event

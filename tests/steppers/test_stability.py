@@ -90,7 +90,7 @@ def test_imaginary_intervals_in_closed_form(name):
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if METHODS[name].explicit])
-def test_intervals_end_where_the_modulus_crosses_one(name):
+def test_intervals_end_where_the_modulus_crosses_1(name):
     """Stability intervals end at a root of |R|^2 - 1, found by NumPy instead of Sturm sequences."""
     found = analyse(name)
     up = np.array([float(x) for x in found.stability_function.numerator.coefficients])[::-1]
@@ -147,7 +147,7 @@ def test_the_other_roots_of_alexanders_polynomial_vanish_at_infinity_but_are_not
     assert found.angle == pytest.approx(largest, abs=0.06)
 
 
-def test_the_sdirk_of_order_three_is_a_stable_for_one_sign_of_the_root_alone():
+def test_the_sdirk_of_order_three_is_a_stable_for_a_single_sign_of_the_root():
     small = METHODS["crouzeix-3"].text.replace("(3+sqrt(3))/6", "y").replace("(3-sqrt(3))/6", "(3+sqrt(3))/6")
     found = analyse(user(small.replace("y", "(3-sqrt(3))/6").replace("-sqrt(3)/3", "sqrt(3)/3")))
     assert found.order == 3 and not found.a_stable and found.angle is None
@@ -196,7 +196,7 @@ def test_decimals_lead_to_the_same_decisions(name, digits):
         assert (found.order, found.stage_order) == (exact.order, exact.stage_order)
 
 
-def test_json_says_none_for_infinity():
+def test_json_has_none_for_infinity():
     plain = analyse("implicit-euler").plain()
     assert plain["real_interval"] is plain["imaginary_interval"] is plain["ssp_radius"] is None
     assert plain["numerator"] == [1.0] and plain["denominator"] == [1.0, -1.0] and plain["pade"] == (0, 1)
@@ -239,7 +239,7 @@ def test_a_touching_root_is_no_change_of_sign():
     assert first_sign_change(Polynomial([-1, 1]) ** 2) is None
 
 
-def test_routh_decides_on_which_side_roots_lie():
+def test_routh_decides_the_side_of_roots():
     assert roots_right(Polynomial([2, -3, 1])) and roots_right(Polynomial([1, -1]) ** 4)
     assert not roots_right(Polynomial([-2, 1, 1])) and not roots_right(Polynomial([1, 0, 1]))
 
@@ -257,7 +257,7 @@ def test_routh_agrees_with_roots_of_numpy():
 
 
 @pytest.mark.parametrize("root", [1, 2, 3, Fraction(1, 2), Fraction(5, 7), 1024])
-def test_a_change_of_sign_is_found_where_bisection_meets_it_exactly(root):
+def test_a_change_of_sign_is_located_where_bisection_hits_it_exactly(root):
     for sign in (1, -1):
         assert first_sign_change(Polynomial([-root, 1]) * sign) == float(root)
         assert first_sign_change(Polynomial([0, -root, 1]) * sign) == float(root)
@@ -299,7 +299,7 @@ def test_determinant_and_resolvent_forms_agree_exactly(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_r_is_what_the_tableau_makes_of_y_prime_is_lambda_y(name):
+def test_r_is_the_result_of_the_tableau_for_y_prime_is_lambda_y(name):
     m, r = METHODS[name], stability_function(METHODS[name])
     for s in (0.3, -1.7, 0.4 + 1.1j, -2.0 + 0.6j, 2.3j):
         k = np.linalg.solve(np.eye(m.stages) - s * m.a, np.ones(m.stages))
@@ -317,7 +317,7 @@ def test_r_of_explicit_methods_is_a_polynomial_that_starts_as_the_exponential(na
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_which_entry_of_the_pade_table_it_is(name):
+def test_the_entry_of_the_pade_table_is_identified(name):
     assert analyse(name).pade == PADE.get(name)
 
 
@@ -332,7 +332,7 @@ def test_the_pade_table_is_that_of_the_books():
 
 @pytest.mark.parametrize("k", range(5))
 @pytest.mark.parametrize("m", range(5))
-def test_an_entry_agrees_with_the_exponential_in_exactly_k_plus_m_plus_one_powers(k, m):
+def test_an_entry_agrees_with_the_exponential_in_exactly_k_plus_m_plus_1_powers(k, m):
     up, down = pade(k, m)
     series = Polynomial(Fraction(1, math.factorial(j)) for j in range(k + m + 3))
     rest = (up - down * series).coefficients
@@ -351,7 +351,7 @@ def test_the_test_system_sees_at_least_the_order(name):
 
 
 @pytest.mark.parametrize("name", ["euler", "heun", "rk4", "implicit-euler", "gauss-4", "radau-iia-3", "esdirk-3"])
-def test_local_error_is_one_order_above_global_error(name):
+def test_local_error_is_a_single_order_above_global_error(name):
     p, lam, end = analyse(name).order, -1.0 + 2.0j, 2.0
     steps = [80, 160, 320]
     local = [abs(local_error(name, lam, end / n)) for n in steps]
@@ -368,7 +368,7 @@ def test_global_error_is_the_sum_of_local_errors_carried_on():
 
 
 @pytest.mark.parametrize("omega", [0.5, 3.0, 40.0, 1e4])
-def test_an_a_stable_method_slows_what_is_too_fast(omega):
+def test_an_a_stable_method_slows_modes_that_are_too_fast(omega):
     h = 0.1
     for name in ("implicit-midpoint", "trapezoid"):
         assert seen_frequency(name, omega, h) == pytest.approx(2.0 / h * math.atan(omega * h / 2.0), rel=1e-12)

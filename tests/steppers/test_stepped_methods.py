@@ -42,7 +42,7 @@ def truth() -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_one_step_of_the_test_system_is_the_stability_function(name):
+def test_a_single_step_of_the_test_system_is_the_stability_function(name):
     start = np.concatenate((np.ones(200), np.zeros(200)))
     end = integrate(test_system, start, [0.0, 1.0], name, step=1.0)[-1]
     wanted = analyse(name).stability_function(LAMBDA)
@@ -62,7 +62,7 @@ def test_fixed_steps_show_the_order(name, truth):
 
 
 @pytest.mark.parametrize("name", ADAPTIVE)
-def test_error_control_keeps_near_its_tolerance(name, truth):
+def test_error_control_stays_near_its_tolerance(name, truth):
     """The error of a step, of order h^(q+1), is rtol, so the total error is of order rtol^(q / (q + 1))."""
     q = METHODS[name].control_order - 1
     for rtol in (1e-4, 1e-8):
@@ -140,7 +140,7 @@ def test_a_users_array_is_a_method_everywhere():
         (dict(rtol=math.nan), "not a positive number"),
     ],
 )
-def test_integrate_refuses_what_it_cannot_do(settings, wanted):
+def test_integrate_refuses_impossible_settings(settings, wanted):
     with pytest.raises(FvsolveError, match=wanted):
         integrate(lambda t, y: -y, [1.0], [0.0, 1.0], **settings)
 

@@ -51,7 +51,7 @@ def departures(name: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", IMPLICIT)
-def test_a_fast_transient_ends_in_one_long_step_of_an_l_stable_method_and_rings_in_others(name):
+def test_a_fast_transient_ends_in_a_single_long_step_of_an_l_stable_method_and_rings_in_others(name):
     """After one long step of an L-stable method only the error of the slow solution remains, at most about h^2 / 6.
 
     The transient of a method that is not L-stable is R(-1e5)^n, of modulus near 1 except for Crouzeix's methods.
@@ -99,7 +99,7 @@ def errors(name: str, f, counts: tuple[int, int]) -> list[float]:
 
 
 @pytest.mark.parametrize("name", IMPLICIT)
-def test_the_order_of_prothero_and_robinson_s_problem_falls_to_what_stage_order_allows(name):
+def test_the_order_of_prothero_and_robinson_s_problem_falls_to_the_stage_order(name):
     order = stiff_order(name)
     coarse, fine = errors(name, prothero_robinson, {5: (12, 24), 4: (24, 48), 1: (192, 384)}.get(order, (48, 96)))
     assert math.log2(coarse / fine) == pytest.approx(order, abs=0.1)
@@ -112,7 +112,7 @@ def test_where_it_is_not_stiff_the_order_is_whole(name):
     assert math.log2(coarse / fine) >= order - 0.1
 
 
-def test_the_page_says_what_its_example_prints(capsys):
+def test_the_page_prints_the_output_of_its_example(capsys):
     page = folders.page("choosing-a-method")
     section = page.split("## Orders that stiffness leaves")[1].split("\n## ")[0]
     code, printed = re.findall(r"```(?:python)?\n(.*?)```", section, re.DOTALL)
@@ -163,7 +163,7 @@ def test_asking_for_more_times_does_not_move_the_end(name, settings):
 
 
 @pytest.mark.parametrize("name", ADAPTIVE)
-def test_what_stands_between_steps_is_no_worse_than_the_tolerance_makes_the_steps(name, truth):
+def test_values_between_steps_are_no_worse_than_the_tolerance_of_the_steps(name, truth):
     q = METHODS[name].control_order - 1
     found = integrate(pendulum, [1.0, 0.2], BETWEEN, name, rtol=1e-6)
     assert np.max(np.abs(found - truth)) < 10.0 * 1e-6 ** (q / (q + 1))
@@ -172,7 +172,7 @@ def test_what_stands_between_steps_is_no_worse_than_the_tolerance_makes_the_step
 RATE = 1.0
 
 
-def test_what_a_plain_function_reads_may_change_between_two_calls(monkeypatch):
+def test_values_read_by_a_plain_function_may_change_between_two_calls(monkeypatch):
     def f(t, y):
         return -RATE * y
 
@@ -190,7 +190,7 @@ def faster(t, y):
     return -(RATE + 1.0) * y
 
 
-def one_rate(t, y):
+def single_rate(t, y):
     return np.array([-y[0]])
 
 
@@ -222,12 +222,12 @@ def test_a_plain_function_is_compiled_once_while_its_values_are_the_same(monkeyp
     before = ode._prepare(faster, 0.0, y)[0]
     monkeypatch.setitem(globals(), "RATE", 5.0)
     assert ode._prepare(faster, 0.0, y)[0] is not before
-    integrate(one_rate, [1.0], [0.0, 1.0], rtol=1e-3)
+    integrate(single_rate, [1.0], [0.0, 1.0], rtol=1e-3)
     with pytest.raises(FvsolveError, match="gives 1 rates for 2 states"):
-        integrate(one_rate, [1.0, 2.0], [0.0, 1.0], rtol=1e-3)
+        integrate(single_rate, [1.0, 2.0], [0.0, 1.0], rtol=1e-3)
 
 
-def test_compiled_functions_are_kept_up_to_a_number(monkeypatch):
+def test_compiled_functions_are_stored_up_to_a_number(monkeypatch):
     monkeypatch.setattr(ode, "_COMPILED", {})
     monkeypatch.setattr(ode, "MOST_COMPILED", 2)
     for rate in (1.0, 2.0, 3.0):

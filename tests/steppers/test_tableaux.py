@@ -70,13 +70,13 @@ def test_the_published_list_is_whole():
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_what_is_derived_is_what_was_published(name):
+def test_derived_properties_are_the_published_ones(name):
     m = METHODS[name]
     assert (m.stages, m.order, m.error_order, m.stage_order) == PUBLISHED[name]
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_every_condition_holds_up_to_the_order_and_one_fails_beyond(name):
+def test_every_condition_holds_up_to_the_order_and_a_condition_fails_beyond(name):
     m = METHODS[name]
     conditions = (
         Conditions(m.forms[0], m.rounding, m.exact.a) if m.kind == "linear" else Conditions(m.exact.a, m.rounding)
@@ -97,7 +97,7 @@ def test_first_members_of_families_are_known_by_both_names(alias, name):
     assert method_named(alias) is method_named(name)
 
 
-def test_one_coefficient_that_is_off_by_its_last_digit_costs_the_order():
+def test_a_coefficient_that_is_off_by_its_last_digit_costs_the_order():
     text = METHODS["esdirk-4"].text.replace("-654441/2922500", "-654442/2922500").replace("5012029/34652500", "x")
     a21 = Fraction(31, 50) - Fraction(1, 4) - Fraction(174375, 388108) + Fraction(654442, 2922500)
     assert tableau_order(text.replace("x", str(a21))) < 4
@@ -126,7 +126,7 @@ def test_stiffly_accurate_methods_need_not_start_with_the_last_rate(name):
 
 
 @pytest.mark.parametrize("name", [*PUBLISHED])
-def test_collocation_is_recognised_and_its_polynomial_meets_the_stages(name):
+def test_collocation_is_recognised_and_its_polynomial_passes_through_the_stages(name):
     m = METHODS[name]
     family = name.startswith(("gauss", "radau-iia", "lobatto-iiia", "implicit", "trapezoid", "euler"))
     assert (len(m.dense) > 0) == (family or name in ("dormand-prince", "tsitouras"))
@@ -178,7 +178,7 @@ def test_a_wrong_array_is_refused_with_its_fault(text, wanted):
     assert "wrong" not in METHODS
 
 
-def test_all_faults_are_said_at_once():
+def test_all_faults_are_reported_at_once():
     with pytest.raises(FvsolveError) as caught:
         tableau("wrong", "0 | 1/2\n1 | 1/3 1/3\n--+--\n | 1/2 1/3")
     assert str(caught.value).splitlines() == [
@@ -352,13 +352,13 @@ def test_short_decimals_and_low_orders_give_no_warning(row, weights):
         assert tableau("low", f"0 |\n{row}\n--+--\n | {weights}").rounded_order is None
 
 
-def test_digits_too_few_to_tell_prove_no_order():
+def test_too_few_digits_prove_no_order():
     """A tableau with entries of 1e6 and few digits has at most order 3."""
     big = "0 |\n1/2 | 1/2\n1 | -1234567.8 1234568.8\n--+--\n | 1/6 2/3 1/6"
     assert tableau_order(big) == 2
 
 
-def test_a_named_number_is_the_root_that_was_asked_for():
+def test_a_named_number_is_the_requested_root():
     text = "g | g\n1 | 1-g g\n--+--\n | 1-g g"
     for near in (0.29, 1.7):
         m = tableau("user", text, numbers={"g": ("x^2-2x+1/2", near)})

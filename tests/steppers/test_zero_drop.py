@@ -39,7 +39,7 @@ def test_a_given_step_is_taken_whole_and_ends_in_rest(name, build, step):
 
 
 @pytest.mark.parametrize("name", ["trapezoid", "implicit-midpoint", "gauss-4"])
-def test_what_is_not_l_stable_swings_but_takes_the_steps_it_is_given_and_says_that_it_is_wrong(name):
+def test_a_method_without_l_stability_oscillates_at_the_given_steps_with_a_notice(name):
     result = fvsolve.run(dead_end(method=name, step=0.01))
     assert result.reason == "finished" and result.summary["steps"] == 100
     wrong = np.mean(np.abs(result["pot.pressure"] - 101325.0 - 9806.65 * 50.0)) / (9806.65 * 50.0)
@@ -70,7 +70,7 @@ def chained(t, y):
 
 
 @pytest.mark.parametrize("name", ["implicit-euler", "esdirk-4", "radau-iia-5"])
-def test_many_drops_may_die_at_once(name):
+def test_several_drops_may_vanish_at_once(name):
     counts: dict = {}
     start = np.array([0.3, 0.9, 0.1, 0.5, 0.0, 0.7])
     found = integrate(chained, start, [0.0, 1.0], name, step=0.1, counts=counts)[-1]
@@ -84,7 +84,7 @@ def rooted(t, y):
 
 
 @pytest.mark.parametrize("name, own, known", [("implicit-euler", 5.0, 0.0), ("trapezoid", 2.5, 2.5)])
-def test_a_long_step_over_a_bare_root_ends_where_its_quadratic_says(name, own, known):
+def test_a_long_step_over_a_bare_root_ends_by_its_quadratic(name, own, known):
     """A step solves y+ + own sign(y+) sqrt|y+| = 1 - known, a quadratic equation in sqrt|y+|."""
     right = 1.0 - known
     z = (np.sqrt(own**2 + 4.0 * abs(right)) - own) / 2.0
@@ -119,7 +119,7 @@ def test_a_chamber_that_fills_is_at_rest_after_few_steps_under_error_control(nam
 
 @pytest.mark.parametrize("name", ["auto", "rodas-4", "rodas-5p", "radau-iia-5"])
 @pytest.mark.parametrize("kind", ["valve", "relief-valve", "check-valve", "spool-valve"])
-def test_what_fills_through_a_valve_that_moves_comes_to_rest_in_few_steps(name, kind):
+def test_a_node_filled_through_a_moving_valve_comes_to_rest_in_few_steps(name, kind):
     """A chamber that fills through a moving valve, spool or disc is at rest after less than 300 steps."""
     area = {"area": 1e-3, "discharge_coefficient": 1.0}
     slow = {"time": [0.0, 1.0, 4.0], "value": [0.3, 0.8, 0.5]}
@@ -140,7 +140,7 @@ def test_what_fills_through_a_valve_that_moves_comes_to_rest_in_few_steps(name, 
     assert result.summary["steps"] < 300
 
 
-def test_what_error_control_does_not_see_shrinks_with_the_opening_that_is_held():
+def test_the_error_outside_of_error_control_shrinks_with_the_frozen_opening():
     """A valve held at opening 0.1 by an input passes the flow of a valve with opening 0.1, at drops above 1 Pa."""
     low, high, area = 1e5, 1e5 + 40.0, 1e-4
     nodes = {"lake": reservoir(high), "pot": chamber(1e-3, low)}

@@ -54,7 +54,7 @@ def compared(case: dict) -> dict:
     return case | {"compare": {"gate.pressure": {"file": "gate.csv", "time": "t [s]", "value": "p [Pa]"}}}
 
 
-def test_a_wave_speed_is_found_within_a_thousandth_from_noisy_data(measured):
+def test_a_wave_speed_is_identified_within_a_thousandth_from_noisy_data(measured):
     free = {"links.down.wave_speed": [900.0, 1300.0], "links.valve.area": [0.0006, 0.001]}
     found, true = calibrate(compared(line(LEAK, SPEED, CELLS, MODEL)), free), [SPEED, AREA]
     assert found.values["links.down.wave_speed"] == approx(SPEED, rel=1e-3)
@@ -65,7 +65,7 @@ def test_a_wave_speed_is_found_within_a_thousandth_from_noisy_data(measured):
     assert 0.0018 * 3e6 < found.rms["gate.pressure"] < 0.01 * 3e6  # noise, and error of fronts on few cells
 
 
-def test_a_planted_leak_is_found_within_a_cell_from_noisy_data(measured):
+def test_a_planted_leak_is_located_within_a_cell_from_noisy_data(measured):
     """Free keys are the size of the leak and the lengths of the pipes beside it."""
     case = compared(line(300.0, SPEED, 40, MODEL))
     free = {
@@ -81,7 +81,7 @@ def test_a_planted_leak_is_found_within_a_cell_from_noisy_data(measured):
     assert np.array(found.correlation).shape == (3, 3) and np.diag(found.correlation) == approx(np.ones(3))
 
 
-def test_what_cannot_be_told_apart_and_what_changes_nothing_is_named(measured):
+def test_indistinguishable_and_ineffective_parameters_are_named(measured):
     """Only the product of area and coefficient of a valve matters; the end of the run changes no earlier value."""
     case = compared(line(LEAK, SPEED, CELLS, MODEL))
     free = {"links.valve.area": [0.0006, 0.001], "links.valve.discharge_coefficient": [0.5, 0.8],
@@ -108,7 +108,7 @@ def test_a_value_at_an_end_of_its_range_is_named(measured):
     assert found.doubts == ["links.valve.area lies at an end of its range; try a wider range"]
 
 
-def test_what_cannot_be_fitted_is_named(measured):
+def test_parameters_that_cannot_be_fitted_are_named(measured):
     case = line(LEAK, SPEED, 20, MODEL)
     with pytest.raises(
         FvsolveError, match="no measured series to fit to; expected a series under .compare. in the case"
@@ -172,7 +172,7 @@ def test_sigma_of_each_key_is_that_of_its_own_series(noise, names, tmp_path, mon
         assert np.all(np.abs(z) < 3.5), name
 
 
-def test_a_series_that_fits_to_its_digits_leaves_the_other_its_say(tmp_path, monkeypatch) -> None:
+def test_a_series_that_fits_to_its_digits_leaves_weight_to_the_others(tmp_path, monkeypatch) -> None:
     """A series without noise has only the scatter of its digits, and the key of the noisy series keeps its sigma."""
     monkeypatch.chdir(tmp_path)
     rng, case = np.random.default_rng(6), filling("ab")

@@ -156,7 +156,7 @@ def test_the_error_at_the_end_is_that_of_the_fields_too(closing):
     assert point.end == pytest.approx(worst, rel=0.02, abs=2 * closing.floor["end"])
 
 
-def told(rows, *probes) -> Outcome:
+def finished_outcome(rows, *probes) -> Outcome:
     """Outcome of a finished run with these rows."""
     return Outcome("finished", ok=True, rows=rows, probes=probes, model=study_model(pot()))
 
@@ -166,17 +166,17 @@ def test_rows_before_and_after_a_jump_are_both_compared_and_weigh_nothing_twice(
     exact = np.column_stack([t, [0.0, 0.0, 10.0, 10.0]])
     off = exact.copy()
     off[1, 1] += 1.0  # only before the jump
-    found = distance(told(off, "p"), reference_of_run(told(exact, "p")))
+    found = distance(finished_outcome(off, "p"), reference_of_run(finished_outcome(exact, "p")))
     assert found.trajectory == pytest.approx(0.5 * 0.1 / 2.0)
     assert found.greatest == pytest.approx(0.1)
     assert found.end == 0.0
 
 
-def test_every_probe_is_measured_by_its_own_range_and_one_that_stands_still_by_none():
+def test_every_probe_is_measured_by_its_own_range_and_a_constant_probe_by_none():
     t = np.linspace(0.0, 1.0, 5)
     exact = np.column_stack([t, 1e6 + 10.0 * t, 1e-3 * t, np.full(5, 7.0)])
     off = exact + np.array([0.0, 0.1, 2e-5, 3.0])
-    found = distance(told(off, "a", "b", "c"), reference_of_run(told(exact, "a", "b", "c")))
+    found = distance(finished_outcome(off, "a", "b", "c"), reference_of_run(finished_outcome(exact, "a", "b", "c")))
     assert found.worst == "b"
     assert found.trajectory == pytest.approx(0.02)
     assert found.overshoot == pytest.approx(0.02)
@@ -186,7 +186,7 @@ def test_a_run_that_stopped_early_has_no_error():
     t = np.linspace(0.0, 1.0, 5)
     exact = np.column_stack([t, t])
     early = Outcome("stopped", rows=exact[:3], probes=("a",))
-    assert math.isnan(distance(early, reference_of_run(told(exact, "a"))).trajectory)
+    assert math.isnan(distance(early, reference_of_run(finished_outcome(exact, "a"))).trajectory)
 
 
 @pytest.mark.parametrize("fine, coarse", [(40, 10), (47, 10), (64, 48)])
@@ -205,7 +205,7 @@ def test_averages_over_fewer_cells_are_those_of_the_field(fine, coarse):
 
 def opinion(name: str, shift: float, own: float):
     t = np.linspace(0.0, 1.0, 11)
-    found = reference_of_run(told(np.column_stack([t, t + shift]), "a"), name)
+    found = reference_of_run(finished_outcome(np.column_stack([t, t + shift]), "a"), name)
     return replace(found, uncertainty=Distance(own, own, own))
 
 
@@ -221,10 +221,10 @@ def test_references_that_agree_by_chance_have_the_floor_of_their_own_error():
 
 
 @pytest.mark.parametrize("order", [1.0, 2.0, 5.0])
-def test_halvings_tell_the_error_of_a_reference(order):
+def test_halved_steps_give_the_error_of_a_reference(order):
     t = np.linspace(0.0, 1.0, 11)
-    runs = [told(np.column_stack([t, t * (1 + 0.1 * 2.0 ** (-order * k))]), "a") for k in range(3)]
-    exact = reference_of_run(told(np.column_stack([t, t]), "a"))
+    runs = [finished_outcome(np.column_stack([t, t * (1 + 0.1 * 2.0 ** (-order * k))]), "a") for k in range(3)]
+    exact = reference_of_run(finished_outcome(np.column_stack([t, t]), "a"))
     own = reference_of_refinements("", runs).uncertainty.trajectory
     assert own == pytest.approx(1.5 * distance(runs[2], exact).trajectory, rel=0.05)  # safety factor 1.5
 
@@ -246,7 +246,7 @@ def test_the_floor_of_a_sudden_closure_covers_the_true_error_of_its_reference():
 
 
 @pytest.mark.parametrize("shape", ["smooth", "kinked"])
-def test_an_exact_solution_judges_where_the_case_names_one(shape):
+def test_an_exact_solution_judges_where_the_case_names_it(shape):
     """Errors against rays and against finer runs agree within the floor of the finer runs."""
     opening = {"smooth": None, "kinked": {"time": [0.1, 0.3], "value": [1.0, 0.0]}}[shape]
     given = {"schemes": ["upwind5"], "methods": ["rk4"], "cells": [10, 20]}
@@ -260,12 +260,12 @@ def test_an_exact_solution_judges_where_the_case_names_one(shape):
         assert one.end == pytest.approx(other.end, abs=2 * runs.floor["end"])
 
 
-def test_a_chart_whose_references_are_no_better_than_its_runs_is_refused():
+def test_a_chart_with_references_no_better_than_its_runs_is_refused():
     with pytest.raises(FvsolveError, match="two references .* disagree by .* larger --rtol"):
         chart(pot(), methods=["dormand-prince"], rtol=[1e-12, 1e-13])
 
 
-def test_no_overshoot_is_claimed_that_the_references_cannot_tell(tmp_path):
+def test_no_overshoot_is_claimed_below_the_error_of_the_references(tmp_path):
     """Upwind at Courant 1 is exact in equal cells: it leaves the range of the smeared reference, not that of rays."""
     nodes = {"lake": reservoir(AMBIENT + 1e6), "gate": junction(), "out": reservoir(AMBIENT)}
     links = {
@@ -341,7 +341,7 @@ def test_a_failed_point_is_no_proof_for_finer_targets():
 # Pareto front -----------------------------------------------------------------------------------------------------
 
 
-def test_the_front_names_the_cheapest_curve_by_updates_and_the_default_beside_it(closing):
+def test_the_front_names_the_cheapest_curve_by_updates_and_the_default(closing):
     assert closing.default == "weno5 rk4"
     assert "weno5 rk4" in closing.curves()
     row = next(row for row in closing.front if row.target == pytest.approx(1e-3))
@@ -411,7 +411,7 @@ def test_a_chart_that_was_broken_off_goes_on_from_its_points(tmp_path):
     assert again.points == found.points  # with their stored times
 
 
-def test_a_case_in_which_nothing_moves_has_no_chart():
+def test_a_case_without_motion_has_no_chart():
     with pytest.raises(FvsolveError, match="all probes are constant"):
         chart(line(end=0.04), schemes=["upwind5"], methods=["rk4"], cells=[10, 20])
 
@@ -456,7 +456,7 @@ def test_a_resolution_that_the_case_has_not_is_named(case, given, said):
         (pot(), {"methods": ["dormand-prince"], "rtol": [1e-7, 1e-8]}),
     ],
 )
-def test_a_target_is_followed_down_to_settings_that_nobody_named(case, given):
+def test_a_target_is_followed_down_to_settings_that_were_not_named(case, given):
     found = chart(case, target=0.05, **given)
     for name, curve in found.curves().items():
         errors = [one.trajectory if one.ok else math.inf for one in curve]

@@ -29,7 +29,7 @@ def study(tmp_path):
     return tmp_path / "taps.toml"
 
 
-def test_every_event_meets_every_protection_as_runs_of_their_own_do(study, tmp_path) -> None:
+def test_every_event_with_every_protection_equals_a_run_of_its_own(study, tmp_path) -> None:
     found = scenarios.study(study, tmp_path / "out")
     assert [(row["event"], row["protection"]) for row in found.rows] == [
         ("fast", "none"), ("fast", "vessel"), ("slow", "none"), ("slow", "vessel")]  # fmt: skip
@@ -107,7 +107,7 @@ def test_the_command_prints_a_table_and_leaves_with_1_where_no_protection_holds(
         (("[events.slow]", "[events.slow"), "line 8: TOML"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_named(study, change, told: str) -> None:
+def test_faults_are_named(study, change, told: str) -> None:
     study.write_text(STUDY.replace(*change))
     with pytest.raises(CaseError) as error:
         scenarios.study(study, study.parent / "out")
@@ -150,7 +150,7 @@ def test_a_protection_holds_by_limits_alone(tmp_path) -> None:
     assert found.limited and found.holds == ["vessel"] and found.ok
 
 
-def test_the_commands_of_the_page_say_what_it_says(fvs, tmp_path, monkeypatch) -> None:
+def test_the_commands_of_the_page_print_its_text(fvs, tmp_path, monkeypatch) -> None:
     """Each command of docs/designs.md prints the results on the page; the study is coarser and shorter here."""
     text = (DOCS / "designs.md").read_text(encoding="utf-8")
     lines = [line for block in re.findall(r"```sh\n(.*?)```", text, re.S) for line in block.splitlines()]
@@ -181,7 +181,7 @@ def still(minimum: float | None = None, maximum: float | None = None) -> dict:
 @pytest.mark.parametrize(
     ("low", "high", "scale"), [(20.0, 80.0, 1.0), ("20 m", "80 m", 1.0), ("20 m", "262 ft", 0.3048)]
 )
-def test_a_size_is_where_the_limit_is_met(low, high, scale: float) -> None:
+def test_a_size_is_where_the_limit_is_reached(low, high, scale: float) -> None:
     exact = 10.0 + 3e5 / (RHO * GRAVITY)
     found = size(still(minimum=3e5), "nodes.lake.head", low, high, rtol=1e-4)
     assert found.value * scale == pytest.approx(exact, rel=2e-4)
@@ -192,7 +192,7 @@ def test_a_size_is_where_the_limit_is_met(low, high, scale: float) -> None:
     assert most.value * scale == pytest.approx(exact, rel=2e-4) and most.value <= most.bracket[0]
 
 
-def test_ends_that_hold_or_fail_are_said() -> None:
+def test_ends_that_hold_or_fail_are_reported() -> None:
     assert size(still(minimum=1e5), "nodes.lake.head", 40.0, 80.0).value == 40.0
     assert len(size(still(minimum=1e5), "nodes.lake.head", 40.0, 80.0).runs) == 1
     lost = size(still(minimum=9e5), "nodes.lake.head", 20.0, 80.0)
@@ -223,7 +223,7 @@ def margins(rule):
     "low, high",
     [(3.8, 4.2), (3.99, 4.01), (11.7, 11.71), (17.0, 17.05), (0.6, 0.62), (19.3, 19.31), (5.0, 5.001)],
 )
-def test_a_narrow_window_with_known_margins_is_found(goal, low, high) -> None:
+def test_a_narrow_window_with_known_margins_is_located(goal, low, high) -> None:
     """Windows of 0.005 % to 2 % of the range 0 to 20, with margins relative to the limits as those of a tank."""
     found = margins(lambda x: min((x - low) / low, (high - x) / high)).search(0.0, 20.0, goal, 1e-3)[0]
     assert found is not None and low <= found <= high
@@ -262,7 +262,7 @@ def test_the_command_shows_its_runs(fvs, tmp_path) -> None:
     assert {"value", "bracket", "runs"} <= set(said)
 
 
-def test_what_cannot_be_sized_is_said() -> None:
+def test_parameters_that_cannot_be_sized_are_reported() -> None:
     with pytest.raises(FvsolveError, match="has no limits"):
         size(throttled() | {"limits": {}}, "nodes.lake.head", 20.0, 80.0)
     with pytest.raises(FvsolveError, match="words or whole numbers"):
@@ -297,7 +297,7 @@ def test_all_that_is_wrong_of_a_search_comes_at_once(fvs, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("margin, what", [(0.2, "error"), (None, "value")])
-def test_an_open_limit_says_if_its_value_or_its_error_is_not_known(margin, what):
+def test_an_open_limit_states_if_its_value_or_its_error_is_not_known(margin, what):
     """The second limit is open, and the first has a smaller margin."""
     row = {"margin": 0.1, "error": 0.05, "unit": "m", "limit": 10.0, "value": 9.9}
     rows = [row, row | {"margin": margin, "error": None}]
@@ -360,19 +360,19 @@ def test_the_command_prints_the_law_for_the_case(fvs, tmp_path) -> None:
         ("nodes.air.pressure", "does not change"),
     ],
 )
-def test_what_is_no_law_is_named(key: str, told: str) -> None:
+def test_an_invalid_law_is_named(key: str, told: str) -> None:
     with pytest.raises(FvsolveError, match=told):
         optimise(column(), key, "max(gate.pressure)")
 
 
-def test_what_cannot_be_minimised_is_named() -> None:
+def test_objectives_that_cannot_be_minimised_are_named() -> None:
     with pytest.raises(fvsolve.CaseError, match='did you mean "gate"'):
         optimise(column(), "links.tap.opening", "max(gaet.pressure)")
     with pytest.raises(FvsolveError, match="expected 15 or more"):
         optimise(column(), "links.tap.opening", "max(gate.pressure)", runs=4)
 
 
-def test_a_shipped_study_is_found_by_its_name():
+def test_a_shipped_study_is_located_by_its_name():
     assert scenarios.read_scenarios("pumping-main-design").path == CASES / "studies" / "pumping-main-design.toml"
     with pytest.raises(CaseError, match="no-such-study"):
         scenarios.read_scenarios("no-such-study")

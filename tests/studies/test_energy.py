@@ -39,7 +39,7 @@ def last(lines: dict) -> float:
     return sum(float(one[-1]) for one in lines.values())
 
 
-def test_half_of_what_fills_a_chamber_is_lost_in_its_orifice():
+def test_half_of_the_energy_that_fills_a_chamber_is_lost_in_its_orifice():
     volume, p0, p1 = 0.5, AMBIENT + 2e5, AMBIENT + 5e6
     nodes = {"pump": reservoir(p1), "pot": chamber(volume, p0)}
     found = energy(scene(nodes, {"hole": valve("pump", "pot", 1e-6)}, 24.0, TIGHT, every=1.0))
@@ -103,14 +103,14 @@ def closing(courant: float, cells: int, end: float) -> dict:
     return scene(nodes, links, end, {"scheme": "upwind", "method": "euler", "courant": courant})
 
 
-def test_a_sudden_closure_at_courant_one_loses_nothing():
+def test_a_sudden_closure_at_courant_1_loses_nothing():
     found = energy(closing(1.0, 20, 4.0))
     assert np.abs(found.remainder).max() < 1e-12 * found.throughput
     assert found.scheme["main"][-1] > 0.01 * found.throughput  # steps create what cells dissipate
     assert found.verdict == "rounding"
 
 
-def test_the_dissipation_of_upwind_at_a_front_is_the_binomial_one():
+def test_the_dissipation_of_upwind_at_a_front_is_the_binomial_value():
     """Each step dissipates C (1 - C) sum of (u_i - u_i-1)^2 dx / (rho A); behind a jump, differences are binomial."""
     courant, cells, steps = 0.5, 100, 100
     h = courant * 10.0 / 1000.0
@@ -147,7 +147,7 @@ def test_gauss_methods_leave_no_remainder(method, friction):
     assert np.abs(found.remainder).max() < 1e-12 * found.stored["way"].max()
 
 
-def test_euler_creates_half_the_square_of_what_a_step_moves():
+def test_euler_creates_half_the_square_of_the_change_in_a_step():
     """Euler uses the level before a step: a tank of area A with inflow M gains rho g (M h / rho)^2 / (2 A) per step."""
     flow, section, h, steps = 0.02, 1.5, 0.5, 40
     nodes = {"spring": {"type": "inflow", "flow": flow}, "pond": tank(section, 1.0)}
@@ -179,7 +179,7 @@ def test_a_constant_force_on_a_spring_loses_half_its_work_to_the_damper():
     assert found.relative < 1e-9
 
 
-def test_an_end_stop_takes_what_a_mass_leaves_behind():
+def test_an_end_stop_takes_the_energy_that_a_mass_leaves():
     links = {"stop": {"type": "end-stop", "from": "ground", "to": "load", "maximum": 1.0, "stiffness": 1e5,
                       "damping": 100.0}}  # fmt: skip
     found = energy(pushed({"method": "dormand-prince", "rtol": 1e-10}, 2.0, links, initial_velocity=1.0))
@@ -189,7 +189,7 @@ def test_an_end_stop_takes_what_a_mass_leaves_behind():
     assert found.at_start["load"] == 1.0
 
 
-def test_what_runs_over_the_rim_carries_its_height_away():
+def test_overflow_over_the_rim_carries_its_height_away():
     flow, rim, end = 0.05, 2.0, 60.0
     nodes = {"spring": {"type": "inflow", "flow": flow, "elevation": 10.0},
              "pond": tank(1.0, 1.5, height=rim, elevation=10.0)}  # fmt: skip
@@ -211,7 +211,7 @@ def test_a_shaped_tank_stores_the_moment_of_its_areas():
     assert found.stored["pond"][-1] == pytest.approx(RHO * GRAVITY * moment, rel=1e-9)
 
 
-def test_a_leak_planted_in_the_ledger_is_found(monkeypatch):
+def test_a_leak_planted_in_the_ledger_is_detected(monkeypatch):
     """The energy of a valve that is missing in the accounts is the remainder."""
     from fvsolve.core.model import energy_accounts
 
@@ -259,7 +259,7 @@ def test_a_column_that_stops_dead_loses_its_kinetic_energy():
 @pytest.mark.parametrize(
     "rim, held", [({}, 0.5 * 3.0**2), ({"height": 4.0}, 0.5 * (3.0**2 - 1.0))], ids=["open", "with a rim"]
 )
-def test_what_a_tank_below_the_port_could_give_is_what_filling_it_to_the_port_sets_free(rim, held):
+def test_available_energy_of_a_tank_below_the_port_is_the_release_of_filling_it_to_the_port(rim, held):
     """Bottom at -5 m, level 2 m: integral of the fall 5 m - z of the water that fills the tank to the port or rim."""
     nodes = {"sea": reservoir(AMBIENT, elevation=0.0), "pit": tank(1.5, 2.0, elevation=-5.0, **rim)}
     case = scene(nodes, {"gap": valve("sea", "pit", 0.05)}, 10.0, TIGHT)
@@ -356,7 +356,7 @@ def test_without_cells_the_remainder_falls_at_least_at_the_order_of_the_method(m
 
 
 @pytest.mark.parametrize("law", ["log", "table"])
-def test_a_chamber_under_a_curved_law_stores_what_its_law_says(law):
+def test_a_chamber_under_a_curved_law_stores_energy_by_its_law(law):
     """Energy of the chamber: V (beta (exp(p / beta) - 1) - p) stored under log; integral of h dm under table."""
     fluid = {**WATER, "law": "log"} if law == "log" else {"name": "Water", "temperature": 293.15, "law": "table"}
     volume, p0, p1 = 0.5, AMBIENT, AMBIENT + 4e7
@@ -384,7 +384,7 @@ def test_a_chamber_under_a_curved_law_stores_what_its_law_says(law):
     assert found.relative < 1e-7
 
 
-def test_the_linear_law_makes_energy_where_a_piston_moves_and_the_ledger_says_so():
+def test_the_linear_law_creates_energy_where_a_piston_moves_and_the_ledger_states_it():
     """A piston under the linear law creates energy of order p / beta of the work; under log it creates none."""
     nodes = {"ground": {"type": "frame"}, "load": {"type": "mass", "mass": 50.0, "initial_position": 0.1},
              "pump": reservoir(AMBIENT + 2e7), "sump": reservoir(AMBIENT)}  # fmt: skip
@@ -422,7 +422,7 @@ def test_at_a_head_of_water_power_is_rho_g_h_q():
     [(name, 150.0) for name in (*(method.name for method in METHODS.values() if method.adaptive), "auto")]
     + [(name, 400.0) for name in ("dormand-prince", "rodas-4", "tr-bdf2", "auto")],
 )
-def test_what_a_draining_tank_loses_is_what_it_had(method, end):
+def test_the_loss_of_a_draining_tank_is_its_initial_energy(method, end):
     """The level is a parabola in time, which methods of order two integrate exactly; the power in the drain is not."""
     nodes, links = {"up": tank(2.0, 10.0), "out": reservoir(AMBIENT)}, {"drain": valve("up", "out", 0.01)}
     found = energy(scene(nodes, links, end, {"method": method, "rtol": 1e-6}, ["up.level"], every=1.0))
@@ -447,7 +447,7 @@ def filled(method: str, **numerics) -> dict:
 
 
 @pytest.mark.parametrize("method", ["gauss-2", "gauss-4", "tr-bdf2", "radau-iia-5"])
-def test_a_chamber_that_has_filled_is_supplied_what_it_took_and_creates_nothing(method):
+def test_a_filled_chamber_is_supplied_with_its_stored_energy_and_creates_nothing(method):
     found = energy(filled(method, step=0.01))
     assert found.supplied["src"][-1] == pytest.approx(PER * P1 * (P1 - P0), rel=1e-6)
     assert found.stored["pot"][-1] == pytest.approx(0.5 * PER * (P1**2 - P0**2), rel=1e-6)
@@ -461,7 +461,7 @@ def test_a_chamber_that_has_filled_is_supplied_what_it_took_and_creates_nothing(
         assert found.verdict != "the numbers create energy"
 
 
-def test_what_newton_leaves_is_a_part_of_its_own_and_condemns_no_method():
+def test_the_residual_of_newton_is_a_part_of_its_own_and_condemns_no_method():
     """With rtol, Newton's method stops at a tolerance."""
     case = fvsolve.load(filled("radau-iia-5", rtol=1e-3))
     found = energy(case)
@@ -473,7 +473,7 @@ def test_what_newton_leaves_is_a_part_of_its_own_and_condemns_no_method():
     assert row["newton_loss"] == found.newton[-1]
 
 
-def test_beside_newton_gauss_leaves_rounding_in_a_network_of_pipes():
+def test_the_residual_of_newton_aside_gauss_leaves_rounding_in_a_network_of_pipes():
     from fvsolve.case import shipped
 
     keys = {"numerics.method": "gauss-4", "numerics.end": 1.0, "numerics.cell_time": 4e-3}
@@ -482,7 +482,7 @@ def test_beside_newton_gauss_leaves_rounding_in_a_network_of_pipes():
     assert max(np.abs(found.newton).max(), np.abs(found.step).max()) < 1e-13 * found.throughput
 
 
-def test_steps_of_second_order_book_the_orifice_to_one_per_cent_where_the_state_is_exact():
+def test_steps_of_second_order_account_for_the_orifice_to_1_percent_where_the_state_is_exact():
     """The mass of the chamber is a parabola in time, so error control sees only the error of the powers."""
     found = energy(filled("tr-bdf2", rtol=1e-6))
     lost = 0.5 * PER * (P1 - P0) ** 2
@@ -551,7 +551,7 @@ def test_stages_outside_a_step_see_jumps_of_its_neighbours(h):
     assert np.max(np.abs(shut - shut[0])) < 1e-12 * found.throughput
 
 
-def test_what_is_stored_and_taken_as_by_fine_cells():
+def test_stored_and_dissipated_energy_as_by_fine_cells():
     found, cells = chain(0.0025), chain(0.0025)
     found = energy(found | {"numerics": found["numerics"] | {"delay_tolerance": 1e-3}})
     cells["numerics"] = {"scheme": "upwind5", "method": "rk4", "courant": 0.9, "end": 4.0}
@@ -566,7 +566,7 @@ def test_what_is_stored_and_taken_as_by_fine_cells():
 
 
 @pytest.mark.parametrize("method", ["rk4", "trapezoid"])
-def test_what_the_steps_take_falls_with_their_square(method):
+def test_the_loss_of_the_steps_falls_with_their_square(method):
     """Stored energy by quadrature and the sum of all powers differ only by interpolation between steps."""
     sizes = [abs(float(energy(chain(h, method)).step[-1])) for h in (0.02, 0.01, 0.005)]
     assert sizes[0] > 3.0 * sizes[1] > 9.0 * sizes[2]

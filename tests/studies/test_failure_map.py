@@ -54,7 +54,7 @@ def shorter(*errors: float):
     return lambda: Measures("finished", True, error=left.pop(0), farthest=1.0)
 
 
-def found(error=0.001, farthest=0.1, **more) -> Measures:
+def measures_of(error=0.001, farthest=0.1, **more) -> Measures:
     return Measures("finished", True, error=error, farthest=farthest, **more)
 
 
@@ -62,22 +62,22 @@ def found(error=0.001, farthest=0.1, **more) -> Measures:
 
 
 def test_a_small_error_and_no_swing_is_stable():
-    assert verdict(found(), never, TOLERANCE) == "stable"
+    assert verdict(measures_of(), never, TOLERANCE) == "stable"
 
 
-def test_an_error_that_a_shorter_step_reduces_is_coarse_and_one_that_stays_is_wrong():
-    assert verdict(found(0.1), shorter(0.05), TOLERANCE) == "coarse"
-    assert verdict(found(0.1), shorter(0.09, 0.03), TOLERANCE) == "coarse"
-    assert verdict(found(0.021), shorter(0.0199), TOLERANCE) == "coarse"  # an error within the tolerance suffices
-    assert verdict(found(0.1), shorter(0.099, 0.099), TOLERANCE) == "wrong"
-    assert verdict(found(0.1), shorter(math.nan, math.nan), TOLERANCE) == "wrong"
+def test_an_error_that_a_shorter_step_reduces_is_coarse_and_a_constant_error_is_wrong():
+    assert verdict(measures_of(0.1), shorter(0.05), TOLERANCE) == "coarse"
+    assert verdict(measures_of(0.1), shorter(0.09, 0.03), TOLERANCE) == "coarse"
+    assert verdict(measures_of(0.021), shorter(0.0199), TOLERANCE) == "coarse"  # an error within the tolerance suffices
+    assert verdict(measures_of(0.1), shorter(0.099, 0.099), TOLERANCE) == "wrong"
+    assert verdict(measures_of(0.1), shorter(math.nan, math.nan), TOLERANCE) == "wrong"
 
 
-def test_what_is_not_finite_or_far_away_has_blown_up():
+def test_values_that_are_not_finite_or_far_away_have_blown_up():
     stopped = Measures("stopped: a value is not finite at main.r[3] at t = 1 s; ...", False)
     assert verdict(stopped, never, TOLERANCE) == "blown up"
-    assert verdict(found(farthest=1.01 * BLOWN_RANGES), never, TOLERANCE) == "blown up"
-    assert verdict(found(farthest=math.nan), never, TOLERANCE) == "blown up"
+    assert verdict(measures_of(farthest=1.01 * BLOWN_RANGES), never, TOLERANCE) == "blown up"
+    assert verdict(measures_of(farthest=math.nan), never, TOLERANCE) == "blown up"
 
 
 def test_a_refused_case_and_a_run_stopped_by_name_are_refused():
@@ -87,19 +87,19 @@ def test_a_refused_case_and_a_run_stopped_by_name_are_refused():
 
 def test_swings_are_ringing_whatever_the_error():
     for error in (0.001, 0.5):
-        assert verdict(found(error, ringing=1.01 * TOLERANCE), never, TOLERANCE) == "ringing"
-        assert verdict(found(error, variation=0.3), never, TOLERANCE) == "ringing"
+        assert verdict(measures_of(error, ringing=1.01 * TOLERANCE), never, TOLERANCE) == "ringing"
+        assert verdict(measures_of(error, variation=0.3), never, TOLERANCE) == "ringing"
 
 
 @pytest.mark.parametrize("factor", [-0.99, -0.9, -0.5])
-def test_the_amplitude_of_ringing_is_what_is_left_after_eight_changes(factor):
+def test_the_amplitude_of_ringing_is_that_after_eight_changes(factor):
     n = np.arange(40)
     swings = 0.3 * factor**n
     amplitude = ringing_amplitude([swings[:, None]], np.ones(1))
     assert amplitude == pytest.approx(0.5 * 0.3 * (1 - factor) * abs(factor) ** 7)
 
 
-def test_a_growing_swing_and_one_on_a_slope_ring_and_waves_noise_free_steps_and_short_swings_do_not():
+def test_a_growing_oscillation_also_on_a_slope_rings_and_waves_noise_free_steps_and_short_oscillations_do_not():
     n = np.arange(60.0)
     assert ringing_amplitude([(-1.05) ** n[:, None]], np.ones(1)) > 1.0
     assert ringing_amplitude([(0.02 * n + 0.1 * (-1) ** n)[:, None]], np.ones(1)) == pytest.approx(0.09)
@@ -109,7 +109,7 @@ def test_a_growing_swing_and_one_on_a_slope_ring_and_waves_noise_free_steps_and_
     assert ringing_amplitude([np.ones((WINDOW_STEPS - 2, 1))], np.ones(1)) == 0.0
 
 
-def test_excess_counts_what_swings_beyond_the_reference_and_nothing_else():
+def test_excess_counts_oscillation_beyond_the_reference_and_nothing_else():
     t = np.linspace(0, 1, 101)[:, None]
     square = np.floor(4 * t) % 2
     assert excess_variation(square, square, np.ones(1)) == 0.0
@@ -154,10 +154,10 @@ def test_a_map_goes_by_the_exact_solution_of_a_case_and_without_it_knows_how_far
     case = closing()
     case["links"]["valve"]["opening"] = step(0.1, 1.0, 0.0)  # all finer runs smear this front alike
     asked = {"schemes": ["upwind5"], "methods": ["rk4"], "courants": [0.5], "tolerance": 0.1}
-    found, exact = (failure_map(load(case | more), **asked) for more in ({}, {"exact": {"name": "rays"}}))
-    assert exact.reference.startswith('exact solution "rays", checked by ') and "exact" not in found.reference
-    apart = abs(found.squares[0].measures.error - exact.squares[0].measures.error)
-    assert 0.0 < apart <= found.doubt
+    measured, exact = (failure_map(load(case | more), **asked) for more in ({}, {"exact": {"name": "rays"}}))
+    assert exact.reference.startswith('exact solution "rays", checked by ') and "exact" not in measured.reference
+    apart = abs(measured.squares[0].measures.error - exact.squares[0].measures.error)
+    assert 0.0 < apart <= measured.doubt
 
 
 def test_a_linear_fifth_order_scheme_is_stable_to_its_limit_and_implicit_euler_is_coarse():
@@ -212,7 +212,7 @@ def test_a_method_that_cannot_go_by_the_case_is_refused_with_its_reason():
     assert made.squares[0].verdict == "refused" and "estimates no error" in made.squares[0].measures.reason
 
 
-def test_finished_squares_are_kept_and_reused(tmp_path):
+def test_finished_squares_are_stored_and_reused(tmp_path):
     asked = {"schemes": ["upwind"], "methods": ["euler"], "courants": [0.5, 1.0]}
     first = failure_map(load(closing()), out=tmp_path, **asked)
     again = ResultCache(tmp_path)
@@ -235,7 +235,7 @@ def test_points_of_other_sources_are_not_taken_up(tmp_path, monkeypatch):
     assert made == ["", "# another"]
 
 
-def test_what_is_watched_steps_as_any_run_does():
+def test_a_watched_run_steps_as_any_run_does():
     from fvsolve.studies.outcome import outcome
 
     case = closing()
@@ -258,7 +258,7 @@ def test_what_is_watched_steps_as_any_run_does():
         ({"key": ("numerics.step", [0.1])}, "the map sets it"),
     ],
 )
-def test_what_cannot_be_asked_says_so(asked, said):
+def test_impossible_requests_are_refused(asked, said):
     with pytest.raises(FvsolveError, match=said):
         failure_map(load(closing()), **asked)
 
@@ -277,7 +277,7 @@ def test_the_command_writes_table_and_pictures_and_speaks_json(tmp_path, fvs):
     assert (tmp_path / "out" / "map.png").stat().st_size > 10_000 and (tmp_path / "out" / "map.svg").is_file()
 
 
-def test_no_old_picture_stands_beside_a_new_table(tmp_path, fvs, monkeypatch):
+def test_no_old_picture_stays_with_a_new_table(tmp_path, fvs, monkeypatch):
     """Pictures of an earlier map are deleted, even if the new picture cannot be drawn."""
     path, out = tmp_path / "scene.toml", tmp_path / "out"
     path.write_text(write(closing()))

@@ -49,7 +49,7 @@ def filling(opening=0.5, **more):
     )
 
 
-def test_a_chamber_behind_an_orifice_is_as_by_hand():
+def test_a_chamber_behind_an_orifice_equals_the_closed_form():
     found = linearise(filling(), ["pump.pressure", "v.opening"], ["bottle.pressure", "v.flow"])
     mass_flow = 0.5 * 1e-5 * math.sqrt(2 * RHO * 2e6)
     slope, stiffness = mass_flow / (2 * 2e6), K / (RHO * 2e-3)
@@ -79,12 +79,12 @@ def test_poles_are_eigenvalues_of_a_with_their_vectors(case):
 
 
 @pytest.mark.parametrize("opening", [0.0, 1.0])
-def test_an_opening_at_the_end_of_its_range_is_moved_to_one_side(opening):
+def test_an_opening_at_the_end_of_its_range_is_moved_to_the_inner_side(opening):
     found = linearise(filling(opening), ["v.opening"], ["v.flow"])
     assert found.d[0, 0] == pytest.approx(1e-5 * math.sqrt(2 * 2e6 / RHO), rel=1e-7)
 
 
-def test_two_tanks_lose_their_difference_at_the_rate_by_hand():
+def test_two_tanks_lose_their_difference_at_the_rate_of_the_closed_form():
     nodes = {"high": tank(3.0, 4.0), "low": tank(1.5, 1.0)}
     found = linearise(scene(nodes, {"hole": valve("high", "low", 0.003)}, 1.0, TIGHT))
     slope = RHO * 0.003 * math.sqrt(2 * GRAVITY * 3.0) / (2 * 3.0)  # d mass flow / d difference of levels
@@ -125,7 +125,7 @@ def test_a_shut_servo_has_the_natural_frequency_of_its_oil():
     assert 2 * math.pi * fastest["frequency"] == pytest.approx(math.sqrt(stiffness / 300.0), rel=2e-3)
 
 
-def test_a_spool_at_its_middle_is_no_place_to_linearise_an_input_but_beside_it_is():
+def test_a_spool_at_its_middle_is_no_place_to_linearise_an_input_and_next_to_it_is():
     with pytest.raises(FvsolveError, match="spool.position = 0 cannot be linearised.*a rise and a fall"):
         linearise(servo(), ["spool.position"])
     found = linearise(servo(), ["spool.position"], set={"links.spool.position": 0.1})
@@ -164,7 +164,7 @@ def test_a_shut_spool_is_refused_whatever_stands_behind_its_chambers(outputs):
 
 
 @pytest.mark.parametrize("position, flows", [(0.01, (150e5, -37e5)), (-0.01, (47e5, -160e5))])
-def test_a_spool_beside_its_middle_has_the_slope_of_that_side(position, flows):
+def test_a_spool_next_to_its_middle_has_the_slope_of_that_side(position, flows):
     found = linearise(behind_hoses(position=position), ["spool.position"])
     rows = [found.states.index(f"{port}.mass") for port in "AB"]
     assert found.b[rows, 0] == pytest.approx([math.copysign(gain(abs(x)), x) for x in flows], rel=1e-6)
@@ -181,7 +181,7 @@ def test_a_shut_valve_has_the_slope_of_its_opening_whatever_stands_behind_it():
 
 
 @pytest.mark.parametrize("hose", [False, True])
-def test_a_relief_valve_at_its_set_pressure_is_refused_whatever_stands_beside_it(hose):
+def test_a_relief_valve_at_its_set_pressure_is_refused_with_any_neighbours(hose):
     """The valve opens in one direction only; the laminar slope of a hose in its row once hid this."""
     nodes = {"T": reservoir(3e5), "A": chamber(4e-4, 5e6)} | ({"a": chamber(4e-4, 5e6)} if hose else {})
     links = {"relief": {"type": "relief-valve", "from": "A", "to": "T", "diameter": 8e-3,
@@ -191,7 +191,7 @@ def test_a_relief_valve_at_its_set_pressure_is_refused_whatever_stands_beside_it
         linearise(scene(nodes, links, 1.0, TIGHT, fluid=OIL))
 
 
-def test_an_output_that_opens_one_way_is_refused_by_its_name():
+def test_an_output_that_opens_in_a_single_direction_is_refused_by_its_name():
     """The gap of a closed linkage is zero, and its probe is the length of a vector, which has no slope at zero."""
     with pytest.raises(FvsolveError, match="loop.gap cannot be linearised.*--outputs"):
         linearise("four-bar", outputs=["two.angle", "loop.gap"])
@@ -240,7 +240,7 @@ def network():
 
 
 @pytest.mark.parametrize("name, change", [("v.opening", 1e-5), ("pump.pressure", 10.0), ("gate.demand", 1e-7)])
-def test_a_small_step_of_an_input_moves_a_run_as_a_b_c_d_say(name, change):
+def test_a_small_step_of_an_input_moves_a_run_as_a_b_c_d_predict(name, change):
     outputs = ["gate.pressure", "main.flow@0.4", "v.flow", "bottle.pressure"]
     found = linearise(network(), [name], outputs)
     model, span = fvsolve.build(fvsolve.load(network())), 0.03
@@ -269,7 +269,7 @@ def test_a_matches_the_models_own_jacobian_and_large_ones_are_sparse():
     assert large.a @ y == pytest.approx(large.at.model.rhs(0.0, y), rel=1e-7, abs=1e-7)
 
 
-def test_a_spectrum_too_large_to_be_whole_says_which_poles_it_holds():
+def test_an_incomplete_spectrum_states_the_poles_it_contains():
     found = linearise(line(900))
     values = poles_of(found.a, energy_form(found.at.model))
     assert not values.complete and "of 1800" in values.description and "ARPACK" in values.description
@@ -303,7 +303,7 @@ def test_a_limited_scheme_is_refused_and_the_way_out_is_named():
         assert linearise(line(10, scheme=scheme), scheme="upwind").a.shape == (20, 20)
 
 
-def test_a_case_that_names_no_scheme_is_linearised_with_the_smooth_one():
+def test_a_case_without_a_scheme_is_linearised_with_the_smooth_scheme():
     case = line(10)
     del case["numerics"]["scheme"]
     found = linearise(case)
@@ -332,7 +332,7 @@ def test_a_valve_at_a_drop_of_zero_has_its_laminar_slope_and_none_where_it_is_ba
         ({"at": -1.0}, FvsolveError, "after the start"),
     ],
 )
-def test_what_is_asked_wrongly_is_said(more, error, said):
+def test_invalid_requests_are_reported(more, error, said):
     with pytest.raises(error, match=said):
         linearise(filling(), **more)
 
@@ -343,7 +343,7 @@ def test_a_case_without_a_state_is_refused():
         linearise(case)
 
 
-def test_the_command_writes_matrices_with_names_and_one_json_object(tmp_path, monkeypatch, fvs):
+def test_the_command_writes_matrices_with_names_and_a_single_json_object(tmp_path, monkeypatch, fvs):
     monkeypatch.chdir(tmp_path)
     code, out, _ = fvs("linearise", "chamber-and-orifice", "--inputs", "hole.opening", "--at", "1 s", "--json")
     assert code == 0
@@ -375,7 +375,7 @@ def masses():
     return scene(nodes, {"s": spring}, 1.0, {"method": "rk4", "step": 1e-3})
 
 
-def test_of_20000_states_the_slowest_poles_and_the_outputs_are_found_soon():
+def test_of_20000_states_the_slowest_poles_and_the_outputs_are_located_soon():
     found = linearise(line(10000, ["end.pressure", "main.flow@0.5"]))
     assert found.c.shape == (2, 20000) and np.count_nonzero(found.c[0]) < 20
     values = poles_of(found.a, energy_form(found.at.model))
@@ -384,26 +384,26 @@ def test_of_20000_states_the_slowest_poles_and_the_outputs_are_found_soon():
     assert not values.complete and "of 20000: eigenvalues nearest 0" in values.description
 
 
-def test_outputs_found_by_halves_are_those_of_every_state_tried_alone(monkeypatch):
+def test_outputs_located_by_bisection_are_those_of_every_state_alone(monkeypatch):
     case = line(40, ["end.pressure", "main.flow@0.37", "main.pressure@0.1"])
     found = linearise(case).c
     monkeypatch.setattr(operating_point, "visible_states", lambda at, *more: range(at.model.y_size))
     assert np.array_equal(found, linearise(case).c) and np.count_nonzero(found) > 3
 
 
-def test_an_eigenvalue_that_is_too_late_is_left_out_and_said():
+def test_an_eigenvalue_that_is_too_late_is_left_out_with_a_notice():
     found = linearise(line(900))
     e = energy_form(found.at.model).seen(found.a)
     assert eigenvalues_near(e, 1e-3, latest=0.0).size == 0
 
 
-def test_what_takes_too_long_to_predict_is_refused_with_the_way_out(monkeypatch):
+def test_a_too_long_prediction_is_refused_with_the_alternative(monkeypatch):
     monkeypatch.setattr(work_limit, "TIME_LIMIT", -1.0)
     with pytest.raises(FvsolveError, match="600 states and 100 steps take longer.*--set links.NAME.cells=100.*--steps"):
         stability(line(300), steps=100)
 
 
-def test_what_takes_too_long_to_measure_is_left_out_and_said(monkeypatch):
+def test_a_too_long_measurement_is_left_out_with_a_notice(monkeypatch):
     monkeypatch.setattr(real_runs, "TIME_LIMIT", -1.0)
     (row,) = stability(line(8), steps=100).rows
     assert np.isfinite(row.predicted) and np.isnan(row.measured) and "take longer" in row.left_out["measured"]
@@ -417,7 +417,7 @@ def test_runs_that_leave_the_state_where_no_linear_step_fails_are_explained():
     assert any("leaves the linearised state" in note for note in row.notes)
 
 
-def test_auto_is_the_method_it_begins_with_once_and_says_so():
+def test_auto_is_its_first_method_once_with_a_notice():
     found = stability(masses(), methods=["auto", "dormand-prince"], steps=50)
     assert [row.method for row in found.rows] == ["dormand-prince"] and "rodas-5p" in found.notes[0]
     assert stability(masses(), methods=["rk4"], steps=50).notes == ()
@@ -429,7 +429,7 @@ def test_auto_is_the_method_it_begins_with_once_and_says_so():
     (["chamber-chain", "--method", ""], '--method "" is an empty list'),
     (["--scheme", ","], '--scheme "," is an empty list'),
 ])  # fmt: skip
-def test_options_that_say_nothing_are_refused(arguments, said, monkeypatch, fvs, tmp_path):
+def test_options_without_effect_are_refused(arguments, said, monkeypatch, fvs, tmp_path):
     monkeypatch.chdir(tmp_path)
     code, _, err = fvs("stability", *arguments)
     assert code == 2 and said in err

@@ -118,7 +118,7 @@ def test_an_unstable_plant_needs_a_least_gain(delay):
     assert found.stable and found.gain_range == (pytest.approx(0.5, rel=CLOSE), high)
 
 
-def test_a_loop_that_no_gain_makes_stable_says_so():
+def test_a_loop_that_no_gain_stabilises_is_reported():
     controls = {"plant": lag("hold", [1.0], [1.0, 0.0, 0.0]),
                 "hold": {"type": "function", "inputs": {"x": "controls.plant"}, "formula": "2*x"}}  # fmt: skip
     found = loop(blocks(controls, 1.0), "hold")
@@ -162,7 +162,7 @@ def test_a_sampled_pi_on_two_lags_is_unstable_from_the_known_gain_on():
     assert found.margins.gain_margin == pytest.approx(LIMIT, rel=CLOSE)
 
 
-def hand_made(gain, parts):
+def explicit_radius(gain, parts):
     """Spectral radius of a sampled PI on two lags, over parts of a period: (length [s], True if the new output acts).
 
     z: states of the plant, integral, new output, last output; the controller reads the plant at the end of a period.
@@ -181,8 +181,8 @@ def hand_made(gain, parts):
     return np.abs(np.linalg.eigvals(control @ step)).max()
 
 
-def test_a_sampled_pi_with_a_computing_time_has_the_limit_of_a_hand_made_map():
-    limit = brentq(lambda gain: hand_made(gain, [(0.04, False), (0.06, True)]) - 1.0, 1.0, 9.0, xtol=1e-13)
+def test_a_sampled_pi_with_a_computing_time_has_the_limit_of_an_explicit_map():
+    limit = brentq(lambda gain: explicit_radius(gain, [(0.04, False), (0.06, True)]) - 1.0, 1.0, 9.0, xtol=1e-13)
     found = loop(two_lags(1.0, 0.04, period=0.1), "hold")
     assert found.gain_range == (None, pytest.approx(limit, rel=CLOSE))
     assert found.margins.gain_margin == pytest.approx(limit, rel=CLOSE)
@@ -235,7 +235,7 @@ def test_two_periods_have_the_map_of_both():
     assert found.period == 0.2 and found.gain_range == (None, pytest.approx(limit, rel=CLOSE))
 
 
-def test_the_sampled_loop_of_the_long_main_grows_in_runs_from_one_percent_above_its_range_on():
+def test_the_sampled_loop_of_the_long_main_grows_in_runs_from_1_percent_above_its_range():
     case = tomllib.loads((CASES / "digital-pressure.toml").read_text(encoding="utf-8"))
     found = loop(case, "pressure")
     assert found.stable and found.margins.gain_margin == pytest.approx(found.gain_range[1], rel=1e-8)
@@ -268,7 +268,7 @@ def test_a_sampled_integrator_has_its_gain_margin_at_half_the_sampling_frequency
         assert found.margins.phase_margin == pytest.approx(90.0 - np.degrees(0.5 * gain * period), abs=1e-4)
 
 
-def test_a_narrow_range_of_a_sampled_loop_is_found():
+def test_a_narrow_range_of_a_sampled_loop_is_located():
     """1 / (s - 1) at 6 s: 1 < k < (1 + exp(6)) / (exp(6) - 1)."""
     found = loop(proportional(lag("", [1.0], [1.0, -1.0], initial=0.0), 1.02, period=6.0), "hold")
     assert not found.stable
@@ -277,7 +277,7 @@ def test_a_narrow_range_of_a_sampled_loop_is_found():
 
 
 @pytest.mark.parametrize(("denominator", "gain"), [([1.0, 1.0], 1e5), ([1.0, 1.0, 0.0], 1e-5)])
-def test_crossovers_far_from_all_rates_are_found(denominator, gain):
+def test_crossovers_far_from_all_rates_are_located(denominator, gain):
     margins = loop(proportional(lag("", [1.0], denominator, initial=0.0), gain), "hold").margins
     w = brentq(lambda x: abs(gain / np.polyval(denominator, 1j * x)) - 1.0, 1e-6, 1e6, xtol=1e-18, rtol=1e-14)
     assert margins.gain_crossover == pytest.approx(w, rel=1e-8)
@@ -457,7 +457,7 @@ def test_an_output_that_is_its_limit_up_to_rounding_is_refused():
 AXIS = Path(__file__).parents[1] / "reference" / "press-axis.toml"
 
 
-def test_a_loop_through_many_stretches_of_delay_lines_ends():
+def test_a_loop_through_dozens_of_stretches_of_delay_lines_ends():
     """Two hoses of 8 m as delay lines of 6 stretches each: gain and poles are those of cells."""
     labels = []
     lines = loop(AXIS, "pos", set={"numerics.pipe_model": "delay-line"}, progress=lambda *now: labels.append(now))
@@ -488,7 +488,7 @@ def test_the_frequencies_of_a_winding_number_end_where_delays_cannot_matter():
     assert np.all(np.abs(np.linalg.eigvals(system.loop_matrices(1j * w))) < 1.0)
 
 
-def test_responses_one_by_one_and_together_are_those_of_the_inverse():
+def test_responses_separate_and_together_are_those_of_the_inverse():
     rng = np.random.default_rng(3)
     a = rng.standard_normal((130, 130))
     system = DelaySystem(a, rng.standard_normal((130, 2)), rng.standard_normal((2, 130)), np.eye(2), 1, 1, np.ones(1))
@@ -498,7 +498,7 @@ def test_responses_one_by_one_and_together_are_those_of_the_inverse():
     assert system.cut_response(s[:2]) == pytest.approx(np.array(exact[:2]), rel=1e-9, abs=1e-9)
 
 
-def test_the_roots_of_many_brackets_are_found_together():
+def test_the_roots_of_several_brackets_are_located_together():
     centres = np.geomspace(1e-6, 1e6, 40)
     found = roots(lambda w: np.tanh(w / centres[np.argmin(np.abs(np.log(w[:, None] / centres)), axis=1)] - 1.0) ** 3,
                   0.9 * centres, 1.2 * centres)  # fmt: skip
@@ -558,7 +558,7 @@ def test_integral_control_through_a_matched_pipe_is_unstable_from_the_gain_of_th
         assert run.ok and (swing[t > 50.0].max() > swing[(t > 20.0) & (t < 30.0)].max()) == grows
 
 
-def test_a_delay_line_with_friction_is_close_to_many_cells():
+def test_a_delay_line_with_friction_is_close_to_thousands_of_cells():
     friction = {"friction": {"model": "steady", "factor": 0.03}}
     line = loop(matched_pipe(**friction), "hold")
     cells = loop(matched_pipe(**friction, pipe_model="finite-volume", cells=24), "hold")

@@ -124,21 +124,21 @@ def test_a_lumped_volume_has_half_the_line_and_its_friction():
     assert said["links.main"]["loss_coefficient"] == pytest.approx(FACTOR * LENGTH / DIAMETER)
 
 
-def test_every_rung_starts_from_the_steady_flow_of_the_line():
+def test_every_model_starts_from_the_steady_flow_of_the_line():
     case = fvsolve.load(shutting(2.0))
     start = fvsolve.run(case)["main.flow"][0]
     for rung in level_names(case):
         assert fvsolve.run(case, level_keys(case, rung))["main.flow"][0] == pytest.approx(start, rel=1e-6)
 
 
-def test_a_chamber_keeps_its_own_volume_beside_the_lines():
+def test_a_chamber_retains_its_own_volume_next_to_the_lines():
     case = shutting(2.0)
     case["nodes"]["gate"] = chamber(0.5)
     lumped = level_keys(fvsolve.load(case), "column and volume")["nodes.gate"]["volume"]
     assert lumped == pytest.approx(0.5 + 0.5 * AREA * LENGTH * WATER["bulk_modulus"] / (RHO * SPEED**2))
 
 
-def test_rungs_that_would_be_ill_posed_are_skipped_by_name():
+def test_models_that_would_be_ill_posed_are_skipped_by_name():
     case = shutting(2.0, cells=8)
     case["links"]["main"]["friction"] = {"model": "none"}
     case["links"]["main"]["initial_flow"] = 0.03
@@ -152,7 +152,7 @@ def test_rungs_that_would_be_ill_posed_are_skipped_by_name():
     assert "only rigid columns join this node" in named(ladder(case), "rigid column").reason
 
 
-def test_a_scene_in_which_nothing_moves_is_refused():
+def test_a_scene_without_motion_is_refused():
     case = shutting(2.0, cells=8)
     case["links"]["valve"]["opening"] = 1.0
     with pytest.raises(FvsolveError, match="no probe changes"):
@@ -167,7 +167,7 @@ def test_a_probe_inside_the_line_is_left_out_where_there_is_no_inside():
     assert set(named(found, "2 cells").errors) == {"gate.pressure", "main.flow", "main.pressure@0.5"}
 
 
-def test_a_scene_without_pipes_has_the_laws_for_its_rungs():
+def test_a_scene_without_pipes_has_the_laws_for_its_models():
     nodes = {"pump": reservoir(1e7), "bottle": chamber(0.02, 1.1e5)}
     case = scene(nodes, {"hole": valve("pump", "bottle", 5e-7)}, 3.0, {"rtol": 1e-8}, ["bottle.pressure"])
     found = ladder(case, target=0.01)
@@ -176,7 +176,7 @@ def test_a_scene_without_pipes_has_the_laws_for_its_rungs():
     assert named(found, "as it is").error == pytest.approx(found.strain, rel=1.0)  # of the size of the strain
 
 
-def test_laws_that_differ_beyond_what_changes_are_said_to():
+def test_laws_that_differ_beyond_the_change_of_model_are_reported():
     """At 100 bar the laws differ by p / K = 0.8 % of a head, most of the range where the supply rises by 1 %."""
     fluid = WATER | {"density": 850.0, "bulk_modulus": 1.2e9}
     nodes = {"pump": reservoir(step(0.01, 1e7, 1.01e7)), "c": chamber(2e-6), "sump": reservoir(2e5)}
@@ -202,7 +202,7 @@ def test_strain_is_the_change_from_the_start_over_the_stiffness_of_the_pipe():
     assert found.law_difference.error == pytest.approx(named(found, "full line").error)
 
 
-def test_bodies_alone_are_one_rung_under_their_own_law():
+def test_bodies_alone_are_a_single_model_under_their_own_law():
     nodes = {"m": {"type": "mass", "mass": 2.0, "initial_position": 0.1}, "wall": {"type": "frame"}}
     links = {"s": {"type": "spring", "from": "m", "to": "wall", "stiffness": 200.0}}
     for law in ("linear", "log"):
@@ -211,7 +211,7 @@ def test_bodies_alone_are_one_rung_under_their_own_law():
         assert found.rules == [] and found.law_difference is None
 
 
-def test_ctrl_c_during_a_rung_ends_the_ladder(tmp_path):
+def test_ctrl_c_during_a_model_ends_the_ladder(tmp_path):
     (tmp_path / "line.toml").write_text(write(shutting(2.0, end=2000.0, every=1.0)))
     script = """if True:
         import os, signal, sys
@@ -224,7 +224,7 @@ def test_ctrl_c_during_a_rung_ends_the_ladder(tmp_path):
     assert left.returncode == 130 and "their results are lost" in left.stderr and "Traceback" not in left.stderr
 
 
-def test_what_means_nothing_to_the_ladder_is_refused_by_name(fvs):
+def test_settings_without_meaning_to_the_ladder_are_refused_by_name(fvs):
     code, _, err = fvs("chart", "gradual-closure", "--models", "--scheme", "weno5", "--step", "1e-3")
     assert code == 2 and err.startswith("--scheme, --step: not valid with --models")
 
@@ -264,7 +264,7 @@ def coarse(cells=(3, 2), **numerics) -> dict:
 
 
 @pytest.mark.parametrize("control", [{}, {"courant": None, "step": 0.02}])
-def test_a_rung_is_within_the_target_of_what_many_cells_say_and_not_of_the_case(control):
+def test_a_model_is_within_the_target_of_fine_cells_and_not_of_the_case(control):
     case = {**coarse(), "fluid": {**WATER}}
     case["numerics"] = {key: value for key, value in (case["numerics"] | control).items() if value is not None}
     found = ladder(case, target=0.01)
@@ -283,7 +283,7 @@ def test_a_rung_is_within_the_target_of_what_many_cells_say_and_not_of_the_case(
     assert found.own_error <= 0.01 and found.cheapest.error <= 0.01
 
 
-def test_where_no_refinement_reaches_the_target_the_answer_says_what_it_is_worth():
+def test_where_no_refinement_reaches_the_target_the_answer_states_its_accuracy():
     found = ladder(coarse(), target=1e-5)
     assert found.own_error > 1e-5 and f"itself has an error of about {found.own_error:.2g}" in found.rules[-1]
     assert "more than the target" in found.rules[-1] and found.plain()["own_error"] == found.own_error
@@ -314,7 +314,7 @@ def test_small_waves_need_modes_and_great_ones_cells():
     assert set(named(small, "frozen", None).errors) == {"hull.angle"}
 
 
-def test_it_says_how_far_from_shallow_a_tank_is():
+def test_the_distance_of_a_tank_from_shallow_water_is_stated():
     found = ladder(rolling(1e-4, level=1.0), target=0.05)
     (said,) = found.shallow_water
     assert (
@@ -323,13 +323,13 @@ def test_it_says_how_far_from_shallow_a_tank_is():
     )
 
 
-def test_a_rung_that_cannot_say_the_scene_is_skipped_with_its_reason():
+def test_a_model_that_cannot_describe_the_scene_is_skipped_with_its_reason():
     found = ladder(rolling(1e-4, manning=0.02))
     assert "modes have no friction" in named(found, "modes", None).reason
     assert named(found, "cells", None).error is not None
 
 
-def test_a_scene_said_by_modes_has_the_same_rungs():
+def test_a_scene_stated_by_modes_has_the_same_models():
     case = rolling(1e-4, sloshing="modes")
     case["output"]["probes"] = ["hull.angle"]
     case["numerics"] = {"end": 8.0, "method": "rk4", "step": 0.02}
@@ -337,14 +337,14 @@ def test_a_scene_said_by_modes_has_the_same_rungs():
     assert [one.name for one in found.rungs[:3]] == ["frozen", "modes", "cells"] and found.cheapest.name == "modes"
 
 
-def test_basins_that_do_not_ride_are_refused_by_name():
+def test_basins_on_no_body_are_refused_by_name():
     case = rolling(1e-4)
     case["nodes"]["pond"] = {"type": "basin", "size": [1, 1], "cells": [4, 4], "level": 0.1}
     with pytest.raises(FvsolveError, match="does not support basins yet; the case has pond"):
         ladder(case)
 
 
-def test_a_liquid_that_rides_is_no_tank_that_sloshes():
+def test_a_liquid_on_a_body_is_no_tank_that_sloshes():
     """A liquid has no level, so a basin of it is refused by name."""
     liquid = {"physics": "liquid", "cells": [4, 4], "pressure": 5e5, "thickness": 0.1}
     case = rolling(1e-4, **liquid)

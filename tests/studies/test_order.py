@@ -77,7 +77,7 @@ def test_a_source_is_fed_in_at_the_order_of_the_scheme(scheme, p):
     assert slow[0] / slow[-1] > 2.0 ** (3 * (p - 0.2))
 
 
-def test_friction_is_averaged_to_fourth_order_where_the_flow_keeps_its_direction():
+def test_friction_is_averaged_to_fourth_order_where_the_flow_retains_its_direction():
     """The flow between two reservoirs does not reverse; where it does, |q| q has a kink and the order is three."""
     factor, loss, k = 0.5, 0.5 * scenes.RHO / (2 * DIAMETER * AREA), 2 * np.pi / LENGTH
 
@@ -98,7 +98,7 @@ def test_friction_is_averaged_to_fourth_order_where_the_flow_keeps_its_direction
         assert errors[0] / errors[-1] > 2.0 ** (3 * 3.8), errors
 
 
-def test_a_wrong_exact_solution_is_found_out():
+def test_a_wrong_exact_solution_is_detected():
     wrong = lambda pipe, x, t: (free(pipe, x, 1.001 * t)[0], free(pipe, x, t)[1])  # noqa: E731
     found = order(case(20), exact=wrong, levels=4)
     assert found.fits["pressure"]["L2"].reason and not found.fits["flow"]["L2"].reason
@@ -109,7 +109,7 @@ def test_a_start_alone_is_judged_by_a_finer_run():
     assert found.kind == "finer" and found.fits["pressure"]["L1"].order == approx(3.0, abs=0.2)
 
 
-def test_time_alone_is_judged_on_the_grid_unless_the_exact_solution_is_asked_for():
+def test_time_alone_is_judged_on_the_grid_unless_the_exact_solution_is_requested():
     grid = order(case(10), methods="ssp-rk3", exact=driven, source=drive, refine="time", levels=4)
     assert grid.kind == "finer" and grid.fits["pressure"]["L2"].order == approx(3.0, abs=0.1)
     asked = order(case(10), methods="ssp-rk3", exact=free, refine="time", levels=4, reference="exact")
@@ -130,7 +130,7 @@ def raises(pipe, x, t):
 
 
 @pytest.mark.parametrize("numerics", [{}, {"courant": None, "rtol": 1e-6}], ids=["courant", "rtol"])
-def test_what_a_source_raises_is_the_cause_that_is_said(numerics):
+def test_exceptions_of_a_source_are_the_stated_cause(numerics):
     given = {key: value for key, value in case(10, **numerics)["numerics"].items() if value is not None}
     with pytest.raises(FvsolveError, match=r'source.*"main" raised ZeroDivisionError: no mass at noon') as error:
         order({**case(10), "numerics": given}, exact=driven, source=raises, levels=3)
@@ -144,14 +144,14 @@ def test_what_a_source_raises_is_the_cause_that_is_said(numerics):
     ids=["nothing", "one", "three", "another shape", "text"],
 )  # fmt: skip
 @pytest.mark.parametrize("name", ["initial", "source", "exact"])
-def test_what_a_function_gives_wrongly_is_named(name, wrong):
+def test_wrong_results_of_a_function_are_named(name, wrong):
     given = {"exact": driven, "source": drive, name: wrong}
     with pytest.raises(FvsolveError, match=rf'{name}\(pipe, x.*"main" must return two numbers or arrays of'):
         order(case(10), levels=3, **given)
 
 
 @pytest.mark.parametrize("name", ["initial", "source", "exact"])
-def test_where_a_function_is_not_finite_is_said(name):
+def test_places_where_a_function_is_not_finite_are_stated(name):
     given = {"exact": driven, "source": drive, name: lambda pipe, x, *t: (np.where(x > 55.0, np.nan, 3e5), 0.0)}
     with pytest.raises(
         FvsolveError, match=rf'{name}\(pipe, x.*"main" returns values that are not finite, first at x = 5'
@@ -190,7 +190,7 @@ def test_the_finer_run_and_the_exact_solution_find_the_same_errors():
 
 
 @pytest.mark.parametrize(("case", "scheme"), [(pulses.case(20), "upwind3"), (pulses.front(40), "upwind")])
-def test_the_error_that_a_reference_states_of_itself_is_about_its_true_one(case, scheme):
+def test_the_stated_error_of_a_reference_is_about_its_true_error(case, scheme):
     case = load(case, {"numerics.scheme": scheme})
     keys = {"links.main.cells": 4 * case.links["main"].cells}
     made = find_reference(case, recording_keys(case, keys), opinions=1, exclude_own=True, exact=False)
@@ -204,7 +204,7 @@ def test_the_error_that_a_reference_states_of_itself_is_about_its_true_one(case,
             assert 0.3 < made.own_error[variable][norm] / true[variable][norm] < 6.0, (variable, norm)
 
 
-def test_rows_that_the_reference_cannot_judge_are_marked_and_said():
+def test_rows_that_the_reference_cannot_judge_are_marked_and_reported():
     """Rows and reference have a front, which finer grids hardly sharpen: the last rows are as good as the reference."""
     found = order(pulses.front(), schemes="fromm", reference="finer", levels=4)
     assert found.kind == "finer" and "reference" in found.fits["pressure"]["L1"].marks
@@ -250,7 +250,7 @@ def test_refining_space_alone_shows_the_error_of_the_step_as_a_floor():
     assert sharp.fits["pressure"]["L1"].order == approx(3.0, abs=0.15)
 
 
-def test_the_exact_solution_judges_time_alone_only_if_asked_to():
+def test_the_exact_solution_judges_time_alone_only_on_request():
     case = pulses.case(20, method="ssp-rk3", points=pulses.FEW)
     asked = order(case, refine="time", levels=4, reference="exact")
     assert (asked.kind, order(case, refine="time", levels=2).kind) == ("exact", "finer")
@@ -302,7 +302,7 @@ def test_rows_that_are_finished_are_reused_and_give_the_same(tmp_path):
     assert study(**{"numerics.courant": 0.5})[0] == 0
 
 
-def test_a_reference_that_fails_says_so():
+def test_a_reference_that_fails_is_reported():
     case = pulses.case(20, exact=False)
     case["numerics"]["end"] = 1e9
     case["numerics"]["below_vapor"], case["output"]["every"] = "stop", 1e6
@@ -357,7 +357,7 @@ def test_refining_space_alone_shows_the_order_of_the_scheme_by_default(scheme, m
     assert found.fits["pressure"]["L1"].order == approx(p, abs=0.3)
 
 
-def test_where_the_step_hides_the_order_of_the_cells_a_smaller_one_is_named():
+def test_where_the_step_hides_the_order_of_the_cells_a_smaller_step_is_named():
     case = pulses.case(20, courant=0.9)
     found = order(case, schemes="upwind5", methods="euler", refine="space", levels=4, cells=30)
     assert any("--set numerics.courant=0.005" in note for note in found.notes), found.notes
@@ -373,7 +373,7 @@ ORDERS = [0.5, 0.83, 1, 2, 3, 4, 5, 6]
 
 @pytest.mark.parametrize("p", ORDERS)
 @pytest.mark.parametrize("rows", [3, 4, 7])
-def test_a_pure_power_is_found_exactly(p, rows):
+def test_a_pure_power_is_identified_exactly(p, rows):
     found = fit(H[:rows], 3.7e5 * H[:rows] ** p)
     assert found.order == approx(p, abs=1e-10) and found.spread == approx(0.0, abs=1e-8)
     assert found.constant == approx(3.7e5) and set(found.marks) == {""} and not found.reason
@@ -416,7 +416,7 @@ def test_a_noisy_floor_is_a_floor():
         assert found.reason or found.order == approx(4, abs=0.3)
 
 
-def test_an_order_of_a_quarter_is_found_where_rows_are_many():
+def test_an_order_of_a_quarter_is_identified_with_enough_rows():
     assert fit(H, H**0.25).order == approx(0.25)
 
 
@@ -454,7 +454,7 @@ def test_a_row_where_the_error_changes_sign_lies_off_the_line():
     assert found.order == approx(2.0) and found.marks[3] == "off the line" and "sign" in found.note
 
 
-def test_a_last_row_that_leaves_the_line_is_said():
+def test_a_last_row_that_leaves_the_line_is_reported():
     e = H[:6] ** 4
     e[-1] *= 4.0
     found = fit(H[:6], e)
@@ -488,7 +488,7 @@ def test_scatter_of_ten_percent_still_shows_the_order_within_its_spread(p):
         ([1.0, 1e-3, 1.02e-3, 1e-3], "floor"),
     ],
 )
-def test_where_there_is_no_order_it_says_why(errors, words):
+def test_an_absent_order_has_a_reason(errors, words):
     found = fit(H[: len(errors)], errors)
     assert words in found.reason and math.isnan(found.order) and math.isnan(found.spread)
 
@@ -508,7 +508,7 @@ def test_a_failed_row_is_left_out():
         ([1.0, 0.5, 0.25], [1.0, -0.5, 0.2], "negative"),
     ],
 )
-def test_what_are_no_errors_are_refused(h, e, words):
+def test_invalid_errors_are_refused(h, e, words):
     with pytest.raises(FvsolveError, match=words):
         fit(h, e)
 

@@ -159,7 +159,7 @@ def test_real_steps_gain_energy_just_beyond_the_courant_limit_and_not_below(sche
     assert gain(scheme, method, max(1.01 * limit, 0.1)) > 1.0 + 1e-5
 
 
-def test_upwind_and_euler_are_passive_up_to_courant_one():
+def test_upwind_and_euler_are_passive_up_to_courant_1():
     assert courant_limit("upwind", "euler") == pytest.approx(1.0, abs=1e-8)
     assert courant_limit("fromm", "euler") == 0.0
 
@@ -173,7 +173,7 @@ def test_a_stable_methods_with_a_passive_scheme_never_gain_energy(scheme, method
 
 
 @pytest.mark.parametrize("scheme", ["central", "linear-upwind", "upwind3", "upwind5"])
-def test_other_schemes_create_energy_at_pipe_ends_and_no_more_than_they_say(scheme):
+def test_other_schemes_create_energy_at_pipe_ends_and_no_more_than_stated(scheme):
     """The method does not matter: gauss-4 itself creates no energy."""
     claim = scheme_claim(scheme)
     assert not claim.passive

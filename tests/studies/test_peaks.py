@@ -26,7 +26,7 @@ from fvsolve.studies.sizing import size
 @pytest.mark.parametrize(
     "name", ["accumulator", "gradual-closure", "closed-cylinder", "three-way-junction", "four-bar"]
 )
-def test_bands_of_shipped_cases_hold_what_four_times_the_resolution_gives(name: str) -> None:
+def test_bands_of_shipped_cases_contain_the_result_of_four_times_the_resolution(name: str) -> None:
     case = fvsolve.load(name)
     said = peak_errors(fvsolve.run(case), case)
     peaks = said["peaks"]
@@ -58,7 +58,7 @@ def throttled(**more) -> dict:
     return scene(nodes, links, 4.0, {"scheme": "muscl", "courant": 0.8}, ["gate.pressure"], **more)
 
 
-def test_the_command_says_how_far_peaks_and_verdicts_are_off(fvs, tmp_path, monkeypatch) -> None:
+def test_the_command_states_the_errors_of_peaks_and_verdicts(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     case = throttled(limits={"top": {"on": "main", "quantity": "gauge_pressure", "maximum": "13 bar"}})
     (tmp_path / "scene.toml").write_text(fvsolve.load(case).resolved())
@@ -127,7 +127,7 @@ def stub(cells: int, opening: dict, beside: int = 100, **more) -> dict:
     return scene(nodes, links, 4.0, {"pipe_model": "finite-volume"}, ["gate.head", "main.head@0.5"], **more)
 
 
-def test_one_cell_cannot_be_halved() -> None:
+def test_a_single_cell_cannot_be_halved() -> None:
     case = stub(1, ramp(0.5, 0.0, 1.0, 0.0), limits={"low": {"on": "gate", "quantity": "head", "minimum": 0.0}})
     said = peak_errors(fvsolve.run(case), fvsolve.load(case))
     assert said["peaks"]["gate.head"]["minimum"]["error"] is None and said["verdicts"][0]["state"] == "open"
@@ -135,7 +135,7 @@ def test_one_cell_cannot_be_halved() -> None:
     assert any("links.short.cells = 4" in text for text in said["resolution"]["reasons"])
 
 
-def test_a_pipe_shorter_than_a_cell_beside_it_is_not_known() -> None:
+def test_a_pipe_shorter_than_an_adjacent_cell_is_not_known() -> None:
     """The long pipe smears the wave over more than the short pipe, for any cells of it: 22.3 m instead of -63.54 m."""
     case = stub(8, ramp(0.5, 0.0, 1.0, 0.0))
     said = peak_errors(fvsolve.run(case), fvsolve.load(case))
@@ -160,7 +160,7 @@ def slamming(at: float) -> dict:
     return case | {"limits": {"high": {"on": "main", "quantity": "pressure", "maximum": 8.5e5}}}
 
 
-def test_every_peak_whose_error_is_wide_or_not_known_says_why() -> None:
+def test_every_peak_with_a_wide_or_unknown_error_has_a_reason() -> None:
     """Law log has no delay lines as a reference."""
     case = slamming(20.0)
     case["fluid"] = dict(case["fluid"], law="log")
@@ -338,7 +338,7 @@ def with_still_water(case: dict, many: int = 1) -> dict:
     return case
 
 
-def test_still_water_hides_no_place_whose_cells_miss_the_peak() -> None:
+def test_still_water_hides_no_place_with_cells_that_miss_the_peak() -> None:
     found = judged(with_still_water(short_pipe()))
     rows = {row["place"]: row for row in found["worst"]}
     assert rows["deep0"]["margin"] < rows["gate"]["margin"] and rows["deep0"]["state"] == "holds"
@@ -350,7 +350,7 @@ def test_a_limit_passed_fails_whatever_another_place_may_do() -> None:
     assert (found["state"], found["bound"]) == ("fails", "minimum")
 
 
-def test_a_run_read_back_is_judged_as_one_in_memory(tmp_path) -> None:
+def test_a_run_read_back_is_judged_as_a_run_in_memory(tmp_path) -> None:
     """The run directory keeps ten places of a limit; here only an eleventh place is open."""
     case = with_still_water(short_pipe(), 12)
     fvsolve.run(case, out=tmp_path / "run", pictures=False)
@@ -360,7 +360,7 @@ def test_a_run_read_back_is_judged_as_one_in_memory(tmp_path) -> None:
     assert (found["state"], found["place"]) == ("open", "gate")
 
 
-def test_run_report_and_study_say_the_same_state(fvs, tmp_path, monkeypatch) -> None:
+def test_run_report_and_study_state_the_same(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "short.toml").write_text(write(short_pipe(maximum=NEAR, minimum=SURE)))
     status, text, _ = fvs("run", "short.toml", "--estimate-error", "--no-pictures", "--out", "run")
@@ -377,7 +377,7 @@ def test_run_report_and_study_say_the_same_state(fvs, tmp_path, monkeypatch) -> 
     assert line["heads state"] == "open"
 
 
-def test_a_study_says_why_errors_are_not_known_and_what_helps(fvs, tmp_path, monkeypatch) -> None:
+def test_a_study_gives_the_reason_of_unknown_errors_and_the_remedy(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     case = short_pipe(maximum=NEAR)
     case["links"]["short"]["cells"] = 1

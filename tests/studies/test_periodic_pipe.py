@@ -25,7 +25,7 @@ EXPLICIT = [name for name, one in METHODS.items() if name == one.name and one.ex
 
 
 @pytest.mark.parametrize("scheme", [*WEIGHTS, "weno5"])
-def test_a_run_is_what_numpy_makes_of_the_same_steps(scheme):
+def test_a_run_equals_the_same_steps_in_numpy(scheme):
     """SSP-RK3 of Shu and Osher with shifted arrays in NumPy; weno5 by its formula."""
     cells, courant, steps = 24, 0.3, 7
     u = np.sin(2 * np.pi * np.arange(cells) / cells) + np.random.default_rng(3).random(cells)
@@ -54,14 +54,14 @@ def test_a_run_is_what_numpy_makes_of_the_same_steps(scheme):
 
 
 @pytest.mark.parametrize("scheme", WEIGHTS)
-def test_runs_fail_where_the_waves_say(scheme):
+def test_runs_fail_where_the_waves_predict(scheme):
     """Measured and predicted limits of linear schemes with explicit methods are equal, because matrices are normal."""
     found = measured_limits([scheme])
     assert [one.method for one in found] == EXPLICIT
     assert all(one.ratio == pytest.approx(1.0, abs=1e-6) for one in found)
 
 
-def test_a_run_fails_where_the_matrix_of_a_step_says():
+def test_a_run_fails_where_the_matrix_of_a_step_predicts():
     """At the measured limit, the greatest norm of the powers of the step matrix (NumPy) passes the threshold."""
     cells, steps = 16, 200
     one = measured_limit("upwind3", "rk4", cells, steps)

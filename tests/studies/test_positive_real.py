@@ -73,13 +73,13 @@ def test_textbook_functions_that_are_positive_real(name):
 
 
 @pytest.mark.parametrize("name", NO)
-def test_textbook_functions_that_are_not_and_why(name):
+def test_textbook_functions_that_are_not_with_reasons(name):
     n, d, why = NO[name]
     found = positive_real(n, d)
     assert not found.positive_real and not found and why in found.reason, found.reason
 
 
-def test_the_inverse_of_a_positive_real_function_is_one_and_of_no_other():
+def test_the_inverse_is_positive_real_exactly_for_a_positive_real_function():
     for n, d in YES.values():
         if any(n):
             assert positive_real(d, n)
@@ -132,14 +132,14 @@ def in_the_right_half_plane(n, d):
 
 
 @pytest.mark.parametrize("name", YES)
-def test_the_theorem_finds_what_the_definition_says(name):
+def test_the_theorem_agrees_with_the_definition(name):
     """Definition of section 4.1, sampled: H is real for positive s, and Re H >= 0 right of the axis."""
     least, imaginary = in_the_right_half_plane(*YES[name])
     assert least > -1e-9 and imaginary == 0.0
 
 
 @pytest.mark.parametrize("name", NO)
-def test_and_where_it_says_no_the_definition_does(name):
+def test_functions_refused_by_the_theorem_fail_the_definition(name):
     assert in_the_right_half_plane(*NO[name][:2])[0] < -1e-3
 
 
@@ -170,7 +170,7 @@ def test_strictly_positive_real_as_khalil_defines_it():
     assert not positive_real([1, 3], [1, 3, 2]).strictly and positive_real([1, 2.5], [1, 3, 2]).strictly
 
 
-def test_lossless_functions_are_told():
+def test_lossless_functions_are_reported():
     assert {name for name, pair in YES.items() if positive_real(*pair).lossless} == {
         "capacitor 1/s", "inductor s", "s + 1/s", "tank circuit s/(s^2+1)", "Foster (s^2+1)/(s(s^2+4))",
         "Foster of poles and zeros by turns"}  # fmt: skip
@@ -190,7 +190,7 @@ def test_the_boundary_is_decided_on_both_sides():
     assert positive_real(*biquad(9)).zeros == (approx(math.sqrt(6), rel=1e-15),)
 
 
-def test_a_band_of_width_1e_9_is_found_and_located():
+def test_a_band_of_width_1e_9_is_detected_and_located():
     # roots of E: x = 2 +- d, with E = (b0 - 1)(b0 - 9) = 4 d^2, exact in both
     tiny = F(1, 10**18)
     (band,) = positive_real(*biquad(1 - tiny)).bands
@@ -203,13 +203,13 @@ def test_a_band_of_width_1e_9_is_found_and_located():
     assert band.least == approx(-2e-18 / 6, rel=1e-6)
 
 
-def test_a_band_narrower_than_floats_can_tell_is_found():
+def test_a_band_narrower_than_floats_resolve_is_detected():
     (band,) = positive_real(*biquad(1 - F(1, 10**80))).bands
     assert band.low == band.high == approx(math.sqrt(2)) and band.width == approx(1e-40, rel=1e-6)
     assert band.least == approx(-2e-80 / 6, rel=1e-6)
 
 
-def test_two_bands_beside_each_other():
+def test_two_adjacent_bands():
     # Re H = (x - 1)(x - 4)(x - 9)(x - 16) / |D|^2 with D Hurwitz: N from Re N(jw) D(-jw) = E, all even
     d = times([1, 1], [1, 2], [1, 3], [1, 5])
     found = positive_real(*with_real_part([F(1), F(4), F(9), F(16)], d))
@@ -259,7 +259,7 @@ def test_a_cancellation_that_fails_by_1e_30_leaves_a_pole_on_the_right():
     assert not found and [mode.side for mode in found.poles] == ["right"] and not found.hidden
 
 
-def test_a_pole_that_misses_the_axis_by_1e_30_is_told_from_one_on_it():
+def test_a_pole_that_misses_the_axis_by_1e_30_is_distinguished_from_a_pole_on_it():
     tiny = F(1, 10**30)
     n = [2, 0]  # s / (s^2 + 2 a s + 1) is positive real for a >= 0
     assert positive_real(n, [1, 2 * tiny, 1]) and not positive_real(n, [1, 2 * tiny, 1]).axis_poles
@@ -389,7 +389,7 @@ def test_leading_zeros_are_no_degree():
 
 
 @pytest.mark.parametrize("bad", [[], [1, "x"], [1j], [math.nan], [math.inf, 1], None, [True], [[1, 2]], ["1/0"]])
-def test_what_is_no_real_coefficient_is_refused(bad):
+def test_coefficients_that_are_not_real_are_refused(bad):
     with pytest.raises(FvsolveError, match="numerator.*expected"):
         positive_real(bad, [1])
     with pytest.raises(FvsolveError, match="denominator"):
@@ -410,7 +410,7 @@ def test_a_verdict_is_plain_for_json():
     assert positive_real([1, 0], [1]).plain()["axis_poles"][0]["frequency"] is None
 
 
-def test_coefficients_of_too_many_digits_are_refused():
+def test_coefficients_of_too_large_a_number_of_digits_are_refused():
     """Floats of degree 30 took more than three minutes; whole numbers of this degree take a second."""
     roots = np.random.default_rng(0).uniform(0.1, 10.0, (2, 30))
     with pytest.raises(FvsolveError, match="degree 30 with up to .* binary digits take too long.*rounded"):

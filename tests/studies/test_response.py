@@ -79,7 +79,7 @@ def test_upwind_biased_lines_are_positive_real_or_on_the_boundary_and_upwind_bey
             assert found.positive_real in (True, None) and -1e-9 < found.margin < 1e-7, found.reason
 
 
-def test_central_differences_break_positive_realness_and_a_direct_solve_says_so_too():
+def test_central_differences_break_positive_realness_as_a_direct_solve_confirms():
     found = response_of_line("central")
     dip = found.verdict.dips[0]
     assert found.verdict.answer == "no" and dip.angle < -1e-5
@@ -116,7 +116,7 @@ def test_ports_that_are_none_and_cases_that_are_too_large_are_refused():
     assert response_of_line("muscl", instead="fromm").scheme == "fromm"
 
 
-def test_the_command_prints_one_object_and_leaves_table_and_pictures(tmp_path, fvs):
+def test_the_command_prints_a_single_object_and_leaves_table_and_pictures(tmp_path, fvs):
     code, out, _ = fvs("response", "chamber-and-orifice", "--port", "bottle", "--json", "--out", tmp_path)
     assert code == 0
     said = json.loads(out)
@@ -163,7 +163,7 @@ def verdict(n, d):
     return state_positive_real(companion(n, d))
 
 
-def test_a_transfer_function_is_what_a_direct_solve_gives():
+def test_a_transfer_function_is_the_result_of_a_direct_solve():
     rng = np.random.default_rng(3)
     a, b, c = rng.normal(size=(9, 9)) * 10.0 ** rng.integers(-3, 3, (9, 1)), rng.normal(size=9), rng.normal(size=9)
     h = Transfer(a, b, c, 0.7)
@@ -184,7 +184,7 @@ def test_a_transfer_function_is_what_a_direct_solve_gives():
         ([1, 1.000001, 1], [1, 1, 1]),
     ],
 )
-def test_what_is_positive_real_beyond_doubt_is_said_to_be(n, d):
+def test_functions_positive_real_beyond_doubt_are_reported_as_such(n, d):
     assert verdict(n, d).answer == "yes"
 
 
@@ -196,7 +196,7 @@ def test_what_is_positive_real_beyond_doubt_is_said_to_be(n, d):
         ([1, 1], [1, 0, -1]), ([1, 1], [1, 0, 0]),
     ],
 )  # fmt: skip
-def test_what_is_not_is_said_not_to_be(n, d):
+def test_functions_that_are_not_are_reported_as_such(n, d):
     assert verdict(n, d).answer == "no"
 
 
@@ -209,7 +209,7 @@ def test_the_boundary_is_called_undecided(n, d):
     assert "at the limit of positive realness" in found.reason
 
 
-def test_a_narrow_band_is_found_without_a_grid():
+def test_a_narrow_band_is_located_without_a_grid():
     # roots of E(x) = x^2 - (b0 + 3) x + 4 b0 with b0 = 1 - 1e-6
     b0 = 1.0 - 1e-6
     found = verdict([1, 1, b0], [1, 1, 4])
@@ -219,14 +219,14 @@ def test_a_narrow_band_is_found_without_a_grid():
     assert found.positive_real is False and verdict([1, 1, 2 - b0], [1, 1, 4]).positive_real is True
 
 
-def test_a_narrow_band_of_a_stiff_system_with_a_quick_pole_beside_it():
+def test_a_narrow_band_of_a_stiff_system_with_a_quick_pole():
     # plus a lag of 1e7 1/s with real part 1e-9, which is less than the dip of 5e-7
     n = np.polyadd(np.polymul([1, 1, 1 - 1e-6], [1e-7, 1]), np.polymul([1e-9], [1, 1, 4]))
     found = verdict(n, np.polymul([1, 1, 4], [1e-7, 1]))
     assert found.positive_real is False and found.dips[0].low < math.sqrt(2) < found.dips[0].high
 
 
-def test_hidden_unstable_poles_are_told():
+def test_hidden_unstable_poles_are_reported():
     a = np.diag([-1.0, 2.0])
     found = state_positive_real(Transfer(a, np.array([1.0, 0.0]), np.array([1.0, 1.0]), 0.0))
     assert found.positive_real and found.hidden == (approx(2.0),) and "hidden" in found.reason
@@ -276,7 +276,7 @@ def test_a_line_that_ends_in_a_negative_resistance_is_not_positive_real():
         assert found.positive_real is False and "a pole with Re s" in found.reason
 
 
-def test_a_line_on_its_lossless_axis_wants_to_be_taken_right_of_its_poles():
+def test_a_line_on_its_lossless_axis_must_be_evaluated_right_of_its_poles():
     for reflection in (-1.0, 1.0):
         with pytest.raises(FvsolveError, match="greater shift|right of its poles"):
             line_positive_real(LineImpedance(Z_LINE, T, reflection), shift=0.0)
@@ -291,7 +291,7 @@ def test_the_bound_of_the_slope_holds_between_any_two_frequencies(g, shift, low,
     assert steepest <= float(line.slope(shift, low, low + width)) * (1 + 1e-9) + 1e-10
 
 
-def test_a_delayed_element_is_not_positive_real_and_the_frequency_is_said():
+def test_a_delayed_element_is_not_positive_real_with_the_frequency_stated():
     found = sweep_positive_real(lambda s: np.exp(-0.3 * s), 0.3, 2.0 * math.pi / 0.3)
     assert found.positive_real is False and np.cos(0.3 * found.worst) < 0.0 and found.least == approx(-1.0, abs=1e-3)
 

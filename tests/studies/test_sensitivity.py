@@ -90,7 +90,7 @@ def test_no_label_of_its_picture_covers_another_or_leaves_it():
     assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y0 >= 0 for box in boxes)
 
 
-def test_the_command_says_it_and_finds_its_runs_again(line, fvs, tmp_path):
+def test_the_command_prints_it_and_reuses_its_runs(line, fvs, tmp_path):
     (tmp_path / "line.toml").write_text(write(line))
     ask = ("sensitivity", tmp_path / "line.toml", "--vary", "links.main.wave_speed=900 m/s,1300",
            "--vary", "nodes.out.pressure=1 atm,2 atm", "--quantity", "max(gate.pressure)", "--samples", 4, "--out",
@@ -106,7 +106,7 @@ def test_the_command_says_it_and_finds_its_runs_again(line, fvs, tmp_path):
     assert (tmp_path / "sensitivity.png").stat().st_size > 1000
 
 
-def test_what_cannot_be_asked_is_named(line):
+def test_impossible_requests_are_named(line):
     bounds = {"links.main.wave_speed": [900.0, 1300.0]}
     for given, said in (
         ({"vary": bounds, "quantity": "max(gate.flow)"}, 'no quantity "max.gate.flow."'),

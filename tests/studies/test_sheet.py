@@ -14,7 +14,7 @@ COLUMNS = (Column("name"), Column("step", "step [s]", ".3g"), Column("whole", wo
 ROWS = [{"name": "a, b", "step": np.float64(1.0 / 3.0), "whole": 1}, {"name": "c", "step": math.nan, "whole": None}]
 
 
-def test_a_file_reads_back_to_the_last_bit_and_has_nothing_for_what_is_not_known(tmp_path):
+def test_a_file_reads_back_to_the_last_bit_and_has_nothing_for_unknown_values(tmp_path):
     with open(ResultTable(COLUMNS, ROWS).write(tmp_path / "sheet.csv"), encoding="utf-8", newline="") as file:
         header, first, second = csv.reader(file)
     assert header == ["name", "step [s]", "whole"]
@@ -53,6 +53,6 @@ class Pole(PlainData):
         return abs(self.at)
 
 
-def test_what_an_object_says_is_its_fields_and_what_is_asked_besides():
+def test_plain_data_of_an_object_are_its_fields_and_the_requested_names():
     assert Pole(3.0 + 4.0j, math.inf).plain() == {"at": [3.0, 4.0], "limit": None, "size": 5.0}
     assert plain({"poles": (Pole(1j, 2.0),)}) == {"poles": [{"at": [0.0, 1.0], "limit": 2.0, "size": 1.0}]}

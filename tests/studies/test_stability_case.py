@@ -104,18 +104,18 @@ def test_a_step_matrix_is_the_stability_function_of_its_eigenvalues(name):
 
 
 @pytest.mark.parametrize("name", [name for name, m in METHODS.items() if name == m.name and m.explicit])
-def test_one_step_of_the_program_is_the_step_matrix_to_round_off(name):
+def test_a_step_of_the_program_is_the_step_matrix_to_round_off(name):
     case = branches(5, "upwind5")
     del case["nodes"]["B"], case["links"]["v"]  # exactly linear without its valve
-    assert one_step_error(case, name, 0.01) < 1e-10
+    assert step_error(case, name, 0.01) < 1e-10
 
 
 @pytest.mark.parametrize("name", IMPLICIT)
-def test_one_implicit_step_of_the_program_is_the_step_matrix(name):
-    assert one_step_error(shut(5, "upwind3"), name, 0.05) < 1e-7
+def test_an_implicit_step_of_the_program_is_the_step_matrix(name):
+    assert step_error(shut(5, "upwind3"), name, 0.05) < 1e-7
 
 
-def one_step_error(case, name, h):
+def step_error(case, name, h):
     """Greatest difference between steps of unit vectors in the program and R(h J), relative to R(h J)."""
     at = operating_point(case)
     a = linearise_at(at).a
@@ -131,7 +131,7 @@ def one_step_error(case, name, h):
 
 
 @pytest.mark.parametrize("steps", [100, 1000])
-def test_limits_of_one_mode_are_those_of_its_powers(steps):
+def test_limits_of_a_single_mode_are_those_of_its_powers(steps):
     decay = predicted_limit(DenseGrowth(method_named("euler"), np.array([[-5.0]]), steps))
     assert decay.step == pytest.approx((1 + 1000 ** (1 / steps)) / 5.0, rel=2e-4)
     swing = predicted_limit(DenseGrowth(method_named("euler"), np.array([[0.0, 3.0], [-3.0, 0.0]]), steps))
@@ -153,19 +153,19 @@ def test_the_greatest_growth_is_not_missed_between_the_powers_looked_at():
         )
 
 
-def test_an_inflow_pipe_grows_at_courant_numbers_far_below_what_its_eigenvalues_say():
+def test_an_inflow_pipe_grows_at_courant_numbers_far_below_the_limit_of_its_eigenvalues():
     for cells in (30, 100):
         e = 10.0 * cells * (np.eye(cells, k=-1) - np.eye(cells))
         euler = method_named("euler")
         found = predicted_limit(DenseGrowth(euler, e, 400)).step * 10.0 * cells
-        assert found == pytest.approx(by_hand(cells, 400), rel=1e-3)
+        assert found == pytest.approx(least_courant_number(cells, 400), rel=1e-3)
         assert found < 1.15
         assert region_limit(euler, np.diag(e)) * 10.0 * cells == pytest.approx(2.0, rel=1e-6)
         field = region_limit(euler, field_of_values(e)) * 10.0 * cells
         assert field == pytest.approx(1.0, abs=0.006)
 
 
-def by_hand(cells, steps):
+def least_courant_number(cells, steps):
     """Least Courant number at which a power of (1 - C) I + C S exceeds norm 1000, S the shift; all powers by NumPy."""
     low, high = 1.0, 1.3
     while high - low > 2e-4:
@@ -223,7 +223,7 @@ def test_steps_of_a_lossless_pipe_are_those_of_its_eigenvalues_though_pivots_cou
 
 
 @pytest.mark.parametrize("states", [90, 600])
-def test_both_ways_to_a_prediction_spend_one_limit(states, monkeypatch):
+def test_both_ways_to_a_prediction_spend_a_common_limit(states, monkeypatch):
     e = 10.0 * (np.eye(states, k=-1) - np.eye(states))
     growth = growth_method(method_named("rk4"), e, 50)
     assert isinstance(growth, DenseGrowth if states < 500 else VectorGrowth)
@@ -267,14 +267,14 @@ PAIRS = [
 
 
 @pytest.mark.parametrize("make, scheme, method", PAIRS)
-def test_prediction_and_measurement_agree_to_one_percent(make, scheme, method):
+def test_prediction_and_measurement_agree_to_1_percent(make, scheme, method):
     (row,) = stability(make(16, scheme), [scheme], [method], steps=300).rows
     assert abs(row.difference) < 0.005
     if make is not chambers:
         assert row.courant(row.predicted) == row.predicted * row.rate > 0.05
 
 
-def test_where_bounds_mislead_it_is_said_and_why():
+def test_misleading_bounds_are_reported_with_the_reason():
     (row,) = stability(through(30, "upwind"), ["upwind"], ["euler"], steps=300).rows
     assert row.courant(row.eigenvalues) == pytest.approx(2.0, rel=1e-6)
     assert row.courant(row.predicted) < 1.2
@@ -290,7 +290,7 @@ def test_a_closed_chamber_and_a_tank_are_slower_than_any_bound():
     assert row.plain()["predicted"] == "none"
 
 
-def test_limited_schemes_are_measured_between_what_their_frozen_weights_say():
+def test_limited_schemes_are_measured_between_limits_of_their_frozen_weights():
     (row,) = stability(shut(20, "muscl"), ["muscl"], ["euler"], steps=200).rows
     assert math.isnan(row.predicted) and {"upwind", "fromm"} < set(row.frozen)
     assert min(row.frozen.values()) < row.measured < max(row.frozen.values())
@@ -307,7 +307,7 @@ def test_rows_that_are_finished_are_reused(tmp_path):
     assert again[0].plain() == first[0].plain() and (tmp_path / "points.jsonl").read_text() == before
 
 
-def test_what_cannot_be_answered_is_said():
+def test_unanswerable_requests_are_reported():
     case = scene({"a": reservoir(2e6), "b": reservoir(1e6)}, {"v": valve("a", "b", 1e-4)}, 1.0, NUMERICS)
     with pytest.raises(FvsolveError, match="has no state"):
         stability(case)
@@ -317,7 +317,7 @@ def test_what_cannot_be_answered_is_said():
         stability(chambers(2), methods=["rk44"])
 
 
-def test_the_command_prints_one_json_object_and_draws(tmp_path, monkeypatch, fvs):
+def test_the_command_prints_a_single_json_object_and_draws(tmp_path, monkeypatch, fvs):
     monkeypatch.chdir(tmp_path)
     code, out, _ = fvs("stability", "chamber-chain", "--method", "rk4", "--steps", "100", "--json")
     assert code == 0
@@ -401,7 +401,7 @@ def system(case: dict, method: str, h: float) -> DelayLineSystem:
 
 @pytest.mark.parametrize("method", ["euler", "rk4", "ssp-rk3", "trapezoid", "gauss-4"])
 @pytest.mark.parametrize("scene", ["vessel", "short", "rough"])
-def test_a_step_of_the_linear_system_is_one_of_the_program(method, scene):
+def test_a_step_of_the_linear_system_is_a_step_of_the_program(method, scene):
     """40 steps from given waves: with a chamber, with lines shorter than steps and a valve, and with friction."""
     rough = main(friction={"model": "steady", "factor": 0.1}, numerics={"delay_tolerance": 0.02})
     case = {"vessel": vessel(method, 0.01, volume=0.15), "short": short("delay-line"), "rough": rough}[scene]
@@ -431,7 +431,7 @@ def test_runs_fail_at_the_step_that_is_predicted(method):
         assert other == pytest.approx(one, rel=1e-6) and one > 100.0
 
 
-def test_what_check_tells_to_grow_has_a_limit_below_the_step():
+def test_a_notice_of_growth_by_check_has_a_limit_below_the_step():
     """Runs that tests/features/test_growth_in_lines.py compares with `check`, with steps of 10 ms for 30 s."""
     for method, volume, grows in (("euler", 0.6, True), ("ssp-rk3", 0.15, True), ("rk4", 0.15, False)):
         made = DelayLineLimits(
@@ -452,7 +452,7 @@ def test_the_energy_of_waves_in_lines_is_summed_as_they_enter_and_leave():
     assert made.propagate(x, before, 1, np.inf)[1] <= 1
 
 
-def test_lines_beside_a_small_chamber_are_refused_before_their_waves_are_stored():
+def test_lines_next_to_a_small_chamber_are_refused_before_their_waves_are_stored():
     """0.1 s of a line in steps for a chamber of 1e-8 m3: 1e10 past waves, for which there is no memory."""
     with pytest.raises(FvsolveError, match="states and 1000 steps take longer than.*as of a small chamber"):
         studies.stability(vessel("rk4", 0.01, volume=1e-8), methods=["rk4"])
@@ -488,7 +488,7 @@ def runs(side, method):
 
 
 @pytest.mark.parametrize("method", ["rodas-5p", "radau-iia-5", "tr-bdf2"])
-def test_what_newton_and_rounding_leave_is_no_growth(arm, method):
+def test_residuals_of_newton_and_rounding_are_no_growth(arm, method):
     """Deviations start at 1e-14 here; runs at 0.2 ms are right to five digits, as the next test shows."""
     assert not any(runs(arm, method).fails(h) for h in (4e-5, 2e-4))
 
@@ -507,20 +507,20 @@ def swing(method, step=None):
     return np.array([run["arm.angle"], run["lift.A.gauge_pressure"]])
 
 
-def test_steps_that_are_said_to_be_safe_are_right(truth):
+def test_steps_stated_to_be_safe_are_right(truth):
     at = round(1.2 / 2e-3)
     assert swing("rodas-5p", 2e-4)[:, at] == pytest.approx(truth[:, at], rel=1e-5)
 
 
 @pytest.mark.parametrize("method, step", [("rk4", 2e-4), ("rodas-5p", 4e-2)])
-def test_steps_that_fail_are_found(arm, truth, method, step):
+def test_steps_that_fail_are_detected(arm, truth, method, step):
     """Explicit steps fail in motion; linearly implicit steps fail where the arm stops, with pressures 18 bar off."""
     assert runs(arm, method).fails(step)
     if method == "rodas-5p":
         assert np.abs(swing(method, step) - truth)[1].max() > 10.0
 
 
-def test_an_implicit_method_that_fails_is_found_where_it_is_predicted_to():
+def test_an_implicit_method_that_fails_is_detected_at_its_predicted_place():
     """Chambers and flowing valves: |R| of this method exceeds 1 beyond h = 10 / |lambda|."""
     fvsolve.tableau("theta-4-10", THETA)
     nodes = {"in": reservoir(2e6), "a": chamber(1e-3), "b": chamber(2e-3), "out": reservoir(1e6)}

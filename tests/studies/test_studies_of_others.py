@@ -42,7 +42,7 @@ def test_a_study_that_cannot_be_imported_names_its_package_and_breaks_no_other(h
         studies.drainin  # noqa: B018
 
 
-def test_a_study_of_fvsolve_keeps_its_name(home):
+def test_a_study_of_fvsolve_retains_its_name(home):
     vars(studies).pop("order", None)
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # no other package is read

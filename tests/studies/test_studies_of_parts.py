@@ -54,7 +54,7 @@ def case(name, **numerics):
 # stability ------------------------------------------------------------------------------------------------------
 
 
-def test_two_runs_of_a_scene_with_events_keep_apart_what_has_shut_in_each():
+def test_two_runs_of_a_scene_with_events_have_separate_states_of_valves():
     (row,) = stability(case("check-valve-slam", links__main__cells=20), at=3.8, steps=200).rows
     assert abs(row.difference) < 0.01
 
@@ -66,7 +66,7 @@ def test_a_state_that_moves_is_named_where_prediction_and_measurement_differ_and
     assert abs(rests.difference) < 1e-3
 
 
-def test_pipes_with_cavities_are_measured_beside_what_upwind_predicts():
+def test_pipes_with_cavities_are_measured_and_compared_with_the_prediction_of_upwind():
     few = case("adelaide", links__main__cells=10)
     (row,) = stability(few, steps=100).rows
     assert row.measured > 0.0 and set(row.frozen) == {"upwind"}
@@ -112,7 +112,7 @@ def test_every_state_has_its_unit(name, states):
 # checks before a run --------------------------------------------------------------------------------------------
 
 
-def test_check_names_the_pipe_that_sets_the_step_and_knows_what_cavities_cost():
+def test_check_names_the_pipe_that_limits_the_step_and_states_the_cost_of_cavities():
     cavities, plain = (fvsolve.build(case(name)).checks for name in ("adelaide", "pump-trip"))
     assert cavities["step_set_by"].startswith("links.main:")
     cost = [one["expected_seconds"] / one["steps"] / one["cells"] for one in (cavities, plain)]
@@ -122,7 +122,7 @@ def test_check_names_the_pipe_that_sets_the_step_and_knows_what_cavities_cost():
 # order ----------------------------------------------------------------------------------------------------------
 
 
-def test_an_order_that_would_take_long_begins_on_fewer_cells_and_says_so(monkeypatch, tmp_path):
+def test_an_order_that_would_take_long_begins_on_fewer_cells_with_a_notice(monkeypatch, tmp_path):
     few = case("relief-on-closed-main", links__main__cells=64)
     whole = affordable_plan(few, None, None, 3, None, "auto", None)
     assert [level.cells for level in whole.levels] == [64, 128, 256] and "begun" not in whole.words
@@ -134,7 +134,7 @@ def test_an_order_that_would_take_long_begins_on_fewer_cells_and_says_so(monkeyp
     assert affordable_plan(few, None, None, 3, None, "auto", ResultCache(tmp_path)) == made  # continued study
 
 
-def test_errors_that_fall_quicker_than_scheme_and_method_can_make_them_are_said_to_show_no_order():
+def test_errors_that_fall_quicker_than_scheme_and_method_allow_show_no_order():
     sizes = [2.0**-k for k in range(5)]
     assert "not the order of the method" in check_order(fit(sizes, [h**8 for h in sizes]), 4.0).note
     assert not check_order(fit(sizes, [h**4 for h in sizes]), 4.0).note
@@ -148,7 +148,7 @@ def test_with_cavities_a_reference_is_finer_by_the_scheme_that_follows_them():
 # chart ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_chart_leaves_out_what_does_not_follow_cavities():
+def test_a_chart_leaves_out_schemes_that_do_not_follow_cavities():
     found, coarse = case("adelaide"), CoarseRun(25, 800.0, 800, [1e6], 0.0)
     made = chart_settings(found, coarse, None, None, [50], None, None)
     assert {one.scheme for one in made} == {"upwind", "muscl"} and default_curve(found) == "muscl rk4"
@@ -162,7 +162,7 @@ def test_with_cavities_both_references_of_a_chart_can_be_run():
     assert found == [True, True]
 
 
-def test_the_work_of_a_chart_counts_pipes_of_one_cell_once():
+def test_the_work_of_a_chart_counts_pipes_of_1_cell_once():
     found = case("pump-trip")
     assert run_work(found, 400) == pytest.approx(4 * run_work(found, 200))
     assert run_work(case("net3-pump-trip"), 400) < 3 * run_work(case("net3-pump-trip"), 200)
@@ -176,14 +176,14 @@ def test_a_chart_of_dear_rates_has_fewer_cells():
 # models ---------------------------------------------------------------------------------------------------------
 
 
-def test_what_acts_on_a_pump_that_trips_is_its_run_down():
+def test_the_schedule_of_a_pump_that_trips_is_its_run_down():
     model = fvsolve.build(case("pump-trip", links__main__cells=10))
     pump = model.case.links["pump"]
     torque = pump_trip.torque(1.0, 46.658e-3)
     assert change_time(model) == pytest.approx(pump.inertia * pump.rated_speed / torque, rel=0.05)
 
 
-def test_a_vessel_is_not_said_by_a_volume():
+def test_a_vessel_is_not_described_by_a_volume():
     with pytest.raises(NotApplicable, match="a volume at top would replace the air-valve"):
         level_keys(case("air-valve"), "lumped volume")
     with pytest.raises(NotApplicable, match="all ends of the pipes are reservoirs"):
@@ -230,7 +230,7 @@ def rough(**numerics) -> dict:
     return case | {"numerics": {"end": pulses.END, **given}}
 
 
-def test_friction_of_lines_is_of_second_order_beside_cells():
+def test_friction_of_lines_is_of_second_order_next_to_cells():
     found = studies.order(rough())
     assert found.kind == "finer" and found.words.startswith("upwind5 on 2560 cells")
     for probe in ("gate.pressure", "main.pressure@0.37"):
@@ -258,7 +258,7 @@ def test_smooth_waves_between_steps_are_of_sixth_order():
     assert max(row.errors["gate.pressure"]["max"] for row in found.rows) < 1e-6
 
 
-def test_what_is_exact_at_any_step_is_said_to_be():
+def test_a_run_exact_at_any_step_is_reported_as_exact():
     found = studies.order(main(4.0), levels=3)
     assert found.words.startswith("upwind on") and any("exact here, at any step" in note for note in found.notes)
     with pytest.raises(FvsolveError, match="no delay line of this case into more stretches: there is no friction"):
@@ -267,7 +267,7 @@ def test_what_is_exact_at_any_step_is_said_to_be():
         studies.order(main(4.0), source=lambda pipe, x, t: (0.0 * x, 0.0 * x))
 
 
-def test_lines_beside_cells_are_refined_with_them():
+def test_lines_next_to_cells_are_refined_with_them():
     case = fork(
         {"scheme": "upwind5", "method": "rk4", "courant": 0.9},
         every=0.0499,
@@ -305,7 +305,7 @@ def test_a_chart_of_lines_has_steps_and_no_more():
         studies.chart(main(2.0, every=0.0499), methods=["euler"], step=[0.05])
 
 
-def test_a_chart_of_lines_beside_cells_refines_the_cells():
+def test_a_chart_of_lines_next_to_cells_refines_the_cells():
     case = fork({"scheme": "upwind5", "method": "rk4", "courant": 0.9}, 2.0, every=0.0499)
     case["links"]["up"]["pipe_model"] = "delay-line"
     case["nodes"]["gate"]["demand"] |= {"time": [0.0, 0.5, 1.5], "value": [0.03, 0.03, 0.0], "kind": "smooth"}
@@ -315,7 +315,7 @@ def test_a_chart_of_lines_beside_cells_refines_the_cells():
     assert "links.up.cells" not in found.points[0].setting.keys and found.default == "weno5 rk4"
 
 
-def test_a_map_of_lines_says_at_which_step_a_store_makes_waves_grow():
+def test_a_map_of_lines_states_the_least_step_of_growth_at_a_store():
     """A chamber that fills within 10 ms at a line of 0.1 s: the limit, and runs on both sides of it."""
     case = vessel("rk4", 0.01, 6.0, 0.15, 60)
     found = studies.failure_map(case, methods=["rk4", "implicit-midpoint", "rodas-5p"], steps=[0.0034, 0.0207, 0.068])
@@ -383,7 +383,7 @@ def test_a_tank_on_a_spring_has_the_pole_of_the_tangent_law():
     assert off[1] < 5e-5 and off[0] / off[1] > 3.5
 
 
-def test_the_impedance_of_a_u_tube_on_its_hull_is_that_of_two_tanks_and_what_lies_between():
+def test_the_impedance_of_a_u_tube_on_its_hull_is_that_of_two_tanks_and_their_connection():
     """Impedance rho g / (A s) (s^2 + w^2) / (s^2 + 2 w^2), w^2 = g a / (A L)."""
     case = u_tube("dormand-prince", free=False)
     case["nodes"]["hull"]["joint"]["angle"] = {"mean": 0.0, "amplitude": 0.0, "period": 5.0}
@@ -395,7 +395,7 @@ def test_the_impedance_of_a_u_tube_on_its_hull_is_that_of_two_tanks_and_what_lie
     assert found(s) == pytest.approx(wanted, rel=1e-6)
 
 
-def test_the_ledger_of_energy_of_a_basin_with_a_wall_and_of_a_device_beside_it_closes():
+def test_the_ledger_of_energy_of_a_basin_with_a_wall_and_of_a_device_closes():
     """Rows of devices come after those of basins; a valve joins a basin with a moving wall to a tank."""
     parts = []
     for step in (8e-3, 4e-3):
@@ -448,7 +448,7 @@ def test_a_map_takes_a_path(path):
     assert [one.verdict for one in found.squares] == ["stable"]
 
 
-def test_without_a_terminal_a_study_says_now_and_then_where_it_is(monkeypatch, capsys):
+def test_without_a_terminal_a_study_prints_its_place_at_intervals(monkeypatch, capsys):
     monkeypatch.setattr(terminal, "PROGRESS_INTERVAL", 1e-3)
     with terminal.progress_line() as progress:
         progress(3, 9, "upwind with rk4")
@@ -460,7 +460,7 @@ def test_without_a_terminal_a_study_says_now_and_then_where_it_is(monkeypatch, c
     assert said.splitlines()[0] == "3 of 9: upwind with rk4"
 
 
-def test_without_a_terminal_a_run_says_now_and_then_where_it_is_and_how_long_the_rest_takes(path, capsys):
+def test_without_a_terminal_a_run_prints_its_place_and_the_remaining_time_at_intervals(path, capsys):
     with terminal.run_progress(fvsolve.load(path)) as progress:
         for t, seconds, steps in ((0.0, 0.0, 0), (1.0, 9.0, 40), (2.0, 20.0, 80), (2.5, 31.0, 700), (2.5, 50.0, 900)):
             progress(t, seconds, steps)
@@ -481,13 +481,13 @@ def test_a_line_of_progress_is_not_repeated_unchanged(monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("study", ["order", "failure-map", "stability"])
-def test_a_setting_that_belongs_to_the_method_asked_for_is_read_with_it(fvs, path, study):
+def test_a_setting_that_belongs_to_the_requested_method_is_read_with_it(fvs, path, study):
     own = ["--set", "numerics.rtol=1e-5", "--method", "dormand-prince"]
     columns = ["--step", "0.1"] if study == "failure-map" else []
     code, _, said = fvs(study, path, *own, *columns)
     assert "rtol" not in said and code == 0, said
 
 
-def test_a_setting_that_belongs_to_no_method_asked_for_is_refused(fvs, path):
+def test_a_setting_that_belongs_to_no_requested_method_is_refused(fvs, path):
     code, _, said = fvs("stability", path, "--set", "numerics.rtol=1e-5", "--method", "rk4")
     assert code == 2 and "rtol" in said

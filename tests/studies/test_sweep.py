@@ -81,7 +81,7 @@ def test_other_processes_find_the_same(line):
     assert together == alone
 
 
-def test_an_interrupted_sweep_keeps_what_it_has_and_goes_on(line, tmp_path):
+def test_an_interrupted_sweep_retains_its_rows_and_goes_on(line, tmp_path):
     def stop(done, total, what):
         if done == 2:
             raise KeyboardInterrupt
@@ -93,7 +93,7 @@ def test_an_interrupted_sweep_keeps_what_it_has_and_goes_on(line, tmp_path):
     assert sweep(line, VARY, out=tmp_path).reused == 2
 
 
-def test_ctrl_c_during_a_run_keeps_the_rows_that_are_finished(line, tmp_path):
+def test_ctrl_c_during_a_run_retains_the_rows_that_are_finished(line, tmp_path):
     (tmp_path / "line.toml").write_text(write({**line, "output": {"every": 1.0, "probes": ["gate.pressure"]}}))
     script = """if True:
         import os, signal, sys
@@ -108,7 +108,7 @@ def test_ctrl_c_during_a_run_keeps_the_rows_that_are_finished(line, tmp_path):
 
 
 @pytest.mark.parametrize("send", [os.kill, os.killpg], ids=["to it", "to all, as a terminal does"])
-def test_ctrl_c_breaks_off_the_runs_of_other_processes_and_keeps_what_is_finished(line, tmp_path, send):
+def test_ctrl_c_breaks_off_the_runs_of_other_processes_and_retains_finished_rows(line, tmp_path, send):
     (tmp_path / "line.toml").write_text(write({**line, "output": {"every": 1e6, "probes": ["gate.pressure"]}}))
     values = "numerics.end=0.5,0.4,1e7,2e7"
     command = [sys.executable, "-m", "fvsolve", "sweep", "line.toml", "--set", values, "--jobs", "2", "--out", "o"]
@@ -128,7 +128,7 @@ def test_ctrl_c_breaks_off_the_runs_of_other_processes_and_keeps_what_is_finishe
     assert len(kept.read_text().splitlines()) == 2
 
 
-def test_a_row_shows_what_the_model_could_not_follow(line, fvs, tmp_path):
+def test_a_row_shows_events_that_the_model_could_not_follow(line, fvs, tmp_path):
     shut = {"start": 0.1, "duration": 0.05, "value": [1.0, 0.0]}  # rho a v exceeds the pressure of the lake
     quiet, marked = sweep(line, {"links.valve.opening": [1.0, shut]}).rows
     assert quiet["marks"] == "" and marked["ok"] and "below vapour pressure" in marked["marks"]
@@ -173,7 +173,7 @@ def test_a_key_that_another_brings_is_none_that_does_not_exist(line):
     assert [row["ok"] for row in made.rows] == [True, True]
 
 
-def test_a_case_that_was_read_with_other_values_keeps_them(line):
+def test_a_case_that_was_read_with_other_values_retains_them(line):
     read = fvsolve.load(line, {"links.main.cells": 10})
     made = sweep(read, {"numerics.courant": [0.5, 0.9]})
     assert (
@@ -202,7 +202,7 @@ def test_a_sweep_of_nothing_is_refused(line, vary, jobs):
         sweep(line, vary, jobs=jobs)
 
 
-def test_the_command_prints_the_rows_and_fails_where_one_does(fvs, tmp_path):
+def test_the_command_prints_the_rows_and_fails_where_a_row_does(fvs, tmp_path):
     code, out, _ = fvs("sweep", "two-tanks", "--set", "numerics.rtol=1e-4,1e-6", "--out", tmp_path, "--json")
     said = json.loads(out)
     assert code == 0 and said["keys"] == ["numerics.rtol"] and [row["ok"] for row in said["rows"]] == [True, True]
@@ -266,7 +266,7 @@ def test_a_sweep_that_is_killed_goes_on_where_it_was_a_torn_line_or_not(line, tm
     assert all(json.loads(text)["key"] for text in kept.read_text().splitlines())
 
 
-def test_a_disk_that_is_full_in_the_middle_is_named_and_what_was_kept_is_found_again(line, tmp_path):
+def test_a_disk_that_is_full_in_the_middle_is_named_and_stored_rows_are_reused(line, tmp_path):
     """Files may have 3000 bytes, enough for two rows and a part of the third."""
     resource = pytest.importorskip("resource", reason="a limit of Unix")
     vary, limits = {"numerics.courant": [0.5, 0.6, 0.7, 0.8]}, resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -283,7 +283,7 @@ def test_a_disk_that_is_full_in_the_middle_is_named_and_what_was_kept_is_found_a
     assert made.reused == kept.count(b"\n") and bare(made.rows) == bare(sweep(line, vary).rows)
 
 
-def test_two_sweeps_in_one_folder_are_refused_and_the_first_loses_nothing(line, tmp_path):
+def test_two_sweeps_in_the_same_folder_are_refused_and_the_first_loses_nothing(line, tmp_path):
     def again(done, total, what):
         if done == 1:
             with pytest.raises(RunError, match="is in use: a study still writes there"):
@@ -292,7 +292,7 @@ def test_two_sweeps_in_one_folder_are_refused_and_the_first_loses_nothing(line, 
     assert len(sweep(line, VARY, out=tmp_path, progress=again).rows) == 4
 
 
-def test_progress_says_how_long_it_will_be(line):
+def test_progress_states_the_remaining_time(line):
     told = []
     sweep(line, VARY, progress=lambda *said: told.append(said))
     assert [said[:2] for said in told] == [(k, 4) for k in range(5)]
@@ -300,7 +300,7 @@ def test_progress_says_how_long_it_will_be(line):
     assert " s left, links.main.cells = 10" in told[1][2]
 
 
-def test_a_file_that_a_value_names_is_part_of_what_is_reused(line, tmp_path, monkeypatch):
+def test_a_file_that_a_value_names_is_part_of_the_reused_key(line, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in "ab":
         (tmp_path / f"{name}.csv").write_text("t [s],opening [-]\n0,1\n0.2,0\n")
@@ -414,7 +414,7 @@ def test_a_number_that_may_also_be_a_table_has_a_range(name, key, given, read):
 
 
 @pytest.mark.parametrize("kind", ["sobol", "lhs"])
-def test_a_sample_fills_its_ranges_more_evenly_than_chance_and_its_seed_says_which(case, kind):
+def test_a_sample_fills_its_ranges_more_evenly_than_chance_and_follows_its_seed(case, kind):
     found = sample_points(case, RANGES, f"{kind}:64", seed=3)
     values = np.array([[*one.values()] for one in found])
     low, high = np.array([*key_ranges(case, RANGES).values()]).T
@@ -427,7 +427,7 @@ def test_a_sample_fills_its_ranges_more_evenly_than_chance_and_its_seed_says_whi
     )
 
 
-def test_all_that_is_wrong_of_ranges_is_said_at_once(case):
+def test_all_faults_of_ranges_are_reported_at_once(case):
     wrong = {"links.valve.area": [0.002, 0.001], "links.main.length": ["900 m", 900], "links.main.cells": [10, 20],
              "numerics.scheme": ["muscl", "weno5"], "links.main.diameter": [0.1, "1 kg"], "links.main.lengt": [1, 2],
              "nodes.lake.head": [1, 2, 3], "links.main.wave_speed": [-1.0, 1000.0]}  # fmt: skip
@@ -489,7 +489,7 @@ def test_cells_are_read_as_settings_are(case, tmp_path):
     ]
 
 
-def test_all_that_is_wrong_of_a_file_is_said_at_once(case, tmp_path):
+def test_all_faults_of_a_file_are_reported_at_once(case, tmp_path):
     text = "links.valve.aera;nodes.lake.head [kg];numerics.scheme [m];nodes.lake.head\n17,7;45;a;1\n;30 kg;b;2 kg\n"
     with pytest.raises(FvsolveError) as raised:
         read(case, tmp_path, text)
@@ -511,7 +511,7 @@ def test_all_that_is_wrong_of_a_file_is_said_at_once(case, tmp_path):
         (b"\xff\xfe\x00", "is not UTF-8 or UTF-16 text"),
     ],
 )
-def test_what_is_no_table_is_named_with_its_line(case, tmp_path, text, said):
+def test_an_invalid_table_is_named_with_its_line(case, tmp_path, text, said):
     with pytest.raises(FvsolveError, match=said):
         read(case, tmp_path, text)
 
@@ -531,6 +531,6 @@ def test_a_file_that_is_not_there_is_named(case, tmp_path):
         ({"vary": {"links.valve.area": [1.0, 2.0], "nodes.lake.head": []}}, "nodes.lake.head: no values"),
     ],
 )
-def test_what_does_not_go_together_is_named(case, given, said):
+def test_combinations_that_exclude_each_other_are_named(case, given, said):
     with pytest.raises(FvsolveError, match=said):
         sweep(case, **given)

@@ -212,7 +212,7 @@ def suited(case: dict, **changes) -> bool:
     return sweep_batches.is_suited(model_of(load(case, changes)))
 
 
-def test_cases_whose_steps_depend_on_states_run_alone():
+def test_cases_with_steps_that_depend_on_states_run_alone():
     case = network(METHODS["upwind5"])
     assert suited(case)
     assert not suited(case, **{"numerics.method": "tr-bdf2"})
@@ -223,7 +223,7 @@ def test_cases_whose_steps_depend_on_states_run_alone():
     assert not suited(case)
 
 
-def test_a_notice_on_the_run_as_a_whole_or_on_two_copies_is_found():
+def test_a_notice_on_the_run_as_a_whole_or_on_two_copies_is_detected():
     own = Notice("range", "links.main~3~", "main~3~: odd")
     found = sweep_batches.notices_of_copies([own])
     assert found[3] == [replace(own, place="links.main", text="main: odd")] and not any(found[:3] + found[4:])
@@ -231,7 +231,7 @@ def test_a_notice_on_the_run_as_a_whole_or_on_two_copies_is_found():
     assert sweep_batches.notices_of_copies([Notice("range", "links.main~3~", "main~3~ and main~4~")]) is None
 
 
-def test_a_step_beyond_a_limit_is_said_in_every_row():
+def test_a_step_beyond_a_limit_is_reported_in_every_row():
     case = network(METHODS["fused"] | {"courant": 1.02})
     tasks = tasks_of("area", 20)
     rows = batched(case, tasks, failed=1)

@@ -106,7 +106,7 @@ def swings(method: str, h: float) -> tuple[np.ndarray, float]:
 
 
 @pytest.mark.parametrize("method", ["trapezoid", "implicit-midpoint"])
-def test_after_a_stiff_step_an_a_stable_method_rings_by_its_r_and_an_l_stable_one_does_not(method):
+def test_after_a_stiff_step_an_a_stable_method_rings_by_its_r_and_an_l_stable_method_does_not(method):
     h = 0.01
     away, z = swings(method, h)
     assert z < -50.0 and r_of(method, z).real < -0.9
@@ -241,7 +241,7 @@ def test_the_softened_law_comes_to_rest_once_the_step_is_below_two_over_its_slop
     assert chatters == (times > 2.0)
 
 
-def test_error_control_shrinks_its_steps_at_a_bare_root_as_the_tolerance_predicts_and_not_at_a_softened_one():
+def test_error_control_shrinks_its_steps_at_a_bare_root_as_the_tolerance_predicts_and_not_at_a_softened_root():
     k, soft, after = root_rate(), 1e-4, 20.0  # odd polynomial in dz below `soft` [m]
     level = 2 * math.sqrt(LEVEL) / k
 
@@ -307,7 +307,7 @@ def test_a_step_across_a_kink_costs_the_order_and_segments_restore_it(kind, orde
 
 
 @pytest.mark.parametrize(("kind", "order"), [("bends", 2), ("jumps", 1)])
-def test_the_program_ends_its_steps_at_kinks_and_jumps_and_keeps_the_order_that_its_bare_law_loses(kind, order):
+def test_the_program_ends_its_steps_at_kinks_and_jumps_and_retains_the_order_that_its_bare_law_loses(kind, order):
     bends, volume, flow_area, pump = kind == "bends", 50.0, 2e-4, 4e5
     value = ramp(BEND, SHUT - BEND, 0.2, 1.0) if bends else step(BEND, 0.2, 1.0)
     nodes = {"pump": reservoir(pump), "body": chamber(volume), "sump": reservoir(AMBIENT)}
@@ -352,7 +352,7 @@ def sections() -> dict[str, str]:
     return dict(zip(parts[1::2], parts[2::2], strict=True))
 
 
-def test_every_section_says_what_why_where_and_what_helps_and_names_tests_that_exist():
+def test_every_section_states_symptom_cause_place_and_remedy_and_names_tests_that_exist():
     written = "".join(path.read_text(encoding="utf-8") for path in TESTS.glob("test_*fail*.py"))
     found = {name: text for name, text in sections().items() if name != "The map"}
     assert len(found) == 14
@@ -390,7 +390,7 @@ def test_every_map_of_the_page_takes_its_options(words, monkeypatch, tmp_path, f
     assert code == 2 and "far enough" in err and asked == [words[2]]
 
 
-def test_the_table_of_courant_limits_is_what_is_computed():
+def test_the_table_of_courant_limits_contains_computed_values():
     rows = re.findall(r"^\| (`.+?`) \|((?: [\d.]+ \|){6})$", PAGE, flags=re.MULTILINE)
     schemes = ("upwind", "linear-upwind", "fromm", "upwind3", "upwind5", "central")
     assert len(rows) == 5

@@ -15,8 +15,8 @@ from reference.lossless_pipes import (
     courant_limit,
     growth,
     lossless,
-    one_step,
     scaled,
+    step_matrix,
 )
 from reference.scenes import (
     AMBIENT,
@@ -52,7 +52,7 @@ def energy_norm(model, y: np.ndarray) -> float:
 
 def worst_start(model, method: str, matrix: np.ndarray, steps: int) -> np.ndarray:
     """State of energy norm 0.001 that grows most in n steps."""
-    power = np.linalg.matrix_power(one_step(method, matrix), steps)
+    power = np.linalg.matrix_power(step_matrix(method, matrix), steps)
     vector = np.linalg.svd(power)[2][0]
     return 1e-3 * vector / np.sqrt(energy_weights(model))
 
@@ -87,7 +87,7 @@ def test_central_differences_with_euler_grow_at_any_step_and_rk4_does_not(couran
 
 @pytest.mark.parametrize("method", EXPLICIT)
 @pytest.mark.parametrize("scheme", LINEAR)
-def test_the_courant_limit_of_each_pair_is_met_by_real_runs_within_one_per_cent(scheme, method):
+def test_the_courant_limit_of_each_pair_agrees_with_real_runs_within_1_percent(scheme, method):
     cells, steps = 16, 1000
     travel = LENGTH / cells / SPEED
     model = lossless(cells, scheme, method, travel)
@@ -101,7 +101,7 @@ def test_the_courant_limit_of_each_pair_is_met_by_real_runs_within_one_per_cent(
     assert below < THRESHOLD < above, (scheme, method, limit, below, above)
 
 
-def test_euler_takes_upwind_to_courant_one_and_nothing_above_first_order_to_any_step_worth_taking():
+def test_euler_takes_upwind_to_courant_1_and_nothing_above_first_order_to_any_step_worth_taking():
     cells, travel = 16, LENGTH / 16 / SPEED
     limits = {}
     for scheme in LINEAR:
@@ -154,7 +154,7 @@ def averages(cell: int, degree: int = 4) -> list[float]:
     return [((cell + 1) ** (k + 1) - cell ** (k + 1)) / (k + 1) for k in range(degree + 1)]
 
 
-def by_hand(cells: int, left: float, right: float, datum: bool) -> np.ndarray:
+def explicit_rates(cells: int, left: float, right: float, datum: bool) -> np.ndarray:
     """Rates of upwind5 per travel time of a cell, for waves r and then l, between ends with reflection factors.
 
     Ghost cells beyond an end continue a polynomial of degree 4. Where a wave leaves, it fits the nearest five cells.
@@ -178,10 +178,10 @@ def by_hand(cells: int, left: float, right: float, datum: bool) -> np.ndarray:
     return np.vstack(rates)
 
 
-def test_a_closure_from_cells_alone_grows_and_the_one_with_the_nodes_value_does_not():
+def test_a_closure_from_cells_alone_grows_and_the_closure_with_the_value_of_the_node_does_not():
     cells = 8
     travel = LENGTH / cells / SPEED
-    matrix = by_hand(cells, -1.0, 1.0, datum=False)
+    matrix = explicit_rates(cells, -1.0, 1.0, datum=False)
     found, vectors = np.linalg.eig(matrix)
     rate = found.real.max()
     assert 1e-4 < rate < 0.1
@@ -191,18 +191,22 @@ def test_a_closure_from_cells_alone_grows_and_the_one_with_the_nodes_value_does_
     assert np.linalg.norm(states[-1]) > 0.3 * THRESHOLD * np.linalg.norm(start)
     model = lossless(cells, "upwind5", "rk4", travel)
     ours = travel * model.jacobian(0.0, np.zeros(2 * cells))
-    assert ours == pytest.approx(by_hand(cells, -1.0, 1.0, datum=True), abs=1e-6)
+    assert ours == pytest.approx(explicit_rates(cells, -1.0, 1.0, datum=True), abs=1e-6)
     assert np.linalg.eigvals(ours).real.max() < 1e-9
     steps = round(until / 0.1)
     start = worst_start(model, "rk4", 0.1 * scaled(model, ours), steps)
     assert measured_growth(lossless(cells, "upwind5", "rk4", 0.1 * travel, steps), start) < 2.0
 
 
-def test_the_one_sided_closure_grows_in_every_short_pipe_and_ours_in_none():
+def test_the_closure_from_a_single_side_grows_in_every_short_pipe_and_ours_in_none():
     for cells in range(5, 25):
         for left, right in ((-1.0, 1.0), (-1.0, -1.0), (1.0, 1.0)):
-            assert np.linalg.eigvals(by_hand(cells, left, right, datum=True)).real.max() < 1e-9, (cells, left, right)
-    assert all(np.linalg.eigvals(by_hand(n, -1.0, 1.0, datum=False)).real.max() > 1e-6 for n in range(5, 25))
+            assert np.linalg.eigvals(explicit_rates(cells, left, right, datum=True)).real.max() < 1e-9, (
+                cells,
+                left,
+                right,
+            )
+    assert all(np.linalg.eigvals(explicit_rates(n, -1.0, 1.0, datum=False)).real.max() > 1e-6 for n in range(5, 25))
 
 
 # fronts ------------------------------------------------------------------------------------------------------------
@@ -249,7 +253,7 @@ def test_unlimited_slopes_overshoot_at_any_step_and_limited_ones_below_their_cou
         assert more_variation("ssp-rk3", courant, limiter="van-leer") < 1e-12
 
 
-def rate_by_hand(u: np.ndarray) -> np.ndarray:
+def minmod_rate(u: np.ndarray) -> np.ndarray:
     """h du/dt of a forward wave at Courant 1 with minmod slopes."""
     d = np.diff(u, prepend=u[0], append=u[-1])
     a, b = d[:-1], d[1:]
@@ -265,8 +269,8 @@ def test_a_method_without_ssp_radius_overshoots_where_its_ssp_twin_of_the_same_s
     assert mine.stability_function.numerator == good.stability_function.numerator
     heights, courant = np.array([0.9, 0.9, 1.0, 0.1, 0.1]), 0.9 * tvd_courant("minmod")
     u = np.pad(heights, 6)
-    k = rate_by_hand(u)
-    new = u + courant * (-4 * k + 5 * rate_by_hand(u + 0.1 * courant * k))
+    k = minmod_rate(u)
+    new = u + courant * (-4 * k + 5 * minmod_rate(u + 0.1 * courant * k))
     predicted = np.abs(np.diff(new)).sum() / np.abs(np.diff(u)).sum() - 1.0
     found = crossed(heights, 1, "short-midpoint", courant, "muscl", "minmod")
     assert found == pytest.approx(predicted, abs=1e-12) and found > 0.05
@@ -301,7 +305,7 @@ def clear(t: np.ndarray, shut: float) -> np.ndarray:
     return np.abs((t - shut + 0.4) % 0.8 - 0.4) > 0.03
 
 
-def upwind_by_hand(steps: np.ndarray, cells: int = 40) -> np.ndarray:
+def upwind_pressure(steps: np.ndarray, cells: int = 40) -> np.ndarray:
     """Gate pressure over rho a v after steps of given Courant numbers, in the closed pipe with its whole flow.
 
     r enters with -l at the lake, l with r at the gate; in units where rho a v is 1, r - l = 1 at the start.
@@ -324,7 +328,7 @@ def test_landing_on_output_times_spoils_the_exact_wave_as_predicted_and_dense_ou
     supply = 2 * AMBIENT + 2 * jump
     landed = (np.array(landed) - supply) / jump
     fractions = np.tile([1.0, every / travel - 1.0], len(times))
-    predicted = upwind_by_hand(fractions)[1::2]
+    predicted = upwind_pressure(fractions)[1::2]
     assert np.max(np.abs(landed - predicted)) < 1e-9
     wrong = np.max(np.abs(landed - square_wave(times, 0.0))[clear(times, 0.0)])
     assert wrong > 0.4
@@ -360,7 +364,7 @@ def test_pressure_below_vapour_pressure_is_marked_at_the_gate_when_the_wave_is_b
     assert "nodes.gate" in [mark.place for mark in marks] and "nodes.lake" not in [mark.place for mark in marks]
 
 
-def test_below_vapour_the_run_can_be_told_to_stop_and_a_slow_closure_needs_no_mark():
+def test_below_vapour_the_run_can_be_stopped_and_a_slow_closure_needs_no_mark():
     stopped = fvsolve.run(falling(1.001 * LIMIT, below_vapor="stop"))
     back = 0.1 + 2 * 400.0 / SPEED
     assert not stopped.ok and "vapour" in stopped.reason and stopped.t[-1] == pytest.approx(back, abs=0.03)
@@ -368,7 +372,7 @@ def test_below_vapour_the_run_can_be_told_to_stop_and_a_slow_closure_needs_no_ma
 
 
 @pytest.mark.parametrize("factor, courant, grows", [(0.05, 1.0, False), (0.05, 0.9, False), (400.0, 1.0, True)])
-def test_upwind_with_euler_at_courant_one_takes_friction_up_to_twice_the_flow_in_a_step(factor, courant, grows):
+def test_upwind_with_euler_at_courant_1_takes_friction_up_to_twice_the_flow_in_a_step(factor, courant, grows):
     """Friction of the waves that enter a cell multiplies the flow by 1 - h g in a step: no growth up to h g = 2.
 
     With g = f v / D of steady friction; friction of the cell's own waves grew at Courant number 1 however small.

@@ -204,7 +204,7 @@ def test_ways_of_writing(text, dimension, value):
     assert parse(text, dimension) == value
 
 
-def test_pressure_says_whether_it_is_gauge():
+def test_pressure_is_stated_as_gauge_or_absolute():
     assert parse("5 barg", "pressure") == (5e5, True)
     assert parse("5 bar(g)", "pressure") == (5e5, True)
     assert parse("5 bara", "pressure") == (5e5, False)
@@ -278,7 +278,7 @@ def test_a_decimal_comma_is_refused_in_units_of_ratios_too():
 
 
 @pytest.mark.parametrize("text, meant", [("0 bar", "0 barg"), ("-0.5 bar", "-0.5 barg"), ("-2 bar", "")])
-def test_a_vacuum_is_meant_as_gauge_only_where_that_is_none(text, meant):
+def test_a_vacuum_is_read_as_gauge_only_where_that_is_none(text, meant):
     said = units.vacuum(text, parse(text, "pressure")[0])
     assert said == f'"{text}" is absolute, a vacuum' + (f'; did you mean "{meant}"?' if meant else "")
 

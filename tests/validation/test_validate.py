@@ -107,7 +107,7 @@ def test_a_far_measurement_widens_no_exact_gate_and_no_run_converges_to_itself(t
 
 
 @pytest.mark.parametrize("because, verdict", [('because = "no waves"', DIFFERS), ("", OUTSIDE)])
-def test_what_agrees_with_codes_and_not_with_the_measurement_differs_for_a_written_reason(tmp_path, because, verdict):
+def test_disagreement_with_the_measurement_in_agreement_with_codes_has_a_written_reason(tmp_path, because, verdict):
     others = f'others = [{{ code = "a", value = {LEVEL} }}]\n{because}'
     measured = f"measured = {{ value = {1.2 * LEVEL} }}\n"
     row = final(LEVEL, "rtol = 0.01", "others", measured + others)
@@ -141,7 +141,7 @@ def with_series(tmp_path: Path, shift: float, gate: str, rows: int = 100) -> tup
     return scene(row, table=table, compare='"tank.level" = { file = "tank.csv" }'), data
 
 
-def test_a_moved_clock_is_told_as_arrival(tmp_path):
+def test_a_moved_clock_is_reported_as_arrival(tmp_path):
     gate = 'atol = 1e-4, reason = "a test"'
     text, data = with_series(tmp_path, 0.0, gate)
     assert validated(tmp_path, text, data).verdict == WITHIN
@@ -169,7 +169,7 @@ def test_data_that_lack_or_are_cut_short_are_named_and_never_pass(tmp_path, caps
     assert exit_code(str(tmp_path / "case.toml"), "--data", str(data)) == 0
 
 
-def test_all_faults_of_the_table_are_found_at_once(tmp_path):
+def test_all_faults_of_the_table_are_reported_at_once(tmp_path):
     rows = (
         'computed = "maks(tank.level)"\ngate = { of = "exact" }',
         'computed = "max(tank.level)"\nexact = { value = "1 kg" }\ngate = { of = "exakt" }',
@@ -213,7 +213,7 @@ def test_faults_of_files_profiles_and_networks_are_messages(tmp_path, table, row
     assert told in message, message
 
 
-def test_two_files_of_one_name_are_refused_and_a_kept_case_runs(tmp_path):
+def test_two_files_of_equal_names_are_refused_and_a_stored_case_runs(tmp_path):
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "case.toml").write_text(scene(final(LEVEL, REASON)))
@@ -237,7 +237,7 @@ def test_a_scene_that_another_row_changes_runs_again(tmp_path):
     assert [row.verdict for row in found.rows] == [WITHIN, WITHIN]
 
 
-def test_tables_are_made_by_formulas_integrals_and_from_matrices(tmp_path):
+def test_tables_are_formed_by_formulas_integrals_and_from_matrices(tmp_path):
     (tmp_path / "a.txt").write_text("a title\n1  10 NaN\n2\t20,30\n3 ; 30 ; 60\n-1 5 5\n")
     made = data_files.derived_table(tmp_path / "a.txt", 1, {"t [s]": "c1 - 1", "x": "2*c2"}, False, 1, "c1 > 0")
     assert list(made) == ["t [s]", "x"] and made["x"].tolist() == [20.0, 40.0, 60.0]
@@ -298,7 +298,7 @@ def test_the_page_has_a_figure_of_each_case_in_both_themes(tmp_path):
     assert "| - | 0 to 0.004 | - | within |" in page  # the gate of the case: at most 0.004
 
 
-def test_limits_lie_about_the_measured_value_and_hold_what_is_within():
+def test_limits_contain_the_measured_value_and_the_margin():
     row = library.validate_file(SHIPPED["adelaide-moderate"]).rows[0]
     low, high = limits_of(row)
     assert low < row.in_unit(row.row.measured["value"]) < high and low < row.in_unit(row.value) < high

@@ -95,7 +95,7 @@ def weighed(weights, k: list) -> list:
     return plus([Fraction(0)], *([w * x for x in one] for w, one in zip(weights, k, strict=False)))
 
 
-def test_a_modulus_of_one_is_enough_for_13_only_where_eigenvectors_are_whole():
+def test_a_modulus_of_1_is_enough_for_13_only_with_all_eigenvectors():
     """With |R| = 1 steps of a defective Jacobian grow linearly, and those of a diagonal Jacobian do not."""
 
     def apart(t, y):
@@ -109,7 +109,7 @@ def test_a_modulus_of_one_is_enough_for_13_only_where_eigenvectors_are_whole():
     assert ends[apart] == pytest.approx([0.0, 1.0]) and ends[together] == pytest.approx([-100.0, 1.0])
 
 
-def test_implicit_euler_is_stable_outside_the_circle_about_one_27():
+def test_implicit_euler_is_stable_outside_the_circle_about_1_27():
     """Implicit Euler is stable outside the circle |h lambda - 1| = 1 and unstable inside."""
     r = analyse("implicit-euler").stability_function
     s = np.add.outer(np.linspace(-4, 4, 81), 1j * np.linspace(-4, 4, 81))

@@ -3,7 +3,7 @@
 import meshio
 import numpy as np
 import pytest
-from reference.refusals import said
+from reference.refusals import messages_of
 from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, scene
 from reference.u_tubes import BORE, DEPTH, HALF, LEVEL, LOSS, ROLL, TANK, hull, u_tube
 from scipy.integrate import simpson, solve_ivp
@@ -224,7 +224,7 @@ def cut(law, **valve):
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_behind_a_shut_valve_stands_what_the_column_weighs_and_is_thrown(law):
+def test_behind_a_shut_valve_the_pressure_is_weight_and_inertia_of_the_column(law):
     run = fv.run(cut(law, opening=0.0))
     angle, w, e = roll(run.t)
     down = {"y": -GRAVITY * np.sin(angle), "z": -GRAVITY * np.cos(angle)}
@@ -238,7 +238,7 @@ def test_behind_a_shut_valve_stands_what_the_column_weighs_and_is_thrown(law):
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_two_columns_that_meet_at_a_shut_valve_are_one(law):
+def test_two_columns_at_a_shut_valve_act_as_a_single_column(law):
     whole, case = u_tube(), u_tube()
     middle = [0, 0.5, -DEPTH]
     case["nodes"] |= {"middle": {"type": "junction", "on": "hull", "at": middle},
@@ -256,7 +256,7 @@ def test_two_columns_that_meet_at_a_shut_valve_are_one(law):
         assert two[name] == pytest.approx(one["duct.flow"], abs=1e-7)
 
 
-def test_what_does_not_ride_together_is_told_all_at_once():
+def test_combinations_that_cannot_move_together_are_reported_all_at_once():
     case = cut("linear")
     case["nodes"]["port"] |= {"elevation": 1.0}
     case["nodes"]["starboard"]["on"] = "hul"
@@ -265,7 +265,7 @@ def test_what_does_not_ride_together_is_told_all_at_once():
     case["nodes"]["head"] = {"type": "reservoir", "head": 3.0, "on": "hull"}
     case["links"]["bridge"] = {**PIPE, "from": "port", "to": "shore", "length": 3.0}
     case["links"]["long"] = {**PIPE, "from": "port", "to": "head", "length": 3.0}
-    found = said(case)
+    found = messages_of(case)
     assert "has no effect on a body" in found["nodes.port.elevation"]
     assert 'did you mean "hull"' in found["nodes.starboard.on"]
     assert "give the body as `on = BODY`" in found["nodes.shore.at"]
@@ -274,26 +274,26 @@ def test_what_does_not_ride_together_is_told_all_at_once():
     assert "too short: the route on hull is" in found["links.long.length"]
 
 
-def test_what_has_no_way_between_its_ends_joins_one_place():
+def test_parts_without_a_route_between_their_ends_join_a_single_place():
     case = cut("linear")
     case["nodes"]["beside"]["at"] = [0, -HALF, 0.0]
-    assert "the ends lie 1.5 m apart" in said(case)["links.gate"]
+    assert "the ends lie 1.5 m apart" in messages_of(case)["links.gate"]
 
 
-def test_a_way_round_that_is_longer_than_its_column_is_told():
+def test_a_route_longer_than_its_column_is_reported():
     case = u_tube(route=[[3.0, 0.0, -DEPTH]])
-    assert said(case)["links.duct.length"].startswith("8 m is too short: the route on hull is 10 m")
+    assert messages_of(case)["links.duct.length"].startswith("8 m is too short: the route on hull is 10 m")
 
 
-def test_a_route_of_a_column_that_stands_still_is_told():
+def test_a_route_of_a_column_at_standstill_is_reported():
     case = ring(kind="fixed")
     del case["nodes"]["rig"]
     for name in ("a", "b"):
         case["nodes"][name] = {"type": "reservoir", "pressure": 1e5}
-    assert "no end of the pipe is on a body" in said(case)["links.way.route"]
+    assert "no end of the pipe is on a body" in messages_of(case)["links.way.route"]
 
 
-def test_steps_that_are_taken_whole_feel_the_body_too():
+def test_steps_without_divisions_include_the_force_on_the_body_too():
     joint = {"kind": "prismatic", "axis": [1, 0, 0],
              "travel": {"start": 0, "duration": 10, "value": [0, 100.0], "exponent": 2}}  # fmt: skip
     case = line([0, 0, 0], [LONG, 0, 0], joint, scheme="upwind", method="euler")
@@ -362,7 +362,7 @@ def test_the_energy_of_a_pipe_between_tanks_that_roll_closes_but_for_its_cells(l
     assert found[1].supplied["hull"][-1] == pytest.approx(work, rel=1e-5)
 
 
-def test_water_that_flows_from_a_place_which_moves_brings_what_moving_it_takes():
+def test_water_from_a_moving_place_carries_the_work_of_moving_it():
     joint = {
         "kind": "revolute",
         "axis": [0, 0, 1],
@@ -391,7 +391,7 @@ def with_tank(**keys):
 
 
 @pytest.mark.parametrize("what", UNFELT)
-def test_energy_and_joints_of_what_bodies_would_not_feel_are_refused_by_name(what):
+def test_energy_and_joints_without_their_forces_on_bodies_are_refused_by_name(what):
     make, place, text = UNFELT[what]
     case = make()
     with pytest.raises(FvsolveError, match=f"{place}: .*{text}"):

@@ -79,7 +79,7 @@ def test_a_run_in_memory_computes_no_frames(monkeypatch):
     assert fvsolve.run(fork(fields=5)).reason == "finished"
 
 
-def test_a_run_interrupted_and_resumed_is_the_unbroken_one_of_the_general_path(tmp_path, monkeypatch):
+def test_a_run_interrupted_and_resumed_equals_the_uninterrupted_run_of_the_general_path(tmp_path, monkeypatch):
     monkeypatch.setattr(SOLVE, "CHECKPOINT_SECONDS", 0.0)
     times = []
 
@@ -112,12 +112,12 @@ def test_a_run_interrupted_and_resumed_is_the_unbroken_one_of_the_general_path(t
     ],
     ids=["upwind and euler", "scheme", "method", "law", "tank"],
 )
-def test_only_upwind_and_euler_leap_and_only_pipes(case, allowed):
+def test_only_upwind_and_euler_take_multiple_steps_and_only_pipes(case, allowed):
     model = build(load(case))
     assert LOOP.fused_step_allowed(model, method_named(model.case.numerics.method)) is allowed
 
 
-def test_scenes_with_events_are_stepped_one_by_one_and_end():
+def test_scenes_with_events_are_stepped_singly_and_end():
     """A fused step that an event cut short once repeated without end."""
     plain = {"numerics.scheme": "upwind", "numerics.method": "euler", "numerics.courant": 1.0}
     case = CASES / "relief-on-closed-main.toml"

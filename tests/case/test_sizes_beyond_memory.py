@@ -22,7 +22,7 @@ POOL = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [4
     ({"links.main.cells": 10**8}, r"links.main.cells: 1e\+08 cells take about 50 GB of memory, and .* are free"),
     ({"links.main.cells": 2 * 10**7, "numerics.method": "radau-iia-5"}, "cells take about 60 GB of memory"),
 ])  # fmt: skip
-def test_what_cannot_advance_or_fit_is_refused_before_it_is_built(settings, words):
+def test_settings_that_cannot_advance_or_fit_are_refused_before_the_build(settings, words):
     if "memory" in words and free_memory() > 50e9:
         pytest.skip("here it fits")
     refused(branched(), words, set=settings)
@@ -41,7 +41,7 @@ def test_basins_likewise():
     {"numerics.courant": 1e-3}, {"output.every": 1e-6}, {"links.main.cells": 10**5},
     {"numerics.end": 1e12, "output.every": 1e9},
 ])  # fmt: skip
-def test_what_fits_is_let_alone(settings):
+def test_settings_that_fit_are_accepted(settings):
     assert fvsolve.load(branched(), settings)
 
 
@@ -52,7 +52,7 @@ def test_a_table_larger_than_the_disk_is_refused_by_its_place(tmp_path, monkeypa
     assert not (tmp_path / "run" / ".lock").exists()
 
 
-def test_the_estimate_of_the_disk_is_near_what_is_written(tmp_path):
+def test_the_estimate_of_the_disk_is_near_the_written_size(tmp_path):
     case = branched(fields=50)
     fvsolve.run(case, {"output.every": "1 ms"}, tmp_path / "run")
     files = [tmp_path / "run" / "history.csv", *(tmp_path / "run" / "fields").iterdir()]
@@ -61,7 +61,7 @@ def test_the_estimate_of_the_disk_is_near_what_is_written(tmp_path):
 
 
 @pytest.mark.parametrize("group", ["nodes", "links", "scalars", "lines"])
-def test_names_of_many_letters_are_refused_at_once(group):
+def test_long_names_are_refused_at_once(group):
     case, name = branched() | {"scalars": {}}, "x" * 10**5
     case["nodes"]["pool"] = POOL
     case["output"]["lines"] = {}
@@ -73,12 +73,12 @@ def test_names_of_many_letters_are_refused_at_once(group):
     assert "has 100000 letters; expected at most 60" in str(error) and len(str(error)) < 5000
 
 
-def test_a_reference_of_many_letters_is_answered_shortly():
+def test_a_long_reference_gets_a_short_message():
     error = refused(branched(), set={"links.valve.to": "y" * 10**5, "output.probes": ["z" * 10**5 + ".pressure"]})
     assert len(str(error)) < 5000
 
 
-def test_a_unit_of_many_letters_is_refused_at_once():
+def test_a_long_unit_is_refused_at_once():
     refused(
         branched(),
         "has 100004 letters, more than a number with its unit; expected a length",
@@ -91,7 +91,7 @@ def test_a_unit_of_many_letters_is_refused_at_once():
     )
 
 
-def test_a_long_run_is_told_before_it_starts(fvs, tmp_path, monkeypatch):
+def test_a_long_run_is_announced_before_it_starts(fvs, tmp_path, monkeypatch):
     long = fvsolve.build(fvsolve.load(branched(), {"numerics.end": 1e12, "output.every": 1e9}))
     assert re.fullmatch(r"case will take about \S+ years", cost_estimate(long))
     large = fvsolve.build(fvsolve.load(branched(fields=10**6), {"numerics.end": 1e-2, "output.every": 1e-3}))

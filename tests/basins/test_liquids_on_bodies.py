@@ -219,7 +219,7 @@ def test_a_joint_holds_the_liquid_that_rests_on_its_body(law):
 
 
 @pytest.mark.parametrize("way", ["pitches", "turns", "slides"])
-def test_what_drives_a_full_box_is_what_its_liquid_gains_and_loses(way):
+def test_work_on_a_full_box_is_the_gain_and_the_loss_of_its_liquid(way):
     swing = {"mean": 0.0, "amplitude": 0.1, "period": 0.17}
     body = {"pitches": turning(swing, (0, 1, 0)), "turns": turning(swing), "slides": sliding(swing)}[way]
     basin = full((16, 12), at=[-0.8, -0.5, 0.6], attitude=TILT, wave_speed=60.0)
@@ -269,7 +269,7 @@ def test_a_full_box_on_a_spring_swings_at_the_root_of_the_tangent_law(law):
 
 
 @pytest.mark.parametrize("law", FLUIDS)
-def test_a_free_box_on_rails_keeps_its_momentum(law):
+def test_a_free_box_on_rails_conserves_its_momentum(law):
     start = {"pressure": "2e5 * exp(-20 * (x - 0.5)**2)", "u": "0.2 * sin(1.5707963 * x)"}
     case = case_of(cart(50.0, rate=0.3), full((30, 4), (2.0, 0.5), start=start), 4e-3, law)
     model = model_of(case)
@@ -293,7 +293,7 @@ def slipping(long, wide):
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_an_upright_box_on_a_pin_swings_as_a_pendulum_whose_liquid_slips(law):
+def test_an_upright_box_on_a_pin_oscillates_as_a_pendulum_with_a_slipping_liquid(law):
     long, high, arm, angle, end = 1.0, 0.6, 0.5, 1e-2, 0.5
     body = {
         "type": "body", "mass": 5.0, "inertia": [1.0, 1.0, 1.0],
@@ -333,7 +333,7 @@ def test_implicit_methods_agree_on_a_box_that_is_free_to_turn(method):
 @pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("side", [{"boundary": "open"}, {"impedance": 0.0}])
-def test_what_lies_beyond_an_open_side_rests_in_the_same_axes(side, law):
+def test_liquid_beyond_an_open_side_rests_in_the_same_axes(side, law):
     body = {**HEAVY, "joint": {"kind": "fixed", "attitude": TILT}}
     _, found = after(case_of(body, full(patches={"gap": {"side": "east", **side}}), 0.01, law), 0.01)
     assert np.abs(found[1:]).max() < 1e-12
@@ -365,7 +365,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("text", FAULTS)
-def test_what_does_not_go_with_a_liquid_that_rides_is_refused_by_name(text):
+def test_features_that_a_liquid_on_a_body_does_not_support_are_refused_by_name(text):
     body, keys = FAULTS[text]
     with pytest.raises(CaseError, match=text):
         load(case_of({**turning(straight(1.0, 100.0)), **body}, full(**keys), 1.0))

@@ -50,7 +50,7 @@ def test_pictures_of_a_command_are_those_of_its_result(fork):
     assert not [path for path in run.directory.iterdir() if path.name.startswith(".")]
 
 
-def test_without_pictures_there_are_none_until_they_are_asked_for(fork):
+def test_pictures_are_drawn_only_on_request(fork):
     assert ".png" not in command("--no-pictures").stdout
     assert not list(Path("runs/fork").glob("*.png"))
     assert fvsolve.run("fork.toml", out="other", pictures=False).ok and not list(Path("other").glob("*.png"))
@@ -81,7 +81,7 @@ with PlotProcess(second_process=True) as painter:
 
 
 @pytest.mark.parametrize("beside", [pytest.param(True, marks=alone), False])
-def test_what_cannot_be_drawn_is_named_and_the_rest_is_drawn(tmp_path, beside):
+def test_items_that_cannot_be_drawn_are_named_and_the_rest_is_drawn(tmp_path, beside):
     (tmp_path / "one.png").mkdir()
     code = f"""
 with PlotProcess(second_process={beside}) as painter:
@@ -109,7 +109,7 @@ with PlotProcess(second_process=True) as painter:
     assert python(code, tmp_path) == "['.1-0.tmp.png', 'one.png']\n"
 
 
-def test_what_breaks_off_the_drawing_leaves_no_half_picture(tmp_path):
+def test_an_interrupted_drawing_leaves_no_incomplete_picture(tmp_path):
     code = """
 class Broken:
     def __iter__(self):

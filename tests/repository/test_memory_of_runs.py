@@ -45,7 +45,7 @@ def test_the_parts_of_a_case_are_gone_with_the_case(use, scene):
     assert [part() for part in parts if part() is not None] == []
 
 
-def test_a_run_keeps_no_memory(scene):
+def test_a_run_retains_no_memory(scene):
     """A block is a small object: before, each run kept more than a hundred."""
     for _ in range(5):
         fvsolve.run(scene)

@@ -98,7 +98,7 @@ def rests(case, loose=1e-13):
 @pytest.mark.in_turn
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("frame", FRAMES)
-def test_basins_that_a_riding_column_joins_rest_where_a_surface_rests_in_their_frame(frame, way, tmp_path):
+def test_basins_joined_by_a_column_on_a_body_rest_where_a_surface_rests_in_their_frame(frame, way, tmp_path):
     (joint, start), more = FRAMES[frame], {"link": COLUMN, **WAYS[way]}
     if "folder" in more:
         more["folder"] = tmp_path
@@ -109,7 +109,7 @@ def test_basins_that_a_riding_column_joins_rest_where_a_surface_rests_in_their_f
 @pytest.mark.in_turn
 @pytest.mark.parametrize("link", [COLUMN, PIPE], ids=["column", "pipe"])
 @pytest.mark.parametrize("way", [{}, {"swap": True}, {"turned": True}, {"folder": True}, {"held": False}])
-def test_basins_that_a_riding_link_joins_rest_on_one_level_in_the_world(way, link, tmp_path):
+def test_basins_joined_by_a_link_on_a_body_rest_on_a_common_level_in_the_world(way, link, tmp_path):
     """The body or its carrier is tilted; the levels of both basins form one horizontal surface."""
     down = Rotation.from_euler("ZYX", [20, -3, 4], degrees=True).inv().apply([0, 0, -1])
     more = {key: tmp_path if key == "folder" else one for key, one in way.items() if key != "held"}
@@ -201,7 +201,7 @@ QUICK = {"of many cells": {"grid": (2, 4)}, "a pipe": {"type": "pipe", "wave_spe
 @pytest.mark.in_turn
 @pytest.mark.parametrize("drawn", [*DRAWN, *QUICK])
 @pytest.mark.parametrize("joint", JOINTS)
-def test_a_basin_and_a_tank_swing_as_one_column_of_water_does(joint, drawn):
+def test_a_basin_and_a_tank_oscillate_as_a_single_column_of_water(joint, drawn):
     """A basin of one cell is equivalent to a column; many cells, or a pipe, are so far as their waves are fast."""
     moves, force = JOINTS[joint]
     result = fv.run(half_u(moves, **(DRAWN | QUICK)[drawn]))
@@ -224,7 +224,7 @@ def test_rates_hang_on_the_states_that_the_pattern_of_implicit_methods_has(link)
 # valves, faults ----------
 
 
-def test_a_valve_between_basins_that_touch_lets_them_come_to_one_level_in_the_world():
+def test_a_valve_between_basins_that_touch_lets_them_reach_a_common_level_in_the_world():
     joint = {"kind": "fixed", "attitude": {"pitch": "4 deg"}}
     case = twins(joint, COLUMN, end=20.0)
     case["links"] = {"gate": {"type": "valve", "from": "a.gap", "to": "b.gap", "area": 0.1}}
@@ -276,7 +276,7 @@ def test_links_that_cannot_be_are_refused_by_name(text):
 
 
 @pytest.mark.parametrize("link", [COLUMN, {"type": "valve", "diameter": BORE, "length": None}], ids=["column", "valve"])
-def test_what_a_joint_holds_and_energy_are_refused_where_a_link_joins_a_basin_that_rides(link):
+def test_joint_forces_and_energy_are_refused_where_a_link_joins_a_basin_on_a_body(link):
     case = changed(twins({"kind": "fixed"}, COLUMN), {"b": {"at": [2, 0, 0]} if link["type"] == "valve" else {}}, {})
     case["links"]["duct"] = changed({"nodes": {}, "links": {"duct": case["links"]["duct"]}}, {}, link)["links"]["duct"]
     with pytest.raises(
@@ -290,7 +290,7 @@ def test_what_a_joint_holds_and_energy_are_refused_where_a_link_joins_a_basin_th
         model_of(case)
 
 
-def test_a_patch_tells_the_pressure_on_the_bed_amid_its_faces():
+def test_a_patch_has_the_pressure_on_the_bed_at_the_middle_of_its_faces():
     """In a decelerated box: rho g times the surface at the faces of the patch minus the bed of the cells behind."""
     joint, _ = FRAMES["slows down"]
     bed = {"bed": "0.1 * x", "start": {"level": f"{LEVEL} + {SLOWS / GRAVITY} * x"}}

@@ -50,7 +50,7 @@ def squares(found) -> dict:
     return {number: answer[0] for number, answer in found.items()}
 
 
-def test_all_tasks_are_done_the_first_one_here():
+def test_all_tasks_are_done_and_the_first_in_this_process():
     tasks = [3, 1, 4, 1, 5, 9, 2, 6]
     found = dict(run_tasks(Work(), tasks, jobs=2))
     assert squares(found) == {k: task * task for k, task in enumerate(tasks)}
@@ -59,26 +59,26 @@ def test_all_tasks_are_done_the_first_one_here():
     assert [*run_tasks(Work(), [], jobs=2)] == [] and squares(dict(run_tasks(Work(), [7], jobs=2))) == {0: 49}
 
 
-def test_a_process_that_is_killed_costs_its_chunk_which_another_does(tmp_path):
+def test_a_process_that_is_killed_costs_its_chunk_and_another_repeats_it(tmp_path):
     found = dict(run_tasks(Work({5}, str(tmp_path / "killed")), range(200), jobs=2))
     assert (tmp_path / "killed").exists() and squares(found) == {k: k * k for k in range(200)}
 
 
-def test_what_kills_every_process_is_lost_and_nothing_else():
+def test_a_task_that_kills_every_process_is_lost_and_nothing_else():
     found = dict(run_tasks(Work({1, 8}), range(12), jobs=2))  # alone at first, and later among others of a chunk
     assert {k for k, answer in found.items() if answer == ("lost", k)} == {1, 8}
     rest = {*range(12)} - {1, 8}
     assert squares({k: found[k] for k in rest}) == {k: k * k for k in rest}
 
 
-def test_processes_end_with_the_one_that_started_them(tmp_path):
+def test_processes_end_with_their_parent(tmp_path):
     """Processes end with a killed parent; otherwise their tasks would continue for hours."""
     script = """if True:
         import os, signal, sys, time
         from fvsolve.studies.parallel import TaskPool
-        def said(task):
+        def square(task):
             if task: open(f"{sys.argv[1]}/{os.getpid()}", "w").close(); time.sleep(60.0)
-        if __name__ == "__main__": [*TaskPool(said, jobs=2).run([0, 1, 2])]"""
+        if __name__ == "__main__": [*TaskPool(square, jobs=2).run([0, 1, 2])]"""
     (tmp_path / "script.py").write_text(textwrap.dedent(script))
     (tmp_path / "there").mkdir()
     running = subprocess.Popen([sys.executable, tmp_path / "script.py", tmp_path / "there"])
@@ -96,7 +96,7 @@ def until(holds) -> None:
     raise AssertionError("it never came about")
 
 
-def test_what_a_task_raises_is_raised_here_and_no_process_stays():
+def test_exceptions_of_a_task_are_raised_here_and_no_process_stays():
     before = {*active_children()}  # processes of Dask
     with pytest.raises(ValueError, match="what a task raises"):
         dict(run_tasks(Work(), [1, 2, "fault", 4], jobs=2))
@@ -109,7 +109,7 @@ def test_chunks_take_about_a_second_and_grow_no_faster_than_that_can_be_known():
     assert next_chunk_size(100, 10.0, 100) == 10 and next_chunk_size(1, 60.0, 1) == 1
 
 
-def test_workers_of_dask_give_what_processes_give(cluster):
+def test_workers_of_dask_give_the_results_of_processes(cluster):
     tasks = [*range(50)]
     found = dict(run_tasks(Work(), tasks, dask=cluster.scheduler_address))
     assert squares(found) == {k: k * k for k in tasks}
@@ -172,7 +172,7 @@ def test_another_version_is_named_with_both_numbers(cluster, monkeypatch):
         dict(run_tasks(Work(), [1, 2, 3], dask=cluster.scheduler_address))
 
 
-def test_a_scheduler_that_goes_away_is_told_and_nobody_waits_for_ever(monkeypatch):
+def test_a_scheduler_that_goes_away_is_reported_without_endless_waiting(monkeypatch):
     distributed = pytest.importorskip("distributed", reason="Dask is an extra")
     from fvsolve.studies import parallel as room
 
@@ -260,7 +260,7 @@ def test_workers_of_dask_find_the_same(line, cluster, study, asked):
     assert timeless(there) == timeless(alone)
 
 
-def test_what_has_no_name_to_be_sent_by_is_refused(line):
+def test_tasks_without_a_name_to_be_sent_by_are_refused(line):
     with pytest.raises(
         FvsolveError, match="initial, source and exact are functions of this process; expected jobs = 1"
     ):
