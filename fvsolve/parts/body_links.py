@@ -60,7 +60,7 @@ class PinRows(Lowering, kind="pin"):
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        row["from_point"], row["to_point"] = draft.point(link.from_), draft.point(link.to)
+        draft.join(row, ("from_point", "to_point"), (link.from_, link.to))
         directions = link.directions()
         row["rows"], row["pull"] = len(directions), link.stabilisation
         row["directions"][: directions.size] = directions.ravel()
@@ -105,7 +105,7 @@ class BushingRows(Lowering, kind="bushing"):
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        row["from_point"], row["to_point"] = draft.point(link.from_), draft.point(link.to)
+        draft.join(row, ("from_point", "to_point"), (link.from_, link.to))
         row["stiffness"], row["damping"] = link.stiffness, link.damping
         row["turn_stiffness"], row["turn_damping"] = link.rotational_stiffness, link.rotational_damping
         case = draft.case

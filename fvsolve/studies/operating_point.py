@@ -150,7 +150,7 @@ def with_held_schedules(model, t: float, before: bool = False):
     for k, record in enumerate(tables.schedules):
         if record["pieces"] != 0:  # it does not follow a block
             schedules[k] = (len(tables.pieces) + k, 1)
-    driven = [{int(row["schedule"]) for row in tables.walls}, *(feature.driven() for feature in model.features)]
+    driven = [{int(row["schedule"]) for row in tables.walls}, *(feature.driven for feature in model.features)]
     for k in set().union(*driven) - {-1}:
         rows[k][4] = slope_at(tables, k, t, limit)
     pieces = np.vstack([tables.pieces, np.array(rows).reshape(-1, 7)])  # the first ones contain formulas of blocks

@@ -51,11 +51,6 @@ class ArraySizes:
         self.feature_marks += int(count)
         return self.first_mark + self.feature_marks - int(count)
 
-    def book(self, power: int, stored: int) -> None:
-        """Reserve rows of power and of stored energy before those of devices."""
-        self.feature_power += int(power)
-        self.feature_stored += int(stored)
-
     def need_places(self, count: int) -> None:
         """State the number of cells of a pipe, or of places that are computed like them."""
         self.places.append(int(count))

@@ -128,6 +128,9 @@ class Feature:
     frames : names of frames that move, whose data it writes to `out`, see `kernels.moving_frames`
     leaks : rows of links that leak between nodes a and b and change their volumes: `leakage` [m3/s/Pa], `speed`,
     `sweep_a`, `sweep_b`; leak_names : names of these links
+    fast_parts : names of parts that can limit the step
+    marks : kind and place of each entry of `marks` that the feature has reserved
+    driven : numbers of schedules whose rates are speeds; link_schedules : link -> its schedule; -1 for none
     further_cells : number of cells whose cost the feature adds to that of pipes and basins; negative if it saves
     """
 
@@ -141,6 +144,10 @@ class Feature:
     frames: Sequence[str] = ()
     leaks: Any = ()
     leak_names: Sequence[str] = ()
+    fast_parts: Sequence[str] = ()
+    marks: Sequence[tuple[str, str]] = ()
+    driven: Collection[int] = ()
+    link_schedules: dict[str, int] = {}
     further_cells = 0
 
     def __init__(self, case, given_up: Collection[str] = ()) -> None:
@@ -169,13 +176,9 @@ class Feature:
 
         Returns the distance of the second part from the first at the start [m], and its rate [m/s]; for points
         `toward` a direction only the rate along it, and `about` an axis that of the angle [rad/s].
-        ports : columns of the row for the two parts; places : their names, or names of points
+        ports : columns of the row for both parts, or for both points of a joint; places : names of parts or points
         """
         return None
-
-    def point(self, draft, place: str) -> int:
-        """Number of a named point of what moves, or of the world; -1 if the feature has none."""
-        return -1
 
     def coordinate(self, name: str) -> Coordinate | None:
         """Coordinate of a part that the feature moves along a line; None for others."""
@@ -300,18 +303,6 @@ class Feature:
     def add_fields(self, fields: dict, model, y: np.ndarray, out: np.ndarray) -> None:
         """Add values along pipes and at nodes to the result of `Model.fields`."""
 
-    def fast_parts(self) -> list[str]:
-        """Names of parts that can limit the step."""
-        return []
-
-    def marks(self) -> list[tuple[str, str]]:
-        """Kind and place of each entry of `marks` that the feature has reserved."""
-        return []
-
-    def driven(self) -> set[int]:
-        """Numbers of schedules whose rates are speeds; -1 for none."""
-        return set()
-
     def drawn(self, model):
         """Lines that move with parts, in the way of `motion.drawing.BodyLines`; None for none."""
         return None
@@ -342,10 +333,6 @@ class Feature:
     def swept_masses(self, y: np.ndarray) -> Iterable[float]:
         """Masses that nodes contain in addition to their states, because volumes have changed [kg]."""
         return ()
-
-    def schedule_of(self, name: str) -> int:
-        """Number of the schedule of a link of the feature; -1 for others."""
-        return -1
 
     def inputs(self, model) -> dict[str, Any]:
         """Inputs that can be held at values : name -> `assembly.lowering.Input`."""
@@ -489,3 +476,13 @@ class FeatureRun:
 def with_slot(members: list[Any], slot: int) -> Any:
     """Feature with a slot, or its data of a run; None if the case does not have the feature."""
     return next((member for member in members if getattr(member, "feature", member).slot == slot), None)
+
+
+def frames_of(owner) -> list[str]:
+    """Names of frames that move in a draft or model, in the order of their data in `out`, see `Feature.frames`."""
+    return [name for feature in owner.features for name in feature.frames]
+
+
+def coordinate_of(owner, name: str) -> Coordinate:
+    """Coordinate of a part that moves along a line, of a draft or a model."""
+    return next(found for feature in owner.features if (found := feature.coordinate(name)) is not None)

@@ -384,29 +384,6 @@ class ModelDraft:
         """Write to the row of a force element what it joins, see `Feature.join`."""
         return next(found for feature in self.features if (found := feature.join(self, row, ports, places, **line)))
 
-    def point(self, place: str) -> int:
-        """Number of a named point of what moves, or of the world."""
-        return next(k for feature in self.features if (k := feature.point(self, place)) >= 0)
-
-    def coordinate(self, name: str):
-        """`Coordinate` of a part that moves along a line."""
-        return next(found for feature in self.features if (found := feature.coordinate(name)) is not None)
-
-    @property
-    def frame_names(self) -> list[str]:
-        """Names of frames that move, in the order of their data in `out`, see `kernels.moving_frames`."""
-        return [name for feature in self.features for name in feature.frames]
-
-    @property
-    def leaks(self):
-        """Rows of links that leak between two nodes, see `Feature.leaks`."""
-        return next((feature.leaks for feature in self.features if len(feature.leaks)), ())
-
-    @property
-    def leak_names(self) -> list[str]:
-        """Names of these links."""
-        return [name for feature in self.features for name in feature.leak_names]
-
     def ends(self, link, row) -> None:
         """Write the indices of the nodes at both ends of a link to its row."""
         row["from_node"], row["to_node"] = self.node_index[link.from_], self.node_index[link.to]

@@ -9,6 +9,7 @@ import numpy as np
 
 from fvsolve.case import moving_walls as case
 from fvsolve.case.bodies import carriers, free_joints, level_over
+from fvsolve.core.assembly.features import coordinate_of, frames_of
 from fvsolve.core.basins import basin_frames as frame
 from fvsolve.core.basins import cell_sides, moving_meshes
 from fvsolve.core.basins.cell_sides import BLOCK
@@ -174,7 +175,7 @@ def lower_frame(draft, basin, row) -> None:
         face_count = lines[0].size * grid.ny + grid.nx * lines[1].size if basin.is_grid else lines[0].size
         numbers[frame.POTENTIALS], places = draft.to_work(basin.n + face_count), [*places, *lines]
     numbers[frame.CELL_POSITIONS] = draft.to_plane(np.concatenate(places))
-    row["body"], row["frame"] = draft.frame_names.index(part.on), draft.to_plane(numbers)
+    row["body"], row["frame"] = frames_of(draft).index(part.on), draft.to_plane(numbers)
     numbered = enumerate(draft.case.probes)
     loads = [(k, p.name) for k, p in numbered if p.part == "nodes" and p.quantity.startswith("joint_")]
     row["loads_body"] = any(loads) or any(free_joints(part.on, draft.case.nodes))
@@ -248,7 +249,7 @@ def lower_walls(draft) -> None:
         row["toward"] = 1.0
         row["schedule"] = draft.schedules.add(stated.travel) if stated.travel is not None else -1
         if stated.body is not None:
-            moved = draft.coordinate(stated.body)
+            moved = coordinate_of(draft, stated.body)
             row["mass"], row["body"], row["rate"], row["speed"] = moved.net, moved.frame, moved.rate, moved.velocity
             row["inertia"], row["lightness"], row["schedule"] = moved.inertia, moved.lightness, moved.schedule
         if row["body"] >= 0:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from fvsolve.core.assembly.features import frames_of
 from fvsolve.core.kernels.dtypes import BODY_OUT
 
 
@@ -14,7 +15,7 @@ def world_points(model, out: np.ndarray, owner: np.ndarray, place: np.ndarray) -
     """
     from fvsolve.core.kernels.moving_frames import ATTITUDE, POSITION, SPIN, VELOCITY  # not loaded without frames
 
-    first, n = int(model.layout["body"]), len(model.frame_names)
+    first, n = int(model.layout["body"]), len(frames_of(model))
     points, speed = place.copy(), np.zeros_like(place)
     for i, row in enumerate(out[first : first + BODY_OUT * n].reshape(n, BODY_OUT)):
         own = owner == i

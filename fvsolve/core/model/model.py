@@ -182,18 +182,9 @@ class Model(Displayable):
         """Names of blocks of `controls`, in the order of their table."""
         return decision_order(self.case.controls)
 
-    @property
-    def frame_names(self) -> list[str]:
-        """Names of frames that move, in the order of their data in `out`, see `kernels.moving_frames`."""
-        return [name for feature in self.features for name in feature.frames]
-
-    def coordinate(self, name: str):
-        """`Coordinate` of a part that moves along a line, see `assembly.features`."""
-        return next(found for feature in self.features if (found := feature.coordinate(name)) is not None)
-
     def schedule_of(self, name: str) -> int:
         """Number of the schedule of a link of a feature."""
-        return next(k for feature in self.features if (k := feature.schedule_of(name)) >= 0)
+        return next(own for feature in self.features if (own := feature.link_schedules.get(name, -1)) >= 0)
 
     @property
     def y_size(self) -> int:

@@ -237,5 +237,5 @@ def fastest_parts(model) -> str:
     moving = [name for name, row in zip(model.valve_names, model.tables.valves, strict=True)
               if row["device"] >= 0 and model.tables.devices[row["device"]]["y"] >= 0]  # fmt: skip
     names = [*(basin.name for basin in model.basins), *stores, *moving]
-    names += [*model.column_names, *(name for feature in model.features for name in feature.fast_parts())]
+    names += [*model.column_names, *(name for feature in model.features for name in feature.fast_parts)]
     return names[0] if len(names) == 1 else f"one of {listing(names)}"

@@ -39,7 +39,8 @@ class SteadyStart:
     def __init__(self, draft) -> None:
         self.draft, self.case, self.law = draft, draft.case, draft.case.law
         self.nodes, self.pipes = draft.node_table, draft.pipe_table
-        self.columns, self.valves, self.leaks = draft.column_table, draft.valve_table, draft.leaks
+        self.columns, self.valves = draft.column_table, draft.valve_table
+        self.leaks = [row for feature in draft.features for row in feature.leaks]
         self.rest = self.case.numerics.initial == "rest"
         self.t = self.case.numerics.start
         self.weight = draft.fluid.density * self.case.gravity

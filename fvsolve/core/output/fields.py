@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fvsolve.core.model.frame_points import world_points
+from fvsolve.core.assembly.features import frames_of
 from fvsolve.errors import RunError
 from fvsolve.file_replacement import write_file
 
@@ -159,6 +159,8 @@ class FieldSeries:
         """Points of the pipes in world axes at the time of a frame : float64[n, 3] [m]; points on frames move."""
         if not (self.owner >= 0).any():
             return self.points
+        from fvsolve.core.model.frame_points import world_points
+
         return world_points(self.model, frame["out"], self.owner, self.points)[0]
 
     def _add_to_collection(self, t: float, part: int, file: str) -> None:
@@ -287,7 +289,7 @@ def points_on_bodies(model, points: np.ndarray) -> np.ndarray:
 
     def body(name: str) -> int:
         on = getattr(places.get(name), "on", None)
-        return -1 if on is None else model.frame_names.index(on)
+        return -1 if on is None else frames_of(model).index(on)
 
     for k, name in enumerate(ends):
         owner[k] = body(name)

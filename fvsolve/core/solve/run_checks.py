@@ -10,6 +10,7 @@ errors remain.
 
 import numpy as np
 
+from fvsolve.core.assembly.features import coordinate_of, frames_of
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.solve.energy_watch import EnergyWatch
 from fvsolve.core.solve.run_loop import STATUS_FAILURES
@@ -162,7 +163,7 @@ class SloshingCheck:
             free = basin.on is not None and basin.physics_type.has_modes and any(free_joints(basin.on, case.nodes))
             if modal or (free and not basin.lumped):
                 place = np.array(basin.place) + basin.rotation[:, :2] @ mesh.centroid
-                about = model.frame_names.index(basin.on), place, basin.rotation[:, 2]
+                about = frames_of(model).index(basin.on), place, basin.rotation[:, 2]
                 self.tanks.append((name, modal, about, *(rises(model, name) if modal else ())))
         self.restart_data = np.zeros((len(self.tanks), 4))
 
@@ -228,7 +229,7 @@ def rises(model, name: str) -> tuple:
     case = model.case
     basin, mesh = case.nodes[name], case.lumped[name]
     modes = sloshing.modes_of(basin, mesh, case.properties.density, case.gravity)
-    rows = [model.coordinate(sloshing.mode_body_name(name, mode)) for mode in modes]
+    rows = [coordinate_of(model, sloshing.mode_body_name(name, mode)) for mode in modes]
     lifts = np.zeros((2, len(modes)))
     lifts[[mode.along for mode in modes], range(len(modes))] = [mode.rise for mode in modes]
     at, start = [row.y for row in rows], np.array([row.position for row in rows])

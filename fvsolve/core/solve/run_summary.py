@@ -129,7 +129,7 @@ def find_marks(run_data: RunData) -> list[Mark]:
     for node in model.tables.patches["node"][np.isin(model.tables.patches["closure"], HELD)]:
         kinds[len(pipes) + len(nodes) + node] = "", ""  # of `held_discharges`
     kinds += [("stopped dead", f"links.{name}") for name in model.column_names]
-    kinds += [mark for feature in model.features for mark in feature.marks()]
+    kinds += [mark for feature in model.features for mark in feature.marks]
     kinds += [("outside its curve", f"links.{name}") for name, *_ in model.devices]
     texts = {
         "stopped dead": (

@@ -16,7 +16,7 @@ class BodyLines:
     owner : int[p]         body of each point, -1 for the world
     place : float64[p, 3]  coordinates of each point in the axes of its owner [m]
     lines : int[l, 2]      points at the ends of each line
-    line_body : int32[l]   body of each line, -1 for none
+    blocks : values of lines that do not change: int32[l], body of each line, -1 for none
     """
 
     name = "bodies"  # of the files
@@ -51,12 +51,7 @@ class BodyLines:
                 lines.append((len(owner) - 2, len(owner) - 1))
                 line_body.append(-1)
         self.owner, self.place = np.array(owner), np.array(place, dtype=float).reshape(-1, 3)
-        self.lines, self.line_body = np.array(lines).reshape(-1, 2), np.array(line_body, dtype=np.int32)
-
-    @property
-    def blocks(self) -> dict[str, list[np.ndarray]]:
-        """Values of lines that do not change."""
-        return {"body": [self.line_body]}
+        self.lines, self.blocks = np.array(lines).reshape(-1, 2), {"body": [np.array(line_body, dtype=np.int32)]}
 
     def at(self, out: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points in world axes [m], and speeds of the midpoints of lines [m/s] : float64[p, 3], float64[l].

@@ -1,4 +1,11 @@
-"""Energy of small deviations of masses and bodies as sums of squares, see `model.energy_norm`."""
+"""Energy of small deviations of masses and bodies as sums of squares, see `model.energy_norm`.
+
+Energy of a small deviation from the state y:
+velocities v of bodies with mass matrix M : v' M v / 2; that of a mass, m v^2 / 2, is among the weights
+elongation s of a spring, of a stop in contact, or of the spring of a joint, stiffness k : k s^2 / 2
+excess mass e [kg] and travel x in a chamber of a cylinder : dp/dm (e - x A e0 / V)^2 / (2 rho), with piston area A,
+volume V and excess mass e0 at y
+"""
 
 from __future__ import annotations
 
@@ -6,24 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
-from fvsolve.core.assembly.features import Squares
 from fvsolve.core.assembly.lowering import rows_in
 from fvsolve.features.motion.kernels.tables import motion_of
 from fvsolve.features.motion.static_forces import mass_factor
-
-
-def squares_of_motion(model, y: np.ndarray) -> Squares:
-    """Squares of chambers of cylinders, of springs and stops, then of velocities of bodies and springs of joints.
-
-    Energy of a small deviation from the state y:
-    velocities v of bodies with mass matrix M : v' M v / 2; that of a mass, m v^2 / 2, is among the weights
-    elongation s of a spring, of a stop in contact, or of the spring of a joint, stiffness k : k s^2 / 2
-    excess mass e [kg] and travel x in a chamber of a cylinder : dp/dm (e - x A e0 / V)^2 / (2 rho), with piston area A,
-    volume V and excess mass e0 at y
-    """
-    elongations = Elongations(model, y)
-    last = [*kinetic_rows(model, y), *joint_spring_rows(model)]
-    return Squares(dict(chamber_rows(model, y, elongations)), [*spring_rows(model, y, elongations)], last)
 
 
 def spring_rows(model, y: np.ndarray, elongations: Elongations):

@@ -7,8 +7,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fvsolve.case import bodies
 from fvsolve.core.assembly.features import Coordinate, Feature, FeatureRun, Squares
+from fvsolve.core.assembly.lowering import rows_in
+from fvsolve.core.kernels.dtypes import BODY_OUT
 from fvsolve.core.kernels.rhs_assembly import RhsTerms
+from fvsolve.errors import FvsolveError, Notice
 from fvsolve.features.motion import lower, ports
 from fvsolve.features.motion.kernels import tables as records
 from fvsolve.features.motion.kernels.tables import MotionTables
@@ -90,6 +94,8 @@ TABLES = {  # name of a table of a case -> its record
     "settings": records.MOTION_SETTINGS,
 }
 
+DRIFT = 1e-6  # deviation of the length of Euler parameters from 1 above which a notice is given
+
 
 class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
     """Masses, bodies, and what acts between them, of a case.
@@ -126,25 +132,10 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
         """Tables as compiled functions read them."""
         return MotionTables(*(getattr(self, name) for name in TABLES))
 
-    @property
-    def frames(self) -> list[str]:
-        return self.body_names
-
-    @property
-    def leaks(self) -> np.ndarray:
-        return self.piston_table
-
-    @property
-    def leak_names(self) -> list[str]:
-        return self.piston_names
-
     # build ----------
 
     def join(self, draft, row, ports_of_row, places, toward=None, about=None) -> tuple[float, float]:
         return ports.join_ports(draft, row, ports_of_row, places, toward=toward, about=about)
-
-    def point(self, draft, place: str) -> int:
-        return ports.point_row(draft, place)
 
     def coordinate(self, name: str) -> Coordinate | None:
         if name in self.mass_index:
@@ -162,15 +153,39 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
 
     def lower_behind_links(self, draft) -> None:
         lower.lower_bodies(draft)
+        self.frames = self.body_names
         lower.lower_moving_segments(draft)
         lower.lower_masses(draft)
         lower.lower_lines(draft)
+        self.leaks, self.leak_names = self.piston_table, self.piston_names
 
     def probe(self, draft, probe, row) -> bool:
         return lower.lower_probe(draft, row, probe)
 
     def reserve(self, draft) -> None:
-        lower.reserve_mechanics(draft)
+        pushes, masses, bodies = len(self.push_names), len(self.mass_table), len(self.body_table)
+        for name, size in (
+            ("net_force", masses), ("push", pushes), ("forcing", len(self.moving_segment_table)),
+            ("travel", 2 * pushes), ("along", 3 * len(self.line_table)), ("pin", 3 * len(self.pin_table)),
+            ("body", BODY_OUT * bodies),
+        ):  # fmt: skip
+            draft.sizes.out(name, size)
+        constraints, freedoms = int(sum(self.pin_table["rows"])), len(self.freedom_table)
+        spatial = 8 * freedoms + self.factor_size + 16 * bodies
+        spatial += constraints * (2 * freedoms + constraints + 1)
+        draft.sizes.need_scratch(max(spatial, 18 if bodies else 0))
+        draft.sizes.need_scratch(2 * masses)
+        self.settings[0]["mark"] = draft.sizes.mark(len(self.piston_table))
+        self.settings[0]["flag"] = draft.sizes.flags(2 * len(self.stop_table))
+        draft.sizes.feature_power += 2 * len(self.bushing_table) + 3 * bodies
+        draft.sizes.feature_stored += len(self.bushing_table) + bodies
+        draft.sizes.reads_rates |= bool(self.moving_segment_table["loads_body"].any())
+        self.point_table = np.array(self.points, records.POINT)
+        self.fast_parts = [*self.mass_names, *self.body_names]
+        self.marks = [("beyond its stroke", f"links.{name}") for name in self.piston_names]
+        self.driven = {int(row["schedule"]) for row in self.body_table}
+        schedules = self.brace_table["schedule"].tolist()
+        self.link_schedules = dict(zip(self.push_names, schedules, strict=False))
 
     def rest(self, case, draft):
         from fvsolve.features.motion.equilibrium_search import with_equilibrium
@@ -198,6 +213,7 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
         for name, record in TABLES.items():  # as bytes: numpy would copy records field by field
             table = getattr(self, name)
             setattr(own, name, np.ndarray(table.shape, record, bytearray(table.tobytes())))
+        own.leaks = own.piston_table
         return own
 
     # model ----------
@@ -227,9 +243,12 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
         return MotionPattern(self, couplings)
 
     def squares(self, model, y: np.ndarray) -> Squares:
-        from fvsolve.features.motion.energy_norm import squares_of_motion
+        from fvsolve.features.motion import energy_norm as norm
 
-        return squares_of_motion(model, y)
+        elongations = norm.Elongations(model, y)
+        last = [*norm.kinetic_rows(model, y), *norm.joint_spring_rows(model)]
+        stored = dict(norm.chamber_rows(model, y, elongations))
+        return Squares(stored, [*norm.spring_rows(model, y, elongations)], last)
 
     def weigh(self, model, weights: np.ndarray) -> None:
         for row in self.mass_table:
@@ -237,19 +256,50 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
                 weights[int(row["y"]) + 1] = 0.5 / row["lightness"]
 
     def begin_accounts(self, accounts) -> None:
-        from fvsolve.features.motion.energy import mass_accounts
-
-        mass_accounts(self, accounts)
+        names = [*self.mass_names, *[""] * (len(self.mass_table) - len(self.mass_names))]
+        for name, row in zip(names, self.mass_table, strict=True):
+            at = accounts.take(1)
+            accounts.hold(name, "mass", at if row["y"] >= 0 else None)
+        for name, link, lowering in rows_in(self.case, "brace"):
+            at, stores = accounts.take(1), lowering.ledger_name == "stored"
+            accounts.hold(name, link.kind, at if stores else None)
+            if not stores:
+                accounts.add(lowering.ledger_name, name, link.kind, at)
+        for name, link, _ in rows_in(self.case, "stop"):
+            at = accounts.take(2)
+            accounts.contacts.append((len(accounts.accounts), len(accounts.accounts) + 1))
+            accounts.hold(name, link.kind, at)
+            accounts.add("dissipated", name, link.kind, at + 1)
+        for name in self.piston_names:
+            at = accounts.take(3)
+            accounts.add("dissipated", name, "leak", at)
+            accounts.add("dissipated", name, "friction", at + 1)
+            accounts.add("law", name, "cylinder", at + 2)
 
     def add_accounts(self, accounts) -> None:
-        from fvsolve.features.motion.energy import body_accounts
-
-        body_accounts(self, accounts)
+        for name in self.bushing_names:
+            at = accounts.take(2)
+            accounts.hold(name, "bushing", at)
+            accounts.add("dissipated", name, "bushing", at + 1)
+        for name, row in zip(self.body_names, self.body_table, strict=True):
+            at = accounts.take(3)
+            accounts.hold(name, "body", at)
+            if row["damping"] > 0.0:
+                accounts.add("dissipated", name, "joint", at + 1)
+            if row["schedule"] >= 0:
+                accounts.add("supplied", name, "drive", at + 2)
 
     def above(self, model) -> dict[str, float]:
-        from fvsolve.features.motion.energy import energies_at_start
-
-        return energies_at_start(self)
+        case, energies = self.case, {}
+        for name, row in zip(self.mass_names, self.mass_table, strict=False):
+            if row["y"] >= 0:
+                energies[name] = 0.5 * row["velocity"] ** 2 / row["lightness"]
+        for (name, *_), row in zip(rows_in(case, "brace"), self.brace_table, strict=True):
+            if row["stiffness"] > 0.0:
+                energies[name] = 0.5 * row["force"] ** 2 / row["stiffness"]
+        for (name, *_), row in zip(rows_in(case, "stop"), self.stop_table, strict=True):
+            energies[name] = 0.5 * row["stiffness"] * min(0.0, row["below"], row["above"]) ** 2
+        return energies
 
     def swept_masses(self, y: np.ndarray) -> Iterator[float]:
         for row in self.piston_table:  # of chambers on an axis, whose mass is state plus swept mass
@@ -257,16 +307,6 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
                 places = self.mass_table[[row["case"], row["rod"]]]["y"]
                 back, forth = (float(y[place]) if place >= 0 else 0.0 for place in places)
                 yield float(row["sweep_a"] + row["sweep_b"]) * (forth - back)
-
-    def schedule_of(self, name: str) -> int:
-        names = self.push_names[: len(self.brace_table)]
-        return int(self.brace_table[names.index(name)]["schedule"]) if name in names else -1
-
-    def driven(self) -> set[int]:
-        return {int(row["schedule"]) for row in self.body_table}
-
-    def marks(self) -> list[tuple[str, str]]:
-        return [("beyond its stroke", f"links.{name}") for name in self.piston_names]
 
     def stored_states(self, model) -> np.ndarray:
         places = self.mass_table["y"]
@@ -279,9 +319,6 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
             for name, row in zip(names, self.mass_table, strict=False)
         }
         return {"masses": masses, "bodies": {name: lower.pose_facts(pose) for name, pose in self.case.poses.items()}}
-
-    def fast_parts(self) -> list[str]:
-        return [*self.mass_names, *self.body_names]
 
     def drawn(self, model):
         from fvsolve.features.motion.drawing import BodyLines
@@ -300,8 +337,25 @@ class MotionRun(FeatureRun):
         return self.feature.tables()._replace(moving_segments=self.segments)
 
     def for_energy(self) -> None:
-        lower.refuse_missing_loads(self.run_data.model.case)
+        case = self.run_data.model.case
+        if faults := [f"{'.'.join(place)}: {text}" for place, text in bodies.missing_reactions(case.nodes, case.links)]:
+            raise FvsolveError(f"the energy of this network on a body is not supported; {'; '.join(faults)}")
         self.segments["loads_body"] = records.JOINT_LOAD_READ
 
     def end_notices(self, y: np.ndarray) -> list:
-        return lower.drift_notices(self.feature, y)
+        # the length of Euler parameters is 1; the difference measures the time error
+        notices = []
+        for name, row in zip(self.feature.body_names, self.feature.body_table, strict=True):
+            if row["joint"] not in (records.BALL, records.FREE):
+                continue
+            first = 3 if row["joint"] == records.FREE else 0
+            at = int(row["y"]) + first
+            length = float(np.linalg.norm(row["start"][first : first + 4] + y[at : at + 4]))
+            if abs(length - 1.0) > DRIFT:
+                text = (
+                    f"{name}: its Euler parameters have drifted from length 1 to {length:.9g} and are divided by this "
+                )
+                text += "length; the error of its attitude is about as large as this drift; "
+                text += 'method = "gauss-4" conserves the length'
+                notices.append(Notice("drift", f"nodes.{name}", text, None, length - 1.0, DRIFT))
+        return notices

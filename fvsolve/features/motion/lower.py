@@ -10,7 +10,6 @@ from fvsolve.case.bodies import free_joints
 from fvsolve.core.assembly.lowering import lowering_of
 from fvsolve.core.assembly.schedule_tables import break_times
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.errors import FvsolveError, Notice
 from fvsolve.features.motion.kernels import tables as records
 from fvsolve.features.motion.kernels.tables import motion_of
 from fvsolve.features.motion.ports import PLAIN_LINE, are_points, distance_and_rate, point_row, push_ends
@@ -263,28 +262,6 @@ def lower_bodies(draft) -> None:
     motion.factor_size = at
 
 
-def reserve_mechanics(draft) -> None:
-    """Reserve the arrays of masses and bodies, of force elements and pins, and of pipes on bodies."""
-    motion = motion_of(draft)
-    pushes, masses, bodies = len(motion.push_names), len(motion.mass_table), len(motion.body_table)
-    for name, size in (
-        ("net_force", masses), ("push", pushes), ("forcing", len(motion.moving_segment_table)),
-        ("travel", 2 * pushes), ("along", 3 * len(motion.line_table)), ("pin", 3 * len(motion.pin_table)),
-        ("body", rec.BODY_OUT * bodies),
-    ):  # fmt: skip
-        draft.sizes.out(name, size)
-    constraints, freedoms = int(sum(motion.pin_table["rows"])), len(motion.freedom_table)
-    spatial = 8 * freedoms + motion.factor_size + 16 * bodies
-    spatial += constraints * (2 * freedoms + constraints + 1)
-    draft.sizes.need_scratch(max(spatial, 18 if bodies else 0))
-    draft.sizes.need_scratch(2 * masses)
-    motion.settings[0]["mark"] = draft.sizes.mark(len(motion.piston_table))
-    motion.settings[0]["flag"] = draft.sizes.flags(2 * len(motion.stop_table))
-    draft.sizes.book(2 * len(motion.bushing_table) + 3 * bodies, len(motion.bushing_table) + bodies)
-    draft.sizes.reads_rates |= bool(motion.moving_segment_table["loads_body"].any())
-    motion.point_table = np.array(motion.points, records.POINT)
-
-
 def fill_body(draft, name: str, body: Any, row) -> None:
     """Fill the BODY row of a body, and add the states of its joint."""
     joint, t = body.joint, draft.case.numerics.start
@@ -470,11 +447,18 @@ def lower_probe(draft, row, probe) -> bool:
         row["kind"] = rec.POSITION if probe.quantity == "position" else rec.VELOCITY
         row["index"] = motion.mass_index[probe.name]
     elif probe.name in case.poses:
-        lower_body_probe(draft, row, probe)
+        from fvsolve.features.motion.kernels import body_values
+
+        quantity = "angle" if probe.quantity == "travel" else probe.quantity
+        row["kind"], row["side"] = rec.BODY_VALUE, body_values.BODY_QUANTITIES.index(quantity)
+        row["index"] = motion.body_names.index(probe.name)
     elif probe.name in (case.nodes.keys() | case.places.keys() | case.network_places):
         return False
     else:
-        lower_body_point(draft, row, probe)
+        from fvsolve.features.motion.kernels import body_values
+
+        row["kind"], row["side"] = rec.POINT_VALUE, body_values.POINT_QUANTITIES.index(probe.quantity)
+        row["index"] = point_row(draft, probe.name)
     return True
 
 
@@ -499,24 +483,6 @@ def lower_link_probe(draft, row, probe) -> bool:
     return True
 
 
-def lower_body_probe(draft, row, probe) -> None:
-    """Fill the row of a probe of a body."""
-    motion = motion_of(draft)
-    from fvsolve.features.motion.kernels.body_values import BODY_QUANTITIES
-
-    quantity = "angle" if probe.quantity == "travel" else probe.quantity
-    row["kind"], row["side"] = rec.BODY_VALUE, BODY_QUANTITIES.index(quantity)
-    row["index"] = motion.body_names.index(probe.name)
-
-
-def lower_body_point(draft, row, probe) -> None:
-    """Fill the row of a probe at a named point of a body or of the world."""
-    from fvsolve.features.motion.kernels.body_values import POINT_QUANTITIES
-
-    row["kind"], row["side"] = rec.POINT_VALUE, POINT_QUANTITIES.index(probe.quantity)
-    row["index"] = point_row(draft, probe.name)
-
-
 def lower_surface(draft, row, probe) -> None:
     """Fill the row of a probe of depth at a point of a basin with sloshing modes."""
     motion = motion_of(draft)
@@ -538,31 +504,3 @@ def pose_facts(pose) -> dict[str, float]:
 
     angles = dict(zip(("roll", "pitch", "yaw"), roll_pitch_yaw(pose.attitude), strict=True))
     return place | angles | {"speed": float(np.linalg.norm(pose.velocity)), "spin": float(np.linalg.norm(pose.spin))}
-
-
-DRIFT = 1e-6  # deviation of the length of Euler parameters from 1 above which a notice is given
-
-
-def drift_notices(motion, y: np.ndarray) -> list[Notice]:
-    """Notices for bodies whose Euler parameters no longer have length 1; the difference measures the time error."""
-    notices = []
-    for name, row in zip(motion.body_names, motion.body_table, strict=True):
-        if row["joint"] not in (records.BALL, records.FREE):
-            continue
-        first = 3 if row["joint"] == records.FREE else 0
-        at = int(row["y"]) + first
-        length = float(np.linalg.norm(row["start"][first : first + 4] + y[at : at + 4]))
-        if abs(length - 1.0) > DRIFT:
-            text = (f"{name}: its Euler parameters have drifted from length 1 to {length:.9g} and are divided by this "
-                    "length; the error of its attitude is about as large as this drift; "
-                    'method = "gauss-4" conserves the length')  # fmt: skip
-            notices.append(Notice("drift", f"nodes.{name}", text, None, length - 1.0, DRIFT))
-    return notices
-
-
-def refuse_missing_loads(case) -> None:
-    """Raise FvsolveError if fluid on bodies loads them in a way that is not modelled."""
-    if case.poses and (
-        faults := [f"{'.'.join(place)}: {text}" for place, text in bodies.missing_reactions(case.nodes, case.links)]
-    ):
-        raise FvsolveError(f"the energy of this network on a body is not supported; {'; '.join(faults)}")

@@ -21,7 +21,10 @@ def are_points(draft, *places: str | None) -> bool:
 
 
 def join_ports(draft, row, ports: tuple[str, str], places: tuple[str | None, str], **line) -> tuple[float, float]:
-    """Write to the row of a force element the two masses or points that it joins, see `Feature.join`."""
+    """Write to the row of a force element, or of a joint, what it joins: masses or points, see `Feature.join`."""
+    if ports[0] == "from_point":
+        row[ports[0]], row[ports[1]] = point_row(draft, places[0]), point_row(draft, places[1])
+        return 0.0, 0.0
     motion = motion_of(draft)
     row["line"] = -1
     if are_points(draft, *places):

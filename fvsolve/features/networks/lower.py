@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fvsolve.core.assembly.features import coordinate_of
 from fvsolve.core.assembly.lowering import lowering_of
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.features.networks.elimination import Elimination, NetworkError, dependent_stores, substituted
@@ -118,7 +119,7 @@ def state_place(draft, item: Element, size: float) -> int:
     kind, name = item.state_of
     if kind == "device":
         return int(draft.device_table[draft.device_names.index(name)]["y"])
-    return draft.coordinate(name).rate
+    return coordinate_of(draft, name).rate
 
 
 def probed_angles(case) -> list[str]:
@@ -143,7 +144,7 @@ def fill_tables(draft, network: Network) -> None:
             row["index"] = draft.device_names.index(name)
             row["side"] = draft.devices[row["index"]][2].quantities.index(quantity)
         elif row["kind"] == rec.FORCE_INPUT:
-            row["index"] = draft.coordinate(name).net
+            row["index"] = coordinate_of(draft, name).net
         elif row["kind"] == rec.FLUID_HEAT:
             row["index"] = exchanger_names(draft.case).index(name)
         elif row["kind"] == rec.FRICTION_FLOW:

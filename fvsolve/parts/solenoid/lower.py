@@ -2,6 +2,7 @@
 
 from math import asinh, pi, sinh, sqrt
 
+from fvsolve.core.assembly.features import coordinate_of
 from fvsolve.core.assembly.lowering import Device
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.network_elements import FLOW, Element, node_or_reference
@@ -42,7 +43,7 @@ class SolenoidRows(Device, kind="solenoid"):
         return [SMALL_FLUX_DENSITY * part.pole_area * part.turns]
 
     def begin(self, start, part, row) -> list[str]:
-        armature, numbers = start.draft.coordinate(part.ports["armature"]), start.draft.tables.floats
+        armature, numbers = coordinate_of(start.draft, part.ports["armature"]), start.draft.tables.floats
         row["travel"] = armature.y
         numbers[row["data"] + law.POSITION], numbers[row["data"] + law.SPEED] = armature.position, armature.velocity
         start.draft.start_flags[int(row["event"])] = self.distance(start, part) >= 0.0
@@ -50,7 +51,7 @@ class SolenoidRows(Device, kind="solenoid"):
 
     def distance(self, start, part) -> float:
         """Distance from the armature to its closed position at the start [m]."""
-        return float(part.closed_position - start.draft.coordinate(part.ports["armature"]).position)
+        return float(part.closed_position - coordinate_of(start.draft, part.ports["armature"]).position)
 
     def source_at_start(self, start, part, row, quantity: str, flow: float) -> float:
         numbers, at, distance = start.draft.tables.floats, int(row["data"]), self.distance(start, part)

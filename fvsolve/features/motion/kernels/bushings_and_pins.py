@@ -29,6 +29,7 @@ from math import sqrt
 
 from fvsolve.core.kernels import moving_frames as layout
 from fvsolve.core.kernels.dtypes import BUSHING_VALUE, PIN_VALUE, RATE, RATE_UNWANTED
+from fvsolve.core.kernels.energy_rows import device_power_row, device_stored_row
 from fvsolve.core.kernels.moving_frames import add_force, add_torque, body_row
 from fvsolve.core.kernels.vectors import (
     cross,
@@ -41,11 +42,12 @@ from fvsolve.core.kernels.vectors import (
     vector_product,
 )
 from fvsolve.features.motion.kernels import mass_matrix as mass
-from fvsolve.features.motion.kernels.body_energy_rows import BUSHING_ROWS, bushing_power_row, bushing_stored_row
 from fvsolve.features.motion.kernels.body_kinematics import body_of_point, point_at, spin_of
-from fvsolve.features.motion.kernels.body_values import acceleration_at
+from fvsolve.features.motion.kernels.body_values import BODY_ROWS, acceleration_at
 from fvsolve.features.motion.kernels.tables import ABOUT, open_motion
 from fvsolve.jit import njit
+
+BUSHING_ROWS = 2  # rows of `power` for each bushing
 
 
 @njit(forceinline=True)
@@ -227,7 +229,8 @@ def observe_bushings(t, y, out, handle, values):
 def power_bushings(t, y, dydt, out, handle, power):
     """Write two entries of `power` for each bushing [W]: rate of stored energy, dissipated power."""
     tables = open_motion(handle)
-    at = bushing_power_row(tables, power)
+    # Bushings come before bodies, and these before devices.
+    at = device_power_row(tables, power) - BODY_ROWS * tables.bodies.size - BUSHING_ROWS * tables.bushings.size
     for k in range(tables.bushings.size):
         bushing = tables.bushings[k]
         gap, rate, _ = bushing_motion(out, tables, bushing)
@@ -246,7 +249,7 @@ def stored_bushings(t, y, dydt, out, handle, stored):
     k [N/m], k_turn [N m/rad] : stiffnesses of the bushing; eps : vector of the Euler parameters of its rotation
     """
     tables = open_motion(handle)
-    at = bushing_stored_row(tables, stored)
+    at = device_stored_row(tables, stored) - tables.bodies.size - tables.bushings.size
     for k in range(tables.bushings.size):
         bushing, gap = tables.bushings[k], bushing_motion(out, tables, tables.bushings[k])[0]
         eps = rotation_deviation(out, tables, bushing)[2]
