@@ -1,8 +1,11 @@
 """Reference pages made from the program: commands with their options, units, public names with their docstrings."""
 
+import ast
 import inspect
 import re
 import shutil
+import sys
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
@@ -11,6 +14,7 @@ import fvsolve.steppers
 import fvsolve.studies
 from fvsolve.units import DIMENSIONS, NEAR_MISSES, UNITS, WORDS, Unit
 
+PACKAGE = Path(fvsolve.__file__).parent
 PYTHON_PAGE = (Path(__file__).parent / "python.md").read_text(encoding="utf-8")
 ARGUMENT = re.compile(r"([^\s,]+(?:, [^\s,]+)*) : ")  # beginning of a line of a docstring about arguments or fields
 CODE = re.compile(r"(`[^`]*`)")
@@ -129,6 +133,47 @@ def table(head, rows) -> str:
     return "".join(f"| {line} |\n" for line in lines)
 
 
+def tables() -> str:
+    """Sections of all tables of a model, by the feature that owns them: columns with types and meanings."""
+    sections = ""
+    for path in sorted(PACKAGE.rglob("*.py"), key=lambda path: ("core" not in path.parts, path)):
+        text = path.read_text(encoding="utf-8")
+        if records := list(records_in(text)):
+            place = path.relative_to(PACKAGE)
+            owner = "the core" if place.parts[0] == "core" else place.parts[1].replace("_", " ")
+            sections += f"## Tables of {owner}\n\n`fvsolve/{place.as_posix()}`\n\n"
+            lines = text.splitlines()
+            for name, about, columns in records:
+                rows = []
+                for column in columns:
+                    line = lines[column.value.end_lineno - 1]
+                    own = "" if line.startswith(name) else comment(line)  # a record in one line has only its own
+                    rows.append((f"`{column.arg}`", type_of(column.value), own))
+                sections += f"### {name}\n\n{escaped(about)}\n\n{table(('column', 'type', 'meaning'), rows)}\n"
+    return sections
+
+
+def records_in(text: str) -> Iterator[tuple[str, str, list[ast.keyword]]]:
+    """Yield the record types in a text of Python: name, comment in its first line, columns as arguments of `record`."""
+    if "= record(" not in text:
+        return
+    for found in ast.parse(text).body:
+        call = found.value if isinstance(found, ast.Assign) else None
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "record":
+            yield found.targets[0].id, comment(text.splitlines()[found.lineno - 1]), call.keywords
+
+
+def type_of(value: ast.expr) -> str:
+    """Type of a column in words; a text such as "(3,)f8" stands for itself."""
+    kind = value.value if isinstance(value, ast.Constant) else value.id
+    return {"i8": "integer", "f8": "number"}.get(kind, f"`{kind}`")
+
+
+def comment(line: str) -> str:
+    """Comment at the end of a line of code; "" without one."""
+    return line.partition("  # ")[2].strip()
+
+
 def validation() -> str:
     """Page that `fvsolve validate --page docs/validation/results` has written, with paths from the folder above it."""
     folder = Path(__file__).parent / "validation" / "results"
@@ -153,4 +198,14 @@ def views() -> str:
     return f"```{{raw}} html\n{text}```\n"
 
 
-GENERATED = {"commands": commands, "units": units, "names": names, "validation": validation, "views": views}
+GENERATED = {
+    "commands": commands,
+    "units": units,
+    "names": names,
+    "tables": tables,
+    "validation": validation,
+    "views": views,
+}
+
+if __name__ == "__main__":
+    print(GENERATED[sys.argv[1]]())

@@ -141,7 +141,7 @@ def own_limiters_removed(monkeypatch):
     from fvsolve.parts import own_limiters
 
     before = dict(LIMITERS)
-    monkeypatch.setenv(own_limiters.VARIABLE, "")
+    monkeypatch.setenv(own_limiters.LIMITERS_VARIABLE, "")
     yield
     LIMITERS.clear()
     LIMITERS.update(before)

@@ -1,4 +1,4 @@
-"""Reading of case files: keys, units, and checks between the parts of a case."""
+"""Reading of case files: sections, references, faults; may import `parts`, `exact`, fluids and methods of `core`."""
 
 from fvsolve.lazy_exports import lazy_names
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 from fvsolve import units
 from fvsolve.case import case_notices, text
 from fvsolve.case.claims import Compare, DesignLimit, Expect
-from fvsolve.case.controls import Block
 from fvsolve.case.pipe_routes import Route
 from fvsolve.case.probe import Probe, of_profiles
 from fvsolve.case.reading import followers
@@ -30,6 +29,7 @@ from fvsolve.units import show
 
 if TYPE_CHECKING:
     from fvsolve.case import bodies
+    from fvsolve.case.controls import Block
     from fvsolve.parts.pump.energy_use import EnergyUse
     from fvsolve.parts.reaction import Reaction
 

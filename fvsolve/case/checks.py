@@ -17,9 +17,9 @@ from fvsolve.core.steppers.tableau import AUTO, METHODS
 from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts import KINDS
 from fvsolve.parts.carried_scalar import ZEROS
-from fvsolve.parts.formula_program import is_formula
 from fvsolve.parts.nodes_and_links import is_in_network, is_kind
 from fvsolve.parts.pipe.pipe_wall import OF_WALL
+from fvsolve.parts.schedule import is_formula
 from fvsolve.parts.table_model import CaseContext
 from fvsolve.parts.tolerances import is_shorter_than_rise
 from fvsolve.parts.value import ROOT

@@ -16,7 +16,6 @@ from fvsolve.case.probe import ALL, OF_PRESSURE, Extent, Kinds, Probe, only_dime
 from fvsolve.case.reading import Reading
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
-from fvsolve.parts.csv_rows import copy_name, find_file, read_columns
 from fvsolve.parts.table_model import check_table, read_keys
 from fvsolve.parts.value import NEEDED, VALUE, Quantity, ReadContext, ValueFault, faults_of, nonnegative
 from fvsolve.units import show
@@ -204,6 +203,8 @@ COMPARE_KEYS = {
 
 def read_compare(probe: Probe | None, given: Any, setting: ReadContext) -> Compare | None:
     """Read one entry of `[compare]`; None if its probe is faulty. Raises ValueError if entry or file are invalid."""
+    from fvsolve.parts.csv_rows import copy_name, find_file, read_columns
+
     check_table(given, 'for example { file = "rig.csv" }')
     values = read_keys(given, COMPARE_KEYS, setting)
     try:

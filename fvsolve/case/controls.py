@@ -269,8 +269,6 @@ def unlike(dimensions: list[str]) -> tuple[str, str] | None:
 
 def read_controls(reading: Reading, kinds: dict[str, Any]) -> dict[str, Block | None]:
     """Blocks of a case by name; None for a faulty block. Adds their quantities to `kinds`, as for `read_probe`."""
-    if "controls" not in reading.raw.table:
-        return {}
     for group in ("nodes", "links"):
         if "controls" in reading.raw.table.get(group, {}):
             reading.fault((group, "controls"), '"controls" is the name of the blocks; expected another name')

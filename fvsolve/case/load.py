@@ -12,7 +12,6 @@ from fvsolve.argument_checks import TABLE, validated
 from fvsolve.case import chainage, checks, claims, connections, part_reading, resource_checks, shipped
 from fvsolve.case.case import Case, wave_speed
 from fvsolve.case.conduits import water_of_conduits
-from fvsolve.case.controls import read_controls
 from fvsolve.case.part_reading import Parts
 from fvsolve.case.pipe_routes import legs, read_routes
 from fvsolve.case.probe import default_probes, read_probe
@@ -128,7 +127,11 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     routes = read_routes(reading, network, parts.links)
     kinds["routes"] = {name: route and (legs(route, parts.links), parts.links) for name, route in routes.items()}
     kinds["reactions"] = reaction_kinds(reactions) if reactions else {}
-    blocks = read_controls(reading, kinds)
+    blocks = {}
+    if "controls" in reading.raw.table:
+        from fvsolve.case.controls import read_controls  # most cases have no blocks
+
+        blocks = read_controls(reading, kinds)
     output = read_output(reading, numerics, kinds)
     kinds["run_up"] = run_up_kinds(reading, output)
     expect, compare = claims.read_expectations(reading, kinds, routes), claims.read_comparisons(reading, kinds)

@@ -19,7 +19,6 @@ from fvsolve.declarations import Declarations
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.exact import NAMES
 from fvsolve.parts import value as val
-from fvsolve.parts.csv_rows import CsvError, copy_name, find_file, read_rows
 from fvsolve.parts.pipe.part import LINES
 from fvsolve.parts.table_model import NamedTables, Table, check_table, read_keys
 from fvsolve.parts.value import BY_CELLS, SHAPE, VALUE, Choice, Number, Quantity, ReadContext, positive
@@ -185,6 +184,8 @@ class MethodChoice(Choice):
             return super().read(given, setting)
         if not Path(given).suffix or (given in METHODS and METHODS[given].name == given):
             return super().read(given, setting)
+        from fvsolve.parts.csv_rows import copy_name, find_file
+
         path = find_file(given, setting)
         name = copy_name(path, setting)
         try:
@@ -446,6 +447,8 @@ class Gauges(NamedTables):
 
     def rows(self, file: str, setting: ReadContext) -> dict[str, Any]:
         """Tables of the gauges of a file by name. Raises ValueError for faults of the file."""
+        from fvsolve.parts.csv_rows import CsvError, find_file, read_rows
+
         rows = read_rows(find_file(file, setting))
         name, basin, x, y = (rows.column(column, 0) for column in self.columns)
         tables: dict[str, Any] = {}

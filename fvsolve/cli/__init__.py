@@ -1,4 +1,4 @@
-"""Command line interface; the only package that prints or exits."""
+"""Command line interface; the only package that prints or exits; may import all, and none imports it."""
 
 import atexit
 import copy

@@ -13,7 +13,7 @@ import threading
 import weakref
 from collections.abc import Callable
 from pathlib import Path
-from types import FunctionType
+from types import FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,6 @@ import numpy as np
 from fvsolve.compile import cache_folders as folders
 from fvsolve.compile import store
 from fvsolve.compile.child_process import python_command, python_environment
-from fvsolve.compile.numba_internals import LOADED_CODE, code_of, dispatcher_class, numba_module
 from fvsolve.compile.store import Code
 
 COMPILE_TIMEOUT = 60.0  # longest wait for a second process that compiles [s]
@@ -56,7 +55,7 @@ def compile_signature(function: Any, letters: str, kinds: tuple) -> DeclaredFunc
     letters, kinds : signature as letters and as numba types of the arguments
     """
     function.compile(kinds)
-    return DeclaredFunction(function, letters, code_of(function.overloads[kinds]))
+    return DeclaredFunction(function, letters, internals().code_of(function.overloads[kinds]))
 
 
 def inline(function: Callable) -> Callable:
@@ -168,7 +167,7 @@ class Function:
         """Numba dispatcher of this function."""
         with COMPILE_LOCK:
             cached = self.folder is not None and self.numba_caches
-            return dispatcher_class()(self.py_func, cached, self.folder or "", **self.targetoptions)
+            return internals().dispatcher_class()(self.py_func, cached, self.folder or "", **self.targetoptions)
 
     @property
     def _numba_type_(self):
@@ -206,7 +205,7 @@ class Function:
             letters = "".join(map(signature_of, arguments))
         except KeyError:  # a type without letter
             return self.numba(*arguments)
-        python = self.code(letters, lambda: tuple(map(numba_module().typeof, arguments))).python
+        python = self.code(letters, lambda: tuple(map(internals().numba_module().typeof, arguments))).python
         if LETTERS.keys() >= set(kinds):
             self.by_types[kinds] = python
         return python(*arguments)
@@ -236,11 +235,11 @@ class Function:
         compiler = self.numba if wrappers else self.numba.within
         compiler.compile(kinds)
         compiled = compiler.overloads[kinds]
-        code = code_of(compiled, wrappers)
+        code = internals().code_of(compiled, wrappers)
         if (name := self._file_name(key)) is not None:
             path = folders.code_folder() / name
             try:
-                loaded = LOADED_CODE.get(compiled.fndesc.llvm_func_name)
+                loaded = internals().LOADED_CODE.get(compiled.fndesc.llvm_func_name)
                 store.write(
                     path, self._identity(key), compiled, loaded or compiled.library._get_compiled_object(), wrappers
                 )
@@ -303,10 +302,17 @@ class DeclaredFunction:
         self.checked[i] = weakref.ref(array)
 
 
+def internals() -> ModuleType:
+    """Module `numba_internals`, imported at the first compilation: a start with stored code needs nothing of numba."""
+    from fvsolve.compile import numba_internals
+
+    return numba_internals
+
+
 @functools.cache
 def plain_kinds() -> dict:
     """Numba types of numbers and of arrays of numbers : letter of a signature -> type."""
-    types = numba_module().types
+    types = internals().numba_module().types
     kinds = {"t": types.float64, "i": types.int64, "b": types.boolean, "c": types.complex128}
     return kinds | {letter: types.Array(getattr(types, kind), axes, "C") for letter, (kind, axes) in ARRAYS.items()}
 

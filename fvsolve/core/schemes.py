@@ -227,6 +227,7 @@ class Limiter(NamedTuple):
 
 
 UNITY, DOUBLE, HALF, ZERO = Fraction(1), Fraction(2), Fraction(1, 2), Fraction(0)
+LIMITERS_VARIABLE = "FVSOLVE_LIMITERS"  # environment variable with the limiters of users, for other processes
 LIMITERS = {
     "minmod": Limiter(((UNITY, ZERO), (ZERO, UNITY)), 1.0),
     "van-leer": Limiter(((HALF, HALF), (DOUBLE, ZERO), (ZERO, DOUBLE)), 2.0),

@@ -1,11 +1,16 @@
-"""Exact solutions, which a case file names under `[exact]`."""
+"""Exact solutions, which a case file names under `[exact]`; may import kernels and fluids of `core`."""
 
 import re
 from collections.abc import Iterator
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 from fvsolve.declarations import Declarations, unreadable
 from fvsolve.errors import FvsolveError
-from fvsolve.exact.solution import Exact, ExactStart, Solution, law_faults, type_faults
+from fvsolve.lazy_exports import lazy_attributes
+
+if TYPE_CHECKING:
+    from fvsolve.exact.solution import Exact, ExactStart, Solution
 
 __all__ = ["NAMES", "Exact", "ExactStart", "Solution", "find_faults", "solution"]
 
@@ -19,6 +24,8 @@ def find_faults(case) -> Iterator[tuple[tuple, str]]:
     keys : key path as a tuple. Parts of types that the solution does not support are reported first; the keys of parts
     are checked only if there are no such parts.
     """
+    from fvsolve.exact.solution import law_faults, type_faults
+
     exact = _exact(case.exact.name)
     if case.controls:
         yield ("controls",), "exact solutions have no controls; remove [controls], or [exact]"
@@ -26,14 +33,24 @@ def find_faults(case) -> Iterator[tuple[tuple, str]]:
     yield from list(type_faults(case, exact.nodes, exact.links)) or exact.find_faults(case)
 
 
-def solution(case, start: ExactStart) -> Solution:
+def solution(case, start: "ExactStart") -> "Solution":
     """Exact solution that a case names under `[exact]`, from the flows and pressures at the start."""
     return _exact(case.exact.name).solution(case, start)
 
 
-def _exact(name: str) -> Exact:
+def _exact(name: str) -> "Exact":
+    from fvsolve.exact.solution import Exact
+
     value = NAMES.load(name)
     if not isinstance(value, Exact):
         found = NAMES[name]
         raise FvsolveError(unreadable(found.source, found.place, "it is not an Exact; expected one of fvsolve.exact"))
     return value
+
+
+# The module `solution` is imported at the first use of a solution. Its import must not replace the function `solution`.
+lazy_attributes(
+    __name__,
+    ("Exact", "ExactStart", "Solution", "solution"),
+    lambda name: getattr(import_module("fvsolve.exact.solution"), name),
+)

@@ -1,1 +1,1 @@
-"""Files and models of other programs: EPANET networks, functional mock-up units; may import studies."""
+"""Files and models of other programs, EPANET and FMU; may import `core`, `case` and `parts`."""

@@ -1,1 +1,1 @@
-"""Features of models: a folder each, which the core finds by the header of its class and never names."""
+"""Features of models, which the core finds by headers and never names; may import `core`, `case` and `parts`."""

@@ -1,4 +1,4 @@
-"""Declarations of all types of parts: keys, units and valid ranges; each name is imported on first use."""
+"""Types of parts: keys, conversion to table rows, compiled laws; may import kernels and base classes of `core`."""
 
 from fvsolve.lazy_exports import lazy_names
 from fvsolve.parts.nodes_and_links import Link, Node

@@ -201,11 +201,6 @@ class Program:
         return Program(f"max(0, {scale!r}*({value}) + {offset!r})", self.names)
 
 
-def is_formula(text: Any) -> bool:
-    """True if a text may be a formula of time: it has the name t or calls a function, and is not a quantity."""
-    return isinstance(text, str) and TIME_FORMULA.search(text) is not None and not units.is_number_with_unit(text)
-
-
 @lru_cache(maxsize=256)
 def program_in(unit: str, dimension: str, text: str, names: tuple[str, ...], ambient: float) -> Program:
     """Formula whose value has a unit; "" for SI. ambient : ambient pressure [Pa]

@@ -16,11 +16,10 @@ from types import CellType, FunctionType, ModuleType
 import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, TEXT, validated
-from fvsolve.core.schemes import LIMITERS, Limiter, OwnLimiter
+from fvsolve.core.schemes import LIMITERS, LIMITERS_VARIABLE, Limiter, OwnLimiter
 from fvsolve.errors import FvsolveError
 from fvsolve.units import show
 
-VARIABLE = "FVSOLVE_LIMITERS"  # environment variable with the limiters of users, for other processes
 SEPARATOR = ";"  # of its entries NAME=FILE.py:FUNCTION or NAME=DATA
 BUILT_IN = tuple(LIMITERS)
 MODULES = {"math": math, "numpy": np}  # modules that a limiter may use
@@ -56,12 +55,12 @@ def add(name: str, data: str) -> None:
     values = np.array([value_at(phi, name, float(r)) for r in RATIOS])
     LIMITERS[name] = limiter(phi, values, data)
     others = [entry for entry in entries() if not entry.startswith(f"{name}=")]
-    os.environ[VARIABLE] = SEPARATOR.join([*others, f"{name}={data}"])
+    os.environ[LIMITERS_VARIABLE] = SEPARATOR.join([*others, f"{name}={data}"])
 
 
 def entries() -> list[str]:
     """Limiters of the environment variable FVSOLVE_LIMITERS, as NAME=FILE.py:FUNCTION or NAME=DATA."""
-    return [entry for entry in os.environ.get(VARIABLE, "").split(SEPARATOR) if entry.strip()]
+    return [entry for entry in os.environ.get(LIMITERS_VARIABLE, "").split(SEPARATOR) if entry.strip()]
 
 
 def read_entry(entry: str) -> None:

@@ -3,7 +3,7 @@
 import os
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.machinery import ModuleSpec
 from importlib.util import module_from_spec
@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.argument_checks import PATH, validated
+from fvsolve.core.schemes import LIMITERS_VARIABLE
 from fvsolve.declarations import EntryPoint, entry_points, unreadable
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import add_sources
-from fvsolve.parts import own_limiters
 from fvsolve.units import show
 
 GROUP, LIMITERS = "fvsolve.parts", "fvsolve.limiters"  # entry points
@@ -58,9 +58,18 @@ def declare(package: str) -> None:
     import_module(f"{package}.part")
 
 
-def register_installed(entry: EntryPoint) -> None:
-    """Register the limiter of an installed package, under the name of its entry point."""
-    own_limiters.register_limiter(entry.name, entry.load())
+def installed_limiters() -> Iterator[tuple[str, Callable[[Any], None], Any]]:
+    """Yield the limiters of installed packages and of the environment variable, as `declare_installed` reads them."""
+    found = entry_points(LIMITERS)
+    if not found and not os.environ.get(LIMITERS_VARIABLE):
+        return
+    from fvsolve.parts import own_limiters
+
+    def register(entry: EntryPoint) -> None:
+        own_limiters.register_limiter(entry.name, entry.load())
+
+    yield from ((f"entry points {LIMITERS}", register, entry) for entry in found)
+    yield from ((LIMITERS_VARIABLE, own_limiters.read_entry, entry) for entry in own_limiters.entries())
 
 
 def declare_installed() -> None:
@@ -68,8 +77,7 @@ def declare_installed() -> None:
     offered: list[tuple[str, Callable[[Any], None], Any]] = [
         *((f"{entry.name} of the entry points {GROUP}", declare, entry.place) for entry in entry_points(GROUP)),
         *((VARIABLE, register_part, folder) for folder in registered_folders()),
-        *((f"entry points {LIMITERS}", register_installed, entry) for entry in entry_points(LIMITERS)),
-        *((own_limiters.VARIABLE, own_limiters.read_entry, entry) for entry in own_limiters.entries()),
+        *installed_limiters(),
     ]
     for source, read, place in offered:
         try:

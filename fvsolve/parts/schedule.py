@@ -1,19 +1,21 @@
 """Schedules: values that may change with time, and the keys that declare them."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
-from fvsolve.parts.csv_rows import copy_name, find_file, read_columns, split_header
-from fvsolve.parts.formula_intervals import find_outside
-from fvsolve.parts.formula_program import Program, is_formula, program_in
 from fvsolve.parts.table_model import keys_json, read_keys
 from fvsolve.parts.value import NEEDED, Choice, Number, Quantity, Range, ReadContext, Rows, Text, Value, ValueFault
-from fvsolve.units import DIMENSIONS, UNITS, begins_as_quantity, expected, may_be_gauge, show
+from fvsolve.units import DIMENSIONS, UNITS, begins_as_quantity, expected, is_number_with_unit, may_be_gauge, show
+
+if TYPE_CHECKING:
+    from fvsolve.parts.formula_program import Program
 
 KINDS = ("linear", "step", "smooth")
 AMPLITUDE_DIMENSIONS = {
@@ -24,6 +26,15 @@ BLOCK_PREFIX = "controls."  # prefix of the name of a block, as in the key `inpu
 UNKNOWN = ""  # dimension of an input or output of a block, not known because of a fault elsewhere
 SIGNS = "*+()^<>="  # of a formula
 BOUNDED = ("pressure", "head", "angular_velocity")  # dimensions that a control may drive only within `limits`
+
+
+def is_formula(given: Any) -> bool:
+    """True if a value may be a formula of time: a text with the name t or a call of a function, and no quantity."""
+    if not isinstance(given, str) or is_number_with_unit(given):
+        return False
+    from fvsolve.parts.formula_program import TIME_FORMULA  # only now: most cases have no formula
+
+    return TIME_FORMULA.search(given) is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,6 +221,8 @@ class Scheduled(Value):
         return Schedule("harmonic", (-np.inf, np.inf), reach, 1.0, values, (mean, amplitude, period, phase))
 
     def _read_file(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
+        from fvsolve.parts.csv_rows import copy_name, find_file, read_columns, split_header
+
         values = read_keys(given, self.forms["file"], setting)
         kind = values["kind"]
         try:
@@ -296,6 +309,8 @@ class Scheduled(Value):
     def _read_formula(self, given: dict[str, Any], setting: ReadContext, origin: Any) -> Schedule:
         setting.lookups += 1  # its range depends on the times of the run
         values = read_keys(given, self.forms["formula"], setting)
+        from fvsolve.parts.formula_program import program_in
+
         place = ("formula",) if isinstance(origin, dict) else ()
         try:
             program = program_in(values["unit"], self.dimension, values["formula"], (), setting.ambient)
@@ -321,6 +336,8 @@ class Scheduled(Value):
 
         place : keys of the formula
         """
+        from fvsolve.parts.formula_intervals import find_outside
+
         if text := program.pole_fault(float(times[0]), float(times[-1])):
             raise ValueFault([(place, text)])
         if (t := find_outside(program.bounds, times, self.range.least, self.range.greatest)) is not None:

@@ -1,4 +1,4 @@
-"""Reports of finished runs: an offline HTML page, a workbook of tables, pictures and pressure cycles."""
+"""Reports and pictures of finished runs: a page, a workbook, `draw`; the page may import all but cli."""
 
 from importlib import import_module
 from typing import Any

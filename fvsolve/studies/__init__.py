@@ -1,4 +1,4 @@
-"""Studies of a case by many runs: order of convergence, accuracy against cost, stability, energy, sizing, sweeps.
+"""Studies of a case by many runs: order, cost, stability, energy, sizing, sweeps; may import all but report and cli.
 
 A public function or class has the header `@declared("study")`. It is found by the text of its module, and imported on
 first use. Studies of other packages are found by their entry points.

@@ -42,8 +42,8 @@ class Limit(NamedTuple):
 # Goals are those of issue 61. Its values are those of 07b0f210: 215 files, 48 811 lines, 223 cells, 96 functions,
 # 53 characters, 1 circle.
 LIMITS = {
-    "files imported by run valve-closure": Limit(limit=194, goal=130, slack=7),
-    "lines of these files": Limit(limit=44_000, goal=35_000, slack=1500),
+    "files imported by run valve-closure": Limit(limit=184, goal=130, slack=7),
+    "lines of these files": Limit(limit=40_500, goal=35_000, slack=1500),
     "files of features among them": Limit(limit=0, goal=0, slack=0),
     "cells of the hub matrix": Limit(limit=197, goal=70, slack=6),
     "cells of the hub matrix, code alone": Limit(limit=167, goal=70, slack=6),

@@ -1,4 +1,4 @@
-"""The core runs without features, studies, report and exchange; each feature runs without the others."""
+"""The core runs without features, studies, reports and exchange; each feature runs without the others."""
 
 import os
 import shutil
@@ -12,7 +12,7 @@ import fvsolve
 
 PACKAGE = Path(fvsolve.__file__).parent
 CASES = PACKAGE.parent / "cases"
-ABOVE = ("studies", "report", "validation", "epanet", "fmi")  # folders that no run needs
+ABOVE = ("studies", "exchange")  # folders that no run needs; of `report` it needs `draw` alone
 # feature -> a case that wakes it, and keys that do
 AWAKE = {
     "delay_lines": ["valve-closure", "--set", 'numerics.pipe_model="delay-line"'],
@@ -29,6 +29,9 @@ def copy_of_package(top: Path, feature: str) -> None:
     left_out = shutil.ignore_patterns("__pycache__", *ABOVE)
     shutil.copytree(PACKAGE, top / "fvsolve", ignore=left_out)
     shutil.copytree(CASES, top / "cases")
+    for file in (top / "fvsolve" / "report").glob("*.py"):
+        if file.name != "__init__.py":
+            file.unlink()
     for folder in (top / "fvsolve" / "features").iterdir():
         if folder.is_dir() and folder.name != feature:
             shutil.rmtree(folder)

@@ -3,11 +3,13 @@
 import re
 import sys
 
+import numpy as np
 import pytest
 from reference.folders import DOCS
 
 import fvsolve
 from fvsolve.cli import COMMANDS
+from fvsolve.core.kernels import dtypes
 from fvsolve.units import UNITS, parse
 
 sys.path.append(str(DOCS))
@@ -43,7 +45,7 @@ def test_all_public_names_are_there_with_the_first_line_of_their_docstrings():
     text = generated_pages.names()
     listed = re.findall(r"\{py:(?:function|class|exception)\} ([\w.]+)", text)
     assert {f"fvsolve.{name}" for name in fvsolve.__all__} <= {*listed} and len(listed) == len({*listed})
-    assert {"fvsolve.studies.order", "fvsolve.studies.sweep", "fvsolve.core.steppers.analyse"} <= {*listed}
+    assert {"fvsolve.studies.order", "fvsolve.studies.sweep", "fvsolve.steppers.analyse"} <= {*listed}
     for name in fvsolve.__all__:
         assert generated_pages.escaped(getattr(fvsolve, name).__doc__.splitlines()[0]) in text
     assert "{py:method} rhs(t, y=None)" in text and "{py:property} envelope" in text
@@ -53,6 +55,15 @@ def test_a_public_name_without_docstring_is_refused(monkeypatch):
     monkeypatch.setattr(fvsolve.run, "__doc__", None)
     with pytest.raises(ValueError, match=r"fvsolve\.run has no docstring"):
         generated_pages.names()
+
+
+def test_all_tables_of_the_core_and_of_features_are_there_with_each_column():
+    text = generated_pages.tables()
+    sections = dict(re.findall(r"^### (\w+)\n(.*?)(?=^##|\Z)", text, re.MULTILINE | re.DOTALL))
+    assert {"## Tables of the core", "## Tables of delay lines", "## Tables of controls"} <= {*text.splitlines()}
+    for name, kind in ((name, kind) for name, kind in vars(dtypes).items() if isinstance(kind, np.dtype)):
+        assert re.findall(r"^\| `(\w+)` \|", sections[name], re.MULTILINE) == list(kind.names)
+    assert "| `tau` | number | travel time of a stretch [s] |" in sections["DELAY"]
 
 
 def test_lines_about_arguments_are_items_of_a_list():

@@ -16,7 +16,7 @@ from math import sqrt
 from fvsolve.core.kernels.dtypes import JUNCTION, NO_SOLUTION, STATUS, WHERE
 from fvsolve.core.kernels.node_clusters import solve_dense
 from fvsolve.core.kernels.restrictions import conductance
-from fvsolve.core.kernels.steady_friction import drag
+from fvsolve.core.kernels.steady_friction import column_drag
 from fvsolve.jit import njit
 
 
@@ -56,13 +56,6 @@ def is_column_junction(tables, out, i):
     """True if node i joins at least two rigid columns, and otherwise only closed valves."""
     node = tables.nodes[i]
     return node["gates"] >= 0 and node["columns"] > 1 and gate_area(tables, out, i)[0] == 0.0
-
-
-@njit
-def column_drag(column, flow):
-    """Friction term of a rigid column [kg/s2] at a mass flow [kg/s]."""
-    kind, loss, rough = column["friction"], column["loss"], column["rough"]
-    return drag(kind, loss, rough, column["roughness"], column["reynolds"], flow)
 
 
 @njit(forceinline=True)

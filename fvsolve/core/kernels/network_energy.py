@@ -21,7 +21,6 @@ Entries of `stored` [J]: each node; kinetic and elastic (with potential) energy 
 and the backward wave of a delay line; each column.
 """
 
-from fvsolve.core.kernels.column_junctions import column_drag
 from fvsolve.core.kernels.density import enthalpy
 from fvsolve.core.kernels.dtypes import CHAMBER, LAW_LINEAR, TANK
 from fvsolve.core.kernels.pipe_energy import (
@@ -31,6 +30,7 @@ from fvsolve.core.kernels.pipe_energy import (
     pipe_power,
     pipe_power_barotropic,
 )
+from fvsolve.core.kernels.steady_friction import column_drag
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.core.kernels.tanks import tank_level
 from fvsolve.jit import njit, specialise

@@ -38,6 +38,7 @@ from fvsolve.core.kernels.restrictions import (
     restriction_slope,
 )
 from fvsolve.core.kernels.self_acting_valves import controls_column
+from fvsolve.core.kernels.steady_friction import column_drag
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.jit import njit, specialise
 
@@ -466,7 +467,7 @@ def column_rate(t, y, tables, out, k, change):
     # At a seat that is closed the general formula would accelerate a column that cannot move.
     if end != 0 and (seating_valve(tables, node) < 0 or junctions.gate_area(tables, out, node)[0] == 0.0):
         return end * controlled_rate(t, y, tables, out, k, end)
-    friction = junctions.column_drag(column, out[tables.layout[0]["column"] + k])
+    friction = column_drag(column, out[tables.layout[0]["column"] + k])
     return column["area"] / column["length"] * (change + column["offset"]) - (friction - column["drag"])
 
 

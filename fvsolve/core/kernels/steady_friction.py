@@ -143,3 +143,10 @@ def drag_slope(kind, loss, rough, roughness, reynolds, flow):
     elif kind == FRICTION_HAZEN:
         slope += (1.0 + EXPONENT) * rough * power_of_square(size * size)
     return slope
+
+
+@njit
+def column_drag(column, flow):
+    """Friction term of a rigid column [kg/s2] at a mass flow [kg/s]."""
+    kind, loss, rough = column["friction"], column["loss"], column["rough"]
+    return drag(kind, loss, rough, column["roughness"], column["reynolds"], flow)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fvsolve.case.controls import decision_order
 from fvsolve.core.assembly.lowering import Input, lowering_of
 from fvsolve.core.assembly.pipe_terms import mass_in_creep
 from fvsolve.core.kernels import dtypes as rec
@@ -180,6 +179,10 @@ class Model(Displayable):
     @property
     def block_names(self) -> list[str]:
         """Names of blocks of `controls`, in the order of their table."""
+        if not self.case.controls:
+            return []
+        from fvsolve.case.controls import decision_order
+
         return decision_order(self.case.controls)
 
     def schedule_of(self, name: str) -> int:

@@ -1,11 +1,11 @@
 """Runge-Kutta methods as data, their properties, and the compiled time loop that steps them."""
 
-from fvsolve.core.steppers import explicit, implicit  # noqa: F401  (declare the built-in methods)
+from fvsolve.core.steppers import explicit  # noqa: F401  (declares the explicit methods)
+from fvsolve.core.steppers.tableau import METHODS
 from fvsolve.lazy_exports import lazy_names
 
 _HOMES = {
     "Facts": "analysis.stability_properties",
-    "METHODS": "tableau",
     "Method": "tableau",
     "StabilityFunction": "analysis.stability_function",
     "analyse": "analysis.stability_properties",
@@ -18,4 +18,5 @@ _HOMES = {
     "stability_function": "analysis.stability_function",
 }
 
-__all__ = lazy_names(__name__, _HOMES)  # noqa: PLE0605
+METHODS.further = "fvsolve.core.steppers.implicit"
+__all__ = ["METHODS", *lazy_names(__name__, _HOMES)]  # noqa: PLE0604

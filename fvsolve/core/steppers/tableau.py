@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import functools
+import importlib
 import warnings
-from collections.abc import Mapping, Sequence
+from collections import UserDict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
@@ -21,7 +23,6 @@ from fvsolve.errors import FvsolveError, nearest
 from fvsolve.units import show
 
 AUTO = "auto"  # in place of a method name: `automatic.py` chooses the method
-METHODS: dict[str, Method] = {}  # some methods have two names: `gauss-2` is `implicit-midpoint`
 LARGEST = 10**30  # greatest size of an entry
 BUILT_IN: set[str] = set()  # names of built-in methods, not available for user methods
 EXACT_DECIMALS = 6  # decimals with at most this many digits are exact
@@ -30,6 +31,43 @@ DENSE_ERROR = 1e-12  # relative difference of the new state from the dense outpu
 DIGITS_MOST = 75  # greatest number of digits that count, below the precision of intermediate results
 STAGES_MOST, LETTERS_MOST = 100, 10**6  # greatest number of stages, and of characters in the text of a tableau
 FAULTS_SHOWN, LINE_SHOWN = 20, 120  # greatest number of faults in a message, and length of a line of the text in it
+
+
+class Methods(UserDict):
+    """Methods by name, in the order of their declarations; some have two names: `gauss-2` is `implicit-midpoint`.
+
+    further : module that declares further built-in methods, imported when a name is not known yet, and before all
+    methods are asked for: most runs have an explicit method
+    """
+
+    further = ""
+
+    def complete(self) -> None:
+        """Declare all built-in methods."""
+        module, self.further = self.further, ""
+        if module:
+            importlib.import_module(module)
+
+    def __contains__(self, name: object) -> bool:
+        if name not in self.data:
+            self.complete()
+        return name in self.data
+
+    def __getitem__(self, name: str) -> Method:
+        if name not in self.data:
+            self.complete()
+        return self.data[name]
+
+    def __iter__(self) -> Iterator[str]:
+        self.complete()
+        return iter(self.data)
+
+    def __len__(self) -> int:
+        self.complete()
+        return len(self.data)
+
+
+METHODS = Methods()
 
 
 class Array(NamedTuple):
@@ -214,6 +252,7 @@ def tableau(
     do not add up to c, invalid entries, an error estimate that is zero for all problems, for y' = lambda y or for
     y' = f(t). Warns of decimals of few digits with which the order is lower than with exact numbers.
     """
+    METHODS.complete()  # their names are not free
     if name in BUILT_IN or name == "auto" or not name.strip() or name != name.strip():
         raise FvsolveError(f'method name "{name}" is not free: it is empty, has blanks at an end or names a built-in '
                            "method. Choose another name")  # fmt: skip

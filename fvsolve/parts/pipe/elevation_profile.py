@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.parts.csv_rows import copy_name, find_file, read_rows
 from fvsolve.parts.tolerances import ROUNDING
 from fvsolve.parts.value import ReadContext, Rows, Value, ValueFault, check_increasing, faults_of
 from fvsolve.units import show
@@ -137,6 +136,8 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np
 
     setting : context for reading. Raises ValueFault with the fault.
     """
+    from fvsolve.parts.csv_rows import copy_name, find_file, read_rows
+
     unknown = [((key,), "unknown key; expected only `file`") for key in given if key != "file"]
     if unknown:
         raise ValueFault(unknown)
