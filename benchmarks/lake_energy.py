@@ -18,17 +18,17 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from reference.meshes import corner_lists, write
 
-from fvsolve.core.basins.cell_sides import STEEPEST
-from fvsolve.core.basins.free_surface import surface_mesh
-from fvsolve.core.basins.free_surface.surface_rates import water_mesh_rates
-from fvsolve.core.basins.liquid import liquid_mesh
-from fvsolve.core.basins.liquid.liquid_rates import mesh_rates
-from fvsolve.core.basins.liquid.liquid_sides import LiquidScheme
-from fvsolve.core.basins.lower_motion import lower_mesh
-from fvsolve.core.basins.mesh_blocks import work_size
 from fvsolve.core.kernels.dtypes import MUSCL, UPWIND
 from fvsolve.core.mesh import Mesh, read, rectangle
 from fvsolve.core.schemes import LIMITERS
+from fvsolve.features.basins.cell_sides import STEEPEST
+from fvsolve.features.basins.free_surface import surface_mesh
+from fvsolve.features.basins.free_surface.surface_rates import water_mesh_rates
+from fvsolve.features.basins.liquid import liquid_mesh
+from fvsolve.features.basins.liquid.liquid_rates import mesh_rates
+from fvsolve.features.basins.liquid.liquid_sides import LiquidScheme
+from fvsolve.features.basins.lower_motion import lower_mesh
+from fvsolve.features.basins.mesh_blocks import work_size
 from fvsolve.jit import njit
 
 BAR, G, C, COURANT = 1.001, 9.80665, 10.0, 0.45

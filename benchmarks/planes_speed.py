@@ -51,7 +51,7 @@ def rate(advance: Callable[[int], object], elements: int, repeats: int = 20, chu
 
 def rates(model: Model, repeats: int) -> tuple[int, float, float]:
     """Number of cells, cell-steps per second, and evaluations of the right-hand side per second times cells."""
-    cells, y, out = model.basins[0].mesh.area.size, initial_state(model).y, model.new_out()
+    cells, y, out = model.meshed[0].mesh.area.size, initial_state(model).y, model.new_out()
     dydt, loop = np.empty_like(y), RunLoop(model)
 
     def evaluate(times: int) -> None:

@@ -101,7 +101,7 @@ def memory(kind: str, cells: int, folder: Path) -> str:
     fvsolve.run(case(kind, SMALL, folder))
     before, given = peak(), case(kind, cells, folder)
     model = fvsolve.build(fvsolve.load(given))
-    n, state = model.basins[0].mesh.area.size, fvsolve.initial_state(model)
+    n, state = model.meshed[0].mesh.area.size, fvsolve.initial_state(model)
     loop = RunLoop(model)
     fvsolve.advance(model, state, 1e-5)
     held = arrays(model.tables), arrays(loop.run_data.written) + arrays(vars(loop.stepper).values())

@@ -62,8 +62,8 @@ def limit_of(case: str, method: str, changes: dict) -> float:
     modes = [values for _, values in modes_outside_cells(model)]
 
     def holds(h: float) -> bool:
-        own = model_with(case, method, changes, step=h) if model.pipes or model.basins else model
-        if (model.pipes or model.basins) and exceeded_checks(own, method, {}, steps_of(own, h)):
+        own = model_with(case, method, changes, step=h) if model.pipes or model.meshed else model
+        if (model.pipes or model.meshed) and exceeded_checks(own, method, {}, steps_of(own, h)):
             return False
         return all(excess_growth(r, s, h).max() <= 1e-9 for s in modes)
 
@@ -119,10 +119,10 @@ def main() -> int:
                 print(f"{case:22} {method:8} no stable step")
                 continue
             model = model_with(case, method, changes, step=limit)
-            if model.basins and first_step(model_with(case, method, changes, courant=1.0)) == 0.0:
+            if model.meshed and first_step(model_with(case, method, changes, courant=1.0)) == 0.0:
                 print(f"{case:22} {method:8} starts dry: no wave limits the first step")
                 continue
-            ways = ["step"] + (["courant"] if model.cells or model.basins else [])
+            ways = ["step"] + (["courant"] if model.cells or model.meshed else [])
             for key in ways:
                 line = f"{case:22} {method:8} {key:8} limit {limit:9.3g} s:"
                 for factor in factors:

@@ -153,20 +153,22 @@ FAULTS = [
         "gain = richest.seconds / cheapest.seconds",
         "gain = cheapest.seconds / richest.seconds",
     ),
-    Fault("core/basins/conduit/conduit_cells.py", "rough[0] * hydraulic_radius_power", "2.0 * hydraulic_radius_power"),
-    Fault("core/basins/frame_forces.py", "spin + f1 - p1 * z", "spin + f1 + p1 * z"),
     Fault(
-        "core/basins/liquid/liquid_mesh.py",
+        "features/basins/conduit/conduit_cells.py", "rough[0] * hydraulic_radius_power", "2.0 * hydraulic_radius_power"
+    ),
+    Fault("features/basins/frame_forces.py", "spin + f1 - p1 * z", "spin + f1 + p1 * z"),
+    Fault(
+        "features/basins/liquid/liquid_mesh.py",
         "m, pressure = forward - backward, c0 * (forward + backward)\n        mass",
         "m, pressure = forward - backward, 1.01 * c0 * (forward + backward)\n        mass",
     ),
     Fault(
-        "core/basins/transport/lower.py",
+        "features/basins/transport/lower.py",
         "return speed * size / np.pi * np.sin(x) ** 2",
         "return 1.01 * speed * size / np.pi * np.sin(x) ** 2",
     ),
     Fault(
-        "core/basins/free_surface/surface_patches.py",
+        "features/basins/free_surface/surface_patches.py",
         "dydt[o + i] += flow * near.flow_weight(",
         "dydt[o + i] -= flow * near.flow_weight(",
     ),

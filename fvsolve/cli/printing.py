@@ -157,7 +157,8 @@ def check_text(case, facts: dict, every: bool = False) -> Iterator:
     every : True for all rows, otherwise only notable rows of long tables
     """
     yield case.title or case.name, "bold"
-    if facts["nodes"] or facts["basins"]:
+    basins = facts.get("basins", {})
+    if facts["nodes"] or basins:
         yield _fluid_text(case, facts["fluid"])
     odd = {part["place"] for part in facts["warnings"]}
     groups = ("nodes", "node", NODE), ("masses", "mass", MASS), ("bodies", "body", BODY), ("pipes", "pipe", PIPE)
@@ -165,7 +166,6 @@ def check_text(case, facts: dict, every: bool = False) -> Iterator:
         place = "links" if group == "pipes" else "nodes"
         noticed = {name for name in facts[group] if f"{place}.{name}" in odd}
         yield from _parts_table(case, word, facts[group], keys, every, noticed)
-    basins = facts["basins"]
     yield from _parts_table(case, "basin", basins, BASIN)
     patches = {f"{name}.{patch}": faces for name, part in basins.items() for patch, faces in part["patches"].items()}
     yield from _parts_table(case, "patch", patches, PATCH)
@@ -188,7 +188,7 @@ def check_text(case, facts: dict, every: bool = False) -> Iterator:
     yield from _first([*notes, *_network_lines(facts["network"])], every)
     yield from _first([f"moves from the start: {text}" for text in facts["moving"]], every)
     yield from _notices(facts["warnings"], every)
-    if facts["basins"]:
+    if basins:
         yield _thread_text(facts["threads"])
     yield _step_text(case, facts)
 

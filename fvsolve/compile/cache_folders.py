@@ -23,9 +23,8 @@ COMPILING = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
 PACKAGE = Path(__file__).resolve().parent.parent
 # Sources that compiled code can depend on: packages and modules with compiled functions and, by import contract, all
-# that they may import; of `parts` the law files, of `basins` all files without a prefix of `UNCOMPILED_PREFIXES`.
+# that they may import; of `parts` the law files. Features state their own sources, see `add_sources`.
 SOURCE_ROOTS = ("core/kernels", "core/steppers", "jit", "compile", "units", "errors")
-UNCOMPILED_PREFIXES = ("part", "lower")  # prefixes of files of `basins` without compiled functions
 EXTRA_FOLDERS: dict[Path, str] = {}  # other folders with compiled functions -> their folder below the code folder
 
 
@@ -164,8 +163,7 @@ def other_caches() -> str:
 def compiled_sources() -> tuple[Path, ...]:
     packages = [path for root in SOURCE_ROOTS for path in (PACKAGE / root).rglob("*.py")]
     modules = [path for root in SOURCE_ROOTS if (path := PACKAGE / f"{root}.py").is_file()]
-    basins = [path for path in (PACKAGE / "core/basins").rglob("*.py") if not path.name.startswith(UNCOMPILED_PREFIXES)]
-    return tuple(sorted([*packages, *modules, *(PACKAGE / "parts").rglob("law*.py"), *basins]))
+    return tuple(sorted([*packages, *modules, *(PACKAGE / "parts").rglob("law*.py")]))
 
 
 def _prune(present: Path) -> None:

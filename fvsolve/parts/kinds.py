@@ -13,7 +13,6 @@ from fvsolve.units import show
 PATTERNS = (
     "parts/[a-z]*.py",
     "parts/*/part.py",
-    "core/basins/*/part.py",
     "features/*/*/part.py",
 )  # modules that declare types
 # Header of a class that declares a type: `kind` of a part, `name` of a physics, `pipe_model` of a pipe. A search for

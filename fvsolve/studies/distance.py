@@ -99,7 +99,7 @@ def error_norms(run: Outcome, truth, own: tuple[str, ...] | None = None) -> dict
         gaps = [by_component[pipe.name, quantity] for pipe in run.model.pipes]
         errors, weights = [gap.error for gap in gaps], [gap.weights for gap in gaps]
         deviations[quantity] = Deviation(np.concatenate(errors), np.concatenate(weights))
-    for basin in run.model.basins:
+    for basin in run.model.meshed:
         by_content = {content: by_component.get((basin, content)) for content in basin_fields(basin, run.y)}
         deviations |= {variable_name(basin, content): gap for content, gap in by_content.items() if gap is not None}
     ends, at_end = set(end_probes(run.model.case)), {}
@@ -176,7 +176,7 @@ def field_deviations(run: Outcome, truth) -> dict[tuple, Deviation]:
     pipes that are not in its `spans` are nan. Basins without values in the reference are left out.
     """
     model, deviations = run.model, {}
-    reference_fields = truth.fields(model) if model.pipes or model.basins else {}
+    reference_fields = truth.fields(model) if model.pipes or model.meshed else {}
     own_fields = fields(model, wave_sums(run)) if model.pipes else {}
     for k, pipe in enumerate(model.pipes):
         lengths, span = np.full(pipe.cells, pipe.length / pipe.cells), truth.spans.get(pipe.name, math.nan)
@@ -184,7 +184,7 @@ def field_deviations(run: Outcome, truth) -> dict[tuple, Deviation]:
         widths = {"pressure": span, "flow": span * flow_per_pressure}
         for quantity, values, expected in zip(widths, own_fields[pipe.name], reference_fields[pipe.name], strict=True):
             deviations[pipe.name, quantity] = Deviation(values - expected, lengths, widths[quantity])
-    for basin in model.basins:
+    for basin in model.meshed:
         reference_basin = reference_fields.get(("basin", basin.name))
         if reference_basin is None:
             continue
@@ -266,7 +266,7 @@ def variable_size(run: Outcome, name: str) -> float:
     if name in ("pressure", "flow"):
         k = ("pressure", "flow").index(name)
         return max(float(np.max(np.abs(pair[k]))) for pair in fields(run.model, wave_sums(run)).values())
-    for basin in run.model.basins:
+    for basin in run.model.meshed:
         for quantity, values in basin_fields(basin, run.y).items():
             if name == variable_name(basin, quantity):
                 return float(np.max(np.abs(values)))

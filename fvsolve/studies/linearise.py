@@ -81,13 +81,13 @@ class Linear:
     def state_units(self) -> list[str]:
         """SI units of the states x."""
         names, model = set(self.states), self.at.model
-        basins = {basin.name: basin.part.physics_type.states for basin in model.basins}
+        meshed = {part.name: part.part.physics_type.states for part in model.meshed}
         units = []
         for name in self.states:
             part, quantity = name.rsplit(".", 1)
             plain = quantity.rstrip("0123456789[]")
-            if part in basins:
-                units.append(basins[part].get(quantity.split("[")[0], "-"))
+            if part in meshed:
+                units.append(meshed[part].get(quantity.split("[")[0], "-"))
             elif part.startswith("controls."):
                 # an integral of a block has the unit of its output, other states of blocks that of its input
                 first, output = model.case.controls[part.removeprefix("controls.")].dimensions
@@ -112,7 +112,7 @@ class Linear:
             a = {"row": entries.row, "column": entries.col, "value": entries.data}
         return {
             "case": self.at.model.case.name, "at": self.at.t, "when": self.at.when,
-            "scheme": self.at.model.case.numerics.scheme if self.at.model.cells or self.at.model.basins else None,
+            "scheme": self.at.model.case.numerics.scheme if self.at.model.cells or self.at.model.meshed else None,
             "states": self.states, "state_units": self.state_units, "inputs": self.inputs,
             "input_units": self.input_units, "input_values": self.input_values, "outputs": self.outputs,
             "output_units": self.output_units, "output_values": self.output_values,
@@ -183,9 +183,9 @@ def refuse_limiter(model) -> None:
     scheme, schemes = model.case.numerics.scheme, model.case.schemes
     if has_limiter(model):
         linear = "upwind"
-        if model.basins and all(basin.is_grid for basin in model.basins):
+        if model.meshed and all(part.is_grid for part in model.meshed):
             linear = "upwind or upwind5"
-        elif "upwind5" in schemes and not model.basins:
+        elif "upwind5" in schemes and not model.meshed:
             linear = f"{SCHEMES[scheme].twin} (equals {scheme} in smooth solutions), upwind or upwind5"
         raise FvsolveError(
             f"numerics.scheme = {scheme} is limited: it has no derivative where the state is constant, however small "

@@ -137,10 +137,10 @@ def _state_at(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray, n
 
 
 def with_held_schedules(model, t: float, before: bool = False):
-    """Model with all schedules of time and all periodic velocities of basins held at their values at t [s].
+    """Model with all schedules of time, and values of features that vary by themselves, held at those at t [s].
 
     before : True for the values just before a kink or jump at t, otherwise just after it
-    Schedules that drive joints and walls continue with their rate of change at this time. Kinks and jumps are removed.
+    Schedules that drive motions continue with their rate of change at this time. Kinks and jumps are removed.
     In a model without a limited scheme, slopes of scalars in pipe cells and bounds of scalars are removed too.
     """
     tables = model.tables
@@ -150,12 +150,12 @@ def with_held_schedules(model, t: float, before: bool = False):
     for k, record in enumerate(tables.schedules):
         if record["pieces"] != 0:  # it does not follow a block
             schedules[k] = (len(tables.pieces) + k, 1)
-    driven = [{int(row["schedule"]) for row in tables.walls}, *(feature.driven for feature in model.features)]
-    for k in set().union(*driven) - {-1}:
+    for k in {k for feature in model.features for k in feature.driven()} - {-1}:
         rows[k][4] = slope_at(tables, k, t, limit)
     pieces = np.vstack([tables.pieces, np.array(rows).reshape(-1, 7)])  # the first ones contain formulas of blocks
     tables = tables._replace(schedules=schedules, pieces=pieces)
-    tables = with_held_velocities(model, tables, t)
+    for feature in model.features:
+        tables = tables._replace(**feature.held_tables(tables, t))
     if not has_limiter(model):
         # limited slopes and bounds of scalars are kinks of the right-hand side, which has no derivative there
         settings, scalars = tables.settings.copy(), tables.scalars.copy()
@@ -163,21 +163,6 @@ def with_held_schedules(model, t: float, before: bool = False):
         scalars["least"], scalars["greatest"] = -np.inf, np.inf
         tables = tables._replace(settings=settings, scalars=scalars)
     return replace(model, tables=tables, breaks=[])
-
-
-def with_held_velocities(model, tables: rec.Tables, t: float) -> rec.Tables:
-    """Tables of a model in which given velocities of basins that reverse periodically are held at their values at t."""
-    if not any(row["period"] > 0.0 for row in tables.basins):
-        return tables
-    tables = tables._replace(basins=tables.basins.copy(), plane=tables.plane.copy())
-    for basin, row in zip(model.basins, tables.basins, strict=True):
-        if row["period"] > 0.0:
-            grid = basin.mesh.grid
-            faces = grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx if basin.is_grid else basin.mesh.left.size
-            factor = np.cos(np.pi * t / row["period"])
-            tables.plane[row["flows"] : row["flows"] + faces] *= factor
-            row["fastest"], row["period"] = abs(factor) * row["fastest"], 0.0
-    return tables
 
 
 def with_weights(at: OperatingPoint, weights: tuple[float, ...], degree: int) -> OperatingPoint:
@@ -199,11 +184,11 @@ def with_weights(at: OperatingPoint, weights: tuple[float, ...], degree: int) ->
 
 
 def has_limiter(model) -> bool:
-    """True if a model uses a limited scheme, in pipes with cells or in basins."""
+    """True if a model uses a limited scheme, in pipes with cells or in meshes."""
     scheme = model.case.numerics.scheme
-    for basin in model.basins:
-        # basins limit their slopes with all schemes except `upwind`, basin grids not with `upwind5` either
-        if scheme != "upwind" and not (scheme == "upwind5" and basin.is_grid):
+    for part in model.meshed:
+        # meshes limit their slopes with all schemes except `upwind`, grids not with `upwind5` either
+        if scheme != "upwind" and not (scheme == "upwind5" and part.is_grid):
             return True
     return model.cells > 0 and scheme in LIMITED
 
@@ -360,8 +345,8 @@ def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray
     pattern.sort_indices()
     rows, starts = pattern.indices, pattern.indptr[:-1]
     columns = np.repeat(np.arange(n), np.diff(pattern.indptr))
-    basins = tuple(f"{basin.name}." for basin in model.basins)
-    in_basins = np.array([name.startswith(basins) for name in model.state_names])
+    meshed = tuple(f"{part.name}." for part in model.meshed)
+    in_meshes = np.array([name.startswith(meshed) for name in model.state_names])
     for steps in (STEPS, FINER_STEPS):
         slopes, sides = matrix_entries(at, width, rows, columns, steps)
         size = np.bincount(rows, np.abs(slopes[len(steps) // 2]), n)
@@ -370,7 +355,7 @@ def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray
         values, errors = best_slopes(slopes, row_size, starts)
         coarse = np.bincount(rows, np.abs(slopes[0]), n)[rows]
         hidden = hidden_kinks(sides, coarse, row_size, starts, steps)
-        hidden &= ~in_basins  # fluxes of water at rest have kinks of about 1e-4 of a row
+        hidden &= ~in_meshes  # fluxes of water at rest have kinks of about 1e-4 of a row
         kink = side_differences(sides, row_size, starts) + hidden
         if max(np.max(errors), np.max(kink)) <= SLOPE_TOLERANCE:
             break
@@ -404,7 +389,7 @@ def refuse_state(model, j: int, cause: str) -> None:
 
     cause : "slope" if difference quotients do not converge, "kink" if they differ from side to side
     """
-    basin = next((part for part in model.basins if model.state_names[j].startswith(f"{part.name}.")), None)
+    basin = next((part for part in model.meshed if model.state_names[j].startswith(f"{part.name}.")), None)
     if basin is not None:
         cause = "basin"
     reason = {

@@ -308,7 +308,7 @@ def _is_characteristic(case, keys: dict) -> bool:
     The number of steps is that of a run of at most about `PROBE_STEPS` steps. keys : overrides of the case
     """
     model = study_model(case, keys)
-    if model.basins:
+    if model.meshed:
         return False
     rates, span = model.wave_rates, case.numerics.end - case.numerics.start
     if np.ptp(rates) > 1e-9 * rates.max():
@@ -341,7 +341,7 @@ def reference_of_run(run: Outcome, words: str = "") -> Reference:
         cells = {pipe.name: pipe.cells for pipe in model.pipes}
         averages = {name: tuple(cell_averages(entry, cells[name]) for entry in pair) for name, pair in sums.items()}
         by_pipe = fields(model, averages)
-        pairs = zip(run.model.basins, model.basins, strict=True)
+        pairs = zip(run.model.meshed, model.meshed, strict=True)
         return by_pipe | {("basin", other.name): project_to(entry, [*basin_fields(entry, run.y).values()], other)
                         for entry, other in pairs}  # fmt: skip
 

@@ -213,7 +213,7 @@ def has_initial_jump(case, coarse: Mapping, fine: Mapping) -> bool:
 def initial_steps(model) -> list[float]:
     """Greatest difference between neighbouring cells at the start, for every quantity of every basin [SI]."""
     greatest = []
-    for basin in model.basins:
+    for basin in model.meshed:
         inner = basin.mesh.inner
         left, right = basin.mesh.left[:inner], basin.mesh.right[:inner]
         values = basin_fields(basin, model.start).values()

@@ -8,9 +8,9 @@ from pytest import approx
 from reference.carried import NONE, SCHEMES, Carried, carried, means, ring_rates
 from scipy.special import erfc
 
-from fvsolve.core.basins import advection
-from fvsolve.core.basins.transport.lower import face_flows, grid_flows
 from fvsolve.core.mesh import rectangle
+from fvsolve.features.basins import advection
+from fvsolve.features.basins.transport.lower import face_flows, grid_flows
 
 TURN = {"expression": "rotation", "centre": (0.5, 0.5), "angular_velocity": 2.0 * np.pi}
 SWIRL = {"expression": "swirl"}

@@ -269,7 +269,7 @@ def at_start(level: str, bed: str = PARABOLOID, rest: float = 0.05, cells: int =
     """Return (depths, areas) of a square bowl for a level at the start."""
     pool = basin((3.0, 3.0), (cells, cells), rest, bed=bed, start={"level": level}, **more)
     model = model_of(alone(pool, 1.0))
-    return model.basins[0].fields(model.basins[0].start())["depth"], model.basins[0].mesh.area
+    return model.meshed[0].fields(model.meshed[0].start())["depth"], model.meshed[0].mesh.area
 
 
 @pytest.mark.parametrize("holes", [{}, {"holes": [[0.0, 0.0, 0.5, 0.5]]}])

@@ -16,14 +16,14 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.spatial import Delaunay
 
 import fvsolve
-from fvsolve.core.basins.basin_output import observe_dense_flows, observe_flows
-from fvsolve.core.basins.liquid.liquid_patches import observe_liquid
 from fvsolve.core.mesh import read, rectangle
 from fvsolve.core.mesh.mesh import MeshPoints
 from fvsolve.core.model import RunData
 from fvsolve.core.output.fields import basin_geometry, grid_xml, split_blocks, write_frame
 from fvsolve.core.run.plot_scene import lengths_of, unit_of
 from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.features.basins.basin_output import observe_dense_flows, observe_flows
+from fvsolve.features.basins.liquid.liquid_patches import observe_liquid
 from fvsolve.report.draw import field_canvas as of_view
 from fvsolve.report.draw.scene import DrawnScene
 from fvsolve.report.draw.sheet import PictureSheet, colour_range
@@ -152,9 +152,9 @@ def test_the_flow_of_a_patch_is_the_gain_of_the_basin():
     flows = []
     for lower in (0.0, -1e-3, -1.4e-3, -1.9e-3, -2e-3):
         y = np.zeros(model.y_size)
-        y[: model.basins[0].n] = lower
+        y[: model.meshed[0].n] = lower
         flow, asked = model.observe(1.5, y)
-        assert flow == approx(model.rhs(1.5, y)[: model.basins[0].n].sum() * area, rel=1e-9)
+        assert flow == approx(model.rhs(1.5, y)[: model.meshed[0].n].sum() * area, rel=1e-9)
         assert -flow == approx(asked, rel=1e-12)
         flows.append(asked)
     assert sorted(flows, reverse=True) == flows and flows[0] > 0.0 and flows[-1] == 0.0
@@ -283,7 +283,7 @@ def test_a_line_across_a_hole_has_nothing_there(tmp_path):
         "output": {"every": 1e-4, "lines": {"cut": {"basin": "block", "from": [0, 2], "to": [4, 2], "points": 9}}}
     })  # fmt: skip
     model = fvsolve.build(case)
-    line = LineSampler(case.output.lines["cut"], model.basins[0], case)
+    line = LineSampler(case.output.lines["cut"], model.meshed[0], case)
     rows = line.text(model.fields(model.start, model.new_out())["block"]).splitlines()
     found = [float(row.split(",")[3]) for row in rows[1:]]  # points at 1 m and 2 m are on the outline
     assert found == approx([5e5, 5e5, 5e5, np.nan, *[5e5] * 5], rel=1e-12, nan_ok=True)
@@ -299,7 +299,7 @@ def test_a_frame_of_triangles_and_quads_opens_with_pyvista_and_meshio_and_knows_
     path = write(tmp_path / "block.msh", *shaken())
     case = liquid([], mesh={"file": str(path)})
     model = model_of(case)
-    basin = model.basins[0]
+    basin = model.meshed[0]
     fields = model.fields(random_state(model, 1e-3), model.new_out())["block"]
     points, cells = basin_geometry(basin, np.zeros(2))
     data = {name: split_blocks(values, cells) for name, values in fields.items()}

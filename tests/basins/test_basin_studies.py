@@ -11,12 +11,12 @@ from reference.jacobians import stray
 from reference.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.core.basins.free_surface.lower import FreeSurfaceRows
-from fvsolve.core.basins.free_surface.lower_error_checks import on_grid, on_mesh, surface_waves
 from fvsolve.core.model import RunData
 from fvsolve.core.model.energy_accounts import Accounts
 from fvsolve.core.model.jacobian_pattern import jacobian_pattern
 from fvsolve.errors import FvsolveError
+from fvsolve.features.basins.free_surface.lower import FreeSurfaceRows
+from fvsolve.features.basins.free_surface.lower_error_checks import on_grid, on_mesh, surface_waves
 from fvsolve.studies.accuracy.chart import chart
 from fvsolve.studies.accuracy.order import order
 from fvsolve.studies.accuracy.refine import refinement_plan, resolutions
@@ -315,12 +315,12 @@ def test_wavenumbers_are_those_of_the_waves_that_there_are():
     k = math.hypot(2.0 * math.pi / 10.0, math.pi / 5.0)
     level = f"1 + 0.01*cos({2.0 * math.pi / 10.0!r}*x)*cos({math.pi / 5.0!r}*y)"
     model = model_of(alone(pool((32, 16), level), 1.0))
-    (basin,), y = model.basins, model.start
+    (basin,), y = model.meshed, model.start
     assert surface_waves(basin, basin.deviations(y)).k == approx(k, rel=1e-12)
     surface = basin.deviations(y)[0]
     assert on_mesh(basin, surface) == approx(on_grid(basin, surface), rel=2.0 * (k * 10.0 / 32.0) ** 2 / 12.0)
     dam = model_of(alone(pool((64, 4), "where(x < 5, 1, 0.4)"), 1.0))
-    assert surface_waves(dam.basins[0], dam.basins[0].deviations(dam.start)).k == approx(
+    assert surface_waves(dam.meshed[0], dam.meshed[0].deviations(dam.start)).k == approx(
         math.sqrt(12.0) / 10.0, rel=1e-3
     )
 
@@ -396,7 +396,7 @@ def test_a_dye_in_a_vortex_that_turns_back_stays_within_bounds_and_shows_its_ord
     assert found.fits["sheet at the end: dye"]["L1"].order == approx(2.1, abs=0.3)
     for cells in (32, 64):
         model = model_of(swirl() | {"nodes": {"sheet": swirl()["nodes"]["sheet"] | {"cells": [cells, cells]}}})
-        basin, start = model.basins[0], model.start
+        basin, start = model.meshed[0], model.start
         y = fvsolve.advance(model, fvsolve.initial_state(model), 1.5).y
         assert basin.amounts(y).max() <= basin.amounts(start).max() and basin.amounts(y).min() >= 0.0
 

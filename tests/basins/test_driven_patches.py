@@ -65,7 +65,7 @@ def on_mesh(case: dict, size, spacing: float, sides, folder) -> dict:
 
 
 def depths(model, state) -> np.ndarray:
-    return model.basins[0].depth + model.basins[0].deviations(state.y)[0]
+    return model.meshed[0].depth + model.meshed[0].deviations(state.y)[0]
 
 
 def mean_error(n: int, kind: str, folder=None, **numerics) -> float:
@@ -75,7 +75,7 @@ def mean_error(n: int, kind: str, folder=None, **numerics) -> float:
     if folder is not None:
         case = on_mesh(case, (LONG, 2.0), LONG / n, ["west"], folder)
     model, state = ended(case)
-    field = model.basins[0]
+    field = model.meshed[0]
     places = ((0.0, 18.0),) if folder else ((-math.sqrt(0.6), 5.0), (0.0, 8.0), (math.sqrt(0.6), 5.0))  # of Gauss
     exact = sum(w / 18.0 * simple_wave(field.x + 0.5 * at * LONG / n, PERIOD, depth_at) for at, w in places)
     return float(np.average(np.abs(depths(model, state) - exact), weights=field.mesh.area))
@@ -107,7 +107,7 @@ def test_at_rest_not_a_bit_moves(kind, path, scheme, tmp_path):
     patches = {side: {"side": side, **AT_REST[kind]} for side in sides}
     case = reach(patches, cells=(60, 4), bed=ROUGH, numerics={"scheme": scheme})
     model = model_of(case if path == "grid" else on_mesh(case, (LONG, 2.0), 0.5, sides, tmp_path))
-    assert (model.basins[0].depth == 0.0).any()
+    assert (model.meshed[0].depth == 0.0).any()
     dydt, out = model.evaluate(0.0, np.zeros(model.y_size))
     assert not dydt.any() and not out[model.layout["supply"] :][: model.ledgers].any()
 
@@ -129,7 +129,7 @@ def test_the_volume_that_enters_is_the_integral_of_the_discharge(method, ground,
     case = reach({"up": {"side": "west", "discharge": schedule}}, cells=(30, 4), bed=ground[0], level=ground[1])
     case["numerics"] = {"end": 5.0, "scheme": "muscl", "method": method} | METHODS[method]
     model, state = ended(case)
-    gained = np.sum(model.basins[0].mesh.area * model.basins[0].deviations(state.y)[0])
+    gained = np.sum(model.meshed[0].mesh.area * model.meshed[0].deviations(state.y)[0])
     assert gained == approx(volume, rel=1e-12) and depths(model, state).min() >= 0.0
 
 
@@ -141,7 +141,7 @@ def test_the_volume_of_a_smooth_discharge_has_the_order_of_the_method(method, or
         case = reach({"up": {"side": "west", "discharge": {"formula": "1 + sin(t)^2"}}}, cells=(15, 1))
         case["numerics"] = {"end": 4.0, "scheme": "muscl", "method": method, "step": step}
         model, state = ended(case)
-        errors.append(abs(np.sum(model.basins[0].mesh.area * model.basins[0].deviations(state.y)[0]) - exact))
+        errors.append(abs(np.sum(model.meshed[0].mesh.area * model.meshed[0].deviations(state.y)[0]) - exact))
     assert math.log2(errors[0] / errors[1]) == approx(order, abs=0.1)
 
 
@@ -195,7 +195,7 @@ def test_backwater_is_gradually_varied_flow(kind):
                      bed=f"{SLOPE}*({long}-x)", manning=ROUGHNESS)  # fmt: skip
         model, state = ended(case)
         h = depths(model, state)
-        errors.append(np.abs(h / backwater(long, depth, model.basins[0].x) - 1.0).max())
+        errors.append(np.abs(h / backwater(long, depth, model.meshed[0].x) - 1.0).max())
     assert errors[1] < 2e-5
     assert kind == "normal_slope" or math.log2(errors[0] / errors[1]) > 1.8
 
@@ -211,7 +211,7 @@ def test_water_behind_a_weir_on_a_steep_slope_is_gradually_varied_flow(end):
         case = reach(patches, (long, 2.0), (n, 1), 3000.0, level=2.5, start={"level": 2.5, "u": 0.5},
                      bed=f"{slope}*({long}-x)", manning=ROUGHNESS)  # fmt: skip
         model, state = ended(case)
-        errors.append(np.abs(depths(model, state) / law.sol(model.basins[0].x)[0] - 1.0).max())
+        errors.append(np.abs(depths(model, state) / law.sol(model.meshed[0].x)[0] - 1.0).max())
     assert errors[1] < 1e-5 and math.log2(errors[0] / errors[1]) > 1.8
 
 
@@ -255,7 +255,7 @@ def test_the_short_channel_of_macdonald_has_its_depths(end, scheme, tmp_path):
                      manning=ROUGHNESS, start={"level": f"{west}*(1 - x/150) + 0.85", "u": 2.4})  # fmt: skip
         model, state = ended(case)
         nodes, weights = np.polynomial.legendre.leggauss(4)
-        places = model.basins[0].x[:, None] + 75.0 / n * nodes
+        places = model.meshed[0].x[:, None] + 75.0 / n * nodes
         error = np.abs(depths(model, state) / (short_channel(places)[0] @ weights / 2.0) - 1.0)
         errors.append(error.max())
         means.append(error.mean())
@@ -333,7 +333,7 @@ def turned(degrees: float, spacing: float, scheme: str, lower: dict, folder) -> 
     case["nodes"]["reach"] = {k: v for k, v in case["nodes"]["reach"].items() if k not in ("size", "cells")}
     model, state = ended(case)
     found = depths(model, state)
-    return float(found @ model.basins[0].mesh.area), found
+    return float(found @ model.meshed[0].mesh.area), found
 
 
 @pytest.mark.parametrize("closure", TURNED_ENDS)
@@ -361,7 +361,7 @@ def test_inflow_through_sides_of_triangles_stays_even(unit, upper, tmp_path):
             tmp_path,
         )
         model, state = ended(case)
-        errors.append(np.abs(model.basins[0].deviations(state.y)[1] / unit - 1.0).max())
+        errors.append(np.abs(model.meshed[0].deviations(state.y)[1] / unit - 1.0).max())
     assert max(errors) < 1e-9
 
 
@@ -370,7 +370,7 @@ def test_the_flow_through_a_side_of_triangles_is_continuous_where_it_turns(tmp_p
     patches = {"west": {"side": "west", "stage": 1.1}, "east": {"side": "east", "stage": 1.0}}
     case = reach(patches, (8.0, 4.0), (16, 8), 5.0, {"scheme": "upwind"})
     model = model_of(on_mesh(case, (8.0, 4.0), 0.5, ["west", "east"], tmp_path))
-    basin, patch, rates = model.basins[0], model.tables.patches[0], []
+    basin, patch, rates = model.meshed[0], model.tables.patches[0], []
     velocities = int(basin.row["y"]) + basin.n
     behind = model.tables.integers[int(patch["ring"]) + int(patch["faces"]) :][: int(patch["faces"])]
     for velocity in (1e-9, -1e-9):
@@ -383,7 +383,7 @@ def test_the_flow_through_a_side_of_triangles_is_continuous_where_it_turns(tmp_p
 
 def test_neighbours_of_faces_of_a_patch_do_not_depend_on_the_order_in_the_file(tmp_path):
     case = on_mesh(uniform_flow(1.0, (4.0, 3.0), (10, 1), 1.0), (4.0, 3.0), 0.5, ["west", "east"], tmp_path)
-    mesh = model_of(case).basins[0].mesh
+    mesh = model_of(case).meshed[0].mesh
     before, after = mesh.neighbouring_faces("west")
     y = mesh.middle[mesh.patch("west"), 1]
     order = np.argsort(-y)  # the west side runs down, anticlockwise around the basin
@@ -407,7 +407,7 @@ def returned(end: dict, speed: float, cells: int = 480, bed="0", **more) -> floa
         case = reach(patches, (120.0, 2.0), (cells, 1), end_time, level=1.0, start=start, bed=bed, **more)
         model, state = ended(case)
         fields.append(depths(model, state))
-    x = model.basins[0].x
+    x = model.meshed[0].x
     volume = np.sum((fields[1] - fields[0])[(x > 40.0) & (x < 110.0)]) * 120.0 / cells
     return volume / (1e-3 * 6.0 * math.sqrt(math.pi)) * (c + speed) / (c - speed)
 
@@ -461,7 +461,7 @@ def test_no_water_enters_behind_a_film_that_runs_away_from_its_patch(end, path, 
     start = {"level": "0.02", "u": 3.0}
     case = reach({"west": {"side": "west", **end}}, end=2.0, level=0.0, start=start, probes=["reach.west.flow"])
     model, state = ended(case if path == "grid" else on_mesh(case, (LONG, 2.0), 0.5, ["west"], tmp_path))
-    volume, start = model.basins[0].mesh.area @ depths(model, state), 0.02 * LONG * 2.0
+    volume, start = model.meshed[0].mesh.area @ depths(model, state), 0.02 * LONG * 2.0
     assert volume == approx(start, rel=1e-12 if "discharge" in end else 1e-6)  # a little may leave later
     assert volume < start * (1.0 + 1e-12)
 
@@ -521,7 +521,7 @@ def test_a_restated_reach_gives_the_same(path, tmp_path):
             basin["mesh"] = {"file": str(folder / "g.msh")}
             basin["patches"] = {name: {k: v for k, v in one.items() if k != "side"} for name, one in patches.items()}
         model, state = ended(case)
-        field = model.basins[0]
+        field = model.meshed[0]
         return depths(model, state), field.x, field.y
 
     here, x, y = depth(("west", "east"), (12.0, 2.0), (24, 4))
@@ -631,6 +631,6 @@ def test_quadrilaterals_of_a_file_have_the_inflow_of_a_grid(tmp_path):
     open_ends = {name: {k: v for k, v in one.items() if k != "side"} for name, one in patches.items()}
     other = case | {"nodes": {"reach": basin | {"mesh": {"file": str(tmp_path / "t.msh")}, "patches": open_ends}}}
     (grid, before), (file, after) = ended(case), ended(other)
-    order = np.lexsort((file.basins[0].x, file.basins[0].y))
-    same = np.lexsort((grid.basins[0].x, grid.basins[0].y))
+    order = np.lexsort((file.meshed[0].x, file.meshed[0].y))
+    same = np.lexsort((grid.meshed[0].x, grid.meshed[0].y))
     assert depths(file, after)[order] == approx(depths(grid, before)[same], abs=1e-6)

@@ -9,11 +9,11 @@ from reference.face_fields import Field, G, march, triangles
 from reference.meshes import corner_lists, delaunay, write
 
 import fvsolve
-from fvsolve.core.basins import cell_sides
-from fvsolve.core.basins.free_surface.surface_mesh import MOST_OVERSHOOT
-from fvsolve.core.basins.lower_motion import lower_mesh
 from fvsolve.core.kernels.dtypes import LAW_LINEAR, MUSCL
 from fvsolve.core.mesh import read, rectangle
+from fvsolve.features.basins import cell_sides
+from fvsolve.features.basins.free_surface.surface_mesh import MOST_OVERSHOOT
+from fvsolve.features.basins.lower_motion import lower_mesh
 
 
 def lake(field: Field, bed: np.ndarray, ripple: float, wide: float, end: float) -> list[float]:

@@ -58,7 +58,7 @@ def villemonte(upper: float, lower: float) -> float:
 
 
 def depth(model, state) -> np.ndarray:
-    return model.basins[0].depth + model.basins[0].deviations(state.y)[0]
+    return model.meshed[0].depth + model.meshed[0].deviations(state.y)[0]
 
 
 LINES = {"across": ACROSS, "oblique": [[9.0, 0.0], [15.0, 6.0]], "steep": [[10.5, 6.0], [13.5, 0.0]]}
@@ -182,7 +182,7 @@ def test_a_group_of_a_mesh_file_is_the_wall_on_its_lines(tmp_path):
     by_line["nodes"]["reach"]["walls"] = {"levee": {"line": ACROSS, "crest": CREST}}
     by_group = with_mesh(by_line, tmp_path / "g.msh")
     by_group["nodes"]["reach"]["walls"] = {"levee": {"group": "levee", "crest": CREST}}
-    one, other = model_of(by_line).basins[0].marks, model_of(by_group).basins[0].marks
+    one, other = model_of(by_line).meshed[0].marks, model_of(by_group).meshed[0].marks
     assert np.array_equal(one.faces, other.faces) and (other.cosine == 1.0).all()
     assert np.isfinite(depth(*ended(by_group))).all()
     by_group["nodes"]["reach"]["walls"]["levee"]["group"] = "leve"
@@ -200,7 +200,7 @@ def test_all_methods_spill_the_same_volume(triangular, numerics, tmp_path):
     assert abs(fvsolve.run(case, {"numerics.end": 5.0}).ledger["mass"]["relative"]) < 1e-12
     model, state = ended(case)
     found, start = depth(model, state), depth(model, fvsolve.initial_state(model))
-    behind, cells = model.basins[0].x > 12.05, model.basins[0].mesh.area
+    behind, cells = model.meshed[0].x > 12.05, model.meshed[0].mesh.area
     spilled, area = float(found[behind] @ cells[behind]), cells[~behind].sum()
     rate = villemonte(CREST + 1.0, 0.0) * SIZE[1] / area  # of a pool with one level: dh/dt = -rate h^1.5
     assert spilled == approx(area * (0.02 - (0.02**-0.5 + 0.5 * rate * end) ** -2), rel=0.03)
@@ -246,8 +246,8 @@ def test_the_integral_of_a_section_is_the_change_of_the_volume_beyond(scheme):
     result, (model, state) = fvsolve.run(case), ended(case)
     t, flow = result.seconds, result["bridge.flow"]
     integral = float(np.sum(0.5 * (flow[1:] + flow[:-1]) * np.diff(t)))
-    west = model.basins[0].x < 6.0
-    gain = (depth(model, state) - depth(model, fvsolve.initial_state(model)))[west] @ model.basins[0].mesh.area[west]
+    west = model.meshed[0].x < 6.0
+    gain = (depth(model, state) - depth(model, fvsolve.initial_state(model)))[west] @ model.meshed[0].mesh.area[west]
     assert abs(gain) > 0.5 and integral == approx(gain, rel=4.0 * case["numerics"]["step"] ** 2)
     back = {"bridge": {"basin": "reach", "from": [6.0, 6.0], "to": [6.0, 0.0]}}
     again = fvsolve.run(case | {"output": case["output"] | {"sections": back}})

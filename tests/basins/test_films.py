@@ -221,7 +221,7 @@ def test_films_that_move_go_as_an_implicit_method_has_them(tmp_path, kind):
     nodes, found = slid({"travel": SHAKEN}) if kind == "body" else between_walls(tmp_path, kind), []
     for numerics in ({"method": "ssp-rk2", "courant": 0.5}, {"method": "rodas-5p", "rtol": 1e-6}):
         model, state = ended(scene(nodes, {}, 0.8, {"scheme": "muscl", **numerics}), 0.8)
-        found.append(model.basins[0].deviations(state.y)[1])
+        found.append(model.meshed[0].deviations(state.y)[1])
     size = np.abs(found[1]).max()
     assert size > 1e-4 and np.abs(found[0] - found[1]).max() < 0.02 * size
 

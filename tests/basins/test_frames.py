@@ -9,10 +9,10 @@ from reference.basins import HEAVY, ended, model_of, sliding, slowing, straight,
 from reference.scenes import GRAVITY, scene
 
 from fvsolve import advance, load, run
-from fvsolve.core.basins import frame_forces
-from fvsolve.core.basins.basin_frames import CELL_POSITIONS, REST_LEVEL, REST_SURFACE
 from fvsolve.core.model.model import State
 from fvsolve.errors import CaseError
+from fvsolve.features.basins import frame_forces
+from fvsolve.features.basins.basin_frames import CELL_POSITIONS, REST_LEVEL, REST_SURFACE
 
 METHODS = ("ssp-rk3", "gauss-4", "rodas-4")
 
@@ -24,7 +24,7 @@ def tank(cells=(20, 20), size=(2.0, 2.0), level=0.3, on="body", **more):
 def moved(body, basin, until, numerics=None, **nodes):
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5, **(numerics or {})}
     model, state = ended(scene({"body": body, "b": basin, **nodes}, {}, until, numerics), until)
-    return model, state, model.basins[0].deviations(state.y)
+    return model, state, model.meshed[0].deviations(state.y)
 
 
 # water at rest ----------
@@ -39,9 +39,9 @@ def test_water_that_turns_with_its_box_rests_as_a_paraboloid_wherever_the_axis_i
     basin = tank((10, 10), at=[-cx, -cy, 0.0], start={"level": bowl})
     case = {"scheme": "muscl", "method": method, **({"courant": 0.5} if method == "ssp-rk3" else {"step": 0.05})}
     model, state = ended(scene({"body": turning(straight(rate, 100.0), axis), "b": basin}, {}, 1.0, case), 1.0)
-    found = model.basins[0].deviations(state.y)
+    found = model.meshed[0].deviations(state.y)
     assert np.abs(found[1:]).max() < (1e-13 if method == "ssp-rk3" else 1e-10)
-    assert found[0] == pytest.approx(model.basins[0].deviations(model.start)[0], abs=1e-10)
+    assert found[0] == pytest.approx(model.meshed[0].deviations(model.start)[0], abs=1e-10)
 
 
 def test_a_box_that_turns_so_fast_that_its_middle_is_dry_rests_too():
@@ -108,8 +108,8 @@ def test_a_box_that_swings_a_little_has_the_waves_of_the_closed_form(way):
         numerics = {"scheme": "upwind5", "method": "rk4", "step": 0.2 * length / n}
         case = scene({"body": body, "b": tank(cells, size, **more)}, {}, 1.0, numerics)
         model = model_of(case)
-        found = model.basins[0].deviations(advance(model, State(0.0, model.start.copy()), 1.0).y)
-        x = model.basins[0].mesh.centre[:, 0 if along == "x" else 1]
+        found = model.meshed[0].deviations(advance(model, State(0.0, model.start.copy()), 1.0).y)
+        x = model.meshed[0].mesh.centre[:, 0 if along == "x" else 1]
         wanted = 0.3 * forced(x, length, w, push) * math.cos(w)
         errors.append(np.abs(found[1 if along == "x" else 2] - wanted).max() / np.abs(wanted).max())
     assert errors[1] < errors[0] / 3.0
@@ -140,7 +140,7 @@ def test_thackers_bowl_seen_from_axes_that_swing_is_the_bowl_that_stands_still()
     for n in (30, 60):
         basin = tank((n, n), (4.0, 4.0), level=h0, at=[-2.0, -2.0, 0.0], bed=bed, start=start)
         model, _, found = moved(turning(swing), basin, end)
-        one = model.basins[0]
+        one = model.meshed[0]
         angle = amplitude * math.sin(2.0 * math.pi * end / period)
         x, y = one.x - 2.0, one.y - 2.0
         east, north = math.cos(angle) * x - math.sin(angle) * y, math.sin(angle) * x + math.cos(angle) * y

@@ -77,7 +77,7 @@ def test_a_free_tank_on_rails_conserves_its_momentum():
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5}
     case = scene({"cart": cart(50.0, rate=0.3), "b": basin}, {}, 2.0, numerics)
     model = model_of(case)
-    basin, at = model.basins[0], model.state_names.index("cart.travel_rate")
+    basin, at = model.meshed[0], model.state_names.index("cart.travel_rate")
 
     def momentum(y):
         found, area = basin.deviations(y), basin.mesh.area

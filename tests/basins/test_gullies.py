@@ -51,7 +51,7 @@ def test_steps_at_a_gully_are_those_of_waves_with_its_crest_at_any_height(crest)
 def test_check_prints_a_crest_and_its_bed(fvs, tmp_path):
     from fvsolve.core.run import model_of
 
-    low, high = (model_of(street(crest, "river", 1.0, bed="10 + 0.01*x")).basins[0].chain_texts()
+    low, high = (model_of(street(crest, "river", 1.0, bed="10 + 0.01*x")).meshed[0].chain_texts()
                  for crest in (10.3, 10.6))  # fmt: skip
     assert low == ["m: crest 10.3 m, 0.01 m below the lowest bed of street.gully; "
                    "surface around it at the start 10.29 m to 10.33 m"]  # fmt: skip

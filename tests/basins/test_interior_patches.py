@@ -75,7 +75,7 @@ ROUGH = "0.3*sin(1.7*x)*cos(2.3*y) + 0.15*x - 0.4"  # with dry cells at the leve
 def test_at_rest_not_a_bit_moves(at, path, tmp_path):
     case = pond(WIDE, lake(0.6, elevation=0.0), level=0.6, bed=ROUGH, cells=(20, 20), hole={"at": at, "area": 4.0})
     model = model_of(case if path == "grid" else on_triangles(case, tmp_path))
-    assert (model.basins[0].depth == 0.0).any()
+    assert (model.meshed[0].depth == 0.0).any()
     dydt, out = model.evaluate(0.0, np.zeros(model.y_size))
     assert not dydt.any() and not out[model.layout["supply"] :][: model.ledgers].any()
 
@@ -113,7 +113,7 @@ def test_a_pond_that_empties_and_fills_conserves_its_volume(ground, head, scheme
     _, state = ended(case)
     assert found.ok and abs(found.ledger["mass"]["relative"]) < 1e-12
     model = model_of(case)
-    assert (model.basins[0].depth + model.basins[0].states_of(state.y)[0]).min() > -1e-12
+    assert (model.meshed[0].depth + model.meshed[0].states_of(state.y)[0]).min() > -1e-12
 
 
 @pytest.mark.parametrize("path", ["mirrored", "turned", "drawn the other way", "polygon", "resumed", "threads"])

@@ -110,7 +110,7 @@ def test_a_wide_orifice_is_a_stage():
     driven["links"], driven["nodes"] = {}, {"reach": driven["nodes"]["reach"]}
     driven["output"]["probes"] = ["reach.volume"]
     model, state = ended(driven)
-    n = model.basins[0].states_of(state.y).size
+    n = model.meshed[0].states_of(state.y).size
     assert linked.y[:n] == approx(state.y[:n], abs=1e-6)
 
 
@@ -147,7 +147,7 @@ ROUGH = "0.3*sin(1.7*x)*cos(2.3*y) + 0.04*x"  # with dry cells at the level 2 m
 def test_at_rest_not_a_bit_moves(side, path, scheme, tmp_path):
     case = channel(DEEP, side=side, bed=ROUGH, numerics={"scheme": scheme})
     model = model_of(case if path == "grid" else on_mesh(case, side, tmp_path))
-    assert (model.basins[0].depth == 0.0).any()
+    assert (model.meshed[0].depth == 0.0).any()
     dydt, out = model.evaluate(0.0, np.zeros(model.y_size))
     assert not dydt.any() and not out[model.layout["supply"] :][: model.ledgers].any()
 
@@ -428,7 +428,7 @@ def test_flows_balance_between_dry_thin_and_deep_water(seed, thinnest, most):
         model = fvsolve.build(fvsolve.load(joined_patches(rng)))
         for _ in range(50):
             y = model.start.copy()
-            for basin in model.basins:
+            for basin in model.meshed:
                 at, n = int(basin.row["y"]), basin.n
                 depth = 10.0 ** rng.uniform(thinnest, 0.3, n) * (rng.random(n) > 0.3)
                 y[at : at + n] = depth - basin.depth

@@ -103,7 +103,7 @@ def test_basins_joined_by_a_column_on_a_body_rest_where_a_surface_rests_in_their
     if "folder" in more:
         more["folder"] = tmp_path
     model = rests(twins(joint, start=start, **more), 1e-8 if way == "implicit" else 1e-11)
-    assert all(np.ptp(one.deviations(model.start)[0]) > 0.01 for one in model.basins)
+    assert all(np.ptp(one.deviations(model.start)[0]) > 0.01 for one in model.meshed)
 
 
 @pytest.mark.in_turn

@@ -17,9 +17,9 @@ from scipy.interpolate import CubicSpline
 from scipy.special import j0
 
 import fvsolve
-from fvsolve.core.basins.cell_sides import BLOCK, MEASURES, NX, NY, REACH
-from fvsolve.core.basins.liquid.grid_nonlinear import log1p_vector
-from fvsolve.core.basins.liquid.liquid_mesh import ROWS, add_side_linear, add_side_linear_moving
+from fvsolve.features.basins.cell_sides import BLOCK, MEASURES, NX, NY, REACH
+from fvsolve.features.basins.liquid.grid_nonlinear import log1p_vector
+from fvsolve.features.basins.liquid.liquid_mesh import ROWS, add_side_linear, add_side_linear_moving
 
 ORDERS = {"upwind": 1, "muscl": 2, "upwind5": 5, "weno5": 5}
 

@@ -11,12 +11,12 @@ from reference.meshes import boundary, triangles, write
 from reference.scenes import NO_FRICTION, junction, ramp, reservoir, scene, stiff_pipe, valve
 
 import fvsolve
-from fvsolve.core.basins.liquid import riemann_invariants
-from fvsolve.core.basins.liquid.lower import RiemannInvariants
 from fvsolve.core.fluid import Fluid, FluidTable
 from fvsolve.core.kernels import density as law
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.errors import CaseError
+from fvsolve.features.basins.liquid import riemann_invariants
+from fvsolve.features.basins.liquid.lower import RiemannInvariants
 
 REST = 6e6
 FLUID = {"name": "CO2", "temperature": 280.0, "pressure": REST, "law": "table"}  # 519 m/s, at 300 bar 697 m/s
@@ -37,7 +37,7 @@ def single(pool: dict, end: float = 1.0, **more):
 
 def at_end(model, end: float) -> np.ndarray:
     """Density and mass flow density along x at the end : float64[2, n]."""
-    pool = model.basins[0]
+    pool = model.meshed[0]
     found = pool.deviations(fvsolve.advance(model, fvsolve.initial_state(model), end).y)
     return np.array([found[0] + pool.density, found[1]])
 
@@ -61,7 +61,7 @@ def test_exact_riemann_problems_of_the_isentrope(name, scheme):
              "u": f"where(x < 50, {left[1]}, {right[1]})"}  # fmt: skip
     for n in (100, 200, 400):
         model = single(basin(size=[100.0, 1.0], cells=[n, 1], start=start), end, scheme=scheme)
-        pool = model.basins[0]
+        pool = model.meshed[0]
         inner = abs(pool.x - 50.0) < 27.0
         rays = (pool.x[inner, None] - 50.0 + 100.0 / n * ((np.arange(8) + 0.5) / 8 - 0.5)) / end
         means = exact.at(rays.ravel()).reshape(2, -1, 8).mean(axis=2)
@@ -90,8 +90,8 @@ def test_a_wave_in_a_row_of_cells_is_that_of_a_pipe_under_the_same_law():
     for n in (200, 400):
         pool = basin(size=[100.0, 1.0], cells=[n, 1], start={"pressure": f"4e6*{PULSE}", "u": f"3*{PULSE}"})
         model = single(pool, end, limiter="monotonized-central")
-        start = model.basins[0].deviations(model.start)[:2]
-        found = at_end(model, end) - [[model.basins[0].density], [0.0]]
+        start = model.meshed[0].deviations(model.start)[:2]
+        found = at_end(model, end) - [[model.meshed[0].density], [0.0]]
         other = pipe_of(n, start, end)
         assert np.abs(found - start).max(axis=1) == approx([16.0, 6400.0], rel=0.5)  # the pulse has moved
         apart.append(np.abs(found - other).mean(axis=1) / np.abs(found).mean(axis=1))
@@ -102,7 +102,7 @@ def test_a_wave_in_a_row_of_cells_is_that_of_a_pipe_under_the_same_law():
 def test_pressures_are_those_of_the_fluids_own_table(wave_speed):
     """Pressures equal those of pipes, also with elastic walls, and those of CoolProp with rigid walls."""
     model = single(basin(wave_speed=wave_speed) if wave_speed else basin())
-    st, floats, pool = model.tables.settings[0], model.tables.floats, model.basins[0]
+    st, floats, pool = model.tables.settings[0], model.tables.floats, model.meshed[0]
     compliance = 1 / (pool.density * pool.speed**2) - law.log_density(st, floats, REST)[1]
     pressures = np.array([-3e7, 1e6, 4.6e6, 5.9e6, 6e6, 6.1e6, 2e7, 5.9e7, 9e7, 1.5e8])
     deviations = pool.deviation(pressures - REST)
@@ -186,7 +186,7 @@ def test_the_pressure_of_a_patch_is_that_of_the_cells_behind(over):
     probes = ["pool.out.pressure", "pool.pressure@2,1"]
     model = model_of(scene(nodes, links, 1.0, numerics, probes, 0.1, fluid=FLUID))
     assert model.observe(0.0, model.start) == approx([REST + over] * 2, rel=1e-9)
-    own, node = model.basins[0], model.tables.nodes[model.node_names.index("pool.out")]
+    own, node = model.meshed[0], model.tables.nodes[model.node_names.index("pool.out")]
     stiffness = model.evaluate(0.0, model.start)[1][model.layout["stiffness"] + node["row"]]
     behind = 0.1 * 16 * own.mesh.area[0]  # [m3]
     assert stiffness == approx(TRUTH.c(REST + over) ** 2 / behind, rel=1e-5)
@@ -202,7 +202,7 @@ def test_probes_and_frames_have_the_isentropes_pressures(holes):
     model = model_of(scene({"pool": pool}, {}, 1.0, numerics, probes, 0.1, fluid=FLUID))
     frame = model.fields(model.start, model.new_out())["pool"]
     found = model.observe(0.0, model.start)
-    own = model.basins[0]
+    own = model.meshed[0]
     for place, (p, u) in zip(places, found.reshape(-1, 2), strict=True):
         x, y = map(float, place.split(","))
         k = int(np.argmin(np.hypot(own.x - x, own.y - y)))
@@ -231,7 +231,7 @@ def test_walls_with_large_compliance_leave_the_pressure_unchanged(wave_speed):
     }  # fmt: skip
     fluid = {"name": "Water", "temperature": 293.15, "law": "table"}
     model = model_of(scene({"b": pool}, {}, 1.0, {"scheme": "muscl"}, fluid=fluid))
-    basin = model.basins[0]
+    basin = model.meshed[0]
     rates = basin.states_of(model.evaluate(0.0, model.start.copy())[0])
     assert rates[1].reshape(2, 10)[:, 2:-2] == approx(-1000.0, rel=1e-5)
     assert basin.fields(basin.deviations(model.start))["pressure"] == approx(3e5 + 1000.0 * (basin.x - 0.5), rel=1e-9)

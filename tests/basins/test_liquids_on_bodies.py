@@ -41,8 +41,8 @@ def after(case, until, start=None):
     model = model_of(case)
     y = model.start.copy()
     if start is not None:
-        model.basins[0].states_of(y)[:] = start(model.basins[0])
-    return model.basins[0], model.basins[0].deviations(advance(model, State(0.0, y), until).y)
+        model.meshed[0].states_of(y)[:] = start(model.meshed[0])
+    return model.meshed[0], model.meshed[0].deviations(advance(model, State(0.0, y), until).y)
 
 
 def resting(law, phi):
@@ -273,7 +273,7 @@ def test_a_free_box_on_rails_conserves_its_momentum(law):
     start = {"pressure": "2e5 * exp(-20 * (x - 0.5)**2)", "u": "0.2 * sin(1.5707963 * x)"}
     case = case_of(cart(50.0, rate=0.3), full((30, 4), (2.0, 0.5), start=start), 4e-3, law)
     model = model_of(case)
-    basin, at = model.basins[0], model.state_names.index("body.travel_rate")
+    basin, at = model.meshed[0], model.state_names.index("body.travel_rate")
 
     def momentum(y):
         found, area = basin.deviations(y), 0.1 * basin.mesh.area

@@ -11,10 +11,10 @@ from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 
 from fvsolve import load, run
-from fvsolve.core.basins.lower_motion import lower_mesh
 from fvsolve.core.mesh import rectangle
 from fvsolve.core.mesh.mesh import assemble, edges_of
 from fvsolve.errors import CaseError
+from fvsolve.features.basins.lower_motion import lower_mesh
 from fvsolve.studies.energy_balance import energy
 
 STEPPED = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2"}
@@ -62,7 +62,7 @@ def test_geometry_of_sides_is_that_of_the_mesh_with_moved_corners(tmp_path, kind
     case = scene({"b": pool(tub(tmp_path, kind, many), patches)}, {}, 1.0, {**STEPPED, "step": 0.01},
                  scalars={"dye": {"initial": 1.0, "diffusivity": 1e-3}})  # fmt: skip
     model = model_of(case)
-    basin, y = model.basins[0], model.start.copy()
+    basin, y = model.meshed[0], model.start.copy()
     y[[int(row["y"]) for row in model.tables.walls]] = 0.2, -0.3
     with model.run_data() as slate:
         model.functions.rhs(0.0, y, np.zeros(y.size), model.new_out(), slate.handle)
@@ -88,7 +88,7 @@ def test_homologous_expansion_is_exact_to_round_off_under_every_method(tmp_path,
         case = scene({"b": pool(tub(tmp_path, kind), patches, start=start)}, {}, 0.5,
                      {**STEPPED, "method": method, "step": 5e-3})  # fmt: skip
         model, state = ended(case, 0.5)
-        basin = model.basins[0]
+        basin = model.meshed[0]
         found, grown = basin.deviations(state.y), 1.0 + 0.5 * rate
         # Jacobians by differences limit Rosenbrock methods, iterations limit methods of two stages
         close = {"rodas-4": 1e-10, "gauss-4": 2e-12}.get(method, 1e-13)
@@ -111,7 +111,7 @@ def test_between_oscillating_walls_a_uniform_lake_stays_uniform_at_any_lines_and
                  {**STEPPED, "scheme": scheme, "method": method, "step": 4e-3},
                  scalars={"even": {"initial": 3.0}, "patchy": {"initial": 1.0}})  # fmt: skip
     model, state = ended(case, 0.4)
-    basin = model.basins[0]
+    basin = model.meshed[0]
     values = basin.values(state.y)
     assert values["even"] == pytest.approx(3.0, abs=1e-9 if method in EXACT[3:] else 1e-12)
     assert np.ptp(values["patchy"]) > 0.5
@@ -125,7 +125,7 @@ def test_where_no_wave_has_come_yet_lines_that_swing_leave_a_lake_as_it_is(tmp_p
     case = scene({"b": pool(tub(tmp_path, many=(30, 2)), patches)}, {}, 1.0,
                  {"scheme": "upwind", "method": method, "step": 2e-3})  # fmt: skip
     model, state = ended(case, 6e-3)  # at most three steps of four stages, each one cell further
-    basin = model.basins[0]
+    basin = model.meshed[0]
     far = np.abs(basin.mesh.centre[:, 0] - 1.0) < 0.1
     assert np.abs(basin.area_ratios(state.y)[far] - 1.0).min() > 1e-5
     assert basin.deviations(state.y)[:, far] == pytest.approx(np.zeros((3, far.sum())), abs=1e-15)
@@ -202,7 +202,7 @@ def test_a_mesh_that_is_turned_by_a_right_angle_has_the_same_waves(tmp_path, sch
         start = {"u": "0.3 * sin(x)"} if not turned else {"v": "0.3 * sin(y)"}
         nodes = {"b": pool(file, {"north" if turned else "east": {"travel": travel, "zone": 1.5}}, start=start)}
         model, state = ended(scene(nodes, {}, 0.5, {**STEPPED, "scheme": scheme, "step": 5e-3}), 0.5)
-        basin = model.basins[0]
+        basin = model.meshed[0]
         depth, x, y = basin.deviations(state.y)[0], *basin.mesh.centre.T
         x, y = (y, 1.0 - x) if turned else (x, y)
         found.append(depth[np.lexsort((np.round(y, 9), np.round(x, 9)))])
@@ -250,7 +250,7 @@ def test_a_liquid_that_is_compressed_evenly_follows_its_law_as_a_chamber_of_the_
         case = scene(nodes, {}, 0.2, {"scheme": "muscl", "method": method, **step}, [f"b.{side}.force"], every=0.05,
                      fluid=fluid(law))  # fmt: skip
         model, state = ended(case, 0.2)
-        basin, ratio = model.basins[0], 2.0 / 1.996
+        basin, ratio = model.meshed[0], 2.0 / 1.996
         wanted = law_of(basin, law, ratio)
         assert basin.pressure(basin.deviations(state.y)[0]) == pytest.approx(wanted, rel=2e-3)
         now = 1.0 / basin.area_ratios(state.y)[0]
@@ -274,7 +274,7 @@ def test_a_piston_that_starts_at_once_makes_a_water_hammer(tmp_path, law, side, 
         nodes = {"b": column(law, {side: {"travel": straight(inward)}}, 60, side=side, file=file)}
         case = scene(nodes, {}, 1e-3, {"scheme": "upwind", "method": "ssp-rk2", "courant": 0.8},
                      [f"b.{side}.force", f"b.{side}.power"], every=1e-4, fluid=fluid(law))  # fmt: skip
-        result, basin = run(case), model_of(case).basins[0]
+        result, basin = run(case), model_of(case).meshed[0]
         rho, c = basin.density, basin.speed
         wanted = rho * c * speed / (1.0 - speed / c)  # m = c r = speed (rho + r)
         if law == "log":  # a simple wave: c falls by half the speed
@@ -293,7 +293,7 @@ def test_where_no_wave_has_come_yet_lines_that_swing_leave_a_liquid_as_it_is(tmp
     nodes = {"b": pool(tub(tmp_path, many=(30, 2)), patches, "liquid") | ({"pressure": 6e6} if law == "table" else {})}
     case = scene(nodes, {}, 1.0, {"scheme": "upwind", "method": method, "step": 1e-5}, fluid=fluid(law))
     model, state = ended(case, 3e-5)
-    basin = model.basins[0]
+    basin = model.meshed[0]
     far = np.abs(basin.mesh.centre[:, 0] - 1.0) < 0.1
     found = basin.deviations(state.y)
     assert np.abs(basin.area_ratios(state.y)[far] - 1.0).min() > 1e-6
@@ -366,7 +366,7 @@ def test_momentum_changes_by_the_forces_of_both_walls_alone(tmp_path, law, schem
     case = scene(nodes, {}, 0.9, {"scheme": scheme, "step": 1e-3, "method": "euler"},
                  fluid=fluid("linear" if water else law))  # fmt: skip
     model = model_of(case)
-    basin, y = model.basins[0], model.start
+    basin, y = model.meshed[0], model.start
     dydt, out = model.evaluate(0.0, y)
     west, east = out[int(model.layout["wall"]) :][:2]
     rate = np.sum(basin.mesh.area * basin.states_of(dydt)[1]) * (RHO if water else basin.part.thickness)
@@ -416,7 +416,7 @@ def test_a_grid_and_a_mesh_of_the_same_rectangles_find_the_same_rates(tmp_path, 
         model = model_of(
             scene(nodes, {}, 0.09, {"scheme": "upwind", "method": "euler", "step": 1e-6}, fluid=fluid(law))
         )
-        basin, y = model.basins[0], model.start.copy()
+        basin, y = model.meshed[0], model.start.copy()
         y[[int(row["y"]) for row in model.tables.walls]] = 0.1, -0.05
         x, z = basin.mesh.centre.T
         deviation = np.array([0.4 * np.cos(5 * x) * np.cos(4 * z), 2e3 * np.sin(3 * x + z), 1e3 * np.cos(4 * x * z)])

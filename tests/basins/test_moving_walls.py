@@ -36,7 +36,7 @@ def test_homologous_expansion_is_exact_to_round_off_under_every_method(method, s
     start = {velocity: f"{rate} * {'x' if side == 'east' else 'y'}"}
     nodes = {"b": flume({"lid": {"side": side, "travel": straight(2.0 * rate)}}, n, side=side, start=start)}
     model, state = ended(scene(nodes, {}, 1.0, {**STEPPED, "method": method, "step": 5e-3}), 1.0)
-    basin = model.basins[0]
+    basin = model.meshed[0]
     found, x = basin.deviations(state.y), (basin.mesh.centre[:, 0 if side == "east" else 1]) * (1.0 + rate)
     close = 1e-10 if method == "rodas-4" else 1e-13  # Rosenbrock methods have a Jacobian by differences
     assert 1.0 + found[0] == pytest.approx(1.0 / (1.0 + rate), abs=close)
@@ -67,10 +67,10 @@ def test_a_wall_drawn_out_makes_a_simple_wave_and_faster_than_twice_the_waves_a_
     for speed in (0.5, 2.5 * c):
         nodes = {"b": flume({"lid": {"side": "east", "travel": straight(speed), "zone": 1.0}}, 200, 1)}
         model, state = ended(scene(nodes, {}, 0.15, {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.5}), 0.15)
-        depth = 1.0 + model.basins[0].deviations(state.y)[0][-1]
+        depth = 1.0 + model.meshed[0].deviations(state.y)[0][-1]
         wanted = max(1.0 - 0.5 * speed / c, 0.0) ** 2
         assert depth == pytest.approx(wanted, abs=4e-3)
-        assert 1.0 + model.basins[0].deviations(state.y)[0].min() >= 0.0
+        assert 1.0 + model.meshed[0].deviations(state.y)[0].min() >= 0.0
 
 
 @pytest.mark.parametrize("method", ["ssp-rk3", "rodas-4"])
@@ -119,7 +119,7 @@ def test_uniform_values_stay_uniform_and_amounts_and_mass_are_conserved_between_
     step = {"courant": 0.5} if method == "ssp-rk3" else {"step": 0.01}
     case = scene(nodes, {}, 0.8, {"scheme": scheme, "method": method, **step}, scalars=scalars)
     model, state = ended(case, 0.8)
-    basin = model.basins[0]
+    basin = model.meshed[0]
     values = basin.values(state.y)
     close = 1e-12 if method == "ssp-rk3" else 1e-8
     assert values["even"] == pytest.approx(3.0, abs=close)
@@ -141,7 +141,7 @@ def test_no_water_flows_through_the_walls_of_a_basin_of_1_or_2_cells_across(cell
     nodes = {"b": flume({}, *cells, start=start, scalars={"even": 3.0})}
     case = scene(nodes, {}, 0.1, {"scheme": scheme, "method": method, "step": 0.01}, scalars={"even": {"initial": 3.0}})
     model, state = ended(case, 0.1)
-    assert model.basins[0].values(state.y)["even"] == pytest.approx(3.0, abs=1e-9)
+    assert model.meshed[0].values(state.y)["even"] == pytest.approx(3.0, abs=1e-9)
     mass, change = model.contents(state.y)
     assert abs(change) < 1e-12 * mass and np.abs(state.y).max() > 0.01
 
@@ -282,7 +282,7 @@ def test_waves_of_a_small_swing_come_out_to_the_order_of_the_scheme(scheme, orde
         limiter = {"limiter": "van-leer"} if scheme == "muscl" else {}
         case = scene(nodes, {}, 1.0, {"scheme": scheme, "method": "rk4", "step": 0.25 / n, **limiter})
         model, state = ended(case, 1.0)
-        basin = model.basins[0]
+        basin = model.meshed[0]
         x = basin.mesh.centre[:, 0]
         wanted = a * w * math.cos(w) * np.sin(k * x) / math.sin(k * length)
         errors.append(np.abs(basin.deviations(state.y)[1] - wanted).mean() / (a * w))
@@ -373,7 +373,7 @@ def run_up(cells: int):
 
 def held(model, state) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return (grid lines, volume of water west of each line, depth and velocity at inner lines)."""
-    depth, flow, _ = model.basins[0].deviations(state.y)[:3]
+    depth, flow, _ = model.meshed[0].deviations(state.y)[:3]
     depth, n = 1.0 + depth, len(depth)
     lines = np.linspace(0.0, LENGTH + RATE * math.sin(math.pi * state.t), n + 1)
     contents = np.concatenate([[0.0], np.cumsum(depth * np.diff(lines))])

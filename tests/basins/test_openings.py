@@ -63,7 +63,7 @@ def test_gain_of_cells_at_an_open_side_is_accounted_to_it(path, scheme, law, tmp
     patches = OPEN if law == "water" else IMPEDANCE
     basin = pool(path, tmp_path, patches, **physics(law))
     model = model_of(case(basin, 1.0, scheme, fluid=fluid(law)))
-    field, rng = model.basins[0], np.random.default_rng(0)
+    field, rng = model.meshed[0], np.random.default_rng(0)
     _, per = field.mass()
     noise = 0.1 * model.scale * rng.normal(size=model.y_size)
     for side in (*SIDES, None):
@@ -110,7 +110,7 @@ def test_a_wave_into_an_empty_half_leaves_half_its_flow_at_either_end(path, law,
         basin["holes"] = [[0.0, 0.0, 4.0, 0.5]]
     model = model_of(case(basin, 0.01, "muscl", fluid=fluid(law)))
     _, out = model.evaluate(0.0, model.start)
-    booked, density = out[model.layout["supply"] :], model.basins[0].row["density"]
+    booked, density = out[model.layout["supply"] :], model.meshed[0].row["density"]
     half = 0.5 * density * 0.01 * 0.1 * (1.5 if path == "holes" else 2.0)
     rel = 1e-12 if law == "linear" else 1e-5
     assert booked[model.node_names.index("pool.west")] == approx(half, rel=rel)

@@ -124,7 +124,7 @@ def test_a_tide_conserves_amount_and_bounds_of_a_dye_and_uniform_values(place, s
         assert found["gate.flow"].max() > 0.3 and found["gate.flow"].min() < -0.3
         assert all(abs(found.ledger[name]["relative"]) < 1e-12 for name in ("mass", "dye"))
         model, state = ended(case)
-        values = model.basins[0].values(state.y)["dye"]
+        values = model.meshed[0].values(state.y)["dye"]
         if dye is SALT:
             assert values.min() > -1e-12 and values.max() < 1.0 + 1e-12
         else:

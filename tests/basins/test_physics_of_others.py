@@ -12,9 +12,9 @@ from pytest import approx
 from reference.scenes import WATER
 
 import fvsolve
-from fvsolve.core.basins.lower import rows_class
-from fvsolve.core.basins.lower_basin import BasinRows
 from fvsolve.errors import FvsolveError
+from fvsolve.features.basins.lower import rows_class
+from fvsolve.features.basins.lower_basin import BasinRows
 from fvsolve.parts import Basin
 from fvsolve.parts.basin import BasinStart, Physics
 from fvsolve.parts.value import Quantity
@@ -44,7 +44,7 @@ class Belt(Physics, name="belt"):
 ''',
     "rates.py": '''
 """Rates of the cells of a belt, and what probes read there."""
-from fvsolve.core.basins.basin_patches import physics_code
+from fvsolve.features.basins.basin_patches import physics_code
 from fvsolve.jit import njit
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.core.kernels.dtypes import CELL_FIELD, RATE
@@ -79,7 +79,7 @@ def read(t, y, out, handle, values):
     "lower.py": '''
 """A belt lowered to rows of tables."""
 import numpy as np
-from fvsolve.core.basins.lower_basin import BasinRows
+from fvsolve.features.basins.lower_basin import BasinRows
 from fvsolve.core.kernels.rhs_assembly import RhsTerms
 
 class BeltRows(BasinRows):
@@ -181,7 +181,7 @@ def test_it_is_checked_by_its_own_declaration(process_results):
 
 def test_every_physics_is_a_folder_that_lowers_itself():
     """Each physics has a folder of basins with `part.py` and `lower.py`, and a basin has all its keys."""
-    folders = {path.parent.name for path in (Path(fvsolve.__file__).parent / "core" / "basins").glob("*/part.py")}
+    folders = {path.parent.name for path in (Path(fvsolve.__file__).parent / "features" / "basins").glob("*/part.py")}
     assert {one.__module__.split(".")[2] for one in Physics.kinds.values()} == folders
     for one in Physics.kinds.values():
         assert set(one.model_fields) <= set(Basin.model_fields)

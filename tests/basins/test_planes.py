@@ -71,9 +71,9 @@ def test_a_uniform_scalar_stays_uniform_in_sloshing_water(scheme, path, tmp_path
         pool = triangulated(tmp_path) | {"level": 1.0, "start": WAVY}
     pool |= {"graded": {"grading": [2.0, 1.5]}, "holes": {"holes": HOLE}}.get(path, {})
     model, state = ended(case(pool, 2.0, {"scheme": scheme}, scalars={"dye": {"initial": 3.0}}))
-    found = model.basins[0].values(state.y)["dye"]
+    found = model.meshed[0].values(state.y)["dye"]
     assert np.abs(found - 3.0).max() < 1e-13
-    assert np.abs(model.basins[0].deviations(state.y)).max() > 0.05
+    assert np.abs(model.meshed[0].deviations(state.y)).max() > 0.05
 
 
 @pytest.mark.parametrize("end", [2.0, 12.0])
@@ -89,7 +89,7 @@ def test_a_uniform_scalar_stays_uniform_next_to_films_that_a_pipe_fills(end):
     numerics = {"end": end, "scheme": "muscl", "method": "ssp-rk3", "courant": 0.9}
     dyed = {"fluid": {"name": "Water", "law": "linear"}, "scalars": {"dye": {"initial": 1.0}}, "nodes": nodes}
     model, state = ended(dyed | {"links": {"feed": feed}, "numerics": numerics, "output": {"every": end}})
-    pool = model.basins[0]
+    pool = model.meshed[0]
     dye, depth = pool.values(state.y)["dye"], pool.depth + pool.deviations(state.y)[0]
     wet, deep = depth > 1e-9, depth > 1e-3
     assert 0 < np.count_nonzero(~wet) and np.count_nonzero(deep) > 10
@@ -110,7 +110,7 @@ def test_first_order_on_a_rectangle_is_the_same_by_both_paths(law, tmp_path):
     for plain, other in pairs:
         fluid = {"name": "Water", "law": "table"} if law == "table" else case(plain, 1.0)["fluid"] | {"law": law}
         one, two = (model_of(case(pool, 1.0, {"scheme": "upwind"}, fluid=fluid)) for pool in (plain, outline | other))
-        a, b = (model.basins[0] for model in (one, two))
+        a, b = (model.meshed[0] for model in (one, two))
         order = np.lexsort((b.x, b.y))
         same = two.start.copy()  # averages of cells, not values at centres
         b.deviations(same)[:, order] = a.deviations(one.start)
@@ -152,7 +152,7 @@ def test_a_boundary_reflects_a_known_part_of_a_wave(boundary, left, holes):
         pool["holes"] = holes
     given = case(pool, 3.0 / SPEED)
     model, state = ended(given)
-    found = model.basins[0].fields(model.basins[0].deviations(state.y))["pressure"] - 2e6
+    found = model.meshed[0].fields(model.meshed[0].deviations(state.y))["pressure"] - 2e6
     assert found.max() == approx(left * 1e5, abs=1.5e3) and found.min() > -1.5e3
     ledger = fvsolve.run(given).ledger["mass"]
     assert abs(ledger["relative"]) < 1e-13 and (ledger["outflow"] > 0.0 or left > 0.0)
@@ -174,7 +174,7 @@ def test_a_uniform_value_leaves_unchanged_through_open_sides_and_drains(path):
     tap = {"tap": valve("pool.drain", "below", 0.02)}
     given = scene({"pool": pool, "below": reservoir(AMBIENT)}, tap, 4.0, STEPS, scalars={"dye": {"initial": 3.0}})
     model, state = ended(given)
-    assert np.abs(model.basins[0].values(state.y)["dye"] - 3.0).max() < 1e-12
+    assert np.abs(model.meshed[0].values(state.y)["dye"] - 3.0).max() < 1e-12
     book = fvsolve.run(given).ledger
     assert abs(book["dye"]["relative"]) < 1e-13 and book["dye"]["outflow"] == approx(3.0 * book["mass"]["outflow"])
 
@@ -207,7 +207,7 @@ def test_a_plug_is_carried_through_a_channel_and_all_of_it_is_booked():
     given = case(pool, 4.0, scalars={"dye": {}})
     result = fvsolve.run(given)
     model, state = ended(given)
-    dye, x = model.basins[0].values(state.y)["dye"], model.basins[0].x
+    dye, x = model.meshed[0].values(state.y)["dye"], model.meshed[0].x
     assert np.abs(dye - ((x > 1.0) & (x < 2.0))).mean() < 0.04 and dye.min() > -1e-12 and dye.max() < 1.0 + 1e-12
     ledger = result.ledger["dye"]
     assert abs(ledger["relative"]) < 1e-13
@@ -234,7 +234,7 @@ def test_decay_and_diffusion_of_a_still_pool_have_their_closed_form():
     pool = water(scalars={"heat": f"1 + cos({k}*x)"})
     given = case(pool, 3.0, scalars={"heat": {"diffusivity": diffusivity, "decay": rate, "ambient": 1.0}})
     model, state = ended(given)
-    value, x = model.basins[0].values(state.y)["heat"], model.basins[0].x
+    value, x = model.meshed[0].values(state.y)["heat"], model.meshed[0].x
     exact = 1.0 + np.cos(k * x) * math.exp(-(diffusivity * k * k + rate) * 3.0)
     assert np.abs(value - exact).max() < 2e-3
     assert abs(fvsolve.run(given).ledger["heat"]["relative"]) < 1e-13
@@ -285,8 +285,8 @@ def test_normal_flow_down_a_slope_has_the_velocity_of_manning():
     pool = basin(size=[100.0, 2.0], cells=[100, 2], level=-1.0, bed="1 - 0.01*x", manning=0.03)
     pool["start"] = {"level": "1.2 - 0.01*x", "u": 1.0}
     model, state = ended(case(pool, 12.0))
-    found = model.basins[0].fields(model.basins[0].deviations(state.y))["velocity"][:, 0]
-    middle = np.abs(model.basins[0].x - 60.0) < 3.0
+    found = model.meshed[0].fields(model.meshed[0].deviations(state.y))["velocity"][:, 0]
+    middle = np.abs(model.meshed[0].x - 60.0) < 3.0
     assert found[middle] == approx(0.2 ** (2 / 3) * 0.1 / 0.03, rel=0.02)
 
 
@@ -339,9 +339,9 @@ def test_a_bank_gives_no_water_that_it_has_not(path):
         {"pool": pool, "outside": reservoir(AMBIENT)}, {"tap": valve("pool.out", "outside", 0.05)}, 60.0, STEPS
     )
     model, state = ended(given)
-    depth = model.basins[0].depth + model.basins[0].deviations(state.y)[0]
+    depth = model.meshed[0].depth + model.meshed[0].deviations(state.y)[0]
     assert depth.min() >= 0.0 and 0.0 < depth.max() < 0.25
-    assert fvsolve.run(given).ledger["mass"]["final"] == approx(RHO * np.sum(model.basins[0].mesh.area * depth))
+    assert fvsolve.run(given).ledger["mass"]["final"] == approx(RHO * np.sum(model.meshed[0].mesh.area * depth))
 
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
@@ -352,7 +352,7 @@ def test_a_tank_without_friction_drains_to_the_last_film(scheme):
     tap = valve("pool.out", "outside", math.pi * 0.15**2 / 4.0 / math.sqrt(2.0), discharge_coefficient=1.0)
     given = scene({"pool": pool, "outside": reservoir(AMBIENT)}, {"tap": tap}, 600.0, STEPS | {"scheme": scheme})
     model, state = ended(given)
-    depth = model.basins[0].depth + model.basins[0].deviations(state.y)[0]
+    depth = model.meshed[0].depth + model.meshed[0].deviations(state.y)[0]
     assert depth.min() >= 0.0 and depth.max() < 1e-3
 
 

@@ -39,7 +39,7 @@ def kinematic(x: np.ndarray, t: float) -> np.ndarray:
 def test_rain_on_a_plane_is_a_kinematic_wave(share):
     end = share * CONCENTRATION
     model, state = ended(field(end, rain=INTENSITY, **PLANE))
-    basin = model.basins[0]
+    basin = model.meshed[0]
     depth, exact = basin.depth + basin.deviations(state.y)[0], kinematic(basin.x, end)
     assert np.sum(np.abs(depth - exact)) < 0.01 * np.sum(exact)
 
@@ -58,7 +58,7 @@ def test_the_recession_after_rain_is_that_of_kinematic_waves():
     stop, end = 1.2 * CONCENTRATION, 1.2 * CONCENTRATION + 300.0
     rain = {"time": [0.0, stop], "value": [INTENSITY, 0.0], "kind": "step"}
     model, state = ended(field(end, rain=rain, **PLANE))
-    basin = model.basins[0]
+    basin = model.meshed[0]
     depth = basin.depth + basin.deviations(state.y)[0]
 
     def place(h):  # x(h, t) of the wave that had the depth h when the rain stopped
@@ -116,7 +116,7 @@ def test_green_ampt_of_each_cell_under_deep_water_is_its_closed_form(by, tmp_pat
                                                    deficit="0.5 - 0.03*x")}  # fmt: skip
     numerics = {"courant": None, "method": "rodas-5p", "rtol": 1e-7}
     model, state = ended(field(1200.0, numerics, level=0.5, infiltration=soil))
-    x, y, at = *model.basins[0].mesh.centre.T, int(model.basins[0].row["infiltrated"])
+    x, y, at = *model.meshed[0].mesh.centre.T, int(model.meshed[0].row["infiltrated"])
     stores = (0.1 + 0.01 * y) * (0.5 - 0.03 * x)
     exact = [brentq(lambda F, S=S, K=K: F - S * math.log1p(F / S) - K * 1200.0, 1e-9, 1.0, xtol=1e-15)
              for S, K in zip(stores, (5 + x) / 3.6e6, strict=True)]  # fmt: skip
@@ -130,7 +130,7 @@ def test_horton_of_each_cell_under_deep_water_is_its_integral(by, tmp_path):
     model, state = ended(
         field(3600.0, {"courant": None, "method": "rodas-5p", "rtol": 1e-8}, level=0.5, infiltration=soil)
     )
-    x, y, at = *model.basins[0].mesh.centre.T, int(model.basins[0].row["infiltrated"])
+    x, y, at = *model.meshed[0].mesh.centre.T, int(model.meshed[0].row["infiltrated"])
     first, last, decay = (40 + 2 * x) / 3.6e6, (5 + x) / 3.6e6, (1 + 0.2 * y) / 3600
     exact = last * 3600.0 - (first - last) / decay * np.expm1(-decay * 3600.0)
     assert state.y[at : at + 16] == approx(exact, rel=1e-6)
@@ -193,7 +193,7 @@ def test_a_storm_on_dry_rough_ground_conserves_its_balance_and_depths_above_zero
     assert found["field.rained"][-1] == approx(rained, rel=1e-12)
     assert found["field.infiltrated"][-1] == approx(-1e-3 * mass["by_node"].get("field.infiltration", 0.0), rel=1e-12)
     model, state = ended(case)
-    assert (model.basins[0].depth + model.basins[0].deviations(state.y)[0]).min() > -1e-15
+    assert (model.meshed[0].depth + model.meshed[0].deviations(state.y)[0]).min() > -1e-15
 
 
 @pytest.mark.parametrize("soil", SOILS)

@@ -49,7 +49,7 @@ def heights(frames: np.ndarray, times: np.ndarray, end: float) -> np.ndarray:
 def soaked(case) -> np.ndarray:
     """Infiltrated height in each cell at the end [m], by rows."""
     model, state = ended(case)
-    row = model.basins[0].row
+    row = model.meshed[0].row
     return state.y[row["infiltrated"] :][: row["n"]].reshape(row["ny"], row["nx"])
 
 
@@ -168,7 +168,7 @@ def test_cells_where_a_frame_lacks_data_may_be_left_out(tmp_path):
     frames[2, :2, 3] = -9999.0
     rain = {"raster": radar(tmp_path / "radar.nc", frames), "outside": "hole"}
     model = model_of(field(40.0, rain=rain))
-    assert len(model.basins[0].mesh.cells) == 14
+    assert len(model.meshed[0].mesh.cells) == 14
     del rain["outside"]
     assert "no data under 2 of 16 cells, first at 8.75,1.25 m" in str(refused(field(40.0, rain=rain)))
 

@@ -144,14 +144,14 @@ def test_a_basin_over_a_raster_has_holes_where_it_lacks_data(tmp_path):
     over = {"size": None, "cells": None, "origin": [EAST - 10.0, NORTH], "mesh": {"raster": path, "cell": "1 m"}}
     over["mesh"]["outside"] = "hole"
     model = model_of(pond({"raster": path}, patches={"out": {"side": "east", "boundary": "critical"}}, **over))
-    mesh = model.basins[0].mesh
+    mesh = model.meshed[0].mesh
     assert len(mesh.cells) == 60 - 8 - 1 and (mesh.grid.nx, mesh.grid.ny) == (10, 6)
     assert mesh.points.min(axis=0) == approx([10.0, 0.0]) and mesh.points.max(axis=0) == approx([20.0, 6.0])
     assert mesh.length[mesh.patch("out")].sum() == approx(4.0)
     whole = np.nansum(values) - np.nansum(values[-2:, :2])
-    assert model.basins[0].bed @ mesh.area == approx(whole * 0.25, rel=1e-12)
+    assert model.meshed[0].bed @ mesh.area == approx(whole * 0.25, rel=1e-12)
     case = pond({"raster": path, "outside": "hole"}, origin=[EAST, NORTH])
-    assert len(model_of(case).basins[0].mesh.cells) == 51
+    assert len(model_of(case).meshed[0].mesh.cells) == 51
     values[:, 8:10] = np.nan
     ascii_grid(tmp_path / "dem.asc", values, corner=(EAST, NORTH))
     assert "2 pieces that share no face, 23 of 45 cells in the largest" in str(refused(case))

@@ -7,9 +7,6 @@ import pytest
 from pytest import approx
 from scipy.optimize import brentq
 
-from fvsolve.core.basins.free_surface.bed_friction import add_capped_friction
-from fvsolve.core.basins.free_surface.surface_grid import PLANS, WORK, FaceFlows, WaterGrid, grid_rates, kerbs_of
-from fvsolve.core.basins.free_surface.surface_rows import SURFACE, put_push
 from fvsolve.core.kernels.cube_root import cube_root_reciprocal, estimate
 from fvsolve.core.kernels.dtypes import (
     DARCY,
@@ -22,6 +19,9 @@ from fvsolve.core.kernels.dtypes import (
     VAN_LEER,
     WENO5,
 )
+from fvsolve.features.basins.free_surface.bed_friction import add_capped_friction
+from fvsolve.features.basins.free_surface.surface_grid import PLANS, WORK, FaceFlows, WaterGrid, grid_rates, kerbs_of
+from fvsolve.features.basins.free_surface.surface_rows import SURFACE, put_push
 from fvsolve.jit import njit
 
 G = 9.80665

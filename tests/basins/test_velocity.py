@@ -10,9 +10,9 @@ from reference.meshes import shaken, triangles, write, write_msh
 from reference.scenes import scene
 
 import fvsolve
-from fvsolve.core.basins.transport.lower import EXPRESSIONS, face_flows, grid_flows
 from fvsolve.core.mesh import read, rectangle
 from fvsolve.errors import CaseError, MeshError
+from fvsolve.features.basins.transport.lower import EXPRESSIONS, face_flows, grid_flows
 
 PI = np.pi
 BUMP = "exp(-50*((x - 0.4)**2 + (y - 0.5)**2))"
@@ -196,7 +196,7 @@ def test_an_advected_scalar_starts_without_a_flow_of_its_own(key):
 ])  # fmt: skip
 def test_a_field_that_is_closed_but_for_rounding_passes_no_outline(velocity, length):
     case = carrying(velocity, size=[length, length], cells=[32, 32])
-    pool = model_of(case).basins[0]
+    pool = model_of(case).meshed[0]
     assert pool.passing == []
 
 
@@ -216,7 +216,7 @@ def test_a_slanted_channel_passes_its_ends_alone(velocity, tmp_path):
 
     write_msh(tmp_path / "channel.msh", points @ turn + away, cells, ends)
     case = carrying(velocity, tmp_path / "channel.msh")
-    pool = model_of(case).basins[0]
+    pool = model_of(case).meshed[0]
     assert sorted(pool.passing) == ["in", "out"]
     if "stream" in velocity or "expression" in velocity:
         flows = pool.flows(None)

@@ -102,7 +102,7 @@ def test_a_grid_of_frames_has_their_times_and_is_no_field(tmp_path):
     with netcdf_file(tmp_path / "grids/ground.nc", mmap=False) as file:
         last = file.variables["bed"][-1].copy()
     assert "has 3 planes" in str(refused(case))
-    assert last.ravel() == approx(fvsolve.build(fvsolve.load(dam({}))).basins[0].bed, rel=1e-15)
+    assert last.ravel() == approx(fvsolve.build(fvsolve.load(dam({}))).meshed[0].bed, rel=1e-15)
 
 
 @pytest.mark.parametrize("kind", ["triangles", "mixed", "holes"])

@@ -330,7 +330,7 @@ def test_the_flows_of_any_junction_balance(seed):
         demand = float(model.case.nodes["m"].demand.value[0])
         for _ in range(100):
             y = model.start.copy()
-            for basin in model.basins:
+            for basin in model.meshed:
                 at, n, full = int(basin.row["y"]), basin.n, basin.section.area
                 kind = rng.choice(4, size=n, p=[0.1, 0.5, 0.2, 0.2])
                 area = full * np.choose(kind, [np.zeros(n), *(rng.uniform(low, high, n) for low, high in

@@ -9,9 +9,9 @@ from reference.refusals import refused
 from reference.scenes import lake, scene, tank, valve
 
 import fvsolve
-from fvsolve.core.basins.transport.lower import face_flows
 from fvsolve.core.mesh import rectangle
 from fvsolve.errors import MeshError
+from fvsolve.features.basins.transport.lower import face_flows
 from fvsolve.parts.csv_rows import read_columns
 from fvsolve.parts.formula import SpatialFieldKey
 from fvsolve.parts.value import ReadContext

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from fvsolve.core.basins import advection, fifth_order
-from fvsolve.core.basins.advection import AdvectionGrid, GridFlows
-from fvsolve.core.basins.transport.lower import face_flows, grid_flows
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.mesh import rectangle
+from fvsolve.features.basins import advection, fifth_order
+from fvsolve.features.basins.advection import AdvectionGrid, GridFlows
+from fvsolve.features.basins.transport.lower import face_flows, grid_flows
 
 SCHEMES = {
     "upwind": (rec.UPWIND, 0), "minmod": (rec.MUSCL, rec.MINMOD), "van-leer": (rec.MUSCL, rec.VAN_LEER),

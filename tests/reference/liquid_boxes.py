@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fvsolve.core.basins.liquid import liquid_grid
-from fvsolve.core.basins.liquid.liquid_sides import LiquidGrid, LiquidScheme, side_kinds, work_size
 from fvsolve.core.kernels.dtypes import LINEAR, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
+from fvsolve.features.basins.liquid import liquid_grid
+from fvsolve.features.basins.liquid.liquid_sides import LiquidGrid, LiquidScheme, side_kinds, work_size
 
 SCHEMES = {"upwind": UPWIND, "muscl": MUSCL, "upwind5": LINEAR, "weno5": WENO5}
 LIMITERS = {"minmod": MINMOD, "van-leer": VAN_LEER, "monotonized-central": MONOTONIZED_CENTRAL}

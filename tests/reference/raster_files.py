@@ -62,5 +62,5 @@ def pond(bed, end=0.1, probes=(), **more) -> dict:
 
 
 def bed_of(case) -> tuple[np.ndarray, np.ndarray]:
-    basin = model_of(case).basins[0]
+    basin = model_of(case).meshed[0]
     return basin.bed, basin.mesh.area

@@ -18,6 +18,7 @@ AWAKE = {
     "delay_lines": ["valve-closure", "--set", 'numerics.pipe_model="delay-line"'],
     "controls": ["tank-relay"],
     "scalars": ["temperature-front"],
+    "basins": ["dam-break"],
     "networks": ["clutch"],
     "motion": ["closed-cylinder"],
 }

@@ -13,6 +13,7 @@ import grimp
 import pytest
 
 import fvsolve
+from fvsolve.features.basins import COMPILED
 
 
 def circle(arrows: dict[str, set[str]]) -> list[str]:
@@ -47,20 +48,23 @@ def is_compiled(module: str) -> bool:
     folder, *names = below_core(module)
     if folder == "parts":
         return len(names) == 2 and names[1].startswith("law")
-    return folder == "basins" and len(names) > 0 and not names[-1].startswith(("part", "lower"))
+    if folder != "features" or names[:1] != ["basins"] or len(names) == 1:
+        return False
+    path = Path(fvsolve.__file__).parent.joinpath("features", *names).with_suffix(".py")
+    return path in COMPILED
 
 
 def test_compiled_files_of_parts_and_basins_import_compiled_code_only():
     """The cache of compiled code is keyed by these sources, so nothing else may influence them."""
     graph = grimp.build_graph("fvsolve", exclude_type_checking_imports=True, cache_dir=None)
     compiled = [module for module in sorted(graph.modules) if is_compiled(module)]
-    assert {below_core(module)[0] for module in compiled} == {"parts", "basins"}
+    assert {below_core(module)[0] for module in compiled} == {"parts", "features"}
     for module in compiled:
         for other in graph.find_modules_directly_imported_by(module):
             assert is_compiled(other) or below_core(other)[0] in ("kernels", "jit"), f"{module} imports {other}"
 
 
-@pytest.mark.parametrize("folder", ["parts", "core/basins"])
+@pytest.mark.parametrize("folder", ["parts", "features/basins"])
 def test_declarations_import_no_lowering(folder):
     """A `part.py` beside a compiled law states keys only, so that a schema needs no tables and no compiled law."""
     graph = grimp.build_graph("fvsolve", exclude_type_checking_imports=True, cache_dir=None)
@@ -77,13 +81,13 @@ def test_parts_are_declared_without_numba():
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 
-@pytest.mark.parametrize("folder", ["parts", "core/basins"])
+@pytest.mark.parametrize("folder", ["parts", "features/basins"])
 def test_every_folder_of_parts_and_basins_has_a_declaration(folder):
     folders = [path for path in (Path(fvsolve.__file__).parent / folder).iterdir() if (path / "__init__.py").is_file()]
     from fvsolve.parts.conduit.part import ConduitFlow
 
-    assert ConduitFlow.package == "fvsolve.core.basins.conduit"  # whose declaration is that of a link
-    folders = [path for path in folders if (folder, path.name) != ("core/basins", "conduit")]
+    assert ConduitFlow.package == "fvsolve.features.basins.conduit"  # whose declaration is that of a link
+    folders = [path for path in folders if (folder, path.name) != ("features/basins", "conduit")]
     assert folders and all((path / "part.py").is_file() for path in folders)
 
 

@@ -18,6 +18,7 @@ import fvsolve
 from fvsolve import jit
 from fvsolve.compile import cache_folders, store
 from fvsolve.core.steppers.run_handle import no_algebra
+from fvsolve.features.basins import COMPILED
 
 PROBE = """
 import sys
@@ -303,19 +304,29 @@ def test_cache_folder_falls_back_when_the_stated_folder_is_not_writable(package,
 
 
 def test_only_hashed_folders_compile():
-    """Functions of the core are hashed together; those of a feature are in its folder `kernels` or in laws of parts."""
+    """Functions of the core are hashed together; those of a feature are in its folder `kernels` or in laws of parts.
+
+    Basins state all their compiled files.
+    """
     users = {path for path in cache_folders.PACKAGE.rglob("*.py") if "njit" in path.read_text(encoding="utf-8")}
     features = cache_folders.PACKAGE / "features"
-    hashed = {*cache_folders.compiled_sources(), *features.glob("*/kernels/*.py"), *features.glob("*/*/law*.py")}
+    hashed = {
+        *cache_folders.compiled_sources(),
+        *features.glob("*/kernels/*.py"),
+        *features.glob("*/*/law*.py"),
+        *COMPILED,
+    }
     assert users <= hashed, "njit outside of the hashed sources would never be cached"
 
 
 def test_declarations_and_lowerings_compile_nothing():
     """Of parts only laws are hashed, of basins only compiled files; edits elsewhere keep the compiled code."""
     hashed = {path.relative_to(cache_folders.PACKAGE) for path in cache_folders.compiled_sources()}
-    assert Path("core/basins/liquid/grid_linear.py") in hashed and Path("core/basins/basin_scalars.py") in hashed
+    of_basins = {path.relative_to(cache_folders.PACKAGE / "features" / "basins") for path in COMPILED}
+    assert not any(path.parts[0] == "features" for path in hashed)
+    assert {Path("liquid/grid_linear.py"), Path("basin_scalars.py"), Path("free_surface/law_patch_face.py")} < of_basins
     assert {path.name[:3] for path in hashed if path.parts[0] == "parts"} == {"law"}
-    assert not any(path.name.startswith(("part", "lower")) for path in hashed if path.parts[0] == "basins")
+    assert not any(path.name.startswith(("part", "lower", "feature")) for path in of_basins)
 
 
 def test_a_compiled_function_of_declared_arguments_takes_no_others():

@@ -130,8 +130,11 @@ class Feature:
     `sweep_a`, `sweep_b`; leak_names : names of these links
     fast_parts : names of parts that can limit the step
     marks : kind and place of each entry of `marks` that the feature has reserved
-    driven : numbers of schedules whose rates are speeds; link_schedules : link -> its schedule; -1 for none
-    further_cells : number of cells whose cost the feature adds to that of pipes and basins; negative if it saves
+    link_schedules : link -> number of its schedule; -1 for none
+    further_cells : number of cells whose cost the feature adds to that of pipes and meshes; negative if it saves
+    meshed : its parts with a mesh of cells, see `assembly.meshed_parts`
+    sources : names of its rows in the ledger of mass that does not pass nodes, such as "street.rain"
+    damped : True if explicit steps divide its rates by a factor for friction, see `steppers.erk`
     """
 
     slot = 0
@@ -146,9 +149,11 @@ class Feature:
     leak_names: Sequence[str] = ()
     fast_parts: Sequence[str] = ()
     marks: Sequence[tuple[str, str]] = ()
-    driven: Collection[int] = ()
     link_schedules: dict[str, int] = {}
     further_cells = 0
+    meshed: Sequence[Any] = ()
+    sources: Sequence[str] = ()
+    damped = False
 
     def __init__(self, case, given_up: Collection[str] = ()) -> None:
         self.case, self.given_up = case, given_up
@@ -185,10 +190,13 @@ class Feature:
         return None
 
     def lower_behind_links(self, draft) -> None:
-        """Fill the tables of the feature, after those of links and devices and before those of basins; add faults."""
+        """Fill the tables of the feature, after those of links and devices; add faults."""
 
-    def lower_behind_basins(self, draft) -> None:
-        """Fill the tables of the feature, after those of basins; add faults."""
+    def lower_behind_nodes(self, draft) -> None:
+        """Fill the tables of the feature, after those of nodes and links; add faults."""
+
+    def lower_behind_meshes(self, draft) -> None:
+        """Fill the tables of the feature, after those of parts with a mesh; add faults."""
 
     def lower_last(self, draft) -> None:
         """Fill the tables of the feature, after all others; add faults."""
@@ -200,6 +208,9 @@ class Feature:
     def probe_rows(self) -> tuple[np.ndarray, list]:
         """Rows of probes that the feature reads itself, and these probes."""
         return np.zeros(0), []
+
+    def change_settings(self, draft, settings) -> None:
+        """Change settings of the model, which follow from the case; settings : record of `kernels.dtypes.SETTINGS`"""
 
     def rate(self, draft) -> float:
         """Greatest constant rate of its states [1/s]."""
@@ -246,7 +257,15 @@ class Feature:
         return []
 
     def start(self, draft, y: np.ndarray) -> None:
-        """Write the states of the feature at the start; those that it leaves are 0."""
+        """Write the states of the feature at the start; those that it leaves are 0. Add notices on them."""
+
+    def level(self, draft, y: np.ndarray, attitudes: Callable[[], dict[str, np.ndarray]] | None = None) -> list[str]:
+        """Write the states of its fluid at rest on bodies to the states y of the model.
+
+        Returns the names of the functions that compute the loads of this fluid, "module: function".
+        attitudes : function that returns the rotation matrix of each body; None for attitudes at the start
+        """
+        return []
 
     def close(self, draft) -> None:
         """Complete the tables of the feature; from here on they are constant."""
@@ -262,8 +281,9 @@ class Feature:
 
         cast : `ModelFeatures` of the model without those of features
         Places: first: before all others; pipes: behind those of pipes; events: with event functions of restrictions;
-        links: behind those of pipes, restrictions and columns; devices: behind those of devices; basins: behind those
-        of basins; last: behind all others but records of nodes.
+        links: behind those of pipes, restrictions and columns; devices: behind those of devices; flow: behind those of
+        the memory of pipes; carried: then, of what flows carry; cells: then, of what is carried in meshes; last: behind
+        all others but records of nodes.
         Places of event functions, in this order, after the nodes are solved: closed: forces; given: values that follow
         from states, nodes and forces; sources: schedules that the feature sets; followed: what follows such schedules;
         solved: other values.
@@ -290,8 +310,36 @@ class Feature:
         """Squares of linear forms in deviations from the state y, whose sum is the energy of the feature."""
         return Squares()
 
-    def weigh(self, model, weights: np.ndarray) -> None:
-        """Write the weights of its states in the norm of deviations, from those of masses, see `model.energy_norm`."""
+    def weigh(self, model, weights: np.ndarray, y: np.ndarray) -> None:
+        """Write the weights of its states in the norm of deviations from y, see `model.energy_norm`.
+
+        weights : of all states; those of nodes, pipes and columns are known
+        """
+
+    def masses(self, model, y: np.ndarray) -> Iterable[tuple[float, float]]:
+        """Pairs for its parts: mass stored at the start, and its change from the start to state y [kg]."""
+        return ()
+
+    def book_sources(self, y: np.ndarray, ledger: np.ndarray) -> None:
+        """Write masses of its `sources` that follow from the last state y.
+
+        ledger : float64[2, sources]  mass that entered, and as a negative number mass that left, of each [kg]
+        """
+
+    def open_nodes(self, model) -> set[int]:
+        """Nodes through which mass enters and leaves the model, because the boundary behind them is open."""
+        return set()
+
+    def cell_states(self, model) -> list[np.ndarray]:
+        """Numbers of its states that belong to cells, or that all cells of a part follow."""
+        return []
+
+    def energy_refusal(self) -> str:
+        """Reason why the energy of a case with the feature cannot be computed; "" if it can."""
+        return ""
+
+    def end_accounts(self, accounts) -> None:
+        """Add accounts with the rows of power and stored energy behind those of all other parts."""
 
     def energy_rows(self, model) -> Iterable[tuple[str, dict[int, float]]]:
         """Rows of the energy of deviations, (name, state -> factor), see `model.energy_norm.energy_form`."""
@@ -330,12 +378,16 @@ class Feature:
         """Energy of parts at the start, above that at rest, see `model.energy_accounts.available_energy` [J]."""
         return {}
 
-    def swept_masses(self, y: np.ndarray) -> Iterable[float]:
-        """Masses that nodes contain in addition to their states, because volumes have changed [kg]."""
-        return ()
-
     def inputs(self, model) -> dict[str, Any]:
         """Inputs that can be held at values : name -> `assembly.lowering.Input`."""
+        return {}
+
+    def driven(self) -> set[int]:
+        """Numbers of schedules whose rates are speeds; -1 for none."""
+        return set()
+
+    def held_tables(self, tables, t: float) -> dict[str, np.ndarray]:
+        """Tables of the model, as copies by name, with values that vary by themselves held at those at t [s]."""
         return {}
 
     def to_hold(self) -> tuple[Feature, np.ndarray]:
@@ -377,6 +429,29 @@ class FeaturePattern:
         """States on which a source of a network depends; None if the feature knows none. row : of the source"""
         return None
 
+    def sets_pressure(self, i: int) -> np.ndarray | None:
+        """States that set the pressure of node i; None if the feature does not set it."""
+        return None
+
+    def fed(self, i: int) -> np.ndarray:
+        """States whose rates the flow into node i changes."""
+        return np.zeros(0, dtype=np.int64)
+
+    def on_bodies(self) -> Iterator[tuple[int, np.ndarray]]:
+        """Yield pairs of fluid that a body carries: number of the body, states of the fluid."""
+        yield from ()
+
+    def carried(self, i: int, q: int) -> tuple[np.ndarray, np.ndarray | None] | None:
+        """States of the amounts of scalar q that set its value at node i, and of the masses that hold them.
+
+        Without masses the flows through the node weigh the amounts; None if the feature does not set the value.
+        """
+        return None
+
+    def reacting_places(self) -> Iterator[tuple[np.ndarray, list, Callable]]:
+        """Yield groups of its places of reactions, see `features.scalars.pattern.reacting_places`."""
+        yield from ()
+
     def read_by(self, part, lowering) -> np.ndarray:
         """States on which values of the feature depend that the law of a device reads before the nodes are solved."""
         return np.zeros(0, dtype=np.int64)
@@ -404,6 +479,10 @@ class FeatureRun:
     def tables(self, view: str = "") -> tuple | None:
         """Tables of the feature as its compiled functions read them; view : name of another view of the model."""
         return None
+
+    def written_tables(self) -> dict[str, np.ndarray]:
+        """Tables of the model that the run writes, as copies by name."""
+        return {}
 
     def views(self) -> dict[str, tuple[np.ndarray, dict[str, np.ndarray]]]:
         """Views that compiled functions open : name -> (array for its handle, tables of the model replaced in it)."""
@@ -456,6 +535,17 @@ class FeatureRun:
     def waves(self, t: float, out: np.ndarray, parts: int) -> Iterator[tuple[int, tuple[np.ndarray, np.ndarray]]]:
         """Yield both waves along the pipes of the feature, see `RunData.along`."""
         yield from ()
+
+    def critical_outflows(self, i: int) -> list[float]:
+        """Greatest flow through each of its links from which node i draws, at critical flow [m3/s]."""
+        return []
+
+    def held_marks(self, start: float, t: float, entered: np.ndarray) -> list:
+        """Marks of a run, see `run_summary.Mark`, in place of marks "dry" of the same places.
+
+        start, t : times of start and end [s]; entered : float64[nodes]  mass that has entered at each node [kg]
+        """
+        return []
 
     def corrected_at(self, t: float) -> bool:
         """True if the feature corrected the state at t, so that the step before it cannot be repeated."""

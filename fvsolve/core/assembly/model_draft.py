@@ -222,7 +222,6 @@ class ModelDraft:
     laws: list[str] = field(default_factory=list)  # modules of compiled laws, in the order of the rows of `hooks`
     events: list[tuple[str, str]] = field(default_factory=list)  # (name, meaning); "" if an event is not reported
     meshes: list[PipeMesh] = field(default_factory=list)
-    basins: list[Any] = field(default_factory=list)
     # table -> links with rows in it, see `assembly.lowering.links_by_table`
     links: dict[str, list[tuple]] = field(default_factory=dict)
     features: list[Any] = field(default_factory=list)  # see `assembly.features`
@@ -295,6 +294,11 @@ class ModelDraft:
             copy.links[table] = [(name, case.links.get(name, link), lowering) for name, link, lowering in entries]
         return copy
 
+    @property
+    def meshed(self) -> list[Any]:
+        """Parts with a mesh of cells, see `assembly.meshed_parts`."""
+        return [part for feature in self.features for part in feature.meshed]
+
     def fault(self, place: str, message: str) -> None:
         self.faults.append(Fault(place, message))
 
@@ -313,7 +317,7 @@ class ModelDraft:
         return self.size - len(names)
 
     def to_plane(self, values: np.ndarray) -> int:
-        """Append values to `plane`, the constant data of basins, at the start of a cache line; return their offset."""
+        """Append values to `plane`, the constant data of meshes, at the start of a cache line; return their offset."""
         self.pieces_of_plane.append(np.append(np.ravel(values), np.zeros(-values.size % CACHE_LINE)))
         self.plane_size += self.pieces_of_plane[-1].size
         return self.plane_size - self.pieces_of_plane[-1].size

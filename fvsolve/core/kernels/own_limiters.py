@@ -20,7 +20,7 @@ from fvsolve.jit import COMPILING, Intrinsic, compile_once, njit
 CLOSEST = 1e-15  # least difference ahead relative to the difference behind: rounding; bounds the ratio r
 LEAST = 1e-300  # least difference ahead, so that equal values have the ratio 0
 FIRST_ADDRESS = 4096  # codes from here on are addresses of tables
-RECONSTRUCTION, ADVECTION = "fvsolve.core.kernels.reconstruction", "fvsolve.core.basins.advection"
+RECONSTRUCTION, ADVECTION = "fvsolve.core.kernels.reconstruction", "fvsolve.features.basins.advection"
 # Loops that `by_limiter` calls : module, types of the arguments after the limiter (see `kernels.calls`), of the result.
 # A number follows the type of the items of a tuple; F is the function `limited_value` of the module.
 LOOPS = {
@@ -28,11 +28,11 @@ LOOPS = {
     "muscl_forward": (RECONSTRUCTION, "VV", ""),
     "muscl_backward": (RECONSTRUCTION, "VV", ""),
     "inner_slopes": ("fvsolve.core.kernels.scalar_transport", "VV", ""),
-    "faces_limited": ("fvsolve.core.basins.liquid.liquid_sides", "VVVV", ""),
-    "faces_upwind_limited": ("fvsolve.core.basins.liquid.grid_nonlinear", "VVVVVVV", ""),
-    "put_sloped": ("fvsolve.core.basins.free_surface.surface_rows", "iVVVV", ""),
-    "put_sloped_at_kerbs": ("fvsolve.core.basins.free_surface.surface_rows", "iVVVV", ""),
-    "put_slopes": ("fvsolve.core.basins.conduit.conduit_cells", "iV", ""),
+    "faces_limited": ("fvsolve.features.basins.liquid.liquid_sides", "VVVV", ""),
+    "faces_upwind_limited": ("fvsolve.features.basins.liquid.grid_nonlinear", "VVVVVVV", ""),
+    "put_sloped": ("fvsolve.features.basins.free_surface.surface_rows", "iVVVV", ""),
+    "put_sloped_at_kerbs": ("fvsolve.features.basins.free_surface.surface_rows", "iVVVV", ""),
+    "put_slopes": ("fvsolve.features.basins.conduit.conduit_cells", "iV", ""),
     "put_face_values": (ADVECTION, "FtVVVVVV", ""),
     "single_face_value": (ADVECTION, "Fbtttt", "t"),
     "north_values_and_rates": (ADVECTION, "FtVtV4V3V3V", ""),

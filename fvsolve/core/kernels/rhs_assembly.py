@@ -33,7 +33,7 @@ class RhsTerms(NamedTuple):
     balance: str = ""  # net flows into nodes, rates of storage in nodes
     rate_limits: str = ""  # rates that limit the step; event functions need the phases up to here
     move: str = ""  # rates of columns, devices, and what moves
-    rates: str = ""  # rates of cells, in pipes and basins
+    rates: str = ""  # rates of cells
     boundary_exchange: str = ""  # exchange between bands of flows through boundaries
     boundary_inflow: str = ""  # flows into cells through patches
     accelerate: str = ""  # accelerations of frames that move, from all forces
@@ -146,10 +146,8 @@ COMPONENTS = {
 }
 COUPLED = RhsTerms(solve_nodes="node_clusters: solve_coupled_clusters")
 BANDS = RhsTerms(exchange="band_exchange: exchange_states", reduce_rate="band_exchange: reduce_rate")
-BOUNDARY_EXCHANGE = RhsTerms(package="fvsolve.core.basins", boundary_exchange="basin_patches: put_boundary_flows")
+BOUNDARY_EXCHANGE = RhsTerms(package="fvsolve.features.basins", boundary_exchange="basin_patches: put_boundary_flows")
 MIXED = RhsTerms(mix="scalar_transport: mix_scalars")
-# places of terms of features whose event functions need solved nodes, see `assembly.features.Feature.terms`
-WITH_NODES = ("first", "pipes", "closed", "sources", "solved", "events", "basins", "last")
 ALWAYS = RhsTerms(record="observation: record_nodes", events="observation: tank_events")
 
 
@@ -159,8 +157,7 @@ class ModelFeatures(NamedTuple):
     family : kernels of the density law, "linear", "barotropic" or "cavitating"
     laws : names of the modules of parts' laws, in the order of the rows of `hooks`
     features, further_packages : place and terms of features, and their further modules, see `assembly.features`
-    basins, carried : terms of basins, and of the scalars that they carry; see `basins.basin_terms`
-    alone : True if there are only basins, and no link
+    alone : True if there are only meshes, and no link
     bands : True if threads or processes step bands of the state
     boundary_exchange : True if several bands have an open boundary
     forces : True if forces on pipes are probed
@@ -176,8 +173,6 @@ class ModelFeatures(NamedTuple):
     viscoelastic_walls: bool = False
     devices: bool = False
     laws: tuple[str, ...] = ()
-    basins: tuple[RhsTerms, ...] = ()
-    carried: tuple[RhsTerms, ...] = ()
     valves: bool = False
     features: tuple[tuple[str, RhsTerms], ...] = ()
     further_packages: tuple[str, ...] = ()
@@ -233,16 +228,14 @@ class ModelFeatures(NamedTuple):
         yield from self.last_components(family)
 
     def last_components(self, family: str) -> Iterator[RhsTerms]:
-        """Yield the last terms: memory of pipes, basins, scalars, and probes; family : kernels of the density law."""
+        """Yield the last terms: memory of pipes, flows, what they carry; family : kernels of the density law."""
         linear = self.family == "linear"
         if self.unsteady_friction:
             yield COMPONENTS["memory" if linear else "memory, barotropic"]
         if self.viscoelastic_walls:
             yield COMPONENTS["creep" if linear else "creep, barotropic"]
-        yield from self.basins
-        yield from self.terms_at("basins")  # from the rates of waves, which come before
-        yield from self.carried
-        yield from self.terms_at("last")
+        for place in ("flow", "carried", "cells", "last"):  # what is carried needs the rates of the flow
+            yield from self.terms_at(place)
         if self.forces:
             yield COMPONENTS[f"forces, {family}"]
         if self.pipes:
@@ -258,8 +251,8 @@ class ModelFeatures(NamedTuple):
         return [import_module(name) for name in self.laws]
 
     def packages(self) -> list[str]:
-        """Names of the modules of laws, and of the packages with functions of basins, that the model needs."""
-        return [*self.laws, *self.further_packages, *(member.package for member in self.basins)]
+        """Names of the modules of laws, and of the packages with functions of features, that the model needs."""
+        return [*self.laws, *self.further_packages, *(member.package for _, member in self.features)]
 
     def count(self, job: str) -> int:
         """Number of the functions of a job, which are not loaded."""
@@ -270,7 +263,7 @@ class ModelFeatures(NamedTuple):
 
         jobs : names of fields of `RhsTerms`
         """
-        members = dict.fromkeys(self.components())  # components that several basins need, once
+        members = dict.fromkeys(self.components())  # components that several members need, once
         return [
             load_function(member.package, name) for job in jobs for member in members if (name := getattr(member, job))
         ]

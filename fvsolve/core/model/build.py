@@ -16,7 +16,6 @@ from fvsolve.core.assembly.lowering import lower_devices, lowering_of
 from fvsolve.core.assembly.model_draft import ModelDraft
 from fvsolve.core.assembly.pipe_terms import MAX_TERMS, add_terms, limit_creep_step
 from fvsolve.core.assembly.scheme_codes import limiter_notices, scheme_settings
-from fvsolve.core.basins.lower import basin_start, lower_basins, reserve_basins
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels import tanks
 from fvsolve.core.model.cluster_tables import classify_nodes
@@ -70,7 +69,7 @@ CHANGING_FIELDS = ("nodes", "links", "raw", "read")  # fields of a case that dif
 def with_new_sizes(packed: ModelDraft, case: Case) -> ModelDraft | None:
     """Copy of packed tables with the restrictions of a case; None if the case differs in more than their sizes.
 
-    The result is also None with basins, and for a change that `Lowering.resize` does not support.
+    The result is also None with data in `plane`, and for a change that `Lowering.resize` does not support.
     """
     before = packed.case
     changed = changed_links(before, case)
@@ -157,9 +156,10 @@ def tables_before_start(case: Case, unfit: Collection[str] = ()) -> ModelDraft:
     fill_nodes(draft)
     fill_links(draft)
     classify_nodes(draft)
-    lower_basins(draft)
     for feature in draft.features:
-        feature.lower_behind_basins(draft)
+        feature.lower_behind_nodes(draft)
+    for feature in draft.features:
+        feature.lower_behind_meshes(draft)
     draft.check()
     for feature in draft.features:
         feature.lower_last(draft)
@@ -246,7 +246,6 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     reserve_network(draft)
     for feature in draft.features:
         feature.reserve_ledger(draft)
-    reserve_basins(draft)
     for feature in draft.features:
         feature.reserve(draft)
     layout = sizes.place()
@@ -310,7 +309,7 @@ def accepted_size(draft: ModelDraft) -> int:
 
     Waves and surfaces need short steps, over which the state of the start serves as well.
     """
-    if not draft.case.law.linear or len(draft.pipe_table) or len(draft.basin_table):
+    if not draft.case.law.linear or len(draft.pipe_table) or draft.meshed:
         return 0
     if not (draft.cluster_table["order"] >= 0).any():
         return 0
@@ -332,10 +331,6 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     s["ambient"], s["gravity"] = case.ambient_pressure, case.gravity
     s["swept"] = (draft.node_table["kind"] == rec.MOVING).any()
     s["vapor"], s["unmarked"] = case.law.cavity_pressure, -np.inf
-    if case.patches_with_faces:
-        from fvsolve.core.basins.free_surface.patch_closures import DEEPEST
-
-        s["unmarked"] = s["vapor"] - 0.5 * DEEPEST * case.properties.density * case.gravity
     s["stop_below"] = case.numerics.below_vapor == "stop"
     case.law.lower(draft.fluid, s, draft.floats)
     s["tolerance"] = case.numerics.rtol or 0.0
@@ -346,6 +341,8 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     rates = [*waves, *column_rates(draft)]
     rates += [feature.rate(draft) for feature in draft.features]
     s["rate"] = max([0.0, *rates])
+    for feature in draft.features:
+        feature.change_settings(draft, s)
     return table
 
 
@@ -370,22 +367,21 @@ def most_states(draft: ModelDraft) -> int:
 def model_of(draft: ModelDraft, notices: Callable[[ModelDraft], list[Notice]] = start_notices) -> Model:
     """Build the model of a complete draft, with `notices` on its start.
 
-    The state at the start is zero except in basins that deviate from the initial steady state, and for scalar amounts.
+    The state at the start is zero except for what features write.
     """
-    case, start = draft.case, basin_start(draft.basins, draft.size)
+    case, start = draft.case, np.zeros(draft.size)
     for feature in draft.features:
         feature.start(draft, start)
     first, last = case.numerics.start, case.numerics.end
     inside = sorted((t, jump) for t, jump in draft.schedules.breaks.items() if first <= t <= last)
-    basin_notices = [notice for basin in draft.basins for notice in basin.notices(basin.deviations(start))]
-    draft.warnings += [*basin_notices, *notices(draft)]
+    draft.warnings += notices(draft)
     draft.warnings += limiter_notices(draft.case.numerics.scheme, draft.case.numerics.limiter)
     return Model(
         case, draft.tables, draft.shapes, draft.state_names, np.array(draft.scale), inside, draft.schedules.spacing,
         draft.meshes, list(case.places), list(case.links), draft.valve_names, draft.column_names,
         dict(case.elevations), case.probes, draft.warnings,
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
-        draft.basins, case.extreme_probes, draft.watched_start, closed(draft),
+        case.extreme_probes, draft.watched_start, closed(draft),
         flags_at_start(draft),
     )  # fmt: skip
 

@@ -10,7 +10,7 @@ from fvsolve.core.assembly.pipe_terms import elements, memory_shares
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.model import Model, once_per_model
 from fvsolve.core.model.run_data import RunData
-from fvsolve.errors import FvsolveError, listing
+from fvsolve.errors import FvsolveError
 
 LEAST_GAS = 1.0  # least gas pressure of a mixture at rest [Pa]
 
@@ -47,8 +47,8 @@ def available_energy(model: Model) -> dict[str, float]:
         energies[pipe.name] = pipe_energy(model, k) + friction_memory_energy(model, k) + creep_energy(model, k)
     for name, row in zip(model.column_names, tables.columns, strict=True):
         energies[name] = 0.5 * row["flow"] ** 2 * row["length"] / (model.case.properties.density * row["area"])
-    for basin in model.basins:
-        energies[basin.name] = basin.above(basin.deviations(model.start), datum)
+    for part in model.meshed:
+        energies[part.name] = part.above(part.deviations(model.start), datum)
     for feature in model.features:
         energies |= feature.above(model)
     return {name: float(value) for name, value in energies.items()}
@@ -188,19 +188,8 @@ class Accounts:
         self.run_data, self.model = run_data, run_data.model
         model, case = run_data.model, run_data.model.case
         compute_all_loads(run_data)
-        if any(basin.part.on is not None and basin.opening for basin in model.basins):
-            raise FvsolveError("the energy of a basin on a body with an open side is not supported; expected closed "
-                               "sides, or a basin that no body carries")  # fmt: skip
-        if model.sources:
-            raise FvsolveError(f"the energy of rain and infiltration ({listing(model.sources)}) is not supported; "
-                               "expected a basin without them")  # fmt: skip
-        if driven := [f"{basin.name}.{name}" for basin in model.basins for name in basin.closed]:
-            raise FvsolveError(f"the energy of water through driven patches ({listing(driven)}) is not supported; "
-                               "expected walls, open sides, or links")  # fmt: skip
-        if conduits := [name for name, link in case.links.items() if link.kind == "conduit"]:
-            raise FvsolveError(f"the energy of conduits ({listing(conduits)}) is not supported; expected other links")
-        if model.basins and not case.law.linear:
-            raise FvsolveError('the energy of basins is computed for law = "linear" only; expected this density law')
+        if reason := next((text for feature in model.features if (text := feature.energy_refusal())), ""):
+            raise FvsolveError(reason)
         self.power, self.stored = model.functions.energies
         self.accounts: list[Account] = []
         self.stored_accounts: list[Account] = []  # accounts of stored energy, by rows of `stored`
@@ -230,8 +219,8 @@ class Accounts:
         for feature in model.features:
             feature.add_accounts(self)
         self.devices()
-        self.walls()
-        self.basins()
+        for feature in model.features:
+            feature.end_accounts(self)
         self.power_terms = terms_of(self.accounts)
         self.stored_terms = terms_of(self.stored_accounts)
 
@@ -283,24 +272,6 @@ class Accounts:
                 self.accounts.append(Account(category, name, kind, rows, (1.0, sign)[: len(rows)]))
             self.hold(name, kind, at + 1)
 
-    def walls(self) -> None:
-        names = [f"{basin.name}.{patch}" for basin in self.model.basins for patch in basin.walls]
-        for name, row in zip(names, self.model.tables.walls, strict=True):
-            at = self.take(2)
-            if row["mass"] < 0 and row["body"] < 0:
-                self.add("supplied", name, "wall", at)
-            self.add("law", name, "wall", at + 1)
-
-    def basins(self) -> None:
-        for basin in self.model.basins:
-            at = self.take(5)
-            self.add("dissipated", basin.name, "patches", at + 1)
-            self.add("dissipated", basin.name, "friction", at + 2)
-            self.hold(basin.name, "basin", at + 3)
-            if basin.part.on is not None:
-                self.add("law", basin.name, "basin", at + 4)
-            self.accounts.append(Account("scheme", basin.name, "basin", tuple(range(at, at + 5)), (1, *[-1] * 4)))
-
     def of(self, category: str) -> list[int]:
         """Indices of the accounts of a category."""
         return [k for k, account in enumerate(self.accounts) if account.category == category]
@@ -328,8 +299,6 @@ def compute_all_loads(run_data: RunData) -> None:
     """Let the right-hand side compute all that energies need; changes tables of `run_data`."""
     for own in run_data.features:
         own.for_energy()
-    if (run_data.model.tables.basins["frame"] >= 0).any():
-        run_data.tables.basins["loads_body"] = 1
 
 
 def terms_of(accounts: list[Account]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -89,11 +89,11 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     potential or flow d of a store of rotation or electricity with the value C : C d^2 / 2; of a heat capacity 1e-6 of
     this
 
-    Devices and features add rows (`energy_rows`, `squares`), basins weights of their cells (`weights`). The form is
-    exact under the density law `linear` about a steady state at rest. A scalar stores no energy, and no other state
-    depends on it; a deviation of its amount, divided by its greatest possible value, counts as 1e-6 of the energy that
-    the same mass would store. Displacements without stiffness store nothing, see `EnergyForm.idle`. Raises FvsolveError
-    if springs join too many positions.
+    Devices and features add rows (`energy_rows`, `squares`), features weights of their states. The form is exact under
+    the density law `linear` about a steady state at rest. A scalar stores no energy, and no other state depends on it;
+    a deviation of its amount, divided by its greatest possible value, counts as 1e-6 of the energy that the same mass
+    would store. Displacements without stiffness store nothing, see `EnergyForm.idle`. Raises FvsolveError if springs
+    join too many positions.
     """
     from scipy.sparse import csr_array
 
@@ -182,15 +182,13 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
         for k, (gain, rate) in enumerate(elements(tables.floats, row)):
             first = row["strain"] + k * row["cells"]
             weights[first : first + row["cells"]] = 0.5 * row["dx"] / (rho * row["area"]) * gain / rate
-    for basin in model.basins:
-        basin.states_of(weights)[:] = basin.weights(basin.deviations(y))
     for row in tables.nodes:
         if row["y"] >= 0 and row["kind"] not in (rec.MOVING, rec.VESSEL):
             weights[row["y"]] = stiffness(model, row) / (2.0 * rho)
     for row in tables.columns:
         weights[row["y"]] = row["length"] / (2.0 * rho * row["area"])
     for feature in model.features:
-        feature.weigh(model, weights)
+        feature.weigh(model, weights, y)
     return weights
 
 

@@ -2,8 +2,8 @@
 
 Cells of a pipe depend on their neighbours within the reach of the scheme. A node depends on the edge cells of all its
 pipes, and cells whose stencil crosses a pipe end depend on the same cells. Tanks, chambers and given pressures separate
-groups of nodes: their pressure follows from their own states, and from those of features. Cells of a basin depend on
-the cells around them (`basins.lower_pattern`). A patch is a node whose pressure is set by the cells behind it.
+groups of nodes: their pressure follows from their own states. Features state the couplings of their own states, and of
+nodes whose pressure they set or influence.
 """
 
 from collections.abc import Iterator
@@ -11,8 +11,6 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.sparse import coo_array, csc_array
 
-from fvsolve.core.basins import lower_pattern as pattern
-from fvsolve.core.basins.lower_pattern import all_states
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.state_pairs import pairs_of, unique_states
 from fvsolve.core.schemes import SCHEMES, Reach
@@ -47,8 +45,7 @@ class Couplings:
         self.reach = reach_of(model.case.numerics.scheme, settings)
         self.inner = self.nodes["kind"] == rec.JUNCTION
         self.devices, self.parts, self.floats = tables.devices, model.devices, tables.floats
-        self.model, self.basins, self.integers, self.walls = model, model.basins, tables.integers, tables.walls
-        self.patches = {int(row["node"]): row for row in tables.patches}
+        self.integers = tables.integers
         self.features = [feature.pattern(self) for feature in model.features]
         self.sets: list[np.ndarray] = []
         self.sets = self.pressures()  # for each node, the states that set its pressure
@@ -63,32 +60,12 @@ class Couplings:
             yield from self.beyond(pipe)
             yield from self.friction_memory_pairs(pipe)
             yield from self.creep_pairs(pipe)
-        for basin in self.basins:
-            yield pattern.interior_pattern(basin)
-            if basin.soil is not None:
-                yield pattern.source_pattern(basin)
-        yield from self.boundary_pairs()
         yield from self.stored()
         for column in self.columns:
             yield pairs_of(unique_states(column["y"]), unique_states(*(self.sets[i] for i in ends_of(column))))
         yield from self.device_pairs()
-        yield from self.wall_pairs()
         for own in self.features:
             yield from own.pairs()
-
-    def boundary_pairs(self) -> Iterator[Pairs]:
-        """Yield couplings of the flow through open patches of basins with the cells there."""
-        for i, row in self.patches.items():
-            basin, behind = self.basins[row["basin"]], row["ring"] + row["faces"]
-            if row["open"]:
-                cells = pattern.cells_read(pattern.neighbours(basin), self.integers[behind : behind + row["faces"]])
-                yield pairs_of(unique_states(self.size + i), pattern.cell_states(basin, cells))
-            joint = rec.DISCHARGE, rec.RATING, *pattern.THROUGH_FACES  # one level for all faces
-            if row["closure"] in joint or (row["closure"] == rec.STAGE and row["neighbours"] >= 0):
-                read = unique_states(
-                    self.behind(i), pattern.cell_states(basin, pattern.cells_at_faces(self.integers, row))
-                )
-                yield pairs_of(self.behind(i), read)
 
     # nodes ------------------------------------------------------------------------------------------------------
 
@@ -109,29 +86,14 @@ class Couplings:
         y = self.nodes["y"][i]
         return np.array([y] if y >= 0 else [], dtype=np.int64)
 
-    def behind(self, i: int, quantities: int | None = None) -> np.ndarray:
-        """States of the cells behind patch i; empty for other nodes.
-
-        quantities : number of quantities of the basin that are included, from the first on; None for all
-        """
-        if i not in self.patches:
-            return unique_states()
-        row = self.patches[i]
-        cells = self.integers[row["first"] : row["first"] + row["count"]]
-        return pattern.cell_states(self.basins[row["basin"]], cells, quantities)
-
     def pressure_states(self, i: int) -> np.ndarray:
-        """Indices of the states that set the pressure of a storing node or a patch.
+        """Indices of the states that set the pressure of a storing node, or of one whose pressure a feature sets.
 
-        For a node they are its mass, states of its device and of features. For a patch they are the first quantity of
-        the cells behind it, and the travels of walls of its basin.
+        For a storing node they are its mass, states of its device and of features.
         """
-        if i in self.patches and self.patches[i]["closure"] in pattern.THROUGH_FACES:
-            row = self.patches[i]
-            read = pattern.cells_at_faces(self.integers, row)
-            return unique_states(self.behind(i), pattern.cell_states(self.basins[row["basin"]], read))
-        if i in self.patches:
-            return unique_states(self.behind(i, 1), *(self.walls["y"][self.walls["basin"] == self.patches[i]["basin"]]))
+        for own in self.features:
+            if (states := own.sets_pressure(i)) is not None:
+                return states
         given = self.schedule(self.nodes["schedule"][i])
         of_devices = (self.device_states(row) for row in self.devices if row["row"] >= 0 and row["node"] == i)
         of_features = (own.pressure(i) for own in self.features)
@@ -192,7 +154,7 @@ class Couplings:
         return [joined[group[i]] if self.inner[i] else self.pressure_states(i) for i in range(len(group))]
 
     def stored(self) -> Iterator[Pairs]:
-        """Yield pairs (rates, states) of the contents of tanks, chambers and patches, and of the mass ledger.
+        """Yield pairs (rates, states) of the masses in nodes and in what they feed, and of the mass ledger.
 
         The states are those that determine the flows into them.
         """
@@ -211,7 +173,8 @@ class Couplings:
             for i, states in own.inflows():
                 into[i].append(states)
         for i in np.flatnonzero(~self.inner):
-            yield pairs_of(unique_states(self.own(i), self.behind(i), self.size + i), unique_states(*into[i]))
+            fed = (own.fed(i) for own in self.features)
+            yield pairs_of(unique_states(self.own(i), *fed, self.size + i), unique_states(*into[i]))
 
     def device_pairs(self) -> Iterator[Pairs]:
         """Yield couplings of the states of each device with each other, and with pressures.
@@ -232,20 +195,6 @@ class Couplings:
         read = [self.sets[n] for n in nodes if n >= 0]
         read += [device["travel"] + np.arange(2)] if device["travel"] >= 0 else []
         return unique_states(self.device_states(device), opening, *read)
-
-    def wall_pairs(self) -> Iterator[Pairs]:
-        """Yield couplings of basin cells with the travel of moving walls, and of this travel with what moves the walls.
-
-        Couplings of what moves them with the cells at the walls are included.
-        """
-        for wall in self.walls:
-            basin = self.basins[wall["basin"]]
-            speed = unique_states(*([wall["rate"]] if wall["rate"] >= 0 else []))
-            yield pairs_of(pattern.all_states(basin), unique_states(wall["y"], speed))
-            yield pairs_of(unique_states(wall["y"]), speed)
-            behind = self.integers[wall["faces"] + wall["count"] :][: wall["count"]]
-            cells = pattern.cells_read(pattern.neighbours(basin), behind)
-            yield pairs_of(speed, unique_states(wall["y"], pattern.cell_states(basin, cells)))
 
     # pipes ------------------------------------------------------------------------------------------------------
 
@@ -355,7 +304,7 @@ def jacobian_pattern(model) -> csc_array:
 
 
 def lumped_states(model) -> np.ndarray:
-    """Indices of all states except waves in cells of pipes, states of basins and travels of their walls : int64[q].
+    """Indices of all states except waves in cells of pipes, and states of meshes : int64[q].
 
     Most are states of lumped parts such as tanks and chambers. Their pressures are hundreds of bars, while the
     flow of restrictions bends within a few pascals. The result is empty under density laws whose pressures come from
@@ -364,6 +313,6 @@ def lumped_states(model) -> np.ndarray:
     if model.case.law.name not in ("linear", "log"):  # pressures come from iterations, rougher than rounding
         return np.zeros(0, dtype=np.int64)
     pipes = model.tables.pipes[model.tables.pipes["cells"] > 0]
-    cells = [pipe["y"] + np.arange(2 * pipe["cells"]) for pipe in pipes] + [all_states(basin) for basin in model.basins]
-    walls = [[at for at, _, _ in basin.stretches] for basin in model.basins]  # every cell's volume follows these
-    return np.setdiff1d(np.arange(model.y_size), np.concatenate([[], *cells, *walls]))
+    cells = [pipe["y"] + np.arange(2 * pipe["cells"]) for pipe in pipes]
+    cells += [states for feature in model.features for states in feature.cell_states(model)]
+    return np.setdiff1d(np.arange(model.y_size), np.concatenate([[], *cells]))

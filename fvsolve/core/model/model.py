@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
     from fvsolve.case import Case
     from fvsolve.case.probe import Probe
+    from fvsolve.core.assembly.meshed_parts import MeshedPart
     from fvsolve.core.assembly.model_draft import PipeMesh
     from fvsolve.core.assembly.state_names import StateNames
-    from fvsolve.core.basins.lower_basin import BasinRows
     from fvsolve.core.kernels.compiled_functions import Functions
     from fvsolve.core.steppers.structure import Structure
 
@@ -150,9 +150,8 @@ class Model(Displayable):
     profiles: dict[int, np.ndarray]  # pipe -> pressure of the profile at cell centres [Pa]
     devices: list[tuple]  # (name, part, lowering), in the order of their table
     laws: list[str]  # modules of compiled laws of parts, in the order of the rows of `hooks`
-    start: np.ndarray  # state at the start: zero except scalar amounts and basins that deviate from the steady state
+    start: np.ndarray  # state at the start: zero except what features write
     events: list[tuple[str, str]]  # of devices and valves: (name, meaning of a zero of its event function)
-    basins: list[BasinRows]  # in the order of their table
     watched: list[Probe]  # read in addition to the probes, for their extremes only
     watched_start: np.ndarray  # pressures of `watched` along pipes in the profile [Pa], nan for others
     features: list[Any]  # see `assembly.features`
@@ -196,8 +195,13 @@ class Model(Displayable):
 
     @property
     def sources(self) -> list[str]:
-        """Names of the rows of the ledger of rain and infiltration, such as "street.rain"."""
-        return [f"{basin.name}.{name}" for basin in self.basins for name in basin.source_names]
+        """Names of the rows of the ledger of mass that does not pass nodes, such as rain : "street.rain"."""
+        return [name for feature in self.features for name in feature.sources]
+
+    @property
+    def meshed(self) -> list[MeshedPart]:
+        """Parts with a mesh of cells, in the order of their tables."""
+        return [part for feature in self.features for part in feature.meshed]
 
     @property
     def ledger_names(self) -> list[str]:
@@ -207,7 +211,7 @@ class Model(Displayable):
 
     @property
     def ledgers(self) -> int:
-        """Number of rows of the ledger: supply of nodes; inflow of scalars, decay, heat, reactions; rain and soil."""
+        """Number of rows of the ledger: supply of nodes, then those of features."""
         return int(self.layout["net"] - self.layout["supply"])
 
     @property
@@ -217,8 +221,8 @@ class Model(Displayable):
 
     @property
     def all_cells(self) -> int:
-        """Number of cells of all pipes (see `PipeMesh`) and basins."""
-        return self.cells + sum(basin.n for basin in self.basins)
+        """Number of cells of all pipes (see `PipeMesh`) and meshes."""
+        return self.cells + sum(part.n for part in self.meshed)
 
     @functools.cached_property
     def wave_rates(self) -> np.ndarray:
@@ -233,9 +237,9 @@ class Model(Displayable):
 
     @property
     def wave_rate(self) -> float:
-        """Greatest of `wave_rates` [1/s]; with basins at least the step-limiting rate of all parts at the start."""
+        """Greatest of `wave_rates` [1/s]; with meshes at least the step-limiting rate of all parts at the start."""
         rate = float(self.wave_rates.max(initial=0.0))
-        if not self.basins:
+        if not self.meshed:
             return rate
         return max(rate, float(self.evaluate(self.case.numerics.start, self.start)[1][rec.RATE]))
 
@@ -266,18 +270,16 @@ class Model(Displayable):
     @functools.cached_property
     def functions(self) -> Functions:
         """Compiled functions (`kernels.compiled_functions.Functions`) for the density law and parts of this model."""
-        from fvsolve.core.basins.basin_terms import terms_of_basins, terms_of_scalars
         from fvsolve.core.kernels.compiled_functions import functions
         from fvsolve.core.kernels.rhs_assembly import ModelFeatures
 
         has = rec.Tables(*(len(table) > 0 for table in self.tables))
-        basins, carried, valves = terms_of_basins(self.basins, has.valves), terms_of_scalars(self.basins), has.valves
-        alone = bool(self.basins) and not (self.pipes or valves or has.devices or has.clusters or has.columns)
+        alone = bool(self.meshed) and not (self.pipes or has.valves or has.devices or has.clusters or has.columns)
         alone = alone and not any(feature.reads_nodes for feature in self.features)
         alone = alone and bool((self.tables.nodes["kind"] == rec.PATCH).all())
         cells = bool((self.tables.pipes["cells"] > 0).any())
         cast = ModelFeatures(self.case.law.family, cells, has.clusters, has.columns, self.unsteady, self.creeps,
-                    has.devices, tuple(self.laws), basins, carried, valves, (), (), has.couplings, alone,
+                    has.devices, tuple(self.laws), has.valves, (), (), has.couplings, alone,
                     forces=bool(self.layout["forces"] >= 0), formulas=bool((self.tables.schedules["pieces"] < 0).any()),
                     device_heat=bool((self.tables.heat_sources["device"] >= 0).any()))  # fmt: skip
         terms = tuple(pair for feature in self.features for pair in feature.terms(self, cast))
@@ -287,8 +289,8 @@ class Model(Displayable):
 
     @property
     def damped(self) -> bool:
-        """True if explicit steps divide the rates of basins by a factor for friction, see `steppers.erk`."""
-        return bool(self.tables.basins["damped"].any())
+        """True if explicit steps divide rates by a factor for friction, see `steppers.erk`."""
+        return any(feature.damped for feature in self.features)
 
     @property
     def layout(self) -> np.void:
@@ -450,10 +452,9 @@ class Model(Displayable):
         return self.case.law.cavitates
 
     def fields(self, y: np.ndarray, out: np.ndarray, lines: dict[int, tuple] | None = None) -> dict[str, Any]:
-        """Values along pipes, in basins and at nodes in a state [SI] : pipe or basin -> quantity -> values of cells.
+        """Values along pipes, in meshes and at nodes in a state [SI] : part -> quantity -> values of cells.
 
-        Further keys: "nodes" : node -> quantity -> float; "points" : basin that moves or is on a body -> corners of its
-        cells.
+        Further keys: "nodes" : node -> quantity -> float; "points" : part whose mesh moves -> corners of its cells.
         out : array that `evaluate` returns; lines : pipe -> both waves of a delay line, as returned by `RunData.along`,
         zero if left out
         """
@@ -475,11 +476,7 @@ class Model(Displayable):
                 "min_pressure": pressure, "max_pressure": pressure,
             }  # fmt: skip
         nodes, at = self.tables.nodes, int(self.layout["pressure"])
-        for basin in self.basins:
-            fields[basin.name] = basin.fields(basin.deviations(y)) | (basin.values(y) if basin.scalars else {})
-        fields["points"] = {basin.name: basin.points_at(y, out, self.layout) for basin in self.basins
-                           if basin.moves or basin.part.on is not None}  # fmt: skip
-        fields["nodes"] = {}
+        fields["points"], fields["nodes"] = {}, {}
         for i, name in enumerate(self.node_names):
             pressure = float(nodes[i]["pressure"] + out[at + i])
             head = float(self.head(pressure, self.elevation[name]))
@@ -499,19 +496,14 @@ class Model(Displayable):
             change += mass_in_creep(self.tables.floats, row, y) if elements else 0.0
         for at in self.tables.nodes["y"].tolist():
             change += float(y[at]) if at >= 0 else 0.0
-        for basin in self.basins:
-            rest, per = basin.mass()
-            for own, start in zip(basin.states_of(y)[:1], basin.states_of(self.start)[:1], strict=True):
-                initial += rest + float(np.sum(per * start))
-                change += float(np.sum(per * (own - start)))
         for feature in self.features:
-            for swept in feature.swept_masses(y):
-                change += swept
+            for at_start, gained in feature.masses(self, y):
+                initial, change = initial + at_start, change + gained
         return initial, change
 
     @functools.cached_property
     def initial_mass(self) -> float:
-        """Mass stored in pipes and nodes at the start [kg], without basins."""
+        """Mass stored in pipes and nodes at the start [kg], without that of features."""
         mass, nodes = 0.0, self.tables.nodes
         for k, row in enumerate(self.tables.pipes):
             mass += self.case.law.mass_in_pipe(row, self.profiles[k], self.tables.profile)

@@ -29,13 +29,13 @@ STIFF_RATIO = 3.0  # ratio of steps to those that waves need, above which an imp
 
 
 def checks(model) -> dict[str, Any]:
-    """Facts about pipes, basins, nodes, the step and its cause, the number of steps and the expected run time; SI."""
+    """Facts about pipes, nodes, the step and its cause, the number of steps and the expected run time; SI."""
     rho, viscosity = model.case.properties.density, model.case.properties.viscosity
-    cells = {f"{place}.inside" for place in model.case.patches_with_faces}  # behind patches; no part of the case
     nodes = {
         name: {"elevation": row["elevation"].item(), "pressure": row["pressure"].item(),
                "head": float(model.head(row["pressure"], row["elevation"]))}
-        for name, row in zip(model.node_names, model.tables.nodes, strict=True) if name not in cells
+        for name, row in zip(model.node_names, model.tables.nodes, strict=True)
+        if row["kind"] != rec.PATCH or not name.endswith(".inside")  # behind patches; no part of the case
     }  # fmt: skip
     pipes, unsteady, creeps = {}, model.steady["unsteady"], model.steady["creep"]
     for k, (mesh, row) in enumerate(zip(model.pipes, model.tables.pipes, strict=True)):
@@ -62,7 +62,7 @@ def checks(model) -> dict[str, Any]:
     step, set_by = step_and_reason(model)
     numerics = model.case.numerics
     steps = math.ceil((numerics.end - numerics.start) / step) if step else None
-    full = max((basin.full_rate for basin in model.basins), default=0.0) * (numerics.end - numerics.start)
+    full = max((part.full_rate for part in model.meshed), default=0.0) * (numerics.end - numerics.start)
     steps_if_full = math.ceil(full / numerics.courant) if steps and numerics.courant is not None else 0
     method = method_named(first_method(numerics.method))
     timed = steps is not None and method.explicit
@@ -72,7 +72,7 @@ def checks(model) -> dict[str, Any]:
         facts |= feature.facts(model)
     return {
         "fluid": model.case.properties.plain(), "nodes": nodes, "masses": {}, "bodies": {},
-        "pipes": pipes, "basins": {item.name: basin_facts(item) for item in model.basins},
+        "pipes": pipes,
         "states": model.y_size, "cells": model.all_cells, "step": step, "step_set_by": set_by, "steps": steps,
         "steps_if_full": steps_if_full if steps_if_full > (steps or 0) else None,
         "network": None, "reactions": {}, **facts,
@@ -105,7 +105,7 @@ def cost_notices(model, steps: int | None, set_by: str) -> list[Notice]:
     """
     numerics, start = model.case.numerics, model.case.numerics.start
     explicit = numerics.method != AUTO and method_named(numerics.method).explicit
-    waves = max([*model.wave_rates, *(basin.max_rate(model.start)[0] for basin in model.basins)], default=0.0)
+    waves = max([*model.wave_rates, *(part.max_rate(model.start)[0] for part in model.meshed)], default=0.0)
     if numerics.step is not None:
         waves = 1.0 / numerics.step
     if not explicit or not waves > 0.0 or (numerics.step is not None and step_at_start(model) == numerics.step):
@@ -121,29 +121,6 @@ def cost_notices(model, steps: int | None, set_by: str) -> list[Notice]:
         'method = "auto" or "rodas-5p" with rtol = 1e-6 needs fewer steps'
     )
     return [Notice("cost", "numerics", text, "method", float(count), float(count / ratio))]
-
-
-def basin_facts(basin) -> dict[str, Any]:
-    """Facts about a basin: mesh, waves at the start, walls and sections, and patches.
-
-    Facts of a patch are the length of its faces, and the area of the cells behind them.
-    """
-    mesh, patches = basin.mesh, {}
-    from fvsolve.case.basins import boundary_cells, patch_names
-
-    for name in patch_names(mesh):
-        faces, part = mesh.faces(name).index, basin.part.patches.get(name)
-        patches[name] = {
-            "faces": faces.size, "length": float(mesh.length[faces].sum()),
-            "area": float(mesh.area[boundary_cells(mesh, name)].sum()),
-            "reflects": 1.0 if part is None else basin.reflection(part),
-        }  # fmt: skip
-    return {
-        "physics": basin.part.physics, "cells": basin.n, "path": "grid" if basin.is_grid else "faces",
-        "area": float(mesh.area.sum()), "least_width": float(np.sqrt(mesh.area.min())),
-        **{key: list(limits) for key, limits in basin.ranges().items()}, "memory": basin.memory, "patches": patches,
-        "chains": basin.chain_texts(),
-    }  # fmt: skip
 
 
 def rhs_seconds(model) -> float:
@@ -184,7 +161,7 @@ def step_and_reason(model) -> tuple[float | None, str]:
         rate = float(model.evaluate(numerics.start, model.start, numerics.start)[1][rec.RATE])
     else:  # waves only: implicit steps are not limited by other parts
         own, rate = model.wave_rates, model.wave_rate
-    filling = {basin.name: basin.filling_step() for basin in model.basins}
+    filling = {part.name: part.filling_step() for part in model.meshed}
     if not rate > 0.0 and min(filling.values(), default=np.inf) < np.inf:
         name = min(filling, key=filling.get)
         group = "links" if name in model.case.links else "nodes"
@@ -236,6 +213,6 @@ def fastest_parts(model) -> str:
               if row["kind"] not in (rec.FIXED, rec.JUNCTION, rec.PATCH)]  # fmt: skip
     moving = [name for name, row in zip(model.valve_names, model.tables.valves, strict=True)
               if row["device"] >= 0 and model.tables.devices[row["device"]]["y"] >= 0]  # fmt: skip
-    names = [*(basin.name for basin in model.basins), *stores, *moving]
+    names = [*(part.name for part in model.meshed), *stores, *moving]
     names += [*model.column_names, *(name for feature in model.features for name in feature.fast_parts)]
     return names[0] if len(names) == 1 else f"one of {listing(names)}"

@@ -19,16 +19,8 @@ def fill_probes(draft, probes: list) -> np.ndarray:
         row["mark"] = -1
         if any(feature.probe(draft, probe, row) for feature in draft.features):
             continue
-        if probe.part == "sections":
-            lower_section(draft, row, probe)
-        elif probe.point is not None:
-            lower_basin_point(draft, row, probe)
-        elif probe.part == "nodes" and probe.name in case.meshes:
-            row["kind"], row["index"] = rec.CELL_FIELD, list(case.meshes).index(probe.name)
-            draft.basins[row["index"]].lower_probe(row, probe.quantity, np.zeros(0, int), np.zeros(0))
-        else:
-            part = parts[probe.part][probe.name]
-            lowering_of(type(part)).of(part).probe(draft, probe.name, probe, row)
+        part = parts[probe.part][probe.name]
+        lowering_of(type(part)).of(part).probe(draft, probe.name, probe, row)
     return table
 
 
@@ -37,17 +29,10 @@ def all_probes(case) -> list:
     return [*case.probes, *case.extreme_probes]
 
 
-def lower_basin_point(draft, row, probe) -> None:
-    """Fill the row of a probe at a point of a basin."""
-    row["kind"] = rec.CELL_FIELD
-    cells, weights = cells_at_point(draft, row, probe)
-    draft.basins[row["index"]].lower_probe(row, probe.quantity, cells, weights)
-
-
 def cells_at_point(draft, row, probe) -> tuple[np.ndarray, np.ndarray]:
-    """Cells of a basin that a probe at a point reads, and their weights, after they are written to its row."""
+    """Cells of a mesh that a probe at a point reads, and their weights, after they are written to its row."""
     k = list(draft.case.meshes).index(probe.name)
-    cells, weights = draft.basins[k].points.cell_weights(*probe.point)
+    cells, weights = draft.meshed[k].points.cell_weights(*probe.point)
     row["index"], row["count"], row["cell"] = k, cells.size, len(draft.integers)
     row["weights"] = len(draft.floats)
     draft.integers += cells.tolist()
@@ -55,22 +40,10 @@ def cells_at_point(draft, row, probe) -> tuple[np.ndarray, np.ndarray]:
     return cells, weights
 
 
-def lower_section(draft, row, probe) -> None:
-    """Fill the row of a probe of the flow through a section: its marked faces, and their lengths with signs."""
-    name = draft.case.output.sections[probe.name].basin
-    k = list(draft.case.meshes).index(name)
-    basin = draft.basins[k]
-    chain = basin.sections[probe.name]
-    row["kind"], row["index"], row["count"] = rec.SECTION_FLOW, k, chain.faces.size
-    row["cell"], row["weights"] = len(draft.integers), len(draft.floats)
-    draft.integers += np.searchsorted(basin.marks.faces, chain.faces).tolist()
-    draft.floats += (chain.turn * basin.mesh.length[chain.faces]).tolist()
-
-
 def probe_offsets(draft, start) -> None:
     """Set scale and offset of the probes of nodes and links from the initial steady state.
 
-    Probes of basins and features, and of forces on pipes, do not need them. Also sets the steady pressures of watched
+    Probes of meshes and features, and of forces on pipes, do not need them. Also sets the steady pressures of watched
     quantities along pipes.
     """
     count = len(draft.case.probes)
@@ -83,7 +56,7 @@ def probe_offsets(draft, start) -> None:
         pairs += zip(*feature.probe_rows(), strict=True)
     for row, probe in pairs:
         if row["kind"] >= rec.CELL_FIELD and row["kind"] != rec.PRESSURE_BETWEEN:
-            continue  # basins hold the profile of theirs, the others need none
+            continue  # meshes hold the profile of theirs, the others need none
         if draft.case.law.linear:
             linear_offsets(draft, start, row, probe)
         else:

@@ -33,28 +33,25 @@ class RunData:
     quantities
     accepted : 1 if there is an accepted state, then pressures of nodes and flows of valves there, as in `out`, then all
     these of the state before; see `kernels.node_clusters.begin_accepted`
-    maxima : greatest values of cells of basins over all accepted steps, see `basins.free_surface.surface_maxima`
-    bands : for each basin, first row (of a mesh: first cell) that this thread computes, and the one after its last
+    maxima : greatest values of cells of meshes over all accepted steps, see `MeshedPart.maxima`
+    bands : for each meshed part first row (or first cell) that this thread computes, and the one after its last
     joint : see `kernels.band_exchange`, empty if one thread computes all; sums : see `kernels.stage_sums`
     """
 
     def __init__(self, model: Model) -> None:
         self.model, self.written, self.tables = model, zeros_for_run(model.shapes), model.tables
-        if len(model.tables.walls) > 0 or (model.tables.basins["frame"] >= 0).any():  # the geometry changes with time
-            basins = model.tables.basins.copy()
-            self.tables = model.tables._replace(plane=aligned_zeros(model.tables.plane.size), basins=basins)
-            self.tables.plane[:] = model.tables.plane
         self.clock = self.written.clock[0]
         self.armed, self.marks = self.written.armed, self.written.marks
         self.envelope, self.extremes = self.written.envelope, self.written.extremes
         self.maxima, self.accepted = self.written.maxima, self.written.accepted
         self.features = [feature.run(self) for feature in model.features]
+        for own in self.features:
+            self.tables = self.tables._replace(**own.written_tables())
         self.kept: list = []  # arrays behind handles
         self.replaced = 0  # number of arrays that have been replaced since the start, because they have grown
         self.clock["limit"], self.marks[:] = np.inf, np.nan
         self.use_flags(model.flags)
-        basins = model.tables.basins
-        self.written.bands[1::2] = np.where(basins["nx"] > 0, basins["ny"], basins["n"])  # all
+        self.written.bands[:] = [row for part in model.meshed for row in part.band(0, part.row_count)]  # all
         for array in (self.envelope, self.extremes):
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
 

@@ -485,12 +485,12 @@ class SteadyStart:
 
     def use_start_flows(self, net: np.ndarray) -> None:
         """Replace the flows of dry conduits by those at the start, in the net inflows of nodes [kg/s]."""
-        basins = {basin.name: basin for basin in self.draft.basins}
+        meshed = {part.name: part for part in self.draft.meshed}
         for name, row in zip(self.draft.valve_names, self.valves, strict=True):
             link = self.case.conduits[name]
             if link.kind == "conduit-end":
                 net[row["to_node"]] = 0.0
-                node, flow = row["from_node"], basins[link.conduit].start_flow(link.patch)
+                node, flow = row["from_node"], meshed[link.conduit].start_flow(link.patch)
                 if self.nodes[node]["y"] >= 0:
                     net[node] += row["flow"] - self.draft.fluid.density * flow
                     net[node] *= abs(net[node]) > 1e-12 * self.flow_scale  # without rounding

@@ -13,7 +13,7 @@ def dividing_rate(model, step: float) -> float:
     pipes are all that a given step can be too long for. The rate is that of the step, and at least that of waves in the
     cells of other pipes. step : given step [s]
     """
-    if model.basins or not (model.tables.pipes["cells"] == 0).any():
+    if model.meshed or not (model.tables.pipes["cells"] == 0).any():
         return 0.0
     return max(1.0 / step, float(model.tables.settings["rate"][0]) * (1.0 + 1e-9))
 

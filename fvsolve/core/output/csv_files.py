@@ -250,7 +250,7 @@ class LineSeries:
 
     def __init__(self, folder: Path, model):
         self.folder = folder / "lines"
-        basins = {basin.name: basin for basin in model.basins}
+        basins = {basin.name: basin for basin in model.meshed}
         self.lines = {name: LineSampler(line, basins[line.basin], model.case)
                       for name, line in model.case.output.lines.items()}  # fmt: skip
 

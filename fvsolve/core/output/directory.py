@@ -87,7 +87,7 @@ class RunDirectory:
         _refuse_reserved_names(model.case)
         self.identity = identity(model.case)
         self.history = csv_files.HistoryFile(self.folder / "history.csv", time_column(model.case), probe_columns(model))
-        drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.basins) + len(frames_of(model)) > 0
+        drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.meshed) + len(frames_of(model)) > 0
         self.fields = FieldSeries(self.folder, model) if drawn else None
         self.lines = csv_files.LineSeries(self.folder, model) if model.case.output.lines else None
         if self.folder.exists() and not self.folder.is_dir():

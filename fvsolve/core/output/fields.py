@@ -53,22 +53,22 @@ class FieldSeries:
         self.folder, self.model, self.pieces = folder, model, None
         self.frames = 0
         self.fixed_grids: dict[str, str] = {}  # file name of a part -> `grid_xml` of points that do not move
-        places = {basin.name: np.array(basin.part.position or (0.0, 0.0)) for basin in model.basins}
+        places = {basin.name: np.array(basin.part.position or (0.0, 0.0)) for basin in model.meshed}
         if model.pipes:
             from fvsolve.core.output import network_layout
 
             places = network_layout.plan_positions(model.case, {pipe.name: pipe.length for pipe in model.pipes})
             self.points, self.lines = pipe_geometry(model, places)
             self.owner = points_on_bodies(model, self.points)
-        moving = {basin.name: np.zeros(2) for basin in model.basins if basin.part.on is not None}
+        moving = {basin.name: np.zeros(2) for basin in model.meshed if basin.part.on is not None}
         self.places = places | moving  # a basin on a body is drawn in world axes
         carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
         units = {basin.name: basin.units | basin.units_of_maxima | (carried if basin.scalars else {})
-                 for basin in model.basins}  # fmt: skip
-        self.basins = {
-            basin.name: (*basin_geometry(basin, self.places[basin.name]), units[basin.name]) for basin in model.basins
+                 for basin in model.meshed}  # fmt: skip
+        self.meshes = {
+            basin.name: (*basin_geometry(basin, self.places[basin.name]), units[basin.name]) for basin in model.meshed
         }
-        self.references = {basin.name: reference_xml(basin) for basin in model.basins}
+        self.references = {basin.name: reference_xml(basin) for basin in model.meshed}
         self.drawn = next((own for feature in model.features if (own := feature.drawn(model)) is not None), None)
         self.pipes = [pipe.name for pipe in model.pipes]
         self.units = FIELD_UNITS | carried
@@ -87,7 +87,7 @@ class FieldSeries:
         """
         index = self.folder / "fields.pvd"
         lines = index.read_text(encoding="utf-8").splitlines() if index.is_file() else []
-        n = frames * (len(self.basins) + (1 if self.pipes else 0) + (1 if self.drawn else 0))
+        n = frames * (len(self.meshes) + (1 if self.pipes else 0) + (1 if self.drawn else 0))
         entries = [f"{line}\n" for line in lines if line.startswith("<DataSet")][:n]
         matches = [FILE_ATTRIBUTE.search(line) for line in entries]
         if len(entries) < n or not all(match and (self.folder / match[1]).is_file() for match in matches):
@@ -113,13 +113,13 @@ class FieldSeries:
 
     def write(self, t: float, frame: dict) -> None:
         """Write the frame at time `t` [s]; frame : result of `RunData.fields`."""
-        for part, basin in enumerate(self.model.basins, 1):
+        for part, basin in enumerate(self.model.meshed, 1):
             self._write_basin(t, part, basin, frame)
         if self.drawn:
             file, (points, speed) = f"fields/{self.drawn.name}-{self.frames:06d}.vtu", self.drawn.at(frame["out"])
             blocks, grid = {**self.drawn.blocks, "speed": [speed]}, [("line", self.drawn.lines)]
             write_frame(self.folder / file, grid_xml(points, grid), blocks, {"speed": "m/s"})
-            self._add_to_collection(t, len(self.basins) + 1, file)
+            self._add_to_collection(t, len(self.meshes) + 1, file)
         if self.pipes:
             file = f"fields/{self.frames:06d}.vtu"
             data = {name: [np.concatenate([frame[pipe][name] for pipe in self.pipes])] for name in self.units}
@@ -132,7 +132,7 @@ class FieldSeries:
 
     def _write_basin(self, t: float, part: int, basin, frame: dict) -> None:
         """Write the fields of a basin at time `t` [s]; part : its number in the index; frame : as for `write`."""
-        points, cells, units = self.basins[basin.name]
+        points, cells, units = self.meshes[basin.name]
         file, values = f"fields/{basin.name}-{self.frames:06d}.vtu", frame[basin.name]
         if self.pieces is not None and basin.name in self.pieces.rows:
             file = f"fields/{basin.name}-{self.frames:06d}.pvtu"
@@ -249,7 +249,7 @@ def pipe_geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.nd
     from fvsolve.core.output import network_layout
 
     places = {name: plan[network_layout.place(name)] for name in model.node_names}
-    for basin in model.basins:
+    for basin in model.meshed:
         from fvsolve.case.basins import patch_names
 
         for patch in patch_names(basin.mesh):
@@ -386,7 +386,7 @@ def write_piece_of_rank(comm, model, path: str, name: str, rows, origin, layouts
 
     layouts : quantity -> (shape of the value of a cell, dtype); other arguments as in `write_piece`
     """
-    basin = next(item for item in model.basins if item.name == name)
+    basin = next(item for item in model.meshed if item.name == name)
     n = rows[comm.rank + 1] - rows[comm.rank]
     values = {key: np.empty((n * basin.mesh.grid.nx, *shape), kind) for key, (shape, kind) in layouts.items()}
     for item in values.values():

@@ -25,7 +25,7 @@ BLOCK = 4096  # cells at once: limits the memory of pairs of cells and pixels
 
 def write_grids(folder: Path, model: Any, t: float, maxima: dict[str, dict[str, np.ndarray]]) -> None:
     """Write all grids of a case. t : end of the run [s]; maxima : basin -> quantity -> float64[n] in SI"""
-    basins = {basin.name: basin for basin in model.basins}
+    basins = {basin.name: basin for basin in model.meshed}
     for name, spec in model.case.output.grids.items():
         (folder / "grids").mkdir(exist_ok=True)
         grid = PixelGrid(basins[spec.basin], spec)

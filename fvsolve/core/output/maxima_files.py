@@ -14,7 +14,7 @@ from fvsolve.file_replacement import write_file
 
 def write_maxima(folder: Path, model, maxima: dict[str, dict[str, np.ndarray]]) -> None:
     """Write maxima-BASIN.vtu of each basin. maxima : basin -> quantity -> float64[n] in SI"""
-    for basin in model.basins:
+    for basin in model.meshed:
         if basin.name in maxima:
             points, cells = basin_geometry(basin, np.array(basin.part.position or (0.0, 0.0)))
             blocks = {key: split_blocks(values, cells) for key, values in maxima[basin.name].items()}

@@ -86,8 +86,8 @@ def rows_of(model, count: int) -> dict:
     count : number of ranks; the values are int64[count + 1]
     """
     partition = make_partition(model, count)
-    divided = zip(partition.basins, partition.firsts, strict=True)
-    return {model.basins[b].name: rows for b, rows in divided if model.basins[b].is_grid}
+    divided = zip(partition.divided, partition.firsts, strict=True)
+    return {part.name: rows for part, rows in divided if part.is_grid}
 
 
 def serve_rank(make: Callable) -> None:

@@ -78,7 +78,7 @@ def energy_terms(model: Model) -> EnergyTerms | None:
         np.column_stack([source, power_rows]).reshape(-1), signs, nodes,
         np.array([spread(model, int(i)) for i in nodes], dtype=np.float64),
         np.column_stack([held, stored_rows]).reshape(-1), holding_signs,
-        sum(basin.energy_of_waves(basin.deviations(model.start)) for basin in model.basins), rounding,
+        sum(part.energy_of_waves(part.deviations(model.start)) for part in model.meshed), rounding,
         calls_without_network(model) if (power_rows[nodes[source] < 0] >= accounts.network_rows).all()
         else model.functions.calls,
     )  # fmt: skip

@@ -19,7 +19,7 @@ class HeldModel:
     """Copy of a model with some inputs held at constant values; the values can be changed.
 
     model : the copy; names : names of the inputs
-    fixed : True if a loop of the copy depends on the values from its start: limits of scalars, step limits of basins
+    fixed : True if a loop of the copy depends on the values from its start: limits of scalars, step limits of meshes
     Raises FvsolveError for an unknown input.
     """
 
@@ -31,7 +31,7 @@ class HeldModel:
                 hint = f'; did you mean "{near}"?' if near else f"; expected one of {', '.join(known)}"
                 raise FvsolveError(f"no input named {show(name)}{hint}")
         self.targets, tables = [known[name] for name in self.names], model.tables
-        self.fixed = bool(self.targets) and (bool(model.basins) or any(target.scalar >= 0 for target in self.targets))
+        self.fixed = bool(self.targets) and (bool(model.meshed) or any(target.scalar >= 0 for target in self.targets))
         schedules, nodes, first = tables.schedules.copy(), tables.nodes.copy(), len(tables.pieces)
         used = [at for target in self.targets if target.held is None
                 for at in (target.schedule, *(part[0] for part in target.parts))]  # fmt: skip

@@ -1,7 +1,7 @@
 """Partition of the state of a model into bands of rows, a band for each thread, and the data that bands exchange.
 
-A band steps its own rows of every basin that can be divided. All other states are stepped by every band. Values of
-neighbouring rows come from the band that owns them. In large basins a band forms the stage sums of a Runge-Kutta step
+A band steps its own rows of every mesh that can be divided. All other states are stepped by every band. Values of
+neighbouring rows come from the band that owns them. In large meshes a band forms the stage sums of a Runge-Kutta step
 in blocks of rows that fit into the processor cache.
 """
 
@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels import stage_sums
 from fvsolve.core.model import Model
 from fvsolve.core.steppers import automatic
@@ -19,34 +18,39 @@ from fvsolve.errors import FvsolveError, Notice, listing
 
 @dataclass(frozen=True)
 class Partition:
-    """Basins of a model divided into bands of rows.
+    """Parts of a model divided into bands of rows.
 
     count : number of bands
-    basins : numbers of the divided basins
-    firsts : int64[basins, count + 1]  for each divided basin the first row of each band, then the number of rows
+    parts : numbers of the divided parts among all meshed parts
+    firsts : int64[parts, count + 1]  for each divided part the first row of each band, then the number of rows
     """
 
     model: Model
     count: int
-    basins: tuple[int, ...]
+    parts: tuple[int, ...]
     firsts: np.ndarray
 
     @property
     def sum_count(self) -> int:
         """Number of partial sums of the error norm of a step, over all bands.
 
-        There is one for each range of `common_states`, and one for each row of each quantity of the divided basins.
+        There is one for each range of `common_states`, and one for each row of each quantity of the divided parts.
         """
-        rows = [row_count(self.model, b) * quantities(self.model, b) for b in self.basins]
+        rows = [part.row_count * part.states_per_cell for part in self.divided]
         return len(self.common_states()) + sum(rows)
+
+    @property
+    def divided(self) -> list:
+        """Divided parts, as `MeshedPart`."""
+        meshed = self.model.meshed
+        return [meshed[b] for b in self.parts]
 
     def common_states(self) -> list[tuple[int, int]]:
         """Ranges (first, last + 1) of the states that every band steps."""
         runs, start = [], 0
-        for b in sorted(self.basins, key=lambda b: self.model.tables.basins[b]["y"]):
-            row = self.model.tables.basins[b]
-            runs.append((start, int(row["y"])))
-            start = int(row["y"] + quantities(self.model, b) * row["n"])
+        for part in sorted(self.divided, key=lambda part: part.first_state):
+            runs.append((start, part.first_state))
+            start = part.first_state + part.states_per_cell * part.n
         runs.append((start, self.model.y_size))
         return [run for run in runs if run[1] > run[0]] or [(0, 0)]
 
@@ -58,48 +62,36 @@ class Partition:
         """
         alike = self.common_states()
         blocks, first = [(*run, m, 1, run[1] - run[0]) for m, run in enumerate(alike)], len(alike)
-        for rows, b in zip(self.firsts, self.basins, strict=True):
-            for q in range(quantities(self.model, b)):
-                states = states_of_rows(self.model, b, q, int(rows[k]), int(rows[k + 1]))
-                blocks.append((*states, first + int(rows[k]), int(rows[k + 1] - rows[k]), row_size(self.model, b)))
-                first += row_count(self.model, b)
+        for rows, part in zip(self.firsts, self.divided, strict=True):
+            for q in range(part.states_per_cell):
+                states = part.states_of_rows(q, int(rows[k]), int(rows[k + 1]))
+                blocks.append((*states, first + int(rows[k]), int(rows[k + 1] - rows[k]), part.row_size))
+                first += part.row_count
         return np.array(blocks, dtype=np.int64)
 
     def maxima_rows(self, k: int) -> list[slice]:
-        """Ranges of the array `maxima` that band k writes in the divided basins."""
-        ranges = []
-        for rows, b in zip(self.firsts, self.basins, strict=True):
-            basin, (begin, stop) = self.model.tables.basins[b], rows[k : k + 2].tolist()
-            at, size, n = int(basin["maxima"]), int(basin["maxima_row"]), int(basin["n"])
-            if at >= 0 and basin["nx"] > 0:
-                ranges.append(slice(at + size * begin, at + size * stop))
-            elif at >= 0:  # a row of each quantity
-                begin, stop = cells_of_rows(self.model, b, begin, stop)
-                ranges += [slice(at + q * n + begin, at + q * n + stop) for q in range(size // n)]
-        return ranges
+        """Ranges of the array `maxima` that band k writes in the divided parts."""
+        pairs = zip(self.firsts, self.divided, strict=True)
+        return [own for rows, part in pairs for own in part.maxima_of_rows(*rows[k : k + 2].tolist())]
 
     def bands(self, k: int) -> np.ndarray:
-        """First row and last row + 1 of band k in each basin, cells for meshes that are not grids : int64[2 basins].
+        """First row and last row + 1 of band k in each part, cells for meshes that are not grids : int64[2 parts].
 
-        An undivided basin has all its rows.
+        An undivided part has all its rows.
         """
-        table = self.model.tables.basins
-        rows_of = np.zeros((len(table), 2), dtype=np.int64)
-        rows_of[:, 1] = np.where(table["nx"] > 0, table["ny"], table["n"])
-        for rows, b in zip(self.firsts, self.basins, strict=True):
-            own = int(rows[k]), int(rows[k + 1])
-            rows_of[b] = own if table[b]["nx"] > 0 else cells_of_rows(self.model, b, *own)
-        return rows_of.ravel()
+        rows_of = [part.band(0, part.row_count) for part in self.model.meshed]
+        for rows, b, part in zip(self.firsts, self.parts, self.divided, strict=True):
+            rows_of[b] = part.band(int(rows[k]), int(rows[k + 1]))
+        return np.array(rows_of, dtype=np.int64).ravel()
 
     def states(self, k: int) -> np.ndarray:
         """Ranges of states that band k reads from other bands : int64[r, 3], (other band, first, last + 1)."""
         parts = []
-        for rows, b in zip(self.firsts, self.basins, strict=True):
-            basin = self.model.tables.basins[b]
-            near = np.arange(*cells_of_rows(self.model, b, *rows_read(self.model, b, int(rows[k]), int(rows[k + 1]))))
-            cells, size = np.concatenate([near, *common_cells(self.model, b)]), row_size(self.model, b)
-            for q in range(quantities(self.model, b)):
-                parts.append(runs(cells, size, rows, k, int(basin["y"] + q * basin["n"])))
+        for rows, part in zip(self.firsts, self.divided, strict=True):
+            near = np.arange(*part.cells_of_rows(*part.rows_read(int(rows[k]), int(rows[k + 1]))))
+            cells = np.concatenate([near, *part.common_cells(self.model.tables)])
+            for q in range(part.states_per_cell):
+                parts.append(runs(cells, part.row_size, rows, k, part.first_state + q * part.n))
         return np.concatenate(parts)
 
     def flows(self, k: int) -> np.ndarray:
@@ -108,81 +100,23 @@ class Partition:
         Each row: other band, first and last + 1 index in the array `work`.
         """
         parts = [np.zeros((0, 3), dtype=np.int64)]
-        for rows, b in zip(self.firsts, self.basins, strict=True):
-            basin = self.model.tables.basins[b]
-            nx, ny, at = int(basin["nx"]), int(basin["ny"]), int(basin["through"])
-            if at < 0:
-                continue
-            if nx > 0:
-                row = np.concatenate([np.arange(ny), np.arange(ny), np.zeros(nx, int), np.full(nx, ny - 1)])
-            else:
-                from fvsolve.core.basins.cell_sides import BLOCK
-
-                mesh = self.model.basins[b].mesh
-                row = mesh.left[mesh.inner :] // BLOCK
-            owner = np.searchsorted(rows, row, "right") - 1
-            parts.append(merged_runs(np.arange(row.size), owner, k, at))
+        for rows, part in zip(self.firsts, self.divided, strict=True):
+            at, row = part.boundary_rows()
+            if at >= 0:
+                owner = np.searchsorted(rows, row, "right") - 1
+                parts.append(merged_runs(np.arange(row.size), owner, k, at))
         return np.concatenate(parts)
 
     @property
     def exchanges_flows(self) -> bool:
-        """True if a divided basin has an open boundary."""
-        return bool((self.model.tables.basins["through"][[*self.basins]] >= 0).any())
-
-
-def quantities(model: Model, b: int) -> int:
-    """Number of states in each cell of basin number b, with transported scalars and the states of the soil."""
-    basin = model.basins[b]
-    return len(basin.quantities) + len(basin.scalars) + basin.soil_states
-
-
-def row_size(model: Model, b: int) -> int:
-    """Number of cells of a row of basin b; a row of a mesh that is not a grid is a block of cells, see `cell_sides`."""
-    from fvsolve.core.basins.cell_sides import BLOCK
-
-    return int(model.tables.basins[b]["nx"]) or BLOCK
-
-
-def row_count(model: Model, b: int) -> int:
-    """Number of rows of basin b, see `row_size`."""
-    return -(-int(model.tables.basins[b]["n"]) // row_size(model, b))
-
-
-def cells_of_rows(model: Model, b: int, first: int, stop: int) -> tuple[int, int]:
-    """(first, last + 1) of the cells of the rows from `first` to `stop` - 1 of basin b."""
-    size, n = row_size(model, b), int(model.tables.basins[b]["n"])
-    return min(first * size, n), min(stop * size, n)
-
-
-def rows_read(model: Model, b: int, first: int, stop: int) -> tuple[int, int]:
-    """(first, last + 1) of the rows of basin b whose values the rates of the rows from `first` to `stop` - 1 read."""
-    if model.tables.basins[b]["nx"] > 0:
-        from fvsolve.core.basins.boundary_cells import BAND_MARGIN
-
-        return max(first - BAND_MARGIN, 0), min(stop + BAND_MARGIN, row_count(model, b))
-    need = model.basins[b].blocks_needed  # rates read values at sides, and these read the cells next to them
-    sides = int(np.searchsorted(need, first, "right")), int(need[stop - 1])
-    return int(np.searchsorted(need, sides[0], "right")), int(need[sides[1] - 1])
-
-
-def common_cells(model: Model, b: int):
-    """Yield the numbers of the cells of basin b that all bands read: an array for each patch and probe in cells."""
-    from fvsolve.core.basins.lower_pattern import cells_at_faces  # loads scipy
-
-    integers = model.tables.integers
-    for patch in model.tables.patches[model.tables.patches["basin"] == b]:
-        yield integers[patch["first"] : patch["first"] + patch["count"]]
-        if patch["closure"] != rec.NO_CLOSURE:
-            yield cells_at_faces(integers, patch)
-    probes = model.tables.probes
-    for probe in probes[np.isin(probes["kind"], (rec.CELL_FIELD, rec.CELL_SCALAR)) & (probes["index"] == b)]:
-        yield integers[probe["cell"] : probe["cell"] + probe["count"]]
+        """True if a divided part has an open boundary."""
+        return any(part.boundary_rows()[0] >= 0 for part in self.divided)
 
 
 def runs(cells: np.ndarray, size: int, rows: np.ndarray, k: int, at: int) -> np.ndarray:
     """Ranges of states of the cells outside band k : int64[r, 3], as `merged_runs` returns them.
 
-    cells : numbers of cells of a basin; size : cells in a row; rows : first row of each band; at : state of cell 0
+    cells : numbers of cells of a mesh; size : cells in a row; rows : first row of each band; at : state of cell 0
     """
     cells = np.unique(cells)
     return merged_runs(cells, np.searchsorted(rows, cells // size, "right") - 1, k, at)
@@ -203,13 +137,13 @@ def merged_runs(places: np.ndarray, owner: np.ndarray, k: int, at: int) -> np.nd
 
 
 def make_partition(model: Model, count: int) -> Partition:
-    """Partition of the divisible basins of a model into `count` bands of about equal numbers of rows."""
-    basins = tuple(b for b, basin in enumerate(model.basins) if not basin.undivided_reason)
-    rows = np.array([row_count(model, b) for b in basins], dtype=np.int64)
-    return Partition(model, count, basins, np.arange(count + 1) * rows[:, None] // count)
+    """Partition of the divisible parts of a model into `count` bands of about equal numbers of rows."""
+    divided = {b: part for b, part in enumerate(model.meshed) if not part.undivided_reason}
+    rows = np.array([part.row_count for part in divided.values()], dtype=np.int64)
+    return Partition(model, count, tuple(divided), np.arange(count + 1) * rows[:, None] // count)
 
 
-READ_ALL_CELLS = ("volume", "wet_area", "infiltration", "infiltrated")  # quantities of whole basins
+READ_ALL_CELLS = ("volume", "wet_area", "infiltration", "infiltrated")  # quantities of whole meshes
 EXPLICIT_ONLY = "only explicit methods can be distributed over threads"
 
 
@@ -226,40 +160,35 @@ def single_thread_reason(model: Model) -> str:
     for probe in (*model.probes, *model.watched):
         if (probe.name in meshes and probe.quantity in READ_ALL_CELLS) or probe.part == "sections":
             return f"the probe {probe.text} reads all cells"
-    if not model.basins:
+    if not model.meshed:
         return "the case has no basin; only rows of basins are distributed over threads"
-    return "" if not all(basin.undivided_reason for basin in model.basins) else undivided_basins(model)
+    return "" if not all(part.undivided_reason for part in model.meshed) else undivided_parts(model)
 
 
-def undivided_basins(model: Model) -> str:
-    """Text with the basins that every thread steps completely, and the reasons."""
-    return "; ".join(f"{basin.name}: {basin.undivided_reason}" for basin in model.basins if basin.undivided_reason)
+def undivided_parts(model: Model) -> str:
+    """Text with the parts that every thread steps completely, and the reasons."""
+    return "; ".join(f"{part.name}: {part.undivided_reason}" for part in model.meshed if part.undivided_reason)
 
 
 def divisible_rows(model: Model) -> dict:
     """Data of the command `check` on threads, as a dict.
 
-    rows : rows of each divisible basin, see `row_size`; texts : these with their unit, such as "50 rows"
-    whole : reason for each undivided basin; most : greatest number of threads
+    rows : rows of each divisible part; texts : these with their unit, such as "50 rows"
+    whole : reason for each undivided part; most : greatest number of threads
     why : reason why only one thread is possible, or ""
     """
-    from fvsolve.core.basins.cell_sides import BLOCK
-
     reason = single_thread_reason(model)
-    divided = [b for b, basin in enumerate(model.basins) if not basin.undivided_reason]
-    rows = {} if reason else {model.basins[b].name: row_count(model, b) for b in divided}
-    units = {
-        model.basins[b].name: "row{}" if model.basins[b].is_grid else f"block{{}} of {BLOCK} cells" for b in divided
-    }
-    texts = {name: f"{count} {units[name].format('s' * (count > 1))}" for name, count in rows.items()}
-    undivided = {basin.name: basin.undivided_reason for basin in model.basins if basin.undivided_reason}
+    divided = [] if reason else [part for part in model.meshed if not part.undivided_reason]
+    rows = {part.name: part.row_count for part in divided}
+    texts = {part.name: part.row_text(part.row_count) for part in divided}
+    undivided = {part.name: part.undivided_reason for part in model.meshed if part.undivided_reason}
     return {"rows": rows, "texts": texts, "whole": undivided, "most": min(rows.values(), default=1), "why": reason}
 
 
 def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
     """Number of threads that can step a model, at most `threads`, and notices on threads.
 
-    Raises FvsolveError if a divisible basin has fewer rows (or blocks of cells of a mesh) than threads.
+    Raises FvsolveError if a divisible part has fewer rows (or blocks of cells of a mesh) than threads.
     """
     if threads == 1:
         return 1, []
@@ -271,59 +200,51 @@ def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
         counts = listing(f"{name} has {divisible['texts'][name]}" for name in few)
         text = f"threads = {threads}: {counts}, and each thread needs at least one"
         raise FvsolveError(f"{text}; expected at most {divisible['most']}")
-    text = f"each thread computes all rows of these basins: {undivided_basins(model)}"
+    text = f"each thread computes all rows of these basins: {undivided_parts(model)}"
     return threads, [Notice("threads", "numerics", text, "threads")] if divisible["whole"] else []
 
 
 # Cells of a block of `stage_sums`: their arrays and the work arrays of the rates fit into a second-level cache.
 CACHED_CELLS = 4096
-LEAST_STATES = 2**17  # least number of states of a basin: smaller basins stay in the second-level cache during a step
+LEAST_STATES = 2**17  # least number of states of a mesh: smaller ones stay in the second-level cache during a step
 
 
 def blocked_sums(cut: Partition, k: int) -> np.ndarray:
-    """Table `sums` of `kernels.stage_sums` for band k : int64[n]; empty if no basin uses blocks.
+    """Table `sums` of `kernels.stage_sums` for band k : int64[n]; empty if no mesh uses blocks.
 
-    A basin uses blocks if it has at least 2^17 states and `forms_stages` is True.
+    A mesh uses blocks if it has at least 2^17 states and `forms_stages` is True.
     """
     model = cut.model
-    forming = [b for b in cut.basins if model.basins[b].forms_stages]
-    blocked_basins = [b for b in forming if quantities(model, b) * model.basins[b].n >= LEAST_STATES]
-    if not blocked_basins:
+    parts = model.meshed
+    forming = [b for b in cut.parts if parts[b].forms_stages]
+    blocked = [b for b in forming if parts[b].states_per_cell * parts[b].n >= LEAST_STATES]
+    if not blocked:
         return np.zeros(0, dtype=np.int64)
-    from fvsolve.core.basins.boundary_cells import BAND_MARGIN
-
     others, common_cells, edges = list(cut.common_states()), [], []
-    for rows, b in zip(cut.firsts, cut.basins, strict=True):
-        first, stop = (int(row) for row in rows[k : k + 2])
-        for q in range(quantities(model, b)):
-            if b not in blocked_basins:
-                others.append(states_of_rows(model, b, q, first, stop))
+    for rows, b in zip(cut.firsts, cut.parts, strict=True):
+        part, (first, stop) = parts[b], (int(row) for row in rows[k : k + 2])
+        for q in range(part.states_per_cell):
+            if b not in blocked:
+                others.append(part.states_of_rows(q, first, stop))
                 continue
-            edges.append(states_of_rows(model, b, q, first, min(first + BAND_MARGIN, stop)))
-            edges.append(states_of_rows(model, b, q, max(stop - BAND_MARGIN, first), stop))
-            common_cells += cells_at(model, b, q, first, stop)
-    head = np.zeros(stage_sums.HEAD + len(model.basins), dtype=np.int64)
+            edges.append(part.states_of_rows(q, first, min(first + part.margin, stop)))
+            edges.append(part.states_of_rows(q, max(stop - part.margin, first), stop))
+            common_cells += cells_at(model, part, q, first, stop)
+    head = np.zeros(stage_sums.HEAD + len(parts), dtype=np.int64)
     head[[stage_sums.OTHERS, stage_sums.CHECKED, stage_sums.EDGES]] = len(others), len(common_cells), len(edges)
-    head[stage_sums.BASINS], head[stage_sums.CELLS] = len(model.basins), CACHED_CELLS
-    head[[stage_sums.HEAD + b for b in blocked_basins]] = 1
+    head[stage_sums.BASINS], head[stage_sums.CELLS] = len(parts), CACHED_CELLS
+    head[[stage_sums.HEAD + b for b in blocked]] = 1
     return np.concatenate([head, np.array([*others, *common_cells, *edges], dtype=np.int64).ravel()])
 
 
-def states_of_rows(model, b: int, q: int, first: int, stop: int) -> tuple[int, int]:
-    """(first state, last state + 1) of the rows from `first` to `stop` - 1 of quantity q of basin b."""
-    basin, (begin, end) = model.tables.basins[b], cells_of_rows(model, b, first, stop)
-    at = int(basin["y"] + q * basin["n"])
-    return at + begin, at + end
-
-
-def cells_at(model, b: int, q: int, first: int, stop: int) -> list[tuple[int, int]]:
+def cells_at(model, part, q: int, first: int, stop: int) -> list[tuple[int, int]]:
     """Ranges (first, last + 1) of states of cells that all bands read, within the rows from `first` to `stop` - 1.
 
-    b : number of the basin; q : number of the quantity
+    part : a `MeshedPart`; q : number of the quantity
     """
-    begin, end = states_of_rows(model, b, q, first, stop)
-    at = begin - int(model.tables.basins[b]["nx"]) * first
-    cells = at + np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *common_cells(model, b)]))
+    begin, end = part.states_of_rows(q, first, stop)
+    at = part.first_state + q * part.n
+    cells = at + np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *part.common_cells(model.tables)]))
     cells = cells[(cells >= begin) & (cells < end)]
     if not cells.size:
         return []

@@ -34,7 +34,7 @@ LEDGER_TOLERANCE = 1e-8  # greatest remainder of a ledger, relative to its large
 
 
 class RunChecks:
-    """Checks during a run: wave rates of basins, size of the states, height of sloshing modes.
+    """Checks during a run: wave rates of meshes, size of the states, height of sloshing modes.
 
     largest : float64[n]  allowed size of each state: 1e6 times its `forcing_sizes`. In cells these are the largest of
     the range of initial values, the range of the schedules, and the Joukowsky jump if the initial flows stop
@@ -45,7 +45,7 @@ class RunChecks:
         self.run_data, self.model = run_data, run_data.model
         model = self.model
         self.energy = EnergyWatch(run_data, has_ranks)
-        self.moving = model.basins if model.case.numerics.step is not None else []
+        self.moving = model.meshed if model.case.numerics.step is not None else []
         self.rates: dict[str, float] = {}
         self.predicted = initial_step_limits(model, run_data)
         self.step_doubling = StepDoubling(run_data)
@@ -72,9 +72,9 @@ class RunChecks:
         return np.array(np.broadcast_to(self.largest, self.model.y_size)) if self.predicted else np.zeros(0)
 
     def check(self, t: float, y: np.ndarray) -> str:
-        """Check state y at time t [s], and update the wave rates of basins; returns the reason to stop, or ""."""
-        for basin in self.moving:
-            self.rates[basin.name] = max(self.rates.get(basin.name, 0.0), basin.max_rate(y)[0])
+        """Check state y at time t [s], and update the wave rates of meshes; returns the reason to stop, or ""."""
+        for part in self.moving:
+            self.rates[part.name] = max(self.rates.get(part.name, 0.0), part.max_rate(y)[0])
         if reason := self.sloshing.check(t, y):
             return reason
         ratio = np.abs(y) / self.largest

@@ -331,7 +331,7 @@ class RunLoop:
             if status == rec.NO_SOLUTION and index >= 0 and self.out[model.layout["supply"] + index] >= 0.0:
                 text = NO_WAY_OUT if self.out[model.layout["supply"] + index] > 0.0 else NO_BALANCE
             if status == rec.NO_WEIGHT:
-                waters = [*(basin.name for basin in model.basins), *model.node_names]
+                waters = [*(part.name for part in model.meshed), *model.node_names]
                 names["name"] = waters[index].removesuffix(".inside")
             elif status == rec.NO_COOLANT:
                 from fvsolve.core.kernels.scalar_transport import GREATEST_RISE
@@ -348,7 +348,7 @@ class RunLoop:
         return text.format(**names)
 
     def demand_above_outflow(self, index: int) -> dict[str, str]:
-        """Names and values of a node that draws more than the critical outflow of the conduits there; empty for others.
+        """Names and values of a node that draws more than the critical outflow of its links; empty for others.
 
         index : number of a node in its cluster, which is solved at once
         """
@@ -357,12 +357,11 @@ class RunLoop:
         for cluster in tables.clusters:
             nodes = tables.integers[cluster["first_node"] : cluster["first_node"] + cluster["nodes"]]
             for i in nodes[self.out[model.layout["supply"] + nodes] < 0.0] if index in nodes else ():
-                ends = [p for p in tables.patches if p["valve"] >= 0 and tables.valves["from_node"][p["valve"]] == i]
-                ends = [(model.basins[p["basin"]], p) for p in ends]
+                limits = [limit for own in self.run_data.features for limit in own.critical_outflows(i)]
                 joined = sum(np.count_nonzero(t[end] == i) for t in links for end in ("from_node", "to_node"))
-                if joined != len(ends) or not all(hasattr(basin, "greatest_outflow") for basin, _ in ends):
+                if joined != len(limits):
                     continue
-                available = sum(basin.greatest_outflow(p, self.run_data.written.work) for basin, p in ends)
+                available = sum(limits)
                 demand = -self.out[model.layout["supply"] + i] / model.case.properties.density
                 if demand > available:
                     found = {"name": model.node_names[i]}
@@ -447,11 +446,11 @@ def longest_step(model: Model) -> float:
     """Longest step [s]; infinite if waves, or a given step, set all steps.
 
     Under error control it resolves schedules and delay lines (the inverse of their greatest wave rate). With a Courant
-    number it is that of basins that start dry, see `filling_step`.
+    number it is that of meshes that start dry, see `filling_step`.
     """
     numerics = model.case.numerics
     if numerics.courant is not None:
-        return min([NO_LIMIT, *(numerics.courant * basin.filling_step() for basin in model.basins)])
+        return min([NO_LIMIT, *(numerics.courant * part.filling_step() for part in model.meshed)])
     if numerics.rtol is None:
         return NO_LIMIT
     others = model.tables.pipes["cells"] == 0

@@ -11,17 +11,7 @@ from fvsolve.core.solve.run_up import RunUpTable, run_up_table
 from fvsolve.errors import Notice, listing
 
 INTEGRATION_TIMES = 10001  # times at which a scheduled flow is integrated, beside its own
-HELD = (rec.DISCHARGE, rec.LINKED, rec.INTERIOR)  # closures of patches whose outflow is held at critical flow
 UNRECORDED = np.array([[np.inf], [np.nan], [-np.inf], [np.nan]])  # extremes before the first record
-
-
-HELD_TEXTS = (  # of a scheduled outflow, and of an outflow through links or from an interior patch
-    ("the scheduled outflow", "less than scheduled have left; give less outflow, or `stage` or `rating`"),
-    (
-        "the flow drawn from it",
-        "were added to meet it (`made_up` in the mass balance); draw less, or widen the patch",
-    ),
-)
 
 
 @dataclass(frozen=True)
@@ -113,11 +103,11 @@ class Summary:
         return 1e9 * self.processor / max(1, self.steps * max(1, self.cells))
 
 
-def find_marks(run_data: RunData) -> list[Mark]:
+def find_marks(run_data: RunData, of_features: list[Mark]) -> list[Mark]:
     """First time of each condition outside the model's validity, at each place.
 
     Pressures below vapour pressure are left out under a density law that models cavities. Overflow of tanks is always
-    left out, because the mass ledger contains it.
+    left out, because the mass ledger contains it. of_features : marks that replace "dry" at the same places
     """
     model, marks = run_data.model, run_data.marks
     if np.isnan(marks).all():
@@ -126,8 +116,6 @@ def find_marks(run_data: RunData) -> list[Mark]:
     kinds = [("below vapor pressure", f"links.{pipe.name}") for pipe in pipes]
     kinds += [(kind, f"nodes.{name}") for kind in ("below vapor pressure", "dry", "spilling") for name in nodes]
     kinds = [(kind, place.removesuffix(".inside")) for kind, place in kinds]
-    for node in model.tables.patches["node"][np.isin(model.tables.patches["closure"], HELD)]:
-        kinds[len(pipes) + len(nodes) + node] = "", ""  # of `held_discharges`
     kinds += [("stopped dead", f"links.{name}") for name in model.column_names]
     kinds += [mark for feature in model.features for mark in feature.marks]
     kinds += [("outside its curve", f"links.{name}") for name, *_ in model.devices]
@@ -148,36 +136,15 @@ def find_marks(run_data: RunData) -> list[Mark]:
         ),
         "dry": "no water is left for the outflow; the missing water is added (`made_up` in the mass balance)",
     }
+    explained = {mark.place for mark in of_features}
     found = [(*kinds[k], float(marks[k])) for k in np.flatnonzero(np.isfinite(marks[: len(kinds)]))]
     return [
         Mark(kind, place, time, f"{place.split('.', 1)[1]}: {texts[kind]}")
         for kind, place, time in found
-        if kind in texts and not (kind == "below vapor pressure" and model.cavitates)
+        if kind in texts
+        and not (kind == "below vapor pressure" and model.cavitates)
+        and not (kind == "dry" and place in explained)
     ]
-
-
-def held_discharges(run_data: RunData, start: float, t: float, entered: np.ndarray) -> list[Mark]:
-    """Marks of patches whose scheduled outflow, or that of their links, is more than critical flow, which leaves.
-
-    start, t : times of start and end [s]; entered : float64[nodes]  mass that has entered at each node [kg]
-    """
-    model, marks = run_data.model, []
-    times = run_data.marks[len(model.pipes) + len(model.node_names) :]
-    for row in model.tables.patches[np.isin(model.tables.patches["closure"], HELD)]:
-        name, time = model.node_names[row["node"]].removesuffix(".inside"), float(times[row["node"]])
-        if np.isfinite(time):
-            basin, _, patch = name.partition(".")
-            volume, linked = (
-                float(entered[row["node"]]) / model.case.properties.density,
-                row["closure"] != rec.DISCHARGE,
-            )
-            if not linked:
-                volume -= scheduled_volume(model.case.nodes[basin].patches[patch].discharge, start, t)
-            lack, when = (model.case.amount(x, kind, 4) for x, kind in ((volume, "volume"), (time, "time")))
-            drawn, result = HELD_TEXTS[int(linked)]
-            text = f"{name}: from {when} on {drawn} is more than critical flow, which leaves instead; {lack} {result}"
-            marks.append(Mark("discharge held", f"nodes.{name}", time, text, volume))
-    return marks
 
 
 def scheduled_volume(schedule, start: float, end: float) -> float:
@@ -319,14 +286,14 @@ def find_point_envelopes(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
 
 
 def find_maxima(run_data: RunData, t: float) -> dict[str, dict[str, np.ndarray]]:
-    """Greatest values up to time t [s] in cells of each basin that records them: basin -> quantity -> float64[n]."""
-    return {basin.name: basin.maxima(t, run_data.maxima) for basin in run_data.model.basins if basin.records_maxima}
+    """Greatest values up to time t [s] in cells of each mesh that records them: part -> quantity -> float64[n]."""
+    return {part.name: part.maxima(t, run_data.maxima) for part in run_data.model.meshed if part.records_maxima}
 
 
 def find_run_ups(model: Model, maxima: dict[str, dict[str, np.ndarray]]) -> dict[str, RunUpTable]:
     """Tables of the run-ups of a case by name; maxima : result of `find_maxima`"""
-    basins = {basin.name: basin for basin in model.basins}
-    return {name: run_up_table(spec, basins[spec.basin], maxima[spec.basin]["max_surface"])
+    meshed = {part.name: part for part in model.meshed}
+    return {name: run_up_table(spec, meshed[spec.basin], maxima[spec.basin]["max_surface"])
             for name, spec in model.case.output.run_up.items()}  # fmt: skip
 
 
@@ -367,17 +334,16 @@ def relative(remainder: float, largest: float) -> float:
 def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, Any]:
     """Mass balance of a run as a dict: stored mass at start and end, inflow, outflow, spilled, made up, remainder [kg].
 
-    ledger : float64[2, nodes + sources]  inflow at each node, and of rain and infiltration [kg]; outflow as negative
-    numbers
+    ledger : float64[2, nodes + sources]  inflow at each node, and of `Model.sources` [kg]; outflow as negative numbers
     The entry `relative` is the remainder as a fraction of the largest term.
     """
     kinds = model.tables.nodes["kind"]
     initial, change = model.contents(y)
-    sources = ((basin, name) for basin in model.basins for name in basin.source_names)
-    for k, (basin, name) in enumerate(sources, len(model.node_names)):
-        if name == "infiltration":  # from its heights, whose sum needs no exchange between threads at every stage
-            ledger[1, k] = -basin.mass_in_soil(y)
-    passes = {int(row["node"]) for row in model.tables.patches if row["open"]}
+    at, passes = len(model.node_names), set()
+    for feature in model.features:
+        feature.book_sources(y, ledger[:, at : at + len(feature.sources)])
+        at += len(feature.sources)
+        passes |= feature.open_nodes(model)
     # nodes with `made_up` and `spilled`
     own = [kind in (rec.TANK, rec.PATCH) and i not in passes for i, kind in enumerate(kinds)]
     words = [("made_up", "spilled") if in_cells else ("inflow", "outflow") for in_cells in own]

@@ -96,7 +96,7 @@ class Run:
         jumps = {t: jump for t, jump in model.breaks if self.start <= t <= self.end}
         self.starts_with_jump, self.ends_with_jump = jumps.pop(self.start, False), jumps.pop(self.end, False)
         self.bounds = [(t, jump) for t, jump in sorted(jumps.items())] + [(self.end, True)]
-        self.watches = [watch for basin in model.basins for watch in basin.watches(basin.deviations(model.start))]
+        self.watches = [watch for part in model.meshed for watch in part.watches(part.deviations(model.start))]
         fields = output.fields if self.watches or getattr(sink, "takes_fields", True) else 0
         self.loop.stepper.set_control(
             start=self.start, every=output.every or (self.end - self.start) / 1000, field_count=fields,
@@ -147,7 +147,7 @@ class Run:
         own = {
             "run": [self.segment, self.seconds, self.processor, loop.last_switch, loop.at_once],
             "changes": self.changes, "switched": loop.switched, "recent events": loop.recent_events,
-            "rates": [rates.get(basin.name, 0.0) for basin in self.checks.moving],
+            "rates": [rates.get(part.name, 0.0) for part in self.checks.moving],
         }  # fmt: skip
         memory = {name: np.array(values, dtype=np.float64) for name, values in own.items()}
         memory |= {name: array.copy() for name, array in self.run_data.arrays().items()}
@@ -169,7 +169,7 @@ class Run:
             automatic.change(loop.stepper)
         loop.switched = [(t, int(k)) for t, k in memory["switched"].reshape(-1, 2).tolist()]
         loop.recent_events.extend(memory["recent events"].tolist())
-        names = [basin.name for basin in self.checks.moving]
+        names = [part.name for part in self.checks.moving]
         self.checks.rates.update(zip(names, memory["rates"].tolist(), strict=True))
         if memory.keys() != self.memory().keys():
             raise ValueError("names of the arrays do not match")
@@ -222,14 +222,14 @@ class Run:
         if higher.any():
             greatest[higher], t_max[higher] = extreme[higher], t[at][higher]
 
-    def check_basins(self, t: float, y: np.ndarray) -> None:
-        """Pass state y at time t [s] to the checks of basins."""
+    def watch(self, t: float, y: np.ndarray) -> None:
+        """Pass state y at time t [s] to the checks of meshes."""
         for watch in self.watches:
             watch.check(t, y)
 
     def frame(self, t: float, y: np.ndarray, out: np.ndarray, last: bool = False) -> None:
-        """Pass the fields at time t [s] to the sink; the last frame also has the greatest values of basins."""
-        self.check_basins(t, y)
+        """Pass the fields at time t [s] to the sink; the last frame also has the greatest values of meshes."""
+        self.watch(t, y)
         fields = self.run_data.fields(t, y, out)
         for name, values in found.find_maxima(self.run_data, t).items() if last else ():
             fields[name] |= values
@@ -421,15 +421,15 @@ class Run:
         if reason != "finished" and saved and loop.t > self.start and np.all(np.isfinite(loop.now)):
             self.save()
         if reason == "finished":
-            self.check_basins(loop.t, loop.now)
+            self.watch(loop.t, loop.now)
         ledger = loop.stepper.ledger.reshape(LEDGER_ROWS, -1)[:2]
         first = int(model.layout["source"] - model.layout["supply"])
         booked = ledger[:, [*range(len(model.node_names)), *range(first, first + len(model.sources))]]
         ledgers = {"mass": mass_ledger(model, loop.now, booked)}
         for feature in model.features:
             ledgers |= feature.ledgers(model, loop.now, ledger)
-        basin_notices = [notice for entry in self.watches for notice in entry.notices()]
-        warnings = [*self.notices, *basin_notices, *self.checks.warnings(ledgers)]
+        watched = [notice for entry in self.watches for notice in entry.notices()]
+        warnings = [*self.notices, *watched, *self.checks.warnings(ledgers)]
         warnings += found.device_notices(self.run_data) + found.spill_notices(self.run_data)
         warnings += [notice for own in self.run_data.features for notice in own.end_notices(loop.now)]
         warnings += split_step_notices(model.case.numerics, loop.stepper.counts())
@@ -437,14 +437,14 @@ class Run:
             ledger[:, : len(model.node_names)].sum(axis=0),
             [Event(t, *model.events[k]) for t, k in loop.switched],
         )
-        held = found.held_discharges(self.run_data, self.start, loop.t, entered)
+        held = [mark for own in self.run_data.features for mark in own.held_marks(self.start, loop.t, entered)]
         unsupplied, losses = found.unsupplied_demands(self.run_data, (self.start, loop.t), entered, events)
         warnings += unsupplied + found.undetermined_notices(self.run_data)
         events = sorted([*events, *losses], key=lambda event: event.time)
         ok = reason == "finished" and not held and all(entry.ok for entry in warnings)
         extremes, watched = found.find_extremes(self.run_data)
         summary = Summary(
-            reason, ok, loop.t, found.find_marks(self.run_data) + held, ledgers, extremes,
+            reason, ok, loop.t, found.find_marks(self.run_data, held) + held, ledgers, extremes,
             found.find_envelope(self.run_data), found.find_point_envelopes(self.run_data), watched,
             loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
             self.setup, events,

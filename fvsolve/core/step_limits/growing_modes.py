@@ -40,7 +40,7 @@ FORCING_KEYS = {"pressure": "pressure", "head": "head", "demand": "flow", "flow"
 def forcing_sizes(model) -> np.ndarray:
     """Largest size that schedules and initial values can give to each state : float64[n].
 
-    It is computed for cells of pipes and basins; for delay lines and other states it is 1000 times their scale or more.
+    It is computed for cells of pipes and meshes; for delay lines and other states it is 1000 times their scale or more.
     """
     largest, linear = OTHER_STATES * model.scale, model.case.properties
     pressure, flow = pressure_and_flow_range(model)
@@ -55,10 +55,10 @@ def forcing_sizes(model) -> np.ndarray:
             continue
         own = slice(row["y"], row["y"] + 2 * mesh.cells)
         largest[own] = np.maximum(max(pressure * float(row["admittance"]), flow), model.scale[own])
-    for basin in model.basins:
-        states, scales = basin.states_of(largest), basin.states_of(model.scale)
+    for part in model.meshed:
+        states, scales = part.states_of(largest), part.states_of(model.scale)
         ratio = 1.0 + pressure / (linear.density * model.case.gravity)
-        for own, scale, start in zip(states, scales, basin.states_of(model.start), strict=True):
+        for own, scale, start in zip(states, scales, part.states_of(model.start), strict=True):
             own[:] = np.maximum(ratio * scale, np.ptp(start))
     return largest
 

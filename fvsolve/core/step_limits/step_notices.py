@@ -1,4 +1,4 @@
-"""Notices for the pipes, basins and modes of a model whose step exceeds the limit of scheme and method.
+"""Notices for the pipes, meshes and modes of a model whose step exceeds the limit of scheme and method.
 
 For linear schemes with a constant wave speed the limit is proved: von Neumann's limit. Other limits are estimates: a
 limited scheme is treated as its linear scheme in smooth flow, and a variable wave speed as the fastest wave. The limit
@@ -48,7 +48,7 @@ LIMITED_EXCESS = 0.3
 
 
 class CourantCheck(NamedTuple):
-    """Comparison of the Courant number of a pipe or a basin with its limit, both defined as in `numerics.courant`.
+    """Comparison of the Courant number of a pipe or a mesh with its limit, both defined as in `numerics.courant`.
 
     place : key path of the part; proved : True if the limit is proved; location : kind of grid, for the text
     courant : Courant number of the longest step that the run takes; share : that step over the given step, which may be
@@ -99,9 +99,9 @@ def step_limits(
     model, rates: dict[str, float] | None = None, step_error: float | None = None, run_data: RunData | None = None,
     cell_error: float | None = None,
 ) -> list[Notice]:  # fmt: skip
-    """Notices for the worst pipe, the basins, delay lines and other modes for which the step exceeds the limit.
+    """Notices for the worst pipe, the meshes, delay lines and other modes for which the step exceeds the limit.
 
-    rates : greatest wave rate of each basin in the run so far, by name [1/s]; default: the initial rates
+    rates : greatest wave rate of each part in the run so far, by name [1/s]; default: the initial rates
     step_error : greatest mean error of a state outside cells, relative to its range (`solve.run_checks`); None before a
     run; cell_error : the same of a state in cells, measured if the step exceeds a limit of cells
     run_data : data of a run, used for the initial rates as in `first_step`
@@ -135,16 +135,16 @@ def step_limits(
 
 
 def exceeded_checks(model, method: str, rates: dict[str, float], steps: Steps) -> list[CourantCheck]:
-    """Checks of pipes and basins in which the longest step of a run exceeds the limit, whether or not waves grow much.
+    """Checks of pipes and meshes in which the longest step of a run exceeds the limit, whether or not waves grow much.
 
     method : name of an explicit method; rates : as for `step_limits`; steps : steps of the run
     """
-    checks = [*pipe_checks(model, method, steps), *basin_checks(model, method, rates, steps)]
+    checks = [*pipe_checks(model, method, steps), *mesh_checks(model, method, rates, steps)]
     return [check for check in checks if check.courant > check.limit * (1.0 + SLACK)]
 
 
 def exceeds_limit_of_cells(model) -> bool:
-    """True if the steps of a run, without error control, exceed a limit of pipes or basins at the start."""
+    """True if the steps of a run, without error control, exceed a limit of pipes or meshes at the start."""
     method, numerics = method_named(automatic.first_method(model.case.numerics.method)), model.case.numerics
     if numerics.rtol is not None or not method.explicit:
         return False
@@ -168,13 +168,13 @@ def initial_step_limits(model, run_data: RunData) -> list[Notice]:
 def first_step(model, run_data: RunData | None = None) -> float:
     """Given step of a run, or its first step under a given Courant number [s]; 0 if the step is unknown.
 
-    run_data : data of a run, or None. In a model without basins they are used to compute the initial rates, and reset
+    run_data : data of a run, or None. In a model without meshes they are used to compute the initial rates, and reset
     afterwards; otherwise new data are used.
     """
     numerics = model.case.numerics
     if numerics.step is not None:
         return given_step(model)
-    if run_data is None or model.basins:  # basins change more of the run data than flags
+    if run_data is None or model.meshed:  # meshes change more of the run data than flags
         rate = float(model.evaluate(numerics.start, model.start)[1][rec.RATE])
     else:
         rate = float(run_data.evaluate(numerics.start, model.start, math.inf)[1][rec.RATE])
@@ -342,33 +342,33 @@ def reflection_products(model, k: int) -> tuple[float, ...]:
     return tuple(sorted({p * q for p in ends[0] for q in ends[1]}))
 
 
-def basin_checks(model, method: str, rates: dict[str, float], steps: Steps) -> list[CourantCheck]:
-    """Checks of all basins whose waves grow, as a list.
+def mesh_checks(model, method: str, rates: dict[str, float], steps: Steps) -> list[CourantCheck]:
+    """Checks of all meshes whose waves grow, as a list.
 
-    If waves grow at every Courant number, a basin is left out in which they grow less than 5 times in the run.
-    rates : greatest wave rate of each basin in the run so far, by name [1/s]; steps : steps of the run
-    Courant numbers and limits refer to the rate that limits the steps of a basin. This rate is the wave rate times the
-    factor `unsplit` of the table of basins.
+    If waves grow at every Courant number, a mesh is left out in which they grow less than 5 times in the run.
+    rates : greatest wave rate of each part in the run so far, by name [1/s]; steps : steps of the run
+    Courant numbers and limits refer to the rate that limits the steps of a part. This rate is the wave rate times the
+    factor `courant_factor`.
     """
     numerics, checks = model.case.numerics, []
-    for basin, row in zip(model.basins, model.tables.basins, strict=True):
-        rate, share = basin.max_rate(model.start)
-        parts = float(row["unsplit"]) or 1.0
-        rate = max(rate, rates.get(basin.name, 0.0))
-        courant = numerics.step * rate * parts if numerics.step is not None else numerics.courant
+    for part in model.meshed:
+        rate, share = part.max_rate(model.start)
+        factor = part.courant_factor
+        rate = max(rate, rates.get(part.name, 0.0))
+        courant = numerics.step * rate * factor if numerics.step is not None else numerics.courant
         courant *= steps.share
-        scheme, limited = smooth_scheme(basin.scheme)
-        share = round(share, 2) if basin.is_grid else 1.0
-        if is_stable_with_margin(scheme, method, courant / parts, share, basin.is_grid and basin.has_waves):
+        scheme, limited = smooth_scheme(part.scheme)
+        share = round(share, 2) if part.is_grid else 1.0
+        if is_stable_with_margin(scheme, method, courant / factor, share, part.is_grid and part.has_waves):
             continue
-        if basin.is_grid:
-            limit = plane_limit(scheme, method, share, basin.has_waves)
+        if part.is_grid:
+            limit = plane_limit(scheme, method, share, part.has_waves)
         else:
             limit = advection_limit(scheme, method).limit
-        fixed = basin.is_grid and basin.has_constant_speed
-        grows = math.inf if limit > 0.0 else growth(scheme, method, courant / parts, steps.count)
+        fixed = part.is_grid and part.has_constant_speed
+        grows = math.inf if limit > 0.0 else growth(scheme, method, courant / factor, steps.count)
         if grows >= ALWAYS_GROWING:
-            checks.append(CourantCheck(f"nodes.{basin.name}", courant, limit * parts, scheme, fixed and not limited,
+            checks.append(CourantCheck(f"nodes.{part.name}", courant, limit * factor, scheme, fixed and not limited,
                               "in a wide basin", growth=grows, share=steps.share))  # fmt: skip
     return checks
 
@@ -393,7 +393,7 @@ def only_doubtful(check: CourantCheck) -> bool:
 
 
 def courant_notice(model, check: CourantCheck, method: str, wrong: bool) -> Notice:
-    """Notice for a pipe or a basin whose Courant number is above its limit.
+    """Notice for a pipe or a mesh whose Courant number is above its limit.
 
     check : its Courant number and limit; method : name of the method; wrong : True if a run has shown errors in cells
     """

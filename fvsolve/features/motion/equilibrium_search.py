@@ -23,7 +23,6 @@ from fvsolve import attitude, units
 from fvsolve.case import checks
 from fvsolve.case.bodies import joint_coordinate
 from fvsolve.core.assembly.model_draft import EQUILIBRIUM_SHARE, ROUNDING_SHARE
-from fvsolve.core.basins.lower import basin_start
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.errors import Notice
 from fvsolve.features.motion.kernels import tables as records
@@ -88,10 +87,8 @@ class Configuration(StaticForces):
         first = int(self.layout["pressure"])
         for row in self.motion.piston_table:
             self.out[[first + row["a"], first + row["b"]]] = 0.0
-        if (self.draft.basin_table["frame"] >= 0).any():
-            level = basin_start(self.draft.basins, self.draft.size, self.attitudes())
-            for basin in self.draft.basins:
-                basin.states_of(self.y)[:] = basin.states_of(level)
+        for feature in self.draft.features:
+            feature.level(self.draft, self.y, self.attitudes)
 
     def force(self, y: np.ndarray) -> np.ndarray:
         """Generalised forces in a configuration : float64[size] [N], [N m], on joint freedoms, then on masses."""
@@ -387,8 +384,8 @@ def refuse_overturned(at: Configuration, y: np.ndarray) -> None:
     at.force(y)
     if at.out[rec.STATUS] != rec.NO_WEIGHT:
         return
-    where = int(at.out[rec.WHERE]) - len(at.draft.basins)
-    name = list(at.draft.case.places)[where] if where >= 0 else at.draft.basins[where].name
+    names = [*(part.name for part in at.draft.meshed), *at.draft.case.places]
+    name = names[int(at.out[rec.WHERE])]
     text = f"{name} is turned over in the equilibrium found, and its contents would run out"
     at.draft.fault(f"nodes.{name}", f'{text}; hold the body upright, state another position, or use initial = "steady"')
 

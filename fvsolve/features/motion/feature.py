@@ -183,7 +183,6 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
         self.point_table = np.array(self.points, records.POINT)
         self.fast_parts = [*self.mass_names, *self.body_names]
         self.marks = [("beyond its stroke", f"links.{name}") for name in self.piston_names]
-        self.driven = {int(row["schedule"]) for row in self.body_table}
         schedules = self.brace_table["schedule"].tolist()
         self.link_schedules = dict(zip(self.push_names, schedules, strict=False))
 
@@ -250,7 +249,7 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
         stored = dict(norm.chamber_rows(model, y, elongations))
         return Squares(stored, [*norm.spring_rows(model, y, elongations)], last)
 
-    def weigh(self, model, weights: np.ndarray) -> None:
+    def weigh(self, model, weights: np.ndarray, y: np.ndarray) -> None:
         for row in self.mass_table:
             if row["y"] >= 0:
                 weights[int(row["y"]) + 1] = 0.5 / row["lightness"]
@@ -301,12 +300,15 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
             energies[name] = 0.5 * row["stiffness"] * min(0.0, row["below"], row["above"]) ** 2
         return energies
 
-    def swept_masses(self, y: np.ndarray) -> Iterator[float]:
+    def masses(self, model, y: np.ndarray) -> Iterator[tuple[float, float]]:
         for row in self.piston_table:  # of chambers on an axis, whose mass is state plus swept mass
             if row["line"] < 0:
                 places = self.mass_table[[row["case"], row["rod"]]]["y"]
                 back, forth = (float(y[place]) if place >= 0 else 0.0 for place in places)
-                yield float(row["sweep_a"] + row["sweep_b"]) * (forth - back)
+                yield 0.0, float(row["sweep_a"] + row["sweep_b"]) * (forth - back)
+
+    def driven(self) -> set[int]:
+        return {int(row["schedule"]) for row in self.body_table}
 
     def stored_states(self, model) -> np.ndarray:
         places = self.mass_table["y"]

@@ -439,11 +439,9 @@ def lower_probe(draft, row, probe) -> bool:
     case, motion = draft.case, motion_of(draft)
     if probe.part == "links" and probe.name in case.links:
         return lower_link_probe(draft, row, probe)
-    if probe.part != "nodes" or (probe.point is not None and probe.name not in case.lumped):
+    if probe.part != "nodes" or probe.point is not None:
         return False
-    if probe.point is not None:
-        lower_surface(draft, row, probe)
-    elif probe.name in motion.mass_names:
+    if probe.name in motion.mass_names:
         row["kind"] = rec.POSITION if probe.quantity == "position" else rec.VELOCITY
         row["index"] = motion.mass_index[probe.name]
     elif probe.name in case.poses:
@@ -481,20 +479,6 @@ def lower_link_probe(draft, row, probe) -> bool:
     else:
         return False
     return True
-
-
-def lower_surface(draft, row, probe) -> None:
-    """Fill the row of a probe of depth at a point of a basin with sloshing modes."""
-    motion = motion_of(draft)
-    from fvsolve.case import sloshing
-
-    case, basin = draft.case, draft.case.nodes[probe.name]
-    arguments = basin, case.lumped[probe.name]
-    modes, shares = sloshing.surface_factors(*arguments, *probe.point, case.properties.density, case.gravity)
-    row["kind"], row["offset"] = rec.SURFACE_VALUE, sloshing.depth_of(*arguments)
-    row["cell"], row["count"], row["weights"] = len(draft.integers), len(modes), len(draft.floats)
-    draft.integers += [motion.body_names.index(sloshing.mode_body_name(probe.name, mode)) for mode in modes]
-    draft.floats += shares
 
 
 def pose_facts(pose) -> dict[str, float]:

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from fvsolve.core.assembly.features import FeaturePattern
-from fvsolve.core.basins.lower_pattern import all_states
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.jacobian_pattern import Pairs
 from fvsolve.core.model.state_pairs import pairs_of, unique_states
@@ -100,9 +99,8 @@ class MotionPattern(FeaturePattern):
         They depend on each other, and on chambers that push the bodies.
         """
         trees: dict[int, list] = {}
-        for basin in self.model.basins:
-            if basin.row["body"] >= 0:
-                trees.setdefault(self.tree_root(self.bodies[basin.row["body"]]["root"]), []).append(all_states(basin))
+        for body, states in (pair for own in self.model.features for pair in own.on_bodies()):
+            trees.setdefault(self.tree_root(self.bodies[body]["root"]), []).append(states)
         for index, cells in self.moving_fluid_states() if len(self.moving_segments) else ():
             trees.setdefault(self.tree_root(self.bodies[self.moving_segments[index]["body"]]["root"]), []).append(cells)
         for root, cells in trees.items():

@@ -2,15 +2,13 @@
 
 import numpy as np
 
-from fvsolve.core.basins.lower import basin_start
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.table_handle import make_handle, with_features
 from fvsolve.core.model.run_data import zeros_for_run
 from fvsolve.features.motion.kernels import tables as records
 from fvsolve.features.motion.kernels.tables import SLOT, motion_of
 
-PACKAGE = "fvsolve"  # package of the kernel functions
-FOLDER = "features.motion.kernels"
+FOLDER = "fvsolve.features.motion.kernels"
 MOTION, LINES = f"{FOLDER}.body_kinematics: kinematics", f"{FOLDER}.bushings_and_pins: add_element_forces"
 WEIGH, ACCELERATE = f"{FOLDER}.mass_matrix: start_mass_matrix", f"{FOLDER}.mass_matrix: solve_accelerations"
 BUSHINGS = f"{FOLDER}.bushings_and_pins: add_bushing_loads"
@@ -18,9 +16,6 @@ PINNED, GAPS, HOLD = (
     f"{FOLDER}.bushings_and_pins: {name}"
     for name in ("solve_pinned_accelerations", "start_gaps", "add_start_pin_forces")
 )
-# loads on bodies of fluid at rest, in addition to pushes
-FLUID_LOADS = ("core.basins.basin_frames: set_frames", "core.basins.frame_forces: add_frame_forces")
-WALL_LOADS = ("core.basins.moving_walls: push_bodies_at_rest",)
 LOADS = f"{FOLDER}.fluid_loads: add_fluid_loads"
 INERTIAL = ("set_segment_drives", "moving_tank_pressures", "add_cell_drives", "moving_column_rates")
 DRIVES, *DRIVEN = (f"{FOLDER}.inertial_forces: {name}" for name in INERTIAL)
@@ -31,15 +26,14 @@ NONE = np.zeros(0)
 def call_pieces(all_tables, pieces: tuple[str, ...], t: float, y: np.ndarray, out: np.ndarray, rates=NONE) -> None:
     """Call the named kernel functions in turn, in the way of the right-hand side; they write to `out` and run arrays.
 
-    all_tables : tables of a model, arrays of a run, tables of motion; pieces : names "MODULE: FUNCTION" below the
-    package
+    all_tables : tables of a model, arrays of a run, tables of motion; pieces : names "MODULE: FUNCTION"
     """
     from fvsolve.core.kernels import calls  # not loaded for cases without bodies
     from fvsolve.core.kernels.rhs_assembly import load_function
 
     addresses = calls.empty_calls(calls.JOBS, len(pieces) + 1)
     for k, piece in enumerate(pieces):
-        addresses[calls.RHS, k] = calls.function_address(load_function(PACKAGE, piece), calls.RATES)
+        addresses[calls.RHS, k] = calls.function_address(load_function(*piece.rsplit(".", 1)), calls.RATES)
     run = calls.compile_as(calls.rhs_in_turn, calls.RATES)
     tables, written, own = all_tables
     kept: list = []  # arrays behind the handle
@@ -85,14 +79,13 @@ class StaticForces:
         self.written.clock["limit"] = t
         self.layout = draft.tables.layout[0]
         self.out = np.zeros(int(self.layout["size"]))
-        self.y, self.tables, moving_basins = np.zeros(draft.size), draft.tables, (draft.basin_table["frame"] >= 0).any()
+        self.y, self.tables = np.zeros(draft.size), draft.tables
         rubber = (BUSHINGS,) if len(motion.bushing_table) else ()
-        self.pushes = (MOTION, LINES, *rubber, *(FLUID_LOADS if moving_basins else ()))
-        self.pushes += WALL_LOADS if (draft.wall_table["body"] >= 0).any() else ()
+        loads = [name for feature in draft.features for name in feature.level(draft, self.y)]
+        self.pushes = (MOTION, LINES, *rubber, *loads)
         if len(motion.moving_segment_table):
             self.pushes += NETWORKS
-        if moving_basins:
-            self.y = basin_start(draft.basins, draft.size)
+        if loads:  # these functions write to `plane`
             self.tables = draft.tables._replace(plane=draft.tables.plane.copy())
         self.run(MOTION)
 

@@ -45,7 +45,7 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
 
     # build ----------
 
-    def lower_behind_basins(self, draft) -> None:
+    def lower_behind_meshes(self, draft) -> None:
         self.network = lower.lower_network(draft)
 
     def probe(self, draft, probe, row) -> bool:

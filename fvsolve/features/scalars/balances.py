@@ -42,7 +42,7 @@ def total_amount(model, q: int, y: np.ndarray) -> float:
     for pipe in pipes:
         at = int(row["y"] + pipe["cell"])
         total += float(np.sum(y[at : at + int(pipe["cells"])])) * pipe["dx"]
-    total += sum(float(np.sum(basin.mass_per_depth() * basin.amounts(y)[q])) for basin in model.basins)
+    total += sum(float(np.sum(basin.mass_per_depth() * basin.amounts(y)[q])) for basin in model.meshed)
     places = model.tables.integers[row["places"] : row["places"] + len(nodes)]
     return total + float(sum(y[place] for place, kind in zip(places, nodes["kind"], strict=True) if kind in STORES))
 

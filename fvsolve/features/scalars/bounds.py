@@ -24,7 +24,7 @@ def scalar_bounds(model, q: int):
     for node, place in zip(tables.nodes, places, strict=True):
         if node["kind"] in STORES:
             yield bound_rows([place], node["y"], NO_STATE, node["mass"], 1.0, *limits)
-    for basin in model.basins:
+    for basin in model.meshed:
         if basin.row["carried"] < 0:
             continue
         states = int(basin.row["carried"]) + q * basin.n + np.arange(basin.n)

@@ -40,7 +40,7 @@ EXCHANGERS = RhsTerms(outlet_values="fluid_heat: node_temperatures", scalar_rate
 class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
     """Scalars, reactions and heat of a case."""
 
-    def lower_behind_basins(self, draft) -> None:
+    def lower_behind_meshes(self, draft) -> None:
         lower.lower_scalars(draft)
         reactions.lower_reactions(draft)
 
@@ -101,19 +101,19 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
                 yield "solved", HEAT_FOR_EVENTS[linear]
             yield "solved", VALUES_FOR_EVENTS
         if len(tables.scalars):
-            yield "basins", AMOUNTS
+            yield "carried", AMOUNTS
             if not cast.alone:
-                yield "basins", MIXED
+                yield "carried", MIXED
             if cast.pipes:
-                yield "basins", CARRIED
+                yield "carried", CARRIED
             if heated:
-                yield "basins", HEAT[linear]
+                yield "carried", HEAT[linear]
             if cast.pipes and (tables.pipes["temperature"] > 0.0).any():
-                yield "basins", VISCOSITY
+                yield "carried", VISCOSITY
             if len(tables.exchangers):
-                yield "basins", EXCHANGERS
+                yield "carried", EXCHANGERS
         if len(tables.reactions):  # those in basins are added later
-            yield "basins", REACTIONS
+            yield "carried", REACTIONS
 
     def run(self, run_data) -> FeatureRun:
         return FeatureRun(self, run_data)
@@ -128,7 +128,7 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
 
         return pipe_scalar_modes(model) + basin_scalar_modes(model) + reactions.reaction_modes(model)
 
-    def weigh(self, model, weights: np.ndarray) -> None:
+    def weigh(self, model, weights: np.ndarray, y: np.ndarray) -> None:
         from fvsolve.features.scalars.weights import weigh_scalars
 
         weigh_scalars(model, weights)

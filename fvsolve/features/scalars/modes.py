@@ -27,7 +27,7 @@ def basin_scalar_modes(model) -> Modes:
     return [
         (f"{basin.name}.{name}", np.array([-scalar.decay - scalar.diffusivity * greatest_diffusion_rate(basin.mesh)]))
         for name, scalar in model.case.scalars.items()
-        for basin in model.basins
+        for basin in model.meshed
         if scalar.decay > 0.0 or scalar.diffusivity > 0.0
     ]
 

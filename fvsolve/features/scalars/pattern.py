@@ -6,7 +6,6 @@ from functools import cached_property
 import numpy as np
 
 from fvsolve.core.assembly.features import FeaturePattern, with_slot
-from fvsolve.core.basins import lower_pattern as pattern
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.pipe_energy import MAX_WIDTH
 from fvsolve.core.model.jacobian_pattern import Pairs, ends_of
@@ -110,17 +109,16 @@ class ScalarCouplings:
             yield pairs_of(unique_states(first + k), unique_states(self.values[i], *self.through[i]))
 
     def own(self, i: int) -> list:
-        """States that set the scalar's value at node i, a storing node or a patch of a basin; else an empty list."""
-        if i in self.of.patches:
-            faces = self.of.patches[i]["closure"] in pattern.THROUGH_FACES  # outflow has the weights of flows
-            return [self.behind(i), *(self.through[i] if faces else [self.of.behind(i, 1)])]
+        """States that set the scalar's value at node i, a storing node or one of a feature; else an empty list."""
+        if (found := self.carried(i)) is not None:
+            amounts, holding = found
+            return [amounts, *(self.through[i] if holding is None else [holding])]
         return [self.places[i], self.of.own(i)] if self.stores[i] else []
 
-    def behind(self, i: int) -> np.ndarray:
-        """States of the amounts in the basin cells behind patch i."""
-        row = self.of.patches[i]
-        cells = self.of.integers[row["first"] : row["first"] + row["count"]]
-        return pattern.amount_states(self.of.basins[row["basin"]], self.q, cells)
+    def carried(self, i: int) -> tuple[np.ndarray, np.ndarray | None] | None:
+        """Result of `FeaturePattern.carried` of the feature that sets the value at node i; None without one."""
+        found = (own.carried(i, self.q) for own in self.of.features)
+        return next((states for states in found if states is not None), None)
 
     def edge(self, pipe, right: int) -> list[np.ndarray]:
         """States of amounts and waves in the cells that give the value at an end of a pipe; right : 1 for `to`."""
@@ -145,22 +143,16 @@ class ScalarCouplings:
         return [joined[group[i]] if inner[i] else unique_states(*self.own(i)) for i in range(len(group))]
 
     def pairs(self) -> Iterator[Pairs]:
-        """Yield the couplings of the scalar; some couplings of a state with itself are missing.
-
-        Those within basins are yielded for all scalars together, with the first scalar.
-        """
+        """Yield the couplings of the scalar in pipes and nodes; some couplings of a state with itself are missing."""
         sources = [[self.values[i], *self.through[i]] for i in range(len(self.values))]
         for valve in self.of.valves:
             i, j = ends_of(valve)
             sources[i].append(self.values[j])
             sources[j].append(self.values[i])
         for i, read in enumerate(sources):
-            affected = [self.places[i]] if self.stores[i] else [self.behind(i)] if i in self.of.patches else []
+            found = self.carried(i)
+            affected = [self.places[i]] if self.stores[i] else [] if found is None else [found[0]]
             yield pairs_of(unique_states(*affected, self.ledger + i), unique_states(*read))
-        if self.q == 0:
-            yield from map(pattern.scalar_pattern, self.of.basins)
-        for basin in self.of.basins:
-            yield from self.boundary_pairs(basin)
         if self.row["losses"] > 0:
             yield from self.decay_pairs()
         if self.heated:
@@ -170,18 +162,6 @@ class ScalarCouplings:
             for right, i in enumerate(ends_of(pipe)):
                 yield pairs_of(self.edge(pipe, right)[0], unique_states(self.values[i]))
                 yield pairs_of(self.close(pipe, right), self.read(pipe, right, i))
-
-    def boundary_pairs(self, basin) -> Iterator[Pairs]:
-        """Yield couplings of the flow through open boundaries of a basin with the cells there.
-
-        This flow is booked at the patches of the basin.
-        """
-        nodes = [i for i, row in self.of.patches.items() if self.of.basins[row["basin"]] is basin]
-        if basin.row["through"] >= 0:
-            behind = [self.of.integers[row["first"] :][: row["count"]] for row in map(self.of.patches.get, nodes)]
-            cells = pattern.cells_read(pattern.scalar_neighbours(basin), np.concatenate(behind))
-            read = unique_states(pattern.amount_states(basin, self.q, cells), pattern.cell_states(basin, cells))
-            yield pairs_of(self.ledger + np.array(nodes), read)
 
     def decay_pairs(self) -> Iterator[Pairs]:
         """Yield couplings of the decay in the ledger with the amounts and masses that decay.
@@ -197,10 +177,6 @@ class ScalarCouplings:
         for i in np.flatnonzero(self.stores):
             read = unique_states(*self.own(i))
             yield pairs_of(np.atleast_1d(pick(self.places[i] - self.row["y"])), read)
-        for basin in self.of.basins:
-            cells = np.arange(basin.n)
-            for first in (pattern.amount_states(basin, self.q, 0), *([basin.row["y"]] if basin.quantities else [])):
-                yield pick(basin.row["lost"] + cells), first + cells
 
     def inside(self, pipe) -> Iterator[Pairs]:
         """Yield couplings of the amount in each cell of a pipe with amounts and waves in neighbouring cells."""
@@ -262,8 +238,5 @@ def reacting_places(couplings, model, stores: np.ndarray) -> Iterator[tuple[np.n
     if stores.size:
         places = tables.integers[scalars[0]["places"] + stores] - scalars[0]["y"]
         yield places, [nodes["y"][stores]], lambda q: scalars[q]["y"] + places
-    for basin in couplings.basins:
-        cells = np.arange(basin.n)
-        depths = [basin.row["y"] + cells] if basin.quantities else []
-        if basin.scalars:
-            yield basin.row["lost"] + cells, depths, lambda q, b=basin, k=cells: pattern.amount_states(b, q, k)
+    for own in couplings.features:
+        yield from own.reacting_places()

@@ -122,7 +122,7 @@ def start_values(case, kinds, meshes: list, basins: list) -> Iterator[tuple[str,
 
 def check_start(draft, name: str, reaction: Reaction) -> None:
     """Add a fault if the rate of a reaction is not finite at the start, with the first such place and its values."""
-    for place, values in start_values(draft.case, draft.node_table["kind"], draft.meshes, draft.basins):
+    for place, values in start_values(draft.case, draft.node_table["kind"], draft.meshes, draft.meshed):
         try:
             finite = math.isfinite(rate_at(reaction, draft.case, values))
         except (OverflowError, ZeroDivisionError):
@@ -154,7 +154,7 @@ def reaction_modes(model) -> list[tuple[str, np.ndarray]]:
     The eigenvalues are those of the slopes of all rates by the extents of all reactions.
     """
     case, modes = model.case, []
-    places = start_values(case, model.tables.nodes["kind"], model.pipes, model.basins) if case.reactions else ()
+    places = start_values(case, model.tables.nodes["kind"], model.pipes, model.meshed) if case.reactions else ()
     for place, values in places:
         scale = max(abs(value) for value in values.values()) or 1.0
         slopes, step = np.zeros((len(case.reactions),) * 2), 1e-6 * scale

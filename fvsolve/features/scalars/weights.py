@@ -10,7 +10,7 @@ from fvsolve.features.scalars.lower import typical_value
 def weigh_scalars(model, weights: np.ndarray) -> None:
     """Write the weights of scalar amounts in basins, pipes, tanks and chambers, from the weights of the mass there."""
     tables, rho = model.tables, model.case.properties.density
-    for basin in model.basins:
+    for basin in model.meshed:
         for q, amount in enumerate(basin.amounts(weights) if basin.scalars else ()):
             amount[:] = SCALAR_WEIGHT * 0.5 * basin.mesh.area / greatest_value(model, q) ** 2
     for q, scalar in enumerate(tables.scalars):

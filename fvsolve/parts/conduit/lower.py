@@ -23,7 +23,7 @@ class ConduitRows(Lowering, kind="conduit"):
             row["kind"], row["index"] = rec.VALVE_FLOW, draft.valve_names.index(f"{name}.{end}.face")
             row["side"] = -1 if end == "to" else 0
             return
-        ((k, basin),) = ((k, basin) for k, basin in enumerate(draft.basins) if basin.name == name)
+        ((k, basin),) = ((k, basin) for k, basin in enumerate(draft.meshed) if basin.name == name)
         at = min(max((probe.fraction or 0.0) * basin.n - 0.5, 0.0), basin.n - 1.0)
         first = min(int(at), max(basin.n - 2, 0))
         cells, weights = [first, min(first + 1, basin.n - 1)], [1.0 - (at - first), at - first]
@@ -59,7 +59,7 @@ class ConduitEndRows(Restriction, kind="conduit-end"):
     def stepper(self, start, k: int, g: float, density_ratio: float):
         """Function as in `Restriction.stepper`, for water at rest."""
         link = start.case.conduits[start.draft.valve_names[k]]
-        basin = next(basin for basin in start.draft.basins if basin.name == link.conduit)
+        basin = next(basin for basin in start.draft.meshed if basin.name == link.conduit)
         (h, e), rho = basin.end_at_rest(link.patch), start.draft.fluid.density
         lowest = max(basin.bed[0 if link.patch == "from" else -1] - basin.part.level, 0.0)
 

@@ -116,7 +116,7 @@ class ConduitEnd(TwoPort):
 class ConduitFlow(Physics, name=""):
     """Area and flow of the cells of a conduit."""
 
-    package: ClassVar[str] = "fvsolve.core.basins.conduit"
+    package: ClassVar[str] = "fvsolve.features.basins.conduit"
     states: ClassVar[dict[str, str]] = {"area": "m2", "flow": "m3/s"}
     fields: ClassVar[dict[str, str]] = {"depth": "level", "surface": "level", "bed": "level"}
     laws: ClassVar[tuple[str, ...]] = ("linear",)

@@ -224,7 +224,7 @@ class SchemeRows:
         is that of `upwind`.
         """
         at = self.at(self.scheme)
-        if at.model.cavitates or at.model.basins:  # their only linear scheme is upwind
+        if at.model.cavitates or at.model.meshed:  # their only linear scheme is upwind
             yield "upwind", LinearSystem(replace(self.at("upwind"), y=at.y))
             return
         for name, weights in branches(self.scheme, at.model.case.numerics.limiter).items():

@@ -270,7 +270,7 @@ def limiter_notes(row, model) -> list[str]:
     frozen = "these weights give the limits in this row"
     if model.cavitates:
         frozen = "in pipes with cavities only the weights of upwind are used"
-    elif model.basins:
+    elif model.meshed:
         frozen = "in basins only the weights of upwind are used"
     texts = [f"{row.scheme} has no derivative at a constant state, so its limit is measured; in predictions its "
              f"weights are held constant: {frozen}"]  # fmt: skip

@@ -1,1 +1,0 @@
-"""Basins: common parts, and a folder for each type of basin; loaded and compiled only for models with a basin."""

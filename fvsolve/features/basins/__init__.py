@@ -1,0 +1,20 @@
+"""Basins: common parts, and a folder for each type of basin; loaded and compiled only for models with a basin."""
+
+from pathlib import Path
+
+from fvsolve.jit import add_sources
+
+FOLDER = Path(__file__).parent
+UNCOMPILED_PREFIXES = (
+    "part",
+    "lower",
+    "feature",
+    "pattern",
+    "accounts",
+    "facts",
+    "held",
+    "__init__",
+)  # of files without compiled functions
+COMPILED = [path for path in sorted(FOLDER.rglob("*.py")) if not path.name.startswith(UNCOMPILED_PREFIXES)]
+
+add_sources(FOLDER, *(str(path.relative_to(FOLDER)) for path in COMPILED))

@@ -1,0 +1,186 @@
+"""Basins of a case: parts with cells in a plane, and conduits."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from fvsolve.core.assembly.features import Feature, FeatureRun
+from fvsolve.core.assembly.model_draft import aligned_zeros
+from fvsolve.core.kernels import dtypes as rec
+from fvsolve.features.basins import lower
+
+# functions of the loads on bodies of water at rest, and of water at rest on moving walls
+LOADS_AT_REST = ("basin_frames: set_frames", "frame_forces: add_frame_forces")
+WALL_LOADS = ("moving_walls: push_bodies_at_rest",)
+PACKAGE = "fvsolve.features.basins"
+
+
+class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
+    """Basins of a case. meshed : `BasinRows` of each, in the order of their table; walls : table of moving walls"""
+
+    def __init__(self, case, given_up=()) -> None:
+        super().__init__(case, given_up)
+        self.meshed: list[Any] = []
+        self.walls = np.zeros(0, rec.WALL)
+
+    # build ----------
+
+    def lower_behind_nodes(self, draft) -> None:
+        lower.lower_basins(draft, self)
+        self.walls = draft.wall_table
+
+    def probe(self, draft, probe, row) -> bool:
+        from fvsolve.features.basins.lower_probes import lower_probe
+
+        return lower_probe(draft, self.meshed, probe, row)
+
+    def change_settings(self, draft, settings) -> None:
+        if draft.case.patches_with_faces:
+            from fvsolve.features.basins.free_surface.patch_closures import DEEPEST
+
+            settings["unmarked"] = (
+                settings["vapor"] - 0.5 * DEEPEST * draft.case.properties.density * draft.case.gravity
+            )
+
+    def reserve(self, draft) -> None:
+        lower.reserve_basins(draft)
+
+    def start(self, draft, y: np.ndarray) -> None:
+        lower.start_basins(self.meshed, y)
+        draft.warnings += [notice for basin in self.meshed for notice in basin.notices(basin.deviations(y))]
+
+    def level(self, draft, y: np.ndarray, attitudes=None) -> list[str]:
+        names = list(WALL_LOADS) if (draft.wall_table["body"] >= 0).any() else []
+        if any(basin.row["frame"] >= 0 for basin in self.meshed):
+            lower.start_basins(self.meshed, y, None if attitudes is None else attitudes())
+            names = [*LOADS_AT_REST, *names]
+        return [f"{PACKAGE}.{name}" for name in names]
+
+    def copy_for(self, case) -> Basins:
+        own = copy.copy(self)
+        own.case = case
+        return own
+
+    # model ----------
+
+    @property
+    def damped(self) -> bool:
+        return any(basin.row["damped"] for basin in self.meshed)
+
+    @property
+    def sources(self) -> list[str]:
+        return [f"{basin.name}.{name}" for basin in self.meshed for name in basin.source_names]
+
+    def terms(self, model, cast) -> Iterator:
+        from fvsolve.features.basins.basin_terms import terms_of_basins, terms_of_scalars
+
+        for terms in terms_of_basins(self.meshed, cast.valves):
+            yield "flow", terms
+        for terms in terms_of_scalars(self.meshed):
+            yield "cells", terms
+
+    def run(self, run_data) -> FeatureRun:
+        return BasinRun(self, run_data)
+
+    def pattern(self, couplings):
+        from fvsolve.features.basins.pattern import BasinPattern
+
+        return BasinPattern(self, couplings)
+
+    def cell_states(self, model) -> list[np.ndarray]:
+        from fvsolve.features.basins.lower_pattern import all_states
+
+        walls = [[at for at, _, _ in basin.stretches] for basin in self.meshed]  # every cell's volume follows these
+        return [*(all_states(basin) for basin in self.meshed), *walls]
+
+    def weigh(self, model, weights: np.ndarray, y: np.ndarray) -> None:
+        for basin in self.meshed:
+            basin.states_of(weights)[:] = basin.weights(basin.deviations(y))
+
+    def masses(self, model, y: np.ndarray) -> Iterator[tuple[float, float]]:
+        for basin in self.meshed:
+            rest, per = basin.mass()
+            for own, start in zip(basin.states_of(y)[:1], basin.states_of(model.start)[:1], strict=True):
+                yield rest + float(np.sum(per * start)), float(np.sum(per * (own - start)))
+
+    def book_sources(self, y: np.ndarray, ledger: np.ndarray) -> None:
+        sources = [(basin, name) for basin in self.meshed for name in basin.source_names]
+        for k, (basin, name) in enumerate(sources):
+            if name == "infiltration":  # from its heights, whose sum needs no exchange between threads at every stage
+                ledger[1, k] = -basin.mass_in_soil(y)
+
+    def open_nodes(self, model) -> set[int]:
+        return {int(row["node"]) for row in model.tables.patches if row["open"]}
+
+    def driven(self) -> set[int]:
+        return {int(k) for k in self.walls["schedule"]}
+
+    def held_tables(self, tables, t: float) -> dict[str, np.ndarray]:
+        """Tables in which given velocities that reverse periodically are held."""
+        if not any(row["period"] > 0.0 for row in tables.basins):
+            return {}
+        basins, plane = tables.basins.copy(), tables.plane.copy()
+        for basin, row in zip(self.meshed, basins, strict=True):
+            if row["period"] > 0.0:
+                grid = basin.mesh.grid
+                faces = grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx if basin.is_grid else basin.mesh.left.size
+                factor = np.cos(np.pi * t / row["period"])
+                plane[row["flows"] : row["flows"] + faces] *= factor
+                row["fastest"], row["period"] = abs(factor) * row["fastest"], 0.0
+        return {"basins": basins, "plane": plane}
+
+    def energy_refusal(self) -> str:
+        from fvsolve.features.basins.accounts import energy_refusal
+
+        return energy_refusal(self.case, self)
+
+    def end_accounts(self, accounts) -> None:
+        from fvsolve.features.basins.accounts import end_accounts
+
+        end_accounts(accounts, self.meshed)
+
+    def add_fields(self, fields: dict, model, y: np.ndarray, out: np.ndarray) -> None:
+        for basin in self.meshed:
+            fields[basin.name] = basin.fields(basin.deviations(y)) | (basin.values(y) if basin.scalars else {})
+            if basin.moves or basin.part.on is not None:
+                fields["points"][basin.name] = basin.points_at(y, out, model.layout)
+
+    def facts(self, model) -> dict[str, Any]:
+        from fvsolve.features.basins.facts import basin_facts
+
+        return {"basins": {basin.name: basin_facts(basin) for basin in self.meshed}}
+
+
+class BasinRun(FeatureRun):
+    """Tables of basins whose geometry changes with time, in a run."""
+
+    def written_tables(self) -> dict[str, np.ndarray]:
+        tables = self.run_data.model.tables
+        if not any(basin.moves or basin.row["frame"] >= 0 for basin in self.feature.meshed):
+            return {}
+        plane = aligned_zeros(tables.plane.size)
+        plane[:] = tables.plane
+        return {"plane": plane, "basins": tables.basins.copy()}
+
+    def for_energy(self) -> None:
+        if any(basin.row["frame"] >= 0 for basin in self.feature.meshed):
+            self.run_data.tables.basins["loads_body"] = 1
+
+    def critical_outflows(self, i: int) -> list[float]:
+        tables, work, found = self.run_data.tables, self.run_data.written.work, []
+        for patch in tables.patches[tables.patches["valve"] >= 0]:
+            basin = self.feature.meshed[patch["basin"]]
+            if tables.valves["from_node"][patch["valve"]] == i and hasattr(basin, "greatest_outflow"):
+                found.append(basin.greatest_outflow(patch, work))
+        return found
+
+    def held_marks(self, start: float, t: float, entered: np.ndarray) -> list:
+        if not np.isin(self.run_data.tables.patches["closure"], lower.HELD).any():
+            return []
+        from fvsolve.features.basins.held_discharges import held_discharges
+
+        return held_discharges(self.run_data, start, t, entered)
