@@ -45,11 +45,11 @@ LIMITS = {
     "files imported by run valve-closure": Limit(limit=184, goal=130, slack=7),
     "lines of these files": Limit(limit=40_500, goal=35_000, slack=1500),
     "files of features among them": Limit(limit=0, goal=0, slack=0),
-    "cells of the hub matrix": Limit(limit=181, goal=70, slack=6),
-    "cells of the hub matrix, code alone": Limit(limit=149, goal=70, slack=6),
+    "cells of the hub matrix": Limit(limit=170, goal=70, slack=6),
+    "cells of the hub matrix, code alone": Limit(limit=132, goal=70, slack=6),
     "functions per 1000 code lines": Limit(limit=97, goal=75, slack=2),
     "characters of the mean code line": Limit(limit=53.5, goal=46, slack=1),
-    "comment lines per 100 code lines of kernels and steppers": Limit(limit=4, goal=4, slack=0.2),
+    "comment lines per 100 code lines of kernels and steppers": Limit(limit=3.9, goal=4, slack=0.5),
     "circles of imports": Limit(limit=1, goal=0, slack=0),
 }
 

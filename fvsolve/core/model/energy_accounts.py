@@ -187,7 +187,8 @@ class Accounts:
     def __init__(self, run_data: RunData) -> None:
         self.run_data, self.model = run_data, run_data.model
         model, case = run_data.model, run_data.model.case
-        compute_all_loads(run_data)
+        for own in run_data.features:
+            own.for_energy()
         if reason := next((text for feature in model.features if (text := feature.energy_refusal())), ""):
             raise FvsolveError(reason)
         self.power, self.stored = model.functions.energies
@@ -293,12 +294,6 @@ class Accounts:
         self.model.functions.rhs(t, y, np.zeros(0), out, self.run_data.handle)
         self.stored(t, y, np.zeros(0), out, self.run_data.handle, rows)
         return sums_of(self.stored_terms, rows, len(self.stored_accounts))
-
-
-def compute_all_loads(run_data: RunData) -> None:
-    """Let the right-hand side compute all that energies need; changes tables of `run_data`."""
-    for own in run_data.features:
-        own.for_energy()
 
 
 def terms_of(accounts: list[Account]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.case import bodies
 from fvsolve.core.assembly.features import Coordinate, Feature, FeatureRun, Squares
 from fvsolve.core.assembly.lowering import rows_in
-from fvsolve.core.kernels.dtypes import BODY_OUT
+from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.rhs_assembly import RhsTerms
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.features.motion import lower, ports
@@ -135,7 +135,7 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
     # build ----------
 
     def join(self, draft, row, ports_of_row, places, toward=None, about=None) -> tuple[float, float]:
-        return ports.join_ports(draft, row, ports_of_row, places, toward=toward, about=about)
+        return ports.join_ports(draft, row, ports_of_row, places, toward, about)
 
     def coordinate(self, name: str) -> Coordinate | None:
         if name in self.mass_index:
@@ -160,14 +160,35 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
         self.leaks, self.leak_names = self.piston_table, self.piston_names
 
     def probe(self, draft, probe, row) -> bool:
-        return lower.lower_probe(draft, row, probe)
+        case = draft.case
+        if probe.part == "links" and probe.name in case.links:
+            return lower.lower_link_probe(draft, row, probe)
+        if probe.part != "nodes" or probe.point is not None:
+            return False
+        if probe.name in self.mass_names:
+            row["kind"] = rec.POSITION if probe.quantity == "position" else rec.VELOCITY
+            row["index"] = self.mass_index[probe.name]
+            return True
+        is_body = probe.name in case.poses
+        if not is_body and probe.name in (case.nodes.keys() | case.places.keys() | case.network_places):
+            return False
+        from fvsolve.features.motion.kernels.body_values import BODY_QUANTITIES, POINT_QUANTITIES
+
+        if is_body:
+            quantity = "angle" if probe.quantity == "travel" else probe.quantity
+            row["kind"], row["side"] = rec.BODY_VALUE, BODY_QUANTITIES.index(quantity)
+            row["index"] = self.body_names.index(probe.name)
+        else:
+            row["kind"], row["side"] = rec.POINT_VALUE, POINT_QUANTITIES.index(probe.quantity)
+            row["index"] = ports.point_row(draft, probe.name)
+        return True
 
     def reserve(self, draft) -> None:
         pushes, masses, bodies = len(self.push_names), len(self.mass_table), len(self.body_table)
         for name, size in (
             ("net_force", masses), ("push", pushes), ("forcing", len(self.moving_segment_table)),
             ("travel", 2 * pushes), ("along", 3 * len(self.line_table)), ("pin", 3 * len(self.pin_table)),
-            ("body", BODY_OUT * bodies),
+            ("body", rec.BODY_OUT * bodies),
         ):  # fmt: skip
             draft.sizes.out(name, size)
         constraints, freedoms = int(sum(self.pin_table["rows"])), len(self.freedom_table)

@@ -12,7 +12,7 @@ from fvsolve.core.assembly.schedule_tables import break_times
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.features.motion.kernels import tables as records
 from fvsolve.features.motion.kernels.tables import motion_of
-from fvsolve.features.motion.ports import PLAIN_LINE, are_points, distance_and_rate, point_row, push_ends
+from fvsolve.features.motion.ports import PLAIN_LINE, distance_and_rate
 from fvsolve.features.motion.static_forces import DRIVES, MOTION, StaticForces, pin_rows
 from fvsolve.parts.network_elements import fill_network_probe
 from fvsolve.parts.nodes_and_links import is_kind
@@ -31,7 +31,9 @@ def lower_masses(draft) -> None:
     motion.mass_names = [name for name, node in case.nodes.items() if node.domain == "translational"]
     motion.mass_index = {name: i for i, name in enumerate(motion.mass_names)}
     pushes = [link for table in ("brace", "stop", "piston") for _, link, _ in draft.links.get(table, ())]
-    outside = any(None in push_ends(link) or are_points(draft, *push_ends(link)) for link in pushes)
+    ports = [link.ports for link in pushes]
+    ends = [(own["case"], own["rod"]) if "rod" in own else (own.get("from"), own["to"]) for own in ports]
+    outside = any(place not in motion.mass_index for both in ends for place in both)  # points, or None
     motion.mass_table = np.zeros(len(motion.mass_names) + outside, records.MASS)
     motion.mass_index |= {None: len(motion.mass_names)}
     for name, row in zip(motion.mass_names, motion.mass_table, strict=False):
@@ -432,32 +434,6 @@ def driven_at_start(draft, start) -> list[str]:
 
 
 LINK_PROBES = {"pin": (rec.PIN_VALUE, ("gap", "force")), "bushing": (rec.BUSHING_VALUE, ("gap", "force", "torque"))}
-
-
-def lower_probe(draft, row, probe) -> bool:
-    """Fill the row of a probe of a mass, a body, a point, what acts between them, or water in sloshing modes."""
-    case, motion = draft.case, motion_of(draft)
-    if probe.part == "links" and probe.name in case.links:
-        return lower_link_probe(draft, row, probe)
-    if probe.part != "nodes" or probe.point is not None:
-        return False
-    if probe.name in motion.mass_names:
-        row["kind"] = rec.POSITION if probe.quantity == "position" else rec.VELOCITY
-        row["index"] = motion.mass_index[probe.name]
-    elif probe.name in case.poses:
-        from fvsolve.features.motion.kernels import body_values
-
-        quantity = "angle" if probe.quantity == "travel" else probe.quantity
-        row["kind"], row["side"] = rec.BODY_VALUE, body_values.BODY_QUANTITIES.index(quantity)
-        row["index"] = motion.body_names.index(probe.name)
-    elif probe.name in (case.nodes.keys() | case.places.keys() | case.network_places):
-        return False
-    else:
-        from fvsolve.features.motion.kernels import body_values
-
-        row["kind"], row["side"] = rec.POINT_VALUE, body_values.POINT_QUANTITIES.index(probe.quantity)
-        row["index"] = point_row(draft, probe.name)
-    return True
 
 
 def lower_link_probe(draft, row, probe) -> bool:

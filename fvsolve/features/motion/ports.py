@@ -8,27 +8,24 @@ from fvsolve.features.motion.kernels.tables import motion_of
 PLAIN_LINE = (-1, -1, -1, records.ALONG, (0.0, 0.0, 0.0), 0.0)  # a line
 
 
-def push_ends(link) -> tuple[str | None, str]:
-    """Names of the two masses or points that a force element joins; the first may be None."""
-    return (
-        (link.ports["case"], link.ports["rod"]) if "rod" in link.ports else (link.ports.get("from"), link.ports["to"])
-    )
+def join_ports(draft, row, ports: tuple, places: tuple, toward=None, about=None) -> tuple[float, float]:
+    """Write to the row of a force element, or of a joint, what it joins: masses or points, see `Feature.join`.
 
-
-def are_points(draft, *places: str | None) -> bool:
-    """True if any of the names is a point of a body or of the world."""
-    return any(place is not None and place not in motion_of(draft).mass_index for place in places)
-
-
-def join_ports(draft, row, ports: tuple[str, str], places: tuple[str | None, str], **line) -> tuple[float, float]:
-    """Write to the row of a force element, or of a joint, what it joins: masses or points, see `Feature.join`."""
+    For points it adds a line of action, to which `lower_lines` later writes the number of the force element. The force
+    acts along the line between them, or `toward` a direction of the world; a torque acts `about` an axis of the second
+    body.
+    """
     if ports[0] == "from_point":
         row[ports[0]], row[ports[1]] = point_row(draft, places[0]), point_row(draft, places[1])
         return 0.0, 0.0
     motion = motion_of(draft)
     row["line"] = -1
-    if are_points(draft, *places):
-        row["line"] = add_line(draft, places, **line)
+    if any(place is not None and place not in motion.mass_index for place in places):  # points
+        acts, direction = (records.ALONG, (0.0, 0.0, 0.0)) if about is None else (records.ABOUT, about)
+        acts, direction = (acts, direction) if toward is None else (records.TOWARD, toward)
+        row["line"] = len(motion.lines)
+        first, second = (-1 if place is None else point_row(draft, place) for place in places)
+        motion.lines.append((-1, first, second, acts, tuple(direction), 0.0))
         row[ports[0]] = row[ports[1]] = motion.mass_index[None]
         return distance_and_rate(draft, places, motion.lines[-1])
     for port, place in zip(ports, places, strict=True):
@@ -45,21 +42,6 @@ def point_row(draft, place: str) -> int:
         motion.point_index[place] = len(motion.points)
         motion.points.append((motion.body_names.index(name) if name else -1, tuple(position)))
     return motion.point_index[place]
-
-
-def add_line(draft, places: tuple[str | None, str], toward=None, about=None) -> int:
-    """Add a line of action of a force between two points; return its row in the table of lines.
-
-    toward : vector of a direction of the world; about : vector of an axis of the second body, about which a torque
-    acts; None for both: the force acts along the line between the points. `lower_lines` later writes the number of the
-    force element.
-    """
-    ends = [-1 if place is None else point_row(draft, place) for place in places]
-    acts, direction = (records.ALONG, (0.0, 0.0, 0.0)) if about is None else (records.ABOUT, about)
-    acts, direction = (acts, direction) if toward is None else (records.TOWARD, toward)
-    lines = motion_of(draft).lines
-    lines.append((-1, *ends, acts, tuple(direction), 0.0))
-    return len(lines) - 1
 
 
 def distance_and_rate(draft, places: tuple[str | None, str], line) -> tuple[float, float]:
