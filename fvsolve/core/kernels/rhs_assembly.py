@@ -191,8 +191,10 @@ class ModelFeatures(NamedTuple):
         if self.boundary_exchange:
             yield BOUNDARY_EXCHANGE
         linear = self.family == "linear"
+        # Only pipes have cavities: without pipes the barotropic functions serve a cavitating law too.
         family = self.family if linear or self.pipes else "barotropic"
         yield from self.terms_at("first")
+        # Without pipes, and waves of features, no waves reach the nodes, which then have simpler functions.
         lumped = linear and not self.pipes and not any(terms.outgoing_waves for terms in self.terms_at("pipes"))
         yield from (ALONE,) if self.alone else (LUMPED,) if lumped else (NETWORK, NODES[family])
         yield READ["linear" if linear else "barotropic"]
@@ -230,6 +232,7 @@ class ModelFeatures(NamedTuple):
     def last_components(self, family: str) -> Iterator[RhsTerms]:
         """Yield the last terms: memory of pipes, flows, what they carry; family : kernels of the density law."""
         linear = self.family == "linear"
+        # After the pipes: these functions subtract from the rates of waves.
         if self.unsteady_friction:
             yield COMPONENTS["memory" if linear else "memory, barotropic"]
         if self.viscoelastic_walls:

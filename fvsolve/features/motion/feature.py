@@ -244,12 +244,15 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
             found.append(ENERGY[linear])
         if len(self.body_table):
             found += [BODIES, ACCELERATIONS[len(self.pin_table) > 0]]
+        # after the accelerations, whose factored mass matrix the rate limits of bushings and pipes use
         if len(self.bushing_table):
             found.append(BUSHINGS)
         if len(self.moving_segment_table):
             found.append(MOVING_FLUID[linear])
+        # before the masses: their event functions read the lengths of elements between bodies
         found += [STRETCHES] if len(self.line_table) else []
         found += [MASSES] if len(self.mass_table) else []
+        # after the masses, whose functions compute the forces of all elements
         found += [LINES] if len(self.line_table) else []
         events = [FORCES_FOR_EVENTS] if len(self.mass_table) and network_of(model) is not None else []
         return [("links", terms) for terms in found] + [("closed", terms) for terms in events]
